@@ -1,0 +1,33 @@
+"""wgmb: motion blur on the GPU.
+
+frames on disk ─ sequence ─┐
+arrays you have ─ Frame ───┼─ velocity ── one method of blur/ ── array | sequence ─ files
+your own wgpu textures ────┘                  │
+Shutter ── times of the samples ──────────────┘
+
+`blur` is one frame at once, `Blur` the same kept for many frames or for your own encoder.
+"""
+
+__version__ = "0.1.0"
+
+from .blur import METHODS
+from .cameras import Camera, CameraFile, Reprojections
+from .errors import DeviceError, Error, InputError, ShaderError
+from .frame import Frame
+from .pipeline import Blur, blur
+from .shutter import Shutter
+
+__all__ = [
+    "METHODS",
+    "Blur",
+    "Camera",
+    "CameraFile",
+    "DeviceError",
+    "Error",
+    "Frame",
+    "InputError",
+    "Reprojections",
+    "ShaderError",
+    "Shutter",
+    "blur",
+]

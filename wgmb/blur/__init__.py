@@ -1,0 +1,30 @@
+"""The methods. Each is one WGSL file and one small class; all are called alike."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+from .tap import Tap
+
+if TYPE_CHECKING:
+    import wgpu
+
+    from ..pipeline import Inputs
+
+
+class Method(Protocol):
+    """What a method is: a name, the inputs it needs, and how it is recorded."""
+
+    name: str
+    """Also the stem of its Python file, its WGSL file and its twin in the tests."""
+    needs: frozenset[str]
+    """Of "color", "motion", "depth"."""
+
+    def encode(
+        self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView
+    ) -> None:
+        """Record its passes; never submit, never wait."""
+        ...
+
+
+METHODS: dict[str, type] = {m.name: m for m in (Tap,)}

@@ -1,0 +1,118 @@
+"""One frame: its pixels, what moves where, and the conventions for all of it.
+
+image    (height, width, channels) float, linear light, premultiplied alpha, row 0 on top
+motion   `to_next`, `to_prev`: displacement [px], x right, y down, to where this pixel's
+         content is one frame later, earlier; one alone means a straight path
+time     frame intervals, 0 = the frame's instant; a 180 degree shutter is open -0.25..0.25
+depth    distance along the view axis [scene units], larger is farther, inf = nothing there
+matrix   `clip_from_world`: destination first, so that products read as chains
+
+Foreign conventions are translated in vectors.py and cameras.py, nowhere else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+from .cameras import Reprojections
+from .errors import InputError
+
+_PLANES = ("depth", "keep", "scale")
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What a method may be given; only `color` must be there."""
+
+    color: np.ndarray
+    """(height, width, 3 or 4) float, linear, premultiplied alpha."""
+    to_next: np.ndarray | None = None
+    """(height, width, 2) float [px]."""
+    to_prev: np.ndarray | None = None
+    """(height, width, 2) float [px]."""
+    depth: np.ndarray | None = None
+    """(height, width) float [scene units], needed where motion comes from `camera`."""
+    camera: Reprojections | None = None
+    """How the camera and the bodies move around this frame: motion from depth."""
+    object_id: np.ndarray | None = None
+    """(height, width) integer: which body of `camera` a pixel shows; 0 is the world."""
+    keep: np.ndarray | None = None
+    """(height, width) float 0..1: 1 stays sharp and out of its neighbours' blur."""
+    scale: np.ndarray | None = None
+    """(height, width) float: multiplies the motion."""
+    object_motion: bool = False
+    """`to_next`, `to_prev` leave the camera's motion out, so the two are added."""
+    number: int = 0
+    """Frame number; varies the jitter."""
+    bad: dict[str, int] = field(init=False, default_factory=dict)
+    """How many pixels of each input are not finite; they weigh nothing, or stand still."""
+
+    def __post_init__(self):
+        color = _float_array("color", self.color)
+        if color.ndim != 3 or color.shape[2] not in (3, 4) or 0 in color.shape:
+            raise InputError(f"color must be (height, width, 3 or 4), got {color.shape}")
+        object.__setattr__(self, "color", color)
+        for name in ("to_next", "to_prev", *_PLANES):
+            given = getattr(self, name)
+            if given is not None:
+                want = color.shape[:2] if name in _PLANES else (*color.shape[:2], 2)
+                object.__setattr__(self, name, _shaped(name, _float_array(name, given), want))
+        if self.object_id is not None:
+            ids = np.asarray(self.object_id)
+            if ids.dtype.kind not in "iu":
+                raise InputError(f"object_id must be integers, got {ids.dtype}")
+            if ids.size and ids.min() < 0:
+                raise InputError(f"object_id must be 0 or more, got {ids.min()}")
+            object.__setattr__(self, "object_id", _shaped("object_id", ids, color.shape[:2]))
+        if self.camera is not None and self.depth is None:
+            raise InputError("motion from a camera needs depth")
+        if self.object_id is not None and self.camera is None:
+            raise InputError("object_id needs the camera file that says how objects move")
+        for name in ("color", "to_next", "to_prev", "scale", "keep"):
+            if given := _count_bad(getattr(self, name)):
+                self.bad[name] = given
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width, height [px]."""
+        return self.color.shape[1], self.color.shape[0]
+
+    @property
+    def has(self) -> frozenset[str]:
+        """What a method may ask for: "color", "motion", "depth"."""
+        there = {"color"}
+        if self.to_next is not None or self.to_prev is not None or self.camera is not None:
+            there.add("motion")
+        if self.depth is not None:
+            there.add("depth")
+        return frozenset(there)
+
+
+PASSES = tuple(f.name for f in fields(Frame) if f.init and f.name != "color")
+
+
+def _float_array(name: str, given) -> np.ndarray:
+    array = np.asarray(given)
+    if array.dtype.kind != "f" or array.dtype.itemsize > 8:
+        hint = "; divide by its maximum and undo its gamma first" if name == "color" else ""
+        raise InputError(f"{name} must be floating point, got {array.dtype}{hint}")
+    return array
+
+
+def _shaped(name: str, array: np.ndarray, want: tuple[int, ...]) -> np.ndarray:
+    if array.shape != want:
+        raise InputError(f"{name} must be {want} like color, got {array.shape}")
+    return array
+
+
+def _count_bad(array: np.ndarray | None) -> int:
+    """Pixels with a value that is not finite."""
+    if array is None:
+        return 0
+    with np.errstate(all="ignore"):
+        if np.isfinite(np.sum(array, dtype=np.float32)):  # quick: any bad value spoils the sum
+            return 0
+        bad = ~np.isfinite(array.astype(np.float32, copy=False))
+    return int(np.count_nonzero(bad.any(axis=2) if bad.ndim == 3 else bad))

@@ -1,0 +1,361 @@
+"""The thin layer over wgpu: choosing a device, one Kernel per shader file, moving images.
+
+Nothing else in the project touches the queue: `submit` is the only place that does,
+because an error inside it would end the process instead of raising.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from dataclasses import dataclass
+from functools import cache, lru_cache
+
+import numpy as np
+import wgpu
+
+from . import shader
+from .errors import DeviceError, InputError, ShaderError
+
+SOFTWARE = "CPU"  # adapter_type of lavapipe, SwiftShader, WARP
+_PREFERENCE = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", SOFTWARE)
+_HALF_MAX = 65504.0  # largest finite f16
+
+# ---- device ---------------------------------------------------------------------------------
+
+
+def adapters() -> list[wgpu.GPUAdapter]:
+    """Every adapter wgpu finds, OpenGL last, the fastest kind first."""
+    if not os.environ.get("XDG_RUNTIME_DIR"):  # Mesa complains on stderr without one
+        os.environ["XDG_RUNTIME_DIR"] = tempfile.gettempdir()
+    found = wgpu.gpu.enumerate_adapters_sync()
+
+    def rank(adapter: wgpu.GPUAdapter) -> tuple[bool, int]:
+        kind = adapter.info["adapter_type"]
+        return _is_opengl(adapter), _PREFERENCE.index(kind) if kind in _PREFERENCE else 3
+
+    return sorted(found, key=rank)
+
+
+def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
+    """The adapter whose number in `adapters()` or part of whose summary is `name`.
+
+    Without a name, `WGMB_ADAPTER` is asked, then the fastest kind is taken. OpenGL is
+    refused unless `name` asks for it ("opengl" is enough): it lacks features and precision.
+    """
+    name = name or os.environ.get("WGMB_ADAPTER") or ""
+    found = adapters()
+    listing = "; ".join(f"{i}: {a.summary}" for i, a in enumerate(found)) or "none at all"
+    if name.isdigit():
+        if int(name) >= len(found):
+            raise DeviceError(f"no adapter number {name}; found {listing}")
+        return found[int(name)]
+    matching = [a for a in found if name.lower() in a.summary.lower()]
+    if not matching:
+        hint = "" if name else "; install a Vulkan driver (Debian, Ubuntu: mesa-vulkan-drivers)"
+        raise DeviceError(f"no adapter matches {name!r}; found {listing}{hint}" if name else
+                          f"no GPU adapter; found {listing}{hint}")
+    if _is_opengl(matching[0]) and "opengl" not in name.lower():
+        raise DeviceError(
+            f"only OpenGL adapters found ({listing}); install a Vulkan driver "
+            "(Debian, Ubuntu: mesa-vulkan-drivers) or ask for it with --adapter opengl"
+        )
+    return matching[0]
+
+
+def _is_opengl(adapter: wgpu.GPUAdapter) -> bool:
+    return adapter.info["backend_type"].startswith("OpenGL")
+
+
+@cache
+def open_device(name: str | None = None) -> wgpu.GPUDevice:
+    """A device of the chosen adapter with all it can do; the same one every time."""
+    adapter = choose_adapter(name)
+    wanted = ("float32-filterable", "timestamp-query")
+    limits = ("max-texture-dimension-2d", "max-buffer-size", "max-storage-buffer-binding-size")
+    try:
+        return adapter.request_device_sync(
+            label="wgmb",
+            required_features=[f for f in wanted if f in adapter.features],
+            required_limits={k: adapter.limits[k] for k in limits},
+        )
+    except (RuntimeError, wgpu.GPUError) as error:
+        raise DeviceError(f"{adapter.summary}: no device: {error}") from None
+
+
+def check_size(device: wgpu.GPUDevice, width: int, height: int) -> None:
+    """Refuse an image that the device cannot hold as one texture."""
+    most = device.limits["max-texture-dimension-2d"]
+    if not (0 < width <= most and 0 < height <= most):
+        raise InputError(f"image is {width} x {height}, the adapter takes 1 to {most} a side")
+
+
+def texel(device: wgpu.GPUDevice, channels: int) -> str:
+    """Format of a float texture that a linear sampler may read: f32, or f16 where it must be."""
+    bits = 32 if "float32-filterable" in device.features else 16
+    return {1: f"r{bits}float", 2: f"rg{bits}float", 4: f"rgba{bits}float"}[channels]
+
+
+_forks = 0
+
+
+def _forked() -> None:
+    global _forks
+    _forks += 1
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forked)
+
+
+def submit(device: wgpu.GPUDevice, *encoders: wgpu.GPUCommandEncoder) -> None:
+    """Run what was recorded. The one place that submits."""
+    if _forks:
+        raise DeviceError("this process was forked; GPU work needs one that was spawned")
+    device.queue.submit([encoder.finish() for encoder in encoders])
+
+
+# ---- kernels --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Given:
+    """What every pass of a frame is given: group 0 of its shader."""
+
+    size: tuple[int, int]  # width, height [px]
+    resources: dict[str, wgpu.GPUBuffer]  # by binding name
+    timing: Timing | None = None
+
+
+class Kernel:
+    """All entry points of one WGSL file, sharing the same bind groups.
+
+    `kernel.run(encoder, "main", given, color=..., output=...)` binds by the names
+    used in the shader; a missing or unknown name is an error before any GPU work.
+    """
+
+    def __init__(
+        self,
+        device: wgpu.GPUDevice,
+        source: shader.Source,
+        constants: dict[str, float] | None = None,
+    ):
+        self.device, self.source = device, source
+        self.bindings = {b.name: b for b in source.bindings()}
+        self.workgroup = int(source.constant("WG_X")), int(source.constant("WG_Y"))
+        try:
+            module = device.create_shader_module(code=source.text, label=source.name)
+        except wgpu.GPUError as error:
+            raise ShaderError(_located(str(error), source)) from None
+        self.groups = sorted({b.group for b in self.bindings.values()})
+        self.layouts = [
+            device.create_bind_group_layout(
+                label=f"{source.name}:{group}",
+                entries=[
+                    _layout_entry(b, source) for b in self.bindings.values() if b.group == group
+                ],
+            )
+            for group in self.groups
+        ]
+        layout = device.create_pipeline_layout(bind_group_layouts=self.layouts)
+        self.pipelines = {
+            name: device.create_compute_pipeline(
+                label=f"{source.name}:{name}",
+                layout=layout,
+                compute={"module": module, "entry_point": name, "constants": constants or {}},
+            )
+            for name in source.entry_points()
+        }
+
+    def run(self, encoder, entry: str, given: Given, **own) -> None:
+        """Record one dispatch over the image: group 0 from `given`, group 1 from `own`."""
+        wanted = {name for name, b in self.bindings.items() if b.group > 0}
+        if own.keys() != wanted:
+            raise ShaderError(f"{self.source.name} binds {sorted(wanted)}, got {sorted(own)}")
+        resources = given.resources | own
+        timing = given.timing
+        label = f"{self.source.name}:{entry}"
+        stamps = {"timestamp_writes": timing.of(label)} if timing else {}
+        compute = encoder.begin_compute_pass(label=label, **stamps)
+        compute.set_pipeline(self.pipelines[entry])
+        for group, layout in zip(self.groups, self.layouts, strict=True):
+            entries = [
+                {"binding": b.index, "resource": _resource(resources[name])}
+                for name, b in self.bindings.items()
+                if b.group == group
+            ]
+            bound = self.device.create_bind_group(layout=layout, entries=entries)
+            compute.set_bind_group(group, bound)
+        compute.dispatch_workgroups(
+            *(-(-n // edge) for n, edge in zip(given.size, self.workgroup, strict=True))
+        )
+        compute.end()
+
+
+@lru_cache(maxsize=256)
+def _kernel(device, file: str, texels: tuple, constants: tuple) -> Kernel:
+    return Kernel(device, shader.load(file).with_texels(**dict(texels)), dict(constants))
+
+
+def kernel(device, file: str, texels: dict[str, str] | None = None, **constants: float) -> Kernel:
+    """The compiled kernel of `wgsl/<file>`, kept for the next time it is asked for.
+
+    `texels` are the storage texel formats (`Output`), `constants` the overrides.
+    """
+    formats = tuple(sorted((texels or {}).items()))
+    return _kernel(device, file, formats, tuple(sorted(constants.items())))
+
+
+def _located(message: str, source: shader.Source) -> str:
+    """The compiler's message with lines of the joined text turned into file:line."""
+    return re.sub(
+        r"wgsl:(\d+):(\d+)", lambda m: f"{source.where(int(m[1]))}:{m[2]}", message
+    )
+
+
+def _resource(given):
+    if isinstance(given, wgpu.GPUBuffer):
+        return {"buffer": given, "offset": 0, "size": given.size}
+    return given
+
+
+def _layout_entry(b: shader.Binding, source: shader.Source) -> dict:
+    entry = {"binding": b.index, "visibility": wgpu.ShaderStage.COMPUTE}
+    if b.space == "uniform":
+        size = source.dtype(b.type).itemsize
+        return entry | {"buffer": {"type": "uniform", "min_binding_size": size}}
+    if b.space.startswith("storage"):
+        kind = "storage" if "read_write" in b.space else "read-only-storage"
+        return entry | {"buffer": {"type": kind}}
+    if m := re.fullmatch(r"texture_storage_2d<(\w+),\s*(\w+)>", b.type):
+        access = {"write": "write-only", "read": "read-only"}[m[2]]
+        return entry | {"storage_texture": {"format": m[1], "access": access}}
+    if b.type == "sampler":
+        return entry | {"sampler": {"type": "filtering"}}
+    if b.type == "texture_2d<f32>":
+        sampled = re.search(rf"textureSample\w*\(\s*{b.name}\b", source.text)
+        return entry | {"texture": {"sample_type": "float" if sampled else "unfilterable-float"}}
+    if b.type == "texture_2d<u32>":
+        return entry | {"texture": {"sample_type": "uint"}}
+    raise ShaderError(f"{source.name}: cannot bind {b.name}: {b.type}")
+
+
+# ---- images ---------------------------------------------------------------------------------
+
+_USAGE = wgpu.TextureUsage
+_NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4"}
+_CHANNELS = {"r": 1, "rg": 2, "rgba": 4}
+
+
+def numpy_of(format: str) -> tuple[np.dtype, int]:
+    """Numpy type and number of channels of a texture format such as `rgba16float`."""
+    letters = re.match(r"[rgba]+", format)[0]
+    return np.dtype(_NUMPY[format[len(letters) :]]), _CHANNELS[letters]
+
+
+class Images:
+    """Textures kept from frame to frame under a name, remade when size or format changes."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self.device = device
+        self._textures: dict[str, wgpu.GPUTexture] = {}
+        self._staging: wgpu.GPUBuffer | None = None
+
+    def texture(self, name: str, size: tuple[int, int], format: str) -> wgpu.GPUTexture:
+        """The texture called `name`; its contents are whatever was last put there."""
+        kept = self._textures.get(name)
+        if kept is None or kept.size[:2] != tuple(size) or kept.format != format:
+            check_size(self.device, *size)
+            usage = _USAGE.TEXTURE_BINDING | _USAGE.COPY_DST | _USAGE.COPY_SRC
+            if format.endswith("float") and format.startswith(("rgba", "r32")):
+                usage |= _USAGE.STORAGE_BINDING
+            kept = self.device.create_texture(
+                label=name, size=(*size, 1), format=format, usage=usage
+            )
+            self._textures[name] = kept
+        return kept
+
+    def view(self, name: str, size: tuple[int, int], format: str) -> wgpu.GPUTextureView:
+        """A view of the texture called `name`."""
+        return self.texture(name, size, format).create_view()
+
+    def upload(self, name: str, image: np.ndarray, format: str) -> wgpu.GPUTextureView:
+        """Put `image` (height, width[, channels]) into the texture called `name`."""
+        height, width = image.shape[:2]
+        kind, channels = numpy_of(format)
+        if kind == np.float16 and image.dtype != np.float16:
+            image = np.where(np.isinf(image), image, np.clip(image, -_HALF_MAX, _HALF_MAX))
+        image = np.ascontiguousarray(image, kind)
+        texture = self.texture(name, (width, height), format)
+        layout = {"bytes_per_row": width * channels * kind.itemsize}
+        self.device.queue.write_texture({"texture": texture}, image, layout, (width, height, 1))
+        return texture.create_view()
+
+    def download(self, encoder, texture: wgpu.GPUTexture) -> np.ndarray:
+        """Submit `encoder` and return `texture` as a new (height, width, channels) array."""
+        width, height, _ = texture.size
+        kind, channels = numpy_of(texture.format)
+        row = width * channels * kind.itemsize
+        pitch = -(-row // 256) * 256  # rows in a buffer start at multiples of 256 bytes
+        if self._staging is None or self._staging.size != pitch * height:
+            usage = wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.MAP_READ
+            self._staging = self.device.create_buffer(
+                label="readback", size=pitch * height, usage=usage
+            )
+        encoder.copy_texture_to_buffer(
+            {"texture": texture},
+            {"buffer": self._staging, "bytes_per_row": pitch, "rows_per_image": height},
+            (width, height, 1),
+        )
+        submit(self.device, encoder)
+        self._staging.map_sync(wgpu.MapMode.READ)
+        try:
+            data = np.frombuffer(self._staging.read_mapped(copy=False), np.uint8)
+            rows = data.reshape(height, pitch)[:, :row]
+            return rows.copy().view(kind).reshape(height, width, channels)
+        finally:
+            self._staging.unmap()
+
+
+class Timing:
+    """GPU time of every pass of one frame, by timestamp queries.
+
+    Software adapters report times that are wrong after some commands; there, wall clock
+    around a submit is the only honest clock, and `Timing.usable` says so.
+    """
+
+    MOST = 64  # passes a frame
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self.device, self.labels = device, []
+        self.queries = device.create_query_set(type="timestamp", count=2 * self.MOST)
+
+    @staticmethod
+    def usable(device: wgpu.GPUDevice) -> bool:
+        """Whether timestamps of this device can be believed."""
+        hardware = device.adapter_info["adapter_type"] != SOFTWARE
+        return hardware and "timestamp-query" in device.features
+
+    def of(self, label: str) -> dict:
+        """The `timestamp_writes` of the pass called `label`."""
+        first = 2 * len(self.labels)
+        self.labels.append(label)
+        return {
+            "query_set": self.queries,
+            "beginning_of_pass_write_index": first,
+            "end_of_pass_write_index": first + 1,
+        }
+
+    def read(self) -> dict[str, float]:
+        """Seconds per pass, after the work was submitted; passes of one name are added up."""
+        usage = wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
+        buffer = self.device.create_buffer(size=16 * len(self.labels), usage=usage)
+        encoder = self.device.create_command_encoder()
+        encoder.resolve_query_set(self.queries, 0, 2 * len(self.labels), buffer, 0)
+        submit(self.device, encoder)
+        stamps = np.frombuffer(self.device.queue.read_buffer(buffer), "<u8").reshape(-1, 2)
+        seconds: dict[str, float] = {}
+        for label, (begin, end) in zip(self.labels, stamps, strict=True):
+            seconds[label] = seconds.get(label, 0.0) + (int(end) - int(begin)) * 1e-9
+        return seconds

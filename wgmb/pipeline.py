@@ -1,0 +1,275 @@
+"""The whole flow in one place: arrays -> textures -> velocity -> one method -> array."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import dataclass
+
+import numpy as np
+import wgpu
+
+from . import gpu, shader
+from .blur import METHODS
+from .cameras import Reprojections
+from .errors import InputError
+from .frame import PASSES, Frame
+from .shutter import Shutter
+from .velocity import VelocityPass
+
+MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
+OUTPUTS = ("rgba32float", "rgba16float")
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What a method may read while it records one frame."""
+
+    given: gpu.Given
+    color: wgpu.GPUTextureView  # linear, premultiplied by alpha and by weight
+    motion: wgpu.GPUTextureView  # to_prev, to_next [px]
+    depth: wgpu.GPUTextureView | None
+    weight: wgpu.GPUTextureView | None  # None: every pixel counts
+    none: wgpu.GPUTextureView  # bound where an input is not there
+    linear: wgpu.GPUSampler
+    even: bool  # the shutter is a box
+
+
+class Blur:
+    """A compiled method. Call it with arrays, or `encode` it into your own frame.
+
+    `method`: a name in METHODS; its own options follow as keywords.
+    `shutter`: degrees (180 is open for half a frame interval), or a Shutter.
+    `samples`: taps a pixel, 1 to 4096.
+    `jitter`: 0 to 1, trades bands for noise: how far a tap may move within its share of time.
+    `max_blur`: longest streak [px]; None leaves it free.
+    `device`: a wgpu device of yours, the name of an adapter, or None for the best.
+    `output`: texel format of the result, rgba32float or rgba16float.
+    """
+
+    def __init__(
+        self,
+        method: str = "tap",
+        *,
+        shutter: Shutter | float = 180,
+        samples: int = 16,
+        jitter: float = 0.0,
+        max_blur: float | None = None,
+        device: wgpu.GPUDevice | str | None = None,
+        output: str = "rgba32float",
+        **options,
+    ):
+        if method not in METHODS:
+            raise InputError(f"unknown method {method!r}, one of {', '.join(METHODS)}")
+        if not isinstance(samples, (int, np.integer)) or not 1 <= samples <= MOST_SAMPLES:
+            raise InputError(f"samples must be 1 to {MOST_SAMPLES}, got {samples!r}")
+        if not 0 <= jitter <= 1:
+            raise InputError(f"jitter must be 0 to 1, got {jitter}")
+        if max_blur is not None and not max_blur >= 0:
+            raise InputError(f"max_blur must be 0 or more pixels, got {max_blur}")
+        if output not in OUTPUTS:
+            raise InputError(f"output must be one of {', '.join(OUTPUTS)}, got {output!r}")
+        known = set(inspect.signature(METHODS[method]).parameters) - {"device", "output"}
+        if unknown := options.keys() - known:
+            raise InputError(
+                f"method {method!r} has no option {', '.join(sorted(unknown))}; "
+                f"it has {', '.join(sorted(known)) or 'none'}"
+            )
+        self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
+        self.method = METHODS[method](self.device, output=output, **options)
+        self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
+        self._velocity = VelocityPass(self.device)
+        self._images = gpu.Images(self.device)
+        self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
+        self._empty = {
+            "float": self._images.view("none", (1, 1), gpu.texel(self.device, 4)),
+            "object": self._images.view("no object", (1, 1), "r32uint"),
+        }
+        self.shutter = shutter
+
+    @property
+    def shutter(self) -> Shutter:
+        """When the shutter is open; may be set between frames, to degrees or a Shutter."""
+        return self._shutter
+
+    @shutter.setter
+    def shutter(self, shutter: Shutter | float) -> None:
+        self._shutter = shutter if isinstance(shutter, Shutter) else Shutter(float(shutter))
+        data = np.zeros((), shader.load("common/shutter.wgsl").dtype("Shutter"))
+        opens, closes = self._shutter.span
+        data["span"] = opens, closes
+        data["step"] = (closes - opens) / self.samples
+        data["rolling"] = self._shutter.delay
+        create = self.device.create_buffer_with_data
+        self._group0 = {
+            "shutter": create(label="shutter", data=data, usage=wgpu.BufferUsage.UNIFORM),
+            "strata": create(
+                label="strata",
+                data=self._shutter.strata(self.samples),
+                usage=wgpu.BufferUsage.STORAGE,
+            ),
+        }
+
+    def encode(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        *,
+        size: tuple[int, int],
+        color: wgpu.GPUTextureView,
+        output: wgpu.GPUTextureView,
+        to_next: wgpu.GPUTextureView | None = None,
+        to_prev: wgpu.GPUTextureView | None = None,
+        depth: wgpu.GPUTextureView | None = None,
+        camera: Reprojections | None = None,
+        object_id: wgpu.GPUTextureView | None = None,
+        keep: wgpu.GPUTextureView | None = None,
+        scale: wgpu.GPUTextureView | None = None,
+        object_motion: bool = False,
+        check_color: bool = False,
+        number: int = 0,
+        timing: gpu.Timing | None = None,
+    ) -> None:
+        """Record the passes into `encoder`; nothing is submitted or waited for.
+
+        Views are of your textures: `color` filterable float (rgba16float always is),
+        `to_next` and `to_prev` with the displacement [px] in x and y, `object_id` r32uint,
+        `output` a storage texture of the format that Blur was made for. `check_color` gives
+        pixels that are not finite no weight, at the price of two small passes.
+        """
+        gpu.check_size(self.device, *size)
+        there = {"color"}
+        if any(source is not None for source in (to_next, to_prev, camera)):
+            there.add("motion")
+        if depth is not None:
+            there.add("depth")
+        self._require(there)
+        given = self._given(size, number, timing)
+        motion = self._images.view("motion", size, "rgba32float")
+        self._encode_motion(encoder, given, motion, to_prev=to_prev, to_next=to_next, depth=depth,
+                            camera=camera, object_id=object_id, scale=scale,
+                            object_motion=object_motion)
+        weight, result, own = None, output, color
+        if keep is not None or check_color:
+            color, weight = self._lift(encoder, given, color, keep)
+            result = self._images.view("blurred", size, self.output)
+        inputs = Inputs(
+            given=given,
+            color=color,
+            motion=motion,
+            depth=depth,
+            weight=weight,
+            none=self._empty["float"],
+            linear=self._linear,
+            even=self._shutter.curve == "box",
+        )
+        self.method.encode(encoder, inputs, result)
+        if weight:
+            self._put_back(encoder, given, own, keep, result, output)
+
+    def __call__(self, color: np.ndarray | Frame, to_next=None, **passes) -> np.ndarray:
+        """Blur one frame: a Frame, or a colour array and its passes (see Frame).
+
+        Returns float32 of color's shape. `InputError` says what is missing or does not fit.
+        """
+        frame = color if isinstance(color, Frame) else Frame(color, to_next, **passes)
+        self._require(frame.has)
+        output = self._images.texture("output", frame.size, self.output)
+        encoder = self.device.create_command_encoder(label="wgmb")
+        self.encode(encoder, output=output.create_view(), **self._upload(frame))
+        return self._images.download(encoder, output)[..., : frame.color.shape[2]].astype("f4", copy=False)
+
+    def motion(self, frame: Frame) -> np.ndarray:
+        """What the methods are given to follow: (height, width, 4) to_prev, to_next [px]."""
+        if "motion" not in frame.has:
+            raise InputError("there is no motion: give to_next, to_prev, or depth and a camera")
+        encoder = self.device.create_command_encoder(label="wgmb motion")
+        views = self._upload(frame)
+        given = self._given(frame.size, frame.number, None)
+        motion = self._images.texture("motion", frame.size, "rgba32float")
+        self._encode_motion(encoder, given, motion.create_view(), **views)
+        return self._images.download(encoder, motion)
+
+    def _upload(self, frame: Frame) -> dict:
+        """The frame's arrays as textures, under the names that `encode` takes."""
+        rgba = frame.color
+        if rgba.shape[2] == 3:
+            rgba = np.ones((*rgba.shape[:2], 4), rgba.dtype)
+            rgba[..., :3] = frame.color
+        half = rgba.dtype == np.float16
+        filterable = {n: gpu.texel(self.device, n) for n in (1, 4)}
+        ids = None if frame.object_id is None else np.minimum(frame.object_id, 2**32 - 1)
+
+        def view(name: str, array: np.ndarray | None, format: str):
+            return None if array is None else self._images.upload(name, array, format)
+
+        return {
+            "size": frame.size,
+            "color": view("color", rgba, "rgba16float" if half else filterable[4]),
+            "to_next": view("to_next", frame.to_next, "rg32float"),
+            "to_prev": view("to_prev", frame.to_prev, "rg32float"),
+            "depth": view("depth", frame.depth, "r32float"),
+            "camera": frame.camera,
+            "object_id": view("object", ids, "r32uint"),
+            "keep": view("keep", frame.keep, filterable[1]),
+            "scale": view("scale", frame.scale, filterable[1]),
+            "object_motion": frame.object_motion,
+            "check_color": "color" in frame.bad,
+            "number": frame.number,
+        }
+
+    def _require(self, there) -> None:
+        if missing := self.method.needs - there:
+            raise InputError(f"method {self.method.name!r} needs {', '.join(sorted(missing))}")
+
+    def _given(self, size: tuple[int, int], number: int, timing) -> gpu.Given:
+        data = np.zeros((), shader.load("common/frame.wgsl").dtype("Frame"))
+        data["size"], data["samples"], data["jitter"] = size, self.samples, self.jitter
+        data["index"] = number % 2**32
+        data["max_blur"] = np.inf if self.max_blur is None else self.max_blur
+        frame = self.device.create_buffer_with_data(
+            label="frame", data=data, usage=wgpu.BufferUsage.UNIFORM
+        )
+        return gpu.Given(size, {"frame": frame, **self._group0}, timing)
+
+    def _encode_motion(self, encoder, given, motion, *, to_prev, to_next, depth, camera, object_id,
+                       scale, object_motion, **_others) -> None:
+        """Record the velocity pass."""
+        self._velocity.encode(encoder, given, empty=self._empty, motion=motion, camera=camera,
+                              object_motion=object_motion, to_prev=to_prev, to_next=to_next,
+                              depth=depth, object=object_id, scale=scale)
+
+    def _keep_kernel(self, output: str, keep) -> gpu.Kernel:
+        texels = {"Output": output, "Weight": self._weight_texel}
+        return gpu.kernel(self.device, "keep.wgsl", texels, KEEP=keep is not None)
+
+    @property
+    def _weight_texel(self) -> str:
+        """One channel where it can be stored and filtered, four elsewhere."""
+        one = gpu.texel(self.device, 1)
+        return one if one == "r32float" else gpu.texel(self.device, 4)
+
+    def _lift(self, encoder, given, color, keep):
+        """The colour times its weight, and the weight."""
+        four, none = gpu.texel(self.device, 4), self._empty["float"]
+        lifted = self._images.view("lifted", given.size, four)
+        weight = self._images.view("weight", given.size, self._weight_texel)
+        self._keep_kernel(four, keep).run(encoder, "before", given, color=color, keep=keep or none,
+                                          blurred=none, weight=weight, output=lifted)
+        return lifted, weight
+
+    def _put_back(self, encoder, given, color, keep, blurred, output) -> None:
+        """The method's result with what is kept sharp put back."""
+        spare = self._images.view("spare", (1, 1), self._weight_texel)
+        self._keep_kernel(self.output, keep).run(
+            encoder, "after", given, color=color, keep=keep or self._empty["float"],
+            blurred=blurred, weight=spare, output=output)
+
+
+def blur(color: np.ndarray, to_next: np.ndarray | None = None, *, method: str = "tap",
+         shutter: Shutter | float = 180, samples: int = 16, **more) -> np.ndarray:
+    """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.
+
+    `more` are the passes of Frame (to_prev, depth, camera, keep, ...) and the options of
+    Blur (jitter, max_blur, device, and those of the method).
+    """
+    passes = {name: more.pop(name) for name in PASSES if name in more}
+    return Blur(method, shutter=shutter, samples=samples, **more)(color, to_next, **passes)

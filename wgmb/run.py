@@ -1,0 +1,153 @@
+"""Blur a whole sequence: reading, the GPU and writing at the same time.
+
+Three threads pass frames on, at most one waiting between two of them, so that memory does
+not depend on the length of the sequence. A frame that fails is reported and passed over.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from .errors import Error, InputError
+from .frame import Frame
+from .pipeline import Blur
+from .sequence import Clip, Output, Source
+
+
+@dataclass
+class Report:
+    """What became of a run."""
+
+    done: list[int] = field(default_factory=list)
+    skipped: list[int] = field(default_factory=list)  # already there (resume)
+    failed: dict[int, str] = field(default_factory=dict)
+    bad: dict[int, dict[str, int]] = field(default_factory=dict)  # pixels not finite, by input
+
+
+Progress = Callable[[int, str], None]
+"""Called with a frame's number and "done", "skipped" or "failed"."""
+
+
+class _Stop(Exception):
+    """The other end of a queue is gone."""
+
+
+class _Handover:
+    """A queue of one place whose both ends notice a stop."""
+
+    def __init__(self, stop: threading.Event):
+        self._queue: queue.Queue = queue.Queue(maxsize=1)
+        self._stop = stop
+
+    def put(self, item) -> None:
+        while not self._stop.is_set():
+            try:
+                return self._queue.put(item, timeout=0.05)
+            except queue.Full:
+                continue
+        raise _Stop
+
+    def get(self):
+        while not self._stop.is_set():
+            try:
+                return self._queue.get(timeout=0.05)
+            except queue.Empty:
+                continue
+        raise _Stop
+
+
+def blur_sequence(
+    clip: Clip, blur: Blur, output: Output, *, resume: bool = False, progress: Progress | None = None
+) -> Report:
+    """Blur every frame of `clip` into `output`.
+
+    Frames that cannot be read, blurred or written are in the report's `failed`, with the
+    reason; the others are done. Interrupted, nothing half written is left and the
+    interruption goes on.
+    """
+    report, stop, tell = Report(), threading.Event(), progress or (lambda number, what: None)
+    to_blur, to_write = _Handover(stop), _Handover(stop)
+    crash: list[BaseException] = []
+
+    def fail(number: int, error: BaseException) -> None:
+        report.failed[number] = " ".join(str(error).split()) or type(error).__name__
+        tell(number, "failed")
+
+    def read() -> None:
+        for number in clip.numbers:
+            if resume and output.done(number, clip.files(number)):
+                report.skipped.append(number)
+                tell(number, "skipped")
+                continue
+            try:
+                source = clip.source(number)
+                to_blur.put((source, clip.frame(source)))
+            except (Error, OSError, MemoryError) as error:
+                fail(number, error)
+            finally:
+                clip.forget(number)
+        to_blur.put(None)
+
+    def write() -> None:
+        while (item := to_write.get()) is not None:
+            source, result = item
+            try:
+                output.write(result, source)
+            except (Error, OSError, MemoryError, RuntimeError) as error:
+                fail(source.number, error)
+            else:
+                report.done.append(source.number)
+                tell(source.number, "done")
+
+    def guarded(work: Callable[[], None]) -> None:
+        try:
+            work()
+        except _Stop:
+            pass
+        except BaseException as error:  # a fault of ours: the main thread raises it
+            crash.append(error)
+            stop.set()
+
+    threads = [threading.Thread(target=guarded, args=(work,), name=work.__name__, daemon=True)
+               for work in (read, write)]  # fmt: skip
+    for thread in threads:
+        thread.start()
+    try:
+        while (item := to_blur.get()) is not None:
+            _blur_one(blur, *item, report, to_write, fail)
+            del item
+        to_write.put(None)
+        for thread in threads:
+            while thread.is_alive():  # a join without limit would hold back Ctrl-C
+                thread.join(0.1)
+    except _Stop:
+        pass
+    finally:
+        broken = any(thread.is_alive() for thread in threads) or crash or not report.done
+        stop.set()
+        for thread in threads:
+            thread.join(0.5)
+        if broken:
+            output.abandon()
+    if crash:
+        raise crash[0]
+    if not broken:
+        try:
+            output.close()
+        except OSError as error:
+            fail(clip.numbers[-1], error)
+    return report
+
+
+def _blur_one(blur: Blur, source: Source, frame: Frame, report: Report, to_write, fail) -> None:
+    try:
+        result = blur(frame)
+    except InputError as error:
+        fail(source.number, InputError(f"{source.path}: {error}"))
+        return
+    if frame.bad:
+        report.bad[source.number] = frame.bad
+    to_write.put((source, result))

@@ -1,0 +1,167 @@
+"""Shutter functions: how much each moment counts towards one frame.
+
+Time is in frame intervals with 0 at the frame's own instant; 360 degrees are one
+interval, so a centred 180 degree shutter is open from -0.25 to 0.25. Every shutter
+integrates to 1. This file is the only place where a curve is written: the GPU gets
+times.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .errors import InputError
+
+Weight = Callable[[np.ndarray], np.ndarray]
+
+
+def _box(x: np.ndarray) -> np.ndarray:
+    return np.ones_like(x)
+
+
+def _trapezoid(x: np.ndarray) -> np.ndarray:
+    """Flat for the middle third, a ramp on either side: at 540 degrees neighbours add up to 1."""
+    return np.clip(np.minimum(x, 1 - x) * 3, 0, 1)
+
+
+def _triangle(x: np.ndarray) -> np.ndarray:
+    return 1 - np.abs(2 * x - 1)
+
+
+def _cosine(x: np.ndarray) -> np.ndarray:
+    """Raised cosine (Cusa 2022, "Motion Blur All the Way Down"), made for 720 degrees."""
+    return 1 - np.cos(2 * math.pi * x)
+
+
+def _gaussian(x: np.ndarray) -> np.ndarray:
+    """Cut off at three standard deviations on either side."""
+    return np.exp(-0.5 * ((x - 0.5) * 6) ** 2)
+
+
+CURVES: dict[str, Weight] = {
+    "box": _box,
+    "trapezoid": _trapezoid,
+    "triangle": _triangle,
+    "cosine": _cosine,
+    "gaussian": _gaussian,
+}
+PHASES = {"start": 0.5, "centre": 0.0, "center": 0.0, "end": -0.5}
+ROLLING = {"down": (0, 1), "up": (0, -1), "right": (1, 0), "left": (-1, 0)}
+
+
+@dataclass(frozen=True)
+class Shutter:
+    """When the shutter is open, and how far.
+
+    `degrees`: open for this much of a turn, 360 = one frame interval; may exceed 360.
+    `phase`: "start" opens at the frame's instant, "centre" is centred on it, "end" closes
+    at it; a number is the time of the exposure's middle [frame intervals].
+    `curve`: a name in CURVES, or a function of x in 0 (opens) to 1 (closes), at any scale,
+    never negative.
+    `rolling`: "down", "up", "right", "left": the side that is exposed first is the one the
+    word moves away from; `rolling_duration` is the delay from first to last row or column
+    [frame intervals], the middle of the image keeping its time.
+    """
+
+    degrees: float = 180.0
+    phase: str | float = "centre"
+    curve: str | Weight = "box"
+    rolling: str | None = None
+    rolling_duration: float = 1.0
+
+    def __post_init__(self):
+        if not (math.isfinite(self.degrees) and 0 <= self.degrees <= 36000):
+            raise InputError(f"shutter must be 0 to 36000 degrees, got {self.degrees}")
+        if isinstance(self.phase, str) and self.phase not in PHASES:
+            raise InputError(f"phase must be start, centre, end or a number, got {self.phase!r}")
+        if not isinstance(self.phase, str) and not abs(self.phase) <= 100:
+            raise InputError(f"phase must be within 100 frame intervals, got {self.phase}")
+        if isinstance(self.curve, str) and self.curve not in CURVES:
+            raise InputError(f"curve must be one of {', '.join(CURVES)}, got {self.curve!r}")
+        if self.rolling is not None and self.rolling not in ROLLING:
+            raise InputError(f"rolling must be one of {', '.join(ROLLING)}, got {self.rolling!r}")
+        if not (math.isfinite(self.rolling_duration) and 0 <= self.rolling_duration <= 100):
+            raise InputError(
+                f"rolling duration must be 0 to 100 frame intervals, got {self.rolling_duration}"
+            )
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """When the shutter opens and closes [frame intervals]."""
+        length = self.degrees / 360
+        if isinstance(self.phase, str):
+            middle = PHASES[self.phase] * length
+        else:
+            middle = float(self.phase)
+        return middle - length / 2, middle + length / 2
+
+    @property
+    def delay(self) -> tuple[float, float]:
+        """Delay of the right edge against the left, the bottom against the top [frame intervals]."""
+        x, y = ROLLING[self.rolling] if self.rolling else (0, 0)
+        return x * self.rolling_duration, y * self.rolling_duration
+
+    def integral(self, steps: int = 4096) -> tuple[np.ndarray, np.ndarray]:
+        """Times from open to close [frame intervals], and the share that has passed by each."""
+        x = np.linspace(0, 1, steps + 1)
+        curve = CURVES[self.curve] if isinstance(self.curve, str) else self.curve
+        w = np.asarray(curve(x), np.float64) + np.zeros_like(x)
+        if not np.isfinite(w).all() or (w < 0).any() or not w.any():
+            raise InputError("a shutter curve must be finite, never negative and not all 0")
+        share = np.concatenate([[0.0], np.cumsum((w[1:] + w[:-1]) / 2)])
+        opens, closes = self.span
+        return opens + (closes - opens) * x, share / share[-1]
+
+    def time(self, shares: np.ndarray) -> np.ndarray:
+        """When each share of the exposure (0..1) has passed [frame intervals]."""
+        times, integral = self.integral()
+        # A flat stretch (weight 0) is jumped over: only the ends of rising steps count.
+        rises = np.diff(integral) > 0
+        used = np.append(rises, False) | np.insert(rises, 0, False)
+        return np.interp(shares, integral[used], times[used])
+
+    def strata(self, samples: int) -> np.ndarray:
+        """(samples, 2) float32: the middle and the length of equal shares of the exposure."""
+        edges = self.time(np.arange(samples + 1) / samples)
+        middles = self.time((np.arange(samples) + 0.5) / samples)
+        return np.stack([middles, np.diff(edges)], 1).astype(np.float32)
+
+
+def read_curve(path: str | Path) -> Weight:
+    """A curve from a CSV file of `time, weight` rows, a header line allowed.
+
+    Times may be in any unit: the first row is where the shutter opens, the last where it
+    closes, and the shutter's degrees say how long that takes. Linear between the rows.
+    """
+    try:
+        with open(path, newline="", encoding="utf-8") as file:
+            rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"curve {path}: {error}") from None
+    try:
+        points = np.array([[float(cell) for cell in row[:2]] for row in rows[_is_header(rows) :]])
+    except ValueError as error:
+        raise InputError(f"curve {path}: rows must be time, weight: {error}") from None
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
+        raise InputError(f"curve {path}: needs at least two rows of time, weight")
+    time, weight = points.T
+    if not np.isfinite(points).all() or (np.diff(time) <= 0).any() or (weight < 0).any():
+        raise InputError(f"curve {path}: times must rise, weights be 0 or more, all finite")
+    if not weight.any():
+        raise InputError(f"curve {path}: all weights are 0")
+    time = (time - time[0]) / (time[-1] - time[0])
+    return lambda x: np.interp(x, time, weight)
+
+
+def _is_header(rows: list[list[str]]) -> bool:
+    try:
+        float(rows[0][0])
+    except (ValueError, IndexError):
+        return bool(rows)
+    return False

@@ -1,0 +1,193 @@
+"""PNG, JPEG and TIFF stills: display values in the file, linear light here.
+
+Integer samples are sRGB and unassociated alpha; float TIFF samples are linear and
+premultiplied already. 16 bits stay 16 bits both ways.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import imageio.v3 as iio
+import numpy as np
+import tifffile
+
+from .errors import InputError
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
+KEYWORD = "wgmb"  # of the text that holds the settings
+_MOST_PIXELS = 1 << 29
+
+
+def read(path: str | Path) -> np.ndarray:
+    """(height, width, 3 or 4) float32, linear, premultiplied.
+
+    `InputError` names the file where it is missing, damaged, cut off or no picture.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    data = path.read_bytes()
+    try:
+        if path.suffix.lower() == ".png":
+            samples = _read_png(data)
+        elif path.suffix.lower() in (".tif", ".tiff"):
+            samples = tifffile.imread(io.BytesIO(data))
+        else:
+            samples = iio.imread(data, extension=path.suffix.lower())
+    except (OSError, ValueError, IndexError, KeyError, TypeError, struct.error, MemoryError,
+            SyntaxError, StopIteration, RuntimeError, av.error.FFmpegError,
+            tifffile.TiffFileError) as error:  # fmt: skip
+        lines = str(error).splitlines() or [type(error).__name__]
+        raise InputError(f"{path}: not a readable picture: {lines[0]}") from None
+    return _to_linear(path, samples)
+
+
+def _read_png(data: bytes) -> np.ndarray:
+    if len(data) < 33 or data[:8] != b"\x89PNG\r\n\x1a\n":
+        raise ValueError("no PNG header")
+    width, height = struct.unpack(">II", data[16:24])
+    if width * height > _MOST_PIXELS:
+        raise ValueError(f"{width} x {height} pixels")
+    with av.open(io.BytesIO(data), format="png_pipe") as container:
+        frame = next(container.decode(video=0))
+    name = frame.format.name
+    alpha = name.startswith(("rgba", "ya", "pal8"))
+    deep = "16" in name or "48" in name or "64" in name
+    wanted = {(False, False): "rgb24", (False, True): "rgb48le",
+              (True, False): "rgba", (True, True): "rgba64le"}[alpha, deep]  # fmt: skip
+    return frame.to_ndarray(format=wanted)
+
+
+def _to_linear(path: Path, samples: np.ndarray) -> np.ndarray:
+    if samples.ndim == 2:
+        samples = samples[..., None]
+    if samples.ndim != 3 or 0 in samples.shape or samples.shape[2] not in (1, 2, 3, 4):
+        raise InputError(f"{path}: must be one grey, RGB or RGBA image, got shape {samples.shape}")
+    if samples.shape[2] < 3:  # grey, grey and alpha
+        samples = np.concatenate([samples[..., :1]] * 3 + [samples[..., 1:]], axis=2)
+    if samples.dtype.kind == "f":
+        return samples.astype(np.float32)
+    if samples.dtype not in (np.uint8, np.uint16):
+        raise InputError(f"{path}: samples must be 8 or 16 bit or float, got {samples.dtype}")
+    most = np.iinfo(samples.dtype).max
+    table = linear(np.arange(most + 1, dtype=np.float32) / np.float32(most))
+    light = table[samples[..., :3]]
+    if samples.shape[2] == 3:
+        return light
+    alpha = samples[..., 3:] / np.float32(most)
+    return np.concatenate([light * alpha, alpha], axis=2)
+
+
+def encode(rgba: np.ndarray, suffix: str, bits: int, settings: str) -> bytes:
+    """The bytes of a still of (height, width, 3 or 4) linear light, `settings` within."""
+    suffix = suffix.lower()
+    if suffix in (".jpg", ".jpeg"):
+        samples = to_display(rgba[..., :3], 8)
+        return iio.imwrite("<bytes>", samples, extension=".jpg", quality=95, subsampling=0,
+                           comment=settings.encode())  # fmt: skip
+    samples = to_display(rgba, bits)
+    if suffix == ".png":
+        return _with_text(_png(samples), settings)
+    stream = io.BytesIO()
+    extra = ["unassalpha"] if samples.shape[2] == 4 else None
+    tifffile.imwrite(stream, samples, photometric="rgb", extrasamples=extra, compression="zlib",
+                     description=f"{KEYWORD} {settings}", metadata=None)  # fmt: skip
+    return stream.getvalue()
+
+
+def settings_of(path: Path) -> str | None:
+    """The settings that `encode` put into a still; None if there are none."""
+    try:
+        data = path.read_bytes()
+        if path.suffix.lower() == ".png":
+            return _text_of(data)
+        if path.suffix.lower() in (".tif", ".tiff"):
+            with tifffile.TiffFile(io.BytesIO(data)) as file:
+                found = str(file.pages.first.description)
+            return found.removeprefix(f"{KEYWORD} ") if found.startswith(KEYWORD) else None
+        comment = iio.immeta(data, extension=".jpg").get("comment", b"")
+        return comment.decode() if isinstance(comment, bytes) else str(comment)
+    except (OSError, ValueError, IndexError, struct.error, tifffile.TiffFileError):
+        return None
+
+
+def _png(samples: np.ndarray) -> bytes:
+    kinds = {(3, 1): ("rgb24", "rgb24"), (4, 1): ("rgba", "rgba"),
+             (3, 2): ("rgb48le", "rgb48be"), (4, 2): ("rgba64le", "rgba64be")}  # fmt: skip
+    given, stored = kinds[samples.shape[2], samples.itemsize]
+    frame = av.VideoFrame.from_ndarray(samples, format=given)
+    codec = av.CodecContext.create("png", "w")
+    codec.width, codec.height, codec.pix_fmt = frame.width, frame.height, stored
+    codec.time_base = Fraction(1, 25)
+    codec.options = {"pred": "mixed"}
+    packets = [*codec.encode(frame.reformat(format=stored)), *codec.encode(None)]
+    return b"".join(bytes(p) for p in packets)
+
+
+_AFTER_HEADER = 33  # bytes of signature and IHDR
+
+
+def _with_text(png: bytes, text: str) -> bytes:
+    """The PNG with a tEXt chunk after its header (PNG specification, 11.3.3)."""
+    body = b"tEXt" + KEYWORD.encode() + b"\0" + text.encode("latin-1", "replace")
+    chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+    return png[:_AFTER_HEADER] + chunk + png[_AFTER_HEADER:]
+
+
+def _text_of(png: bytes) -> str | None:
+    at = _AFTER_HEADER
+    while at + 8 <= len(png):
+        length, kind = struct.unpack(">I4s", png[at : at + 8])
+        body = png[at + 8 : at + 8 + length]
+        if kind == b"tEXt" and body.startswith(KEYWORD.encode() + b"\0"):
+            return body[len(KEYWORD) + 1 :].decode("latin-1")
+        at += 12 + length
+    return None
+
+
+# ---- light and display values ---------------------------------------------------------------
+
+
+def linear(display: np.ndarray) -> np.ndarray:
+    """sRGB display values 0..1 -> linear light (IEC 61966-2-1)."""
+    high = ((np.maximum(display, 0.04045) + 0.055) / 1.055) ** 2.4
+    return np.where(display <= 0.04045, display / 12.92, high).astype(np.float32)
+
+
+def srgb(light: np.ndarray) -> np.ndarray:
+    """Linear light -> sRGB display values, held to 0..1."""
+    light = np.clip(light, 0, 1)
+    high = 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(light <= 0.0031308, 12.92 * light, high).astype(np.float32)
+
+
+def to_display(rgba: np.ndarray, bits: int) -> np.ndarray:
+    """Linear premultiplied (height, width, 3 or 4) -> sRGB integers of 8 or 16 bits."""
+    rgb, alpha = rgba[..., :3], rgba[..., 3:]
+    if alpha.shape[2]:
+        rgb = np.divide(rgb, alpha, out=np.zeros_like(rgb), where=alpha > 0)
+    if bits == 8:
+        shown = _eight_bits()[rgb.astype(np.float16).view(np.uint16)]
+        covered = np.rint(np.clip(alpha, 0, 1) * 255).astype(np.uint8)
+    else:
+        shown = np.rint(srgb(rgb) * 65535).astype(np.uint16)
+        covered = np.rint(np.clip(alpha, 0, 1) * 65535).astype(np.uint16)
+    return np.concatenate([shown, covered], axis=2) if alpha.shape[2] else shown
+
+
+def _eight_bits() -> np.ndarray:
+    """sRGB of every f16 by its bits: a table instead of a power per pixel."""
+    if not _TABLE:
+        with np.errstate(all="ignore"):
+            halves = np.nan_to_num(np.arange(65536, dtype=np.uint16).view(np.float16).astype("f4"))
+        _TABLE.append(np.rint(srgb(halves) * 255).astype(np.uint8))
+    return _TABLE[0]
+
+
+_TABLE: list[np.ndarray] = []

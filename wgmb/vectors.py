@@ -1,0 +1,276 @@
+"""Motion vectors as programs write them -> to_prev, to_next in pixels, y down.
+
+Foreign conventions end here. A convention is what the numbers mean; `detect` finds out
+whether they do, by warping the neighbouring frame with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .errors import InputError
+from .layers import component, layers, pick, stem
+
+Motion = tuple[np.ndarray | None, np.ndarray | None]  # to_prev, to_next (height, width, 2)
+
+
+@dataclass(frozen=True)
+class Convention:
+    """What a program's vectors mean. `signs` turn them into displacements [px], y down."""
+
+    about: str
+    stems: tuple[str, ...]  # last part of the layer's name, lower case
+    prev: tuple[int, int] | None  # which components lead to the previous frame
+    next: tuple[int, int] | None
+    prev_sign: tuple[int, int] = (1, 1)
+    next_sign: tuple[int, int] = (1, 1)
+    components: tuple[str, ...] = ()  # the layer must have these, if any are named
+    offset: float = 0.0  # what stands for no motion
+    unit: float = 1.0  # pixels in one, before the user's own scale
+
+
+CONVENTIONS: dict[str, Convention] = {
+    "blender": Convention(
+        "Vector pass: pixels, y up; XY = P(n-1) - P(n), ZW = P(n) - P(n+1)",
+        ("vector",), (0, 1), (2, 3), (1, -1), (-1, 1), ("x", "y", "z", "w"),
+    ),
+    "nuke": Convention(
+        "forward.u/v to the next, backward.u/v to the previous frame: pixels, y up",
+        ("forward", "backward"), (0, 1), (0, 1), (1, -1), (1, -1),
+    ),
+    "arnold": Convention(
+        "motionvector: pixels to the next frame, y up; scale by 2 if rendered for half a frame",
+        ("motionvector", "motion_vector"), None, (0, 1), (1, -1), (1, -1),
+    ),
+    "vray": Convention(
+        "velocity: pixels to the next frame, y up, 0.5 added; scale by 2 x max velocity if clamped",
+        ("velocity", "vrayvelocity"), None, (0, 1), (1, -1), (1, -1), ("r", "g"), 0.5,
+    ),
+    "rsmb": Convention(
+        "0..1, 0.5 is no motion, y up, to the next frame; scale by 2 x MaxDisplace",
+        ("rsmb", "mv2dtoxik", "mv2d", "lm_2dmv"), None, (0, 1), (1, -1), (1, -1), (), 0.5,
+    ),
+    "plain": Convention(
+        "to_prev.x/y, to_next.x/y or velocity.x/y (to the next frame): pixels, y down",
+        ("to_prev", "to_next", "velocity", "motion", "motionvectors"), (0, 1), (0, 1),
+    ),
+}  # fmt: skip
+_BACKWARD = ("backward", "to_prev")
+_MOVING = 1.0  # [px] slower pixels say nothing about a convention
+_PROBES = 20_000  # pixels compared
+_CLEARLY = 0.75  # another reading must leave less than this share of the difference
+
+
+@dataclass(frozen=True)
+class Vectors:
+    """Which vectors to read, and what they mean.
+
+    `convention`: "auto", "none" or a name in CONVENTIONS. `layer` where its name is unusual.
+    `scale` multiplies, after `offset` (what stands for no motion) was taken away; `flip`
+    turns "x", "y" or "xy" round.
+    """
+
+    convention: str = "auto"
+    layer: str | None = None
+    scale: float = 1.0
+    offset: float | None = None
+    flip: str = ""
+
+    def __post_init__(self):
+        if self.convention not in ("auto", "none", *CONVENTIONS):
+            known = ", ".join(("auto", *CONVENTIONS, "none"))
+            raise InputError(f"vectors must be one of {known}, got {self.convention!r}")
+        if self.flip not in ("", "x", "y", "xy"):
+            raise InputError(f"vector flip must be x, y or xy, got {self.flip!r}")
+        if not np.isfinite(self.scale) or not np.isfinite(self.offset or 0.0):
+            raise InputError("vector scale and offset must be finite")
+
+    def __str__(self) -> str:
+        more = [f"scale {self.scale:g}"] if self.scale != 1 else []
+        more += [f"offset {self.offset:g}"] if self.offset is not None else []
+        more += [f"flip {self.flip}"] if self.flip else []
+        return " ".join((self.convention, *more))
+
+
+def named(names: Iterable[str], wanted: Vectors) -> Vectors | None:
+    """`wanted` with "auto" replaced by the convention the layers' names speak for."""
+    if wanted.convention == "none":
+        return None
+    if wanted.convention != "auto":
+        return wanted
+    by_layer = layers(names)
+    if wanted.layer is not None:
+        only = pick(by_layer, wanted.layer, "vector layer")
+        by_layer = {only: by_layer[only]}
+    for name, convention in CONVENTIONS.items():
+        if _find(by_layer, convention):
+            return replace(wanted, convention=name)
+    return replace(wanted, convention="plain") if wanted.layer is not None else None
+
+
+def _find(by_layer: Mapping[str, list[str]], convention: Convention) -> dict[str, list[str]]:
+    """The layers of a convention, by stem."""
+    found: dict[str, list[str]] = {}
+    for layer, members in by_layer.items():
+        fits = len(members) >= 2
+        if convention.components:
+            fits = [component(m) for m in members][: len(convention.components)] == list(
+                convention.components
+            )
+        if stem(layer) in convention.stems and fits:
+            found.setdefault(stem(layer), members)
+    return found
+
+
+def channels_of(names: Iterable[str], vectors: Vectors) -> dict[str, tuple[str, str]]:
+    """The x and y channels for "prev" and "next"; one of them may not be there."""
+    convention = CONVENTIONS[vectors.convention]
+    by_layer = layers(names)
+    if vectors.layer is not None:
+        members = by_layer[pick(by_layer, vectors.layer, "vector layer")]
+        sides = [("next", convention.next)]
+        if convention.prev and convention.prev != convention.next:
+            sides.append(("prev", convention.prev))
+        found = [(side, members, where) for side, where in sides if where]
+    else:
+        found = []
+        for name, members in _find(by_layer, convention).items():
+            if convention.prev and convention.prev != convention.next:
+                found += [("prev", members, convention.prev), ("next", members, convention.next)]
+            elif name in _BACKWARD:
+                found.append(("prev", members, convention.prev))
+            else:
+                found.append(("next", members, convention.next))
+    if not found:
+        raise InputError(
+            f"no {vectors.convention} vectors ({' or '.join(convention.stems)}); "
+            f"there is {', '.join(map(repr, by_layer))}"
+        )
+    result: dict[str, tuple[str, str]] = {}
+    for side, members, (x, y) in found:
+        if max(x, y) >= len(members):
+            raise InputError(f"vector layer needs {max(x, y) + 1} components, has {len(members)}")
+        result.setdefault(side, (members[x], members[y]))
+    return result
+
+
+def read(channels: Mapping[str, np.ndarray], vectors: Vectors) -> Motion:
+    """to_prev and to_next [px] of a frame's channels; None for a side that is not there."""
+    convention = CONVENTIONS[vectors.convention]
+    sides = channels_of(channels, vectors)
+    offset = convention.offset if vectors.offset is None else vectors.offset
+    flip = np.array([-1 if axis in vectors.flip else 1 for axis in "xy"], np.float32)
+    signs = {"prev": convention.prev_sign, "next": convention.next_sign}
+
+    def side(name: str) -> np.ndarray | None:
+        if name not in sides:
+            return None
+        factor = np.float32(vectors.scale * convention.unit) * flip * np.array(signs[name], "f4")
+        x, y = (channels[c] for c in sides[name])
+        motion = np.empty((*x.shape, 2), np.float32)
+        for axis, plane in enumerate((x, y)):
+            np.subtract(plane, np.float32(offset), out=motion[..., axis])
+            motion[..., axis] *= factor[axis]
+        return motion
+
+    return side("prev"), side("next")
+
+
+# ---- what the numbers really mean -----------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What warping the neighbouring frame said about a convention."""
+
+    vectors: Vectors  # the reading that explains the neighbour
+    sure: bool  # something moves, and one reading is clearly better than standing still
+    text: str  # for people
+
+
+_LEFT = "the neighbouring frame differs by {:.0%} of what it differs unmoved"
+_ALTERNATIVES = (("", 1.0), ("y", 1.0), ("x", 1.0), ("xy", 1.0), ("", 2.0), ("", 0.5))
+
+
+def detect(color, motion: Motion, prev_color, next_color, vectors: Vectors) -> Finding:
+    """Test `vectors`, which were read as `motion`, against the neighbouring frames' colour.
+
+    color: (height, width, 3 or 4); neighbours alike, or None. Every alternative (flipped,
+    twice, half) warps the neighbours; the one that leaves the least difference is meant.
+    """
+    pairs = [(m, c) for m, c in zip(motion, (prev_color, next_color), strict=True)
+             if m is not None and c is not None and c.shape[:2] == color.shape[:2]]  # fmt: skip
+    if not pairs and prev_color is not None and motion[1] is not None:
+        pairs = [(-motion[1], prev_color)]
+    if not pairs:
+        return Finding(vectors, False, f"{vectors}, by name (no neighbouring frame to test it on)")
+    at = _moving_pixels(pairs)
+    if len(at) < 16:
+        return Finding(vectors, False, f"{vectors}, by name (nothing moves, so it cannot be tested)")
+    still = _difference(color, pairs, at, 0.0, "")
+    left = {(flip, scale): _difference(color, pairs, at, scale, flip)
+            for flip, scale in _ALTERNATIVES}  # fmt: skip
+    least = min(left.values())  # of equals (nothing moves along y, say) the plainest
+    best = min((k for k, d in left.items() if d <= 1.02 * least),
+               key=lambda k: (len(_combine(vectors.flip, k[0])), k != ("", 1.0), left[k]))  # fmt: skip
+    stated = left["", 1.0]
+    if least > 0.9 * still:
+        return Finding(vectors, False, f"{vectors}, by name; no reading of these vectors explains "
+                       "the neighbouring frame: check them")  # fmt: skip
+    share = "the neighbouring frame differs by {{:.0%}} of what it differs unmoved"
+    if best == ("", 1.0) or left[best] > _CLEARLY * stated:
+        return Finding(vectors, True, f"{vectors}, tested: {_LEFT.format(stated / still)}")
+    flip, scale = best
+    meant = replace(vectors, flip=_combine(vectors.flip, flip), scale=vectors.scale * scale)
+    return Finding(meant, True, f"{meant}, because with {vectors} "
+                   f"{_LEFT.format(stated / still)}, so with {left[best] / still:.0%}")  # fmt: skip
+
+
+def _combine(a: str, b: str) -> str:
+    return "".join(axis for axis in "xy" if (axis in a) != (axis in b))
+
+
+def _moving_pixels(pairs) -> np.ndarray:
+    """Up to _PROBES pixels (y, x) that move in every given direction."""
+    moving = None
+    with np.errstate(all="ignore"):
+        for motion, _ in pairs:
+            speed = np.hypot(motion[..., 0], motion[..., 1])
+            this = (speed > _MOVING) & np.isfinite(speed)
+            moving = this if moving is None else moving & this
+    at = np.argwhere(moving)
+    chosen = np.random.default_rng(0).permutation(len(at))[:_PROBES]
+    return at[chosen]
+
+
+def _difference(color, pairs, at, scale: float, flip: str) -> float:
+    """Mean difference, robust against what appears and disappears, of warped neighbours."""
+    factor = np.array([-scale if axis in flip else scale for axis in "xy"])
+    here = _tone(color[at[:, 0], at[:, 1], :3])
+    total = 0.0
+    for motion, neighbour in pairs:
+        where = at[:, ::-1] + motion[at[:, 0], at[:, 1]] * factor
+        there = _tone(_bilinear(neighbour, where))
+        total += float(np.minimum(np.abs(there - here).sum(axis=1), 0.3).mean())
+    return total / len(pairs)
+
+
+def _tone(color: np.ndarray) -> np.ndarray:
+    """Held to 0..1 without hard limit, so that one highlight does not decide."""
+    light = np.clip(np.nan_to_num(color.astype(np.float32)), 0, 1e4)
+    return light / (1 + light)
+
+
+def _bilinear(image: np.ndarray, where: np.ndarray) -> np.ndarray:
+    height, width = image.shape[:2]
+    x = np.clip(where[:, 0], 0, width - 1.001)
+    y = np.clip(where[:, 1], 0, height - 1.001)
+    left, top = x.astype(int), y.astype(int)
+    right, below = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+    u, v = (x - left)[:, None], (y - top)[:, None]
+    rgb = image[..., :3]
+    return ((1 - v) * ((1 - u) * rgb[top, left] + u * rgb[top, right])
+            + v * ((1 - u) * rgb[below, left] + u * rgb[below, right]))  # fmt: skip

@@ -1,0 +1,51 @@
+// Average the colour along each pixel's own path (Rosado 2007, GPU Gems 3, chapter 27).
+//#include common/frame.wgsl
+//#include common/noise.wgsl
+//#include common/path.wgsl
+//#include common/shutter.wgsl
+
+@group(1) @binding(0) var color: texture_2d<f32>;       // linear, premultiplied by alpha and by weight
+@group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
+@group(1) @binding(2) var weight: texture_2d<f32>;      // 0: keeps out of its neighbours' blur
+@group(1) @binding(3) var linear: sampler;
+@group(1) @binding(4) var output: Output;
+
+override CURVED: bool = true;       // parabola through three places, or a line along their mean velocity
+override WEIGHTED: bool = false;    // read `weight`
+override PUBLISHED: bool = false;   // equal taps from the pixel along half the way it came
+
+const STILL: f32 = 0.01;            // paths shorter than this [px] take one tap
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let x = vec2f(id.xy) + 0.5;
+    var path = path_of(textureLoad(motion, id.xy, 0));
+    if !CURVED { path.curvature = vec2f(0.0); }
+    if PUBLISHED { path = Path(-textureLoad(motion, id.xy, 0).xy, vec2f(0.0)); }
+
+    // A loop that ends early is the only branch that saves time on every driver.
+    let delay = shutter_delay(x);
+    let first = displacement(path, shutter.span.x + delay);
+    let last = displacement(path, shutter.span.y + delay);
+    let still = !PUBLISHED && max(dot(first, first), dot(last, last)) < STILL * STILL;
+    let count = select(frame.samples, 1u, still);
+    let moving = select(1.0, 0.0, still);
+
+    let share = 1.0 / f32(count);   // before adding, so that no sum of finite colours overflows
+    let shift = frame.jitter * (pixel_noise(id.xy) - 0.5);
+    let texel = 1.0 / vec2f(frame.size);
+    let uv = x * texel;
+    let way = Path(path.velocity * texel * moving, path.curvature * texel * moving);
+    var sum = vec4f(0.0);
+    var total = 0.0;
+    for (var i = 0u; i < count; i++) {
+        var t = -shutter_time(i, shift) - delay;
+        if PUBLISHED { t = 0.5 * f32(i) * share; }
+        let at = uv + displacement(way, t);
+        sum += share * textureSampleLevel(color, linear, at, 0.0);
+        if WEIGHTED { total += share * textureSampleLevel(weight, linear, at, 0.0).x; }
+    }
+    if WEIGHTED { sum = select(vec4f(0.0), sum / total, total > 0.0); }
+    textureStore(output, id.xy, sum);
+}

@@ -1,0 +1,105 @@
+// Motion of every pixel: from vectors, from depth and matrices (Rosado 2007), or from both.
+//#include common/finite.wgsl
+//#include common/frame.wgsl
+//#include common/path.wgsl
+//#include common/shutter.wgsl
+
+struct Reprojection {       // of one rigid body; homogeneous pixel: see homogeneous()
+    prev: mat4x4f,          // clip position in the previous frame
+    next: mat4x4f,          // clip position in the next frame
+}
+
+struct Velocity {
+    display: vec2f,         // size of the whole picture that the matrices speak of [px]
+    origin: vec2f,          // where this image begins in it [px]
+    far: f32,               // depth from here on: nothing there, moves with the camera's turn only
+    depth_kind: u32,        // PLANAR, ORTHOGRAPHIC or CLIP
+    bodies: u32,            // rows of `reprojections`
+}
+
+@group(1) @binding(0) var<uniform> velocity: Velocity;
+@group(1) @binding(1) var to_prev: texture_2d<f32>;     // displacement to the previous frame [px]
+@group(1) @binding(2) var to_next: texture_2d<f32>;     // displacement to the next frame [px]
+@group(1) @binding(3) var depth: texture_2d<f32>;       // see depth_kind
+@group(1) @binding(4) var object: texture_2d<u32>;      // row of `reprojections`; 0 and unknown ones: the world
+@group(1) @binding(5) var scale: texture_2d<f32>;       // multiplies the motion
+@group(1) @binding(6) var<storage, read> reprojections: array<Reprojection>;
+@group(1) @binding(7) var motion: texture_storage_2d<rgba32float, write>;   // to_prev, to_next [px]
+
+override PREV: bool = false;        // which inputs there are
+override NEXT: bool = false;
+override CAMERA: bool = false;
+override OBJECTS: bool = false;
+override SCALED: bool = false;
+override ADDED: bool = false;       // vectors leave the camera's motion out: add it
+
+const PLANAR: u32 = 0u;             // distance along the view axis of a perspective camera
+const ORTHOGRAPHIC: u32 = 1u;       // the same of an orthographic one
+const CLIP: u32 = 2u;               // z after projection, as in a depth buffer
+
+const NEAREST: f32 = 1e-4;          // share of its distance below which a point is at the camera, or behind
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    var way = vec4f(0.0);
+    var nothing_there = false;
+    if CAMERA {
+        let z = textureLoad(depth, id.xy, 0).x;
+        nothing_there = !is_finite(z) || z >= velocity.far || (z <= 0.0 && velocity.depth_kind == PLANAR);
+        way = camera_motion(id.xy, z, nothing_there);
+    }
+    if PREV || NEXT {
+        var given = vec4f(0.0);
+        if PREV { given = vec4f(textureLoad(to_prev, id.xy, 0).xy, given.zw); }
+        if NEXT { given = vec4f(given.xy, textureLoad(to_next, id.xy, 0).xy); }
+        if !PREV { given = vec4f(-given.zw, given.zw); }
+        if !NEXT { given = vec4f(given.xy, -given.xy); }
+        if !is_finite4(given) { given = vec4f(0.0); }
+        if ADDED { way += given; } else if !nothing_there { way = given; }
+    }
+    if SCALED {
+        let factor = textureLoad(scale, id.xy, 0).x;
+        way *= select(0.0, factor, is_finite(factor));
+    }
+    textureStore(motion, id.xy, clamped(way));
+}
+
+/// To where the depth at `px` puts its content in the previous and the next frame [px].
+fn camera_motion(px: vec2u, z: f32, nothing_there: bool) -> vec4f {
+    var body = 0u;
+    if OBJECTS && !nothing_there { body = textureLoad(object, px, 0).x; }
+    if body >= velocity.bodies { body = 0u; }
+    let at = vec2f(px) + 0.5 + velocity.origin;
+    let ndc = (at / velocity.display * 2.0 - 1.0) * vec2f(1.0, -1.0);
+    if nothing_there && velocity.depth_kind == ORTHOGRAPHIC { return vec4f(0.0); }
+    let here = homogeneous(ndc, z, nothing_there);
+    let prev = reprojections[body].prev * here;
+    let next = reprojections[body].next * here;
+    let back = to_pixels(prev, ndc);
+    let ahead = to_pixels(next, ndc);
+    // A point that is behind the camera in one of the frames goes on as in the other.
+    if prev.w <= NEAREST && next.w <= NEAREST { return vec4f(0.0); }
+    if prev.w <= NEAREST { return vec4f(-ahead, ahead); }
+    if next.w <= NEAREST { return vec4f(back, -back); }
+    return vec4f(back, ahead);
+}
+
+/// What the matrices multiply: a point of the view volume up to a positive factor.
+/// Dividing a perspective point by its depth makes infinitely far an ordinary number, 0.
+fn homogeneous(ndc: vec2f, z: f32, nothing_there: bool) -> vec4f {
+    if velocity.depth_kind == PLANAR { return vec4f(ndc, 1.0, select(1.0 / z, 0.0, nothing_there)); }
+    return vec4f(ndc, z, 1.0);
+}
+
+/// Displacement from `ndc` to a clip position [px]; exactly 0 where nothing moved.
+fn to_pixels(clip: vec4f, ndc: vec2f) -> vec2f {
+    return (clip.xy - ndc * clip.w) / clip.w * vec2f(0.5, -0.5) * velocity.display;
+}
+
+/// The motion shortened so that the streak over the exposure is at most frame.max_blur.
+fn clamped(way: vec4f) -> vec4f {
+    let path = path_of(way);
+    let streak = distance(displacement(path, shutter.span.x), displacement(path, shutter.span.y));
+    return way * min(1.0, frame.max_blur / max(streak, 1e-6));
+}
