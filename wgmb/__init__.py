@@ -14,20 +14,30 @@ from .blur import METHODS
 from .cameras import Camera, CameraFile, Reprojections
 from .errors import DeviceError, Error, InputError, ShaderError
 from .frame import Frame
+from .output import Output
 from .pipeline import Blur, blur
+from .run import Report, blur_sequence
+from .sequence import Clip, Passes
 from .shutter import Shutter
+from .vectors import Vectors
 
 __all__ = [
     "METHODS",
     "Blur",
     "Camera",
     "CameraFile",
+    "Clip",
     "DeviceError",
     "Error",
     "Frame",
     "InputError",
+    "Output",
+    "Passes",
+    "Report",
     "Reprojections",
     "ShaderError",
     "Shutter",
+    "Vectors",
     "blur",
+    "blur_sequence",
 ]

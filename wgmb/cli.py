@@ -10,21 +10,22 @@ import os
 import signal
 import sys
 import time
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import cyclopts
 import numpy as np
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from . import __version__, gpu, layers, sequence, shutter, stills, vectors
+from . import __version__, gpu, layers, stills
 from .display import motion_picture
 from .errors import DeviceError, Error, InputError
 from .frame import Frame
+from .options import BlurOptions, InputOptions, OutputOptions, ShutterOptions
+from .output import Output, replace_file
 from .pipeline import Blur
 from .run import Report, blur_sequence
 
@@ -39,144 +40,6 @@ app = cyclopts.App(
     result_action="return_value",
     default_parameter=Parameter(negative=()),
 )
-
-_IN = Group("Input", sort_key=1)
-_LOOK = Group("Blur", sort_key=2)
-_SHUTTER = Group("Shutter", sort_key=3)
-_OUT = Group("Output", sort_key=4)
-
-
-@Parameter(name="*", group=_SHUTTER)
-@dataclass(frozen=True, kw_only=True)
-class ShutterOptions:
-    """When the shutter is open."""
-
-    shutter: float = 180.0
-    "Degrees it is open: 360 is one frame interval, more is allowed."
-    phase: str = "centre"
-    "start (opens at the frame), centre, end (closes at it), or the middle's time in frames."
-    curve: str = "box"
-    "box, trapezoid, triangle, cosine, gaussian, or a CSV file of time, weight."
-    rolling: Literal["up", "down", "left", "right"] | None = None
-    "Rolling shutter: the way the exposure runs over the picture."
-    rolling_duration: float = 1.0
-    "Time from the first row or column to the last, in frame intervals."
-
-    def make(self) -> shutter.Shutter:
-        """The Shutter these options describe."""
-        phase: str | float = self.phase
-        if phase not in shutter.PHASES:
-            try:
-                phase = float(phase)
-            except ValueError:
-                raise InputError(f"phase must be start, centre, end or a number, got {phase!r}") from None
-        curve = self.curve
-        if curve not in shutter.CURVES:
-            if not Path(curve).is_file():
-                known = ", ".join(shutter.CURVES)
-                raise InputError(f"curve must be one of {known}, or a CSV file; got {curve!r}")
-            curve = shutter.read_curve(curve)
-        return shutter.Shutter(self.shutter, phase, curve, self.rolling, self.rolling_duration)
-
-
-@Parameter(name="*", group=_IN)
-@dataclass(frozen=True, kw_only=True)
-class InputOptions:
-    """Which frames and layers, and what they mean."""
-
-    frames: str | None = None
-    "Frames of the pattern, such as 1-100x2 or 1,3,5-8; all that exist by default."
-    layer: str | None = None
-    "The picture's layer, where its name does not say so."
-    vectors: str = "auto"
-    "What the motion vectors mean: auto, blender, nuke, arnold, vray, rsmb, plain or none."
-    vector_layer: str | None = None
-    "The vectors' layer, where its name does not say so."
-    vector_scale: float = 1.0
-    "Multiplies the vectors."
-    vector_offset: float | None = None
-    "What stands for no motion, taken away first (vray, rsmb: 0.5)."
-    vector_flip: Literal["x", "y", "xy"] | None = None
-    "Turns the vectors round along an axis."
-    object_motion: bool = False
-    "The vectors leave the camera's motion out: add it from --camera."
-    camera: Path | None = None
-    "JSON with a camera for every frame: motion from depth where there are no vectors."
-    depth: str | None = None
-    "The depth layer, where its name does not say so."
-    depth_kind: Literal["planar", "inverse", "clip"] = "planar"
-    "Distance along the view axis, 1 / that (Nuke), or z after projection."
-    far: float = 1e9
-    "Depth from which on nothing is there (sky)."
-    object_layer: str | None = None
-    "Index layer that tells the camera file's objects apart."
-    also: tuple[str, ...] = ()
-    "Pattern of files with further layers of the same frames; may be repeated."
-    skip_missing: bool = False
-    "Leave out frames that are not there instead of refusing."
-
-    def open(self, pattern: str, keep: str | None = None, scale: str | None = None) -> sequence.Clip:
-        """The clip these options describe."""
-        passes = sequence.Passes(
-            color=self.layer,
-            vectors=vectors.Vectors(self.vectors, self.vector_layer, self.vector_scale,
-                                    self.vector_offset, self.vector_flip or ""),
-            depth=self.depth,
-            depth_kind=self.depth_kind,
-            far=self.far,
-            camera=self.camera,
-            object_layer=self.object_layer,
-            object_motion=self.object_motion,
-            keep=keep,
-            scale=scale,
-            also=self.also,
-        )  # fmt: skip
-        return sequence.Clip(pattern, frames=self.frames, passes=passes, skip_missing=self.skip_missing)
-
-
-@Parameter(name="*", group=_LOOK)
-@dataclass(frozen=True, kw_only=True)
-class BlurOptions:
-    """How to blur."""
-
-    method: str = "tap"
-    "tap: average along each pixel's own path."
-    samples: int = 16
-    "Taps a pixel."
-    jitter: float = 0.0
-    "0 to 1: trades bands for noise."
-    path: Literal["curved", "straight"] = "curved"
-    "Through the previous and the next place, or along the mean velocity."
-    form: Literal["shutter", "published"] = "shutter"
-    "published: equal taps along half the way from the previous frame, as in GPU Gems 3."
-    keep: str | None = None
-    "Stays sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or an image file."
-    scale: str | None = None
-    "Multiplies the motion, per pixel: a LAYER or an image file."
-    max_blur: float | None = None
-    "Longest streak in pixels."
-
-    def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
-        """The Blur these options describe."""
-        return Blur(self.method, shutter=shutter_, samples=self.samples, jitter=self.jitter,
-                    max_blur=self.max_blur, device=adapter, path=self.path, form=self.form)  # fmt: skip
-
-
-@Parameter(name="*", group=_OUT)
-@dataclass(frozen=True, kw_only=True)
-class OutputOptions:
-    """Where to."""
-
-    output: Annotated[str, Parameter(alias="-o")]
-    "Pattern or file: .exr .png .jpg .tif, or a video .mp4 .mov .mkv .webm .gif."
-    bits: int = 8
-    "Bits a sample of PNG and TIFF: 8 or 16."
-    fps: str = "24"
-    "Frames per second of a video, such as 24 or 30000/1001."
-    overwrite: bool = False
-    "Replace files that exist."
-    resume: bool = False
-    "Keep frames that are done; redo those whose settings or inputs differ."
 
 
 @app.command
@@ -212,9 +75,15 @@ def blur(
     clip = given.open(pattern, look.keep, look.scale)
     made = look.make(when.make(), adapter)
     settings = _settings(look, when, given)
-    files = sequence.Output(output.output, settings=settings, numbers=clip.numbers, bits=output.bits,
-                            fps=_fraction(output.fps), overwrite=output.overwrite,
-                            resume=output.resume)  # fmt: skip
+    files = Output(
+        output.output,
+        settings=settings,
+        numbers=clip.numbers,
+        bits=output.bits,
+        fps=_fraction(output.fps),
+        overwrite=output.overwrite,
+        resume=output.resume,
+    )
     if verbose:
         say.print(f"adapter: {made.device.adapter.summary}", markup=False)
         say.print(f"settings: {files.settings}", markup=False)
@@ -250,8 +119,13 @@ def _progress(say: Console, frames: int, quiet: bool):
     if quiet or not say.is_terminal:
         yield None
         return
-    columns = ("{task.description}", BarColumn(), "{task.completed}/{task.total}",
-               TextColumn("{task.fields[speed]}"), TimeRemainingColumn())  # fmt: skip
+    columns = (
+        "{task.description}",
+        BarColumn(),
+        "{task.completed}/{task.total}",
+        TextColumn("{task.fields[speed]}"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=say, transient=True) as bar:
         task = bar.add_task("blurring", total=frames, speed="")
         started, made = time.perf_counter(), [0]
@@ -259,7 +133,9 @@ def _progress(say: Console, frames: int, quiet: bool):
         def tick(number: int, what: str) -> None:
             made[0] += what == "done"
             speed = made[0] / (time.perf_counter() - started)
-            bar.update(task, advance=1, description=f"frame {number}", speed=f"{speed:.1f} frames/s")
+            bar.update(
+                task, advance=1, description=f"frame {number}", speed=f"{speed:.1f} frames/s"
+            )
 
         yield tick
 
@@ -323,13 +199,18 @@ def info(
         if part.data_window != part.display_window:
             line("window", f"data {part.data_window} in display {part.display_window}")
     for layer, members in layers.layers(source.channels).items():
-        kinds = ", ".join(f"{layers.component(m).upper()} {source.channels[m].dtype}" for m in members)
+        kinds = ", ".join(
+            f"{layers.component(m).upper()} {source.channels[m].dtype}" for m in members
+        )
         line("layer", f"{layer or '(picture)'}: {kinds}")
     line("picture", ", ".join(source.color))
     line("depth", layers.find_depth(source.channels, given.depth) or "none")
     line("vectors", clip.finding)
     if frame.bad:
-        line("bad", ", ".join(f"{n} pixels of {name} are not finite" for name, n in frame.bad.items()))
+        line(
+            "bad",
+            ", ".join(f"{n} pixels of {name} are not finite" for name, n in frame.bad.items()),
+        )
     if "motion" in frame.has:
         _show_motion(line, frame, output)
     elif output:
@@ -342,16 +223,25 @@ def _show_motion(line, frame: Frame, output: Path | None) -> None:
     speed = np.hypot(motion[..., 0], motion[..., 1])
     share = (50, 90, 99, 100)
     found = np.percentile(speed, share)
-    line("speed", "pixels per frame: " + ", ".join(
-        f"{v:.1f} ({'fastest' if s == 100 else f'{s} %'})" for s, v in zip(share, found, strict=True)))  # fmt: skip
+    line(
+        "speed",
+        "pixels per frame: "
+        + ", ".join(
+            f"{v:.1f} ({'fastest' if s == 100 else f'{s} %'})"
+            for s, v in zip(share, found, strict=True)
+        ),
+    )
     if found[2] > _MANY_BAD * frame.size[0]:
-        line("warning", f"one pixel in a hundred moves over {found[2]:.0f} px, a quarter of the width: "
-             "check the vectors' convention and scale")  # fmt: skip
+        line(
+            "warning",
+            f"one pixel in a hundred moves over {found[2]:.0f} px, a quarter of the width: "
+            "check the vectors' convention and scale",
+        )
     if output is not None:
         if output.suffix.lower() not in stills.SUFFIXES:
             raise InputError(f"output {output}: a picture, {', '.join(stills.SUFFIXES)}")
         picture = motion_picture(motion, float(max(found[2], 1.0)))
-        sequence.replace_file(output, stills.encode(picture, output.suffix, 8, "motion"))
+        replace_file(output, stills.encode(picture, output.suffix, 8, "motion"))
         line("motion", f"{output} (full brightness: {max(found[2], 1.0):.1f} px per frame)")
 
 
@@ -410,8 +300,13 @@ def _own_streams() -> None:
             if stream.fileno() > 2:
                 continue
             stream.flush()
-            own = os.fdopen(os.dup(stream.fileno()), "w", buffering=1, encoding=stream.encoding,
-                            errors="replace")  # fmt: skip
+            own = os.fdopen(
+                os.dup(stream.fileno()),
+                "w",
+                buffering=1,
+                encoding=stream.encoding,
+                errors="replace",
+            )
         except (OSError, ValueError, AttributeError):
             continue
         setattr(sys, name, own)

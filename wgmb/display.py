@@ -12,7 +12,7 @@ def motion_colors(motion: np.ndarray, fastest: float) -> np.ndarray:
     black stands still, full brightness moves `fastest` [px] or more; grey is not finite.
     """
     with np.errstate(invalid="ignore", over="ignore"):
-        finite = np.isfinite(motion).all(axis=2)
+        finite = np.isfinite(motion[..., 0]) & np.isfinite(motion[..., 1])
         x, y = (np.where(finite, motion[..., i], 0) for i in range(2))
         hue = np.arctan2(y, x) / (2 * np.pi) % 1.0
         value = np.clip(np.hypot(x, y) / max(fastest, 1e-6), 0, 1)

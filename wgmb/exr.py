@@ -22,8 +22,18 @@ import OpenEXR
 from .errors import InputError
 
 MOST_PIXELS_A_SIDE = 32768
-_WRITTEN_ANEW = ("channels", "compression", "dataWindow", "displayWindow", "type", "lineOrder", "tiles",
-                 "chunkCount", "version", "name")  # fmt: skip
+_WRITTEN_ANEW = (
+    "channels",
+    "compression",
+    "dataWindow",
+    "displayWindow",
+    "type",
+    "lineOrder",
+    "tiles",
+    "chunkCount",
+    "version",
+    "name",
+)
 _lock = threading.Lock()
 
 
@@ -79,8 +89,10 @@ def read(path: str | Path, *, header_only: bool = False) -> Exr:
         return Exr(path, promised)
     content = _open(path, header_only=False)
     if len(content.parts) != len(promised):
-        raise InputError(f"{path}: damaged or cut off: pixels of {len(content.parts)} of "
-                         f"{len(promised)} parts could be read")  # fmt: skip
+        raise InputError(
+            f"{path}: damaged or cut off: pixels of {len(content.parts)} of "
+            f"{len(promised)} parts could be read"
+        )
     for want, got in zip(promised, content.parts, strict=True):
         for name in want.channels:
             pixels = got.channels[name].pixels if name in got.channels else None
@@ -148,7 +160,9 @@ def _promised(path: Path, part) -> Part:
     data, display = (_corners(header[k]) for k in ("dataWindow", "displayWindow"))
     width, height = data[2] - data[0] + 1, data[3] - data[1] + 1
     if not (0 < width <= MOST_PIXELS_A_SIDE and 0 < height <= MOST_PIXELS_A_SIDE):
-        raise InputError(f"{path}: image of {width} x {height}; at most {MOST_PIXELS_A_SIDE} a side")
+        raise InputError(
+            f"{path}: image of {width} x {height}; at most {MOST_PIXELS_A_SIDE} a side"
+        )
     channels = {c.name: np.empty((0, 0), np.float32) for c in header["channels"]}
     if not channels:
         raise InputError(f"{path}: a part without channels")

@@ -1,4 +1,4 @@
-"""The thin layer over wgpu: choosing a device, one Kernel per shader file, moving images.
+"""The thin layer over wgpu: choosing a device, one Kernel per shader file.
 
 Nothing else in the project touches the queue: `submit` is the only place that does,
 because an error inside it would end the process instead of raising.
@@ -11,16 +11,18 @@ import re
 import tempfile
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from typing import TYPE_CHECKING
 
-import numpy as np
 import wgpu
 
 from . import shader
 from .errors import DeviceError, InputError, ShaderError
 
+if TYPE_CHECKING:
+    from .timing import Timing
+
 SOFTWARE = "CPU"  # adapter_type of lavapipe, SwiftShader, WARP
 _PREFERENCE = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", SOFTWARE)
-_HALF_MAX = 65504.0  # largest finite f16
 
 # ---- device ---------------------------------------------------------------------------------
 
@@ -54,8 +56,11 @@ def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
     matching = [a for a in found if name.lower() in a.summary.lower()]
     if not matching:
         hint = "" if name else "; install a Vulkan driver (Debian, Ubuntu: mesa-vulkan-drivers)"
-        raise DeviceError(f"no adapter matches {name!r}; found {listing}{hint}" if name else
-                          f"no GPU adapter; found {listing}{hint}")
+        raise DeviceError(
+            f"no adapter matches {name!r}; found {listing}{hint}"
+            if name
+            else f"no GPU adapter; found {listing}{hint}"
+        )
     if _is_opengl(matching[0]) and "opengl" not in name.lower():
         raise DeviceError(
             f"only OpenGL adapters found ({listing}); install a Vulkan driver "
@@ -209,9 +214,7 @@ def kernel(device, file: str, texels: dict[str, str] | None = None, **constants:
 
 def _located(message: str, source: shader.Source) -> str:
     """The compiler's message with lines of the joined text turned into file:line."""
-    return re.sub(
-        r"wgsl:(\d+):(\d+)", lambda m: f"{source.where(int(m[1]))}:{m[2]}", message
-    )
+    return re.sub(r"wgsl:(\d+):(\d+)", lambda m: f"{source.where(int(m[1]))}:{m[2]}", message)
 
 
 def _resource(given):
@@ -239,123 +242,3 @@ def _layout_entry(b: shader.Binding, source: shader.Source) -> dict:
     if b.type == "texture_2d<u32>":
         return entry | {"texture": {"sample_type": "uint"}}
     raise ShaderError(f"{source.name}: cannot bind {b.name}: {b.type}")
-
-
-# ---- images ---------------------------------------------------------------------------------
-
-_USAGE = wgpu.TextureUsage
-_NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4"}
-_CHANNELS = {"r": 1, "rg": 2, "rgba": 4}
-
-
-def numpy_of(format: str) -> tuple[np.dtype, int]:
-    """Numpy type and number of channels of a texture format such as `rgba16float`."""
-    letters = re.match(r"[rgba]+", format)[0]
-    return np.dtype(_NUMPY[format[len(letters) :]]), _CHANNELS[letters]
-
-
-class Images:
-    """Textures kept from frame to frame under a name, remade when size or format changes."""
-
-    def __init__(self, device: wgpu.GPUDevice):
-        self.device = device
-        self._textures: dict[str, wgpu.GPUTexture] = {}
-        self._staging: wgpu.GPUBuffer | None = None
-
-    def texture(self, name: str, size: tuple[int, int], format: str) -> wgpu.GPUTexture:
-        """The texture called `name`; its contents are whatever was last put there."""
-        kept = self._textures.get(name)
-        if kept is None or kept.size[:2] != tuple(size) or kept.format != format:
-            check_size(self.device, *size)
-            usage = _USAGE.TEXTURE_BINDING | _USAGE.COPY_DST | _USAGE.COPY_SRC
-            if format.endswith("float") and format.startswith(("rgba", "r32")):
-                usage |= _USAGE.STORAGE_BINDING
-            kept = self.device.create_texture(
-                label=name, size=(*size, 1), format=format, usage=usage
-            )
-            self._textures[name] = kept
-        return kept
-
-    def view(self, name: str, size: tuple[int, int], format: str) -> wgpu.GPUTextureView:
-        """A view of the texture called `name`."""
-        return self.texture(name, size, format).create_view()
-
-    def upload(self, name: str, image: np.ndarray, format: str) -> wgpu.GPUTextureView:
-        """Put `image` (height, width[, channels]) into the texture called `name`."""
-        height, width = image.shape[:2]
-        kind, channels = numpy_of(format)
-        if kind == np.float16 and image.dtype != np.float16:
-            image = np.where(np.isinf(image), image, np.clip(image, -_HALF_MAX, _HALF_MAX))
-        image = np.ascontiguousarray(image, kind)
-        texture = self.texture(name, (width, height), format)
-        layout = {"bytes_per_row": width * channels * kind.itemsize}
-        self.device.queue.write_texture({"texture": texture}, image, layout, (width, height, 1))
-        return texture.create_view()
-
-    def download(self, encoder, texture: wgpu.GPUTexture) -> np.ndarray:
-        """Submit `encoder` and return `texture` as a new (height, width, channels) array."""
-        width, height, _ = texture.size
-        kind, channels = numpy_of(texture.format)
-        row = width * channels * kind.itemsize
-        pitch = -(-row // 256) * 256  # rows in a buffer start at multiples of 256 bytes
-        if self._staging is None or self._staging.size != pitch * height:
-            usage = wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.MAP_READ
-            self._staging = self.device.create_buffer(
-                label="readback", size=pitch * height, usage=usage
-            )
-        encoder.copy_texture_to_buffer(
-            {"texture": texture},
-            {"buffer": self._staging, "bytes_per_row": pitch, "rows_per_image": height},
-            (width, height, 1),
-        )
-        submit(self.device, encoder)
-        self._staging.map_sync(wgpu.MapMode.READ)
-        try:
-            data = np.frombuffer(self._staging.read_mapped(copy=False), np.uint8)
-            rows = data.reshape(height, pitch)[:, :row]
-            return rows.copy().view(kind).reshape(height, width, channels)
-        finally:
-            self._staging.unmap()
-
-
-class Timing:
-    """GPU time of every pass of one frame, by timestamp queries.
-
-    Software adapters report times that are wrong after some commands; there, wall clock
-    around a submit is the only honest clock, and `Timing.usable` says so.
-    """
-
-    MOST = 64  # passes a frame
-
-    def __init__(self, device: wgpu.GPUDevice):
-        self.device, self.labels = device, []
-        self.queries = device.create_query_set(type="timestamp", count=2 * self.MOST)
-
-    @staticmethod
-    def usable(device: wgpu.GPUDevice) -> bool:
-        """Whether timestamps of this device can be believed."""
-        hardware = device.adapter_info["adapter_type"] != SOFTWARE
-        return hardware and "timestamp-query" in device.features
-
-    def of(self, label: str) -> dict:
-        """The `timestamp_writes` of the pass called `label`."""
-        first = 2 * len(self.labels)
-        self.labels.append(label)
-        return {
-            "query_set": self.queries,
-            "beginning_of_pass_write_index": first,
-            "end_of_pass_write_index": first + 1,
-        }
-
-    def read(self) -> dict[str, float]:
-        """Seconds per pass, after the work was submitted; passes of one name are added up."""
-        usage = wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
-        buffer = self.device.create_buffer(size=16 * len(self.labels), usage=usage)
-        encoder = self.device.create_command_encoder()
-        encoder.resolve_query_set(self.queries, 0, 2 * len(self.labels), buffer, 0)
-        submit(self.device, encoder)
-        stamps = np.frombuffer(self.device.queue.read_buffer(buffer), "<u8").reshape(-1, 2)
-        seconds: dict[str, float] = {}
-        for label, (begin, end) in zip(self.labels, stamps, strict=True):
-            seconds[label] = seconds.get(label, 0.0) + (int(end) - int(begin)) * 1e-9
-        return seconds

@@ -13,8 +13,12 @@ from .errors import InputError
 
 Channels = Mapping[str, np.ndarray]
 
-_COMPONENTS = ({"x": 0, "y": 1, "z": 2, "w": 3}, {"r": 0, "g": 1, "b": 2, "a": 3},
-               {"u": 0, "v": 1}, {"red": 0, "green": 1, "blue": 2, "alpha": 3})  # fmt: skip
+_COMPONENTS = (
+    {"x": 0, "y": 1, "z": 2, "w": 3},
+    {"r": 0, "g": 1, "b": 2, "a": 3},
+    {"u": 0, "v": 1},
+    {"red": 0, "green": 1, "blue": 2, "alpha": 3},
+)
 _COLOR = ("combined", "rgba", "rgb", "beauty", "color", "colour", "image", "final", "noisy image")
 _DEPTH = ("depth", "z", "zdepth", "vrayzdepth", "z-depth", "z_depth", "worlddepth")
 
@@ -115,7 +119,9 @@ def mask(channels: Channels, attributes: Mapping, wanted: str) -> np.ndarray:
     try:
         number = float(value)
     except ValueError:
-        raise InputError(f"layer {layer!r} is no Cryptomatte, so {value!r} must be a number") from None
+        raise InputError(
+            f"layer {layer!r} is no Cryptomatte, so {value!r} must be a number"
+        ) from None
     return (np.abs(plane - number) < 0.5).astype(np.float32)
 
 
@@ -137,15 +143,16 @@ def _crypto_coverage(channels: Channels, crypto: Mapping[str, str], value: str) 
     """Coverage of one id (Cryptomatte specification 1.2): pairs of id and coverage, by rank."""
     name = crypto["name"]
     wanted = np.uint32(_crypto_id(crypto, value))
-    ranks = {k: v for k, v in layers(channels).items() if re.fullmatch(re.escape(name) + r"\d\d", k)}
+    ranks = {
+        k: v for k, v in layers(channels).items() if re.fullmatch(re.escape(name) + r"\d\d", k)
+    }
     if not ranks:
         raise InputError(f"Cryptomatte {name!r} has no layers {name}00, {name}01, ...")
-    total = None
+    total = np.zeros(next(iter(channels.values())).shape, np.float32)
     for members in ranks.values():
         for id_, coverage in zip(members[0::2], members[1::2], strict=False):
             ids = np.ascontiguousarray(channels[id_], np.float32).view(np.uint32)
-            part = np.where(ids == wanted, np.asarray(channels[coverage], np.float32), 0)
-            total = part if total is None else total + part
+            total += np.where(ids == wanted, np.asarray(channels[coverage], np.float32), 0)
     return np.clip(total, 0, 1)
 
 
@@ -160,7 +167,9 @@ def _crypto_id(crypto: Mapping[str, str], value: str) -> int:
         manifest = {}
     if value not in manifest:
         known = ", ".join(list(manifest)[:8]) or "nothing; give the id as 0x and eight digits"
-        raise InputError(f"Cryptomatte {crypto['name']!r} has no {value!r}; its manifest has {known}")
+        raise InputError(
+            f"Cryptomatte {crypto['name']!r} has no {value!r}; its manifest has {known}"
+        )
     try:
         return struct.unpack(">I", bytes.fromhex(manifest[value]))[0]
     except (ValueError, struct.error, TypeError):

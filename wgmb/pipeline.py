@@ -13,7 +13,9 @@ from .blur import METHODS
 from .cameras import Reprojections
 from .errors import InputError
 from .frame import PASSES, Frame
+from .images import Images
 from .shutter import Shutter
+from .timing import Timing
 from .velocity import VelocityPass
 
 MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
@@ -78,7 +80,7 @@ class Blur:
         self.method = METHODS[method](self.device, output=output, **options)
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._velocity = VelocityPass(self.device)
-        self._images = gpu.Images(self.device)
+        self._images = Images(self.device)
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
         self._empty = {
             "float": self._images.view("none", (1, 1), gpu.texel(self.device, 4)),
@@ -126,7 +128,7 @@ class Blur:
         object_motion: bool = False,
         check_color: bool = False,
         number: int = 0,
-        timing: gpu.Timing | None = None,
+        timing: Timing | None = None,
     ) -> None:
         """Record the passes into `encoder`; nothing is submitted or waited for.
 
@@ -144,9 +146,18 @@ class Blur:
         self._require(there)
         given = self._given(size, number, timing)
         motion = self._images.view("motion", size, "rgba32float")
-        self._encode_motion(encoder, given, motion, to_prev=to_prev, to_next=to_next, depth=depth,
-                            camera=camera, object_id=object_id, scale=scale,
-                            object_motion=object_motion)
+        self._encode_motion(
+            encoder,
+            given,
+            motion,
+            to_prev=to_prev,
+            to_next=to_next,
+            depth=depth,
+            camera=camera,
+            object_id=object_id,
+            scale=scale,
+            object_motion=object_motion,
+        )
         weight, result, own = None, output, color
         if keep is not None or check_color:
             color, weight = self._lift(encoder, given, color, keep)
@@ -175,7 +186,9 @@ class Blur:
         output = self._images.texture("output", frame.size, self.output)
         encoder = self.device.create_command_encoder(label="wgmb")
         self.encode(encoder, output=output.create_view(), **self._upload(frame))
-        return self._images.download(encoder, output)[..., : frame.color.shape[2]].astype("f4", copy=False)
+        return self._images.download(encoder, output)[..., : frame.color.shape[2]].astype(
+            "f4", copy=False
+        )
 
     def motion(self, frame: Frame) -> np.ndarray:
         """What the methods are given to follow: (height, width, 4) to_prev, to_next [px]."""
@@ -230,12 +243,35 @@ class Blur:
         )
         return gpu.Given(size, {"frame": frame, **self._group0}, timing)
 
-    def _encode_motion(self, encoder, given, motion, *, to_prev, to_next, depth, camera, object_id,
-                       scale, object_motion, **_others) -> None:
+    def _encode_motion(
+        self,
+        encoder,
+        given,
+        motion,
+        *,
+        to_prev,
+        to_next,
+        depth,
+        camera,
+        object_id,
+        scale,
+        object_motion,
+        **_others,
+    ) -> None:
         """Record the velocity pass."""
-        self._velocity.encode(encoder, given, empty=self._empty, motion=motion, camera=camera,
-                              object_motion=object_motion, to_prev=to_prev, to_next=to_next,
-                              depth=depth, object=object_id, scale=scale)
+        self._velocity.encode(
+            encoder,
+            given,
+            empty=self._empty,
+            motion=motion,
+            camera=camera,
+            object_motion=object_motion,
+            to_prev=to_prev,
+            to_next=to_next,
+            depth=depth,
+            object=object_id,
+            scale=scale,
+        )
 
     def _keep_kernel(self, output: str, keep) -> gpu.Kernel:
         texels = {"Output": output, "Weight": self._weight_texel}
@@ -252,20 +288,42 @@ class Blur:
         four, none = gpu.texel(self.device, 4), self._empty["float"]
         lifted = self._images.view("lifted", given.size, four)
         weight = self._images.view("weight", given.size, self._weight_texel)
-        self._keep_kernel(four, keep).run(encoder, "before", given, color=color, keep=keep or none,
-                                          blurred=none, weight=weight, output=lifted)
+        self._keep_kernel(four, keep).run(
+            encoder,
+            "before",
+            given,
+            color=color,
+            keep=keep or none,
+            blurred=none,
+            weight=weight,
+            output=lifted,
+        )
         return lifted, weight
 
     def _put_back(self, encoder, given, color, keep, blurred, output) -> None:
         """The method's result with what is kept sharp put back."""
         spare = self._images.view("spare", (1, 1), self._weight_texel)
         self._keep_kernel(self.output, keep).run(
-            encoder, "after", given, color=color, keep=keep or self._empty["float"],
-            blurred=blurred, weight=spare, output=output)
+            encoder,
+            "after",
+            given,
+            color=color,
+            keep=keep or self._empty["float"],
+            blurred=blurred,
+            weight=spare,
+            output=output,
+        )
 
 
-def blur(color: np.ndarray, to_next: np.ndarray | None = None, *, method: str = "tap",
-         shutter: Shutter | float = 180, samples: int = 16, **more) -> np.ndarray:
+def blur(
+    color: np.ndarray,
+    to_next: np.ndarray | None = None,
+    *,
+    method: str = "tap",
+    shutter: Shutter | float = 180,
+    samples: int = 16,
+    **more,
+) -> np.ndarray:
     """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.
 
     `more` are the passes of Frame (to_prev, depth, camera, keep, ...) and the options of

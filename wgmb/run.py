@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 
 from .errors import Error, InputError
 from .frame import Frame
+from .output import Output
 from .pipeline import Blur
-from .sequence import Clip, Output, Source
+from .sequence import Clip, Source
 
 
 @dataclass
@@ -31,7 +32,7 @@ Progress = Callable[[int, str], None]
 """Called with a frame's number and "done", "skipped" or "failed"."""
 
 
-class _Stop(Exception):
+class _StopError(Exception):
     """The other end of a queue is gone."""
 
 
@@ -48,7 +49,7 @@ class _Handover:
                 return self._queue.put(item, timeout=0.05)
             except queue.Full:
                 continue
-        raise _Stop
+        raise _StopError
 
     def get(self):
         while not self._stop.is_set():
@@ -56,11 +57,16 @@ class _Handover:
                 return self._queue.get(timeout=0.05)
             except queue.Empty:
                 continue
-        raise _Stop
+        raise _StopError
 
 
 def blur_sequence(
-    clip: Clip, blur: Blur, output: Output, *, resume: bool = False, progress: Progress | None = None
+    clip: Clip,
+    blur: Blur,
+    output: Output,
+    *,
+    resume: bool = False,
+    progress: Progress | None = None,
 ) -> Report:
     """Blur every frame of `clip` into `output`.
 
@@ -105,25 +111,28 @@ def blur_sequence(
     def guarded(work: Callable[[], None]) -> None:
         try:
             work()
-        except _Stop:
+        except _StopError:
             pass
         except BaseException as error:  # a fault of ours: the main thread raises it
             crash.append(error)
             stop.set()
 
-    threads = [threading.Thread(target=guarded, args=(work,), name=work.__name__, daemon=True)
-               for work in (read, write)]  # fmt: skip
+    threads = [
+        threading.Thread(target=guarded, args=(work,), name=work.__name__, daemon=True)
+        for work in (read, write)
+    ]
     for thread in threads:
         thread.start()
     try:
         while (item := to_blur.get()) is not None:
-            _blur_one(blur, *item, report, to_write, fail)
-            del item
+            source, frame = item
+            _blur_one(blur, source, frame, report, to_write, fail)
+            del item, source, frame
         to_write.put(None)
         for thread in threads:
             while thread.is_alive():  # a join without limit would hold back Ctrl-C
                 thread.join(0.1)
-    except _Stop:
+    except _StopError:
         pass
     finally:
         broken = any(thread.is_alive() for thread in threads) or crash or not report.done

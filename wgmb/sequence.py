@@ -1,28 +1,26 @@
-"""Frame sequences on disk: a pattern in, Frames out; results in, files out.
+"""Frame sequences on disk: a pattern in, Frames out.
 
-`Clip` reads frames, finds their layers and keeps neighbours; `Output` writes pictures or
-a video, each file complete under its final name or not there at all.
+`Clip` reads frames, finds their layers, settles what the vectors mean and keeps neighbours.
 """
 
 from __future__ import annotations
 
-import json
-import os
 import re
 from collections import OrderedDict
-from dataclasses import dataclass, field, replace
-from fractions import Fraction
+from dataclasses import dataclass, field
 from pathlib import Path
 
-import fileseq
 import numpy as np
+from fileseq.constants import PAD_STYLE_HASH1
+from fileseq.exceptions import FileSeqException
+from fileseq.filesequence import FileSequence
+from fileseq.frameset import FrameSet
 
-from . import exr, layers, stills, vectors, video
+from . import exr, layers, stills, vectors
 from .cameras import CameraFile
 from .errors import InputError
 from .frame import Frame
 
-SETTINGS = "wgmb"  # attribute and keyword under which the settings are written
 _PATTERN = re.compile(r"[#@]|%\d*d|\$F\d*|<UDIM>")
 DEPTHS = ("planar", "inverse", "clip")
 
@@ -35,10 +33,10 @@ def is_pattern(path: str | Path) -> bool:
     return bool(_PATTERN.search(Path(path).name))
 
 
-def _sequence(pattern: str | Path) -> fileseq.FileSequence:
+def _sequence(pattern: str | Path) -> FileSequence:
     try:
-        return fileseq.FileSequence(str(pattern), pad_style=fileseq.PAD_STYLE_HASH1)
-    except fileseq.exceptions.FileSeqException as error:
+        return FileSequence(str(pattern), pad_style=PAD_STYLE_HASH1)
+    except FileSeqException as error:
         raise InputError(f"{pattern}: not a frame pattern: {error}") from None
 
 
@@ -52,8 +50,8 @@ def frame_path(pattern: str | Path, number: int) -> Path:
 def frame_numbers(text: str) -> list[int]:
     """`1-100x2`, `1,3,5-8` -> frame numbers."""
     try:
-        numbers = [int(n) for n in fileseq.FrameSet(text)]
-    except (fileseq.exceptions.FileSeqException, ValueError) as error:
+        numbers = [int(n) for n in FrameSet(text)]
+    except (FileSeqException, ValueError) as error:
         raise InputError(f"frames {text!r}: {error}") from None
     if not numbers:
         raise InputError(f"frames {text!r}: none")
@@ -63,8 +61,8 @@ def frame_numbers(text: str) -> list[int]:
 def numbers_on_disk(pattern: str | Path) -> list[int]:
     """The frames of a pattern that exist, in order."""
     try:
-        found = fileseq.findSequenceOnDisk(str(pattern), pad_style=fileseq.PAD_STYLE_HASH1)
-    except fileseq.exceptions.FileSeqException:
+        found = FileSequence.findSequenceOnDisk(str(pattern), pad_style=PAD_STYLE_HASH1)
+    except FileSeqException:
         raise InputError(f"{pattern}: no such frames") from None
     return sorted(int(n) for n in found.frameSet() or [])
 
@@ -135,8 +133,14 @@ class Clip:
     Iterating gives Frames. `finding` says what the vectors were found to mean.
     """
 
-    def __init__(self, pattern: str | Path, *, frames: str | None = None,
-                 passes: Passes | None = None, skip_missing: bool = False):  # fmt: skip
+    def __init__(
+        self,
+        pattern: str | Path,
+        *,
+        frames: str | None = None,
+        passes: Passes | None = None,
+        skip_missing: bool = False,
+    ):
         self.pattern, self.passes = str(pattern), passes or Passes()
         self.numbers = self._numbers(frames, skip_missing)
         self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
@@ -157,8 +161,10 @@ class Clip:
         wanted = frame_numbers(frames) if frames else list(range(there[0], there[-1] + 1))
         missing = [n for n in wanted if n not in set(there)]
         if missing and not skip_missing:
-            named = fileseq.FrameSet(missing)
-            raise InputError(f"{self.pattern}: missing frames {named}; --skip-missing leaves them out")
+            named = FrameSet(missing)
+            raise InputError(
+                f"{self.pattern}: missing frames {named}; --skip-missing leaves them out"
+            )
         return [n for n in wanted if n not in set(missing)]
 
     def __iter__(self):
@@ -199,8 +205,13 @@ class Clip:
             path = frame_path(self.pattern, number)
             if is_pattern(self.pattern) and path.is_file():
                 near[side] = self.source(number).rgba
-        found = vectors.detect(source.rgba, vectors.read(source.channels, self._vectors),
-                               near.get("prev"), near.get("next"), self._vectors)  # fmt: skip
+        found = vectors.detect(
+            source.rgba,
+            vectors.read(source.channels, self._vectors),
+            near.get("prev"),
+            near.get("next"),
+            self._vectors,
+        )
         self._vectors, self.finding = found.vectors, found.text
         self.forget(source.number - 1)
 
@@ -220,18 +231,27 @@ class Clip:
             raise InputError(f"{self._camera.path}: no camera for frame {source.number}")
         try:
             return Frame(
-                rgba, motion[1], motion[0], depth, reprojections, ids,
-                keep=self._mask(source, self.passes.keep), scale=self._mask(source, self.passes.scale),
-                object_motion=self.passes.object_motion, number=source.number,
-            )  # fmt: skip
+                rgba,
+                motion[1],
+                motion[0],
+                depth,
+                reprojections,
+                ids,
+                keep=self._mask(source, self.passes.keep),
+                scale=self._mask(source, self.passes.scale),
+                object_motion=self.passes.object_motion,
+                number=source.number,
+            )
         except InputError as error:
             raise InputError(f"{source.path}: {error}") from None
 
     def _depth(self, source: Source) -> np.ndarray:
         name = layers.find_depth(source.channels, self.passes.depth)
         if name is None:
-            raise InputError(f"{source.path}: motion from a camera needs a depth layer; there is "
-                             f"{', '.join(layers.layers(source.channels))}")  # fmt: skip
+            raise InputError(
+                f"{source.path}: motion from a camera needs a depth layer; there is "
+                f"{', '.join(layers.layers(source.channels))}"
+            )
         depth = source.channels[name].astype(np.float32)
         if self.passes.depth_kind == "inverse":
             with np.errstate(divide="ignore"):
@@ -245,8 +265,11 @@ class Clip:
             x, y, right, bottom = part.display_window
             left, top = part.data_window[:2]
             window = (left - x, top - y, right - x + 1, bottom - y + 1)
+        assert self._camera is not None
         kind = "clip" if self.passes.depth_kind == "clip" else "planar"
-        return self._camera.around(source.number, depth_kind=kind, far=self.passes.far, window=window)
+        return self._camera.around(
+            source.number, depth_kind=kind, far=self.passes.far, window=window
+        )
 
     def _object_ids(self, source: Source, reprojections) -> np.ndarray | None:
         if not reprojections.here.bodies:
@@ -254,7 +277,9 @@ class Clip:
         by_layer = layers.layers(source.channels)
         name = self.passes.object_layer
         if name is None:
-            named = [k for k in by_layer if layers.stem(k) in ("indexob", "objectindex", "object_id")]
+            named = [
+                k for k in by_layer if layers.stem(k) in ("indexob", "objectindex", "object_id")
+            ]
             if not named:
                 return None
             name = named[0]
@@ -268,13 +293,17 @@ class Clip:
         size = source.channels[source.color[0]].shape
         file = frame_path(wanted, source.number)
         if file.suffix.lower() in (".exr", *stills.SUFFIXES):
-            image = _read([file], source.number, Passes()).rgba if file.suffix.lower() == ".exr" else (
-                stills.read(file)
+            image = (
+                _read([file], source.number, Passes()).rgba
+                if file.suffix.lower() == ".exr"
+                else (stills.read(file))
             )
             plane = stills.srgb(image[..., 0]) if file.suffix.lower() != ".exr" else image[..., 0]
             if plane.shape != size:
-                raise InputError(f"{file}: mask must be {size[1]} x {size[0]} like "
-                                 f"{source.path.name}, got {plane.shape[1]} x {plane.shape[0]}")  # fmt: skip
+                raise InputError(
+                    f"{file}: mask must be {size[1]} x {size[0]} like "
+                    f"{source.path.name}, got {plane.shape[1]} x {plane.shape[0]}"
+                )
             return plane.astype(np.float32)
         try:
             return layers.mask(source.channels, source.attributes, wanted)
@@ -312,138 +341,3 @@ def _read(paths: list[Path], number: int, passes: Passes) -> Source:
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return Source(number, path, file, channels, attributes, color)
-
-
-# ---- writing --------------------------------------------------------------------------------
-
-
-def replace_file(path: Path, data: bytes) -> None:
-    """Put `data` at `path`: all of it under a temporary name, then renamed.
-
-    Raises OSError, and then nothing has changed.
-    """
-    temporary = temporary_name(path)
-    try:
-        with open(temporary, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-
-
-def temporary_name(path: Path) -> Path:
-    """Where a file is written before it gets its name: beside it, always the same."""
-    return path.with_name(f".{path.name}.part")
-
-
-class Output:
-    """Where results go: a pattern of pictures, one picture, or a video.
-
-    `settings`: written into every file, and compared when a run is resumed.
-    """
-
-    def __init__(self, pattern: str | Path, *, settings: dict, numbers: list[int], bits: int = 8,
-                 fps: Fraction = Fraction(24), overwrite: bool = False, resume: bool = False):  # fmt: skip
-        self.pattern, self.bits, self.numbers = Path(pattern), bits, numbers
-        self.settings = json.dumps(settings, sort_keys=True)
-        suffix = self.pattern.suffix.lower()
-        self._video: video.Video | None = None
-        self._abandoned = False
-        if suffix not in (".exr", *stills.SUFFIXES, *video.SUFFIXES):
-            known = ", ".join((".exr", *stills.SUFFIXES, *video.SUFFIXES))
-            raise InputError(f"output {pattern}: the name must end in one of {known}")
-        if bits not in (8, 16) or (bits == 16 and suffix in (".jpg", ".jpeg")):
-            raise InputError(f"bits must be 8 or 16 (JPEG: 8), got {bits}")
-        is_video = suffix in video.SUFFIXES
-        if is_video and resume:
-            raise InputError("--resume continues frame files; a video starts anew")
-        if not is_video and len(numbers) > 1 and not is_pattern(pattern):
-            raise InputError(f"output {pattern}: {len(numbers)} frames need a pattern such as out.####.exr")
-        self._prepare_folder()
-        paths = [self.pattern] if is_video else [self.path(n) for n in numbers]
-        there = [p for p in paths if p.exists()]
-        if there and not (overwrite or resume):
-            more = f" and {len(there) - 1} more" if len(there) > 1 else ""
-            raise InputError(f"{there[0]}{more} exists; --overwrite replaces it"
-                             + ("" if is_video else ", --resume keeps what is done"))  # fmt: skip
-        for path in paths:
-            temporary_name(path).unlink(missing_ok=True)
-        if is_video:
-            self._video = video.Video(
-                self.pattern, temporary_name(self.pattern), fps, self.settings
-            )
-
-    def _prepare_folder(self) -> None:
-        folder = self.pattern.parent
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"output folder {folder}: {error.strerror}") from None
-        if not os.access(folder, os.W_OK | os.X_OK):
-            raise InputError(f"output folder {folder}: not writable")
-
-    def path(self, number: int) -> Path:
-        """The file that frame `number` goes to."""
-        return self.pattern if self._video else frame_path(self.pattern, number)
-
-    def done(self, number: int, inputs: list[Path]) -> bool:
-        """Whether frame `number` is there, newer than its inputs, with the same settings."""
-        path = self.path(number)
-        try:
-            written = path.stat().st_mtime_ns
-            if any(p.stat().st_mtime_ns > written for p in inputs):
-                return False
-            if path.suffix.lower() == ".exr":
-                header = exr.read(path, header_only=True)
-                return header.parts[0].attributes.get(SETTINGS) == self.settings
-            return stills.settings_of(path) == self.settings
-        except (OSError, InputError):
-            return False
-
-    def write(self, result: np.ndarray, source: Source) -> None:
-        """Write one frame: into an EXR with all the other layers of `source`, if it is one."""
-        if self._abandoned:
-            return
-        if self._video is not None:
-            self._video.add(result)
-            return
-        path = self.path(source.number)
-        if path.suffix.lower() == ".exr":
-            data = exr.encode(_with_result(source, result, self.settings))
-        else:
-            data = stills.encode(result, path.suffix, self.bits, self.settings)
-        replace_file(path, data)
-
-    def close(self) -> None:
-        """Finish a video; pictures are finished one by one."""
-        if self._video is not None:
-            self._video.close()
-
-    def abandon(self) -> None:
-        """After an interruption or an error: leave no unfinished file."""
-        self._abandoned = True
-        if self._video is not None:
-            self._video.abandon()
-        else:
-            for number in self.numbers:
-                temporary_name(self.path(number)).unlink(missing_ok=True)
-
-
-def _with_result(source: Source, result: np.ndarray, settings: str) -> exr.Exr:
-    """The source's file with the picture replaced and the settings added."""
-    if source.file is None:
-        return exr.new(result, {SETTINGS: settings})
-    new = {name: result[..., i] for i, name in enumerate(source.color)}
-    parts = [replace(p, channels=dict(p.channels), attributes=dict(p.attributes))
-             for p in source.file.parts]  # fmt: skip
-    parts[0].attributes[SETTINGS] = settings
-    twins = dict(zip(map(id, source.file.parts), parts, strict=True))
-    for full, part, name in source.file.places():
-        if full in new:
-            kind = part.channels[name].dtype
-            half = kind == np.float16
-            twins[id(part)].channels[name] = exr.to_half(new[full]) if half else new[full].astype(kind)
-    return exr.Exr(source.path, parts)

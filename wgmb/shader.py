@@ -74,9 +74,7 @@ class Source:
 
     def entry_points(self) -> list[str]:
         """Names of the compute entry points."""
-        return re.findall(
-            r"@compute\s+@workgroup_size\([^)]*\)\s+fn (\w+)", self.text
-        )
+        return re.findall(r"@compute\s+@workgroup_size\([^)]*\)\s+fn (\w+)", self.text)
 
     def with_texels(self, **formats: str) -> Source:
         """The same shader with other texel formats in its aliases, as `Output="rgba16float"`."""
@@ -130,7 +128,11 @@ def _array(item_kind: str, count: str, kind: str, text: str) -> tuple[np.dtype, 
     item, align = layout(item_kind, text)
     if item.itemsize % align:
         raise ShaderError(f"{kind}: elements would need padding, use vec4")
-    n = count.rstrip("u") if count.rstrip("u").isdigit() else Source(text, (("shader", 1),)).constant(count)
+    n = (
+        count.rstrip("u")
+        if count.rstrip("u").isdigit()
+        else Source(text, (("shader", 1),)).constant(count)
+    )
     return np.dtype((item, (int(n),))), align
 
 

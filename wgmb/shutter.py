@@ -95,15 +95,12 @@ class Shutter:
     def span(self) -> tuple[float, float]:
         """When the shutter opens and closes [frame intervals]."""
         length = self.degrees / 360
-        if isinstance(self.phase, str):
-            middle = PHASES[self.phase] * length
-        else:
-            middle = float(self.phase)
+        middle = PHASES[self.phase] * length if isinstance(self.phase, str) else self.phase
         return middle - length / 2, middle + length / 2
 
     @property
     def delay(self) -> tuple[float, float]:
-        """Delay of the right edge against the left, the bottom against the top [frame intervals]."""
+        """Delay of the right edge after the left, the bottom after the top [frame intervals]."""
         x, y = ROLLING[self.rolling] if self.rolling else (0, 0)
         return x * self.rolling_duration, y * self.rolling_duration
 

@@ -11,11 +11,14 @@ import struct
 import zlib
 from fractions import Fraction
 from pathlib import Path
+from typing import cast
 
 import av
 import imageio.v3 as iio
 import numpy as np
 import tifffile
+from av.container import InputContainer
+from av.error import FFmpegError
 
 from .errors import InputError
 
@@ -40,9 +43,20 @@ def read(path: str | Path) -> np.ndarray:
             samples = tifffile.imread(io.BytesIO(data))
         else:
             samples = iio.imread(data, extension=path.suffix.lower())
-    except (OSError, ValueError, IndexError, KeyError, TypeError, struct.error, MemoryError,
-            SyntaxError, StopIteration, RuntimeError, av.error.FFmpegError,
-            tifffile.TiffFileError) as error:  # fmt: skip
+    except (
+        OSError,
+        ValueError,
+        IndexError,
+        KeyError,
+        TypeError,
+        struct.error,
+        MemoryError,
+        SyntaxError,
+        StopIteration,
+        RuntimeError,
+        FFmpegError,
+        tifffile.TiffFileError,
+    ) as error:
         lines = str(error).splitlines() or [type(error).__name__]
         raise InputError(f"{path}: not a readable picture: {lines[0]}") from None
     return _to_linear(path, samples)
@@ -54,13 +68,17 @@ def _read_png(data: bytes) -> np.ndarray:
     width, height = struct.unpack(">II", data[16:24])
     if width * height > _MOST_PIXELS:
         raise ValueError(f"{width} x {height} pixels")
-    with av.open(io.BytesIO(data), format="png_pipe") as container:
+    with cast(InputContainer, av.open(io.BytesIO(data), format="png_pipe")) as container:
         frame = next(container.decode(video=0))
     name = frame.format.name
     alpha = name.startswith(("rgba", "ya", "pal8"))
     deep = "16" in name or "48" in name or "64" in name
-    wanted = {(False, False): "rgb24", (False, True): "rgb48le",
-              (True, False): "rgba", (True, True): "rgba64le"}[alpha, deep]  # fmt: skip
+    wanted = {
+        (False, False): "rgb24",
+        (False, True): "rgb48le",
+        (True, False): "rgba",
+        (True, True): "rgba64le",
+    }[alpha, deep]
     return frame.to_ndarray(format=wanted)
 
 
@@ -89,15 +107,28 @@ def encode(rgba: np.ndarray, suffix: str, bits: int, settings: str) -> bytes:
     suffix = suffix.lower()
     if suffix in (".jpg", ".jpeg"):
         samples = to_display(rgba[..., :3], 8)
-        return iio.imwrite("<bytes>", samples, extension=".jpg", quality=95, subsampling=0,
-                           comment=settings.encode())  # fmt: skip
+        return iio.imwrite(
+            "<bytes>",
+            samples,
+            extension=".jpg",
+            quality=95,
+            subsampling=0,
+            comment=settings.encode(),
+        )
     samples = to_display(rgba, bits)
     if suffix == ".png":
         return _with_text(_png(samples), settings)
     stream = io.BytesIO()
     extra = ["unassalpha"] if samples.shape[2] == 4 else None
-    tifffile.imwrite(stream, samples, photometric="rgb", extrasamples=extra, compression="zlib",
-                     description=f"{KEYWORD} {settings}", metadata=None)  # fmt: skip
+    tifffile.imwrite(
+        stream,
+        samples,
+        photometric="rgb",
+        extrasamples=extra,
+        compression="zlib",
+        description=f"{KEYWORD} {settings}",
+        metadata=None,
+    )
     return stream.getvalue()
 
 
@@ -118,8 +149,12 @@ def settings_of(path: Path) -> str | None:
 
 
 def _png(samples: np.ndarray) -> bytes:
-    kinds = {(3, 1): ("rgb24", "rgb24"), (4, 1): ("rgba", "rgba"),
-             (3, 2): ("rgb48le", "rgb48be"), (4, 2): ("rgba64le", "rgba64be")}  # fmt: skip
+    kinds = {
+        (3, 1): ("rgb24", "rgb24"),
+        (4, 1): ("rgba", "rgba"),
+        (3, 2): ("rgb48le", "rgb48be"),
+        (4, 2): ("rgba64le", "rgba64be"),
+    }
     given, stored = kinds[samples.shape[2], samples.itemsize]
     frame = av.VideoFrame.from_ndarray(samples, format=given)
     codec = av.CodecContext.create("png", "w")

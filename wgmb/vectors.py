@@ -35,29 +35,56 @@ class Convention:
 CONVENTIONS: dict[str, Convention] = {
     "blender": Convention(
         "Vector pass: pixels, y up; XY = P(n-1) - P(n), ZW = P(n) - P(n+1)",
-        ("vector",), (0, 1), (2, 3), (1, -1), (-1, 1), ("x", "y", "z", "w"),
+        ("vector",),
+        (0, 1),
+        (2, 3),
+        (1, -1),
+        (-1, 1),
+        ("x", "y", "z", "w"),
     ),
     "nuke": Convention(
         "forward.u/v to the next, backward.u/v to the previous frame: pixels, y up",
-        ("forward", "backward"), (0, 1), (0, 1), (1, -1), (1, -1),
+        ("forward", "backward"),
+        (0, 1),
+        (0, 1),
+        (1, -1),
+        (1, -1),
     ),
     "arnold": Convention(
         "motionvector: pixels to the next frame, y up; scale by 2 if rendered for half a frame",
-        ("motionvector", "motion_vector"), None, (0, 1), (1, -1), (1, -1),
+        ("motionvector", "motion_vector"),
+        None,
+        (0, 1),
+        (1, -1),
+        (1, -1),
     ),
     "vray": Convention(
         "velocity: pixels to the next frame, y up, 0.5 added; scale by 2 x max velocity if clamped",
-        ("velocity", "vrayvelocity"), None, (0, 1), (1, -1), (1, -1), ("r", "g"), 0.5,
+        ("velocity", "vrayvelocity"),
+        None,
+        (0, 1),
+        (1, -1),
+        (1, -1),
+        ("r", "g"),
+        0.5,
     ),
     "rsmb": Convention(
         "0..1, 0.5 is no motion, y up, to the next frame; scale by 2 x MaxDisplace",
-        ("rsmb", "mv2dtoxik", "mv2d", "lm_2dmv"), None, (0, 1), (1, -1), (1, -1), (), 0.5,
+        ("rsmb", "mv2dtoxik", "mv2d", "lm_2dmv"),
+        None,
+        (0, 1),
+        (1, -1),
+        (1, -1),
+        (),
+        0.5,
     ),
     "plain": Convention(
         "to_prev.x/y, to_next.x/y or velocity.x/y (to the next frame): pixels, y down",
-        ("to_prev", "to_next", "velocity", "motion", "motionvectors"), (0, 1), (0, 1),
+        ("to_prev", "to_next", "velocity", "motion", "motionvectors"),
+        (0, 1),
+        (0, 1),
     ),
-}  # fmt: skip
+}
 _BACKWARD = ("backward", "to_prev")
 _MOVING = 1.0  # [px] slower pixels say nothing about a convention
 _PROBES = 20_000  # pixels compared
@@ -201,32 +228,48 @@ def detect(color, motion: Motion, prev_color, next_color, vectors: Vectors) -> F
     color: (height, width, 3 or 4); neighbours alike, or None. Every alternative (flipped,
     twice, half) warps the neighbours; the one that leaves the least difference is meant.
     """
-    pairs = [(m, c) for m, c in zip(motion, (prev_color, next_color), strict=True)
-             if m is not None and c is not None and c.shape[:2] == color.shape[:2]]  # fmt: skip
+    pairs = [
+        (m, c)
+        for m, c in zip(motion, (prev_color, next_color), strict=True)
+        if m is not None and c is not None and c.shape[:2] == color.shape[:2]
+    ]
     if not pairs and prev_color is not None and motion[1] is not None:
         pairs = [(-motion[1], prev_color)]
     if not pairs:
         return Finding(vectors, False, f"{vectors}, by name (no neighbouring frame to test it on)")
     at = _moving_pixels(pairs)
     if len(at) < 16:
-        return Finding(vectors, False, f"{vectors}, by name (nothing moves, so it cannot be tested)")
+        return Finding(
+            vectors, False, f"{vectors}, by name (nothing moves, so it cannot be tested)"
+        )
     still = _difference(color, pairs, at, 0.0, "")
-    left = {(flip, scale): _difference(color, pairs, at, scale, flip)
-            for flip, scale in _ALTERNATIVES}  # fmt: skip
-    least = min(left.values())  # of equals (nothing moves along y, say) the plainest
-    best = min((k for k, d in left.items() if d <= 1.02 * least),
-               key=lambda k: (len(_combine(vectors.flip, k[0])), k != ("", 1.0), left[k]))  # fmt: skip
+    left = {
+        (flip, scale): _difference(color, pairs, at, scale, flip) for flip, scale in _ALTERNATIVES
+    }
+    least = min(left.values())
+    # Of readings that do as well (nothing moves along y, say) the plainest.
+    best = min(
+        (k for k, d in left.items() if d <= 1.02 * least),
+        key=lambda k: (len(_combine(vectors.flip, k[0])), k != ("", 1.0), left[k]),
+    )
     stated = left["", 1.0]
     if least > 0.9 * still:
-        return Finding(vectors, False, f"{vectors}, by name; no reading of these vectors explains "
-                       "the neighbouring frame: check them")  # fmt: skip
-    share = "the neighbouring frame differs by {{:.0%}} of what it differs unmoved"
+        return Finding(
+            vectors,
+            False,
+            f"{vectors}, by name; no reading of these vectors explains "
+            "the neighbouring frame: check them",
+        )
     if best == ("", 1.0) or left[best] > _CLEARLY * stated:
         return Finding(vectors, True, f"{vectors}, tested: {_LEFT.format(stated / still)}")
     flip, scale = best
     meant = replace(vectors, flip=_combine(vectors.flip, flip), scale=vectors.scale * scale)
-    return Finding(meant, True, f"{meant}, because with {vectors} "
-                   f"{_LEFT.format(stated / still)}, so with {left[best] / still:.0%}")  # fmt: skip
+    return Finding(
+        meant,
+        True,
+        f"{meant}, because with {vectors} "
+        f"{_LEFT.format(stated / still)}, so with {left[best] / still:.0%}",
+    )
 
 
 def _combine(a: str, b: str) -> str:
@@ -235,12 +278,11 @@ def _combine(a: str, b: str) -> str:
 
 def _moving_pixels(pairs) -> np.ndarray:
     """Up to _PROBES pixels (y, x) that move in every given direction."""
-    moving = None
+    moving = np.ones(pairs[0][0].shape[:2], bool)
     with np.errstate(all="ignore"):
         for motion, _ in pairs:
             speed = np.hypot(motion[..., 0], motion[..., 1])
-            this = (speed > _MOVING) & np.isfinite(speed)
-            moving = this if moving is None else moving & this
+            moving &= (speed > _MOVING) & np.isfinite(speed)
     at = np.argwhere(moving)
     chosen = np.random.default_rng(0).permutation(len(at))[:_PROBES]
     return at[chosen]
@@ -272,5 +314,6 @@ def _bilinear(image: np.ndarray, where: np.ndarray) -> np.ndarray:
     right, below = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
     u, v = (x - left)[:, None], (y - top)[:, None]
     rgb = image[..., :3]
-    return ((1 - v) * ((1 - u) * rgb[top, left] + u * rgb[top, right])
-            + v * ((1 - u) * rgb[below, left] + u * rgb[below, right]))  # fmt: skip
+    return (1 - v) * ((1 - u) * rgb[top, left] + u * rgb[top, right]) + v * (
+        (1 - u) * rgb[below, left] + u * rgb[below, right]
+    )

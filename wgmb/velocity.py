@@ -34,10 +34,13 @@ class VelocityPass:
             ADDED=object_motion,
         )
         uniform, table = self._matrices(given.size, camera)
-        bound = {name: view or empty["object" if name == "object" else "float"]
-                 for name, view in views.items()}
-        kernel.run(encoder, "main", given, velocity=uniform, reprojections=table, motion=motion,
-                   **bound)
+        bound = {
+            name: view or empty["object" if name == "object" else "float"]
+            for name, view in views.items()
+        }
+        kernel.run(
+            encoder, "main", given, velocity=uniform, reprojections=table, motion=motion, **bound
+        )
 
     def _matrices(self, size: tuple[int, int], camera: Reprojections | None):
         source = shader.load(FILE)

@@ -43,5 +43,13 @@ class Tap:
             WEIGHTED=inputs.weight is not None,
             **self._constants,
         )
-        kernel.run(encoder, "main", inputs.given, color=inputs.color, motion=inputs.motion,
-                   weight=inputs.weight or inputs.none, linear=inputs.linear, output=output)
+        kernel.run(
+            encoder,
+            "main",
+            inputs.given,
+            color=inputs.color,
+            motion=inputs.motion,
+            weight=inputs.weight or inputs.none,
+            linear=inputs.linear,
+            output=output,
+        )

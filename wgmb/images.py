@@ -1,0 +1,83 @@
+"""Images on the GPU: textures kept from frame to frame, arrays up and down."""
+
+from __future__ import annotations
+
+import numpy as np
+import wgpu
+
+from .gpu import check_size, submit
+
+_HALF_MAX = 65504.0  # largest finite f16
+_USAGE = wgpu.TextureUsage
+_NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4"}
+_CHANNELS = {"r": 1, "rg": 2, "rgba": 4}
+
+
+def numpy_of(format: str) -> tuple[np.dtype, int]:
+    """Numpy type and number of channels of a texture format such as `rgba16float`."""
+    letters, _, _ = format.partition("32" if "32" in format else "16")
+    return np.dtype(_NUMPY[format[len(letters) :]]), _CHANNELS[letters]
+
+
+class Images:
+    """Textures kept from frame to frame under a name, remade when size or format changes."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self.device = device
+        self._textures: dict[str, wgpu.GPUTexture] = {}
+        self._staging: wgpu.GPUBuffer | None = None
+
+    def texture(self, name: str, size: tuple[int, int], format: str) -> wgpu.GPUTexture:
+        """The texture called `name`; its contents are whatever was last put there."""
+        kept = self._textures.get(name)
+        if kept is None or kept.size[:2] != tuple(size) or kept.format != format:
+            check_size(self.device, *size)
+            usage = _USAGE.TEXTURE_BINDING | _USAGE.COPY_DST | _USAGE.COPY_SRC
+            if format.endswith("float") and format.startswith(("rgba", "r32")):
+                usage |= _USAGE.STORAGE_BINDING
+            kept = self.device.create_texture(
+                label=name, size=(*size, 1), format=format, usage=usage
+            )
+            self._textures[name] = kept
+        return kept
+
+    def view(self, name: str, size: tuple[int, int], format: str) -> wgpu.GPUTextureView:
+        """A view of the texture called `name`."""
+        return self.texture(name, size, format).create_view()
+
+    def upload(self, name: str, image: np.ndarray, format: str) -> wgpu.GPUTextureView:
+        """Put `image` (height, width[, channels]) into the texture called `name`."""
+        height, width = image.shape[:2]
+        kind, channels = numpy_of(format)
+        if kind == np.float16 and image.dtype != np.float16:
+            image = np.where(np.isinf(image), image, np.clip(image, -_HALF_MAX, _HALF_MAX))
+        image = np.ascontiguousarray(image, kind)
+        texture = self.texture(name, (width, height), format)
+        layout = {"bytes_per_row": width * channels * kind.itemsize}
+        self.device.queue.write_texture({"texture": texture}, image, layout, (width, height, 1))
+        return texture.create_view()
+
+    def download(self, encoder, texture: wgpu.GPUTexture) -> np.ndarray:
+        """Submit `encoder` and return `texture` as a new (height, width, channels) array."""
+        width, height, _ = texture.size
+        kind, channels = numpy_of(texture.format)
+        row = width * channels * kind.itemsize
+        pitch = -(-row // 256) * 256  # rows in a buffer start at multiples of 256 bytes
+        if self._staging is None or self._staging.size != pitch * height:
+            usage = wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.MAP_READ
+            self._staging = self.device.create_buffer(
+                label="readback", size=pitch * height, usage=usage
+            )
+        encoder.copy_texture_to_buffer(
+            {"texture": texture},
+            {"buffer": self._staging, "bytes_per_row": pitch, "rows_per_image": height},
+            (width, height, 1),
+        )
+        submit(self.device, encoder)
+        self._staging.map_sync(wgpu.MapMode.READ)
+        try:
+            data = np.asarray(self._staging.read_mapped(copy=False)).view(np.uint8)
+            rows = data.reshape(height, pitch)[:, :row]
+            return rows.copy().view(kind).reshape(height, width, channels)
+        finally:
+            self._staging.unmap()

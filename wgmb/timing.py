@@ -1,0 +1,51 @@
+"""GPU time of every pass, by timestamp queries."""
+
+from __future__ import annotations
+
+import numpy as np
+import wgpu
+
+from .gpu import SOFTWARE, submit
+
+
+class Timing:
+    """GPU time of every pass of one frame, by timestamp queries.
+
+    Software adapters report times that are wrong after some commands; there, wall clock
+    around a submit is the only honest clock, and `Timing.usable` says so.
+    """
+
+    MOST = 64  # passes a frame
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self.device, self.labels = device, []
+        self.queries = device.create_query_set(type="timestamp", count=2 * self.MOST)
+
+    @staticmethod
+    def usable(device: wgpu.GPUDevice) -> bool:
+        """Whether timestamps of this device can be believed."""
+        hardware = device.adapter_info["adapter_type"] != SOFTWARE
+        return hardware and "timestamp-query" in device.features
+
+    def of(self, label: str) -> dict:
+        """The `timestamp_writes` of the pass called `label`."""
+        first = 2 * len(self.labels)
+        self.labels.append(label)
+        return {
+            "query_set": self.queries,
+            "beginning_of_pass_write_index": first,
+            "end_of_pass_write_index": first + 1,
+        }
+
+    def read(self) -> dict[str, float]:
+        """Seconds per pass, after the work was submitted; passes of one name are added up."""
+        usage = wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
+        buffer = self.device.create_buffer(size=16 * len(self.labels), usage=usage)
+        encoder = self.device.create_command_encoder()
+        encoder.resolve_query_set(self.queries, 0, 2 * len(self.labels), buffer, 0)
+        submit(self.device, encoder)
+        stamps = np.asarray(self.device.queue.read_buffer(buffer)).view("<u8").reshape(-1, 2)
+        seconds: dict[str, float] = {}
+        for label, (begin, end) in zip(self.labels, stamps, strict=True):
+            seconds[label] = seconds.get(label, 0.0) + (int(end) - int(begin)) * 1e-9
+        return seconds
