@@ -264,6 +264,49 @@ def devices() -> int:
     return DONE
 
 
+@app.command
+def bench(
+    *,
+    method: str = "tap",
+    samples: int = 16,
+    size: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    rounds: int = 9,
+    adapter: str | None = None,
+) -> int:
+    """Time a method on this machine: median milliseconds a frame.
+
+    Example: wgmb bench --size 1920x1080 3840x2160 --samples 16
+
+    Parameters
+    ----------
+    size
+        Pictures to time it on; 1920x1080 by default.
+    rounds
+        How often everything is done.
+    """
+    from . import bench as measure
+
+    blur = Blur(method, samples=samples, device=adapter)
+    sys.stdout.write(f"{blur.device.adapter.summary}, {method}, {samples} samples\n")
+    for text in size or ["1920x1080"]:
+        width, height = _size(text)
+        found = measure.bench(blur, width, height, rounds)
+        sys.stdout.write(f"{width} x {height}\n")
+        for name, milliseconds in found.items():
+            each = 1e6 * milliseconds / (width * height)
+            sys.stdout.write(f"  {name:24}{milliseconds:9.2f} ms {each:8.1f} ns a pixel\n")
+        if "numba" in found:
+            sys.stdout.write(f"  gpu / numba{found['gpu'] / found['numba']:22.2f}\n")
+    return DONE
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if not (width.isdigit() and height.isdigit() and int(width) and int(height)):
+        raise InputError(f"size must be like 1920x1080, got {text!r}")
+    return int(width), int(height)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     _own_streams()

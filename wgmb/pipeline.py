@@ -266,6 +266,7 @@ class Blur:
             motion=motion,
             camera=camera,
             object_motion=object_motion,
+            limited=self.max_blur is not None,
             to_prev=to_prev,
             to_next=to_next,
             depth=depth,

@@ -1,7 +1,7 @@
 """Blur a whole sequence: reading, the GPU and writing at the same time.
 
-Three threads pass frames on, at most one waiting between two of them, so that memory does
-not depend on the length of the sequence. A frame that fails is reported and passed over.
+Three threads pass frames on. At most IN_FLIGHT of them are in memory, however long the
+sequence. A frame that fails is reported and passed over.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ class Report:
     bad: dict[int, dict[str, int]] = field(default_factory=dict)  # pixels not finite, by input
 
 
+IN_FLIGHT = 3  # frames: one being read, one on the GPU, one being written
+
 Progress = Callable[[int, str], None]
 """Called with a frame's number and "done", "skipped" or "failed"."""
 
@@ -37,19 +39,12 @@ class _StopError(Exception):
 
 
 class _Handover:
-    """A queue of one place whose both ends notice a stop."""
+    """A queue whose end notices a stop."""
 
     def __init__(self, stop: threading.Event):
-        self._queue: queue.Queue = queue.Queue(maxsize=1)
+        self._queue: queue.SimpleQueue = queue.SimpleQueue()
         self._stop = stop
-
-    def put(self, item) -> None:
-        while not self._stop.is_set():
-            try:
-                return self._queue.put(item, timeout=0.05)
-            except queue.Full:
-                continue
-        raise _StopError
+        self.put = self._queue.put
 
     def get(self):
         while not self._stop.is_set():
@@ -76,9 +71,13 @@ def blur_sequence(
     """
     report, stop, tell = Report(), threading.Event(), progress or (lambda number, what: None)
     to_blur, to_write = _Handover(stop), _Handover(stop)
+    places = _Handover(stop)
+    for _ in range(IN_FLIGHT):
+        places.put(None)
     crash: list[BaseException] = []
 
     def fail(number: int, error: BaseException) -> None:
+        places.put(None)
         report.failed[number] = " ".join(str(error).split()) or type(error).__name__
         tell(number, "failed")
 
@@ -88,9 +87,11 @@ def blur_sequence(
                 report.skipped.append(number)
                 tell(number, "skipped")
                 continue
+            places.get()
             try:
                 source = clip.source(number)
                 to_blur.put((source, clip.frame(source)))
+                del source
             except (Error, OSError, MemoryError) as error:
                 fail(number, error)
             finally:
@@ -105,8 +106,10 @@ def blur_sequence(
             except (Error, OSError, MemoryError, RuntimeError) as error:
                 fail(source.number, error)
             else:
+                places.put(None)
                 report.done.append(source.number)
                 tell(source.number, "done")
+            del item, source, result
 
     def guarded(work: Callable[[], None]) -> None:
         try:

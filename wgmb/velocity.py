@@ -17,7 +17,9 @@ class VelocityPass:
     def __init__(self, device: wgpu.GPUDevice):
         self.device = device
 
-    def encode(self, encoder, given: gpu.Given, *, empty, motion, camera, object_motion, **views):
+    def encode(
+        self, encoder, given: gpu.Given, *, empty, motion, camera, object_motion, limited, **views
+    ):
         """Record motion (to_prev, to_next) from those of `views` that are not None.
 
         views: to_prev, to_next, depth, object, scale; `empty` stands in for the others.
@@ -31,6 +33,7 @@ class VelocityPass:
             CAMERA=camera is not None,
             OBJECTS=camera is not None and "object" in there,
             SCALED="scale" in there,
+            LIMITED=limited,
             ADDED=object_motion,
         )
         uniform, table = self._matrices(given.size, camera)

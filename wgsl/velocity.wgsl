@@ -31,6 +31,7 @@ override NEXT: bool = false;
 override CAMERA: bool = false;
 override OBJECTS: bool = false;
 override SCALED: bool = false;
+override LIMITED: bool = false;     // frame.max_blur
 override ADDED: bool = false;       // vectors leave the camera's motion out: add it
 
 const PLANAR: u32 = 0u;             // distance along the view axis of a perspective camera
@@ -62,7 +63,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let factor = textureLoad(scale, id.xy, 0).x;
         way *= select(0.0, factor, is_finite(factor));
     }
-    textureStore(motion, id.xy, clamped(way));
+    if LIMITED { way = limited(way); }
+    textureStore(motion, id.xy, way);
 }
 
 /// To where the depth at `px` puts its content in the previous and the next frame [px].
@@ -98,7 +100,7 @@ fn to_pixels(clip: vec4f, ndc: vec2f) -> vec2f {
 }
 
 /// The motion shortened so that the streak over the exposure is at most frame.max_blur.
-fn clamped(way: vec4f) -> vec4f {
+fn limited(way: vec4f) -> vec4f {
     let path = path_of(way);
     let streak = distance(displacement(path, shutter.span.x), displacement(path, shutter.span.y));
     return way * min(1.0, frame.max_blur / max(streak, 1e-6));

@@ -36,13 +36,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let shift = frame.jitter * (pixel_noise(id.xy) - 0.5);
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
-    let way = Path(path.velocity * texel * moving, path.curvature * texel * moving);
+    let back = Path(-path.velocity * texel * moving, path.curvature * texel * moving);  // in time
     var sum = vec4f(0.0);
     var total = 0.0;
     for (var i = 0u; i < count; i++) {
-        var t = -shutter_time(i, shift) - delay;
-        if PUBLISHED { t = 0.5 * f32(i) * share; }
-        let at = uv + displacement(way, t);
+        var t = shutter_time(i, shift, delay);
+        if PUBLISHED { t = -0.5 * f32(i) * share; }
+        let at = uv + displacement(back, t);
         sum += share * textureSampleLevel(color, linear, at, 0.0);
         if WEIGHTED { total += share * textureSampleLevel(weight, linear, at, 0.0).x; }
     }

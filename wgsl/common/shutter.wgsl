@@ -14,10 +14,11 @@ struct Shutter {
 override EVEN: bool = false;    // a box: all shares are equally long, and no table is needed
 
 /// Time of sample `i` of frame.samples; `shift` in -0.5..0.5 moves it within its share.
-fn shutter_time(i: u32, shift: f32) -> f32 {
-    if EVEN { return shutter.span.x + (f32(i) + (0.5 + shift)) * shutter.step; }
+fn shutter_time(i: u32, shift: f32, delay: f32) -> f32 {
+    // Everything but `i` is in the bracket, which a compiler takes out of the loop.
+    if EVEN { return (shutter.span.x + (0.5 + shift) * shutter.step + delay) + f32(i) * shutter.step; }
     let stratum = strata[i];
-    return stratum.x + stratum.y * shift;
+    return stratum.x + stratum.y * shift + delay;
 }
 
 /// By how much later than the middle of the image the pixel at `x` [px] is exposed.

@@ -1,0 +1,154 @@
+"""How fast a method is: GPU work alone, transfers apart, beside the same filter in numba.
+
+Figures of different days or machines say little; ratios of one run do. Candidates take
+turns, and medians are reported.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+
+import numpy as np
+import wgpu
+
+from . import gpu
+from .errors import InputError
+from .frame import Frame
+from .images import Images
+from .pipeline import Blur
+from .timing import Timing
+
+MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
+
+
+def synthetic_frame(width: int, height: int) -> Frame:
+    """Noise under a camera that turns and comes closer; every pixel moves."""
+    rng = np.random.default_rng(0)
+    color = rng.random((height, width, 4), np.float32)
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    x, y = (x - width / 2) / width, (y - height / 2) / width
+    motion = np.stack([x - 0.5 * y + 0.2, y + 0.5 * x + 0.05], axis=2)
+    motion *= MEAN_SPEED / np.hypot(motion[..., 0], motion[..., 1]).mean()
+    return Frame(color, motion, -motion)
+
+
+def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, float]:
+    """Median milliseconds by name: `gpu` (all passes), every pass where the adapter can time
+    them, `upload`, `readback`, `call` (arrays in, array out), and `numba` for tap if numba is
+    installed.
+    """
+    frame = synthetic_frame(width, height)
+    images, device = Images(blur.device), blur.device
+    color = images.upload("color", frame.color, gpu.texel(device, 4))
+    to_next = images.upload("to_next", _motion(frame, "to_next"), "rg32float")
+    to_prev = images.upload("to_prev", _motion(frame, "to_prev"), "rg32float")
+    output = images.texture("output", frame.size, blur.output)
+    token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
+    passes: dict[str, list[float]] = {}
+
+    def work() -> None:
+        timing = Timing(device) if Timing.usable(device) else None
+        encoder = device.create_command_encoder()
+        view = output.create_view()
+        blur.encode(
+            encoder,
+            size=frame.size,
+            color=color,
+            to_next=to_next,
+            to_prev=to_prev,
+            output=view,
+            timing=timing,
+        )
+        gpu.submit(device, encoder)
+        device.queue.read_buffer(token)  # waits for the work
+        for label, seconds in timing.read().items() if timing else ():
+            passes.setdefault(label, []).append(seconds)
+
+    def upload() -> None:
+        images.upload("color", frame.color, gpu.texel(device, 4))
+        images.upload("to_next", _motion(frame, "to_next"), "rg32float")
+        images.upload("to_prev", _motion(frame, "to_prev"), "rg32float")
+        gpu.submit(device, device.create_command_encoder())
+        device.queue.read_buffer(token)
+
+    def readback() -> None:
+        images.download(device.create_command_encoder(), output)
+
+    jobs: dict[str, Callable[[], object]] = {
+        "gpu": work,
+        "upload": upload,
+        "readback": readback,
+        "call": lambda: blur(frame),
+    }
+    if blur.method.name == "tap" and (peer := _numba_peer(frame, blur.samples)):
+        jobs["numba"] = peer
+    seconds = alternate(jobs, rounds)
+    return {k: 1e3 * statistics.median(v) for k, v in (seconds | passes).items()}
+
+
+def alternate(jobs: dict[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
+    """Seconds of every job in every round; all jobs take turns after one round for warmth."""
+    if rounds < 1:
+        raise InputError(f"rounds must be 1 or more, got {rounds}")
+    seconds: dict[str, list[float]] = {name: [] for name in jobs}
+    for job in jobs.values():
+        job()
+    for _ in range(rounds):
+        for name, job in jobs.items():
+            started = time.perf_counter()
+            job()
+            seconds[name].append(time.perf_counter() - started)
+    return seconds
+
+
+def _motion(frame: Frame, side: str) -> np.ndarray:
+    motion = getattr(frame, side)
+    assert motion is not None
+    return motion
+
+
+def _numba_peer(frame: Frame, samples: int) -> Callable[[], object] | None:
+    """The tap blur as one would write it for the CPU: curved paths, bilinear, all cores."""
+    try:
+        from numba import njit, prange
+    except ImportError:
+        return None
+
+    @njit(parallel=True, fastmath=True)
+    def tap(color, to_prev, to_next, times, out):  # pragma: no cover - compiled
+        height, width = color.shape[:2]
+        zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
+        right, bottom = np.float32(width - 1), np.float32(height - 1)
+        share = one / np.float32(times.size)
+        for y in prange(height):
+            for x in range(width):
+                ax = (to_next[y, x, 0] - to_prev[y, x, 0]) * half
+                bx = (to_next[y, x, 0] + to_prev[y, x, 0]) * half
+                ay = (to_next[y, x, 1] - to_prev[y, x, 1]) * half
+                by = (to_next[y, x, 1] + to_prev[y, x, 1]) * half
+                r, g, b, a = zero, zero, zero, zero
+                for k in range(times.size):
+                    t = times[k]
+                    u = min(max(np.float32(x) + (ax + bx * t) * t, zero), right)
+                    v = min(max(np.float32(y) + (ay + by * t) * t, zero), bottom)
+                    i, j = int(u), int(v)
+                    i1, j1 = min(i + 1, width - 1), min(j + 1, height - 1)
+                    u -= np.float32(i)
+                    v -= np.float32(j)
+                    w00, w10, w01, w11 = (one - u) * (one - v), u * (one - v), (one - u) * v, u * v
+                    p, q, s, t1 = color[j, i], color[j, i1], color[j1, i], color[j1, i1]
+                    r += p[0] * w00 + q[0] * w10 + s[0] * w01 + t1[0] * w11
+                    g += p[1] * w00 + q[1] * w10 + s[1] * w01 + t1[1] * w11
+                    b += p[2] * w00 + q[2] * w10 + s[2] * w01 + t1[2] * w11
+                    a += p[3] * w00 + q[3] * w10 + s[3] * w01 + t1[3] * w11
+                out[y, x, 0] = r * share
+                out[y, x, 1] = g * share
+                out[y, x, 2] = b * share
+                out[y, x, 3] = a * share
+
+    times = -(((np.arange(samples) + 0.5) / samples - 0.5) * 0.5).astype(np.float32)
+    out = np.empty_like(frame.color)
+    to_prev, to_next = _motion(frame, "to_prev"), _motion(frame, "to_next")
+    return lambda: tap(frame.color, to_prev, to_next, times, out)
