@@ -31,7 +31,7 @@ def synthetic_frame(width: int, height: int) -> Frame:
     x, y = (x - width / 2) / width, (y - height / 2) / width
     motion = np.stack([x - 0.5 * y + 0.2, y + 0.5 * x + 0.05], axis=2)
     motion *= MEAN_SPEED / np.hypot(motion[..., 0], motion[..., 1]).mean()
-    return Frame(color, motion, -motion)
+    return Frame(color, motion=np.concatenate([-motion, motion], axis=2))
 
 
 def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, float]:
@@ -42,8 +42,7 @@ def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, flo
     frame = synthetic_frame(width, height)
     images, device = Images(blur.device), blur.device
     color = images.upload("color", frame.color, gpu.texel(device, 4))
-    to_next = images.upload("to_next", _motion(frame, "to_next"), "rg32float")
-    to_prev = images.upload("to_prev", _motion(frame, "to_prev"), "rg32float")
+    motion = images.upload("motion", _motion(frame), "rgba32float")
     output = images.texture("output", frame.size, blur.output)
     token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
     passes: dict[str, list[float]] = {}
@@ -56,8 +55,7 @@ def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, flo
             encoder,
             size=frame.size,
             color=color,
-            to_next=to_next,
-            to_prev=to_prev,
+            motion=motion,
             output=view,
             timing=timing,
         )
@@ -68,8 +66,7 @@ def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, flo
 
     def upload() -> None:
         images.upload("color", frame.color, gpu.texel(device, 4))
-        images.upload("to_next", _motion(frame, "to_next"), "rg32float")
-        images.upload("to_prev", _motion(frame, "to_prev"), "rg32float")
+        images.upload("motion", _motion(frame), "rgba32float")
         gpu.submit(device, device.create_command_encoder())
         device.queue.read_buffer(token)
 
@@ -103,10 +100,9 @@ def alternate(jobs: dict[str, Callable[[], object]], rounds: int) -> dict[str, l
     return seconds
 
 
-def _motion(frame: Frame, side: str) -> np.ndarray:
-    motion = getattr(frame, side)
-    assert motion is not None
-    return motion
+def _motion(frame: Frame) -> np.ndarray:
+    assert frame.motion is not None
+    return frame.motion
 
 
 def _numba_peer(frame: Frame, samples: int) -> Callable[[], object] | None:
@@ -117,17 +113,17 @@ def _numba_peer(frame: Frame, samples: int) -> Callable[[], object] | None:
         return None
 
     @njit(parallel=True, fastmath=True)
-    def tap(color, to_prev, to_next, times, out):  # pragma: no cover - compiled
+    def tap(color, motion, times, out):  # pragma: no cover - compiled
         height, width = color.shape[:2]
         zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
         right, bottom = np.float32(width - 1), np.float32(height - 1)
         share = one / np.float32(times.size)
         for y in prange(height):
             for x in range(width):
-                ax = (to_next[y, x, 0] - to_prev[y, x, 0]) * half
-                bx = (to_next[y, x, 0] + to_prev[y, x, 0]) * half
-                ay = (to_next[y, x, 1] - to_prev[y, x, 1]) * half
-                by = (to_next[y, x, 1] + to_prev[y, x, 1]) * half
+                ax = (motion[y, x, 2] - motion[y, x, 0]) * half
+                bx = (motion[y, x, 2] + motion[y, x, 0]) * half
+                ay = (motion[y, x, 3] - motion[y, x, 1]) * half
+                by = (motion[y, x, 3] + motion[y, x, 1]) * half
                 r, g, b, a = zero, zero, zero, zero
                 for k in range(times.size):
                     t = times[k]
@@ -150,5 +146,4 @@ def _numba_peer(frame: Frame, samples: int) -> Callable[[], object] | None:
 
     times = -(((np.arange(samples) + 0.5) / samples - 0.5) * 0.5).astype(np.float32)
     out = np.empty_like(frame.color)
-    to_prev, to_next = _motion(frame, "to_prev"), _motion(frame, "to_next")
-    return lambda: tap(frame.color, to_prev, to_next, times, out)
+    return lambda: tap(frame.color, _motion(frame), times, out)

@@ -19,7 +19,7 @@ import numpy as np
 from .cameras import Reprojections
 from .errors import InputError
 
-_PLANES = ("depth", "keep", "scale")
+_CHANNELS = {"to_next": (2,), "to_prev": (2,), "motion": (4,), "depth": (), "keep": (), "scale": ()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +32,8 @@ class Frame:
     """(height, width, 2) float [px]."""
     to_prev: np.ndarray | None = None
     """(height, width, 2) float [px]."""
+    motion: np.ndarray | None = None
+    """(height, width, 4) float [px]: to_prev and to_next side by side, instead of the two."""
     depth: np.ndarray | None = None
     """(height, width) float [scene units], needed where motion comes from `camera`."""
     camera: Reprojections | None = None
@@ -54,10 +56,10 @@ class Frame:
         if color.ndim != 3 or color.shape[2] not in (3, 4) or 0 in color.shape:
             raise InputError(f"color must be (height, width, 3 or 4), got {color.shape}")
         object.__setattr__(self, "color", color)
-        for name in ("to_next", "to_prev", *_PLANES):
+        for name, channels in _CHANNELS.items():
             given = getattr(self, name)
             if given is not None:
-                want = color.shape[:2] if name in _PLANES else (*color.shape[:2], 2)
+                want = (*color.shape[:2], *channels)
                 object.__setattr__(self, name, _shaped(name, _float_array(name, given), want))
         if self.object_id is not None:
             ids = np.asarray(self.object_id)
@@ -70,7 +72,9 @@ class Frame:
             raise InputError("motion from a camera needs depth")
         if self.object_id is not None and self.camera is None:
             raise InputError("object_id needs the camera file that says how objects move")
-        for name in ("color", "to_next", "to_prev", "scale", "keep"):
+        if self.motion is not None and not (self.to_next is None and self.to_prev is None):
+            raise InputError("motion stands instead of to_next and to_prev: give one or the other")
+        for name in ("color", "to_next", "to_prev", "motion", "scale", "keep"):
             if given := _count_bad(getattr(self, name)):
                 self.bad[name] = given
 
@@ -83,7 +87,8 @@ class Frame:
     def has(self) -> frozenset[str]:
         """What a method may ask for: "color", "motion", "depth"."""
         there = {"color"}
-        if self.to_next is not None or self.to_prev is not None or self.camera is not None:
+        given = (self.to_next, self.to_prev, self.motion, self.camera)
+        if any(source is not None for source in given):
             there.add("motion")
         if self.depth is not None:
             there.add("depth")

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import inspect
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import wgpu
 
 from . import gpu, shader
 from .blur import METHODS
-from .cameras import Reprojections
 from .errors import InputError
 from .frame import PASSES, Frame
 from .images import Images
 from .shutter import Shutter
 from .timing import Timing
-from .velocity import VelocityPass
+from .velocity import Moving, VelocityPass
 
 MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
 OUTPUTS = ("rgba32float", "rgba16float")
+View = wgpu.GPUTextureView
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class Inputs:
     """What a method may read while it records one frame."""
 
     given: gpu.Given
-    color: wgpu.GPUTextureView  # linear, premultiplied by alpha and by weight
-    motion: wgpu.GPUTextureView  # to_prev, to_next [px]
-    depth: wgpu.GPUTextureView | None
-    weight: wgpu.GPUTextureView | None  # None: every pixel counts
-    none: wgpu.GPUTextureView  # bound where an input is not there
+    color: View  # linear, premultiplied by alpha and by weight
+    motion: View  # to_prev, to_next [px]
+    depth: View | None
+    weight: View | None  # None: every pixel counts
+    none: View  # bound where an input is not there
     linear: wgpu.GPUSampler
     even: bool  # the shutter is a box
 
@@ -79,13 +79,11 @@ class Blur:
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         self.method = METHODS[method](self.device, output=output, **options)
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
-        self._velocity = VelocityPass(self.device)
         self._images = Images(self.device)
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
-        self._empty = {
-            "float": self._images.view("none", (1, 1), gpu.texel(self.device, 4)),
-            "object": self._images.view("no object", (1, 1), "r32uint"),
-        }
+        self._none = self._images.view("none", (1, 1), gpu.texel(self.device, 4))
+        no_object = self._images.view("no object", (1, 1), "r32uint")
+        self._velocity = VelocityPass(self.device, self._none, no_object)
         self.shutter = shutter
 
     @property
@@ -116,59 +114,43 @@ class Blur:
         encoder: wgpu.GPUCommandEncoder,
         *,
         size: tuple[int, int],
-        color: wgpu.GPUTextureView,
-        output: wgpu.GPUTextureView,
-        to_next: wgpu.GPUTextureView | None = None,
-        to_prev: wgpu.GPUTextureView | None = None,
-        depth: wgpu.GPUTextureView | None = None,
-        camera: Reprojections | None = None,
-        object_id: wgpu.GPUTextureView | None = None,
-        keep: wgpu.GPUTextureView | None = None,
-        scale: wgpu.GPUTextureView | None = None,
-        object_motion: bool = False,
-        check_color: bool = False,
+        color: View,
+        output: View,
+        keep: View | None = None,
+        check: bool = False,
         number: int = 0,
         timing: Timing | None = None,
+        **moving,
     ) -> None:
         """Record the passes into `encoder`; nothing is submitted or waited for.
 
-        Views are of your textures: `color` filterable float (rgba16float always is),
-        `to_next` and `to_prev` with the displacement [px] in x and y, `object_id` r32uint,
-        `output` a storage texture of the format that Blur was made for. `check_color` gives
-        pixels that are not finite no weight, at the price of two small passes.
+        Views are of your textures: `color` filterable float (rgba16float always is), `keep`
+        0..1, `output` a storage texture of the format that Blur was made for. `moving` are
+        the inputs of velocity.Moving: `to_next` and `to_prev` with the displacement [px] in
+        x and y, or `motion` with to_prev and to_next together, which saves a pass; or
+        `camera` and `depth`. `check` gives pixels that are not finite no weight, at the
+        price of three small passes.
         """
         gpu.check_size(self.device, *size)
-        there = {"color"}
-        if any(source is not None for source in (to_next, to_prev, camera)):
-            there.add("motion")
-        if depth is not None:
-            there.add("depth")
-        self._require(there)
+        motions = _moving(moving)
+        there = {"color"} | ({"motion"} if motions.known else set())
+        self._require(there | ({"depth"} if motions.depth is not None else set()))
         given = self._given(size, number, timing)
-        motion = self._images.view("motion", size, "rgba32float")
-        self._encode_motion(
-            encoder,
-            given,
-            motion,
-            to_prev=to_prev,
-            to_next=to_next,
-            depth=depth,
-            camera=camera,
-            object_id=object_id,
-            scale=scale,
-            object_motion=object_motion,
-        )
+        motion, limited = motions.motion, self.max_blur is not None
+        if motion is None or not motions.ready or limited or check:
+            motion = self._images.view("motion", size, "rgba32float")
+            self._velocity.encode(encoder, given, motions, limited, motion)
         weight, result, own = None, output, color
-        if keep is not None or check_color:
+        if keep is not None or check:
             color, weight = self._lift(encoder, given, color, keep)
             result = self._images.view("blurred", size, self.output)
         inputs = Inputs(
             given=given,
             color=color,
             motion=motion,
-            depth=depth,
+            depth=motions.depth,
             weight=weight,
-            none=self._empty["float"],
+            none=self._none,
             linear=self._linear,
             even=self._shutter.curve == "box",
         )
@@ -195,10 +177,11 @@ class Blur:
         if "motion" not in frame.has:
             raise InputError("there is no motion: give to_next, to_prev, or depth and a camera")
         encoder = self.device.create_command_encoder(label="wgmb motion")
-        views = self._upload(frame)
         given = self._given(frame.size, frame.number, None)
         motion = self._images.texture("motion", frame.size, "rgba32float")
-        self._encode_motion(encoder, given, motion.create_view(), **views)
+        moving = _moving(self._upload_moving(frame))
+        limited = self.max_blur is not None
+        self._velocity.encode(encoder, given, moving, limited, motion.create_view())
         return self._images.download(encoder, motion)
 
     def _upload(self, frame: Frame) -> dict:
@@ -208,26 +191,31 @@ class Blur:
             rgba = np.ones((*rgba.shape[:2], 4), rgba.dtype)
             rgba[..., :3] = frame.color
         half = rgba.dtype == np.float16
-        filterable = {n: gpu.texel(self.device, n) for n in (1, 4)}
-        ids = None if frame.object_id is None else np.minimum(frame.object_id, 2**32 - 1)
-
-        def view(name: str, array: np.ndarray | None, format: str):
-            return None if array is None else self._images.upload(name, array, format)
-
+        four = "rgba16float" if half else gpu.texel(self.device, 4)
         return {
             "size": frame.size,
-            "color": view("color", rgba, "rgba16float" if half else filterable[4]),
-            "to_next": view("to_next", frame.to_next, "rg32float"),
-            "to_prev": view("to_prev", frame.to_prev, "rg32float"),
-            "depth": view("depth", frame.depth, "r32float"),
-            "camera": frame.camera,
-            "object_id": view("object", ids, "r32uint"),
-            "keep": view("keep", frame.keep, filterable[1]),
-            "scale": view("scale", frame.scale, filterable[1]),
-            "object_motion": frame.object_motion,
-            "check_color": "color" in frame.bad,
+            "color": self._images.upload("color", rgba, four),
+            "keep": self._view("keep", frame.keep, "r32float"),
+            "check": bool(frame.bad),
             "number": frame.number,
+            **self._upload_moving(frame),
         }
+
+    def _upload_moving(self, frame: Frame) -> dict:
+        ids = None if frame.object_id is None else np.minimum(frame.object_id, 2**32 - 1)
+        return {
+            "to_next": self._view("to_next", frame.to_next, "rg32float"),
+            "to_prev": self._view("to_prev", frame.to_prev, "rg32float"),
+            "motion": self._view("to_prev, to_next", frame.motion, "rgba32float"),
+            "depth": self._view("depth", frame.depth, "r32float"),
+            "camera": frame.camera,
+            "object_id": self._view("object", ids, "r32uint"),
+            "scale": self._view("scale", frame.scale, "r32float"),
+            "object_motion": frame.object_motion,
+        }
+
+    def _view(self, name: str, array: np.ndarray | None, format: str) -> View | None:
+        return None if array is None else self._images.upload(name, array, format)
 
     def _require(self, there) -> None:
         if missing := self.method.needs - there:
@@ -243,37 +231,6 @@ class Blur:
         )
         return gpu.Given(size, {"frame": frame, **self._group0}, timing)
 
-    def _encode_motion(
-        self,
-        encoder,
-        given,
-        motion,
-        *,
-        to_prev,
-        to_next,
-        depth,
-        camera,
-        object_id,
-        scale,
-        object_motion,
-        **_others,
-    ) -> None:
-        """Record the velocity pass."""
-        self._velocity.encode(
-            encoder,
-            given,
-            empty=self._empty,
-            motion=motion,
-            camera=camera,
-            object_motion=object_motion,
-            limited=self.max_blur is not None,
-            to_prev=to_prev,
-            to_next=to_next,
-            depth=depth,
-            object=object_id,
-            scale=scale,
-        )
-
     def _keep_kernel(self, output: str, keep) -> gpu.Kernel:
         texels = {"Output": output, "Weight": self._weight_texel}
         return gpu.kernel(self.device, "keep.wgsl", texels, KEEP=keep is not None)
@@ -286,7 +243,7 @@ class Blur:
 
     def _lift(self, encoder, given, color, keep):
         """The colour times its weight, and the weight."""
-        four, none = gpu.texel(self.device, 4), self._empty["float"]
+        four, none = gpu.texel(self.device, 4), self._none
         lifted = self._images.view("lifted", given.size, four)
         weight = self._images.view("weight", given.size, self._weight_texel)
         self._keep_kernel(four, keep).run(
@@ -309,11 +266,20 @@ class Blur:
             "after",
             given,
             color=color,
-            keep=keep or self._empty["float"],
+            keep=keep or self._none,
             blurred=blurred,
             weight=spare,
             output=output,
         )
+
+
+def _moving(given: dict) -> Moving:
+    known = {f.name for f in fields(Moving)}
+    if unknown := given.keys() - known:
+        raise InputError(
+            f"encode has no input {', '.join(sorted(unknown))}; it has {', '.join(sorted(known))}"
+        )
+    return Moving(**given)
 
 
 def blur(

@@ -219,7 +219,7 @@ class Clip:
         """What a method is given of `source`."""
         self.decide(source)
         rgba = source.rgba
-        motion = (None, None)
+        motion = None
         if self._vectors is not None:
             motion = vectors.read(source.channels, self._vectors)
         depth = reprojections = ids = None
@@ -232,11 +232,10 @@ class Clip:
         try:
             return Frame(
                 rgba,
-                motion[1],
-                motion[0],
-                depth,
-                reprojections,
-                ids,
+                motion=motion,
+                depth=depth,
+                camera=reprojections,
+                object_id=ids,
                 keep=self._mask(source, self.passes.keep),
                 scale=self._mask(source, self.passes.scale),
                 object_motion=self.passes.object_motion,

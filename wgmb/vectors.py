@@ -14,8 +14,6 @@ import numpy as np
 from .errors import InputError
 from .layers import component, layers, pick, stem
 
-Motion = tuple[np.ndarray | None, np.ndarray | None]  # to_prev, to_next (height, width, 2)
-
 
 @dataclass(frozen=True)
 class Convention:
@@ -29,7 +27,6 @@ class Convention:
     next_sign: tuple[int, int] = (1, 1)
     components: tuple[str, ...] = ()  # the layer must have these, if any are named
     offset: float = 0.0  # what stands for no motion
-    unit: float = 1.0  # pixels in one, before the user's own scale
 
 
 CONVENTIONS: dict[str, Convention] = {
@@ -184,26 +181,30 @@ def channels_of(names: Iterable[str], vectors: Vectors) -> dict[str, tuple[str, 
     return result
 
 
-def read(channels: Mapping[str, np.ndarray], vectors: Vectors) -> Motion:
-    """to_prev and to_next [px] of a frame's channels; None for a side that is not there."""
+def read(channels: Mapping[str, np.ndarray], vectors: Vectors) -> np.ndarray:
+    """(height, width, 4) float32: to_prev and to_next [px] of a frame's channels.
+
+    Where one side is not there it is the other's opposite: a straight path.
+    """
     convention = CONVENTIONS[vectors.convention]
     sides = channels_of(channels, vectors)
     offset = convention.offset if vectors.offset is None else vectors.offset
     flip = np.array([-1 if axis in vectors.flip else 1 for axis in "xy"], np.float32)
     signs = {"prev": convention.prev_sign, "next": convention.next_sign}
 
-    def side(name: str) -> np.ndarray | None:
-        if name not in sides:
-            return None
-        factor = np.float32(vectors.scale * convention.unit) * flip * np.array(signs[name], "f4")
-        x, y = (channels[c] for c in sides[name])
-        motion = np.empty((*x.shape, 2), np.float32)
-        for axis, plane in enumerate((x, y)):
-            np.subtract(plane, np.float32(offset), out=motion[..., axis])
-            motion[..., axis] *= factor[axis]
-        return motion
-
-    return side("prev"), side("next")
+    first = channels[next(iter(sides.values()))[0]]
+    motion = np.empty((*first.shape, 4), np.float32)
+    for side, (begin, other) in (("prev", (0, 2)), ("next", (2, 0))):
+        if side not in sides:
+            continue
+        factor = np.float32(vectors.scale) * flip * np.array(signs[side], np.float32)
+        for axis, name in enumerate(sides[side]):
+            plane = motion[..., begin + axis]
+            np.subtract(channels[name], np.float32(offset), out=plane)
+            plane *= factor[axis]
+        if len(sides) == 1:
+            np.negative(motion[..., begin : begin + 2], out=motion[..., other : other + 2])
+    return motion
 
 
 # ---- what the numbers really mean -----------------------------------------------------------
@@ -222,19 +223,14 @@ _LEFT = "the neighbouring frame differs by {:.0%} of what it differs unmoved"
 _ALTERNATIVES = (("", 1.0), ("y", 1.0), ("x", 1.0), ("xy", 1.0), ("", 2.0), ("", 0.5))
 
 
-def detect(color, motion: Motion, prev_color, next_color, vectors: Vectors) -> Finding:
+def detect(color, motion: np.ndarray, prev_color, next_color, vectors: Vectors) -> Finding:
     """Test `vectors`, which were read as `motion`, against the neighbouring frames' colour.
 
     color: (height, width, 3 or 4); neighbours alike, or None. Every alternative (flipped,
     twice, half) warps the neighbours; the one that leaves the least difference is meant.
     """
-    pairs = [
-        (m, c)
-        for m, c in zip(motion, (prev_color, next_color), strict=True)
-        if m is not None and c is not None and c.shape[:2] == color.shape[:2]
-    ]
-    if not pairs and prev_color is not None and motion[1] is not None:
-        pairs = [(-motion[1], prev_color)]
+    sides = ((motion[..., :2], prev_color), (motion[..., 2:], next_color))
+    pairs = [(m, c) for m, c in sides if c is not None and c.shape[:2] == color.shape[:2]]
     if not pairs:
         return Finding(vectors, False, f"{vectors}, by name (no neighbouring frame to test it on)")
     at = _moving_pixels(pairs)

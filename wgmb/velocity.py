@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import wgpu
 
@@ -9,40 +11,70 @@ from . import gpu, shader
 from .cameras import Reprojections
 
 FILE = "velocity.wgsl"
+View = wgpu.GPUTextureView
+
+
+@dataclass(frozen=True)
+class Moving:
+    """What is known of the motion: textures, and the matrices around the frame."""
+
+    to_prev: View | None = None  # displacement [px] in x, y
+    to_next: View | None = None
+    motion: View | None = None  # both in one texture, instead of the two
+    camera: Reprojections | None = None
+    depth: View | None = None  # needed with camera
+    object_id: View | None = None  # r32uint: rows of the camera's bodies
+    scale: View | None = None  # multiplies the result
+    object_motion: bool = False  # vectors leave the camera's motion out
+
+    @property
+    def known(self) -> bool:
+        """Whether anything says what moves."""
+        given = (self.to_prev, self.to_next, self.motion, self.camera)
+        return any(source is not None for source in given)
+
+    @property
+    def ready(self) -> bool:
+        """Whether `motion` is already all there is to know."""
+        return self.motion is not None and self.camera is None and self.scale is None
 
 
 class VelocityPass:
-    """Records wgsl/velocity.wgsl; keeps nothing but the device."""
+    """Records wgsl/velocity.wgsl; keeps nothing but the device and two empty textures."""
 
-    def __init__(self, device: wgpu.GPUDevice):
-        self.device = device
+    def __init__(self, device: wgpu.GPUDevice, none: View, no_object: View):
+        self._device, self._none, self._no_object = device, none, no_object
 
-    def encode(
-        self, encoder, given: gpu.Given, *, empty, motion, camera, object_motion, limited, **views
-    ):
-        """Record motion (to_prev, to_next) from those of `views` that are not None.
-
-        views: to_prev, to_next, depth, object, scale; `empty` stands in for the others.
-        """
-        there = {name for name, view in views.items() if view is not None}
+    def encode(self, encoder, given: gpu.Given, moving: Moving, limited: bool, output: View):
+        """Record `output` = to_prev, to_next [px] of every pixel."""
+        paired = moving.motion is not None
+        to_prev = moving.motion if paired else moving.to_prev
+        with_camera = moving.camera is not None
         kernel = gpu.kernel(
-            self.device,
+            self._device,
             FILE,
-            PREV="to_prev" in there,
-            NEXT="to_next" in there,
-            CAMERA=camera is not None,
-            OBJECTS=camera is not None and "object" in there,
-            SCALED="scale" in there,
+            PREV=to_prev is not None,
+            NEXT=moving.to_next is not None or paired,
+            PAIRED=paired,
+            CAMERA=with_camera,
+            OBJECTS=with_camera and moving.object_id is not None,
+            SCALED=moving.scale is not None,
             LIMITED=limited,
-            ADDED=object_motion,
+            ADDED=moving.object_motion,
         )
-        uniform, table = self._matrices(given.size, camera)
-        bound = {
-            name: view or empty["object" if name == "object" else "float"]
-            for name, view in views.items()
-        }
+        uniform, table = self._matrices(given.size, moving.camera)
         kernel.run(
-            encoder, "main", given, velocity=uniform, reprojections=table, motion=motion, **bound
+            encoder,
+            "main",
+            given,
+            velocity=uniform,
+            to_prev=to_prev or self._none,
+            to_next=moving.to_next or self._none,
+            depth=moving.depth or self._none,
+            object=moving.object_id or self._no_object,
+            scale=moving.scale or self._none,
+            reprojections=table,
+            motion=output,
         )
 
     def _matrices(self, size: tuple[int, int], camera: Reprojections | None):
@@ -60,7 +92,7 @@ class VelocityPass:
             # Row i of a matrix in numpy is column i in WGSL.
             table["prev"] = matrices[:, 0].transpose(0, 2, 1)
             table["next"] = matrices[:, 1].transpose(0, 2, 1)
-        create = self.device.create_buffer_with_data
+        create = self._device.create_buffer_with_data
         return (
             create(label="velocity", data=data, usage=wgpu.BufferUsage.UNIFORM),
             create(label="reprojections", data=table, usage=wgpu.BufferUsage.STORAGE),

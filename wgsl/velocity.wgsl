@@ -18,7 +18,7 @@ struct Velocity {
 }
 
 @group(1) @binding(0) var<uniform> velocity: Velocity;
-@group(1) @binding(1) var to_prev: texture_2d<f32>;     // displacement to the previous frame [px]
+@group(1) @binding(1) var to_prev: texture_2d<f32>;     // displacement to the previous frame [px]; with PAIRED in zw to the next
 @group(1) @binding(2) var to_next: texture_2d<f32>;     // displacement to the next frame [px]
 @group(1) @binding(3) var depth: texture_2d<f32>;       // see depth_kind
 @group(1) @binding(4) var object: texture_2d<u32>;      // row of `reprojections`; 0 and unknown ones: the world
@@ -28,6 +28,7 @@ struct Velocity {
 
 override PREV: bool = false;        // which inputs there are
 override NEXT: bool = false;
+override PAIRED: bool = false;
 override CAMERA: bool = false;
 override OBJECTS: bool = false;
 override SCALED: bool = false;
@@ -51,10 +52,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         way = camera_motion(id.xy, z, nothing_there);
     }
     if PREV || NEXT {
-        var given = vec4f(0.0);
-        if PREV { given = vec4f(textureLoad(to_prev, id.xy, 0).xy, given.zw); }
-        if NEXT { given = vec4f(given.xy, textureLoad(to_next, id.xy, 0).xy); }
-        if !PREV { given = vec4f(-given.zw, given.zw); }
+        var given = textureLoad(to_prev, id.xy, 0);
+        let ahead = textureLoad(to_next, id.xy, 0).xy;
+        if !PAIRED { given = vec4f(given.xy, ahead); }
+        if !PREV { given = vec4f(-ahead, ahead); }
         if !NEXT { given = vec4f(given.xy, -given.xy); }
         if !is_finite4(given) { given = vec4f(0.0); }
         if ADDED { way += given; } else if !nothing_there { way = given; }

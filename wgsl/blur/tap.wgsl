@@ -25,22 +25,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if PUBLISHED { path = Path(-textureLoad(motion, id.xy, 0).xy, vec2f(0.0)); }
 
     // A loop that ends early is the only branch that saves time on every driver.
-    let delay = shutter_delay(x);
-    let first = displacement(path, shutter.span.x + delay);
-    let last = displacement(path, shutter.span.y + delay);
-    let still = !PUBLISHED && max(dot(first, first), dot(last, last)) < STILL * STILL;
+    let times = shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5));
+    let opening = displacement(path, shutter.span.x + times.delay);
+    let closing = displacement(path, shutter.span.y + times.delay);
+    let still = !PUBLISHED && max(dot(opening, opening), dot(closing, closing)) < STILL * STILL;
     let count = select(frame.samples, 1u, still);
     let moving = select(1.0, 0.0, still);
 
     let share = 1.0 / f32(count);   // before adding, so that no sum of finite colours overflows
-    let shift = frame.jitter * (pixel_noise(id.xy) - 0.5);
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
     let back = Path(-path.velocity * texel * moving, path.curvature * texel * moving);  // in time
     var sum = vec4f(0.0);
     var total = 0.0;
     for (var i = 0u; i < count; i++) {
-        var t = shutter_time(i, shift, delay);
+        var t = shutter_time(times, i);
         if PUBLISHED { t = -0.5 * f32(i) * share; }
         let at = uv + displacement(back, t);
         sum += share * textureSampleLevel(color, linear, at, 0.0);

@@ -13,15 +13,22 @@ struct Shutter {
 
 override EVEN: bool = false;    // a box: all shares are equally long, and no table is needed
 
-/// Time of sample `i` of frame.samples; `shift` in -0.5..0.5 moves it within its share.
-fn shutter_time(i: u32, shift: f32, delay: f32) -> f32 {
-    // Everything but `i` is in the bracket, which a compiler takes out of the loop.
-    if EVEN { return (shutter.span.x + (0.5 + shift) * shutter.step + delay) + f32(i) * shutter.step; }
-    let stratum = strata[i];
-    return stratum.x + stratum.y * shift + delay;
+struct Times {      // what a pixel's sample times have in common, fetched once before its loop
+    first: f32,     // of a box [frame intervals]
+    step: f32,
+    shift: f32,     // within every share, -0.5..0.5
+    delay: f32,     // of the rolling shutter [frame intervals]
 }
 
-/// By how much later than the middle of the image the pixel at `x` [px] is exposed.
-fn shutter_delay(x: vec2f) -> f32 {
-    return dot(shutter.rolling, x / vec2f(frame.size) - 0.5);
+/// For the pixel at `x` [px], its samples moved by `shift` within their shares.
+fn shutter_times(x: vec2f, shift: f32) -> Times {
+    let delay = dot(shutter.rolling, x / vec2f(frame.size) - 0.5);
+    return Times(shutter.span.x + (0.5 + shift) * shutter.step + delay, shutter.step, shift, delay);
+}
+
+/// Time of sample `i` of frame.samples [frame intervals].
+fn shutter_time(times: Times, i: u32) -> f32 {
+    if EVEN { return times.first + f32(i) * times.step; }
+    let stratum = strata[i];
+    return stratum.x + stratum.y * times.shift + times.delay;
 }
