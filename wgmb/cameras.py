@@ -36,6 +36,8 @@ class Camera:
             array = np.asarray(matrix, np.float64)
             if array.shape != (4, 4) or not np.isfinite(array).all():
                 raise InputError(f"{name} must be a finite 4 x 4 matrix, got shape {array.shape}")
+            if name.startswith("body") and not _invertible(array):
+                raise InputError(f"{name}: its matrix has no inverse")
         if any(not 0 < k < MOST_BODIES for k in self.bodies):
             raise InputError(f"object indices must be 1 to {MOST_BODIES - 1}")
 
@@ -69,8 +71,11 @@ class Reprojections:
             raise InputError("motion from a camera needs the camera of a neighbouring frame")
         if self.depth_kind not in ("planar", "clip"):
             raise InputError(f"depth must be planar or clip, got {self.depth_kind!r}")
-        if np.linalg.cond(np.asarray(self.here.clip_from_world)) > 1e15:
+        if not _invertible(np.asarray(self.here.clip_from_world, np.float64)):
             raise InputError("clip_from_world has no inverse")
+        if not self.far > 0:
+            raise InputError(f"far must be over 0, got {self.far}")
+        self._world_from_pixel()  # refuses what is no camera
 
     def matrices(self) -> np.ndarray:
         """(bodies, 2, 4, 4): clip position in the previous, the next frame from the pixel.
@@ -103,7 +108,10 @@ class Reprojections:
             if self.here.view_from_world is None:
                 raise InputError("planar depth of an orthographic camera needs view_from_world")
             rows = np.stack([clip[0], clip[1], -np.asarray(self.here.view_from_world)[2]])
-        return np.linalg.inv(np.vstack([rows, [0, 0, 0, 1]]))
+        pixel_from_world = np.vstack([rows, [0, 0, 0, 1]])
+        if not _invertible(pixel_from_world):
+            raise InputError("clip_from_world is not the projection of a camera")
+        return np.linalg.inv(pixel_from_world)
 
 
 class CameraFile:
@@ -128,24 +136,33 @@ class CameraFile:
         if number not in self._frames:
             raise InputError(f"{self.path}: no camera for frame {number}")
         near = {k: self._camera(number + k) for k in (-1, 0, 1) if number + k in self._frames}
-        for k in near:
-            self._check_shared(number, number + k)
-        return Reprojections(near[0], near.get(-1), near.get(1), **options)
+        try:
+            for k in near:
+                self._check_shared(number, number + k)
+            return Reprojections(near[0], near.get(-1), near.get(1), **options)
+        except InputError as error:
+            raise InputError(f"{self.path}: frame {number:g}: {error}") from None
 
     def _check_shared(self, here: float, there: float) -> None:
         """Objects that share an index can only be told apart if they move as one."""
-        seen: dict[int, tuple[str, np.ndarray]] = {}
-        objects = self._frames[there].get("objects", {})
-        for name, given in self._frames[here].get("objects", {}).items():
-            if given["index"] == 0 or name not in objects:
+        objects, then = (self._frames[k].get("objects", {}) for k in (here, there))
+        by_index: dict[int, list[str]] = {}
+        for name in objects.keys() & then.keys():
+            by_index.setdefault(objects[name]["index"], []).append(name)
+        for index, names in by_index.items():
+            if index == 0 or len(names) == 1:
                 continue
-            now, then = _matrix(given["matrix_world"]), _matrix(objects[name]["matrix_world"])
-            moved = then @ np.linalg.pinv(now)
-            first, expected = seen.setdefault(given["index"], (name, moved))
-            if not np.allclose(moved, expected, rtol=0, atol=1e-4 * np.abs(expected).max()):
+            ways = [
+                _matrix(then[name]["matrix_world"])
+                @ np.linalg.pinv(_matrix(objects[name]["matrix_world"]))
+                for name in sorted(names)
+            ]
+            apart = [np.abs(way - ways[0]).max() > 1e-4 * np.abs(ways[0]).max() for way in ways]
+            if any(apart):
+                first, other = sorted(names)[0], sorted(names)[apart.index(True)]
                 raise InputError(
-                    f"{self.path}: objects {first} and {name} share index {given['index']} "
-                    f"but move apart between frames {here:g} and {there:g}"
+                    f"objects {first} and {other} share index {index} but move apart "
+                    f"between frames {here:g} and {there:g}"
                 )
 
     def _camera(self, number: float) -> Camera:
@@ -161,8 +178,20 @@ class CameraFile:
             else:
                 raise InputError("needs clip_from_world, or camera_matrix_world and projection")
             return Camera(clip, view, _bodies(given.get("objects", {})))
-        except (InputError, TypeError, AttributeError, KeyError, np.linalg.LinAlgError) as error:
+        except (
+            InputError,
+            TypeError,
+            AttributeError,
+            KeyError,
+            np.linalg.LinAlgError,
+            OverflowError,
+        ) as error:
             raise InputError(f"{self.path}: frame {number:g}: {_first_line(error)}") from None
+
+
+def _invertible(matrix: np.ndarray) -> bool:
+    with np.errstate(all="ignore"):
+        return bool(np.linalg.cond(matrix) < 1e15)  # NaN is not
 
 
 def _read_json(path: Path) -> dict[float, dict]:
@@ -186,7 +215,7 @@ def _read_json(path: Path) -> dict[float, dict]:
 def _matrix(rows) -> np.ndarray:
     try:
         array = np.array(rows, np.float64)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         raise InputError("a matrix is not 4 lists of 4 numbers") from None
     if array.shape != (4, 4) or not np.isfinite(array).all():
         raise InputError(f"a matrix is not 4 lists of 4 finite numbers (shape {array.shape})")

@@ -6,10 +6,12 @@ Exit codes: 0 done, 1 some frames failed, 2 usage or input, 3 no adapter, 130 in
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import signal
 import sys
 import time
+import warnings
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
@@ -23,11 +25,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from . import __version__, gpu, layers, stills
 from .display import motion_picture
 from .errors import DeviceError, Error, InputError
-from .frame import Frame
+from .numbering import frame_range
 from .options import BlurOptions, InputOptions, OutputOptions, ShutterOptions
 from .output import Output, replace_file
 from .pipeline import Blur
 from .run import Report, blur_sequence
+from .sequence import Clip, Source
 
 DONE, SOME_FAILED, USAGE, NO_DEVICE, INTERRUPTED = 0, 1, 2, 3, 130
 _MANY_BAD = 0.25  # of the width: a 99th percentile of speed above it is worth a warning
@@ -38,6 +41,7 @@ app = cyclopts.App(
     help="GPU motion blur for rendered frames.\n\n"
     "Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180",
     result_action="return_value",
+    suppress_keyboard_interrupt=False,
     default_parameter=Parameter(negative=()),
 )
 
@@ -74,7 +78,7 @@ def blur(
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     clip = given.open(pattern, look.keep, look.scale)
     made = look.make(when.make(), adapter)
-    settings = _settings(look, when, given)
+    settings = _settings(look, when, given) | {"bits": output.bits}
     files = Output(
         output.output,
         settings=settings,
@@ -169,6 +173,7 @@ def info(
     given: InputOptions | None = None,
     *,
     output: Annotated[Path | None, Parameter(alias="-o")] = None,
+    overwrite: bool = False,
 ) -> int:
     """Say what a frame holds: layers, sizes, what its motion vectors mean, speeds.
 
@@ -180,69 +185,68 @@ def info(
         A file, or a pattern (its first frame is shown, neighbours test the vectors).
     output
         Draw the motion as a picture: hue is direction, brightness speed.
+    overwrite
+        Replace that picture if it exists.
     """
     given = given or InputOptions()
     clip = given.open(pattern)
+    if output is not None and output.suffix.lower() not in stills.SUFFIXES:
+        raise InputError(f"output {output}: a picture, {', '.join(stills.SUFFIXES)}")
+    if output is not None and output.exists() and not overwrite:
+        raise InputError(f"{output} exists; --overwrite replaces it")
     source = clip.source(clip.numbers[0])
-    frame = clip.frame(source)
-    say = Console(highlight=False, soft_wrap=True)
-
-    def line(name: str, text: object) -> None:
-        say.print(f"{name:10}{text}", markup=False)
-
-    line("file", source.path)
+    lines = [("file", str(source.path))]
     if len(clip.numbers) > 1:
-        line("frames", f"{clip.numbers[0]}-{clip.numbers[-1]} ({len(clip.numbers)})")
-    width, height = frame.size
-    line("size", f"{width} x {height}")
+        lines.append(("frames", f"{frame_range(clip.numbers)} ({len(clip.numbers)})"))
+    lines.append(("size", "{} x {}".format(*source.size)))
     for part in source.file.parts if source.file else ():
         if part.data_window != part.display_window:
-            line("window", f"data {part.data_window} in display {part.display_window}")
+            lines.append(("window", f"data {part.data_window} in display {part.display_window}"))
     for layer, members in layers.layers(source.channels).items():
-        kinds = ", ".join(
-            f"{layers.component(m).upper()} {source.channels[m].dtype}" for m in members
-        )
-        line("layer", f"{layer or '(picture)'}: {kinds}")
-    line("picture", ", ".join(source.color))
-    line("depth", layers.find_depth(source.channels, given.depth) or "none")
-    line("vectors", clip.finding)
-    if frame.bad:
-        line(
-            "bad",
-            ", ".join(f"{n} pixels of {name} are not finite" for name, n in frame.bad.items()),
-        )
-    if "motion" in frame.has:
-        _show_motion(line, frame, output)
-    elif output:
-        raise InputError(f"{source.path}: no motion to draw: no vectors, no camera")
+        kinds = [f"{layers.component(m).upper()} {source.channels[m].dtype}" for m in members]
+        lines.append(("layer", f"{layer or '(picture)'}: {', '.join(kinds)}"))
+    lines.append(("picture", ", ".join(source.color) if source.beside else "none found"))
+    depth = layers.find_depth(source.channels, given.depth, source.beside)
+    lines.append(("depth", depth or "none"))
+    lines.append(("vectors", clip.finding))
+    lines += _about_motion(clip, source, output)
+    say = Console(highlight=False, soft_wrap=True)
+    for name, text in lines:
+        say.print(f"{name:10}{text}", markup=False)
     return DONE
 
 
-def _show_motion(line, frame: Frame, output: Path | None) -> None:
+def _about_motion(clip: Clip, source: Source, output: Path | None) -> list[tuple[str, str]]:
+    """What the frame's motion is like; drawn into `output`."""
+    frame = clip.frame(source, picture=source.beside is not None)
+    lines = []
+    if frame.bad:
+        found = [f"{n} pixels of {name}" for name, n in frame.bad.items()]
+        lines.append(("bad", f"not finite or not in front of the camera: {', '.join(found)}"))
+    if "motion" not in frame.has:
+        if output:
+            raise InputError(f"{source.path}: no motion to draw: no vectors, no camera")
+        return lines
     motion = Blur().motion(frame)[..., 2:]
     speed = np.hypot(motion[..., 0], motion[..., 1])
-    share = (50, 90, 99, 100)
-    found = np.percentile(speed, share)
-    line(
+    half, most, nearly, fastest = np.percentile(speed, (50, 90, 99, 100))
+    lines.append((
         "speed",
-        "pixels per frame: "
-        + ", ".join(
-            f"{v:.1f} ({'fastest' if s == 100 else f'{s} %'})"
-            for s, v in zip(share, found, strict=True)
-        ),
-    )
-    if found[2] > _MANY_BAD * frame.size[0]:
-        line(
+        f"pixels per frame: half are under {half:.1f}, 90 % under {most:.1f}, "
+        f"99 % under {nearly:.1f}, the fastest is {fastest:.1f}",
+    ))  # fmt: skip
+    if nearly > _MANY_BAD * frame.size[0]:
+        lines.append((
             "warning",
-            f"one pixel in a hundred moves over {found[2]:.0f} px, a quarter of the width: "
+            f"one pixel in a hundred moves over {nearly:.0f} px, a quarter of the width: "
             "check the vectors' convention and scale",
-        )
+        ))  # fmt: skip
     if output is not None:
-        if output.suffix.lower() not in stills.SUFFIXES:
-            raise InputError(f"output {output}: a picture, {', '.join(stills.SUFFIXES)}")
-        picture = motion_picture(motion, float(max(found[2], 1.0)))
+        full = max(float(nearly), 1.0)
+        picture = motion_picture(motion, full)
         replace_file(output, stills.encode(picture, output.suffix, 8, "motion"))
-        line("motion", f"{output} (full brightness: {max(found[2], 1.0):.1f} px per frame)")
+        lines.append(("motion", f"{output} (full brightness: {full:.1f} px per frame)"))
+    return lines
 
 
 @app.command
@@ -310,28 +314,34 @@ def _size(text: str) -> tuple[int, int]:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     _own_streams()
-    signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+    signal.signal(signal.SIGTERM, _interrupted)
+    signal.signal(signal.SIGINT, _interrupted)  # a shell may have set it to be ignored
+    warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
+    logging.getLogger("tifffile").setLevel(logging.CRITICAL)
     try:
         result = app(arguments, exit_on_error=False, print_error=False)
         sys.stdout.flush()
         return result if isinstance(result, int) else DONE
     except cyclopts.CycloptsError as error:
-        return _say_why(" ".join(str(error).split()), USAGE)
+        return _say_why(str(error), USAGE)
     except DeviceError as error:
         return _say_why(str(error), NO_DEVICE)
     except Error as error:
         return _say_why(str(error), USAGE)
-    except BrokenPipeError:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - whoever read us is gone
-        return SOME_FAILED
     except OSError as error:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - whoever read us may be gone
         return _say_why(str(error), SOME_FAILED)
     except KeyboardInterrupt:
         return _say_why("interrupted", INTERRUPTED)
 
 
+def _interrupted(*_) -> None:
+    raise KeyboardInterrupt
+
+
 def _say_why(text: str, code: int) -> int:
-    sys.stderr.write(f"wgmb: {' '.join(text.split())}\n")
+    with contextlib.suppress(OSError):
+        sys.stderr.write(f"wgmb: {' '.join(text.split())}\n")
     return code
 
 

@@ -34,6 +34,7 @@ _WRITTEN_ANEW = (
     "version",
     "name",
 )
+_CHATTER = "Warning: Exception raised reading pixel data"
 _lock = threading.Lock()
 
 
@@ -76,7 +77,7 @@ class Exr:
 
 
 def read(path: str | Path, *, header_only: bool = False) -> Exr:
-    """Read `path`; `header_only` leaves every channel an empty array of its type.
+    """Read `path`; `header_only` leaves every channel an empty array.
 
     `InputError` names the file where it is missing, damaged, cut off, deep or absurdly large.
     """
@@ -84,7 +85,10 @@ def read(path: str | Path, *, header_only: bool = False) -> Exr:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     header = _open(path, header_only=True)
-    promised = [_promised(path, part) for part in header.parts]
+    try:
+        promised = [_promised(path, part) for part in header.parts]
+    except (UnicodeDecodeError, KeyError, TypeError, IndexError) as error:
+        raise InputError(f"{path}: not a readable EXR file: {_first_line(error)}") from None
     if header_only:
         return Exr(path, promised)
     content = _open(path, header_only=False)
@@ -111,7 +115,9 @@ def encode(exr: Exr) -> bytes:
     """The file's bytes: every part, ZIP compressed scan lines."""
     parts = []
     for part in exr.parts:
-        header = {k: v for k, v in part.attributes.items() if k not in _WRITTEN_ANEW} | {
+        # An empty list says nothing, and the library cannot write it.
+        kept = {k: v for k, v in part.attributes.items() if not (isinstance(v, list) and not v)}
+        header = {k: v for k, v in kept.items() if k not in _WRITTEN_ANEW} | {
             "compression": OpenEXR.ZIP_COMPRESSION,
             "type": OpenEXR.scanlineimage,
             "dataWindow": _box(part.data_window),
@@ -121,8 +127,11 @@ def encode(exr: Exr) -> bytes:
         channels = {k: np.ascontiguousarray(v) for k, v in part.channels.items()}
         parts.append(OpenEXR.Part(header, channels, part.name))
     stream = io.BytesIO()
-    with _quiet():
-        OpenEXR.File(parts, num_threads=2).write(stream)
+    try:
+        with _quiet():
+            OpenEXR.File(parts, num_threads=2).write(stream)
+    except (RuntimeError, TypeError, ValueError) as error:
+        raise InputError(f"{exr.path}: cannot be written as EXR: {_first_line(error)}") from None
     return stream.getvalue()
 
 
@@ -184,17 +193,39 @@ def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
+class _Sieve:
+    """A text stream without the lines that the OpenEXR module prints about damaged files."""
+
+    def __init__(self, stream):
+        self._stream, self._holding = stream, False
+
+    def write(self, text: str) -> int:
+        if text.startswith(_CHATTER):
+            self._holding = True  # until its line ends
+        elif not self._holding:
+            self._stream.write(text)
+        if text.endswith("\n"):
+            self._holding = False
+        return len(text)
+
+    def flush(self) -> None:
+        self._stream.flush()
+
+    def __getattr__(self, name: str):
+        return getattr(self._stream, name)
+
+
 @contextlib.contextmanager
 def _quiet():
     """Hold back what native code prints, where Python's own streams live elsewhere."""
-    try:
-        apart = sys.stdout.fileno() != 1 and sys.stderr.fileno() != 2
-    except (OSError, ValueError, AttributeError):
-        apart = False
-    if not apart:
-        yield
-        return
-    with _lock:
+    with _lock, contextlib.redirect_stdout(_Sieve(sys.stdout)):
+        try:
+            apart = sys.stdout.fileno() != 1 and sys.stderr.fileno() != 2
+        except (OSError, ValueError, AttributeError):
+            apart = False
+        if not apart:
+            yield
+            return
         kept = os.dup(1), os.dup(2)
         nowhere = os.open(os.devnull, os.O_WRONLY)
         try:

@@ -49,7 +49,10 @@ class Frame:
     number: int = 0
     """Frame number; varies the jitter."""
     bad: dict[str, int] = field(init=False, default_factory=dict)
-    """How many pixels of each input are not finite; they weigh nothing, or stand still."""
+    """How many pixels of each input are not finite, or have no depth in front of the camera.
+
+    Bad colours weigh nothing, bad motion stands still, bad depth is infinitely far.
+    """
 
     def __post_init__(self):
         color = _float_array("color", self.color)
@@ -77,6 +80,10 @@ class Frame:
         for name in ("color", "to_next", "to_prev", "motion", "scale", "keep"):
             if given := _count_bad(getattr(self, name)):
                 self.bad[name] = given
+        if self.camera is not None and self.depth is not None and self.camera.depth_kind != "clip":
+            with np.errstate(invalid="ignore"):
+                if given := int(np.count_nonzero(~(self.depth > 0))):
+                    self.bad["depth"] = given
 
     @property
     def size(self) -> tuple[int, int]:

@@ -10,6 +10,7 @@ from .gpu import check_size, submit
 _HALF_MAX = 65504.0  # largest finite f16
 _USAGE = wgpu.TextureUsage
 _NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4"}
+_STORABLE = ("rgba16float", "rgba32float", "r32float", "r32uint")
 _CHANNELS = {"r": 1, "rg": 2, "rgba": 4}
 
 
@@ -33,7 +34,7 @@ class Images:
         if kept is None or kept.size[:2] != tuple(size) or kept.format != format:
             check_size(self.device, *size)
             usage = _USAGE.TEXTURE_BINDING | _USAGE.COPY_DST | _USAGE.COPY_SRC
-            if format.endswith("float") and format.startswith(("rgba", "r32")):
+            if format in _STORABLE:
                 usage |= _USAGE.STORAGE_BINDING
             kept = self.device.create_texture(
                 label=name, size=(*size, 1), format=format, usage=usage

@@ -23,12 +23,17 @@ _COLOR = ("combined", "rgba", "rgb", "beauty", "color", "colour", "image", "fina
 _DEPTH = ("depth", "z", "zdepth", "vrayzdepth", "z-depth", "z_depth", "worlddepth")
 
 
-def layers(names: Iterable[str]) -> dict[str, list[str]]:
-    """Channel names by layer, in the order x y z w, r g b a, or u v; the rest by name."""
+def layers(names: Iterable[str], near: str | None = None) -> dict[str, list[str]]:
+    """Channel names by layer, in the order x y z w, r g b a, or u v; the rest by name.
+
+    Layers beside the channel `near` (of the same view layer, say) come first.
+    """
     found: dict[str, list[str]] = {}
     for name in names:
         found.setdefault(name.rpartition(".")[0], []).append(name)
-    return {layer: sorted(members, key=_order) for layer, members in sorted(found.items())}
+    beside = (near or "").rpartition(".")[0].rpartition(".")[0]
+    first = sorted(found, key=lambda layer: (layer.rpartition(".")[0] != beside, layer))
+    return {layer: sorted(found[layer], key=_order) for layer in first}
 
 
 def _order(channel: str) -> tuple[int, str]:
@@ -72,9 +77,11 @@ def _rgba(members: list[str]) -> list[str]:
     return []
 
 
-def find_depth(names: Iterable[str], wanted: str | None = None) -> str | None:
-    """The channel that holds depth; None if no name says so."""
-    by_layer = layers(names)
+def find_depth(
+    names: Iterable[str], wanted: str | None = None, near: str | None = None
+) -> str | None:
+    """The channel that holds depth, beside the channel `near`; None if no name says so."""
+    by_layer = layers(names, near)
     if wanted is not None:
         return one_channel(by_layer, wanted, "depth layer")
     if "Z" in by_layer.get("", ()):
@@ -97,6 +104,14 @@ def one_channel(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> st
     """The channel called `wanted`, or the first of the layer of that name."""
     everything = [name for members in by_layer.values() for name in members]
     return wanted if wanted in everything else by_layer[pick(by_layer, wanted, what)][0]
+
+
+def grey(channels: Channels) -> np.ndarray:
+    """The one channel of a grey picture, or the red one of a coloured one."""
+    for name in ("Y", "R"):
+        if name in channels:
+            return channels[name]
+    return channels[next(iter(layers(channels).values()))[0]]
 
 
 # ---- masks ----------------------------------------------------------------------------------
@@ -165,8 +180,11 @@ def _crypto_id(crypto: Mapping[str, str], value: str) -> int:
         manifest = json.loads(crypto.get("manifest") or "{}")
     except ValueError:
         manifest = {}
-    if value not in manifest:
-        known = ", ".join(list(manifest)[:8]) or "nothing; give the id as 0x and eight digits"
+    if not isinstance(manifest, dict) or value not in manifest:
+        known = (
+            ", ".join(list(manifest)[:8] if isinstance(manifest, dict) else ())
+            or "nothing; give the id as 0x and eight digits"
+        )
         raise InputError(
             f"Cryptomatte {crypto['name']!r} has no {value!r}; its manifest has {known}"
         )

@@ -12,7 +12,8 @@ import numpy as np
 
 from . import exr, stills, video
 from .errors import InputError
-from .sequence import Source, frame_path, is_pattern
+from .numbering import frame_path, is_pattern
+from .sequence import Source
 
 SETTINGS = "wgmb"  # attribute and keyword under which the settings are written
 
@@ -29,6 +30,9 @@ def replace_file(path: Path, data: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise OSError(f"{path}: {error.strerror or error}") from None
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
@@ -76,6 +80,8 @@ class Output:
         self._prepare_folder()
         paths = [self.pattern] if is_video else [self.path(n) for n in numbers]
         there = [p for p in paths if p.exists()]
+        if folders := [p for p in there if not p.is_file()]:
+            raise InputError(f"output {folders[0]}: is not a file")
         if there and not (overwrite or resume):
             more = f" and {len(there) - 1} more" if len(there) > 1 else ""
             raise InputError(
@@ -131,9 +137,14 @@ class Output:
         replace_file(path, data)
 
     def close(self) -> None:
-        """Finish a video; pictures are finished one by one."""
-        if self._video is not None:
+        """Finish a video (OSError if it cannot be); pictures are finished one by one."""
+        if self._video is None:
+            return
+        try:
             self._video.close()
+        except OSError as error:
+            self.abandon()
+            raise OSError(f"{self.pattern}: {error.strerror or error}") from None
 
     def abandon(self) -> None:
         """After an interruption or an error: leave no unfinished file."""

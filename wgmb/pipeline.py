@@ -196,7 +196,7 @@ class Blur:
             "size": frame.size,
             "color": self._images.upload("color", rgba, four),
             "keep": self._view("keep", frame.keep, "r32float"),
-            "check": bool(frame.bad),
+            "check": bool(frame.bad.keys() - {"depth"}),
             "number": frame.number,
             **self._upload_moving(frame),
         }

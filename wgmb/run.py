@@ -149,8 +149,10 @@ def blur_sequence(
     if not broken:
         try:
             output.close()
-        except OSError as error:
-            fail(clip.numbers[-1], error)
+        except OSError as error:  # a video that cannot be finished is not there at all
+            for number in report.done:
+                fail(number, error)
+            report.done.clear()
     return report
 
 

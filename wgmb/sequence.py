@@ -5,75 +5,29 @@
 
 from __future__ import annotations
 
-import re
+import contextlib
 from collections import OrderedDict
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from fileseq.constants import PAD_STYLE_HASH1
-from fileseq.exceptions import FileSeqException
-from fileseq.filesequence import FileSequence
-from fileseq.frameset import FrameSet
 
 from . import exr, layers, stills, vectors
 from .cameras import CameraFile
 from .errors import InputError
 from .frame import Frame
+from .numbering import (
+    frame_numbers,
+    frame_path,
+    frame_range,
+    is_pattern,
+    number_in,
+    numbers_on_disk,
+)
 
-_PATTERN = re.compile(r"[#@]|%\d*d|\$F\d*|<UDIM>")
 DEPTHS = ("planar", "inverse", "clip")
-
-
-# ---- names ----------------------------------------------------------------------------------
-
-
-def is_pattern(path: str | Path) -> bool:
-    """Whether a path stands for many frames: `shot.####.exr`, `shot.%04d.exr`, `$F4`."""
-    return bool(_PATTERN.search(Path(path).name))
-
-
-def _sequence(pattern: str | Path) -> FileSequence:
-    try:
-        return FileSequence(str(pattern), pad_style=PAD_STYLE_HASH1)
-    except FileSeqException as error:
-        raise InputError(f"{pattern}: not a frame pattern: {error}") from None
-
-
-def frame_path(pattern: str | Path, number: int) -> Path:
-    """The file of frame `number`; a path that is no pattern stands for itself."""
-    if not is_pattern(pattern):
-        return Path(pattern)
-    return Path(_sequence(pattern).frame(number))
-
-
-def frame_numbers(text: str) -> list[int]:
-    """`1-100x2`, `1,3,5-8` -> frame numbers."""
-    try:
-        numbers = [int(n) for n in FrameSet(text)]
-    except (FileSeqException, ValueError) as error:
-        raise InputError(f"frames {text!r}: {error}") from None
-    if not numbers:
-        raise InputError(f"frames {text!r}: none")
-    return numbers
-
-
-def numbers_on_disk(pattern: str | Path) -> list[int]:
-    """The frames of a pattern that exist, in order."""
-    try:
-        found = FileSequence.findSequenceOnDisk(str(pattern), pad_style=PAD_STYLE_HASH1)
-    except FileSeqException:
-        raise InputError(f"{pattern}: no such frames") from None
-    return sorted(int(n) for n in found.frameSet() or [])
-
-
-def _number_in(path: Path) -> int:
-    """The frame number at the end of a file's name; 0 if there is none."""
-    m = re.search(r"(\d+)(?=\.[^.\d][^.]*$)", path.name)
-    return int(m[1]) if m else 0
-
-
-# ---- reading --------------------------------------------------------------------------------
+_OBJECT_STEMS = ("indexob", "objectindex", "object_id")
+Window = tuple[int, int, int, int]  # left, top, right, bottom; the last pixels belong to it
 
 
 @dataclass(frozen=True)
@@ -103,6 +57,8 @@ class Passes:
     def __post_init__(self):
         if self.depth_kind not in DEPTHS:
             raise InputError(f"depth must be one of {', '.join(DEPTHS)}, got {self.depth_kind!r}")
+        if not self.far > 0:
+            raise InputError(f"far must be over 0, got {self.far}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +68,29 @@ class Source:
     number: int
     path: Path
     file: exr.Exr | None  # None: a still
-    channels: dict[str, np.ndarray]
+    channels: dict[str, np.ndarray]  # of all its files, in the picture's data window
     attributes: dict
-    color: list[str]  # names of the picture's channels
+    wanted: str | None = None  # the picture's layer, if its name does not say so
+    part: exr.Part | None = None  # of the file, that the picture is in
+
+    @property
+    def color(self) -> list[str]:
+        """Names of the picture's channels, 3 or 4."""
+        with _about(self.path):
+            return layers.find_color(self.channels, self.wanted)
+
+    @property
+    def beside(self) -> str | None:
+        """A channel whose neighbours are preferred: the picture's first, if there is one."""
+        with contextlib.suppress(InputError):
+            return self.color[0]
+        return None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [px]."""
+        height, width = next(iter(self.channels.values())).shape
+        return width, height
 
     @property
     def rgba(self) -> np.ndarray:
@@ -125,6 +101,15 @@ class Source:
         for i, plane in enumerate(planes):
             rgba[..., i] = plane
         return rgba
+
+    @property
+    def window(self) -> Window | None:
+        """Where the image lies in the whole picture: x, y, whole width, whole height [px]."""
+        if self.part is None:
+            return None
+        left, top, right, bottom = self.part.display_window
+        x, y = self.part.data_window[:2]
+        return x - left, y - top, right - left + 1, bottom - top + 1
 
 
 class Clip:
@@ -141,13 +126,14 @@ class Clip:
         passes: Passes | None = None,
         skip_missing: bool = False,
     ):
+        """`frames`: "1-100x2", "1,3,5-8"; all that exist by default, and none may be missing
+        between them unless `skip_missing`.
+        """
         self.pattern, self.passes = str(pattern), passes or Passes()
         self.numbers = self._numbers(frames, skip_missing)
         self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
         self._kept: OrderedDict[int, Source] = OrderedDict()
-        self._vectors: vectors.Vectors | None = None
-        self.finding = "none asked for"
-        self._decided = self.passes.vectors.convention == "none"
+        self._found: vectors.Finding | None = None
 
     def _numbers(self, frames: str | None, skip_missing: bool) -> list[int]:
         if not is_pattern(self.pattern):
@@ -156,15 +142,17 @@ class Clip:
                 raise InputError(f"{path}: no such file")
             if frames is not None:
                 raise InputError(f"--frames needs a pattern such as shot.####.exr, got {path.name}")
-            return [_number_in(path)]
+            return [number_in(path)]
         there = numbers_on_disk(self.pattern)
         wanted = frame_numbers(frames) if frames else list(range(there[0], there[-1] + 1))
-        missing = [n for n in wanted if n not in set(there)]
+        missing = sorted(set(wanted) - set(there))
         if missing and not skip_missing:
-            named = FrameSet(missing)
             raise InputError(
-                f"{self.pattern}: missing frames {named}; --skip-missing leaves them out"
+                f"{self.pattern}: missing frames {frame_range(missing)}; "
+                "--skip-missing leaves them out"
             )
+        if len(missing) == len(set(wanted)):
+            raise InputError(f"{self.pattern}: none of the frames {frames} exist")
         return [n for n in wanted if n not in set(missing)]
 
     def __iter__(self):
@@ -172,66 +160,92 @@ class Clip:
             yield self.frame(self.source(number))
 
     def files(self, number: int) -> list[Path]:
-        """Every file that frame `number` is read from."""
-        return [frame_path(p, number) for p in (self.pattern, *self.passes.also)]
+        """Every file that the result of frame `number` depends on."""
+        passes = self.passes
+        masks = [m for m in (passes.keep, passes.scale) if m is not None and _is_file(m, number)]
+        patterns = (self.pattern, *passes.also, *masks)
+        camera = [passes.camera] if passes.camera else []
+        return [*(frame_path(p, number) for p in patterns), *camera]
 
     def source(self, number: int) -> Source:
         """Frame `number` as stored; the last three are kept for their neighbours."""
         if number not in self._kept:
             while len(self._kept) > 2:
                 self._kept.popitem(last=False)
-            self._kept[number] = _read(self.files(number), number, self.passes)
+            paths = [frame_path(p, number) for p in (self.pattern, *self.passes.also)]
+            self._kept[number] = _read(paths, number, self.passes.color)
         return self._kept[number]
 
     def forget(self, number: int) -> None:
         """Let go of a frame that nobody will ask for again."""
         self._kept.pop(number, None)
 
-    def decide(self, source: Source) -> None:
-        """Settle, once, what the vectors mean: by name, and by a neighbouring frame."""
-        if self._decided:
-            return
-        self._decided = True
-        wanted = self.passes.vectors
-        self._vectors = vectors.named(source.channels, wanted)
-        if self._vectors is None:
-            self.finding = "no vector layer found"
-            return
-        self.finding = str(self._vectors)
-        if wanted.convention != "auto":
-            return
-        near = {}
-        for side, number in (("prev", source.number - 1), ("next", source.number + 1)):
-            path = frame_path(self.pattern, number)
-            if is_pattern(self.pattern) and path.is_file():
-                near[side] = self.source(number).rgba
-        found = vectors.detect(
-            source.rgba,
-            vectors.read(source.channels, self._vectors),
-            near.get("prev"),
-            near.get("next"),
-            self._vectors,
-        )
-        self._vectors, self.finding = found.vectors, found.text
-        self.forget(source.number - 1)
+    @property
+    def finding(self) -> str:
+        """What the vectors were found to mean, for people."""
+        return self._decide().text
 
-    def frame(self, source: Source) -> Frame:
-        """What a method is given of `source`."""
-        self.decide(source)
-        rgba = source.rgba
-        motion = None
-        if self._vectors is not None:
-            motion = vectors.read(source.channels, self._vectors)
-        depth = reprojections = ids = None
-        if self._camera is not None and source.number in self._camera.numbers():
-            depth = self._depth(source)
-            reprojections = self._reprojections(source)
-            ids = self._object_ids(source, reprojections)
-        elif self._camera is not None:
-            raise InputError(f"{self._camera.path}: no camera for frame {source.number}")
+    def _decide(self) -> vectors.Finding:
+        """Settle, once for all frames, what the vectors mean.
+
+        By name, and tested on the clip's first frame, or its middle or last one where nothing
+        moves; so every run over the same frames settles it alike.
+        """
+        if self._found is None:
+            wanted = self.passes.vectors
+            self._found = vectors.Finding(None, False, "none asked for")
+            if wanted.convention != "none":
+                tested = dict.fromkeys(self.numbers[i] for i in (0, len(self.numbers) // 2, -1))
+                for number in tested:
+                    with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                        self._found = self._test(number, wanted)
+                    if self._found.sure or wanted.convention != "auto":
+                        break
+        return self._found
+
+    def _test(self, number: int, wanted: vectors.Vectors) -> vectors.Finding:
+        source = self.source(number)
+        named = vectors.named(source.channels, wanted, source.beside)
+        if named is None:
+            return vectors.Finding(None, False, "no vector layer found")
+        if wanted.convention != "auto":
+            return vectors.Finding(named, True, str(named))
+        motion = vectors.read(source.channels, named, source.beside)
+        prev, next_ = self._neighbour(number - 1), self._neighbour(number + 1)
+        if source.beside is None:
+            return vectors.Finding(named, False, f"{named}, by name (no picture to test it on)")
+        return vectors.detect(source.rgba, motion, prev, next_, named)
+
+    def _neighbour(self, number: int) -> np.ndarray | None:
+        if not is_pattern(self.pattern) or not frame_path(self.pattern, number).is_file():
+            return None
+        wanted = number in self.numbers
         try:
+            return self.source(number).rgba
+        except (InputError, OSError):
+            return None
+        finally:
+            if not wanted:
+                self.forget(number)
+
+    def frame(self, source: Source, picture: bool = True) -> Frame:
+        """What a method is given of `source`; without `picture`, all but the colour (0)."""
+        meaning = self._decide().vectors
+        with _about(source.path):
+            if meaning is None:  # where a layer was asked for, this says why there is none
+                meaning = vectors.named(source.channels, self.passes.vectors, source.beside)
+            motion = depth = reprojections = ids = None
+            if meaning is not None:
+                motion = vectors.read(source.channels, meaning, source.beside)
+            if self._camera is not None:
+                depth = self._depth(source)
+                kind = "clip" if self.passes.depth_kind == "clip" else "planar"
+                reprojections = self._camera.around(
+                    source.number, depth_kind=kind, far=self.passes.far, window=source.window
+                )
+                ids = self._object_ids(source) if reprojections.here.bodies else None
             return Frame(
-                rgba,
+                source.rgba if picture else np.zeros((*source.size[::-1], 3), np.float16),
                 motion=motion,
                 depth=depth,
                 camera=reprojections,
@@ -241,44 +255,23 @@ class Clip:
                 object_motion=self.passes.object_motion,
                 number=source.number,
             )
-        except InputError as error:
-            raise InputError(f"{source.path}: {error}") from None
 
     def _depth(self, source: Source) -> np.ndarray:
-        name = layers.find_depth(source.channels, self.passes.depth)
+        name = layers.find_depth(source.channels, self.passes.depth, source.beside)
         if name is None:
-            raise InputError(
-                f"{source.path}: motion from a camera needs a depth layer; there is "
-                f"{', '.join(layers.layers(source.channels))}"
-            )
+            there = ", ".join(layers.layers(source.channels))
+            raise InputError(f"motion from a camera needs a depth layer; there is {there}")
         depth = source.channels[name].astype(np.float32)
         if self.passes.depth_kind == "inverse":
             with np.errstate(divide="ignore"):
                 depth = np.where(depth > 0, 1 / depth, np.inf).astype(np.float32)
         return depth
 
-    def _reprojections(self, source: Source):
-        window = None
-        if source.file is not None:
-            part = source.file.parts[0]
-            x, y, right, bottom = part.display_window
-            left, top = part.data_window[:2]
-            window = (left - x, top - y, right - x + 1, bottom - y + 1)
-        assert self._camera is not None
-        kind = "clip" if self.passes.depth_kind == "clip" else "planar"
-        return self._camera.around(
-            source.number, depth_kind=kind, far=self.passes.far, window=window
-        )
-
-    def _object_ids(self, source: Source, reprojections) -> np.ndarray | None:
-        if not reprojections.here.bodies:
-            return None
-        by_layer = layers.layers(source.channels)
+    def _object_ids(self, source: Source) -> np.ndarray | None:
+        by_layer = layers.layers(source.channels, near=source.beside)
         name = self.passes.object_layer
         if name is None:
-            named = [
-                k for k in by_layer if layers.stem(k) in ("indexob", "objectindex", "object_id")
-            ]
+            named = [k for k in by_layer if layers.stem(k) in _OBJECT_STEMS]
             if not named:
                 return None
             name = named[0]
@@ -289,36 +282,53 @@ class Clip:
     def _mask(self, source: Source, wanted: str | None) -> np.ndarray | None:
         if wanted is None:
             return None
-        size = source.channels[source.color[0]].shape
-        file = frame_path(wanted, source.number)
-        if file.suffix.lower() in (".exr", *stills.SUFFIXES):
-            image = (
-                _read([file], source.number, Passes()).rgba
-                if file.suffix.lower() == ".exr"
-                else (stills.read(file))
-            )
-            plane = stills.srgb(image[..., 0]) if file.suffix.lower() != ".exr" else image[..., 0]
-            if plane.shape != size:
-                raise InputError(
-                    f"{file}: mask must be {size[1]} x {size[0]} like "
-                    f"{source.path.name}, got {plane.shape[1]} x {plane.shape[0]}"
-                )
-            return plane.astype(np.float32)
-        try:
+        if not _is_file(wanted, source.number):
             return layers.mask(source.channels, source.attributes, wanted)
-        except InputError as error:
-            raise InputError(f"{source.path}: {error}") from None
+        file = frame_path(wanted, source.number)
+        if file.suffix.lower() == ".exr":
+            channels = _read([file], source.number, None).channels
+            plane = layers.grey(channels).astype(np.float32)
+        else:
+            plane = stills.srgb(stills.read(file)[..., 0])  # grey values as painted
+        if plane.shape[::-1] != source.size:
+            raise InputError(
+                f"{file} must be {_size(source.size)} like the picture, is {_size(plane)}"
+            )
+        return plane
 
 
-def _read(paths: list[Path], number: int, passes: Passes) -> Source:
+def _is_file(mask: str, number: int) -> bool:
+    return frame_path(mask, number).suffix.lower() in (".exr", *stills.SUFFIXES)
+
+
+def _size(of) -> str:
+    width, height = of if isinstance(of, tuple) else of.shape[::-1]
+    return f"{width} x {height}"
+
+
+@contextlib.contextmanager
+def _about(path: Path):
+    """Name the file in errors that do not."""
+    try:
+        yield
+    except InputError as error:
+        if str(path) in str(error):
+            raise
+        raise InputError(f"{path}: {error}") from None
+
+
+def _read(paths: list[Path], number: int, wanted: str | None) -> Source:
     """One frame's files, their channels together."""
-    path = paths[0]
-    file, channels, attributes = None, {}, {}
+    path, channels, attributes = paths[0], {}, {}
+    file: exr.Exr | None = None
+    onto: exr.Part | None = None
+    size: tuple[int, int] | None = None
     for p in paths:
         if p.suffix.lower() == ".exr":
             read = exr.read(p)
-            file = file or (read if p == path else None)
-            more = read.channels()
+            onto = onto or _picture_part(read, wanted)
+            file = read if p == path else file
+            more = _one_window(read, onto)
             for part in reversed(read.parts):
                 attributes = {**part.attributes, **attributes}
         elif p.suffix.lower() in stills.SUFFIXES:
@@ -327,16 +337,47 @@ def _read(paths: list[Path], number: int, passes: Passes) -> Source:
         else:
             known = ", ".join((".exr", *stills.SUFFIXES))
             raise InputError(f"{p}: cannot read this kind of file; frames may be {known}")
-        first = next(iter(channels.values())) if channels else None
         for name, plane in more.items():
-            if first is not None and plane.shape != first.shape:
+            size = size or plane.shape[::-1]
+            if plane.shape[::-1] != size:
                 raise InputError(
-                    f"{p}: layer {name} is {plane.shape[1]} x {plane.shape[0]}, "
-                    f"{path.name} is {first.shape[1]} x {first.shape[0]}"
+                    f"{p}: layer {name} is {_size(plane)}, {path.name} is {_size(size)}"
                 )
             channels.setdefault(name, plane)
-    try:
-        color = layers.find_color(channels, passes.color)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    return Source(number, path, file, channels, attributes, color)
+    return Source(number, path, file, channels, attributes, wanted, onto if file else None)
+
+
+def _picture_part(read: exr.Exr, wanted: str | None) -> exr.Part:
+    """The part that the picture is in; the first one where none is found."""
+    places = {full: part for full, part, _ in read.places()}
+    with contextlib.suppress(InputError):
+        return places[layers.find_color(places, wanted)[0]]
+    return read.parts[0]
+
+
+def _one_window(read: exr.Exr, onto: exr.Part) -> dict[str, np.ndarray]:
+    """All channels in the data window of the part `onto`; 0 where they have none."""
+    channels = {}
+    for full, part, name in read.places():
+        plane = part.channels[name]
+        if part.data_window != onto.data_window:
+            if part.display_window != onto.display_window:
+                raise InputError(
+                    f"{read.path}: layer {full}, {_size(plane)}, lies in another display window "
+                    f"than the picture, {_size(onto.size)}"
+                )
+            plane = _moved(plane, part.data_window, onto.data_window)
+        channels[full] = plane
+    return channels
+
+
+def _moved(plane: np.ndarray, window: Window, onto: Window) -> np.ndarray:
+    """What `plane`, which covers `window`, has in `onto`."""
+    left, top = max(window[0], onto[0]), max(window[1], onto[1])
+    right, bottom = min(window[2], onto[2]) + 1, min(window[3], onto[3]) + 1
+    moved = np.zeros((onto[3] - onto[1] + 1, onto[2] - onto[0] + 1), plane.dtype)
+    if left < right and top < bottom:
+        moved[top - onto[1] : bottom - onto[1], left - onto[0] : right - onto[0]] = plane[
+            top - window[1] : bottom - window[1], left - window[0] : right - window[0]
+        ]
+    return moved

@@ -84,7 +84,9 @@ CONVENTIONS: dict[str, Convention] = {
 }
 _BACKWARD = ("backward", "to_prev")
 _MOVING = 1.0  # [px] slower pixels say nothing about a convention
+_BRIGHT = 1e4  # light beyond this is all the same
 _PROBES = 20_000  # pixels compared
+_EXPLAINS = 0.9  # what a right reading leaves at most of the unmoved difference
 _CLEARLY = 0.75  # another reading must leave less than this share of the difference
 
 
@@ -119,13 +121,16 @@ class Vectors:
         return " ".join((self.convention, *more))
 
 
-def named(names: Iterable[str], wanted: Vectors) -> Vectors | None:
-    """`wanted` with "auto" replaced by the convention the layers' names speak for."""
+def named(names: Iterable[str], wanted: Vectors, near: str | None = None) -> Vectors | None:
+    """`wanted` with "auto" replaced by the convention the layers' names speak for.
+
+    Layers beside the channel `near` come first. None: "none", or no name speaks for any.
+    """
     if wanted.convention == "none":
         return None
     if wanted.convention != "auto":
         return wanted
-    by_layer = layers(names)
+    by_layer = layers(names, near)
     if wanted.layer is not None:
         only = pick(by_layer, wanted.layer, "vector layer")
         by_layer = {only: by_layer[only]}
@@ -149,10 +154,12 @@ def _find(by_layer: Mapping[str, list[str]], convention: Convention) -> dict[str
     return found
 
 
-def channels_of(names: Iterable[str], vectors: Vectors) -> dict[str, tuple[str, str]]:
+def channels_of(
+    names: Iterable[str], vectors: Vectors, near: str | None = None
+) -> dict[str, tuple[str, str]]:
     """The x and y channels for "prev" and "next"; one of them may not be there."""
     convention = CONVENTIONS[vectors.convention]
-    by_layer = layers(names)
+    by_layer = layers(names, near)
     if vectors.layer is not None:
         members = by_layer[pick(by_layer, vectors.layer, "vector layer")]
         sides = [("next", convention.next)]
@@ -181,13 +188,15 @@ def channels_of(names: Iterable[str], vectors: Vectors) -> dict[str, tuple[str, 
     return result
 
 
-def read(channels: Mapping[str, np.ndarray], vectors: Vectors) -> np.ndarray:
+def read(
+    channels: Mapping[str, np.ndarray], vectors: Vectors, near: str | None = None
+) -> np.ndarray:
     """(height, width, 4) float32: to_prev and to_next [px] of a frame's channels.
 
     Where one side is not there it is the other's opposite: a straight path.
     """
     convention = CONVENTIONS[vectors.convention]
-    sides = channels_of(channels, vectors)
+    sides = channels_of(channels, vectors, near)
     offset = convention.offset if vectors.offset is None else vectors.offset
     flip = np.array([-1 if axis in vectors.flip else 1 for axis in "xy"], np.float32)
     signs = {"prev": convention.prev_sign, "next": convention.next_sign}
@@ -214,13 +223,13 @@ def read(channels: Mapping[str, np.ndarray], vectors: Vectors) -> np.ndarray:
 class Finding:
     """What warping the neighbouring frame said about a convention."""
 
-    vectors: Vectors  # the reading that explains the neighbour
+    vectors: Vectors | None  # the reading that explains the neighbour; None: there are none
     sure: bool  # something moves, and one reading is clearly better than standing still
     text: str  # for people
 
 
 _LEFT = "the neighbouring frame differs by {:.0%} of what it differs unmoved"
-_ALTERNATIVES = (("", 1.0), ("y", 1.0), ("x", 1.0), ("xy", 1.0), ("", 2.0), ("", 0.5))
+_ALTERNATIVES = tuple((flip, scale) for flip in ("", "y", "x", "xy") for scale in (1.0, 2.0, 0.5))
 
 
 def detect(color, motion: np.ndarray, prev_color, next_color, vectors: Vectors) -> Finding:
@@ -230,7 +239,9 @@ def detect(color, motion: np.ndarray, prev_color, next_color, vectors: Vectors) 
     twice, half) warps the neighbours; the one that leaves the least difference is meant.
     """
     sides = ((motion[..., :2], prev_color), (motion[..., 2:], next_color))
-    pairs = [(m, c) for m, c in sides if c is not None and c.shape[:2] == color.shape[:2]]
+    pairs = [
+        (m, _tone(c[..., :3])) for m, c in sides if c is not None and c.shape[:2] == color.shape[:2]
+    ]
     if not pairs:
         return Finding(vectors, False, f"{vectors}, by name (no neighbouring frame to test it on)")
     at = _moving_pixels(pairs)
@@ -249,23 +260,17 @@ def detect(color, motion: np.ndarray, prev_color, next_color, vectors: Vectors) 
         key=lambda k: (len(_combine(vectors.flip, k[0])), k != ("", 1.0), left[k]),
     )
     stated = left["", 1.0]
-    if least > 0.9 * still:
-        return Finding(
-            vectors,
-            False,
-            f"{vectors}, by name; no reading of these vectors explains "
-            "the neighbouring frame: check them",
-        )
-    if best == ("", 1.0) or left[best] > _CLEARLY * stated:
+    if left[best] > _CLEARLY * stated:
+        best = ("", 1.0)
+    if left[best] > _EXPLAINS * still:
+        text = f"{vectors}, by name; no reading of these vectors explains the neighbouring frame"
+        return Finding(vectors, False, text + ": check them")
+    if best == ("", 1.0):
         return Finding(vectors, True, f"{vectors}, tested: {_LEFT.format(stated / still)}")
     flip, scale = best
     meant = replace(vectors, flip=_combine(vectors.flip, flip), scale=vectors.scale * scale)
-    return Finding(
-        meant,
-        True,
-        f"{meant}, because with {vectors} "
-        f"{_LEFT.format(stated / still)}, so with {left[best] / still:.0%}",
-    )
+    then, now = _LEFT.format(stated / still), f"{left[best] / still:.0%}"
+    return Finding(meant, True, f"{meant}, because with {vectors} {then}, so with {now}")
 
 
 def _combine(a: str, b: str) -> str:
@@ -291,14 +296,14 @@ def _difference(color, pairs, at, scale: float, flip: str) -> float:
     total = 0.0
     for motion, neighbour in pairs:
         where = at[:, ::-1] + motion[at[:, 0], at[:, 1]] * factor
-        there = _tone(_bilinear(neighbour, where))
+        there = _bilinear(neighbour, where)
         total += float(np.minimum(np.abs(there - here).sum(axis=1), 0.3).mean())
     return total / len(pairs)
 
 
 def _tone(color: np.ndarray) -> np.ndarray:
     """Held to 0..1 without hard limit, so that one highlight does not decide."""
-    light = np.clip(np.nan_to_num(color.astype(np.float32)), 0, 1e4)
+    light = np.clip(np.nan_to_num(color.astype(np.float32)), 0, _BRIGHT)
     return light / (1 + light)
 
 
@@ -309,7 +314,6 @@ def _bilinear(image: np.ndarray, where: np.ndarray) -> np.ndarray:
     left, top = x.astype(int), y.astype(int)
     right, below = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
     u, v = (x - left)[:, None], (y - top)[:, None]
-    rgb = image[..., :3]
-    return (1 - v) * ((1 - u) * rgb[top, left] + u * rgb[top, right]) + v * (
-        (1 - u) * rgb[below, left] + u * rgb[below, right]
-    )
+    upper = (1 - u) * image[top, left] + u * image[top, right]
+    lower = (1 - u) * image[below, left] + u * image[below, right]
+    return (1 - v) * upper + v * lower

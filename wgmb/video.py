@@ -16,6 +16,7 @@ from av.error import FFmpegError
 from av.video.reformatter import Colorspace
 from av.video.stream import VideoStream
 
+from .errors import InputError
 from .stills import to_display
 
 SUFFIXES = (".mp4", ".mov", ".mkv", ".webm", ".gif")
@@ -39,10 +40,17 @@ class Video:
         self.path, self.temporary, self.fps, self.settings = path, temporary, fps, settings
         self._open: tuple[OutputContainer, VideoStream] | None = None
         self._gif: list[np.ndarray] = []
+        self._size: tuple[int, ...] = ()
 
     def add(self, rgba: np.ndarray) -> None:
         """Append one frame of linear light, (height, width, 3 or 4); OSError if it cannot be."""
         shown = to_display(rgba[..., :3], 8)
+        self._size = self._size or shown.shape
+        if shown.shape != self._size:
+            raise InputError(
+                f"frame of {shown.shape[1]} x {shown.shape[0]} in a video of "
+                f"{self._size[1]} x {self._size[0]}"
+            )
         if self.path.suffix.lower() == ".gif":
             self._gif.append(shown)
             return
