@@ -19,7 +19,15 @@ import numpy as np
 from .cameras import Reprojections
 from .errors import InputError
 
-_CHANNELS = {"to_next": (2,), "to_prev": (2,), "motion": (4,), "depth": (), "keep": (), "scale": ()}
+_CHANNELS = {
+    "to_next": (2,),
+    "to_prev": (2,),
+    "motion": (4,),
+    "normal": (3,),
+    "depth": (),
+    "keep": (),
+    "scale": (),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +48,8 @@ class Frame:
     """How the camera and the bodies move around this frame: motion from depth."""
     object_id: np.ndarray | None = None
     """(height, width) integer: which body of `camera` a pixel shows; 0 is the world."""
+    normal: np.ndarray | None = None
+    """(height, width, 3) float: unit vectors in the world; 0 where nothing is."""
     keep: np.ndarray | None = None
     """(height, width) float 0..1: 1 stays sharp and out of its neighbours' blur."""
     scale: np.ndarray | None = None

@@ -153,7 +153,7 @@ class Kernel:
             module = device.create_shader_module(code=source.text, label=source.name)
         except wgpu.GPUError as error:
             raise ShaderError(_located(str(error), source)) from None
-        self.groups = sorted({b.group for b in self.bindings.values()})
+        self.groups = range(1 + max((b.group for b in self.bindings.values()), default=-1))
         self.layouts = [
             device.create_bind_group_layout(
                 label=f"{source.name}:{group}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import wgpu
 
+from .errors import InputError
 from .gpu import check_size, submit
 
 _HALF_MAX = 65504.0  # largest finite f16
@@ -18,6 +19,25 @@ def numpy_of(format: str) -> tuple[np.dtype, int]:
     """Numpy type and number of channels of a texture format such as `rgba16float`."""
     letters, _, _ = format.partition("32" if "32" in format else "16")
     return np.dtype(_NUMPY[format[len(letters) :]]), _CHANNELS[letters]
+
+
+class Scratch:
+    """A storage buffer that is only remade when it has to grow."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device: wgpu.GPUDevice = device
+        self._buffer: wgpu.GPUBuffer | None = None
+
+    def at_least(self, size: int) -> wgpu.GPUBuffer:
+        """The buffer, of `size` bytes or more; what is in it is undefined."""
+        most = self._device.limits["max-storage-buffer-binding-size"]
+        if size > most:
+            raise InputError(f"the picture needs a buffer of {size} bytes, the adapter has {most}")
+        if self._buffer is None or self._buffer.size < size:
+            self._buffer = self._device.create_buffer(
+                label="scratch", size=size, usage=wgpu.BufferUsage.STORAGE
+            )
+        return self._buffer
 
 
 class Images:

@@ -12,6 +12,7 @@ from . import gpu, shader
 from .blur import METHODS
 from .errors import InputError
 from .frame import PASSES, Frame
+from .gbuffer import SceneOnGpu
 from .images import Images
 from .shutter import Shutter
 from .timing import Timing
@@ -27,6 +28,8 @@ class Inputs:
     """What a method may read while it records one frame."""
 
     given: gpu.Given
+    samples: int
+    shutter: Shutter
     color: View  # linear, premultiplied by alpha and by weight
     motion: View  # to_prev, to_next [px]
     depth: View | None
@@ -34,6 +37,8 @@ class Inputs:
     none: View  # bound where an input is not there
     linear: wgpu.GPUSampler
     even: bool  # the shutter is a box
+    scene: SceneOnGpu | None
+    progress: tuple[int, int]  # samples done before, samples to do now
 
 
 class Blur:
@@ -114,8 +119,10 @@ class Blur:
         encoder: wgpu.GPUCommandEncoder,
         *,
         size: tuple[int, int],
-        color: View,
         output: View,
+        color: View | None = None,
+        scene: SceneOnGpu | None = None,
+        progress: tuple[int, int] | None = None,
         keep: View | None = None,
         check: bool = False,
         number: int = 0,
@@ -130,29 +137,37 @@ class Blur:
         x and y, or `motion` with to_prev and to_next together, which saves a pass; or
         `camera` and `depth`. `check` gives pixels that are not finite no weight, at the
         price of three small passes.
+
+        `scene` instead of `color`, for the methods that need one, which may be recorded
+        bit by bit: `progress` is how many samples were done before, and are to be done now.
         """
         gpu.check_size(self.device, *size)
         motions = _moving(moving)
-        there = {"color"} | ({"motion"} if motions.known else set())
-        self._require(there | ({"depth"} if motions.depth is not None else set()))
-        given = self._given(size, number, timing)
+        given_inputs = {"color": color, "motion": motions.known or None, "depth": motions.depth}
+        given_inputs["scene"] = scene
+        self._require({name for name, input_ in given_inputs.items() if input_ is not None})
+        given = self.given(size, number, timing)
         motion, limited = motions.motion, self.max_blur is not None
-        if motion is None or not motions.ready or limited or check:
+        if motions.known and (not motions.ready or limited or check):
             motion = self._images.view("motion", size, "rgba32float")
             self._velocity.encode(encoder, given, motions, limited, motion)
         weight, result, own = None, output, color
-        if keep is not None or check:
+        if color is not None and (keep is not None or check):
             color, weight = self._lift(encoder, given, color, keep)
             result = self._images.view("blurred", size, self.output)
         inputs = Inputs(
             given=given,
-            color=color,
-            motion=motion,
+            samples=self.samples,
+            shutter=self._shutter,
+            color=color or self._none,
+            motion=motion or self._none,
             depth=motions.depth,
             weight=weight,
             none=self._none,
             linear=self._linear,
             even=self._shutter.curve == "box",
+            scene=scene,
+            progress=progress or (0, self.samples),
         )
         self.method.encode(encoder, inputs, result)
         if weight:
@@ -177,7 +192,7 @@ class Blur:
         if "motion" not in frame.has:
             raise InputError("there is no motion: give to_next, to_prev, or depth and a camera")
         encoder = self.device.create_command_encoder(label="wgmb motion")
-        given = self._given(frame.size, frame.number, None)
+        given = self.given(frame.size, frame.number, None)
         motion = self._images.texture("motion", frame.size, "rgba32float")
         moving = _moving(self._upload_moving(frame))
         limited = self.max_blur is not None
@@ -221,7 +236,10 @@ class Blur:
         if missing := self.method.needs - there:
             raise InputError(f"method {self.method.name!r} needs {', '.join(sorted(missing))}")
 
-    def _given(self, size: tuple[int, int], number: int, timing) -> gpu.Given:
+    def given(
+        self, size: tuple[int, int], number: int = 0, timing: Timing | None = None
+    ) -> gpu.Given:
+        """What every pass of a frame is given: frame, shutter, times of the samples."""
         data = np.zeros((), shader.load("common/frame.wgsl").dtype("Frame"))
         data["size"], data["samples"], data["jitter"] = size, self.samples, self.jitter
         data["index"] = number % 2**32

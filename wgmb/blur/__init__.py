@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
+from .accumulate import Accumulate
+from .distributed import Distributed
 from .tap import Tap
 
 if TYPE_CHECKING:
@@ -18,7 +20,7 @@ class Method(Protocol):
     name: str
     """Also the stem of its Python file, its WGSL file and its twin in the tests."""
     needs: frozenset[str]
-    """Of "color", "motion", "depth"."""
+    """Of "color", "motion", "depth", "scene"."""
 
     def encode(
         self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView
@@ -27,4 +29,4 @@ class Method(Protocol):
         ...
 
 
-METHODS: dict[str, type] = {m.name: m for m in (Tap,)}
+METHODS: dict[str, type] = {m.name: m for m in (Tap, Accumulate, Distributed)}

@@ -29,13 +29,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let opening = displacement(path, shutter.span.x + times.delay);
     let closing = displacement(path, shutter.span.y + times.delay);
     let still = !PUBLISHED && max(dot(opening, opening), dot(closing, closing)) < STILL * STILL;
-    let count = select(frame.samples, 1u, still);
-    let moving = select(1.0, 0.0, still);
+    let count = select(frame.samples, 0u, still);
 
-    let share = 1.0 / f32(count);   // before adding, so that no sum of finite colours overflows
+    let share = 1.0 / f32(frame.samples);   // before adding, so that no sum of finite colours overflows
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
-    let back = Path(-path.velocity * texel * moving, path.curvature * texel * moving);  // in time
+    let back = Path(-path.velocity * texel, path.curvature * texel);    // in time
     var sum = vec4f(0.0);
     var total = 0.0;
     for (var i = 0u; i < count; i++) {
@@ -44,6 +43,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let at = uv + displacement(back, t);
         sum += share * textureSampleLevel(color, linear, at, 0.0);
         if WEIGHTED { total += share * textureSampleLevel(weight, linear, at, 0.0).x; }
+    }
+    if still {      // to the bit
+        sum = textureLoad(color, id.xy, 0);
+        if WEIGHTED { total = textureLoad(weight, id.xy, 0).x; }
     }
     if WEIGHTED { sum = select(vec4f(0.0), sum / total, total > 0.0); }
     textureStore(output, id.xy, sum);

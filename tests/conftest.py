@@ -1,0 +1,54 @@
+"""What the numerical tests share: a device, pictures, and a comparison that shows its failures."""
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from wgmb import gpu
+
+np.seterr(all="raise")
+
+
+@pytest.fixture(scope="session")
+def device():
+    return gpu.open_device()
+
+
+@pytest.fixture(scope="session")
+def noise():
+    return np.random.default_rng(1).random((48, 64, 3), "f4")
+
+
+def difference(got, want) -> tuple[float, float]:
+    """Greatest and mean absolute difference; infinite where the shapes or a NaN differ."""
+    got, want = np.asarray(got, np.float64), np.asarray(want, np.float64)
+    if got.shape != want.shape or not np.isfinite(got).all():
+        return float("inf"), float("inf")
+    apart = np.abs(got - want)
+    return float(apart.max()), float(apart.mean())
+
+
+@pytest.fixture
+def close(tmp_path):
+    """close(got, want, atol): on failure the pictures and 8 x their difference are kept."""
+
+    def check(got, want, atol: float):
+        most, mean = difference(got, want)
+        if most <= atol:
+            return
+        for name, picture in (("got", got), ("want", want)):
+            _show(tmp_path / f"{name}.png", np.asarray(picture, np.float64))
+        if np.shape(got) == np.shape(want):
+            _show(tmp_path / "difference.png", 8 * np.abs(np.asarray(got, "f8") - want))
+        pytest.fail(
+            f"differ by up to {most:.3g}, {mean:.3g} in the mean, allowed {atol:g}: {tmp_path}"
+        )
+
+    return check
+
+
+def _show(path, picture):
+    plane = np.nan_to_num(np.atleast_3d(picture))[..., :3]
+    if plane.shape[2] == 2:
+        plane = np.dstack([plane, 0 * plane[..., :1]])
+    iio.imwrite(path, (255 * np.clip(plane, 0, 1)).astype("u1").squeeze())

@@ -1,0 +1,28 @@
+"""Every method honours the same small contract, checked without knowing any of them."""
+
+import inspect
+
+import pytest
+
+import wgmb
+from wgmb import shader
+
+
+@pytest.mark.parametrize("name", sorted(wgmb.METHODS))
+def test_contract(name):
+    method = wgmb.METHODS[name]
+    assert method.name == name
+    assert method.__module__ == f"wgmb.blur.{name}"
+    assert method.needs
+    assert method.needs <= {"color", "motion", "depth", "scene"}
+    assert list(inspect.signature(method.encode).parameters) == [
+        "self", "encoder", "inputs", "output",
+    ]  # fmt: skip
+    assert shader.load(f"blur/{name}.wgsl").text.startswith("// ")
+    assert {n for n in vars(method) if not n.startswith("_")} == {"name", "needs", "encode"}
+    assert "Artefacts:" in (method.__doc__ or "")
+
+
+def test_every_shader_of_a_method_belongs_to_one():
+    files = {p.stem for p in (shader.ROOT / "blur").glob("*.wgsl")}
+    assert files == set(wgmb.METHODS)

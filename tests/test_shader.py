@@ -1,0 +1,143 @@
+"""WGSL is the one place of truth: Python reads it as the GPU does."""
+
+import itertools
+import random
+import re
+
+import numpy as np
+import pytest
+import wgpu
+
+from wgmb import ShaderError, gpu, shader
+
+LEAVES = ["f32", "u32", "i32", "vec2f", "vec2u", "vec3f", "vec3u", "vec4f", "vec4<i32>", "mat4x4f",
+          "array<vec4f, 3>"]  # fmt: skip
+FILES = sorted(p.relative_to(shader.ROOT).as_posix() for p in shader.ROOT.rglob("*.wgsl"))
+ENTERED = [f for f in FILES if shader.load(f).entry_points()]
+ONE = "const WG_X: u32 = 1u;\nconst WG_Y: u32 = 1u;\n"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(shader, "ROOT", tmp_path)
+    shader.load.cache_clear()
+    yield tmp_path
+    shader.load.cache_clear()
+
+
+def words(kind):
+    """WGSL suffixes that read every 32-bit word of a field."""
+    if kind in ("f32", "u32", "i32"):
+        return [""]
+    if kind.startswith("vec"):
+        return [f".{c}" for c in "xyzw"[: int(kind[3])]]
+    rows = 4 if kind == "mat4x4f" else 3
+    return [f"[{i}].{c}" for i in range(rows) for c in "xyzw"]
+
+
+def run(device, source, size=(1, 1), **own):
+    kernel = gpu.Kernel(device, source)
+    encoder = device.create_command_encoder()
+    kernel.run(encoder, "main", gpu.Given(size, {}), **own)
+    gpu.submit(device, encoder)
+
+
+@pytest.mark.parametrize("seed", range(300))
+def test_python_and_gpu_agree_on_struct_layout(device, seed, folder):
+    rng = random.Random(seed)
+    fields = [(f"m{i}", rng.choice(LEAVES)) for i in range(rng.randint(1, 9))]
+    body = "".join(f"    {n}: {k},\n" for n, k in fields)
+    reads = [f"p.{name}{w}" for name, kind in fields for w in words(kind)]
+    code = "".join(f"    out[{i}] = bitcast<u32>({r});\n" for i, r in enumerate(reads))
+    (folder / "probe.wgsl").write_text(
+        f"{ONE}struct Probe {{\n{body}}}\n@group(1) @binding(0) var<uniform> p: Probe;\n"
+        "@group(1) @binding(1) var<storage, read_write> out: array<u32>;\n"
+        f"@compute @workgroup_size(1)\nfn main() {{\n{code}}}\n"
+    )
+    source = shader.load("probe.wgsl")
+    data = np.zeros((), source.dtype("Probe"))
+    want, at = np.arange(1, len(reads) + 1, dtype="<u4"), 0
+    for name, kind in fields:
+        view, count = data[name], len(words(kind))
+        data[name] = want[at : at + count].view(view.dtype.base).reshape(view.shape)
+        at += count
+    usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
+    out = device.create_buffer(size=4 * len(reads), usage=usage)
+    uniform = device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM)
+    run(device, source, p=uniform, out=out)
+    assert np.array_equal(np.frombuffer(device.queue.read_buffer(out), "<u4"), want)
+
+
+@pytest.mark.parametrize("file", ENTERED)
+def test_every_shader_compiles_with_every_override(device, file):
+    names = re.findall(r"^override (\w+): bool", shader.load(file).text, re.M)
+    for values in itertools.islice(itertools.product((0, 1), repeat=len(names)), 256):
+        gpu.Kernel(device, shader.load(file), dict(zip(names, values, strict=True)))
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_every_shader_begins_with_what_it_does(file):
+    first = (shader.ROOT / file).read_text().splitlines()[0]
+    assert re.fullmatch(r"// [A-Z].*[.:]", first) or first.startswith("// ")
+
+
+def test_an_error_names_the_included_file(device, folder):
+    (folder / "inc.wgsl").write_text("const A: f32 = 1.0;\nfn broken() -> f32 { return A + 1u; }\n")
+    (folder / "main.wgsl").write_text(
+        f"//#include inc.wgsl\n{ONE}"
+        "@compute @workgroup_size(1)\nfn main() { let x = broken(); }\n"
+    )
+    with pytest.raises(ShaderError, match=r"inc\.wgsl:2"):
+        gpu.Kernel(device, shader.load("main.wgsl"))
+
+
+def test_an_error_in_the_file_itself_keeps_its_line(device, folder):
+    (folder / "inc.wgsl").write_text("const A: f32 = 1.0;\n")
+    (folder / "main.wgsl").write_text(
+        f"//#include inc.wgsl\n{ONE}@compute @workgroup_size(1)\nfn main() {{ let x = A +; }}\n"
+    )
+    with pytest.raises(ShaderError, match=r"main\.wgsl:5"):
+        gpu.Kernel(device, shader.load("main.wgsl"))
+
+
+def test_a_missing_include_names_both_files(folder):
+    (folder / "main.wgsl").write_text("//#include nope.wgsl\n")
+    with pytest.raises(ShaderError, match=r"main\.wgsl: no such file wgsl/nope\.wgsl"):
+        shader.load("main.wgsl")
+
+
+def test_a_file_included_twice_is_there_once(folder):
+    (folder / "c.wgsl").write_text("const C: u32 = 7u;\n")
+    (folder / "b.wgsl").write_text("//#include c.wgsl\n")
+    (folder / "a.wgsl").write_text("//#include b.wgsl\n//#include c.wgsl\n")
+    assert shader.load("a.wgsl").text.count("const C") == 1
+    assert shader.load("a.wgsl").constant("C") == 7
+
+
+@pytest.mark.parametrize(
+    "kind, text",
+    [
+        ("array<vec3f, 2>", ""),
+        ("S", "struct S {\n @size(32) a: f32,\n}"),
+        ("f16", ""),
+        ("mat3x3f", ""),
+    ],
+)
+def test_what_is_not_supported_is_refused(kind, text):
+    with pytest.raises(ShaderError):
+        shader.layout(kind, text)
+
+
+def test_a_missing_constant_is_named():
+    with pytest.raises(ShaderError, match="no constant NOPE in keep"):
+        shader.load("keep.wgsl").constant("NOPE")
+
+
+@pytest.mark.parametrize("given", [{}, {"p": None, "q": None}])
+def test_too_few_or_too_many_names_are_listed(device, folder, given):
+    (folder / "m.wgsl").write_text(
+        f"{ONE}@group(1) @binding(0) var<uniform> p: vec4f;\n"
+        "@compute @workgroup_size(1)\nfn main() { let x = p; }\n"
+    )
+    with pytest.raises(ShaderError, match=r"binds \['p'\], got"):
+        run(device, shader.load("m.wgsl"), **given)

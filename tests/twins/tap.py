@@ -1,0 +1,59 @@
+"""Taps along each pixel's own path, one pixel and one tap at a time."""
+
+import numpy as np
+
+
+def displacement(motion, t):
+    """Where the parabola through previous, this and next place is at time t."""
+    to_prev, to_next = motion[:2], motion[2:]
+    return to_prev * t * (t - 1) / 2 + to_next * t * (t + 1) / 2
+
+
+def bilinear(image, x, y):
+    """The image at a position in pixels, centres at + 0.5, edges repeated."""
+    height, width = image.shape[:2]
+    u, v = x - 0.5, y - 0.5
+    i, j = int(np.floor(u)), int(np.floor(v))
+    total = 0.0
+    for dj in (0, 1):
+        for di in (0, 1):
+            share = (1 - abs(u - (i + di))) * (1 - abs(v - (j + dj)))
+            column, row = min(max(i + di, 0), width - 1), min(max(j + dj, 0), height - 1)
+            total = total + share * image[row, column]
+    return total
+
+
+def tap(color, motion, times, delay=(0.0, 0.0), curved=True, weight=None):
+    """Mean over `times` of the colour where the pixel's content was when it passes here.
+
+    `delay`: rolling shutter, across the width and the height [frame intervals].
+    """
+    height, width = color.shape[:2]
+    out = np.zeros(color.shape)
+    for y in range(height):
+        for x in range(width):
+            path = motion[y, x].astype(float)
+            if not curved:
+                mean = (path[2:] - path[:2]) / 2
+                path = np.concatenate([-mean, mean])
+            late = delay[0] * ((x + 0.5) / width - 0.5) + delay[1] * ((y + 0.5) / height - 0.5)
+            total, counted = 0.0, 0.0
+            for t in times:
+                at = np.array([x + 0.5, y + 0.5]) + displacement(path, -(t + late))
+                total = total + bilinear(color, *at)
+                counted += 1.0 if weight is None else bilinear(weight, *at)
+            out[y, x] = total / counted if counted > 0 else 0.0
+    return out
+
+
+def published(color, to_prev, samples):
+    """Rosado's taps: velocity is half the difference to the previous place."""
+    height, width = color.shape[:2]
+    out = np.zeros(color.shape)
+    for y in range(height):
+        for x in range(width):
+            velocity = -to_prev[y, x] / 2
+            for i in range(samples):
+                at = np.array([x + 0.5, y + 0.5]) + velocity * i / samples
+                out[y, x] += bilinear(color, *at) / samples
+    return out

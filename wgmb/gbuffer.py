@@ -1,0 +1,125 @@
+"""A scene on the GPU: its bodies, where they are over a span of time, and pictures of instants."""
+
+from __future__ import annotations
+
+import numpy as np
+import wgpu
+
+from . import gpu, shader
+from .cameras import Camera, Reprojections
+from .errors import InputError
+from .images import Images
+from .scene import SHAPES, Scene
+
+ROWS = 257  # poses between which the GPU interpolates
+MOST_RAYS = 8  # a side, for antialiasing
+MOST_LOOPS = 32_768  # turns of a shader's loops: lavapipe ends them all at twice that, silently
+
+
+class SceneOnGpu:
+    """A scene's buffers for one picture: group 1, bindings 0 to 2, of wgsl/scene/trace.wgsl."""
+
+    def __init__(
+        self,
+        device,
+        scene: Scene,
+        *,
+        size: tuple[int, int],
+        time: float,
+        fps: float,
+        span: tuple[float, float],
+        rays: int,
+    ):
+        """`time` of the frame [s]; `span` of interest around it [frame intervals]."""
+        self.device, self.scene, self.size, self.time, self.fps = device, scene, size, time, fps
+        self.loops = 2 * len(scene.bodies) + 4  # of one ray: what it meets, and its shadow
+        if self.loops * rays * rays > MOST_LOOPS:
+            raise InputError(f"{len(scene.bodies)} bodies are too many for {rays} x {rays} rays")
+        source = shader.load("scene/trace.wgsl")
+        first, last = span
+        step = max((last - first) / (ROWS - 1), 1e-6)
+        times = time + (first + step * np.arange(ROWS)) / fps
+        data = np.zeros((), source.dtype("Scene"))
+        sun = np.array(scene.sun[:3]) / np.linalg.norm(scene.sun[:3])
+        data["sun"], data["sky"] = (*sun, scene.sun[3]), scene.sky
+        data["horizon"] = (*scene.horizon, 0)
+        data["first"], data["step"], data["rows"] = first, step, ROWS
+        data["bodies"] = len(scene.bodies)
+        shapes = [b.shape for b in scene.bodies]
+        data["spheres"], data["boxes"] = (shapes.count(s) for s in SHAPES[:2])
+        zoom = float(np.ravel(scene.shot.zoom(np.array([time])))[0])
+        data["pixel"] = 2 / (zoom * size[1])
+        data["rays"] = rays
+        buffer = device.create_buffer_with_data
+        self.resources = {
+            "scene": buffer(label="scene", data=data, usage=wgpu.BufferUsage.UNIFORM),
+            "bodies": buffer(
+                label="bodies", data=_bodies(scene, source), usage=wgpu.BufferUsage.STORAGE
+            ),
+            "poses": buffer(
+                label="poses",
+                data=_poses(scene, source, times, size),
+                usage=wgpu.BufferUsage.STORAGE,
+            ),
+        }
+
+    def encode(self, encoder, given: gpu.Given, images: Images, name: str, time: float) -> dict:
+        """Record the picture at `time` [frame intervals from this frame]; its textures."""
+        kernel = gpu.kernel(self.device, "gbuffer.wgsl")
+        view = np.zeros((), kernel.source.dtype("View"))
+        view["time"] = time
+        buffer = self.device.create_buffer_with_data(
+            label="view", data=view, usage=wgpu.BufferUsage.UNIFORM
+        )
+        formats = {
+            "color": "rgba32float",
+            "depth": "r32float",
+            "normal": "rgba32float",
+            "object": "r32uint",
+        }
+        textures = {k: images.texture(f"{name} {k}", self.size, f) for k, f in formats.items()}
+        views = {k: t.create_view() for k, t in textures.items()}
+        kernel.run(encoder, "main", given, view=buffer, **self.resources, **views)
+        return textures
+
+    def reprojections(self, time: float = 0.0) -> Reprojections:
+        """How everything moves around the instant `time` [frame intervals from this frame]."""
+        prev, here, next_ = (self._camera(time + k) for k in (-1, 0, 1))
+        return Reprojections(here, prev, next_)
+
+    def _camera(self, frames: float) -> Camera:
+        t = self.time + frames / self.fps
+        shot = self.scene.shot
+        view = np.linalg.inv(shot.world_from_camera(t)[0])
+        clip = shot.clip_from_camera(t, self.size[0] / self.size[1])[0]
+        bodies = {i + 1: b.world_from_body(t)[0] for i, b in enumerate(self.scene.bodies)}
+        return Camera(clip @ view, view, bodies)
+
+
+def _bodies(scene: Scene, source: shader.Source) -> np.ndarray:
+    table = np.zeros(max(len(scene.bodies), 1), source.dtype("Body"))
+    for i, body in enumerate(scene.bodies):
+        row = table[i : i + 1]
+        row["size"] = (*body.size, 0)
+        row["color"], row["other"] = (*body.color, body.light), (*body.other, body.gloss)
+        row["repeats"], row["object"] = body.repeats, i + 1
+        row["pattern"] = source.constant(body.pattern)
+    return table
+
+
+def _poses(scene: Scene, source: shader.Source, times: np.ndarray, size) -> np.ndarray:
+    """(rows, 1 + bodies) matrices: of the picture into the world, then of the world into bodies."""
+    dtype = source.dtype("Pose")
+    if len(times) * (1 + len(scene.bodies)) * dtype.itemsize > 128 << 20:
+        raise InputError(f"a scene of {len(scene.bodies)} bodies is too large")
+    table = np.zeros((len(times), 1 + len(scene.bodies)), dtype)
+    zoom = np.broadcast_to(scene.shot.zoom(times), times.shape)
+    lens = np.zeros((len(times), 4, 4))
+    lens[:, 0, 0], lens[:, 1, 1] = size[0] / size[1] / zoom, 1 / zoom
+    lens[:, 2, 2], lens[:, 3, 3] = -1, 1  # looking along -z
+    matrices = [scene.shot.world_from_camera(times) @ lens]
+    matrices += [np.linalg.inv(body.world_from_body(times)) for body in scene.bodies]
+    for i, matrix in enumerate(matrices):
+        for row, name in enumerate("xyz"):
+            table[name][:, i] = matrix[:, row]
+    return table

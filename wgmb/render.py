@@ -1,0 +1,125 @@
+"""A scene through a method: what `wgmb render` and the viewer call."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+
+import numpy as np
+import wgpu
+
+from . import gpu
+from .errors import InputError
+from .frame import Frame
+from .gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
+from .images import Images
+from .pipeline import Blur
+from .scene import Scene
+
+_BUSY = 0.1  # seconds of GPU work handed over at once, so that Ctrl-C is heard
+Progress = Callable[[int, int], None]
+"""Called with the samples done and their total."""
+
+
+class Render:
+    """A scene and a Blur, kept for many pictures.
+
+    `size` (width, height) [px]; `fps`: frames per second, what the shutter's times refer to;
+    `rays`: antialiasing of the pictures that image methods start from, rays a pixel's side.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        blur: Blur,
+        *,
+        size: tuple[int, int] = (640, 360),
+        fps: float = 24.0,
+        rays: int = 3,
+    ):
+        gpu.check_size(blur.device, *size)
+        if not 0 < fps <= 100_000:
+            raise InputError(f"fps must be over 0 and at most 100000, got {fps}")
+        if not 1 <= rays <= MOST_RAYS:
+            raise InputError(f"rays must be 1 to {MOST_RAYS}, got {rays}")
+        self.scene, self.blur, self.size, self.fps, self.rays = scene, blur, size, fps, rays
+        self._images = Images(blur.device)
+        self._token = blur.device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
+
+    def __call__(
+        self, time: float, number: int = 0, progress: Progress | None = None
+    ) -> np.ndarray:
+        """(height, width, 4) float32, linear: the frame whose instant is `time` [s]."""
+        on_gpu, blur = self._on_gpu(time), self.blur
+        output = self._images.texture("output", self.size, blur.output)
+        if "scene" in blur.method.needs:
+            self._in_steps(on_gpu, output.create_view(), number, progress)
+            return self._images.download(blur.device.create_command_encoder(), output)
+        encoder = blur.device.create_command_encoder(label="render")
+        given = blur.given(self.size, number)
+        seen = on_gpu.encode(encoder, given, self._images, "frame", 0.0)
+        gpu.submit(blur.device, encoder)
+        encoder = blur.device.create_command_encoder(label="blur")
+        blur.encode(
+            encoder,
+            size=self.size,
+            output=output.create_view(),
+            color=seen["color"].create_view(),
+            depth=seen["depth"].create_view(),
+            object_id=seen["object"].create_view(),
+            camera=on_gpu.reprojections(),
+            number=number,
+        )
+        return self._images.download(encoder, output)
+
+    def frame(self, time: float, number: int = 0) -> Frame:
+        """The sharp picture at `time` [s] with its depth, normals, object indices and motion."""
+        on_gpu, blur = self._on_gpu(time), self.blur
+        encoder = blur.device.create_command_encoder(label="render")
+        seen = on_gpu.encode(encoder, blur.given(self.size, number), self._images, "frame", 0.0)
+        arrays = {}
+        for name, texture in seen.items():
+            arrays[name] = self._images.download(encoder, texture)
+            encoder = blur.device.create_command_encoder(label="download")
+        return Frame(
+            arrays["color"],
+            depth=arrays["depth"][..., 0],
+            normal=np.ascontiguousarray(arrays["normal"][..., :3]),
+            object_id=arrays["object"][..., 0],
+            camera=on_gpu.reprojections(),
+            number=number,
+        )
+
+    def _on_gpu(self, time: float) -> SceneOnGpu:
+        if not np.isfinite(time):
+            raise InputError(f"time must be finite, got {time}")
+        opens, closes = self.blur.shutter.span
+        delay = max(map(abs, self.blur.shutter.delay)) / 2
+        span = min(opens, 0.0) - delay, max(closes, 0.0) + delay
+        return SceneOnGpu(
+            self.blur.device,
+            self.scene,
+            size=self.size,
+            time=time,
+            fps=self.fps,
+            span=span,
+            rays=self.rays,
+        )
+
+    def _in_steps(self, on_gpu: SceneOnGpu, output, number: int, progress: Progress | None):
+        """Submit the samples bit by bit, each bit about _BUSY seconds of work."""
+        blur, done, count = self.blur, 0, 1
+        most = max(1, MOST_LOOPS // on_gpu.loops)
+        while done < blur.samples:
+            count = min(count, most, blur.samples - done)
+            started = clock.perf_counter()
+            encoder = blur.device.create_command_encoder(label=f"samples {done}")
+            blur.encode(encoder, size=self.size, output=output, scene=on_gpu,
+                        progress=(done, count), number=number)  # fmt: skip
+            gpu.submit(blur.device, encoder)
+            blur.device.queue.read_buffer(self._token)  # waits
+            took = clock.perf_counter() - started
+            done += count
+            count = max(1, min(2 * count, int(count * _BUSY / max(took, 1e-4))))
+            if progress:
+                progress(done, blur.samples)
