@@ -6,7 +6,7 @@ import pytest
 
 from wgmb import gpu
 
-np.seterr(all="raise")
+np.seterr(all="raise", under="ignore")
 
 
 @pytest.fixture(scope="session")
