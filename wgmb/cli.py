@@ -12,7 +12,6 @@ import signal
 import sys
 import time
 import warnings
-from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
 
@@ -22,13 +21,21 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from . import __version__, gpu, layers, stills
+from . import __version__, gpu, layers, scenes, stills
 from .display import motion_picture
 from .errors import DeviceError, Error, InputError
 from .numbering import frame_range
-from .options import BlurOptions, InputOptions, OutputOptions, ShutterOptions
+from .options import (
+    BlurOptions,
+    InputOptions,
+    OutputOptions,
+    SceneOptions,
+    ShutterOptions,
+    size_of,
+)
 from .output import Output, replace_file
 from .pipeline import Blur
+from .render import Render, render_frames
 from .run import Report, blur_sequence
 from .sequence import Clip, Source
 
@@ -84,7 +91,7 @@ def blur(
         settings=settings,
         numbers=clip.numbers,
         bits=output.bits,
-        fps=_fraction(output.fps),
+        fps=output.rate,
         overwrite=output.overwrite,
         resume=output.resume,
     )
@@ -99,26 +106,18 @@ def blur(
 
 def _settings(look: BlurOptions, when: ShutterOptions, given: InputOptions) -> dict:
     """Everything that changes a result, as it is written into the files."""
-    every = {"wgmb": __version__}
-    for options in (look, when, given):
-        every |= {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items()}
+    every = {"wgmb": __version__} | _plain(look) | _plain(when) | _plain(given)
     for not_a_look in ("frames", "skip_missing"):
         del every[not_a_look]
     return every
 
 
-def _fraction(text: str) -> Fraction:
-    try:
-        fps = Fraction(text)
-    except (ValueError, ZeroDivisionError):
-        raise InputError(f"fps must be a number or a fraction, got {text!r}") from None
-    if not 0 < fps <= 1000:
-        raise InputError(f"fps must be over 0 and at most 1000, got {text}")
-    return fps
+def _plain(options) -> dict:
+    return {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items()}
 
 
 @contextlib.contextmanager
-def _progress(say: Console, frames: int, quiet: bool):
+def _progress(say: Console, frames: int, quiet: bool, doing: str = "blurring"):
     """A bar with frames/s and time left where somebody watches; nothing elsewhere."""
     if quiet or not say.is_terminal:
         yield None
@@ -131,7 +130,7 @@ def _progress(say: Console, frames: int, quiet: bool):
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=say, transient=True) as bar:
-        task = bar.add_task("blurring", total=frames, speed="")
+        task = bar.add_task(doing, total=frames, speed="")
         started, made = time.perf_counter(), [0]
 
         def tick(number: int, what: str) -> None:
@@ -163,6 +162,82 @@ def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, ver
     if report.failed:
         line(f"wgmb: {len(report.failed)} of {len(clip.numbers)} frames failed")
         return SOME_FAILED
+    return DONE
+
+
+@app.command
+def render(
+    scene: str,
+    /,
+    output: OutputOptions,
+    what: SceneOptions | None = None,
+    look: BlurOptions | None = None,
+    when: ShutterOptions | None = None,
+    *,
+    sharp: bool = False,
+    passes: bool = False,
+    adapter: str | None = None,
+    verbose: Annotated[bool, Parameter(alias="-v")] = False,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+) -> int:
+    """Render a built-in scene with motion blur.
+
+    Scenes: translation, scaling, rotation, crossing, wheel, fence, bounce, hdr.
+
+    Example: wgmb render crossing -o crossing.png --method distributed --samples 256
+
+    Parameters
+    ----------
+    scene
+        Its name.
+    sharp
+        Without blur.
+    passes
+        EXR: with depth, motion, normal and object index, so that `wgmb blur` can take it on.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    verbose
+        Say which GPU and settings are used.
+    quiet
+        Print errors only.
+    """
+    what, look, when = what or SceneOptions(), look or BlurOptions(), when or ShutterOptions()
+    if look.keep or look.scale:
+        raise InputError("--keep and --scale are for files: wgmb render has no layers to name")
+    if passes and not output.output.lower().endswith(".exr"):
+        raise InputError(f"--passes need an .exr output, got {output.output}")
+    fps = float(output.rate)
+    moments = what.moments(fps)
+    picture = scenes.make(scene, **what.settings())
+    renderer = Render(
+        picture, look.make(when.make(), adapter), size=size_of(what.size), fps=fps, rays=what.rays
+    )
+    settings = {"scene": scene, "sharp": sharp, "passes": passes, "bits": output.bits}
+    settings |= _plain(look) | _plain(when) | _plain(what) | {"wgmb": __version__, "fps": fps}
+    files = Output(
+        output.output,
+        settings=settings,
+        numbers=list(moments),
+        bits=output.bits,
+        fps=output.rate,
+        overwrite=output.overwrite,
+        resume=output.resume,
+    )
+    say = Console(stderr=True, highlight=False, soft_wrap=True)
+    if verbose:
+        say.print(f"adapter: {renderer.blur.device.adapter.summary}", markup=False)
+        say.print(f"settings: {files.settings}", markup=False)
+    started = time.perf_counter()
+    with _progress(say, len(moments), quiet, "rendering") as tick:
+        try:
+            skipped = render_frames(renderer, moments, files, sharp, passes, output.resume, tick)
+        except BaseException:
+            files.abandon()
+            raise
+    if not quiet:
+        seconds, made = time.perf_counter() - started, len(moments) - skipped
+        done = f"{made} frames in {seconds:.1f} s -> {files.pattern}"
+        say.print(done + (f", {skipped} were there" if skipped else ""), markup=False)
     return DONE
 
 
@@ -293,7 +368,7 @@ def bench(
     blur = Blur(method, samples=samples, device=adapter)
     sys.stdout.write(f"{blur.device.adapter.summary}, {method}, {samples} samples\n")
     for text in size or ["1920x1080"]:
-        width, height = _size(text)
+        width, height = size_of(text)
         found = measure.bench(blur, width, height, rounds)
         sys.stdout.write(f"{width} x {height}\n")
         for name, milliseconds in found.items():
@@ -302,13 +377,6 @@ def bench(
         if "numba" in found:
             sys.stdout.write(f"  gpu / numba{found['gpu'] / found['numba']:22.2f}\n")
     return DONE
-
-
-def _size(text: str) -> tuple[int, int]:
-    width, _, height = text.partition("x")
-    if not (width.isdigit() and height.isdigit() and int(width) and int(height)):
-        raise InputError(f"size must be like 1920x1080, got {text!r}")
-    return int(width), int(height)
 
 
 def main(arguments: list[str] | None = None) -> int:

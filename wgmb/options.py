@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,6 +11,7 @@ from cyclopts import Group, Parameter
 
 from . import sequence, shutter, vectors
 from .errors import InputError
+from .numbering import frame_numbers
 from .pipeline import Blur
 
 _IN = Group("Input", sort_key=1)
@@ -123,24 +125,28 @@ class BlurOptions:
     """How to blur."""
 
     method: str = "tap"
-    "tap: average along each pixel's own path."
+    "tap: average along each pixel's own path. Scenes: also accumulate, distributed."
     samples: int = 16
-    "Taps a pixel."
+    "Taps, pictures or rays a pixel."
     jitter: float = 0.0
     "0 to 1: trades bands for noise."
-    path: Literal["curved", "straight"] = "curved"
-    "Through the previous and the next place, or along the mean velocity."
-    form: Literal["shutter", "published"] = "shutter"
-    "published: equal taps along half the way from the previous frame, as in GPU Gems 3."
     keep: str | None = None
     "Stays sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or an image file."
     scale: str | None = None
     "Multiplies the motion, per pixel: a LAYER or an image file."
     max_blur: float | None = None
     "Longest streak in pixels."
+    path: Literal["curved", "straight"] | None = None
+    "tap: through the previous and the next place (curved), or along the mean velocity."
+    form: Literal["shutter", "published"] | None = None
+    "tap: by the shutter, or published: equal taps along half the way from the previous frame."
+    seed: int | None = None
+    "distributed: another seed is other noise."
 
     def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
-        """The Blur these options describe."""
+        """The Blur these options describe; an option its method does not have is an error."""
+        options = {"path": self.path, "form": self.form, "seed": self.seed}
+        given = {name: value for name, value in options.items() if value is not None}
         return Blur(
             self.method,
             shutter=shutter_,
@@ -148,9 +154,48 @@ class BlurOptions:
             jitter=self.jitter,
             max_blur=self.max_blur,
             device=adapter,
-            path=self.path,
-            form=self.form,
+            **given,
         )
+
+
+@Parameter(name="*", group=_IN)
+@dataclass(frozen=True, kw_only=True)
+class SceneOptions:
+    """Which moments of a scene, and how large."""
+
+    time: float | None = None
+    "The one picture's time in seconds (0 if there are no --frames either)."
+    frames: str | None = None
+    "Frames such as 0-99; frame N is at N / fps seconds."
+    size: str = "640x360"
+    "Width x height in pixels."
+    rays: int = 3
+    "Antialiasing of what image methods start from: rays a pixel's side, 1 to 8."
+    set: tuple[str, ...] = ()
+    "A parameter of the scene as NAME=VALUE; may be repeated."
+
+    def settings(self) -> dict[str, str]:
+        """The scene's parameters by name."""
+        pairs = [text.partition("=") for text in self.set]
+        if wrong := [name for name, equals, _ in pairs if not equals]:
+            raise InputError(f"--set takes NAME=VALUE, got {wrong[0]!r}")
+        return {name: value for name, _, value in pairs}
+
+    def moments(self, fps: float) -> dict[int, float]:
+        """Times in seconds by frame number."""
+        if self.time is not None and self.frames is not None:
+            raise InputError("give --time or --frames, not both")
+        if self.frames is None:
+            return {0: self.time or 0.0}
+        return {n: n / fps for n in frame_numbers(self.frames)}
+
+
+def size_of(text: str) -> tuple[int, int]:
+    """`1920x1080` -> width, height."""
+    width, _, height = text.partition("x")
+    if not (width.isdigit() and height.isdigit() and int(width) and int(height)):
+        raise InputError(f"size must be like 1920x1080, got {text!r}")
+    return int(width), int(height)
 
 
 @Parameter(name="*", group=_OUT)
@@ -168,3 +213,14 @@ class OutputOptions:
     "Replace files that exist."
     resume: bool = False
     "Keep frames that are done; redo those whose settings or inputs differ."
+
+    @property
+    def rate(self) -> Fraction:
+        """Frames per second, exactly."""
+        try:
+            fps = Fraction(self.fps)
+        except (ValueError, ZeroDivisionError):
+            raise InputError(f"fps must be a number or a fraction, got {self.fps!r}") from None
+        if not 0 < fps <= 1000:
+            raise InputError(f"fps must be over 0 and at most 1000, got {self.fps}")
+        return fps

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import wgpu
 
-from . import gpu
+from . import exr, gpu
 from .errors import InputError
 from .frame import Frame
 from .gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
 from .images import Images
+from .output import Output
 from .pipeline import Blur
 from .scene import Scene
+from .sequence import Source
 
 _BUSY = 0.1  # seconds of GPU work handed over at once, so that Ctrl-C is heard
 Progress = Callable[[int, int], None]
@@ -123,3 +126,50 @@ class Render:
             count = max(1, min(2 * count, int(count * _BUSY / max(took, 1e-4))))
             if progress:
                 progress(done, blur.samples)
+
+
+def render_frames(
+    render: Render,
+    moments: dict[int, float],
+    output: Output,
+    sharp: bool,
+    passes: bool,
+    resume: bool,
+    progress: Callable[[int, str], None] | None,
+) -> int:
+    """Render every moment into `output`; returns how many were there already (`resume`).
+
+    `sharp`: without blur. `passes`: EXR with all that `wgmb blur` can use.
+    """
+    tell, skipped = progress or (lambda number, what: None), 0
+    for number, time in moments.items():
+        if resume and output.done(number, []):
+            skipped += 1
+            tell(number, "skipped")
+            continue
+        seen = render.frame(time, number) if sharp or passes else None
+        result = seen.color if sharp and seen else render(time, number)
+        source = (
+            _with_passes(render, seen, number)
+            if passes and seen
+            else Source(number, Path(), None, {}, {})
+        )
+        output.write(result, source)
+        tell(number, "done")
+    output.close()
+    return skipped
+
+
+def _with_passes(render: Render, frame: Frame, number: int) -> Source:
+    """A frame's passes as layers that sequence.py finds by their names."""
+    motion = render.blur.motion(frame)
+    assert frame.depth is not None and frame.normal is not None and frame.object_id is not None
+    channels = {name: frame.color[..., i] for i, name in enumerate("RGBA")}
+    channels |= {"Z": frame.depth, "object_id.X": frame.object_id}
+    channels |= {f"normal.{c}": frame.normal[..., i] for i, c in enumerate("XYZ")}
+    names = ("to_prev.x", "to_prev.y", "to_next.x", "to_next.y")
+    channels |= {name: motion[..., i] for i, name in enumerate(names)}
+    width, height = frame.size
+    window = (0, 0, width - 1, height - 1)
+    part = exr.Part("", channels, {}, window, window)
+    return Source(number, Path(), exr.Exr(Path(), [part]), channels, {}, part=part)
