@@ -15,11 +15,12 @@ def test_contract(name):
     assert method.__module__ == f"wgmb.blur.{name}"
     assert method.needs
     assert method.needs <= {"color", "motion", "depth", "scene"}
+    assert method.uses <= {"neighbours"}
     assert list(inspect.signature(method.encode).parameters) == [
         "self", "encoder", "inputs", "output",
     ]  # fmt: skip
     assert shader.load(f"blur/{name}.wgsl").text.startswith("// ")
-    assert {n for n in vars(method) if not n.startswith("_")} == {"name", "needs", "encode"}
+    assert {n for n in vars(method) if not n.startswith("_")} == {"name", "needs", "uses", "encode"}
     assert "Artefacts:" in (method.__doc__ or "")
 
 

@@ -56,6 +56,10 @@ class Frame:
     """(height, width) float: multiplies the motion."""
     object_motion: bool = False
     """`to_next`, `to_prev` leave the camera's motion out, so the two are added."""
+    prev: Frame | None = None
+    """The frame before, for methods that use neighbours."""
+    next: Frame | None = None
+    """The frame after."""
     number: int = 0
     """Frame number; varies the jitter."""
     bad: dict[str, int] = field(init=False, default_factory=dict)
@@ -87,6 +91,9 @@ class Frame:
             raise InputError("object_id needs the camera file that says how objects move")
         if self.motion is not None and not (self.to_next is None and self.to_prev is None):
             raise InputError("motion stands instead of to_next and to_prev: give one or the other")
+        for name, neighbour in (("prev", self.prev), ("next", self.next)):
+            if neighbour is not None and neighbour.size != self.size:
+                raise InputError(f"{name} must be {self.size} like the frame, got {neighbour.size}")
         for name in ("color", "to_next", "to_prev", "motion", "scale", "keep"):
             if given := _count_bad(getattr(self, name)):
                 self.bad[name] = given

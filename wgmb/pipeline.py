@@ -24,17 +24,31 @@ View = wgpu.GPUTextureView
 
 
 @dataclass(frozen=True)
+class Neighbour:
+    """The frame before or after, as far as a method needs it."""
+
+    offset: int  # -1, 1 [frame intervals]
+    color: View
+    motion: View
+    depth: View
+
+
+@dataclass(frozen=True)
 class Inputs:
     """What a method may read while it records one frame."""
 
     given: gpu.Given
     samples: int
+    number: int
+    jitter: float
     shutter: Shutter
     color: View  # linear, premultiplied by alpha and by weight
     motion: View  # to_prev, to_next [px]
     depth: View | None
     weight: View | None  # None: every pixel counts
+    neighbours: tuple[Neighbour, ...]
     none: View  # bound where an input is not there
+    one: View  # bound where a weight is not there
     linear: wgpu.GPUSampler
     even: bool  # the shutter is a box
     scene: SceneOnGpu | None
@@ -88,6 +102,8 @@ class Blur:
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
         self._none = self._images.view("none", (1, 1), gpu.texel(self.device, 4))
         no_object = self._images.view("no object", (1, 1), "r32uint")
+        ones = np.ones((1, 1, 4), np.float32)
+        self._one = self._images.upload("one", ones, gpu.texel(self.device, 4))
         self._velocity = VelocityPass(self.device, self._none, no_object)
         self.shutter = shutter
 
@@ -123,6 +139,7 @@ class Blur:
         color: View | None = None,
         scene: SceneOnGpu | None = None,
         progress: tuple[int, int] | None = None,
+        neighbours: dict[int, dict] | None = None,
         keep: View | None = None,
         check: bool = False,
         number: int = 0,
@@ -138,6 +155,9 @@ class Blur:
         `camera` and `depth`. `check` gives pixels that are not finite no weight, at the
         price of three small passes.
 
+        `neighbours`: -1 and 1, each with `color` and its own `moving` inputs and depth, for
+        methods that use them.
+
         `scene` instead of `color`, for the methods that need one, which may be recorded
         bit by bit: `progress` is how many samples were done before, and are to be done now.
         """
@@ -151,6 +171,11 @@ class Blur:
         if motions.known and (not motions.ready or limited or check):
             motion = self._images.view("motion", size, "rgba32float")
             self._velocity.encode(encoder, given, motions, limited, motion)
+        near = tuple(
+            self._neighbour(encoder, given, offset, dict(inputs))
+            for offset, inputs in (neighbours or {}).items()
+            if "neighbours" in self.method.uses
+        )
         weight, result, own = None, output, color
         if color is not None and (keep is not None or check):
             color, weight = self._lift(encoder, given, color, keep)
@@ -158,12 +183,16 @@ class Blur:
         inputs = Inputs(
             given=given,
             samples=self.samples,
+            number=number,
+            jitter=self.jitter,
             shutter=self._shutter,
             color=color or self._none,
             motion=motion or self._none,
             depth=motions.depth,
             weight=weight,
+            neighbours=near,
             none=self._none,
+            one=self._one,
             linear=self._linear,
             even=self._shutter.curve == "box",
             scene=scene,
@@ -201,36 +230,67 @@ class Blur:
 
     def _upload(self, frame: Frame) -> dict:
         """The frame's arrays as textures, under the names that `encode` takes."""
-        rgba = frame.color
-        if rgba.shape[2] == 3:
-            rgba = np.ones((*rgba.shape[:2], 4), rgba.dtype)
-            rgba[..., :3] = frame.color
-        half = rgba.dtype == np.float16
-        four = "rgba16float" if half else gpu.texel(self.device, 4)
+        rgba, four = self._rgba(frame)
         return {
             "size": frame.size,
             "color": self._images.upload("color", rgba, four),
             "keep": self._view("keep", frame.keep, "r32float"),
             "check": bool(frame.bad.keys() - {"depth"}),
             "number": frame.number,
+            "neighbours": self._upload_neighbours(frame),
             **self._upload_moving(frame),
         }
 
-    def _upload_moving(self, frame: Frame) -> dict:
+    def _rgba(self, frame: Frame) -> tuple[np.ndarray, str]:
+        """The colour with alpha, and the texture format for it."""
+        rgba = frame.color
+        if rgba.shape[2] == 3:
+            rgba = np.ones((*rgba.shape[:2], 4), rgba.dtype)
+            rgba[..., :3] = frame.color
+        return rgba, "rgba16float" if rgba.dtype == np.float16 else gpu.texel(self.device, 4)
+
+    def _upload_neighbours(self, frame: Frame) -> dict[int, dict]:
+        """Those neighbours that the method uses and that have what it needs, without a fault."""
+        if "neighbours" not in self.method.uses:
+            return {}
+        found = {}
+        for offset, near in ((-1, frame.prev), (1, frame.next)):
+            if (
+                near is not None
+                and near.has >= self.method.needs
+                and not near.bad.keys() - {"depth"}
+            ):
+                rgba, texel = self._rgba(near)
+                color = self._images.upload(f"color {offset}", rgba, texel)
+                found[offset] = {"color": color, **self._upload_moving(near, f" {offset}")}
+        return found
+
+    def _upload_moving(self, frame: Frame, which: str = "") -> dict:
+        deep = frame.camera is not None or "depth" in self.method.needs
         ids = None if frame.object_id is None else np.minimum(frame.object_id, 2**32 - 1)
         return {
-            "to_next": self._view("to_next", frame.to_next, "rg32float"),
-            "to_prev": self._view("to_prev", frame.to_prev, "rg32float"),
-            "motion": self._view("to_prev, to_next", frame.motion, "rgba32float"),
-            "depth": self._view("depth", frame.depth, "r32float"),
+            "to_next": self._view("to_next" + which, frame.to_next, "rg32float"),
+            "to_prev": self._view("to_prev" + which, frame.to_prev, "rg32float"),
+            "motion": self._view("to_prev, to_next" + which, frame.motion, "rgba32float"),
+            "depth": self._view("depth" + which, frame.depth if deep else None, "r32float"),
             "camera": frame.camera,
-            "object_id": self._view("object", ids, "r32uint"),
-            "scale": self._view("scale", frame.scale, "r32float"),
+            "object_id": self._view("object" + which, ids, "r32uint"),
+            "scale": self._view("scale" + which, frame.scale, "r32float"),
             "object_motion": frame.object_motion,
         }
 
     def _view(self, name: str, array: np.ndarray | None, format: str) -> View | None:
         return None if array is None else self._images.upload(name, array, format)
+
+    def _neighbour(self, encoder, given, offset: int, inputs: dict) -> Neighbour:
+        color, moving = inputs.pop("color"), _moving(inputs)
+        motion, limited = moving.motion, self.max_blur is not None
+        if not moving.known or moving.depth is None:
+            raise InputError("a neighbouring frame needs color, motion and depth")
+        if motion is None or not moving.ready or limited:
+            motion = self._images.view(f"motion {offset}", given.size, "rgba32float")
+            self._velocity.encode(encoder, given, moving, limited, motion)
+        return Neighbour(offset, color, motion, moving.depth)
 
     def _require(self, there) -> None:
         if missing := self.method.needs - there:

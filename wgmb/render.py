@@ -59,21 +59,36 @@ class Render:
             self._in_steps(on_gpu, output.create_view(), number, progress)
             return self._images.download(blur.device.create_command_encoder(), output)
         encoder = blur.device.create_command_encoder(label="render")
-        given = blur.given(self.size, number)
-        seen = on_gpu.encode(encoder, given, self._images, "frame", 0.0)
+        seen = {k: self._see(encoder, on_gpu, number, k) for k in self._offsets}
         gpu.submit(blur.device, encoder)
         encoder = blur.device.create_command_encoder(label="blur")
+        here = seen.pop(0)
         blur.encode(
             encoder,
             size=self.size,
             output=output.create_view(),
-            color=seen["color"].create_view(),
-            depth=seen["depth"].create_view(),
-            object_id=seen["object"].create_view(),
-            camera=on_gpu.reprojections(),
             number=number,
+            neighbours=seen,
+            **here,
         )
         return self._images.download(encoder, output)
+
+    @property
+    def _offsets(self) -> tuple[int, ...]:
+        """The frames that the method is given [frame intervals]."""
+        return (0, -1, 1) if "neighbours" in self.blur.method.uses else (0,)
+
+    def _see(self, encoder, on_gpu: SceneOnGpu, number: int, offset: int) -> dict:
+        """Record one frame's picture; what Blur.encode takes of it."""
+        given = self.blur.given(self.size, number)
+        name = f"frame {offset}"
+        seen = on_gpu.encode(encoder, given, self._images, name, float(offset))
+        return {
+            "color": seen["color"].create_view(),
+            "depth": seen["depth"].create_view(),
+            "object_id": seen["object"].create_view(),
+            "camera": on_gpu.reprojections(offset),
+        }
 
     def frame(self, time: float, number: int = 0) -> Frame:
         """The sharp picture at `time` [s] with its depth, normals, object indices and motion."""
@@ -98,7 +113,8 @@ class Render:
             raise InputError(f"time must be finite, got {time}")
         opens, closes = self.blur.shutter.span
         delay = max(map(abs, self.blur.shutter.delay)) / 2
-        span = min(opens, 0.0) - delay, max(closes, 0.0) + delay
+        most = max(self._offsets)
+        span = min(opens, -most) - delay, max(closes, most) + delay
         return SceneOnGpu(
             self.blur.device,
             self.scene,

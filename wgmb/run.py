@@ -71,6 +71,8 @@ def blur_sequence(
     """
     report, stop, tell = Report(), threading.Event(), progress or (lambda number, what: None)
     to_blur, to_write = _Handover(stop), _Handover(stop)
+    neighbours = "neighbours" in blur.method.uses
+    prepare = clip.with_neighbours if neighbours else clip.frame
     places = _Handover(stop)
     for _ in range(IN_FLIGHT):
         places.put(None)
@@ -90,12 +92,12 @@ def blur_sequence(
             places.get()
             try:
                 source = clip.source(number)
-                to_blur.put((source, clip.frame(source)))
+                to_blur.put((source, prepare(source)))
                 del source
             except (Error, OSError, MemoryError) as error:
                 fail(number, error)
             finally:
-                clip.forget(number)
+                clip.forget(number - 1 if neighbours else number)
         to_blur.put(None)
 
     def write() -> None:

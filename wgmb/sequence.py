@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -228,17 +228,32 @@ class Clip:
             if not wanted:
                 self.forget(number)
 
+    def with_neighbours(self, source: Source) -> Frame:
+        """`frame`, and the frames before and after as far as they can be read."""
+        near = {}
+        for side, number in (("prev", source.number - 1), ("next", source.number + 1)):
+            path = frame_path(self.pattern, number)
+            if is_pattern(self.pattern) and path.is_file():
+                with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                    other = self.source(number)
+                    if other.size == source.size:
+                        near[side] = self.frame(other)
+        return replace(self.frame(source), **near)
+
     def frame(self, source: Source, picture: bool = True) -> Frame:
         """What a method is given of `source`; without `picture`, all but the colour (0)."""
         meaning = self._decide().vectors
         with _about(source.path):
             if meaning is None:  # where a layer was asked for, this says why there is none
                 meaning = vectors.named(source.channels, self.passes.vectors, source.beside)
-            motion = depth = reprojections = ids = None
+            motion = reprojections = ids = None
+            depth = self._depth(source)
             if meaning is not None:
                 motion = vectors.read(source.channels, meaning, source.beside)
             if self._camera is not None:
-                depth = self._depth(source)
+                if depth is None:
+                    there = ", ".join(layers.layers(source.channels))
+                    raise InputError(f"motion from a camera needs a depth layer; there is {there}")
                 kind = "clip" if self.passes.depth_kind == "clip" else "planar"
                 reprojections = self._camera.around(
                     source.number, depth_kind=kind, far=self.passes.far, window=source.window
@@ -256,12 +271,11 @@ class Clip:
                 number=source.number,
             )
 
-    def _depth(self, source: Source) -> np.ndarray:
+    def _depth(self, source: Source) -> np.ndarray | None:
         name = layers.find_depth(source.channels, self.passes.depth, source.beside)
         if name is None:
-            there = ", ".join(layers.layers(source.channels))
-            raise InputError(f"motion from a camera needs a depth layer; there is {there}")
-        depth = source.channels[name].astype(np.float32)
+            return None
+        depth = source.channels[name].astype(np.float32, copy=False)
         if self.passes.depth_kind == "inverse":
             with np.errstate(divide="ignore"):
                 depth = np.where(depth > 0, 1 / depth, np.inf).astype(np.float32)

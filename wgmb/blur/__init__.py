@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from .accumulate import Accumulate
 from .distributed import Distributed
+from .reproject import Reproject
 from .tap import Tap
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ class Method(Protocol):
     """Also the stem of its Python file, its WGSL file and its twin in the tests."""
     needs: frozenset[str]
     """Of "color", "motion", "depth", "scene"."""
+    uses: frozenset[str]
+    """What it takes if it is there: "neighbours"."""
 
     def encode(
         self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView
@@ -29,4 +32,4 @@ class Method(Protocol):
         ...
 
 
-METHODS: dict[str, type] = {m.name: m for m in (Tap, Accumulate, Distributed)}
+METHODS: dict[str, type] = {m.name: m for m in (Tap, Reproject, Accumulate, Distributed)}

@@ -26,6 +26,7 @@ class Distributed:
 
     name = "distributed"
     needs = frozenset({"scene"})
+    uses: frozenset[str] = frozenset()
 
     def __init__(self, device, *, output="rgba32float", seed=0):
         self._device, self._output, self._seed = device, output, seed
