@@ -226,5 +226,5 @@ def test_a_lone_good_pixel_fills_its_bad_neighbours(method):
 
 
 def test_missing_inputs_are_named(method, noise):
-    with pytest.raises(wgmb.InputError, match="needs .*motion"):
+    with pytest.raises(wgmb.InputError, match=r"needs .*motion"):
         wgmb.blur(noise, method=method)

@@ -14,7 +14,7 @@ from PIL import Image
 
 from wgmb import InputError, exr, stills
 from wgmb.output import Output
-from wgmb.sequence import Source
+from wgmb.source import Source
 
 rng = np.random.default_rng(7)
 

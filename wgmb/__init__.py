@@ -2,7 +2,8 @@
 
 frames on disk ─ sequence ─┐
 arrays you have ─ Frame ───┼─ velocity ── one method of blur/ ── array | sequence ─ files
-your own wgpu textures ────┘                  │
+your own wgpu textures ────┤                  │
+Scene ── gbuffer ──────────┘                  │
 Shutter ── times of the samples ──────────────┘
 
 `blur` is one frame at once, `Blur` the same kept for many frames or for your own encoder.
@@ -16,7 +17,9 @@ from .errors import DeviceError, Error, InputError, ShaderError
 from .frame import Frame
 from .output import Output
 from .pipeline import Blur, blur
+from .render import Render
 from .run import Report, blur_sequence
+from .scene import Body, Scene, Shot
 from .sequence import Clip, Passes
 from .shutter import Shutter
 from .vectors import Vectors
@@ -24,6 +27,7 @@ from .vectors import Vectors
 __all__ = [
     "METHODS",
     "Blur",
+    "Body",
     "Camera",
     "CameraFile",
     "Clip",
@@ -33,9 +37,12 @@ __all__ = [
     "InputError",
     "Output",
     "Passes",
+    "Render",
     "Report",
     "Reprojections",
+    "Scene",
     "ShaderError",
+    "Shot",
     "Shutter",
     "Vectors",
     "blur",

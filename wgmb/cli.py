@@ -16,15 +16,13 @@ from pathlib import Path
 from typing import Annotated
 
 import cyclopts
-import numpy as np
 from cyclopts import Parameter
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from . import __version__, gpu, layers, scenes, stills
-from .display import motion_picture
+from . import __version__, gpu, scenes
 from .errors import DeviceError, Error, InputError
-from .numbering import frame_range
+from .info import describe
 from .options import (
     BlurOptions,
     InputOptions,
@@ -33,14 +31,12 @@ from .options import (
     ShutterOptions,
     size_of,
 )
-from .output import Output, replace_file
+from .output import Output
 from .pipeline import Blur
 from .render import Render, render_frames
 from .run import Report, blur_sequence
-from .sequence import Clip, Source
 
 DONE, SOME_FAILED, USAGE, NO_DEVICE, INTERRUPTED = 0, 1, 2, 3, 130
-_MANY_BAD = 0.25  # of the width: a 99th percentile of speed above it is worth a warning
 
 app = cyclopts.App(
     name="wgmb",
@@ -265,63 +261,13 @@ def info(
     """
     given = given or InputOptions()
     clip = given.open(pattern)
-    if output is not None and output.suffix.lower() not in stills.SUFFIXES:
-        raise InputError(f"output {output}: a picture, {', '.join(stills.SUFFIXES)}")
     if output is not None and output.exists() and not overwrite:
         raise InputError(f"{output} exists; --overwrite replaces it")
-    source = clip.source(clip.numbers[0])
-    lines = [("file", str(source.path))]
-    if len(clip.numbers) > 1:
-        lines.append(("frames", f"{frame_range(clip.numbers)} ({len(clip.numbers)})"))
-    lines.append(("size", "{} x {}".format(*source.size)))
-    for part in source.file.parts if source.file else ():
-        if part.data_window != part.display_window:
-            lines.append(("window", f"data {part.data_window} in display {part.display_window}"))
-    for layer, members in layers.layers(source.channels).items():
-        kinds = [f"{layers.component(m).upper()} {source.channels[m].dtype}" for m in members]
-        lines.append(("layer", f"{layer or '(picture)'}: {', '.join(kinds)}"))
-    lines.append(("picture", ", ".join(source.color) if source.beside else "none found"))
-    depth = layers.find_depth(source.channels, given.depth, source.beside)
-    lines.append(("depth", depth or "none"))
-    lines.append(("vectors", clip.finding))
-    lines += _about_motion(clip, source, output)
+    lines = describe(clip, output)
     say = Console(highlight=False, soft_wrap=True)
     for name, text in lines:
         say.print(f"{name:10}{text}", markup=False)
     return DONE
-
-
-def _about_motion(clip: Clip, source: Source, output: Path | None) -> list[tuple[str, str]]:
-    """What the frame's motion is like; drawn into `output`."""
-    frame = clip.frame(source, picture=source.beside is not None)
-    lines = []
-    if frame.bad:
-        found = [f"{n} pixels of {name}" for name, n in frame.bad.items()]
-        lines.append(("bad", f"not finite or not in front of the camera: {', '.join(found)}"))
-    if "motion" not in frame.has:
-        if output:
-            raise InputError(f"{source.path}: no motion to draw: no vectors, no camera")
-        return lines
-    motion = Blur().motion(frame)[..., 2:]
-    speed = np.hypot(motion[..., 0], motion[..., 1])
-    half, most, nearly, fastest = np.percentile(speed, (50, 90, 99, 100))
-    lines.append((
-        "speed",
-        f"pixels per frame: half are under {half:.1f}, 90 % under {most:.1f}, "
-        f"99 % under {nearly:.1f}, the fastest is {fastest:.1f}",
-    ))  # fmt: skip
-    if nearly > _MANY_BAD * frame.size[0]:
-        lines.append((
-            "warning",
-            f"one pixel in a hundred moves over {nearly:.0f} px, a quarter of the width: "
-            "check the vectors' convention and scale",
-        ))  # fmt: skip
-    if output is not None:
-        full = max(float(nearly), 1.0)
-        picture = motion_picture(motion, full)
-        replace_file(output, stills.encode(picture, output.suffix, 8, "motion"))
-        lines.append(("motion", f"{output} (full brightness: {full:.1f} px per frame)"))
-    return lines
 
 
 @app.command

@@ -13,7 +13,7 @@ import numpy as np
 from . import exr, stills, video
 from .errors import InputError
 from .numbering import frame_path, is_pattern
-from .sequence import Source
+from .source import Source
 
 SETTINGS = "wgmb"  # attribute and keyword under which the settings are written
 

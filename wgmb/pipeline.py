@@ -14,6 +14,7 @@ from .errors import InputError
 from .frame import PASSES, Frame
 from .gbuffer import SceneOnGpu
 from .images import Images
+from .keep import KeepPass
 from .shutter import Shutter
 from .timing import Timing
 from .velocity import Moving, VelocityPass
@@ -105,6 +106,7 @@ class Blur:
         ones = np.ones((1, 1, 4), np.float32)
         self._one = self._images.upload("one", ones, gpu.texel(self.device, 4))
         self._velocity = VelocityPass(self.device, self._none, no_object)
+        self._keep = KeepPass(self.device, self._images, self._none)
         self.shutter = shutter
 
     @property
@@ -178,7 +180,7 @@ class Blur:
         )
         weight, result, own = None, output, color
         if color is not None and (keep is not None or check):
-            color, weight = self._lift(encoder, given, color, keep)
+            color, weight = self._keep.before(encoder, given, color, keep)
             result = self._images.view("blurred", size, self.output)
         inputs = Inputs(
             given=given,
@@ -199,8 +201,8 @@ class Blur:
             progress=progress or (0, self.samples),
         )
         self.method.encode(encoder, inputs, result)
-        if weight:
-            self._put_back(encoder, given, own, keep, result, output)
+        if weight and own:
+            self._keep.after(encoder, given, own, keep, result, output, self.output)
 
     def __call__(self, color: np.ndarray | Frame, to_next=None, **passes) -> np.ndarray:
         """Blur one frame: a Frame, or a colour array and its passes (see Frame).
@@ -308,47 +310,6 @@ class Blur:
             label="frame", data=data, usage=wgpu.BufferUsage.UNIFORM
         )
         return gpu.Given(size, {"frame": frame, **self._group0}, timing)
-
-    def _keep_kernel(self, output: str, keep) -> gpu.Kernel:
-        texels = {"Output": output, "Weight": self._weight_texel}
-        return gpu.kernel(self.device, "keep.wgsl", texels, KEEP=keep is not None)
-
-    @property
-    def _weight_texel(self) -> str:
-        """One channel where it can be stored and filtered, four elsewhere."""
-        one = gpu.texel(self.device, 1)
-        return one if one == "r32float" else gpu.texel(self.device, 4)
-
-    def _lift(self, encoder, given, color, keep):
-        """The colour times its weight, and the weight."""
-        four, none = gpu.texel(self.device, 4), self._none
-        lifted = self._images.view("lifted", given.size, four)
-        weight = self._images.view("weight", given.size, self._weight_texel)
-        self._keep_kernel(four, keep).run(
-            encoder,
-            "before",
-            given,
-            color=color,
-            keep=keep or none,
-            blurred=none,
-            weight=weight,
-            output=lifted,
-        )
-        return lifted, weight
-
-    def _put_back(self, encoder, given, color, keep, blurred, output) -> None:
-        """The method's result with what is kept sharp put back."""
-        spare = self._images.view("spare", (1, 1), self._weight_texel)
-        self._keep_kernel(self.output, keep).run(
-            encoder,
-            "after",
-            given,
-            color=color,
-            keep=keep or self._none,
-            blurred=blurred,
-            weight=spare,
-            output=output,
-        )
 
 
 def _moving(given: dict) -> Moving:

@@ -17,7 +17,7 @@ from .images import Images
 from .output import Output
 from .pipeline import Blur
 from .scene import Scene
-from .sequence import Source
+from .source import Source
 
 _BUSY = 0.1  # seconds of GPU work handed over at once, so that Ctrl-C is heard
 Progress = Callable[[int, int], None]

@@ -15,7 +15,8 @@ from .errors import Error, InputError
 from .frame import Frame
 from .output import Output
 from .pipeline import Blur
-from .sequence import Clip, Source
+from .sequence import Clip
+from .source import Source
 
 
 @dataclass

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import exr, layers, stills, vectors
+from . import layers, stills, vectors
 from .cameras import CameraFile
 from .errors import InputError
 from .frame import Frame
@@ -24,10 +24,10 @@ from .numbering import (
     number_in,
     numbers_on_disk,
 )
+from .source import Source, about, read, size_text
 
 DEPTHS = ("planar", "inverse", "clip")
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
-Window = tuple[int, int, int, int]  # left, top, right, bottom; the last pixels belong to it
 
 
 @dataclass(frozen=True)
@@ -59,57 +59,6 @@ class Passes:
             raise InputError(f"depth must be one of {', '.join(DEPTHS)}, got {self.depth_kind!r}")
         if not self.far > 0:
             raise InputError(f"far must be over 0, got {self.far}")
-
-
-@dataclass(frozen=True, eq=False)
-class Source:
-    """One frame as it came from disk."""
-
-    number: int
-    path: Path
-    file: exr.Exr | None  # None: a still
-    channels: dict[str, np.ndarray]  # of all its files, in the picture's data window
-    attributes: dict
-    wanted: str | None = None  # the picture's layer, if its name does not say so
-    part: exr.Part | None = None  # of the file, that the picture is in
-
-    @property
-    def color(self) -> list[str]:
-        """Names of the picture's channels, 3 or 4."""
-        with _about(self.path):
-            return layers.find_color(self.channels, self.wanted)
-
-    @property
-    def beside(self) -> str | None:
-        """A channel whose neighbours are preferred: the picture's first, if there is one."""
-        with contextlib.suppress(InputError):
-            return self.color[0]
-        return None
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height [px]."""
-        height, width = next(iter(self.channels.values())).shape
-        return width, height
-
-    @property
-    def rgba(self) -> np.ndarray:
-        """The picture, (height, width, 3 or 4), as stored (float16 or float32)."""
-        planes = [self.channels[name] for name in self.color]
-        kind = np.float16 if all(p.dtype == np.float16 for p in planes) else np.float32
-        rgba = np.empty((*planes[0].shape, len(planes)), kind)
-        for i, plane in enumerate(planes):
-            rgba[..., i] = plane
-        return rgba
-
-    @property
-    def window(self) -> Window | None:
-        """Where the image lies in the whole picture: x, y, whole width, whole height [px]."""
-        if self.part is None:
-            return None
-        left, top, right, bottom = self.part.display_window
-        x, y = self.part.data_window[:2]
-        return x - left, y - top, right - left + 1, bottom - top + 1
 
 
 class Clip:
@@ -173,7 +122,7 @@ class Clip:
             while len(self._kept) > 2:
                 self._kept.popitem(last=False)
             paths = [frame_path(p, number) for p in (self.pattern, *self.passes.also)]
-            self._kept[number] = _read(paths, number, self.passes.color)
+            self._kept[number] = read(paths, number, self.passes.color)
         return self._kept[number]
 
     def forget(self, number: int) -> None:
@@ -243,7 +192,7 @@ class Clip:
     def frame(self, source: Source, picture: bool = True) -> Frame:
         """What a method is given of `source`; without `picture`, all but the colour (0)."""
         meaning = self._decide().vectors
-        with _about(source.path):
+        with about(source.path):
             if meaning is None:  # where a layer was asked for, this says why there is none
                 meaning = vectors.named(source.channels, self.passes.vectors, source.beside)
             motion = reprojections = ids = None
@@ -300,98 +249,16 @@ class Clip:
             return layers.mask(source.channels, source.attributes, wanted)
         file = frame_path(wanted, source.number)
         if file.suffix.lower() == ".exr":
-            channels = _read([file], source.number, None).channels
+            channels = read([file], source.number, None).channels
             plane = layers.grey(channels).astype(np.float32)
         else:
             plane = stills.srgb(stills.read(file)[..., 0])  # grey values as painted
         if plane.shape[::-1] != source.size:
             raise InputError(
-                f"{file} must be {_size(source.size)} like the picture, is {_size(plane)}"
+                f"{file} must be {size_text(source.size)} like the picture, is {size_text(plane)}"
             )
         return plane
 
 
 def _is_file(mask: str, number: int) -> bool:
     return frame_path(mask, number).suffix.lower() in (".exr", *stills.SUFFIXES)
-
-
-def _size(of) -> str:
-    width, height = of if isinstance(of, tuple) else of.shape[::-1]
-    return f"{width} x {height}"
-
-
-@contextlib.contextmanager
-def _about(path: Path):
-    """Name the file in errors that do not."""
-    try:
-        yield
-    except InputError as error:
-        if str(path) in str(error):
-            raise
-        raise InputError(f"{path}: {error}") from None
-
-
-def _read(paths: list[Path], number: int, wanted: str | None) -> Source:
-    """One frame's files, their channels together."""
-    path, channels, attributes = paths[0], {}, {}
-    file: exr.Exr | None = None
-    onto: exr.Part | None = None
-    size: tuple[int, int] | None = None
-    for p in paths:
-        if p.suffix.lower() == ".exr":
-            read = exr.read(p)
-            onto = onto or _picture_part(read, wanted)
-            file = read if p == path else file
-            more = _one_window(read, onto)
-            for part in reversed(read.parts):
-                attributes = {**part.attributes, **attributes}
-        elif p.suffix.lower() in stills.SUFFIXES:
-            rgba = stills.read(p)
-            more = {c: rgba[..., i] for i, c in enumerate("RGBA"[: rgba.shape[2]])}
-        else:
-            known = ", ".join((".exr", *stills.SUFFIXES))
-            raise InputError(f"{p}: cannot read this kind of file; frames may be {known}")
-        for name, plane in more.items():
-            size = size or plane.shape[::-1]
-            if plane.shape[::-1] != size:
-                raise InputError(
-                    f"{p}: layer {name} is {_size(plane)}, {path.name} is {_size(size)}"
-                )
-            channels.setdefault(name, plane)
-    return Source(number, path, file, channels, attributes, wanted, onto if file else None)
-
-
-def _picture_part(read: exr.Exr, wanted: str | None) -> exr.Part:
-    """The part that the picture is in; the first one where none is found."""
-    places = {full: part for full, part, _ in read.places()}
-    with contextlib.suppress(InputError):
-        return places[layers.find_color(places, wanted)[0]]
-    return read.parts[0]
-
-
-def _one_window(read: exr.Exr, onto: exr.Part) -> dict[str, np.ndarray]:
-    """All channels in the data window of the part `onto`; 0 where they have none."""
-    channels = {}
-    for full, part, name in read.places():
-        plane = part.channels[name]
-        if part.data_window != onto.data_window:
-            if part.display_window != onto.display_window:
-                raise InputError(
-                    f"{read.path}: layer {full}, {_size(plane)}, lies in another display window "
-                    f"than the picture, {_size(onto.size)}"
-                )
-            plane = _moved(plane, part.data_window, onto.data_window)
-        channels[full] = plane
-    return channels
-
-
-def _moved(plane: np.ndarray, window: Window, onto: Window) -> np.ndarray:
-    """What `plane`, which covers `window`, has in `onto`."""
-    left, top = max(window[0], onto[0]), max(window[1], onto[1])
-    right, bottom = min(window[2], onto[2]) + 1, min(window[3], onto[3]) + 1
-    moved = np.zeros((onto[3] - onto[1] + 1, onto[2] - onto[0] + 1), plane.dtype)
-    if left < right and top < bottom:
-        moved[top - onto[1] : bottom - onto[1], left - onto[0] : right - onto[0]] = plane[
-            top - window[1] : bottom - window[1], left - window[0] : right - window[0]
-        ]
-    return moved
