@@ -2,11 +2,11 @@
 
 import subprocess
 
-import make_frames as make
 import numpy as np
 import pytest
 from PIL import Image
 
+import make_frames as make
 import wgmb
 from wgmb import cli
 

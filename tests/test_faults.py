@@ -8,12 +8,12 @@ import signal
 import subprocess
 import time
 
-import make_frames as make
 import numpy as np
 import OpenEXR
 import pytest
 import tifffile
 
+import make_frames as make
 from wgmb import CameraFile, InputError, exr, stills
 
 READ = {".exr": exr.read, ".png": stills.read, ".jpg": stills.read, ".tif": stills.read}

@@ -2,11 +2,11 @@
 
 import os
 
-import make_frames as make
 import numpy as np
 import pytest
 from PIL import Image
 
+import make_frames as make
 from wgmb import Blur, Frame, InputError, sequence
 from wgmb.output import Output, temporary_name
 from wgmb.sequence import Clip, Passes

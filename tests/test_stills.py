@@ -5,13 +5,13 @@ import struct
 from fractions import Fraction
 
 import av
-import make_frames as make
 import numpy as np
 import OpenEXR
 import pytest
 import tifffile
 from PIL import Image
 
+import make_frames as make
 from wgmb import InputError, exr, stills
 from wgmb.output import Output
 from wgmb.source import Source

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from twins import keep as keep_twin
-from twins import tap as tap_twin
-from twins import velocity as velocity_twin
 
 import wgmb
+from twins import keep as keep_twin
+from twins import reproject as reproject_twin
+from twins import tap as tap_twin
+from twins import velocity as velocity_twin
 from wgmb import Camera, Reprojections, Shutter
 
 SIZES = [(48, 64), (37, 53), (1, 1), (3, 130)]
@@ -63,6 +64,34 @@ def test_kept_and_bad_pixels_are_their_twin(close, size):
     times = Shutter(180).strata(5)[:, 0].astype(float)
     blurred = tap_twin.tap(lifted, motion, times, weight=weight)
     close(got, keep_twin.after(color, keep, blurred), 5e-4)  # a quotient of two sums
+
+
+@pytest.mark.parametrize("neighbours", [False, True])
+@pytest.mark.parametrize("size", [(24, 32), (17, 23), (1, 1)])
+def test_reproject_is_its_twin(size, neighbours):
+    """Samples that are equally near to a hair may change places; all other pixels agree."""
+    frames = []
+    for seed in range(3 if neighbours else 1):
+        color, motion = pictures(size, speed=3.0, seed=seed)
+        depth = np.random.default_rng(seed + 9).uniform(1, 9, size).astype("f4")
+        depth[::5, ::7] = np.inf
+        frames.append((color, motion, depth))
+    near = [wgmb.Frame(c, motion=m, depth=d) for c, m, d in frames]
+    frame = wgmb.Frame(
+        frames[0][0],
+        motion=frames[0][1],
+        depth=frames[0][2],
+        prev=near[1] if neighbours else None,
+        next=near[2] if neighbours else None,
+    )
+    got = wgmb.Blur("reproject", samples=4)(frame)
+    share = wgmb.Blur("reproject", samples=4, show="count")(frame)[..., 0]
+    sources = [(offset, *f) for offset, f in zip((0, -1, 1), frames, strict=False)]
+    times = Shutter(180).strata(4)[:, 0].astype(float)
+    want, count = reproject_twin.reproject(sources, times)
+    assert np.array_equal(np.rint(4 * share), count)
+    wrong = (np.abs(got - want) > TOLERANCE).any(axis=2)
+    assert wrong.mean() < 0.01
 
 
 def camera(position, yaw=0.0, pitch=0.0, roll=0.0, zoom=1.7, orthographic=False, bodies=None):

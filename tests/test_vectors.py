@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-import make_frames as make
 import numpy as np
 import pytest
 
+import make_frames as make
 from wgmb import InputError, vectors
 from wgmb.vectors import Vectors
 
