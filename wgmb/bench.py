@@ -108,7 +108,7 @@ def _motion(frame: Frame) -> np.ndarray:
 def _numba_peer(frame: Frame, samples: int) -> Callable[[], object] | None:
     """The tap blur as one would write it for the CPU: curved paths, bilinear, all cores."""
     try:
-        from numba import njit, prange
+        from numba import njit, prange  # pyright: ignore[reportMissingImports]
     except ImportError:
         return None
 

@@ -41,6 +41,21 @@ class Camera:
         if any(not 0 < k < MOST_BODIES for k in self.bodies):
             raise InputError(f"object indices must be 1 to {MOST_BODIES - 1}")
 
+    def toward(self, other: Camera, share: float) -> Camera:
+        """The camera on the way to another: position and projection linear, orientation turned
+        at constant speed (spherical linear interpolation). Both need `view_from_world`.
+        """
+        own, others = self.view_from_world, other.view_from_world
+        if own is None or others is None:
+            raise InputError("cameras are interpolated by their view_from_world")
+        a, b = np.linalg.inv(own), np.linalg.inv(others)
+        world_from_view = np.eye(4)
+        world_from_view[:3, 3] = (1 - share) * a[:3, 3] + share * b[:3, 3]
+        world_from_view[:3, :3] = a[:3, :3] @ _power(a[:3, :3].T @ b[:3, :3], share)
+        lenses = self.clip_from_world @ a, other.clip_from_world @ b
+        view = np.linalg.inv(world_from_view)
+        return Camera(((1 - share) * lenses[0] + share * lenses[1]) @ view, view)
+
     @property
     def orthographic(self) -> bool:
         """Whether depth does not divide: the last row of the projection is constant."""
@@ -187,6 +202,21 @@ class CameraFile:
             OverflowError,
         ) as error:
             raise InputError(f"{self.path}: frame {number:g}: {_first_line(error)}") from None
+
+
+def _power(turn: np.ndarray, share: float) -> np.ndarray:
+    """Part of a rotation, about the same axis (Rodrigues' formula)."""
+    cos = np.clip((np.trace(turn) - 1) / 2, -1, 1)
+    angle = math.acos(cos)
+    if angle < 1e-9:
+        return np.eye(3)
+    values, vectors_ = np.linalg.eig(turn)
+    axis = np.real(vectors_[:, np.argmin(np.abs(values - 1))])
+    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    if np.trace(k.T @ (turn - turn.T)) < 0:  # the axis points the other way
+        k = -k
+    part = angle * share
+    return np.eye(3) + math.sin(part) * k + (1 - math.cos(part)) * k @ k
 
 
 def _invertible(matrix: np.ndarray) -> bool:

@@ -138,14 +138,16 @@ class BlurOptions:
     "Longest streak in pixels."
     path: Literal["curved", "straight"] | None = None
     "tap: through the previous and the next place (curved), or along the mean velocity."
-    form: Literal["shutter", "published"] | None = None
-    "tap: by the shutter, or published: equal taps along half the way from the previous frame."
+    form: Literal["shutter", "slices", "published"] | None = None
+    "tap (shutter), reproject (slices): published is the form of the paper, without the shutter."
+    show: Literal["color", "count"] | None = None
+    "reproject: count shows how often a pixel was reached."
     seed: int | None = None
     "distributed: another seed is other noise."
 
     def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
         """The Blur these options describe; an option its method does not have is an error."""
-        options = {"path": self.path, "form": self.form, "seed": self.seed}
+        options = {"path": self.path, "form": self.form, "show": self.show, "seed": self.seed}
         given = {name: value for name, value in options.items() if value is not None}
         return Blur(
             self.method,

@@ -10,6 +10,7 @@ import wgpu
 
 from . import gpu, shader
 from .blur import METHODS
+from .cameras import Reprojections
 from .errors import InputError
 from .frame import PASSES, Frame
 from .gbuffer import SceneOnGpu
@@ -46,6 +47,7 @@ class Inputs:
     color: View  # linear, premultiplied by alpha and by weight
     motion: View  # to_prev, to_next [px]
     depth: View | None
+    camera: Reprojections | None
     weight: View | None  # None: every pixel counts
     neighbours: tuple[Neighbour, ...]
     none: View  # bound where an input is not there
@@ -191,6 +193,7 @@ class Blur:
             color=color or self._none,
             motion=motion or self._none,
             depth=motions.depth,
+            camera=motions.camera if not motions.has_vectors else None,
             weight=weight,
             neighbours=near,
             none=self._none,

@@ -28,10 +28,14 @@ class Moving:
     object_motion: bool = False  # vectors leave the camera's motion out
 
     @property
+    def has_vectors(self) -> bool:
+        """Whether there are vectors, with a camera or without."""
+        return any(v is not None for v in (self.to_prev, self.to_next, self.motion))
+
+    @property
     def known(self) -> bool:
         """Whether anything says what moves."""
-        given = (self.to_prev, self.to_next, self.motion, self.camera)
-        return any(source is not None for source in given)
+        return self.has_vectors or self.camera is not None
 
     @property
     def ready(self) -> bool:
@@ -82,10 +86,7 @@ class VelocityPass:
         data = np.zeros((), source.dtype("Velocity"))
         table = np.zeros(1, source.dtype("Reprojection"))
         if camera is not None:
-            x, y, width, height = camera.window or (0, 0, *size)
-            data["display"], data["origin"] = (width, height), (x, y)
-            data["far"] = camera.far if camera.depth_kind == "planar" else np.inf
-            data["depth_kind"] = source.constant(_kind(camera))
+            data["view"] = view_of(camera, size)
             matrices = camera.matrices()
             table = np.zeros(len(matrices), source.dtype("Reprojection"))
             data["bodies"] = len(matrices)
@@ -99,7 +100,13 @@ class VelocityPass:
         )
 
 
-def _kind(camera: Reprojections) -> str:
-    if camera.depth_kind == "clip":
-        return "CLIP"
-    return "ORTHOGRAPHIC" if camera.here.orthographic else "PLANAR"
+def view_of(camera: Reprojections, size: tuple[int, int]) -> np.ndarray:
+    """The View of wgsl/common/camera.wgsl for an image of `size`."""
+    source = shader.load("common/camera.wgsl")
+    view = np.zeros((), source.dtype("View"))
+    x, y, width, height = camera.window or (0, 0, *size)
+    view["display"], view["origin"] = (width, height), (x, y)
+    view["far"] = camera.far if camera.depth_kind == "planar" else np.inf
+    kind = "ORTHOGRAPHIC" if camera.here.orthographic else "PLANAR"
+    view["depth_kind"] = source.constant("CLIP" if camera.depth_kind == "clip" else kind)
+    return view

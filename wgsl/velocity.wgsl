@@ -1,4 +1,5 @@
 // Motion of every pixel: from vectors, from depth and matrices (Rosado 2007), or from both.
+//#include common/camera.wgsl
 //#include common/finite.wgsl
 //#include common/frame.wgsl
 //#include common/path.wgsl
@@ -10,10 +11,7 @@ struct Reprojection {       // of one rigid body; homogeneous pixel: see homogen
 }
 
 struct Velocity {
-    display: vec2f,         // size of the whole picture that the matrices speak of [px]
-    origin: vec2f,          // where this image begins in it [px]
-    far: f32,               // depth from here on: nothing there, moves with the camera's turn only
-    depth_kind: u32,        // PLANAR, ORTHOGRAPHIC or CLIP
+    view: View,
     bodies: u32,            // rows of `reprojections`
 }
 
@@ -35,12 +33,6 @@ override SCALED: bool = false;
 override LIMITED: bool = false;     // frame.max_blur
 override ADDED: bool = false;       // vectors leave the camera's motion out: add it
 
-const PLANAR: u32 = 0u;             // distance along the view axis of a perspective camera
-const ORTHOGRAPHIC: u32 = 1u;       // the same of an orthographic one
-const CLIP: u32 = 2u;               // z after projection, as in a depth buffer
-
-const NEAREST: f32 = 1e-4;          // share of its distance below which a point is at the camera, or behind
-
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
@@ -48,7 +40,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var nothing_there = false;
     if CAMERA {
         let z = textureLoad(depth, id.xy, 0).x;
-        nothing_there = !is_finite(z) || z >= velocity.far || (z <= 0.0 && velocity.depth_kind == PLANAR);
+        nothing_there = is_nothing(velocity.view, z);
         way = camera_motion(id.xy, z, nothing_there);
     }
     if PREV || NEXT {
@@ -73,31 +65,19 @@ fn camera_motion(px: vec2u, z: f32, nothing_there: bool) -> vec4f {
     var body = 0u;
     if OBJECTS && !nothing_there { body = textureLoad(object, px, 0).x; }
     if body >= velocity.bodies { body = 0u; }
-    let at = vec2f(px) + 0.5 + velocity.origin;
-    let ndc = (at / velocity.display * 2.0 - 1.0) * vec2f(1.0, -1.0);
-    if nothing_there && velocity.depth_kind == ORTHOGRAPHIC { return vec4f(0.0); }
-    let here = homogeneous(ndc, z, nothing_there);
+    let view = velocity.view;
+    let ndc = ndc_of(view, px);
+    if nothing_there && view.depth_kind == ORTHOGRAPHIC { return vec4f(0.0); }
+    let here = homogeneous(view, ndc, z, nothing_there);
     let prev = reprojections[body].prev * here;
     let next = reprojections[body].next * here;
-    let back = to_pixels(prev, ndc);
-    let ahead = to_pixels(next, ndc);
+    let back = to_pixels(view, prev, ndc);
+    let ahead = to_pixels(view, next, ndc);
     // A point that is behind the camera in one of the frames goes on as in the other.
     if prev.w <= NEAREST && next.w <= NEAREST { return vec4f(0.0); }
     if prev.w <= NEAREST { return vec4f(-ahead, ahead); }
     if next.w <= NEAREST { return vec4f(back, -back); }
     return vec4f(back, ahead);
-}
-
-/// What the matrices multiply: a point of the view volume up to a positive factor.
-/// Dividing a perspective point by its depth makes infinitely far an ordinary number, 0.
-fn homogeneous(ndc: vec2f, z: f32, nothing_there: bool) -> vec4f {
-    if velocity.depth_kind == PLANAR { return vec4f(ndc, 1.0, select(1.0 / z, 0.0, nothing_there)); }
-    return vec4f(ndc, z, 1.0);
-}
-
-/// Displacement from `ndc` to a clip position [px]; exactly 0 where nothing moved.
-fn to_pixels(clip: vec4f, ndc: vec2f) -> vec2f {
-    return (clip.xy - ndc * clip.w) / clip.w * vec2f(0.5, -0.5) * velocity.display;
 }
 
 /// The motion shortened so that the streak over the exposure is at most frame.max_blur.
