@@ -31,7 +31,8 @@ def synthetic_frame(width: int, height: int) -> Frame:
     x, y = (x - width / 2) / width, (y - height / 2) / width
     motion = np.stack([x - 0.5 * y + 0.2, y + 0.5 * x + 0.05], axis=2)
     motion *= MEAN_SPEED / np.hypot(motion[..., 0], motion[..., 1]).mean()
-    return Frame(color, motion=np.concatenate([-motion, motion], axis=2))
+    depth = 5 + 4 * np.sin(9 * x) * np.cos(9 * y)
+    return Frame(color, motion=np.concatenate([-motion, motion], axis=2), depth=depth)
 
 
 def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, float]:
@@ -43,6 +44,7 @@ def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, flo
     images, device = Images(blur.device), blur.device
     color = images.upload("color", frame.color, gpu.texel(device, 4))
     motion = images.upload("motion", _motion(frame), "rgba32float")
+    depth = images.upload("depth", np.asarray(frame.depth), "r32float")
     output = images.texture("output", frame.size, blur.output)
     token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
     passes: dict[str, list[float]] = {}
@@ -56,6 +58,7 @@ def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, flo
             size=frame.size,
             color=color,
             motion=motion,
+            depth=depth,
             output=view,
             timing=timing,
         )
