@@ -32,24 +32,30 @@ class SceneOnGpu:
     ):
         """`time` of the frame [s]; `span` of interest around it [frame intervals]."""
         self.device, self.scene, self.size, self.time, self.fps = device, scene, size, time, fps
-        self.loops = 2 * len(scene.bodies) + 4  # of one ray: what it meets, and its shadow
+        n = len(scene.bodies)
+        self.loops = 4 * n + n // 16 + 4  # of one ray and its shadow: both sift, then meet, all bodies
         if self.loops * rays * rays > MOST_LOOPS:
-            raise InputError(f"{len(scene.bodies)} bodies are too many for {rays} x {rays} rays")
+            raise InputError(f"{n} bodies are too many for {rays} x {rays} rays")
         source = shader.load("scene/trace.wgsl")
+        if n > (most := source.constant("MOST_BODIES")):
+            raise InputError(f"a scene has at most {most} bodies, got {n}")
         first, last = span
         step = max((last - first) / (ROWS - 1), 1e-6)
         times = time + (first + step * np.arange(ROWS)) / fps
+        places = [body.world_from_body(times) for body in scene.bodies]
         data = np.zeros((), source.dtype("Scene"))
         sun = np.array(scene.sun[:3]) / np.linalg.norm(scene.sun[:3])
         data["sun"], data["sky"] = (*sun, scene.sun[3]), scene.sky
         data["horizon"] = (*scene.horizon, 0)
         data["first"], data["step"], data["rows"] = first, step, ROWS
-        data["bodies"] = len(scene.bodies)
+        data["bodies"] = n
         shapes = [b.shape for b in scene.bodies]
         data["spheres"], data["boxes"] = (shapes.count(s) for s in SHAPES[:2])
         zoom = float(np.ravel(scene.shot.zoom(np.array([time])))[0])
         data["pixel"] = 2 / (zoom * size[1])
         data["rays"] = rays
+        for bounds, place in zip(data["bounds"], places, strict=False):
+            bounds["low"][:3], bounds["high"][:3] = _bounds(place)
         buffer = device.create_buffer_with_data
         self.resources = {
             "scene": buffer(label="scene", data=data, usage=wgpu.BufferUsage.UNIFORM),
@@ -58,7 +64,7 @@ class SceneOnGpu:
             ),
             "poses": buffer(
                 label="poses",
-                data=_poses(scene, source, times, size),
+                data=_poses(scene, source, times, places, size),
                 usage=wgpu.BufferUsage.STORAGE,
             ),
         }
@@ -107,7 +113,17 @@ def _bodies(scene: Scene, source: shader.Source) -> np.ndarray:
     return table
 
 
-def _poses(scene: Scene, source: shader.Source, times: np.ndarray, size) -> np.ndarray:
+def _bounds(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two corners of a box along the world's axes around a body at all its places (rows, 4, 4)."""
+    middle, reach = place[:, :3, 3], np.abs(place[:, :3, :3]).sum(axis=-1)
+    # Between two rows a body strays from both by less than they differ; the rest is rounding.
+    margin = np.abs(np.diff(place, axis=0)).max() + 1e-4 + 1e-6 * np.abs(place).max()
+    return (middle - reach).min(axis=0) - margin, (middle + reach).max(axis=0) + margin
+
+
+def _poses(
+    scene: Scene, source: shader.Source, times: np.ndarray, places: list[np.ndarray], size
+) -> np.ndarray:
     """(rows, 1 + bodies) matrices: of the picture into the world, then of the world into bodies."""
     dtype = source.dtype("Pose")
     if len(times) * (1 + len(scene.bodies)) * dtype.itemsize > 128 << 20:
@@ -118,7 +134,7 @@ def _poses(scene: Scene, source: shader.Source, times: np.ndarray, size) -> np.n
     lens[:, 0, 0], lens[:, 1, 1] = size[0] / size[1] / zoom, 1 / zoom
     lens[:, 2, 2], lens[:, 3, 3] = -1, 1  # looking along -z
     matrices = [scene.shot.world_from_camera(times) @ lens]
-    matrices += [np.linalg.inv(body.world_from_body(times)) for body in scene.bodies]
+    matrices += [np.linalg.inv(place) for place in places]
     for i, matrix in enumerate(matrices):
         for row, name in enumerate("xyz"):
             table[name][:, i] = matrix[:, row]
