@@ -33,7 +33,8 @@ class SceneOnGpu:
         """`time` of the frame [s]; `span` of interest around it [frame intervals]."""
         self.device, self.scene, self.size, self.time, self.fps = device, scene, size, time, fps
         n = len(scene.bodies)
-        self.loops = 4 * n + n // 16 + 4  # of one ray and its shadow: both sift, then meet, all bodies
+        # Of one ray and its shadow: both sift, then meet, all bodies.
+        self.loops = 4 * n + n // 16 + 4
         if self.loops * rays * rays > MOST_LOOPS:
             raise InputError(f"{n} bodies are too many for {rays} x {rays} rays")
         source = shader.load("scene/trace.wgsl")
