@@ -7,6 +7,7 @@ import wgmb
 from twins import keep as keep_twin
 from twins import reproject as reproject_twin
 from twins import tap as tap_twin
+from twins import tiles as tiles_twin
 from twins import velocity as velocity_twin
 from wgmb import Camera, Reprojections, Shutter
 
@@ -72,10 +73,9 @@ def test_jittered_taps_are_their_twin(close, curve):
     color, motion = pictures((17, 23))
     shutter, number = Shutter(360, "start", curve), 5
     got = wgmb.blur(color, motion=motion, shutter=shutter, samples=3, jitter=0.8, number=number)
-    want = np.zeros(color.shape)
+    want, noise = np.zeros(color.shape), noise_of((17, 23), number)
     for y, x in np.ndindex(color.shape[:2]):
-        at = 0.06711056 * (x + 5.588238 * number) + 0.00583715 * (y + 5.588238 * number)
-        shift = 0.8 * (52.9829189 * (at % 1) % 1 - 0.5)
+        shift = 0.8 * (noise[y, x] - 0.5)
         times = shutter.sample_times(3, shift).astype(float)
         want[y, x] = tap_twin.pixel(color, motion, x, y, times)
     close(got, want, 2e-4)
@@ -107,6 +107,34 @@ def test_reproject_is_its_twin(size, neighbours):
     assert np.array_equal(np.rint(4 * share), count)
     wrong = (np.abs(got - want) > TOLERANCE).any(axis=2)
     assert wrong.mean() < 0.01
+
+
+@pytest.mark.parametrize(
+    "form, depths, speed",
+    [("even", True, 6.0), ("even", False, 60.0), ("published", True, 60.0)],
+)
+def test_tiles_is_its_twin(form, depths, speed):
+    """Taps that land on a texel's edge may read the next one; all other pixels agree."""
+    size = (44, 84)  # tiles of 40 px: two rows, three columns
+    color, motion = pictures(size, speed)
+    motion[:, 20:60] *= 0.02
+    depth = np.random.default_rng(4).uniform(1, 9, size).astype("f4") if depths else None
+    shutter = Shutter(300, "start", "triangle")
+    got = wgmb.blur(color, motion=motion, depth=depth, method="tiles", shutter=shutter, samples=5,
+                    number=2, form=form)  # fmt: skip
+    times = shutter.sample_times(5).astype(float)
+    want = tiles_twin.tiles(
+        color, motion, depth, times, shutter.span, noise_of(size, 2), 40, form == "published"
+    )
+    wrong = (np.abs(got - want) > 1e-3).any(axis=2)
+    assert wrong.mean() < 0.01
+
+
+def noise_of(size, number):
+    """Interleaved gradient noise (Jimenez 2014)."""
+    y, x = np.mgrid[: size[0], : size[1]]
+    at = 0.06711056 * (x + 5.588238 * number) + 0.00583715 * (y + 5.588238 * number)
+    return 52.9829189 * (at % 1) % 1
 
 
 def camera(position, yaw=0.0, pitch=0.0, roll=0.0, zoom=1.7, orthographic=False, bodies=None):

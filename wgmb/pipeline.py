@@ -279,7 +279,7 @@ class Blur:
         return found
 
     def _upload_moving(self, frame: Frame, which: str = "") -> dict:
-        deep = frame.camera is not None or "depth" in self.method.needs
+        deep = frame.camera is not None or "depth" in self.method.needs | self.method.uses
         return {
             "to_next": self._view("to_next" + which, frame.to_next, "rg32float"),
             "to_prev": self._view("to_prev" + which, frame.to_prev, "rg32float"),
