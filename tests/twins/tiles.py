@@ -21,8 +21,8 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
         if reach <= SHORT:
             out[y, x] = _own(color, weight, y, x)
             continue
-        own = _held(motion[y, x], span, edge)
-        here = max(_streak(own, span), SHORT)
+        own = motion[y, x]
+        here = np.clip(_streak(own, span), SHORT, edge)
         share = (1.0 if published else 0.25) / (KAPPA * here)
         total = share * color[y, x]
         counted = share * (1 if weight is None else weight[y, x])
@@ -30,14 +30,15 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
             offset = displacement(fast, t)
             far = np.hypot(*offset)
             if i % 2:
-                trust = np.clip((_streak(own, span) - SHORT) / GAMMA, 0, 1)
-                offset = far * _own_direction(displacement(own, t), offset, trust)
+                trust = np.clip((here - SHORT) / GAMMA, 0, 1)
+                odd = _own_direction(_direction(own, span), _direction(fast, span), trust)
+                offset = far * np.sign(t) * odd
             at = np.array([x + 0.5, y + 0.5]) - offset
             column = int(np.clip(np.floor(at[0]), 0, width - 1))
             row = int(np.clip(np.floor(at[1]), 0, height - 1))
             there = np.clip(_streak(motion[row, column], span), SHORT, edge)
-            w = _weight(far, offset, here, there, displacement(own, t),
-                        displacement(motion[row, column], t),
+            w = _weight(far, offset, here, there, _direction(own, span),
+                        _direction(motion[row, column], span),
                         _depth(depth, y, x), _depth(depth, row, column))  # fmt: skip
             if not published:
                 w /= max(2 * _cone(far, reach) + 2 * _cylinder(far, reach), 1e-3)
@@ -51,8 +52,8 @@ def _weight(far, offset, here, there, own_way, way, z, z_there):
     front = np.clip(1 - (z_there - z) / min(z, z_there), 0, 1)
     behind = np.clip(1 - (z - z_there) / min(z, z_there), 0, 1)
     direction = _unit(offset)
-    along_here = abs(_unit(own_way) @ direction) if here > SHORT and far > 0 else 1.0
-    along_there = abs(_unit(way) @ direction) if there > SHORT and far > 0 else 1.0
+    along_here = abs(own_way @ direction) if here > SHORT and far > 0 else 1.0
+    along_there = abs(way @ direction) if there > SHORT and far > 0 else 1.0
     return (
         front * _cone(far, there) * along_there
         + behind * _cone(far, here) * along_here
@@ -60,11 +61,22 @@ def _weight(far, offset, here, there, own_way, way, z, z_there):
     )
 
 
-def _streak(motion, span):
+def _farthest(motion, span):
+    """When it is farthest from its place: at an end, or where it turns."""
     velocity, curvature = (motion[2:] - motion[:2]) / 2, (motion[2:] + motion[:2]) / 2
     bend = curvature @ curvature
     turn = np.clip(-0.5 * (velocity @ curvature) / max(bend, 1e-30), *span)
-    return max(np.hypot(*displacement(motion, t)) for t in (*span, turn))
+    return max((span[1], span[0], turn), key=lambda t: np.hypot(*displacement(motion, t)))
+
+
+def _streak(motion, span):
+    return np.hypot(*displacement(motion, _farthest(motion, span)))
+
+
+def _direction(motion, span):
+    """Of the farthest place, as it is after time 0."""
+    when = _farthest(motion, span)
+    return np.sign(when) * _unit(displacement(motion, when))
 
 
 def _held(motion, span, edge):
@@ -110,7 +122,7 @@ def _own_direction(own, dominant, trust):
     across = np.array([-along[1], along[0]])
     if across @ own < 0:
         across = -across
-    return _unit((1 - trust) * across + trust * _unit(own))
+    return _unit((1 - trust) * across + trust * own)
 
 
 def _own(color, weight, y, x):

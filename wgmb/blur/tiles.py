@@ -9,7 +9,7 @@ import wgpu
 
 from .. import gpu
 from ..errors import InputError
-from ..images import Scratch
+from ..images import Images, Scratch
 
 FORMS = ("even", "published")
 LONGEST = (40, 9)  # streak to either side: so many pixels, or the height over this
@@ -38,31 +38,42 @@ class Tiles:
         if form not in FORMS:
             raise InputError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
         self._device, self._output, self._form = device, output, form
+        self._images = Images(device)
         self._rows, self._fastest, self._dominant = (Scratch(device) for _ in range(3))
 
     def encode(self, encoder, inputs, output):
-        """Record three small passes over the tiles, and one over the picture."""
+        """Record three passes over the tiles between two over the picture."""
         kernel = gpu.kernel(
             self._device,
             "blur/tiles.wgsl",
             {"Output": self._output},
             EVEN=inputs.even,
             WEIGHTED=inputs.weight is not None,
-            DEEP=inputs.depth is not None,
             PUBLISHED=self._form == "published",
         )
+        look = gpu.kernel(self._device, "blur/tiles_moves.wgsl", DEEP=inputs.depth is not None)
         width, height = inputs.given.size
         edge = max(LONGEST[0], height // LONGEST[1])
         count = -(-width // edge), -(-height // edge)
         data = np.zeros((), kernel.source.dtype("Tiles"))
         data["count"], data["edge"] = count, edge
+        tiles = self._device.create_buffer_with_data(
+            label="tiles", data=data, usage=wgpu.BufferUsage.UNIFORM
+        )
+        moves = self._images.view("moves", (width, height), "rgba32float")
+        look.run(
+            encoder,
+            "main",
+            inputs.given,
+            motion=inputs.motion,
+            depth=inputs.depth or inputs.none,
+            moves=moves,
+        )
         own = {
-            "tiles": self._device.create_buffer_with_data(
-                label="tiles", data=data, usage=wgpu.BufferUsage.UNIFORM
-            ),
+            "tiles": tiles,
             "color": inputs.color,
             "motion": inputs.motion,
-            "depth": inputs.depth or inputs.none,
+            "moves": moves,
             "weight": inputs.weight or inputs.none,
             "linear": inputs.linear,
             "rows": self._rows.at_least(16 * count[0] * height),
