@@ -105,6 +105,25 @@ class Reprojections:
             table[k] = [self._reprojection(self.prev, k), self._reprojection(self.next, k)]
         return table
 
+    def displacement(self, size: tuple[int, int], x, y, depth, side: int) -> np.ndarray:
+        """(n, 2) way of the world at pixels x, y [px] to the previous (side -1), next (1) frame.
+
+        NaN where there is no such frame, or it is behind its camera; bodies count as the world.
+        """
+        left, top, width, height = self.window or (0, 0, *size)
+        scale = np.array([width / 2, -height / 2])
+        ndc = (np.stack([x, y], axis=1) + 0.5 + (left, top)) / scale + (-1, 1)
+        z = np.asarray(depth, np.float64)[:, None]
+        one = np.ones_like(z)
+        with np.errstate(all="ignore"):
+            planar = self.depth_kind == "planar" and not self.here.orthographic
+            nothing = ~np.isfinite(z) | (z >= self.far) | (z <= 0)
+            inverse = np.where(nothing, 0.0, 1 / z)
+            pixel = np.hstack([ndc, one, inverse] if planar else [ndc, z, one])
+            clip = pixel @ self._reprojection(self.prev if side < 0 else self.next, None).T
+            way = (clip[:, :2] / clip[:, 3:] - ndc) * scale
+        return np.where(clip[:, 3:] > 0, way, np.nan)
+
     def _reprojection(self, there: Camera | None, body: int | None) -> np.ndarray:
         if there is None:
             return np.diag([0.0, 0.0, 0.0, 0.0])

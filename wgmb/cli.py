@@ -153,6 +153,8 @@ def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, ver
             line(f"frame {number}: pixels that are not finite were given no weight: {what}")
         if verbose or "because" in clip.finding or "check them" in clip.finding:
             line(f"vectors: {clip.finding}")
+        if clip.cuts:
+            line(f"camera cut before frame {', '.join(map(str, sorted(clip.cuts)))}")
         done = f"{len(report.done)} frames in {seconds:.1f} s -> {files.pattern}"
         line(done + (f", {len(report.skipped)} were there" if report.skipped else ""))
     if report.failed:

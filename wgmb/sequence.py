@@ -14,6 +14,7 @@ import numpy as np
 
 from . import layers, stills, vectors
 from .cameras import CameraFile
+from .cuts import is_cut, jumps, straightened
 from .errors import InputError
 from .frame import Frame
 from .numbering import (
@@ -64,7 +65,8 @@ class Passes:
 class Clip:
     """A frame sequence, or one picture, being read.
 
-    Iterating gives Frames. `finding` says what the vectors were found to mean.
+    Iterating gives Frames. `finding` says what the vectors were found to mean; `cuts` has the
+    frames read so far that come after a camera cut.
     """
 
     def __init__(
@@ -81,6 +83,7 @@ class Clip:
         self.pattern, self.passes = str(pattern), passes or Passes()
         self.numbers = self._numbers(frames, skip_missing)
         self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
+        self.cuts: set[int] = set()
         self._kept: OrderedDict[int, Source] = OrderedDict()
         self._found: vectors.Finding | None = None
 
@@ -187,10 +190,26 @@ class Clip:
                     other = self.source(number)
                     if other.size == source.size:
                         near[side] = self.frame(other)
-        return replace(self.frame(source), **near)
+        frame = self.frame(source)
+        for side in list(near):
+            if is_cut(frame, near[side], -1 if side == "prev" else 1):
+                del near[side]
+                self.cuts.add(source.number if side == "prev" else source.number + 1)
+        return replace(frame, **near)
 
     def frame(self, source: Source, picture: bool = True) -> Frame:
-        """What a method is given of `source`; without `picture`, all but the colour (0)."""
+        """What a method is given of `source`; without `picture`, all but the colour (0).
+
+        Motion that leads across a camera cut is left out (see cuts.jumps).
+        """
+        frame = self._frame(source, picture)
+        for side in (-1, 1):
+            if jumps(frame, side):
+                self.cuts.add(source.number + (side > 0))
+                frame = straightened(frame, side)
+        return frame
+
+    def _frame(self, source: Source, picture: bool) -> Frame:
         meaning = self._decide().vectors
         with about(source.path):
             if meaning is None:  # where a layer was asked for, this says why there is none
