@@ -47,6 +47,20 @@ def test_straight_taps_are_their_twin(close, size, samples):
     close(got, tap_twin.tap(color, motion, times, curved=False), TOLERANCE)
 
 
+@pytest.mark.parametrize("curve", ["box", "triangle"])
+def test_auto_taps_are_their_twin(close, curve):
+    """One a pixel of streak from opening to closing, two at least."""
+    color, motion = pictures((17, 23), speed=15.0)
+    motion[..., 2:] = -motion[..., :2]
+    shutter = Shutter(360, curve=curve)
+    want = np.zeros(color.shape)
+    for y, x in np.ndindex(color.shape[:2]):
+        count = int(np.clip(np.ceil(np.hypot(*motion[y, x, 2:])), 2, 64))
+        times = shutter.time((np.arange(count) + 0.5) / count)
+        want[y, x] = tap_twin.pixel(color, motion, x, y, times)
+    close(wgmb.blur(color, motion=motion, shutter=shutter, samples="auto"), want, 1e-3)
+
+
 @pytest.mark.parametrize("size", SIZES)
 def test_the_published_form_is_its_twin(close, size):
     color, motion = pictures(size)

@@ -126,8 +126,8 @@ class BlurOptions:
 
     method: str = "tap"
     "tap, tiles, reproject. Scenes: also accumulate, distributed. See the README's table."
-    samples: int = 16
-    "Taps, pictures or rays a pixel."
+    samples: int | Literal["auto"] = 16
+    "Taps, pictures or rays a pixel; auto: one a pixel of a streak, 64 at most."
     jitter: float = 0.0
     "0 to 1: trades bands for noise."
     keep: str | None = None

@@ -21,6 +21,8 @@ from .timing import Timing
 from .velocity import Moving, VelocityPass
 
 MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
+AUTO_SAMPLES = 64  # the most that "auto" takes a pixel
+AUTO_STRATA = 256  # equal shares of the exposure that times are interpolated in
 OUTPUTS = ("rgba32float", "rgba16float")
 View = wgpu.GPUTextureView
 
@@ -54,6 +56,7 @@ class Inputs:
     one: View  # bound where a weight is not there
     linear: wgpu.GPUSampler
     even: bool  # the shutter is a box
+    auto: bool  # `samples` is the most a pixel may take
     scene: SceneOnGpu | None
     progress: tuple[int, int]  # samples done before, samples to do now
 
@@ -63,7 +66,8 @@ class Blur:
 
     `method`: a name in METHODS; its own options follow as keywords.
     `shutter`: degrees (180 is open for half a frame interval), or a Shutter.
-    `samples`: taps a pixel, 1 to 4096.
+    `samples`: taps a pixel, 1 to 4096; "auto" takes one a pixel of a streak, 64 at most (methods
+    that cannot tell pixels apart take 64).
     `jitter`: 0 to 1, trades bands for noise: how far a tap may move within its share of time.
     `max_blur`: longest streak [px]; None leaves it free.
     `device`: a wgpu device of yours, the name of an adapter, or None for the best.
@@ -75,7 +79,7 @@ class Blur:
         method: str = "tap",
         *,
         shutter: Shutter | float = 180,
-        samples: int = 16,
+        samples: int | str = 16,
         jitter: float = 0.0,
         max_blur: float | None = None,
         device: wgpu.GPUDevice | str | None = None,
@@ -84,8 +88,10 @@ class Blur:
     ):
         if method not in METHODS:
             raise InputError(f"unknown method {method!r}, one of {', '.join(METHODS)}")
+        self.auto = samples == "auto"
+        samples = AUTO_SAMPLES if self.auto else samples
         if not isinstance(samples, (int, np.integer)) or not 1 <= samples <= MOST_SAMPLES:
-            raise InputError(f"samples must be 1 to {MOST_SAMPLES}, got {samples!r}")
+            raise InputError(f"samples must be 1 to {MOST_SAMPLES} or auto, got {samples!r}")
         if not 0 <= jitter <= 1:
             raise InputError(f"jitter must be 0 to 1, got {jitter}")
         if max_blur is not None and not max_blur >= 0:
@@ -136,7 +142,7 @@ class Blur:
             "shutter": create(label="shutter", data=data, usage=wgpu.BufferUsage.UNIFORM),
             "strata": create(
                 label="strata",
-                data=self._shutter.strata(self.samples),
+                data=self._shutter.strata(AUTO_STRATA if self.auto else self.samples),
                 usage=wgpu.BufferUsage.STORAGE,
             ),
         }
@@ -208,6 +214,7 @@ class Blur:
             one=self._one,
             linear=self._linear,
             even=self._shutter.curve == "box",
+            auto=self.auto,
             scene=scene,
             progress=progress or (0, self.samples),
         )
@@ -351,7 +358,7 @@ def blur(
     *,
     method: str = "tap",
     shutter: Shutter | float = 180,
-    samples: int = 16,
+    samples: int | str = 16,
     **more,
 ) -> np.ndarray:
     """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.

@@ -38,7 +38,7 @@ class Distributed:
         kernel = gpu.kernel(self._device, "blur/distributed.wgsl", {"Output": self._output})
         data = np.zeros((), kernel.source.dtype("Progress"))
         data["first"], data["count"] = inputs.progress
-        data["seed"], data["times"] = self._seed, TIMES
+        data["seed"] = self._seed
         create = self._device.create_buffer_with_data
         width, height = inputs.given.size
         kernel.run(

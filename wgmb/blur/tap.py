@@ -41,6 +41,7 @@ class Tap:
             "blur/tap.wgsl",
             {"Output": self._output},
             EVEN=inputs.even,
+            AUTO=inputs.auto,
             WEIGHTED=inputs.weight is not None,
             **self._constants,
         )

@@ -48,6 +48,7 @@ class Tiles:
             "blur/tiles.wgsl",
             {"Output": self._output},
             EVEN=inputs.even,
+            AUTO=inputs.auto,
             WEIGHTED=inputs.weight is not None,
             PUBLISHED=self._form == "published",
         )

@@ -93,22 +93,24 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let x = vec2f(id.xy) + 0.5;
     let noise = pixel_noise(id.xy);
-    let times = shutter_times(x, frame.jitter * (noise - 0.5));
+    let most_times = shutter_times(x, frame.jitter * (noise - 0.5));
     let limit = f32(tiles.edge);
-    let fast = held(path_of(dominant[tile_at(x, noise)]), times.delay, limit);
-    let all = max(length(streak(fast, times.delay)), SHORT);
+    let fast = held(path_of(dominant[tile_at(x, noise)]), most_times.delay, limit);
+    let way = streak(fast, most_times.delay);
+    let all = max(length(way), SHORT);
+    let times = enough_times(most_times, 4.0 * all);    // to both sides, in two directions by turns
     let still = all <= SHORT;
-    let count = select(frame.samples, 0u, still);
+    let count = select(times.count, 0u, still);
 
     let own = textureLoad(moves, id.xy, 0);
     let here = clamp(own.z, SHORT, limit);
     let trust = clamp((here - SHORT) / GAMMA, 0.0, 1.0);
-    let odd = own_direction(own.xy, streak(fast, times.delay), trust);
+    let odd = own_direction(own.xy, way, trust);
     let z = own.w;
     // The paper's weight of the pixel itself, and a quarter of it where a tap's is 1 instead of 4;
     // all are over the number of taps, so that no sum of finite colours overflows.
     let middle = select(0.25, 1.0, PUBLISHED) / (KAPPA * here);
-    let share = 1.0 / f32(frame.samples);
+    let share = 1.0 / f32(times.count);
     var sum = middle * textureLoad(color, id.xy, 0);
     var total = middle;
     if WEIGHTED { total *= textureLoad(weight, id.xy, 0).x; }
@@ -119,15 +121,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let along = displacement(fast, t);
         let far = length(along);
         let even_way = along / max(far, 1e-6);
-        let way = select(even_way, odd * sign(t), i % 2u == 1u);
-        let at = x - far * way;
+        let toward = select(even_way, odd * sign(t), i % 2u == 1u);
+        let at = x - far * toward;
         let other = textureLoad(moves, vec2u(clamp(floor(at), vec2f(0.0), most)), 0);
         let there = clamp(other.z, SHORT, limit);
         let nearest = 1.0 / min(z, other.w);
         let front = clamp(1.0 - (other.w - z) * nearest, 0.0, 1.0);
         let behind = clamp(1.0 - (z - other.w) * nearest, 0.0, 1.0);
-        let along_here = select(1.0, abs(dot(own.xy, way)), here > SHORT && far > 0.0);
-        let along_there = select(1.0, abs(dot(other.xy, way)), there > SHORT && far > 0.0);
+        let along_here = select(1.0, abs(dot(own.xy, toward)), here > SHORT && far > 0.0);
+        let along_there = select(1.0, abs(dot(other.xy, toward)), there > SHORT && far > 0.0);
         var w = front * cone(far, there) * along_there + behind * cone(far, here) * along_here
             + 2.0 * cylinder(far, min(there, here)) * max(along_here, along_there);
         if !PUBLISHED { w /= max(2.0 * cone(far, all) + 2.0 * cylinder(far, all), 1e-3); }
