@@ -158,7 +158,7 @@ def test_a_rotating_bar_covers_what_it_sweeps(turn, curve):
     # It is seen from the bar at an angle of e to s from its axis, or -s to -e, at either end.
     s, e = np.arcsin(np.minimum(1, width / far)), np.arccos(np.minimum(1, length / far))
     want = np.zeros_like(far)
-    for end in np.arange(-3, 4) * np.pi:
+    for end in np.arange(-2, 3) * np.pi:
         for begin, close in ((e, s), (-s, -e)):
             first, last = (passed(shutter, (angle - end - 0.3 - a) / turn) for a in (close, begin))
             want += np.where(e < s, np.abs(last - first), 0)
