@@ -227,14 +227,36 @@ def test_1024_bodies_are_drawn_and_more_are_refused():
         frame(crowd(1025), size=(33, 33))
     with pytest.raises(InputError, match="1024 bodies are too many for 3 x 3 rays"):
         frame(crowd(1024), size=(33, 33), rays=3)
+    blur = wgmb.Blur("distributed", samples=4)  # whose rays are its samples
+    assert wgmb.Render(crowd(1024), blur, size=(33, 33), rays=8)(0.0)[16, 16, 1] > 0
 
 
 def test_what_is_no_body_is_refused():
     with pytest.raises(InputError, match="cone"):
         Scene("x", (Body("cone", (1, 1, 1), at(0, 0, 0)),), STILL)
-    for bad in (0.0, -1.0, float("nan"), float("inf")):
+    for bad in (0.0, -1.0, float("nan"), float("inf"), 1e-300):
         with pytest.raises(InputError, match="positive sizes"):
             Scene("x", (Body("box", (1, bad, 1), at(0, 0, 0)),), STILL)
+    with pytest.raises(InputError, match=r"PLAIN, CHECKER.*'MORTAR'"):
+        Scene("x", (Body("box", (1, 1, 1), at(0, 0, 0), pattern="MORTAR"),), STILL)
+    for look in ({"light": 1e300}, {"color": (float("nan"), 0, 0)}, {"repeats": (1, float("inf"))}):
+        with pytest.raises(InputError, match="f32"):
+            Scene("x", (Body("box", (1, 1, 1), at(0, 0, 0), **look),), STILL)
+    for light in ({"sun": (0, 0, 0, 1)}, {"sky": (0, float("nan"), 0, 1)}):
+        with pytest.raises(InputError, match="sun and sky"):
+            Scene("x", (), STILL, **light)
+
+
+@pytest.mark.parametrize(
+    "name, settings, who",
+    [("scaling", {"zoom": -1e5}, "camera"), ("scaling", {"zoom": 1e4}, "camera"),
+     ("translation", {"speed": 1e300}, "camera"), ("crossing", {"speed": 1e300}, "body 1"),
+     ("bounce", {"gravity": 1e30}, "body 1"), ("hdr", {"light": 1e300}, "sphere")],
+)  # fmt: skip
+@pytest.mark.parametrize("method", ["tap", "distributed"])
+def test_what_leaves_the_numbers_is_refused(name, settings, who, method):
+    with pytest.raises(InputError, match=who):
+        wgmb.Render(scenes.make(name, **settings), wgmb.Blur(method), size=(32, 18))(0.1)
 
 
 @pytest.mark.parametrize("options", [{"fps": 0}, {"fps": float("nan")}, {"rays": 0}, {"rays": 9}])
