@@ -10,7 +10,7 @@ import wgpu
 from .. import gpu
 from ..images import Scratch
 
-TIMES = 256  # equal shares of the exposure between which times are interpolated
+TIMES = 4096  # equal shares of the exposure between which times are interpolated
 
 
 class Distributed:
