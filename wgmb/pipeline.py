@@ -33,6 +33,7 @@ class Neighbour:
     color: View
     motion: View
     depth: View
+    normal: View | None
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,8 @@ class Inputs:
     motion: View  # to_prev, to_next [px]
     depth: View | None
     camera: Reprojections | None
+    by_camera: bool  # the motion is the camera's alone: there are no vectors
+    normal: View | None  # unit vectors in the world
     weight: View | None  # None: every pixel counts
     neighbours: tuple[Neighbour, ...]
     none: View  # bound where an input is not there
@@ -145,6 +148,7 @@ class Blur:
         progress: tuple[int, int] | None = None,
         neighbours: dict[int, dict] | None = None,
         keep: View | None = None,
+        normal: View | None = None,
         check: bool = False,
         number: int = 0,
         timing: Timing | None = None,
@@ -153,14 +157,15 @@ class Blur:
         """Record the passes into `encoder`; nothing is submitted or waited for.
 
         Views are of your textures: `color` filterable float (rgba16float always is), `keep`
-        0..1, `output` a storage texture of the format that Blur was made for. `moving` are
+        0..1, `normal` unit vectors in the world, `output` a storage texture of the format that
+        Blur was made for. `moving` are
         the inputs of velocity.Moving: `to_next` and `to_prev` with the displacement [px] in
         x and y, or `motion` with to_prev and to_next together, which saves a pass; or
         `camera` and `depth`. `check` gives pixels that are not finite no weight, at the
         price of three small passes.
 
-        `neighbours`: -1 and 1, each with `color` and its own `moving` inputs and depth, for
-        methods that use them.
+        `neighbours`: -1 and 1, each with `color`, its own `moving` inputs and depth, and
+        `normal` if there is one, for methods that use them.
 
         `scene` instead of `color`, for the methods that need one, which may be recorded
         bit by bit: `progress` is how many samples were done before, and are to be done now.
@@ -193,7 +198,9 @@ class Blur:
             color=color or self._none,
             motion=motion or self._none,
             depth=motions.depth,
-            camera=motions.camera if not motions.has_vectors else None,
+            camera=motions.camera,
+            by_camera=motions.camera is not None and not motions.has_vectors,
+            normal=normal,
             weight=weight,
             neighbours=near,
             none=self._none,
@@ -240,6 +247,7 @@ class Blur:
             "size": frame.size,
             "color": self._images.upload("color", rgba, four),
             "keep": self._view("keep", frame.keep, "r32float"),
+            "normal": self._normal(frame),
             "check": bool(frame.bad.keys() - {"depth"}),
             "number": frame.number,
             "neighbours": self._upload_neighbours(frame),
@@ -267,7 +275,8 @@ class Blur:
             ):
                 rgba, texel = self._rgba(near)
                 color = self._images.upload(f"color {offset}", rgba, texel)
-                found[offset] = {"color": color, **self._upload_moving(near, f" {offset}")}
+                found[offset] = {"color": color, "normal": self._normal(near, f" {offset}")}
+                found[offset] |= self._upload_moving(near, f" {offset}")
         return found
 
     def _upload_moving(self, frame: Frame, which: str = "") -> dict:
@@ -287,15 +296,23 @@ class Blur:
     def _view(self, name: str, array: np.ndarray | None, format: str) -> View | None:
         return None if array is None else self._images.upload(name, array, format)
 
+    def _normal(self, frame: Frame, which: str = "") -> View | None:
+        if frame.normal is None or "normal" not in self.method.uses:
+            return None
+        four = np.zeros((*frame.normal.shape[:2], 4), np.float32)
+        four[..., :3] = frame.normal
+        return self._images.upload("normal" + which, four, "rgba32float")
+
     def _neighbour(self, encoder, given, offset: int, inputs: dict) -> Neighbour:
-        color, moving = inputs.pop("color"), _moving(inputs)
+        color, normal = inputs.pop("color"), inputs.pop("normal", None)
+        moving = _moving(inputs)
         motion, limited = moving.motion, self.max_blur is not None
         if not moving.known or moving.depth is None:
             raise InputError("a neighbouring frame needs color, motion and depth")
         if motion is None or not moving.ready or limited:
             motion = self._images.view(f"motion {offset}", given.size, "rgba32float")
             self._velocity.encode(encoder, given, moving, limited, motion)
-        return Neighbour(offset, color, motion, moving.depth)
+        return Neighbour(offset, color, motion, moving.depth, normal)
 
     def _require(self, there) -> None:
         if missing := self.method.needs - there:

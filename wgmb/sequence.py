@@ -212,6 +212,7 @@ class Clip:
                 source.rgba if picture else np.zeros((*source.size[::-1], 3), np.float16),
                 motion=motion,
                 depth=depth,
+                normal=self._normal(source) if picture else None,
                 camera=reprojections,
                 object_id=ids,
                 keep=self._mask(source, self.passes.keep),
@@ -229,6 +230,12 @@ class Clip:
             with np.errstate(divide="ignore"):
                 depth = np.where(depth > 0, 1 / depth, np.inf).astype(np.float32)
         return depth
+
+    def _normal(self, source: Source) -> np.ndarray | None:
+        names = layers.find_normal(source.channels, source.beside)
+        if not names:
+            return None
+        return np.stack([source.channels[name] for name in names], 2, dtype=np.float32)
 
     def _object_ids(self, source: Source) -> np.ndarray | None:
         by_layer = layers.layers(source.channels, near=source.beside)

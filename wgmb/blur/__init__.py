@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from .accumulate import Accumulate
 from .distributed import Distributed
+from .fusion import Fusion
 from .reproject import Reproject
 from .tap import Tap
 
@@ -23,7 +24,7 @@ class Method(Protocol):
     needs: frozenset[str]
     """Of "color", "motion", "depth", "scene"."""
     uses: frozenset[str]
-    """What it takes if it is there: "neighbours"."""
+    """What it takes if it is there: "neighbours", "normal"."""
 
     def encode(
         self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView
@@ -32,4 +33,4 @@ class Method(Protocol):
         ...
 
 
-METHODS: dict[str, type] = {m.name: m for m in (Tap, Reproject, Accumulate, Distributed)}
+METHODS: dict[str, type] = {m.name: m for m in (Tap, Fusion, Reproject, Accumulate, Distributed)}

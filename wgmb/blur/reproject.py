@@ -108,7 +108,7 @@ class Reproject:
         run("finish", 0, 0.0)
 
     def _published(self, encoder, inputs, output):
-        camera: Reprojections | None = inputs.camera
+        camera: Reprojections | None = inputs.camera if inputs.by_camera else None
         ways: list[tuple[Camera, Camera]] = []
         if camera and camera.prev and camera.here.view_from_world is not None:
             ways = [(camera.here, camera.prev), (camera.prev, camera.here)]
