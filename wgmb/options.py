@@ -126,8 +126,8 @@ class BlurOptions:
 
     method: str = "tap"
     "tap: average along each pixel's own path. Scenes: also accumulate, distributed."
-    samples: int = 16
-    "Taps, pictures or rays a pixel."
+    samples: int | None = None
+    "Taps, pictures or rays a pixel: 16, for fusion 8."
     jitter: float = 0.0
     "0 to 1: trades bands for noise."
     keep: str | None = None
@@ -139,15 +139,24 @@ class BlurOptions:
     path: Literal["curved", "straight"] | None = None
     "tap: through the previous and the next place (curved), or along the mean velocity."
     form: Literal["shutter", "slices", "published"] | None = None
-    "tap (shutter), reproject (slices): published is the form of the paper, without the shutter."
+    "tap, fusion (shutter), reproject (slices): published is the paper's, without the shutter."
     show: Literal["color", "count"] | None = None
     "reproject: count shows how often a pixel was reached."
+    weights: Literal["normalised", "published"] | None = None
+    "fusion: with the sum 1, or as printed."
+    alpha_front: float | None = None
+    "fusion: factor of faces that lead, 0.02 to 0.10; a greater one blurs them less."
+    alpha_back: float | None = None
+    "fusion: factor of all other faces."
+    tau: float | None = None
+    "fusion: weight of a sample over the next newer one's, to 1."
     seed: int | None = None
     "distributed: another seed is other noise."
 
     def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
         """The Blur these options describe; an option its method does not have is an error."""
-        options = {"path": self.path, "form": self.form, "show": self.show, "seed": self.seed}
+        own = ("path", "form", "show", "weights", "alpha_front", "alpha_back", "tau", "seed")
+        options = {name: getattr(self, name) for name in own}
         given = {name: value for name, value in options.items() if value is not None}
         return Blur(
             self.method,

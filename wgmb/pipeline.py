@@ -21,6 +21,7 @@ from .timing import Timing
 from .velocity import Moving, VelocityPass
 
 MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
+SAMPLES = 16
 OUTPUTS = ("rgba32float", "rgba16float")
 View = wgpu.GPUTextureView
 
@@ -66,7 +67,7 @@ class Blur:
 
     `method`: a name in METHODS; its own options follow as keywords.
     `shutter`: degrees (180 is open for half a frame interval), or a Shutter.
-    `samples`: taps a pixel, 1 to 4096.
+    `samples`: taps a pixel, 1 to 4096; 16, or what the method's source says, by default.
     `jitter`: 0 to 1, trades bands for noise: how far a tap may move within its share of time.
     `max_blur`: longest streak [px]; None leaves it free.
     `device`: a wgpu device of yours, the name of an adapter, or None for the best.
@@ -78,7 +79,7 @@ class Blur:
         method: str = "tap",
         *,
         shutter: Shutter | float = 180,
-        samples: int = 16,
+        samples: int | None = None,
         jitter: float = 0.0,
         max_blur: float | None = None,
         device: wgpu.GPUDevice | str | None = None,
@@ -87,6 +88,8 @@ class Blur:
     ):
         if method not in METHODS:
             raise InputError(f"unknown method {method!r}, one of {', '.join(METHODS)}")
+        if samples is None:
+            samples = getattr(METHODS[method], "samples", SAMPLES)
         if not isinstance(samples, (int, np.integer)) or not 1 <= samples <= MOST_SAMPLES:
             raise InputError(f"samples must be 1 to {MOST_SAMPLES}, got {samples!r}")
         if not 0 <= jitter <= 1:
@@ -121,7 +124,14 @@ class Blur:
 
     @shutter.setter
     def shutter(self, shutter: Shutter | float) -> None:
-        self._shutter = shutter if isinstance(shutter, Shutter) else Shutter(float(shutter))
+        if not isinstance(shutter, Shutter):
+            try:
+                degrees = float(shutter)
+            except (TypeError, ValueError):
+                wanted = "degrees or a Shutter"
+                raise InputError(f"shutter must be {wanted}, got {shutter!r}") from None
+            shutter = Shutter(degrees)
+        self._shutter = shutter
         data = np.zeros((), shader.load("common/shutter.wgsl").dtype("Shutter"))
         opens, closes = self._shutter.span
         data["span"] = opens, closes
@@ -172,6 +182,8 @@ class Blur:
         """
         gpu.check_size(self.device, *size)
         motions = _moving(moving)
+        views = {"output": output, "color": color, "keep": keep, "normal": normal}
+        _check_views(size, views | moving)
         given_inputs = {"color": color, "motion": motions.known or None, "depth": motions.depth}
         given_inputs["scene"] = scene
         self._require({name for name, input_ in given_inputs.items() if input_ is not None})
@@ -281,14 +293,13 @@ class Blur:
 
     def _upload_moving(self, frame: Frame, which: str = "") -> dict:
         deep = frame.camera is not None or "depth" in self.method.needs
-        ids = None if frame.object_id is None else np.minimum(frame.object_id, 2**32 - 1)
         return {
             "to_next": self._view("to_next" + which, frame.to_next, "rg32float"),
             "to_prev": self._view("to_prev" + which, frame.to_prev, "rg32float"),
             "motion": self._view("to_prev, to_next" + which, frame.motion, "rgba32float"),
             "depth": self._view("depth" + which, frame.depth if deep else None, "r32float"),
             "camera": frame.camera,
-            "object_id": self._view("object" + which, ids, "r32uint"),
+            "object_id": self._view("object" + which, frame.object_id, "r32uint"),
             "scale": self._view("scale" + which, frame.scale, "r32float"),
             "object_motion": frame.object_motion,
         }
@@ -305,6 +316,7 @@ class Blur:
 
     def _neighbour(self, encoder, given, offset: int, inputs: dict) -> Neighbour:
         color, normal = inputs.pop("color"), inputs.pop("normal", None)
+        _check_views(given.size, {"color": color, "normal": normal, **inputs})
         moving = _moving(inputs)
         motion, limited = moving.motion, self.max_blur is not None
         if not moving.known or moving.depth is None:
@@ -338,7 +350,19 @@ def _moving(given: dict) -> Moving:
         raise InputError(
             f"encode has no input {', '.join(sorted(unknown))}; it has {', '.join(sorted(known))}"
         )
-    return Moving(**given)
+    moving = Moving(**given)
+    if moving.camera is not None and moving.depth is None:
+        raise InputError("motion from a camera needs depth")
+    if moving.motion is not None and not (moving.to_next is None and moving.to_prev is None):
+        raise InputError("motion stands instead of to_next and to_prev: give one or the other")
+    return moving
+
+
+def _check_views(size: tuple[int, int], views: dict) -> None:
+    for name, view in views.items():
+        if isinstance(view, View) and view.size[:2] != tuple(size):
+            width, height = view.size[:2]
+            raise InputError(f"{name} is {width} x {height}, the image {size[0]} x {size[1]}")
 
 
 def blur(
@@ -347,7 +371,7 @@ def blur(
     *,
     method: str = "tap",
     shutter: Shutter | float = 180,
-    samples: int = 16,
+    samples: int | None = None,
     **more,
 ) -> np.ndarray:
     """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.

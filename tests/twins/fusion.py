@@ -26,7 +26,7 @@ def fusion(color, motion, depth, times, middle, alphas, *, span=None, delay=(0.0
             if span is None:
                 path = np.concatenate([path[:2], -path[:2]])
             late = delay[0] * ((x + 0.5) / width - 0.5) + delay[1] * ((y + 0.5) / height - 0.5)
-            ends = [displacement(path, t + late) for t in (opens, (opens + closes) / 2, closes)]
+            ends = [displacement(path, t) for t in _instants(path, opens + late, closes + late)]
             if max(map(np.linalg.norm, ends)) < 0.01:
                 out[y, x] = color[y, x]
                 continue
@@ -43,26 +43,29 @@ def fusion(color, motion, depth, times, middle, alphas, *, span=None, delay=(0.0
                 share = min(alphas) / alpha
                 sharp, each = 1 - share, share * fade / fade.sum()
             if span is not None:
-                bend = 2 * np.linalg.norm(ends[1] - (ends[0] + ends[2]) / 2)
-                streak = min(1.0, max(np.linalg.norm(ends[2] - ends[0]), bend))
+                streak = min(1.0, max(np.linalg.norm(a - b) for a in ends for b in ends))
                 sharp, each = sharp + each.sum() * (1 - streak), each * streak
             here = np.array([x + 0.5, y + 0.5])
-            at = here - _way(path, middle + late)
+            at = here + displacement(path, -(middle + late))
             total = sharp * bilinear(color, *at)
             counted = sharp * (1.0 if weight is None else bilinear(weight, *at))
             for t, share in zip(times, each, strict=True):
-                at = here - _way(path, t + late)
+                at = here + displacement(path, -(t + late))
                 total = total + share * bilinear(soft, *at)
                 counted += share * (1.0 if weight is None else bilinear(soft_weight, *at))
             if weight is not None:
-                total = total / counted * (sharp + each.sum()) if counted > 0 else 0.0
+                if counted <= 0:
+                    total, counted, sharp = color[y, x], max(weight[y, x], 1e-30), 1 - each.sum()
+                total = total / counted * (sharp + each.sum())
             out[y, x] = total
     return out
 
 
-def _way(path, t):
-    """Displacement as taps see it: from where the content was to where it is at `t`."""
-    return -displacement(path, -t)
+def _instants(path, opens, closes):
+    """When the shutter opens and closes, and when between the two the path turns."""
+    velocity, curvature = (path[2:] - path[:2]) / 2, (path[2:] + path[:2]) / 2
+    turn = -0.5 * (velocity @ curvature) / max(curvature @ curvature, 1e-30)
+    return opens, min(max(turn, opens), closes), closes
 
 
 def gaussian(image):

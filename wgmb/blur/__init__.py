@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 
 class Method(Protocol):
-    """What a method is: a name, the inputs it needs, and how it is recorded."""
+    """What a method is: a name, the inputs it needs, and how it is recorded.
+
+    It may also have `samples`, its own default number of them.
+    """
 
     name: str
     """Also the stem of its Python file, its WGSL file and its twin in the tests."""

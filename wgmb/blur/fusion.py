@@ -53,6 +53,7 @@ class Fusion:
     name = "fusion"
     needs = frozenset({"color", "motion", "depth"})
     uses = frozenset({"normal"})
+    samples = 8
 
     def __init__(
         self,
@@ -139,15 +140,18 @@ class Fusion:
 def facing_of(camera: Reprojections | None, dtype: np.dtype) -> np.ndarray:
     """The Facing of wgsl/common/facing.wgsl."""
     data = np.zeros((), dtype)
+    data["planar"] = 0, 1, 1, 0
     if camera is None:
         return data
     here: Camera = camera.here
     if here.view_from_world is not None:
         view = np.asarray(here.view_from_world)
         data["right"][:3], data["up"][:3] = view[0, :3], view[1, :3]
-    if camera.depth_kind == "clip" and not here.orthographic:
-        # z after projection is a + b / depth, for z and w are of one line of points.
+    if camera.depth_kind == "clip":
         z, w = np.asarray(here.clip_from_world)[2:]
-        a = z[:3] @ w[:3] / (w[:3] @ w[:3])
-        data["planar"] = z[3] - a * w[3], -a
+        if here.orthographic:  # from the near plane, z = -1
+            data["planar"] = 1, 1, np.linalg.norm(z[:3]), 0
+        else:  # z after projection is a + b / depth
+            a = z[:3] @ w[:3] / (w[:3] @ w[:3])
+            data["planar"] = z[3] - a * w[3], 0, -a, 1
     return data

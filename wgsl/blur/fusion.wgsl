@@ -48,14 +48,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if PUBLISHED { open = vec2f(-0.5, 0.0); middle = 0.0; }
     let opening = displacement(path, open.x);
     let closing = displacement(path, open.y);
-    let between = displacement(path, 0.5 * (open.x + open.y));  // of a way there and back
-    let far = max(max(dot(opening, opening), dot(closing, closing)), dot(between, between));
-    let still = far < STILL * STILL;
+    let turn = displacement(path, turning(path, open.x, open.y));
+    let farthest = max(dot(turn, turn), max(dot(opening, opening), dot(closing, closing)));
+    let still = farthest < STILL * STILL;
     let count = select(frame.samples, 0u, still);
 
     var share = select(fusion.behind, fusion.front, faces_ahead(id.xy, path.velocity));
     if !PUBLISHED {
-        let streak = max(distance(opening, closing), 2.0 * distance(between, 0.5 * (opening + closing)));
+        let streak = max(distance(opening, closing), max(distance(opening, turn), distance(turn, closing)));
         let faded = share.y * max(0.0, 1.0 - streak / FADES);
         share += vec2f(faded, -faded);
     }
@@ -76,7 +76,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         each *= fusion.fading;
     }
     var all = share.x + share.y;
-    if still {      // to the bit
+    if still || (WEIGHTED && total <= 0.0) {    // its own colour, to the bit
         sum = textureLoad(color, id.xy, 0);
         if WEIGHTED { total = textureLoad(weight, id.xy, 0).x; }
         all = 1.0;

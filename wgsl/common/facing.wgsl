@@ -4,8 +4,7 @@
 struct Facing {
     right: vec4f,           // the camera's x axis in the world
     up: vec4f,              // its y axis
-    planar: vec2f,          // depth along the view axis = x / (z + y); x = 0: it is z itself
-    unused: vec2f,
+    planar: vec4f,          // depth along the view axis of a depth d: (x + y d) / (z + w d)
 }
 
 const SLOPE: f32 = 2e-5;    // share of depth a pixel under which a surface has no slope, only rounding
@@ -40,6 +39,7 @@ fn slope_along(facing: Facing, depth: texture_2d<f32>, px: vec2i, step: vec2i, z
 fn planar_depth(facing: Facing, depth: texture_2d<f32>, px: vec2i) -> f32 {
     if any(px < vec2i(0)) || any(px >= vec2i(textureDimensions(depth))) { return -1.0; }
     let z = textureLoad(depth, px, 0).x;
-    let there = select(z, facing.planar.x / (z + facing.planar.y), facing.planar.x != 0.0);
+    let to = facing.planar;
+    let there = (to.x + to.y * z) / (to.z + to.w * z);
     return select(-1.0, there, is_finite(there) && there > 0.0);
 }
