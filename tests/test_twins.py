@@ -1,5 +1,7 @@
 """Every kernel against its slow, obvious twin; the largest differences measured are 5e-5."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -179,6 +181,71 @@ def test_reproject_is_its_twin(size, neighbours):
     assert np.array_equal(np.rint(4 * share), count)
     wrong = (np.abs(got - want) > TOLERANCE).any(axis=2)
     assert wrong.mean() < 0.01
+
+
+def published_pair(size, speed=3.0):
+    """Two frames' colours, motions and depths, and the Frame of the second one."""
+    frames = [(*pictures(size, speed, seed), depths(size, seed)) for seed in (0, 1)]
+    prev = wgmb.Frame(frames[1][0], motion=frames[1][1], depth=frames[1][2])
+    color, motion, depth = frames[0]
+    return frames, wgmb.Frame(color, motion=motion, depth=depth, prev=prev)
+
+
+def agree(got, want, few=0.01):
+    """Samples that lie on the border of two pixels to a hair may go to either."""
+    assert np.isfinite(got).all()
+    assert (np.abs(got - want) > TOLERANCE).any(axis=2).mean() <= few
+
+
+@pytest.mark.parametrize("options", [{}, {"depth_test": True}, {"splat": "line"}])
+@pytest.mark.parametrize("size", [(24, 32), (17, 23), (1, 1), (3, 130)])
+def test_published_reprojection_along_vectors_is_its_twin(size, options):
+    frames, frame = published_pair(size)
+    movers = [
+        (color, reproject_twin.along(motion, depth, sign))
+        for sign, (color, motion, depth) in zip((-1, 1), frames, strict=True)
+    ]
+    flags = {"nearest": "depth_test" in options, "line": "splat" in options}
+    want, count = reproject_twin.published(frame.color, 4, movers, **flags)
+    blur = [
+        wgmb.Blur("reproject", form="published", samples=4, show=show, **options)
+        for show in ("color", "count")
+    ]
+    agree(blur[0](frame), want)
+    agree(blur[1](frame)[..., :1], count[..., None])
+
+
+@pytest.mark.parametrize("options", [{}, {"depth_test": True}, {"splat": "line"}, {"facing": True},
+                                     {"facing": True, "splat": "line"}])  # fmt: skip
+@pytest.mark.parametrize("normals", [True, False])
+def test_published_reprojection_by_cameras_is_its_twin(options, normals):
+    size = (20, 30)
+    rng = np.random.default_rng(5)
+    y, x = np.mgrid[: size[0], : size[1]]
+    way = [camera((0.9, 0.1, -0.3), 0.25, 0.02, 0.1), camera((0, 0, 0))]
+    kinds, frames, movers = [way[1], way[0]], [], []
+    for here, there in (kinds, kinds[::-1]):
+        color = rng.random((*size, 4)).astype("f4")
+        depth = (3 + np.sin(x / 3) + np.cos(y / 2) + 0.1 * rng.random(size)).astype("f4")
+        normal = rng.normal(size=(*size, 3)).astype("f4")
+        normal[0] = 0
+        around = Reprojections(here, there if here is way[1] else None,
+                               there if here is way[0] else None)  # fmt: skip
+        frames.append(wgmb.Frame(color, depth=depth, camera=around,
+                                 normal=normal if normals else None))  # fmt: skip
+        mover = reproject_twin.by_camera(depth, normal if normals else None, here, there,
+                                         "facing" in options)  # fmt: skip
+        movers.append((color, mover))
+    flags = {"nearest": "depth_test" in options, "line": "splat" in options}
+    want, count = reproject_twin.published(frames[0].color, 3, movers, **flags)
+    frame = replace(frames[0], prev=frames[1])
+    for show, twin in (("color", want), ("count", count[..., None])):
+        got = wgmb.Blur("reproject", form="published", samples=3, show=show, **options)(frame)
+        agree(got if show == "color" else got[..., :1], twin, 0.02)
+    if "facing" in options:
+        plain = {k: v for k, v in options.items() if k != "facing"}
+        free = wgmb.Blur("reproject", form="published", samples=3, show="count", **plain)(frame)
+        assert free[..., 0].mean() > count.mean() + 0.005
 
 
 def camera(position, yaw=0.0, pitch=0.0, roll=0.0, zoom=1.7, orthographic=False, bodies=None):

@@ -119,6 +119,10 @@ class InputOptions:
         )
 
 
+OWN = ("path", "form", "show", "facing", "depth_test", "splat", "weights", "alpha_front",
+       "alpha_back", "tau", "seed")  # fmt: skip
+
+
 @Parameter(name="*", group=_LOOK)
 @dataclass(frozen=True, kw_only=True)
 class BlurOptions:
@@ -142,6 +146,12 @@ class BlurOptions:
     "tap, fusion (shutter), reproject (slices): published is the paper's, without the shutter."
     show: Literal["color", "count"] | None = None
     "reproject: count shows how often a pixel was reached."
+    facing: bool = False
+    "reproject, published: leave out what faces away from the interpolated camera."
+    depth_test: bool = False
+    "reproject, published: only the nearest of the samples on a pixel."
+    splat: Literal["point", "line"] | None = None
+    "reproject, published: lines between the steps, or points."
     weights: Literal["normalised", "published"] | None = None
     "fusion: with the sum 1, or as printed."
     alpha_front: float | None = None
@@ -155,9 +165,10 @@ class BlurOptions:
 
     def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
         """The Blur these options describe; an option its method does not have is an error."""
-        own = ("path", "form", "show", "weights", "alpha_front", "alpha_back", "tau", "seed")
-        options = {name: getattr(self, name) for name in own}
-        given = {name: value for name, value in options.items() if value is not None}
+        own = {name: getattr(self, name) for name in OWN}
+        given = {
+            name: value for name, value in own.items() if value is not None and value is not False
+        }
         return Blur(
             self.method,
             shutter=shutter_,
