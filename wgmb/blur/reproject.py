@@ -74,7 +74,7 @@ class Reproject:
         self._device, self._output, self._show, self._form = device, output, show, form
         self._nearest, self._winner = Scratch(device), Scratch(device)
         self._means, self._counts = Scratch(device), Scratch(device)
-        self._carries, self._links = Scratch(device), Scratch(device)
+        self._carries, self._links, self._heads = (Scratch(device) for _ in range(3))
 
     def encode(self, encoder, inputs, output):
         """Record four passes a slice and source, or two for several steps."""
@@ -106,11 +106,11 @@ class Reproject:
         shift = inputs.jitter * (inputs.number * GOLDEN % 1 - 0.5)
         times = inputs.shutter.sample_times(inputs.samples, shift)
 
-        def run(entry: str, source: int, time: float, first: bool = False) -> None:
+        def run(entry: str, source: int, time: float) -> None:
             offset, color, motion, depth, weight = sources[source]
             data = np.zeros((), kernel.source.dtype("Slice"))
             data["time"], data["offset"], data["source"] = time, offset, source
-            data["first"] = first
+            data["last"] = source == len(sources) - 1
             kernel.run(
                 encoder,
                 entry,
@@ -125,8 +125,8 @@ class Reproject:
                 **shared,
             )
 
-        for i, time in enumerate(times):
-            run("clear", 0, time, first=i == 0)
+        run("clear", 0, 0.0)
+        for time in times:
             for entry in ("depths", "winners", "gather"):
                 for source in range(len(sources)):
                     run(entry, source, time)
@@ -162,13 +162,14 @@ class Reproject:
         most = 1 if self._depth_test else most
         shared = {
             "own": inputs.color,
-            "heads": self._nearest.at_least(4 * width * height),
+            "heads": self._heads.at_least(4 * width * height),
             "links": self._links.at_least(4 * most * width * height),
             "sums": self._means.at_least(16 * width * height),
             "carries": self._carries.at_least(16 * width * height),
             "counts": self._counts.at_least(4 * width * height),
             "output": output,
         }
+        encoder.clear_buffer(shared["heads"])
         create = self._device.create_buffer_with_data
 
         def run(entry: str, source, steps: np.ndarray, way, first: bool, last: bool) -> None:
@@ -224,4 +225,5 @@ class Reproject:
 
 def _eye(camera: Camera) -> np.ndarray:
     """A camera's place in the world, or the direction to it where it is orthographic."""
+    assert camera.view_from_world is not None
     return np.linalg.inv(camera.view_from_world)[:, 2 if camera.orthographic else 3]

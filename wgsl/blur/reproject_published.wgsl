@@ -29,7 +29,7 @@ struct Chunk {                  // steps of one source that are done together
 @group(1) @binding(5) var normal: texture_2d<f32>;      // of the source frame, in the world
 @group(1) @binding(6) var weight: texture_2d<f32>;      // of the source frame, 0: is not moved
 @group(1) @binding(7) var own: texture_2d<f32>;         // the frame itself, for pixels that nothing reached
-@group(1) @binding(8) var<storage, read_write> heads: array<atomic<u32>>;   // of a pixel's list: number + 1; 0 before and after
+@group(1) @binding(8) var<storage, read_write> heads: array<atomic<u32>>;   // of a pixel's list: number + 1; 0: empty, as a chunk finds and leaves it
 @group(1) @binding(9) var<storage, read_write> links: array<u32>;           // per sample and step: the next one + 1
 @group(1) @binding(10) var<storage, read_write> sums: array<atomic<u32>>;   // r, g, b, a per pixel, low words; of lines times UNIT
 @group(1) @binding(11) var<storage, read_write> carries: array<atomic<u32>>;    // the high words
