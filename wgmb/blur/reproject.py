@@ -158,7 +158,10 @@ class Reproject:
         )
         width, height = inputs.given.size
         bits = (width - 1).bit_length(), (width - 1).bit_length() + (height - 1).bit_length()
-        most = max(1, min(2 ** (32 - bits[1]) - 2, LINKS // (4 * width * height), inputs.samples))
+        rows = int(kernel.source.constant("ROWS"))
+        most = max(
+            1, min(rows - 1, 2 ** (32 - bits[1]) - 2, LINKS // (4 * width * height), inputs.samples)
+        )
         most = 1 if self._depth_test else most
         shared = {
             "own": inputs.color,
@@ -177,7 +180,7 @@ class Reproject:
             data = np.zeros((), kernel.source.dtype("Chunk"))
             data["bits"], data["steps"] = bits, max(len(steps) - 1, 0)
             data["first"], data["last"] = first, last
-            table = np.zeros(max(len(steps), 1), kernel.source.dtype("Step"))
+            table = np.zeros(rows, kernel.source.dtype("Step"))
             table["time"][: len(steps)] = steps
             if camera and way:
                 seen = replace(camera, here=way[0], prev=None, next=way[1])
@@ -193,7 +196,7 @@ class Reproject:
                 entry,
                 inputs.given,
                 chunk=create(label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM),
-                steps=create(label="steps", data=table, usage=wgpu.BufferUsage.STORAGE),
+                steps=create(label="steps", data=table, usage=wgpu.BufferUsage.UNIFORM),
                 color=color,
                 motion=motion,
                 depth=depth,

@@ -22,7 +22,7 @@ struct Chunk {                  // steps of one source that are done together
 }
 
 @group(1) @binding(0) var<uniform> chunk: Chunk;
-@group(1) @binding(1) var<storage, read> steps: array<Step>;
+@group(1) @binding(1) var<uniform> steps: array<Step, ROWS>;
 @group(1) @binding(2) var color: texture_2d<f32>;       // of the source frame
 @group(1) @binding(3) var motion: texture_2d<f32>;      // of the source frame: to_prev, to_next [px]
 @group(1) @binding(4) var depth: texture_2d<f32>;       // of the source frame
@@ -49,6 +49,7 @@ const STEPS_PER_UNIT: f32 = 16384.0;
 const LARGEST: f32 = 262143.0;      // colour beyond this, and below 0, is held to the range [linear]
 const UNIT: u32 = 1024u;            // what a sample counts that lies on one pixel for a whole step
 const MOST: u32 = 60000u;           // samples in one pixel's list: lavapipe ends loops soon after
+const ROWS: u32 = 17u;             // steps of a chunk, and one more where a line ends
 const LONGEST: f32 = 4000.0;        // line in one step [px]; beyond it, points have gaps
 
 /// Link every sample to the pixels that it is rounded to, one a step.
