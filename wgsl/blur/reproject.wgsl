@@ -113,17 +113,19 @@ fn splat(px: vec2u, decide: bool) {
     if WEIGHTED { if textureLoad(weight, px, 0).x <= 0.0 { return; } }
     let x = vec2f(px) + way(px);        // in pixels whose centres are integers
     if any(abs(x) > vec2f(1e6)) { return; }
-    let base = floor(x);
+    let base = vec2i(floor(x));
+    let size = vec2i(frame.size);
+    let behind = select(0u, NEIGHBOUR, slice.source > 0u);
     let number = (slice.source << SOURCE_BITS) | (px.y << ROW_BIT) | px.x;
     for (var i = 0u; i < 4u; i++) {
-        let to = vec2i(base) + vec2i(vec2u(i & 1u, i >> 1u));
-        if any(to < vec2i(0)) || any(to >= vec2i(frame.size)) { continue; }
+        let to = base + vec2i(vec2u(i & 1u, i >> 1u));
+        if any(to < vec2i(0)) || any(to >= size) { continue; }
         let off = abs(vec2f(to) - x);
         if off.x >= 1.0 || off.y >= 1.0 { continue; }
-        let at = index_of(vec2u(to));
+        let at = to.y * size.x + to.x;
         // Bits of positive floats are in their order; a neighbouring frame's come after all of the
         // frame's own: its samples fill what the frame itself does not show, and spoil nothing.
-        let key = bitcast<u32>(z * (1.0 + OFF_CENTRE * (off.x + off.y))) | select(0u, NEIGHBOUR, slice.source > 0u);
+        let key = bitcast<u32>(z * (1.0 + OFF_CENTRE * (off.x + off.y))) | behind;
         if !decide {
             atomicMin(&nearest[at], key);
         } else {

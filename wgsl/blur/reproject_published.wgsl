@@ -57,15 +57,16 @@ const LONGEST: f32 = 4000.0;        // line in one step [px]; beyond it, points 
 fn link(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let sample = sample_at(id.xy);
+    let size = vec2i(frame.size);
     let pixels = frame.size.x * frame.size.y;
+    let shift = chunk.bits.y;
     let index = id.y * frame.size.x + id.x;
     let number = 1u + (id.y << chunk.bits.x) + id.x;
     let count = select(0u, chunk.steps, sample.counts);
     for (var k = 0u; k < count; k++) {
         let to = vec2i(floor(vec2f(id.xy) + 0.5 + way(sample, k)));
-        if any(to < vec2i(0)) || any(to >= vec2i(frame.size)) || turned_away(sample, k) { continue; }
-        let at = u32(to.y) * frame.size.x + u32(to.x);
-        links[k * pixels + index] = atomicExchange(&heads[at], number + (k << chunk.bits.y));
+        if any(to < vec2i(0)) || any(to >= size) || turned_away(sample, k) { continue; }
+        links[k * pixels + index] = atomicExchange(&heads[to.y * size.x + to.x], number + (k << shift));
     }
 }
 
@@ -75,23 +76,24 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let at = id.y * frame.size.x + id.x;
     let pixels = frame.size.x * frame.size.y;
+    let row = frame.size.x;
+    let bits = chunk.bits;
     let mask = vec2u((1u << chunk.bits.x) - 1u, (1u << chunk.bits.y) - 1u);
     var low = vec4u(0u);
     var high = vec4u(0u);
     var count = 0u;
-    if chunk.first == 0u {
-        for (var c = 0u; c < 4u; c++) {
-            low[c] = atomicLoad(&sums[4u * at + c]);
-            high[c] = atomicLoad(&carries[4u * at + c]);
-        }
+    let before_first = select(4u, 0u, chunk.first == 1u);   // only loops not entered save time everywhere
+    for (var c = 0u; c < before_first; c++) {
+        low[c] = atomicLoad(&sums[4u * at + c]);
+        high[c] = atomicLoad(&carries[4u * at + c]);
         count = atomicLoad(&counts[at]);
     }
     var best = vec2u(0xffffffffu);      // bits of depth, number
     var next = atomicLoad(&heads[at]);
     for (var turn = 0u; next != 0u && turn < MOST; turn++) {
         let number = next - 1u;
-        let px = vec2u(number & mask.x, (number & mask.y) >> chunk.bits.x);
-        next = links[(number >> chunk.bits.y) * pixels + px.y * frame.size.x + px.x];
+        let px = vec2u(number & mask.x, (number & mask.y) >> bits.x);
+        next = links[(number >> bits.y) * pixels + px.y * row + px.x];
         if NEAREST_ONLY {
             let key = bitcast<u32>(depth_then(sample_at(px)));
             if key < best.x || (key == best.x && number < best.y) { best = vec2u(key, number); }
@@ -109,14 +111,13 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
         count += UNIT;
     }
     atomicStore(&heads[at], 0u);
-    if chunk.last == 0u {
-        for (var c = 0u; c < 4u; c++) {
-            atomicStore(&sums[4u * at + c], low[c]);
-            atomicStore(&carries[4u * at + c], high[c]);
-        }
+    let after_last = select(4u, 0u, chunk.last == 1u);
+    for (var c = 0u; c < after_last; c++) {
+        atomicStore(&sums[4u * at + c], low[c]);
+        atomicStore(&carries[4u * at + c], high[c]);
         atomicStore(&counts[at], count);
-        return;
     }
+    if after_last > 0u { return; }
     let share = f32(count) / f32(UNIT);
     var result = textureLoad(own, id.xy, 0);
     let whole = STEPS_PER_UNIT * select(1.0, f32(UNIT), LINES);
