@@ -245,7 +245,7 @@ def test_accumulate_approaches_distributed_until_its_antialiasing_is_what_is_lef
 
 def test_accumulate_is_the_mean_of_its_pictures():
     shutter = Shutter(360, "start", "triangle")
-    times = shutter.strata(5)[:, 0]
+    times = shutter.sample_times(5)
     each = [rendered(scenes.make("crossing"), (32, 18), Shutter(1e-4, float(t)), 1, "accumulate")
             for t in times]  # fmt: skip
     got = rendered(scenes.make("crossing"), (32, 18), shutter, 5, "accumulate")

@@ -59,8 +59,13 @@ def test_a_moving_camera_blurs_as_the_reference_does(name, tap, reproject):
 
 @pytest.mark.parametrize(
     "name, tap, reproject",
-    [("crossing", 33.8, 37.5), ("bounce", 34.9, 39.0), ("wheel", 32.4, 35.4), ("fence", 26.7, 31.4)],
-)  # fmt: skip
+    [
+        ("crossing", 33.8, 37.5),
+        ("bounce", 34.9, 39.0),
+        ("wheel", 32.4, 35.4),
+        ("fence", 26.7, 31.4),
+    ],
+)
 def test_moving_bodies_blur_as_the_reference_does(name, tap, reproject):
     """Measured PSNR [dB], less one; reproject is well above the sharp picture, and above tap."""
     truth = rendered(name, "distributed", 1024)

@@ -90,7 +90,7 @@ class Reprojections:
             raise InputError("clip_from_world has no inverse")
         if not self.far > 0:
             raise InputError(f"far must be over 0, got {self.far}")
-        self._world_from_pixel()  # refuses what is no camera
+        self.world_from_pixel()  # refuses what is no camera
 
     def matrices(self) -> np.ndarray:
         """(bodies, 2, 4, 4): clip position in the previous, the next frame from the pixel.
@@ -130,9 +130,9 @@ class Reprojections:
         moved = np.eye(4)
         if body is not None and body in there.bodies:
             moved = np.asarray(there.bodies[body]) @ np.linalg.inv(self.here.bodies[body])
-        return np.asarray(there.clip_from_world) @ moved @ self._world_from_pixel()
+        return np.asarray(there.clip_from_world) @ moved @ self.world_from_pixel()
 
-    def _world_from_pixel(self) -> np.ndarray:
+    def world_from_pixel(self) -> np.ndarray:
         """World position from (x d, y d, d, 1), or (x, y, d, 1) without perspective."""
         clip = np.asarray(self.here.clip_from_world, np.float64)
         if self.depth_kind == "clip":

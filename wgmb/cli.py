@@ -81,7 +81,7 @@ def blur(
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     clip = given.open(pattern, look.keep, look.scale)
     made = look.make(when.make(), adapter)
-    settings = _settings(look, when, given) | {"bits": output.bits}
+    settings = _settings(look, when, given) | {"samples": _samples(made), "bits": output.bits}
     files = Output(
         output.output,
         settings=settings,
@@ -137,6 +137,10 @@ def _progress(say: Console, frames: int, quiet: bool, doing: str = "blurring"):
             )
 
         yield tick
+
+
+def _samples(blur: Blur) -> int | str:
+    return "auto" if blur.auto else blur.samples
 
 
 def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, verbose: bool) -> int:
@@ -207,11 +211,11 @@ def render(
     fps = float(output.rate)
     moments = what.moments(fps)
     picture = scenes.make(scene, **what.settings())
-    renderer = Render(
-        picture, look.make(when.make(), adapter), size=size_of(what.size), fps=fps, rays=what.rays
-    )
+    made = look.make(when.make(), adapter)
+    renderer = Render(picture, made, size=size_of(what.size), fps=fps, rays=what.rays)
     settings = {"scene": scene, "sharp": sharp, "passes": passes, "bits": output.bits}
     settings |= _plain(look) | _plain(when) | _plain(what) | {"wgmb": __version__, "fps": fps}
+    settings["samples"] = _samples(made)
     files = Output(
         output.output,
         settings=settings,
@@ -295,7 +299,7 @@ def devices() -> int:
 def bench(
     *,
     method: str = "tap",
-    samples: int = 16,
+    samples: int | None = None,
     size: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     rounds: int = 9,
     adapter: str | None = None,
@@ -314,7 +318,7 @@ def bench(
     from . import bench as measure
 
     blur = Blur(method, samples=samples, device=adapter)
-    sys.stdout.write(f"{blur.device.adapter.summary}, {method}, {samples} samples\n")
+    sys.stdout.write(f"{blur.device.adapter.summary}, {method}, {blur.samples} samples\n")
     for text in size or ["1920x1080"]:
         width, height = size_of(text)
         found = measure.bench(blur, width, height, rounds)

@@ -86,6 +86,7 @@ class Render:
         return {
             "color": seen["color"].create_view(),
             "depth": seen["depth"].create_view(),
+            "normal": seen["normal"].create_view(),
             "object_id": seen["object"].create_view(),
             "camera": on_gpu.reprojections(offset),
         }

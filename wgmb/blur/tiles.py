@@ -33,6 +33,7 @@ class Tiles:
     name = "tiles"
     needs = frozenset({"color", "motion"})
     uses = frozenset({"depth"})
+    adaptive = True
 
     def __init__(self, device, *, output="rgba32float", form="even"):
         if form not in FORMS:
