@@ -143,8 +143,7 @@ def test_a_moving_disk_covers_what_it_passes(curve):
     assert_right(got, np.where(square > 0, leaves - enters, 0).mean(axis=2))
 
 
-@pytest.mark.parametrize("curve", ["box", "early"])
-@pytest.mark.parametrize("turn", [1.1, -0.6])
+@pytest.mark.parametrize("turn, curve", [(1.1, "early"), (-0.6, "box")])
 def test_a_rotating_bar_covers_what_it_sweeps(turn, curve):
     """`turn` in radians a frame, anticlockwise as seen by the camera."""
     shutter, length, width = Shutter(360, "start", CURVES[curve]), 27.0, 5.0
@@ -153,7 +152,7 @@ def test_a_rotating_bar_covers_what_it_sweeps(turn, curve):
         return translation(0, 0, -AWAY - THIN, t) @ rotation("z", 0.3 + turn * FPS * t, t)
 
     got = rendered(flat("box", (metres(length, 64), metres(width, 64)), path), SIZE, shutter)
-    x, y = places(SIZE, 16)
+    x, y = places(SIZE, 12)
     far, angle = np.hypot(x - 48, y - 32), np.arctan2(32 - y, x - 48)
     # It is seen from the bar at an angle of e to s from its axis, or -s to -e, at either end.
     s, e = np.arcsin(np.minimum(1, width / far)), np.arccos(np.minimum(1, length / far))
@@ -216,10 +215,10 @@ def test_a_seed_is_its_noise():
     assert abs((one - other).mean()) < 0.005
 
 
-@pytest.mark.parametrize("curve", ["box", "cosine", "early"])
+@pytest.mark.parametrize("curve", ["box", "early"])
 def test_accumulate_is_wrong_by_half_a_picture_at_most(curve):
     """At any place the share of N pictures is within 1 / 2 N of the share of the exposure."""
-    size, shutter = (96, 8), Shutter(360, "start", CURVES[curve])
+    size, shutter = (96, 4), Shutter(360, "start", CURVES[curve])
     want = edge_covers(shutter, size)
     for pictures in (16, 64, 256):
         got = rendered(edge(size), size, shutter, pictures, "accumulate", rays=4)
