@@ -12,6 +12,7 @@ import pytest
 
 import wgmb
 from wgmb import Body, InputError, Scene, Shot, Shutter, scenes
+from wgmb.render import Render
 from wgmb.scene import rotation, translation
 
 STILL = Shot(lambda t: (0 * t, 0 * t, 0 * t))
@@ -254,3 +255,9 @@ def test_accumulate_is_the_mean_of_its_pictures():
 def test_accumulate_cannot_roll():
     with pytest.raises(InputError, match="cannot roll"):
         rendered(edge(), (32, 18), Shutter(180, rolling="down"), 2, "accumulate")
+
+
+def test_every_frame_has_noise_of_its_own():
+    render = Render(scenes.make("crossing"), wgmb.Blur("distributed", samples=1), size=(32, 18))
+    assert np.array_equal(render(0.0, number=3), render(0.0, number=3))
+    assert np.abs(render(0.0, number=3) - render(0.0, number=4)).max() > 0.05

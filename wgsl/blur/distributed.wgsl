@@ -35,9 +35,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     textureStore(output, id.xy, vec4f(sum.rgb / sum.w, 1.0));
 }
 
-/// Three numbers in [0, 1) for a pixel and a seed (PCG3D: Jarzynski and Olano 2020).
+/// Three numbers in [0, 1) for a pixel, a frame and a seed (PCG3D: Jarzynski and Olano 2020).
 fn random3(px: vec2u) -> vec3f {
-    var v = vec3u(px, progress.seed) * 1664525u + 1013904223u;
+    var v = vec3u(px, progress.seed + 0x9E3779B1u * frame.index) * 1664525u + 1013904223u;
     v.x += v.y * v.z;
     v.y += v.z * v.x;
     v.z += v.x * v.y;
