@@ -77,7 +77,8 @@ def blur(
     quiet
         Print errors only.
     """
-    look, when, given = look or BlurOptions(), when or ShutterOptions(), given or InputOptions()
+    look, given = (look or BlurOptions()).settled(), given or InputOptions()
+    when = (when or ShutterOptions()).settled()
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     clip = given.open(pattern, look.keep, look.scale)
     made = look.make(when.make(), adapter)
@@ -178,7 +179,7 @@ def render(
 ) -> int:
     """Render a built-in scene with motion blur.
 
-    Scenes: translation, scaling, rotation, crossing, wheel, fence, bounce, hdr.
+    Scenes: translation, scaling, rotation, crossing, wheel, fence, bounce, hdr; torusphere.
 
     Example: wgmb render crossing -o crossing.png --method distributed --samples 256
 
@@ -198,13 +199,14 @@ def render(
         Print errors only.
     """
     what, look, when = what or SceneOptions(), look or BlurOptions(), when or ShutterOptions()
+    fps = float(output.rate)
+    picture = scenes.make(scene, **what.settings())
+    look, when = look.settled(picture), when.settled(picture, fps)
     if look.keep or look.scale:
         raise InputError("--keep and --scale are for files: wgmb render has no layers to name")
     if passes and not output.output.lower().endswith(".exr"):
         raise InputError(f"--passes need an .exr output, got {output.output}")
-    fps = float(output.rate)
     moments = what.moments(fps)
-    picture = scenes.make(scene, **what.settings())
     renderer = Render(
         picture, look.make(when.make(), adapter), size=size_of(what.size), fps=fps, rays=what.rays
     )

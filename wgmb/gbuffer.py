@@ -31,10 +31,14 @@ class SceneOnGpu:
         rays: int,
     ):
         """`time` of the frame [s]; `span` of interest around it [frame intervals]."""
-        self.device, self.scene, self.size, self.time, self.fps = device, scene, size, time, fps
+        self.device, self.size, self.time, self.fps = device, size, time, fps
+        self.shown = scene
+        self.scene = scene = scene.solid(time)
         n = len(scene.bodies)
         # Of one ray and its shadow: both sift, then meet, all bodies.
-        self.loops = 4 * n + n // 16 + 4
+        rings = sum(b.shape == "ring" for b in scene.bodies)
+        steps = int(shader.load("scene/trace.wgsl").constant("RING_STEPS"))
+        self.loops = 4 * n + n // 16 + 4 + 2 * rings * steps
         if self.loops * rays * rays > MOST_LOOPS:
             raise InputError(f"{n} bodies are too many for {rays} x {rays} rays")
         source = shader.load("scene/trace.wgsl")
@@ -51,7 +55,10 @@ class SceneOnGpu:
         data["first"], data["step"], data["rows"] = first, step, ROWS
         data["bodies"] = n
         shapes = [b.shape for b in scene.bodies]
-        data["spheres"], data["boxes"] = (shapes.count(s) for s in SHAPES[:2])
+        data["spheres"], data["boxes"], data["cylinders"] = map(shapes.count, SHAPES[:3])
+        self.constants = {"RINGS": "ring" in shapes, "STAGED": scene.stage is not None}
+        if scene.stage is not None:
+            scene.stage.fill(data["stage"])
         zoom = float(np.ravel(scene.shot.zoom(np.array([time])))[0])
         data["pixel"] = 2 / (zoom * size[1])
         data["rays"] = rays
@@ -72,7 +79,7 @@ class SceneOnGpu:
 
     def encode(self, encoder, given: gpu.Given, images: Images, name: str, time: float) -> dict:
         """Record the picture at `time` [frame intervals from this frame]; its textures."""
-        kernel = gpu.kernel(self.device, "gbuffer.wgsl")
+        kernel = gpu.kernel(self.device, "gbuffer.wgsl", None, **self.constants)
         view = np.zeros((), kernel.source.dtype("View"))
         view["time"] = time
         buffer = self.device.create_buffer_with_data(

@@ -55,10 +55,14 @@ class Render:
         """(height, width, 4) float32, linear: the frame whose instant is `time` [s]."""
         on_gpu, blur = self._on_gpu(time), self.blur
         output = self._images.texture("output", self.size, blur.output)
-        if "scene" in blur.method.needs:
+        if "progress" in blur.method.uses:
             self._in_steps(on_gpu, output.create_view(), number, progress)
             return self._images.download(blur.device.create_command_encoder(), output)
         encoder = blur.device.create_command_encoder(label="render")
+        if "scene" in blur.method.needs:
+            blur.encode(encoder, size=self.size, output=output.create_view(), scene=on_gpu,
+                        number=number)  # fmt: skip
+            return self._images.download(encoder, output)
         seen = {k: self._see(encoder, on_gpu, number, k) for k in self._offsets}
         gpu.submit(blur.device, encoder)
         encoder = blur.device.create_command_encoder(label="blur")

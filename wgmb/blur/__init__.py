@@ -8,6 +8,7 @@ from .accumulate import Accumulate
 from .distributed import Distributed
 from .reproject import Reproject
 from .tap import Tap
+from .volume import Volume
 
 if TYPE_CHECKING:
     import wgpu
@@ -23,7 +24,7 @@ class Method(Protocol):
     needs: frozenset[str]
     """Of "color", "motion", "depth", "scene"."""
     uses: frozenset[str]
-    """What it takes if it is there: "neighbours"."""
+    """What it takes if it is there: "neighbours"; "progress": samples bit by bit."""
 
     def encode(
         self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView
@@ -32,4 +33,4 @@ class Method(Protocol):
         ...
 
 
-METHODS: dict[str, type] = {m.name: m for m in (Tap, Reproject, Accumulate, Distributed)}
+METHODS: dict[str, type] = {m.name: m for m in (Tap, Reproject, Volume, Accumulate, Distributed)}
