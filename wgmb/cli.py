@@ -35,6 +35,7 @@ from .output import Output
 from .pipeline import Blur
 from .render import Render, render_frames
 from .run import Report, blur_sequence
+from .shutter import Shutter
 
 DONE, SOME_FAILED, USAGE, NO_DEVICE, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -302,6 +303,8 @@ def bench(
 ) -> int:
     """Time a method on this machine: median milliseconds a frame.
 
+    volume draws the torusphere (640x360: beside the article's own shader on two cores).
+
     Example: wgmb bench --size 1920x1080 3840x2160 --samples 16
 
     Parameters
@@ -313,10 +316,14 @@ def bench(
     """
     from . import bench as measure
 
-    blur = Blur(method, samples=samples, device=adapter)
+    shutter = Shutter(720, curve="cosine") if method == "volume" else 180
+    blur = Blur(method, samples=samples, device=adapter, shutter=shutter)
     sys.stdout.write(f"{blur.device.adapter.summary}, {method}, {samples} samples\n")
     for text in size or ["1920x1080"]:
         width, height = size_of(text)
+        if method == "volume":
+            _bench_volume(measure.bench_torusphere(blur, width, height, rounds), width, height)
+            continue
         found = measure.bench(blur, width, height, rounds)
         sys.stdout.write(f"{width} x {height}\n")
         for name, milliseconds in found.items():
@@ -325,6 +332,21 @@ def bench(
         if "numba" in found:
             sys.stdout.write(f"  gpu / numba{found['gpu'] / found['numba']:22.2f}\n")
     return DONE
+
+
+def _bench_volume(found: dict, width: int, height: int) -> None:
+    from .bench import ARTICLE
+
+    sys.stdout.write(f"{width} x {height}, torusphere, published density\n")
+    for time_, (frame, recording, work) in found.items():
+        line = f"  iTime {time_:<6g}{frame:9.2f} ms a frame, {recording:.2f} of them recording, "
+        line += f"{work:.2f} ms of all cores"
+        if (width, height) == (640, 360):
+            ratios = frame / ARTICLE[time_], work / 2 / ARTICLE[time_]
+            line += "; to the article's shader {:.2f}, as work of two free cores {:.2f}".format(
+                *ratios
+            )
+        sys.stdout.write(line + "\n")
 
 
 def main(arguments: list[str] | None = None) -> int:

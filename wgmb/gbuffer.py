@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import wgpu
 
@@ -41,31 +43,41 @@ class SceneOnGpu:
         self.loops = 4 * n + n // 16 + 4 + 2 * rings * steps
         if self.loops * rays * rays > MOST_LOOPS:
             raise InputError(f"{n} bodies are too many for {rays} x {rays} rays")
-        source = shader.load("scene/trace.wgsl")
-        if n > (most := source.constant("MOST_BODIES")):
+        if n > (most := shader.load("scene/trace.wgsl").constant("MOST_BODIES")):
             raise InputError(f"a scene has at most {most} bodies, got {n}")
-        first, last = span
+        self.rays, self.span = rays, span
+        self.constants = {"RINGS": rings > 0, "STAGED": scene.stage is not None}
+
+    @cached_property
+    def resources(self) -> dict[str, wgpu.GPUBuffer]:
+        """The buffers, made when the first kernel binds them."""
+        scene, size, time, source = (
+            self.scene,
+            self.size,
+            self.time,
+            shader.load("scene/trace.wgsl"),
+        )
+        first, last = self.span
         step = max((last - first) / (ROWS - 1), 1e-6)
-        times = time + (first + step * np.arange(ROWS)) / fps
+        times = time + (first + step * np.arange(ROWS)) / self.fps
         places = [body.world_from_body(times) for body in scene.bodies]
         data = np.zeros((), source.dtype("Scene"))
         sun = np.array(scene.sun[:3]) / np.linalg.norm(scene.sun[:3])
         data["sun"], data["sky"] = (*sun, scene.sun[3]), scene.sky
         data["horizon"] = (*scene.horizon, 0)
         data["first"], data["step"], data["rows"] = first, step, ROWS
-        data["bodies"] = n
+        data["bodies"] = len(scene.bodies)
         shapes = [b.shape for b in scene.bodies]
         data["spheres"], data["boxes"], data["cylinders"] = map(shapes.count, SHAPES[:3])
-        self.constants = {"RINGS": "ring" in shapes, "STAGED": scene.stage is not None}
         if scene.stage is not None:
             scene.stage.fill(data["stage"])
         zoom = float(np.ravel(scene.shot.zoom(np.array([time])))[0])
         data["pixel"] = 2 / (zoom * size[1])
-        data["rays"] = rays
+        data["rays"] = self.rays
         for bounds, place in zip(data["bounds"], places, strict=False):
             bounds["low"][:3], bounds["high"][:3] = _bounds(place)
-        buffer = device.create_buffer_with_data
-        self.resources = {
+        buffer = self.device.create_buffer_with_data
+        return {
             "scene": buffer(label="scene", data=data, usage=wgpu.BufferUsage.UNIFORM),
             "bodies": buffer(
                 label="bodies", data=_bodies(scene, source), usage=wgpu.BufferUsage.STORAGE

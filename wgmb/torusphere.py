@@ -106,7 +106,6 @@ def torusphere(cam_x: float = 0.0, cam_y: float = 0.0, density: str = "exact") -
         (),
         shot,
         volumes=instant,
-        stage=Stage(),
         density=density,
         exposure=(EXPOSURE, "cosine"),
     )

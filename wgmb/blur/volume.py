@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import wgpu
 
-from .. import gpu, scene
+from .. import gpu, scene, shader
 from ..errors import InputError
 from ..shader import Source
 from ..shutter import Shutter
@@ -16,6 +17,7 @@ CLOSED = ("box", "cosine")  # curves whose integral and periodic sum the shader 
 SLOWEST = 3e-5  # radians within the exposure; a slower body stands still
 MOST_TURNS = 4096  # within the exposure: beyond, a periodic sum is its mean to 1e-3
 TURN = 2 * math.pi
+CLOUD, SHADOW = 1, 2  # what can be in a tile
 
 
 class Volume:
@@ -52,33 +54,52 @@ class Volume:
         exact = on_gpu.shown.density == "exact"
         ways = [Way(v, shutter, on_gpu.fps, exact) for v in volumes]
         closed = shutter.curve in CLOSED
-        kernel = gpu.kernel(
-            self._device,
-            "blur/volume.wgsl",
-            {"Output": self._output},
-            CURVE=CLOSED.index(shutter.curve) if closed else len(CLOSED),
-            EXACT=exact,
-            MANY=any(way.many for way in ways),
-            ORBITS=sum(isinstance(v, scene.Orbit) for v in volumes),
-            TORI=sum(isinstance(v, scene.Torus) for v in volumes),
-            BLENDED=all(v.facing is not None for v in volumes),
-        )
-        if len(volumes) > (most := kernel.source.constant("MOST_VOLUMES")):
+        constants = {
+            "CURVE": CLOSED.index(shutter.curve) if closed else len(CLOSED),
+            "EXACT": exact,
+            "MANY": any(way.many for way in ways),
+            "ORBITS": sum(isinstance(v, scene.Orbit) for v in volumes),
+            "TORI": sum(isinstance(v, scene.Torus) for v in volumes),
+            "BLENDED": all(v.facing is not None for v in volumes),
+        }
+        source = shader.load("blur/volume.wgsl")
+        if len(volumes) > (most := source.constant("MOST_VOLUMES")):
             raise InputError(f"a scene has at most {most} volumes, got {len(volumes)}")
         create = self._device.create_buffer_with_data
-        data = _uniforms(kernel.source, on_gpu, stage, ways)
-        kernel.run(
-            encoder,
-            "main",
-            inputs.given,
-            scene=create(label="volumes", data=data, usage=wgpu.BufferUsage.UNIFORM),
-            tables=create(
+        data = _uniforms(source, on_gpu, stage, ways)
+        shared = {
+            "scene": create(label="volumes", data=data, usage=wgpu.BufferUsage.UNIFORM),
+            "tables": create(
                 label="tables",
-                data=tables(kernel.source, shutter, ways, closed),
+                data=tables(source, shutter, ways, closed),
                 usage=wgpu.BufferUsage.STORAGE,
             ),
-            output=output,
-        )
+            "output": output,
+        }
+        edges = int(source.constant("WG_X")), int(source.constant("WG_Y"))
+        kinds = tile_kinds(data, len(ways), on_gpu.size, edges)
+        row = int(source.constant("TILES_A_ROW"))
+        for kind in np.unique(kinds):
+            cloud, shadow = bool(kind & CLOUD), bool(kind & SHADOW)
+            kernel = gpu.kernel(
+                self._device,
+                "blur/volume.wgsl",
+                {"Output": self._output},
+                CLOUD=cloud,
+                SHADOW=shadow,
+                **(constants if cloud or shadow else {"ORBITS": 0, "TORI": 0}),
+            )
+            at = np.argwhere(kinds == kind)[:, ::-1].astype(np.uint32)
+            groups = min(len(at), row), -(-len(at) // row)
+            kernel.run(
+                encoder,
+                "main",
+                replace(inputs.given, size=(groups[0] * edges[0], groups[1] * edges[1])),
+                tiles=create(
+                    label="tiles", data=np.ascontiguousarray(at), usage=wgpu.BufferUsage.STORAGE
+                ),
+                **shared,
+            )
 
 
 class Way:
@@ -120,7 +141,7 @@ class Way:
             row["turn"] = c, -s, -way * s, -way * c
             row["small"], row["large"] = v.radius, v.orbit
             quick = 2 * speed * _smoothstep(30, 40, speed)
-            row["lead"] = 0.004 * (quick + (0.037 * quick) ** 3)
+            row["lead"] = math.cos(min(0.004 * (quick + (0.037 * quick) ** 3), math.pi))
             middle = middle + v.orbit * math.cos(half) * np.array([c, 0, -s])
             reach = v.orbit * math.sin(half) + v.radius
             slab = (0, 1, 0, v.radius)
@@ -153,6 +174,68 @@ def _uniforms(source: Source, on_gpu, stage: scene.Stage, ways: list[Way]) -> np
     for i, way in enumerate(ways):
         way.row(data["volumes"][i], i, source)
     return data
+
+
+def tile_kinds(
+    data: np.ndarray, count: int, size: tuple[int, int], edges: tuple[int, int]
+) -> np.ndarray:
+    """(rows, columns) of CLOUD and SHADOW: where the view, or light to the ground, meets a bound.
+
+    `data`: the shader's `Volumes`; `count` of them; `edges` of a tile [px]. Every ray of a tile is
+    within a cone around that through its middle, or starts in a circle on the ground.
+    """
+    rows, columns = (-(-n // edge) for n, edge in zip(size[::-1], edges[::-1], strict=True))
+    x = np.arange(columns + 1) * edges[0] / size[0] * 2 - 1
+    y = 1 - np.arange(rows + 1) * edges[1] / size[1] * 2
+    eye, right, up, forward = (data[n][:3].astype(float) for n in ("eye", "right", "up", "forward"))
+    corner = x[:, None] * right + y[:, None, None] * up + forward  # (rows + 1, columns + 1, 3)
+    middle = (corner[:-1, :-1] + corner[1:, 1:]) / 2
+    length = np.sqrt(_dot(middle, middle))
+    spread = np.linalg.norm(corner[0, 0] - corner[1, 1]) / 2 / length
+    bounds, slabs = (data["volumes"][n][:count].astype(float) for n in ("bound", "slab"))
+    seen = _meets(eye, middle / length[..., None], bounds, slabs, spread)
+    light, height = data["stage"]["light"][:3].astype(float), float(data["stage"]["tint"][3])
+    drop = height - eye[1]
+    down = corner[..., 1] * drop > 0
+    along = drop / np.where(down, corner[..., 1], 1)
+    ground = np.stack([eye[0] + along * corner[..., 0], eye[2] + along * corner[..., 2]], axis=-1)
+    four = np.stack([ground[:-1, :-1], ground[1:, :-1], ground[:-1, 1:], ground[1:, 1:]])
+    any_down, all_down = (
+        f([down[:-1, :-1], down[1:, :-1], down[:-1, 1:], down[1:, 1:]], axis=0)
+        for f in (np.any, np.all)
+    )
+    centre = four.mean(axis=0)
+    circle = np.hypot(*np.moveaxis(four - centre, -1, 0)).max(axis=0)
+    start = np.insert(centre, 1, height, axis=-1)
+    shaded = _meets(start, light, bounds, slabs, 0.0, circle) | ~all_down
+    return CLOUD * seen + SHADOW * (shaded & any_down)
+
+
+def _meets(origin, way, bounds, slabs, spread, wide=0.0) -> np.ndarray:
+    """Whether lines of unit direction, thickened, are in a bound's sphere and slab at once.
+
+    They are `wide` at their origin and spread by the tangent `spread`.
+    """
+    found = False
+    for bound, slab in zip(bounds, slabs, strict=True):
+        if not bound[3]:
+            continue
+        to = bound[:3] - origin
+        distance2, along = _dot(to, to), _dot(to, way)
+        thick = wide + spread * (np.sqrt(distance2) + bound[3])
+        root = (bound[3] + thick) ** 2 - (distance2 - along**2)
+        half = np.sqrt(np.maximum(root, 0))
+        rise, height = way @ slab[:3], to @ slab[:3]
+        rise = np.where(np.abs(rise) < 1e-9, 1e-9, rise)
+        edges = [(height + k * (slab[3] + thick)) / rise for k in (-1, 1)]
+        first = np.maximum(along - half, np.minimum(*edges))
+        last = np.minimum(along + half, np.maximum(*edges))
+        found = found | ((root > 0) & (first <= last) & (last > 0))
+    return np.broadcast_to(found, np.broadcast_shapes(np.shape(origin), np.shape(way))[:-1])
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("...i,...i", a, b)
 
 
 def tables(source: Source, shutter: Shutter, ways: list[Way], closed: bool) -> np.ndarray:

@@ -4,7 +4,13 @@
 //#include scene/stage.wgsl
 
 @group(1) @binding(1) var<uniform> scene: Volumes;
-@group(1) @binding(2) var output: Output;
+@group(1) @binding(2) var<storage, read> tiles: array<vec2u>;  // the workgroups' places in the picture
+@group(1) @binding(3) var output: Output;
+
+// A loop costs lavapipe one turn even where it has none, and branches save nothing: so it is told
+// beforehand which tiles a volume, or a shadow, can be in.
+override CLOUD: bool = true;
+override SHADOW: bool = true;
 
 override ORBITS: u32 = 1;           // volumes that are spheres on circles; they come first
 override TORI: u32 = 1;             // volumes that are tori
@@ -18,7 +24,7 @@ struct Volume {
     facing: f32,        // weight of its gradient
     small: f32,         // radius; of a torus the minor one
     large: f32,         // of the circle; of a torus the major radius
-    lead: f32,          // orbit: angle by which its normals run ahead; torus: thickness that they lose
+    lead: f32,          // orbit: cosine of the angle by which its normals run ahead; torus: thickness that they lose
     swell: f32,         // torus: its normals are those of one so much smaller
     turning: Turning,
     bound: vec4f,       // sphere that holds it throughout the exposure: centre, radius
@@ -37,11 +43,15 @@ struct Volumes {
 }
 
 const MOST_VOLUMES: u32 = 16u;
+const TILES_A_ROW: u32 = 1024u;     // of the dispatch: a dimension has 65,535 workgroups at most
 const STEPS: u32 = 40u;             // at most, a twentieth of the searched sphere's radius each
 const SHADED: u32 = 30u;            // at most
 const SHADOW_STEPS: u32 = 20u;      // at most, twice as long
 const FAINT: f32 = 0.002;           // density that is passed over
 const FULL: f32 = 0.95;             // coverage at which a ray ends
+
+// Registers, as far as loops over volumes are unrolled: uniforms are dear within loops.
+var<private> volumes: array<Volume, MOST_VOLUMES>;
 
 struct Span {           // of steps
     first: u32,
@@ -49,31 +59,39 @@ struct Span {           // of steps
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local: vec3u) {
+    let tile = group.y * TILES_A_ROW + group.x;
+    if tile >= arrayLength(&tiles) { return; }
+    let id = tiles[tile] * vec2u(WG_X, WG_Y) + local.xy;
+    if any(id >= frame.size) { return; }
+    for (var i = 0u; i < ORBITS + TORI; i++) { volumes[i] = scene.volumes[i]; }
     let size = vec2f(frame.size);
-    let x = (vec2f(id.xy) + 0.5) / size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
+    let x = (vec2f(id) + 0.5) / size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
     let ray = x.x * scene.right.xyz + x.y * scene.up.xyz + scene.forward.xyz;
     let direction = normalize(ray);
     let light = scene.stage.light.xyz;
     let eye = scene.eye.xyz;
     let strobe = 1.0 - scene.strobe.y
         * (sin(scene.strobe.x + PI * smoothstep(0.4, 0.6, (f32(id.x) + 0.5) / size.x)) + 1.0);
-    let noise = random2(id.xy);
+    let noise = random2(id);
 
     let drop = scene.stage.tint.w - eye.y;
     var color = scene.stage.tint.rgb;
     let down = ray.y * drop > 0.0;
     let at = on_ground(ray, drop);
-    let shadow = shadow_at(vec3f(at.x, scene.stage.tint.w, at.y), light, strobe, noise.y, down);
+    var shadow = 0.0;
+    if SHADOW { shadow = shadow_at(vec3f(at.x, scene.stage.tint.w, at.y), light, strobe, noise.y, down); }
     let to_right = on_ground(ray + scene.right.xyz * (2.0 / size.x), drop);
     let to_up = on_ground(ray + scene.up.xyz * (2.0 / size.y), drop);
     let width = max(max(abs(to_right - at), abs(to_up - at)), vec2f(1e-6));
     let ground = ground_color(scene.stage, at, width) * (1.0 - 0.7 * shadow);
     color = haze(scene.stage, select(color, ground, down), direction.y);
 
-    let seen = march(eye, direction, light, strobe, noise.x);
-    textureStore(output, id.xy, vec4f(linear_light(color * (1.0 - seen.a) + seen.rgb), 1.0));
+    if CLOUD {
+        let seen = march(eye, direction, light, strobe, noise.x);
+        color = color * (1.0 - seen.a) + seen.rgb;
+    }
+    textureStore(output, id, vec4f(linear_light(color), 1.0));
 }
 
 /// Where a ray meets the ground `drop` above the eye: x, z.
@@ -133,8 +151,8 @@ fn steps(start: vec3f, step: vec3f, most: u32, there: bool) -> Span {
     var near = 1e9;
     var far = -1e9;
     for (var i = 0u; i < ORBITS + TORI; i++) {
-        let bound = scene.volumes[i].bound;
-        let slab = scene.volumes[i].slab;
+        let bound = volumes[i].bound;
+        let slab = volumes[i].slab;
         let ball = in_sphere(start, step, bound);
         let slope = dot(slab.xyz, step);
         let over = 1.0 / select(slope, 1e-9, abs(slope) < 1e-9);
@@ -168,34 +186,34 @@ fn density(p: vec3f) -> vec4f {
     var sum = vec4f(0.0);
     for (var i = 0u; i < ORBITS; i++) {
         let d = orbit_density(i, p);
-        sum += d * vec4f(scene.volumes[i].color, 1.0);
+        sum += d * vec4f(volumes[i].color, 1.0);
     }
     for (var i = ORBITS; i < ORBITS + TORI; i++) {
         let d = torus_density(i, p);
-        sum += d * vec4f(scene.volumes[i].color, 1.0);
+        sum += d * vec4f(volumes[i].color, 1.0);
     }
     return sum;
 }
 
 fn orbit_density(i: u32, p: vec3f) -> f32 {
-    let q = p - scene.volumes[i].centre;
-    let turn = scene.volumes[i].turn;
+    let q = p - volumes[i].centre;
+    let turn = volumes[i].turn;
     let x = turn.x * q.x + turn.y * q.z;
     let y = turn.z * q.x + turn.w * q.z;
-    let radius = scene.volumes[i].small;
+    let radius = volumes[i].small;
     let section = radius * radius - q.y * q.y;
-    let h = disk_half_angle(sqrt(x * x + y * y), sqrt(max(section, 0.0)), scene.volumes[i].large);
-    let d = presence(angle(x, y), h, scene.volumes[i].turning);
-    return select(0.0, scene.volumes[i].opacity * d, section > 0.0);
+    let h = disk_half_angle(sqrt(x * x + y * y), sqrt(max(section, 0.0)), volumes[i].large);
+    let d = presence(angle(x, y), h, volumes[i].turning);
+    return select(0.0, volumes[i].opacity * d, section > 0.0);
 }
 
 fn torus_density(i: u32, p: vec3f) -> f32 {
-    let q = p - scene.volumes[i].centre;
-    let turn = scene.volumes[i].turn;
+    let q = p - volumes[i].centre;
+    let turn = volumes[i].turn;
     let x = turn.x * q.x + turn.y * q.y;
     let y = turn.z * q.x + turn.w * q.y;
-    let turning = scene.volumes[i].turning;
-    let h = spiric_half_angle(sqrt(x * x + y * y), q.z, scene.volumes[i].small, scene.volumes[i].large);
+    let turning = volumes[i].turning;
+    let h = spiric_half_angle(sqrt(x * x + y * y), q.z, volumes[i].small, volumes[i].large);
     let theta = angle(x, y);
     let opposite = theta + select(PI, -PI, theta >= 0.0);
     var d = 0.0;
@@ -206,19 +224,19 @@ fn torus_density(i: u32, p: vec3f) -> f32 {
         d = min(crossing(theta, h, turning.rate) + crossing(opposite, h, turning.rate), 1.0);
         d = select(d, 1.0, h >= 0.5 * PI);
     }
-    return scene.volumes[i].opacity * d;
+    return volumes[i].opacity * d;
 }
 
 /// There is no such thing as a motion-blurred normal: gradients of pseudo distances, mixed.
 fn normal(p: vec3f) -> vec3f {
     var sum = vec3f(0.0);
     for (var i = 0u; i < ORBITS; i++) {
-        var weight = scene.volumes[i].facing;
+        var weight = volumes[i].facing;
         if !BLENDED { weight *= orbit_density(i, p); }
         sum += weight * orbit_gradient(i, p);
     }
     for (var i = ORBITS; i < ORBITS + TORI; i++) {
-        var weight = scene.volumes[i].facing;
+        var weight = volumes[i].facing;
         if !BLENDED { weight *= torus_density(i, p); }
         sum += weight * torus_gradient(i, p);
     }
@@ -227,19 +245,20 @@ fn normal(p: vec3f) -> vec3f {
 
 /// Of the distance to the standing sphere from where a place less than `lead` ahead or behind is drawn to it.
 fn orbit_gradient(i: u32, p: vec3f) -> vec3f {
-    let q = p - scene.volumes[i].centre;
-    let turn = scene.volumes[i].turn;
+    let q = p - volumes[i].centre;
+    let turn = volumes[i].turn;
     let x = turn.x * q.x + turn.y * q.z;
     let y = turn.z * q.x + turn.w * q.z;
     let side = select(1.0, -1.0, y < 0.0);
     let r = max(sqrt(x * x + y * y), 1e-9);
-    let lead = scene.volumes[i].lead;
+    let lead = volumes[i].lead;
+    let lead_sine = sqrt(1.0 - lead * lead);
     let c = x / r;
     let s = abs(y) / r;
-    let ahead = lead >= PI || c > cos(lead);
-    let cosine = select(c * cos(lead) + s * sin(lead), 1.0, ahead);
-    let sine = select(s * cos(lead) - c * sin(lead), 0.0, ahead);
-    let large = scene.volumes[i].large;
+    let ahead = c >= lead;
+    let cosine = select(c * lead + s * lead_sine, 1.0, ahead);
+    let sine = select(s * lead - c * lead_sine, 0.0, ahead);
+    let large = volumes[i].large;
     let out = r - large * cosine;       // along the radius; across it: large * sine
     let round = large * sine;
     let gx = out * c - round * s;
@@ -250,20 +269,20 @@ fn orbit_gradient(i: u32, p: vec3f) -> vec3f {
 
 /// Of the smooth maximum of a thinned standing torus and a shell around its turning ring.
 fn torus_gradient(i: u32, p: vec3f) -> vec3f {
-    let swell = scene.volumes[i].swell;
-    let q = swell * (p - scene.volumes[i].centre);
-    let turn = scene.volumes[i].turn;
+    let swell = volumes[i].swell;
+    let q = swell * (p - volumes[i].centre);
+    let turn = volumes[i].turn;
     let x = turn.x * q.x + turn.y * q.y;
     let y = turn.z * q.x + turn.w * q.y;
-    let minor = scene.volumes[i].small;
-    let major = scene.volumes[i].large;
+    let minor = volumes[i].small;
+    let major = volumes[i].large;
     let wide = max(sqrt(x * x + q.z * q.z), 1e-9);
     let out = wide - major;
     let across = max(sqrt(out * out + y * y), 1e-9);
     let far = max(sqrt(dot(q, q)), 1e-9);
     let torus = across - minor;
     let shell = abs(far - major) - 0.3 * minor;
-    let a = scene.volumes[i].lead - torus;
+    let a = volumes[i].lead - torus;
     let b = 0.1 - shell;
     let h = 0.5 * max(0.1 - abs(a - b), 0.0) / 0.1;
     let share = select(h, 1.0 - h, a < b);
