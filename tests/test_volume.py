@@ -12,6 +12,7 @@ import wgmb
 from twins import volume as twin
 from wgmb import InputError, Scene, Shutter, gpu, scenes, shader, stills
 from wgmb.blur import volume as method_file
+from wgmb.density import overrides, tables
 from wgmb.scene import Orbit, Stage, Torus
 
 CURVES = ["box", "trapezoid", "triangle", "cosine", "gaussian"]
@@ -85,21 +86,21 @@ def densities(device):
     source = shader.Source(text, source.files)
 
     def found(volume, p, shutter, fps, density="exact"):
-        way = method_file.Way(volume, shutter, fps, density == "exact")
-        closed = shutter.curve in method_file.CLOSED
+        way = method_file.way_of(volume, shutter, fps, density == "exact")
         kernel = gpu.Kernel(
             device,
             source,
             {
-                "CURVE": method_file.CLOSED.index(shutter.curve) if closed else 2,
+                **overrides(shutter, [way]),
                 "EXACT": density == "exact",
-                "MANY": way.many,
                 "ORBITS": isinstance(volume, Orbit),
                 "TORI": isinstance(volume, Torus),
             },
         )
         uniforms = np.zeros((), source.dtype("Volumes"))
-        way.row(uniforms["volumes"][0], 0, source)
+        row = uniforms["volumes"][0]
+        method_file.volume_row(row, volume, way, sum(shutter.span) / 2 / fps)
+        way.fill(row["turning"], 0)
         at = np.zeros((len(p), 4), "f4")
         at[:, :3] = p
         create = device.create_buffer_with_data
@@ -113,9 +114,7 @@ def densities(device):
             given,
             points=buffer,
             scene=create(data=uniforms, usage=usage.UNIFORM),
-            tables=create(
-                data=method_file.tables(source, shutter, [way], closed), usage=usage.STORAGE
-            ),
+            tables=create(data=tables(shutter, [way]), usage=usage.STORAGE),
         )
         gpu.submit(device, encoder)
         return np.asarray(device.queue.read_buffer(buffer)).view("<f4").reshape(-1, 4)[:, 3]

@@ -95,7 +95,7 @@ def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, flo
 
 def bench_torusphere(
     blur: Blur, width: int, height: int, rounds: int = 9
-) -> dict[float, tuple[float, float, float]]:
+) -> dict[float, tuple[float, ...]]:
     """By iTime [s]: milliseconds a frame, of those recording it, and of all cores' work.
 
     Published density, the shutter that the scene is made for. Medians; all times take turns.

@@ -51,6 +51,8 @@ class SceneOnGpu:
     @cached_property
     def resources(self) -> dict[str, wgpu.GPUBuffer]:
         """The buffers, made when the first kernel binds them."""
+        if self.scene.figure is not None:
+            raise InputError(f"scene {self.scene.name!r} is flat: only method 'volume' draws it")
         scene, size, time, source = (
             self.scene,
             self.size,

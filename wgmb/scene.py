@@ -11,10 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .errors import InputError
+
+if TYPE_CHECKING:
+    from .figures import Figure
 
 Color = tuple[float, float, float]
 Place = Callable[[np.ndarray], np.ndarray]  # times (n,) -> world_from_body (n, 4, 4)
@@ -291,6 +295,8 @@ class Scene:
     density: str = "exact"
     exposure: tuple[float, str] | None = None
     """The shutter it is made for: seconds, curve."""
+    figure: Figure | None = None
+    """A flat picture instead, for the method "volume"."""
 
     def __post_init__(self):
         for body in self.bodies:
@@ -308,7 +314,7 @@ class Scene:
     @property
     def has_volumes(self) -> bool:
         """Whether the method "volume" has anything to show."""
-        return bool(self.volumes)
+        return bool(self.volumes) or self.figure is not None
 
     def instant(self, time: float) -> Instant:
         """Its volumes and their stage around `time` [s]; phases are the angles at it."""

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .errors import InputError
+from .figures import cone, disk, spiric
 from .scene import Body, Scene, Shot, at, moving, rotation, translation
 from .torusphere import torusphere
 
@@ -283,6 +284,9 @@ SCENES: dict[str, Callable[..., Scene]] = {
     "bounce": bounce,
     "hdr": hdr,
     "torusphere": torusphere,
+    "disk": disk,
+    "cone": cone,
+    "spiric": spiric,
 }
 
 

@@ -9,14 +9,11 @@ import numpy as np
 import wgpu
 
 from .. import gpu, scene, shader
+from ..density import TURN, Way, overrides, tables
 from ..errors import InputError
-from ..shader import Source
+from ..figures import RATE
 from ..shutter import Shutter
 
-CLOSED = ("box", "cosine")  # curves whose integral and periodic sum the shader has in closed form
-SLOWEST = 3e-5  # radians within the exposure; a slower body stands still
-MOST_TURNS = 4096  # within the exposure: beyond, a periodic sum is its mean to 1e-3
-TURN = 2 * math.pi
 CLOUD, SHADOW = 1, 2  # what can be in a tile
 
 
@@ -40,24 +37,30 @@ class Volume:
         self._device, self._output = device, output
 
     def encode(self, encoder, inputs, output):
-        """Record the one pass."""
+        """Record a pass for every kind of tile."""
         on_gpu, shutter = inputs.scene, inputs.shutter
-        if not on_gpu.shown.has_volumes:
-            raise InputError(f"method 'volume' needs volumes, scene {on_gpu.shown.name!r} has none")
-        if on_gpu.shown.bodies:
+        shown = on_gpu.shown
+        if not shown.has_volumes:
+            raise InputError(f"method 'volume' needs volumes, scene {shown.name!r} has none")
+        if shown.bodies:
             raise InputError("method 'volume' shows volumes only, the scene has rigid bodies too")
         if shutter.rolling:
             raise InputError("volume exposes whole pictures: it cannot roll the shutter")
+        if shown.figure is not None:
+            self._figure(encoder, inputs, shown.figure, output)
+        else:
+            self._volumes(encoder, inputs, output)
+
+    def _volumes(self, encoder, inputs, output):
+        on_gpu, shutter = inputs.scene, inputs.shutter
         volumes, stage = on_gpu.shown.instant(on_gpu.time)
         volumes = [v for v in volumes if v.opacity or v.facing]
         volumes.sort(key=lambda v: isinstance(v, scene.Torus))
         exact = on_gpu.shown.density == "exact"
-        ways = [Way(v, shutter, on_gpu.fps, exact) for v in volumes]
-        closed = shutter.curve in CLOSED
+        ways = [way_of(v, shutter, on_gpu.fps, exact) for v in volumes]
         constants = {
-            "CURVE": CLOSED.index(shutter.curve) if closed else len(CLOSED),
+            **overrides(shutter, ways),
             "EXACT": exact,
-            "MANY": any(way.many for way in ways),
             "ORBITS": sum(isinstance(v, scene.Orbit) for v in volumes),
             "TORI": sum(isinstance(v, scene.Torus) for v in volumes),
             "BLENDED": all(v.facing is not None for v in volumes),
@@ -65,15 +68,10 @@ class Volume:
         source = shader.load("blur/volume.wgsl")
         if len(volumes) > (most := source.constant("MOST_VOLUMES")):
             raise InputError(f"a scene has at most {most} volumes, got {len(volumes)}")
-        create = self._device.create_buffer_with_data
-        data = _uniforms(source, on_gpu, stage, ways)
+        data = _uniforms(on_gpu, shutter, stage, volumes, ways)
         shared = {
-            "scene": create(label="volumes", data=data, usage=wgpu.BufferUsage.UNIFORM),
-            "tables": create(
-                label="tables",
-                data=tables(source, shutter, ways, closed),
-                usage=wgpu.BufferUsage.STORAGE,
-            ),
+            "scene": self._uniform("volumes", data),
+            "tables": self._storage("tables", tables(shutter, ways)),
             "output": output,
         }
         edges = int(source.constant("WG_X")), int(source.constant("WG_Y"))
@@ -95,64 +93,73 @@ class Volume:
                 encoder,
                 "main",
                 replace(inputs.given, size=(groups[0] * edges[0], groups[1] * edges[1])),
-                tiles=create(
-                    label="tiles", data=np.ascontiguousarray(at), usage=wgpu.BufferUsage.STORAGE
-                ),
+                tiles=self._storage("tiles", np.ascontiguousarray(at)),
                 **shared,
             )
 
-
-class Way:
-    """A volume's turning within the exposure.
-
-    `swept`: radians; `angle`: in the middle; `turns`: what repeats, within the exposure.
-    """
-
-    def __init__(self, volume: scene.Volume, shutter: Shutter, fps: float, exact: bool):
+    def _figure(self, encoder, inputs, figure, output):
+        source = shader.load("figure.wgsl")
+        shutter, fps = inputs.shutter, inputs.scene.fps
+        if figure.shutter is not None:
+            shutter, fps = figure.shutter, RATE
         opens, closes = shutter.span
-        self.volume = volume
-        self.seconds = (closes - opens) / fps
-        self.swept = abs(volume.speed) * self.seconds
-        self.angle = math.fmod(volume.phase + volume.speed * (opens + closes) / 2 / fps, TURN)
-        # A torus is itself again after half a turn; the published form does not use that.
-        often = 2 if exact and isinstance(volume, scene.Torus) else 1
-        self.turns = often * self.swept / TURN
-        self.rate = 1 / max(often * self.swept, SLOWEST)
+        often = 2 if figure.kind == "SPIRIC" else 1  # a torus is itself again after half a turn
+        way = Way(figure.speed * (closes - opens) / fps, often)
+        data = np.zeros((), source.dtype("Figure"))
+        figure.fill(data, inputs.scene.time + (opens + closes) / 2 / fps)
+        way.fill(data["turning"], 0)
+        kernel = gpu.kernel(
+            self._device,
+            "figure.wgsl",
+            {"Output": self._output},
+            **overrides(shutter, [way]),
+            KIND=source.constant(figure.kind),
+            SHARP=closes == opens,
+        )
+        kernel.run(
+            encoder,
+            "main",
+            inputs.given,
+            figure=self._uniform("figure", data),
+            tables=self._storage("tables", tables(shutter, [way])),
+            output=output,
+        )
 
-    @property
-    def many(self) -> bool:
-        """Whether the closed form of all revolutions holds."""
-        return self.turns > 1.5
+    def _uniform(self, label: str, data: np.ndarray) -> wgpu.GPUBuffer:
+        usage = wgpu.BufferUsage.UNIFORM
+        return self._device.create_buffer_with_data(label=label, data=data, usage=usage)
 
-    def row(self, row: np.ndarray, index: int, source: Source) -> None:
-        """Fill one `Volume` of the shader."""
-        v, c, s = self.volume, math.cos(self.angle), math.sin(self.angle)
-        way = -1 if v.speed < 0 else 1
-        speed = 30 * self.swept  # at the exposure that the pseudo distances were made for
-        row["centre"], row["color"], row["opacity"] = v.centre, v.color, v.opacity
-        row["facing"] = 1 if v.facing is None else v.facing
-        turning = row["turning"]
-        turning["rate"], turning["turns"] = self.rate, self.turns
-        turning["half"] = self.turns / 2 % 1
-        turning["sum"] = (index + 1) * (source.constant("SHARES") + 1)
-        half = min(self.swept / 2, math.pi / 2)
-        middle, reach = np.array(v.centre), v.reach
-        if isinstance(v, scene.Orbit):
-            row["turn"] = c, -s, -way * s, -way * c
-            row["small"], row["large"] = v.radius, v.orbit
-            quick = 2 * speed * _smoothstep(30, 40, speed)
-            row["lead"] = math.cos(min(0.004 * (quick + (0.037 * quick) ** 3), math.pi))
-            middle = middle + v.orbit * math.cos(half) * np.array([c, 0, -s])
-            reach = v.orbit * math.sin(half) + v.radius
-            slab = (0, 1, 0, v.radius)
-        else:
-            row["turn"] = c, s, -way * s, way * c
-            row["small"], row["large"] = v.minor_radius, v.major_radius
-            row["lead"], row["swell"] = 0.001 * speed, v.swell
-            slab = (-s, c, 0, v.minor_radius + v.major_radius * math.sin(half))
-        margin = 1e-5 * v.reach
-        row["bound"] = (*middle, reach + margin if v.opacity else 0)
-        row["slab"] = (*slab[:3], slab[3] + margin)
+    def _storage(self, label: str, data: np.ndarray) -> wgpu.GPUBuffer:
+        usage = wgpu.BufferUsage.STORAGE
+        return self._device.create_buffer_with_data(label=label, data=data, usage=usage)
+
+
+def volume_row(row: np.ndarray, v: scene.Volume, way: Way, middle_of: float) -> None:
+    """Fill a `Volume` of the shader, all but `turning`; `middle_of` the exposure [s]."""
+    angle, swept = math.fmod(v.phase + v.speed * middle_of, TURN), way.swept
+    c, s = math.cos(angle), math.sin(angle)
+    side = -1 if v.speed < 0 else 1
+    speed = 30 * swept  # at the exposure that the pseudo distances were made for
+    row["centre"], row["color"], row["opacity"] = v.centre, v.color, v.opacity
+    row["facing"] = 1 if v.facing is None else v.facing
+    half = min(swept / 2, math.pi / 2)
+    middle, reach = np.array(v.centre), v.reach
+    if isinstance(v, scene.Orbit):
+        row["turn"] = c, -s, -side * s, -side * c
+        row["small"], row["large"] = v.radius, v.orbit
+        quick = 2 * speed * _smoothstep(30, 40, speed)
+        row["lead"] = math.cos(min(0.004 * (quick + (0.037 * quick) ** 3), math.pi))
+        middle = middle + v.orbit * math.cos(half) * np.array([c, 0, -s])
+        reach = v.orbit * math.sin(half) + v.radius
+        slab = (0, 1, 0, v.radius)
+    else:
+        row["turn"] = c, s, -side * s, side * c
+        row["small"], row["large"] = v.minor_radius, v.major_radius
+        row["lead"], row["swell"] = 0.001 * speed, v.swell
+        slab = (-s, c, 0, v.minor_radius + v.major_radius * math.sin(half))
+    margin = 1e-5 * v.reach
+    row["bound"] = (*middle, reach + margin if v.opacity else 0)
+    row["slab"] = (*slab[:3], slab[3] + margin)
 
 
 def _smoothstep(a: float, b: float, x: float) -> float:
@@ -160,19 +167,31 @@ def _smoothstep(a: float, b: float, x: float) -> float:
     return u * u * (3 - 2 * u)
 
 
-def _uniforms(source: Source, on_gpu, stage: scene.Stage, ways: list[Way]) -> np.ndarray:
+def way_of(volume: scene.Volume, shutter: Shutter, fps: float, exact: bool) -> Way:
+    """How far it turns; a torus is itself again after half a turn, which "published" ignores."""
+    opens, closes = shutter.span
+    often = 2 if exact and isinstance(volume, scene.Torus) else 1
+    return Way(abs(volume.speed) * (closes - opens) / fps, often)
+
+
+def _uniforms(
+    on_gpu, shutter: Shutter, stage: scene.Stage, volumes: list[scene.Volume], ways: list[Way]
+) -> np.ndarray:
+    source = shader.load("blur/volume.wgsl")
     data = np.zeros((), source.dtype("Volumes"))
     width, height = on_gpu.size
     camera = on_gpu.shown.shot.world_from_camera(on_gpu.time)[0]
     zoom = float(np.ravel(on_gpu.shown.shot.zoom(np.array([on_gpu.time])))[0])
-    bound = stage.bound or max(math.dist((0, 0, 0), w.volume.centre) + w.volume.reach for w in ways)
+    bound = stage.bound or max(math.dist((0, 0, 0), v.centre) + v.reach for v in volumes)
     data["eye"] = (*camera[:3, 3], bound)
     data["right"][:3] = camera[:3, 0] * width / height / zoom
     data["up"][:3], data["forward"][:3] = camera[:3, 1] / zoom, -camera[:3, 2]
     data["strobe"], data["grain"] = stage.strobe, stage.grain
     stage.fill(data["stage"])
-    for i, way in enumerate(ways):
-        way.row(data["volumes"][i], i, source)
+    middle_of = sum(shutter.span) / 2 / on_gpu.fps
+    for i, (row, volume, way) in enumerate(zip(data["volumes"], volumes, ways, strict=False)):
+        volume_row(row, volume, way, middle_of)
+        way.fill(row["turning"], i)
     return data
 
 
@@ -236,32 +255,3 @@ def _meets(origin, way, bounds, slabs, spread, wide=0.0) -> np.ndarray:
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("...i,...i", a, b)
-
-
-def tables(source: Source, shutter: Shutter, ways: list[Way], closed: bool) -> np.ndarray:
-    """The shutter's integral, and for each fast volume its periodic sum less the mean."""
-    if closed:
-        return np.zeros(1, np.float32)
-    shares = int(source.constant("SHARES"))
-    _, integral = shutter.integral(shares)
-    rows = [integral]
-    for way in ways:
-        rows.append(periodic_sum(integral, way.turns) if way.many else np.zeros(shares + 1))
-    return np.concatenate(rows).astype(np.float32)
-
-
-def periodic_sum(integral: np.ndarray, turns: float) -> np.ndarray:
-    """Sum over k of S((edge + 2 pi k) / speed), less its mean and trend, at edges 0 to 2 pi.
-
-    `integral`: S at equal shares of the exposure; `turns`: revolutions within it.
-    """
-    steps = len(integral) - 1
-    if turns > MOST_TURNS:
-        return np.zeros(steps + 1)
-    edges = np.linspace(0, 1, steps + 1)  # turns
-    reach = math.ceil(turns / 2) + 1
-    shares = np.linspace(0, 1, steps + 1)
-    total = np.zeros(steps + 1)
-    for k in range(-reach, reach + 1):
-        total += np.interp((edges + k) / turns + 0.5, shares, integral)
-    return total - edges - (reach + 0.5)
