@@ -9,17 +9,22 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import wgpu
 
-from . import gpu
+from . import gpu, scenes
 from .errors import InputError
 from .frame import Frame
 from .images import Images
 from .pipeline import Blur
+from .render import Render
 from .timing import Timing
 
+# Milliseconds by iTime [s] of the article's own fragment shader of the torusphere, 640 x 360,
+# software OpenGL (Mesa 22.3) on two cores; another machine's figures are another matter.
+ARTICLE = {31.0: 13.7, 20.5: 20.2, 16.0: 22.7, 12.0: 24.9, 7.5: 27.7, 0.0: 35.0}
 MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
 
 
@@ -86,6 +91,38 @@ def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, flo
         jobs["numba"] = peer
     seconds = alternate(jobs, rounds)
     return {k: 1e3 * statistics.median(v) for k, v in (seconds | passes).items()}
+
+
+def bench_torusphere(
+    blur: Blur, width: int, height: int, rounds: int = 9
+) -> dict[float, tuple[float, ...]]:
+    """By iTime [s]: milliseconds a frame, of those recording it, and of all cores' work.
+
+    Published density, the shutter that the scene is made for. Medians; all times take turns.
+    """
+    device = blur.device
+    token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
+    scene = scenes.make("torusphere", density="published")
+    render = Render(scene, blur, size=(width, height), fps=60)
+    output = Images(device).texture("output", (width, height), blur.output)
+    work: dict[float, list[float]] = {t: [] for t in ARTICLE}
+    recording: dict[float, list[float]] = {t: [] for t in ARTICLE}
+
+    def frame(t: float) -> None:
+        cores, started = time.process_time(), time.perf_counter()
+        on_gpu = render.on_gpu(t)
+        encoder = device.create_command_encoder()
+        blur.encode(encoder, size=render.size, output=output.create_view(), scene=on_gpu)
+        recording[t].append(time.perf_counter() - started)
+        gpu.submit(device, encoder)
+        device.queue.read_buffer(token)
+        work[t].append(time.process_time() - cores)
+
+    seconds = alternate({str(t): partial(frame, t) for t in ARTICLE}, rounds)
+    return {
+        t: tuple(1e3 * statistics.median(s) for s in (seconds[str(t)], recording[t], work[t]))
+        for t in ARTICLE
+    }
 
 
 def alternate(jobs: dict[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:

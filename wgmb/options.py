@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Literal
@@ -13,6 +13,7 @@ from . import sequence, shutter, vectors
 from .errors import InputError
 from .numbering import frame_numbers
 from .pipeline import Blur
+from .scene import Scene
 
 _IN = Group("Input", sort_key=1)
 _LOOK = Group("Blur", sort_key=2)
@@ -25,19 +26,31 @@ _OUT = Group("Output", sort_key=4)
 class ShutterOptions:
     """When the shutter is open."""
 
-    shutter: float = 180.0
-    "Degrees it is open: 360 is one frame interval, more is allowed."
+    shutter: float | None = None
+    "Degrees it is open: 360 is one frame interval, more is allowed. 180, or what a scene asks for."
     phase: str = "centre"
     "start (opens at the frame), centre, end (closes at it), or the middle's time in frames."
-    curve: str = "box"
-    "box, trapezoid, triangle, cosine, gaussian, or a CSV file of time, weight."
+    curve: str | None = None
+    "box (default), trapezoid, triangle, cosine, gaussian, or a CSV file of time, weight."
     rolling: Literal["up", "down", "left", "right"] | None = None
     "Rolling shutter: the way the exposure runs over the picture."
     rolling_duration: float = 1.0
     "Time from the first row or column to the last, in frame intervals."
 
+    def settled(self, scene: Scene | None = None, fps: float = 24.0) -> ShutterOptions:
+        """What was left open taken from the scene, or 180 degrees and a box."""
+        degrees, curve = 180.0, "box"
+        if scene is not None and scene.exposure is not None:
+            seconds, curve = scene.exposure
+            degrees = round(360 * seconds * fps, 9)
+        return replace(
+            self,
+            shutter=degrees if self.shutter is None else self.shutter,
+            curve=curve if self.curve is None else self.curve,
+        )
+
     def make(self) -> shutter.Shutter:
-        """The Shutter these options describe."""
+        """The Shutter these options describe, once they are settled."""
         phase: str | float = self.phase
         if phase not in shutter.PHASES:
             try:
@@ -47,6 +60,7 @@ class ShutterOptions:
                     f"phase must be start, centre, end or a number, got {phase!r}"
                 ) from None
         curve = self.curve
+        assert self.shutter is not None and curve is not None
         if curve not in shutter.CURVES:
             if not Path(curve).is_file():
                 known = ", ".join(shutter.CURVES)
@@ -128,8 +142,8 @@ OWN = ("path", "form", "show", "facing", "depth_test", "splat", "weights", "alph
 class BlurOptions:
     """How to blur."""
 
-    method: str = "tap"
-    "tap, tiles, fusion, reproject. Scenes: also accumulate, distributed. See the README's table."
+    method: str | None = None
+    "tap (default), tiles, fusion, reproject. Scenes: also accumulate, distributed, volume."
     samples: int | Literal["auto"] | None = None
     "Taps, pictures or rays a pixel: 16, for fusion 8; auto: one a pixel of a streak, 64 at most."
     jitter: float = 0.0
@@ -163,6 +177,11 @@ class BlurOptions:
     seed: int | None = None
     "distributed: another seed is other noise."
 
+    def settled(self, scene: Scene | None = None) -> BlurOptions:
+        """The method, where it was left open, that suits the scene."""
+        suited = "volume" if scene is not None and scene.has_volumes else "tap"
+        return replace(self, method=self.method or suited)
+
     def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
         """The Blur these options describe; an option its method does not have is an error."""
         own = {name: getattr(self, name) for name in OWN}
@@ -170,7 +189,7 @@ class BlurOptions:
             name: value for name, value in own.items() if value is not None and value is not False
         }
         return Blur(
-            self.method,
+            self.settled().method or "",
             shutter=shutter_,
             samples=self.samples,
             jitter=self.jitter,

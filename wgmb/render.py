@@ -53,12 +53,16 @@ class Render:
         self, time: float, number: int = 0, progress: Progress | None = None
     ) -> np.ndarray:
         """(height, width, 4) float32, linear: the frame whose instant is `time` [s]."""
-        on_gpu, blur = self._on_gpu(time), self.blur
+        on_gpu, blur = self.on_gpu(time), self.blur
         output = self._images.texture("output", self.size, blur.output)
-        if "scene" in blur.method.needs:
+        if "progress" in blur.method.uses:
             self._in_steps(on_gpu, output.create_view(), number, progress)
             return self._images.download(blur.device.create_command_encoder(), output)
         encoder = blur.device.create_command_encoder(label="render")
+        if "scene" in blur.method.needs:
+            blur.encode(encoder, size=self.size, output=output.create_view(), scene=on_gpu,
+                        number=number)  # fmt: skip
+            return self._images.download(encoder, output)
         seen = {k: self._see(encoder, on_gpu, number, k) for k in self._offsets}
         gpu.submit(blur.device, encoder)
         encoder = blur.device.create_command_encoder(label="blur")
@@ -93,7 +97,7 @@ class Render:
 
     def frame(self, time: float, number: int = 0) -> Frame:
         """The sharp picture at `time` [s] with its depth, normals, object indices and motion."""
-        on_gpu, blur = self._on_gpu(time), self.blur
+        on_gpu, blur = self.on_gpu(time), self.blur
         encoder = blur.device.create_command_encoder(label="render")
         seen = on_gpu.encode(encoder, blur.given(self.size, number), self._images, "frame", 0.0)
         arrays = {}
@@ -109,7 +113,8 @@ class Render:
             number=number,
         )
 
-    def _on_gpu(self, time: float) -> SceneOnGpu:
+    def on_gpu(self, time: float) -> SceneOnGpu:
+        """The scene around `time` [s], as far as this Blur looks."""
         if not np.isfinite(time):
             raise InputError(f"time must be finite, got {time}")
         opens, closes = self.blur.shutter.span
