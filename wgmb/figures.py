@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import InputError
-from .perceive import Cone
+from .perceive import VIDEOS, Cone
 from .scene import Scene, Shot
 from .shutter import Shutter
 
@@ -20,12 +20,6 @@ RADIUS, ORBIT = 0.1, 0.2  # of the disk and its circle [picture heights]
 RATE = 60.0  # frames a second of figures 2 and 3
 WAYS = 10  # frames that figure 3 adds up
 FASTEST = 1e4  # rad/s: beyond, nothing changes and a loop over passes is long
-VIDEOS = {  # of figure 3: the shutter of its frames
-    "none": Shutter(0),
-    "box": Shutter(360),
-    "trapezoid": Shutter(540, curve="trapezoid"),
-    "cosine": Shutter(720, curve="cosine"),
-}
 
 
 @dataclass(frozen=True, kw_only=True)

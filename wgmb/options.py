@@ -12,13 +12,15 @@ from cyclopts import Group, Parameter
 from . import sequence, shutter, vectors
 from .errors import InputError
 from .numbering import frame_numbers
+from .perceive import Cone
 from .pipeline import Blur
 from .scene import Scene
 
 _IN = Group("Input", sort_key=1)
 _LOOK = Group("Blur", sort_key=2)
 _SHUTTER = Group("Shutter", sort_key=3)
-_OUT = Group("Output", sort_key=4)
+_PERCEPTION = Group("Perception", sort_key=4)
+_OUT = Group("Output", sort_key=5)
 
 
 @Parameter(name="*", group=_SHUTTER)
@@ -217,10 +219,7 @@ class SceneOptions:
 
     def settings(self) -> dict[str, str]:
         """The scene's parameters by name."""
-        pairs = [text.partition("=") for text in self.set]
-        if wrong := [name for name, equals, _ in pairs if not equals]:
-            raise InputError(f"--set takes NAME=VALUE, got {wrong[0]!r}")
-        return {name: value for name, _, value in pairs}
+        return settings_of(self.set)
 
     def moments(self, fps: float) -> dict[int, float]:
         """Times in seconds by frame number."""
@@ -231,12 +230,42 @@ class SceneOptions:
         return {n: n / fps for n in frame_numbers(self.frames)}
 
 
+@Parameter(name="*", group=_PERCEPTION)
+@dataclass(frozen=True, kw_only=True)
+class PerceptionOptions:
+    """Who looks, and at what."""
+
+    cone_rate: float = 50.0
+    "How fast a cone cell's answer to a flash fades, 1/s."
+    cone_peak: float = 0.05
+    "When it is strongest, seconds after the flash."
+    nature: float = 480.0
+    "Scenes: pictures a second that stand for a world without frames."
+    size: str = "640x360"
+    "Scenes: width x height in pixels."
+    set: tuple[str, ...] = ()
+    "Scenes: a parameter as NAME=VALUE; may be repeated."
+
+    @property
+    def cone(self) -> Cone:
+        """The cone cell."""
+        return Cone(self.cone_rate, self.cone_peak)
+
+
 def size_of(text: str) -> tuple[int, int]:
     """`1920x1080` -> width, height."""
     width, _, height = text.partition("x")
     if not (width.isdigit() and height.isdigit() and int(width) and int(height)):
         raise InputError(f"size must be like 1920x1080, got {text!r}")
     return int(width), int(height)
+
+
+def settings_of(texts: tuple[str, ...]) -> dict[str, str]:
+    """`NAME=VALUE` each -> values by name."""
+    pairs = [text.partition("=") for text in texts]
+    if wrong := [name for name, equals, _ in pairs if not equals]:
+        raise InputError(f"--set takes NAME=VALUE, got {wrong[0]!r}")
+    return {name: value for name, _, value in pairs}
 
 
 @Parameter(name="*", group=_OUT)

@@ -95,6 +95,15 @@ class Render:
             "camera": on_gpu.reprojections(offset),
         }
 
+    def sharp(self, time: float) -> np.ndarray:
+        """(height, width, 4) float32, linear: the picture at `time` [s] without any blur."""
+        if not self.scene.has_volumes:
+            return self.frame(time).color
+        return Render(
+            self.scene, Blur("volume", shutter=0, device=self.blur.device),
+            size=self.size, fps=self.fps,
+        )(time)  # fmt: skip
+
     def frame(self, time: float, number: int = 0) -> Frame:
         """The sharp picture at `time` [s] with its depth, normals, object indices and motion."""
         on_gpu, blur = self.on_gpu(time), self.blur

@@ -21,6 +21,12 @@ def in_disk(x, y, phi):
     return np.hypot(x - 0.2 * np.cos(np.pi - phi), y - 0.2 * np.sin(np.pi - phi)) < 0.1
 
 
+def antialiased(x, y, phi, height):
+    """The disk as it is drawn without blur."""
+    apart = np.hypot(x - 0.2 * np.cos(np.pi - phi), y - 0.2 * np.sin(np.pi - phi))
+    return 1 - smoothstep(0.1, 0.1 + 1 / height, apart)
+
+
 def in_section(x, y, phi, minor, major, slice_):
     """Whether the torus, turned by `phi`, covers the places in the plane z = slice."""
     u, v = x * np.cos(phi) + y * np.sin(phi), y * np.cos(phi) - x * np.sin(phi)
