@@ -17,10 +17,11 @@ from typing import Annotated
 
 import cyclopts
 from cyclopts import Parameter
+from cyclopts.config import Toml
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from . import __version__, gpu, scenes
+from . import __version__, gpu
 from .errors import DeviceError, Error, InputError
 from .info import describe
 from .options import (
@@ -52,12 +53,12 @@ app = cyclopts.App(
 @app.command
 def blur(
     pattern: str,
-    /,
     output: OutputOptions,
     look: BlurOptions | None = None,
     when: ShutterOptions | None = None,
     given: InputOptions | None = None,
     *,
+    config: Path | None = None,
     adapter: str | None = None,
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
@@ -70,6 +71,8 @@ def blur(
     ----------
     pattern
         Frames to blur: shot.####.exr, shot.%04d.exr, or one file.
+    config
+        TOML file whose table [blur] holds options, as `wgmb view` saves it.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     verbose
@@ -164,7 +167,6 @@ def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, ver
 @app.command
 def render(
     scene: str,
-    /,
     output: OutputOptions,
     what: SceneOptions | None = None,
     look: BlurOptions | None = None,
@@ -172,6 +174,7 @@ def render(
     *,
     sharp: bool = False,
     passes: bool = False,
+    config: Path | None = None,
     adapter: str | None = None,
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
@@ -190,6 +193,8 @@ def render(
         Without blur.
     passes
         EXR: with depth, motion, normal and object index, so that `wgmb blur` can take it on.
+    config
+        TOML file whose table [render] holds options, as `wgmb view` saves it.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     verbose
@@ -204,10 +209,8 @@ def render(
         raise InputError(f"--passes need an .exr output, got {output.output}")
     fps = float(output.rate)
     moments = what.moments(fps)
-    picture = scenes.make(scene, **what.settings())
-    renderer = Render(
-        picture, look.make(when.make(), adapter), size=size_of(what.size), fps=fps, rays=what.rays
-    )
+    made = look.make(when.make(), adapter)
+    renderer = Render(what.make(scene), made, size=size_of(what.size), fps=fps, rays=what.rays)
     settings = {"scene": scene, "sharp": sharp, "passes": passes, "bits": output.bits}
     settings |= _plain(look) | _plain(when) | _plain(what) | {"wgmb": __version__, "fps": fps}
     files = Output(
@@ -333,7 +336,9 @@ def main(arguments: list[str] | None = None) -> int:
     warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)
     try:
-        result = app(arguments, exit_on_error=False, print_error=False)
+        words = sys.argv[1:] if arguments is None else arguments
+        app.config = _config(words)
+        result = app(words, exit_on_error=False, print_error=False)
         sys.stdout.flush()
         return result if isinstance(result, int) else DONE
     except cyclopts.CycloptsError as error:
@@ -347,6 +352,18 @@ def main(arguments: list[str] | None = None) -> int:
         return _say_why(str(error), SOME_FAILED)
     except KeyboardInterrupt:
         return _say_why("interrupted", INTERRUPTED)
+
+
+def _config(words: list[str]) -> tuple[Toml, ...]:
+    """The file named by --config; what stands on the command line wins over it."""
+    for i, word in enumerate(words):
+        name, _, path = word.partition("=")
+        if name == "--config":
+            path = path or "".join(words[i + 1 : i + 2])
+            if not Path(path).is_file():
+                raise InputError(f"--config {path}: no such file")
+            return (Toml(path, must_exist=True, search_parents=False),)
+    return ()
 
 
 def _interrupted(*_) -> None:
