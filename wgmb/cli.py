@@ -1,6 +1,7 @@
 """The command line: options into the library's words, errors into one line and an exit code.
 
-Exit codes: 0 done, 1 some frames failed, 2 usage or input, 3 no adapter, 130 interrupted.
+Exit codes: 0 done, 1 some frames failed, 2 usage or input, 3 no adapter or display,
+130 interrupted.
 """
 
 from __future__ import annotations
@@ -241,6 +242,46 @@ def render(
 
 
 @app.command
+def view(
+    what: str | None = None,
+    given: InputOptions | None = None,
+    look: BlurOptions | None = None,
+    when: ShutterOptions | None = None,
+    *,
+    config: Path | None = None,
+    window: str = "1280x720",
+    adapter: str | None = None,
+) -> int:
+    """Look at a scene or at frames interactively.
+
+    Example: wgmb view wheel
+    Example: wgmb view 'shot.####.exr' --method reproject
+
+    Parameters
+    ----------
+    what
+        A scene, a file or a pattern; crossing if there is no --config either.
+    config
+        TOML file that the viewer saved: begin as it says.
+    window
+        Width x height of the window.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    """
+    from . import viewer
+
+    state = viewer.State()
+    if config is not None:
+        state = viewer.State.of_toml(config.read_text(encoding="utf-8"))
+    if what is not None:
+        state = state.opened(what)
+    given, look, when = given or InputOptions(), look or BlurOptions(), when or ShutterOptions()
+    state = state.told(vars(given) | vars(look) | vars(when))
+    viewer.view(state, adapter=adapter, size=size_of(window))
+    return DONE
+
+
+@app.command
 def info(
     pattern: str,
     /,
@@ -356,7 +397,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _config(words: list[str]) -> tuple[Toml, ...]:
     """The file named by --config; what stands on the command line wins over it."""
-    for i, word in enumerate(words):
+    for i, word in enumerate(words if words[:1] != ["view"] else []):
         name, _, path = word.partition("=")
         if name == "--config":
             path = path or "".join(words[i + 1 : i + 2])
