@@ -177,7 +177,7 @@ class Panel:
                 scenes.SCENES[state.source]
             ).parameters.items():
                 default = parameter.default
-                value = values.get(name, default)
+                value = values[name] if name in values else default
                 new = self._setting(name, value, default)
                 if new != value:
                     state = state.with_setting(name, new)
