@@ -80,6 +80,7 @@ fn composed(at: vec2f) -> vec3f {
 fn side_by_side(at: vec2f) -> vec3f {
     let half = vec2f(0.5 * view.area.z, view.area.w);
     let right = at.x >= view.area.x + half.x;
+    if abs(at.x - view.area.x - half.x) < 1.0 { return vec3f(0.35); }
     let middle = view.area.xy + half * vec2f(select(0.5, 1.5, right), 0.5);
     let size = view.place.zw * 0.5;
     let pan = (view.place.xy + size - view.area.xy - view.area.zw * 0.5) * 0.5;

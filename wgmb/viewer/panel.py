@@ -172,12 +172,10 @@ class Panel:
         if chosen != state.source:
             return state.opened(chosen)
         if state.is_scene:
-            values: dict[str, float] = dict(state.settings)
-            for name, parameter in inspect.signature(
-                scenes.SCENES[state.source]
-            ).parameters.items():
-                default = parameter.default
-                value = values[name] if name in values else default
+            known = inspect.signature(scenes.SCENES[state.source]).parameters
+            defaults = {name: parameter.default for name, parameter in known.items()}
+            for name, value in (defaults | dict(state.settings)).items():
+                default = defaults[name]
                 new = self._setting(name, value, default)
                 if new != value:
                     state = state.with_setting(name, new)

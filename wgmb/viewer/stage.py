@@ -181,8 +181,8 @@ class Stage:
 
     # ---- drawing -------------------------------------------------------------------------
 
-    def update(self, state: State, area: Box, ratio: float, moving: bool, full: bool) -> Report:
-        """Go on with what `state` shows in `area` [px] of the canvas, `ratio` px a logical one.
+    def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> Report:
+        """Go on with what `state` shows in `area` [px] of the canvas, `now` [s].
 
         `moving`: quick is better than fine. `full`: everything now, however long it takes.
         """
@@ -190,7 +190,7 @@ class Stage:
         subject = self.subject(state)
         shape = subject.size(state)
         place = _fit(shape, area, state)
-        size, rays = self._quality(state, shape, place, area, moving, full)
+        size, rays = self._quality(state, shape, place, now, moving, full)
         report = Report(
             size, shape if not state.is_scene else _whole(place), place, area, moving=moving
         )
@@ -217,12 +217,11 @@ class Stage:
             drawing = self.report.seconds.get("draw", 0.0)
             self.pace.observe(seconds, drawing, rays)
 
-    def _quality(self, state, shape, place, area, moving, full) -> tuple[tuple[int, int], int]:
+    def _quality(self, state, shape, place, now, moving, full) -> tuple[tuple[int, int], int]:
         """Size to draw [px] and rays: coarse while moving, then in full, then antialiased."""
         if not state.is_scene:
             self._level = 0
             return shape, 1
-        now = time.perf_counter()
         if full:
             self._level = 0
         elif moving:

@@ -202,7 +202,7 @@ class Viewer:
             or self._sliding
         )
         full = self._video is not None
-        report = self.stage.update(state, area, ratio, moving and not full, full)
+        report = self.stage.update(state, area, self._now, moving and not full, full)
         subject = self.stage.subject(state)
         self._info = Info(
             report=report,
@@ -213,7 +213,7 @@ class Viewer:
             options=self.stage.options(state.method),
             frame_times=np.array(self._frame_times),
             draw_times=np.array(self._draw_times),
-            passes=self._passes,
+            passes={k: v for k, v in self._passes.items() if k != "draw"},
             recording="recording" if self._video else "",
             export=self._export_said,
             message=self._message[0] if self._now < self._message[1] else "",
