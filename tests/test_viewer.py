@@ -566,7 +566,8 @@ def test_settings_that_make_no_sense_are_told(text, said):
 
 def test_render_takes_the_saved_settings(hand, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    hand.viewer.state = replace(MANY, playing=False, compare="off", exposure=0.0, tone="clip")
+    plain = {"compare": "off", "exposure": 0.0, "tone": "clip"}
+    hand.viewer.state = replace(MANY, playing=False, jitter=0.0, **plain)
     shown = hand.picture()
     hand.viewer.do("save", "wgmb.toml")
     assert tomllib.loads(Path("wgmb.toml").read_text())["render"]["samples"] == 5

@@ -33,6 +33,8 @@ _AFTER_WHEEL = 0.3  # seconds for which turning the wheel counts as moving
 _FLICKER = 0.5  # seconds an image is shown
 _MESSAGE = 4.0  # seconds a message stays
 _TIMES = 90  # frames in the plots
+_HANDLED = ("pointer_down", "pointer_up", "pointer_move", "wheel", "key_down")
+_SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "key_up", "char", "resize")
 
 
 class Viewer:
@@ -75,9 +77,9 @@ class Viewer:
         self._windowed: tuple[int, int, int, int] | None = None
         self._info: Info | None = None
         self._sliding = False
-        events = ("pointer_down", "pointer_up", "pointer_move", "wheel", "key_down")
-        canvas.add_event_handler(self._guarded(self._on_event), *events, order=-200)
-        canvas.add_event_handler(self._guarded(self._on_any), "*", order=-201)
+        # Before ImGui's handlers, which keep to themselves what they take.
+        canvas.add_event_handler(self._guarded(self._on_any), *_SEEN, order=-201)
+        canvas.add_event_handler(self._guarded(self._on_event), *_HANDLED, order=-200)
         canvas.request_draw(self._guarded(self._draw))
 
     # ---- events --------------------------------------------------------------------------
@@ -97,8 +99,7 @@ class Viewer:
         return guarded
 
     def _on_any(self, event: dict) -> None:
-        if event["event_type"] not in ("close", "before_draw"):
-            self.canvas.request_draw()
+        self.canvas.request_draw()
 
     def _on_event(self, event: dict) -> None:
         kind = event["event_type"]
@@ -310,7 +311,7 @@ class Viewer:
         return stills.linear(np.clip(self.stage.picture(), 0, 1))
 
     def _screenshot(self) -> None:
-        path, settings = _free(".png"), self.state.toml()
+        path, settings = _free(".png", ".exr"), self.state.toml()
         replace_file(path, stills.encode(self._shown(), ".png", 8, settings))
         linear = self.stage.download()
         rgba = np.ones((*linear.shape[:2], 4), np.float32)
@@ -410,11 +411,11 @@ def view(state: State, *, adapter: str | None = None, size: tuple[int, int] = (1
         raise viewer.failed
 
 
-def _free(suffix: str) -> Path:
-    """The first of wgmb-001, wgmb-002, ... that is not there yet, here."""
+def _free(*suffixes: str) -> Path:
+    """The first of wgmb-001, wgmb-002, ... that is not there yet, here, with any of these."""
     for number in range(1, 10_000):
-        path = Path(f"wgmb-{number:03d}{suffix}")
-        if not path.exists() and not path.with_suffix(".exr").exists():
+        path = Path(f"wgmb-{number:03d}{suffixes[0]}")
+        if not any(path.with_suffix(suffix).exists() for suffix in suffixes):
             return path
     raise InputError("wgmb-001 to wgmb-9999 are all there")
 
