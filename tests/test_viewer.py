@@ -8,8 +8,21 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 
-from wgmb import Blur, Clip, InputError, Render, cli, display, exr, scenes, stills
+from wgmb import (
+    Blur,
+    Clip,
+    DeviceError,
+    InputError,
+    Render,
+    cli,
+    display,
+    exr,
+    gpu,
+    scenes,
+    stills,
+)
 from wgmb.blur import METHODS
+from wgmb.timing import Timing
 from wgmb.viewer import State, controls, offscreen
 from wgmb.viewer.stage import Pace
 from wgmb.viewer.window import frame
@@ -463,6 +476,25 @@ def test_an_error_while_drawing_is_not_swallowed(monkeypatch):
     with pytest.raises(ZeroDivisionError):
         hand.look()
     assert hand.viewer.canvas.get_closed()
+
+
+def test_a_lost_gpu_is_told():
+    wanted = ["float32-filterable"]
+    device = gpu.choose_adapter().request_device_sync(required_features=wanted)
+    viewer = offscreen(PLAIN, (320, 180), device=device)
+    frame(viewer)
+    device.destroy()
+    with pytest.raises(DeviceError, match="lost"):
+        frame(viewer)
+
+
+def test_times_of_the_gpu_are_told_by_pass(monkeypatch):
+    monkeypatch.setattr(Timing, "usable", staticmethod(lambda device: True))
+    hand = Hand(replace(PLAIN, method="reproject", samples=64))
+    passes = hand.viewer.stage.report.passes
+    assert {"gbuffer.wgsl:main", "blur/reproject.wgsl:gather"} <= passes.keys()
+    hand.look()
+    assert passes.keys() <= hand.viewer._info.passes.keys()
 
 
 # ---- quick while moving ---------------------------------------------------------------------

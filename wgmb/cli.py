@@ -268,8 +268,13 @@ def view(
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     """
-    from . import viewer
-
+    try:
+        from . import viewer
+    except ImportError as error:  # of a system library: the packages are required
+        raise DeviceError(
+            f"the viewer cannot be loaded: {error}; on Debian, Ubuntu: "
+            "apt-get install libx11-6 libxext6"
+        ) from None
     state = viewer.State()
     if config is not None:
         state = viewer.State.of_toml(config.read_text(encoding="utf-8"))

@@ -21,6 +21,7 @@ from ..errors import InputError
 from ..images import Images
 from ..options import ShutterOptions
 from ..pipeline import MOST_SAMPLES, Blur
+from ..timing import Timing
 from .state import LOOKS, REFERENCE, State
 from .subject import ClipSubject, SceneSubject, Subject, methods_for, options_of
 
@@ -52,7 +53,7 @@ class Pace:
     def observe(self, seconds: float, drawing: float, rays: int) -> None:
         """A moving frame took so long, `drawing` of it for what depends on the level."""
         self._took.append((seconds, drawing))
-        if len(self._took) < 2:
+        if len(self._took) < 3:
             return
         middle = sorted(self._took)[len(self._took) // 2]
         rest, drew = max(middle[0] - middle[1], 0.0), middle[1]
@@ -114,7 +115,8 @@ class Report:
     full: tuple[int, int] = (0, 0)
     place: Box = (0, 0, 0, 0)
     area: Box = (0, 0, 0, 0)
-    seconds: dict[str, float] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)  # on the clock
+    passes: dict[str, float] = field(default_factory=dict)  # on the GPU, where it tells
     labels: tuple[str, str] = ("", "")
     reference: int = 0
     measured: Measured | None = None
@@ -137,9 +139,10 @@ class Stage:
         self._blurs: dict[tuple, Blur] = {}
         self._shown = {"first": Shown(""), "second": Shown("")}
         self._level, self._still_since, self._still = 0, 0.0, ()
-        self._composed, self._canvas = (), (1, 1)
+        self._composed, self._canvas, self._moved = (), (1, 1), False
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._none = self.images.view("none", (1, 1), "rgba32float")
+        self._timing = Timing(device) if Timing.usable(device) else None
         self._worker = ThreadPoolExecutor(1, "flip")
         self._measured: tuple[tuple, Measured] | None = None
         self._options: dict[str, dict] = {}
@@ -213,9 +216,12 @@ class Stage:
 
     def finished(self, seconds: float, rays: int) -> None:
         """The window's frame took so long; moving frames set the pace."""
-        if self.report.moving and self.report.changed:
-            drawing = self.report.seconds.get("draw", 0.0)
-            self.pace.observe(seconds, drawing, rays)
+        if not self.report.moving:
+            self._moved = False
+        elif self.report.changed:
+            if self._moved:  # the first one may have had shaders to compile
+                self.pace.observe(seconds, self.report.seconds["draw"], rays)
+            self._moved = True
 
     def _quality(self, state, shape, place, now, moving, full) -> tuple[tuple[int, int], int]:
         """Size to draw [px] and rays: coarse while moving, then in full, then antialiased."""
@@ -268,7 +274,10 @@ class Stage:
             shown.texture = self.images.texture(slot, size, blur.output)
             shown.total = blur.samples
             seconds = float("inf") if full or quick else _STEP
-            shown.done = subject.draw(blur, shown.texture, (shown.done, seconds))
+            budget = shown.done, seconds
+            shown.done = subject.draw(blur, shown.texture, budget, self._timing)
+        if self._timing:
+            report.passes |= self._timing.read()
         self.device.queue.read_buffer(self._token)  # waits
         report.changed = True
         report.seconds[shown.label] = time.perf_counter() - started

@@ -17,6 +17,7 @@ from ..images import Images
 from ..options import BlurOptions, InputOptions, SceneOptions, size_of
 from ..pipeline import Blur
 from ..render import Render
+from ..timing import Timing
 from .state import State
 
 _FRAMES_KEPT = 16
@@ -56,14 +57,14 @@ class SceneSubject:
         """The sharp picture and what lies under it, by name."""
         return self._render.passes(self._time, self._number)
 
-    def draw(self, blur: Blur, output: Texture, budget: Budget) -> int:
+    def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Timing | None) -> int:
         """Draw with `blur`; samples done, which may be less than it has where it is slow."""
         view, (done, seconds) = output.create_view(), budget
         if "scene" in blur.method.needs:
             return self._render.refine(
                 view, self._time, self._number, done=done, seconds=seconds, blur=blur
             )
-        self._render.draw(view, self._time, self._number, blur=blur)
+        self._render.draw(view, self._time, self._number, blur=blur, timing=timing)
         return blur.samples
 
 
@@ -128,10 +129,11 @@ class ClipSubject:
         rgba[..., : frame.color.shape[2]] = frame.color
         return rgba
 
-    def draw(self, blur: Blur, output: Texture, budget: Budget) -> int:
-        """Draw with `blur`."""
+    def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Timing | None) -> int:
+        """Draw with `blur`, all its samples."""
         encoder = self._device.create_command_encoder(label="blur")
-        blur.encode(encoder, output=output.create_view(), **self._inputs(blur))
+        view = output.create_view()
+        blur.encode(encoder, output=view, timing=timing, **self._inputs(blur))
         gpu.submit(self._device, encoder)
         return blur.samples
 

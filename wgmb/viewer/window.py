@@ -177,7 +177,7 @@ class Viewer:
         flicked = self._flicked()
         picture = self.stage.compose(state, self._canvas_size(), ratio, flicked)
         self._paint(picture)
-        self._passes |= report.seconds
+        self._passes |= report.seconds | report.passes
         self._imgui.render()
         if self._video:
             self._video.add(self._shown())
@@ -185,10 +185,10 @@ class Viewer:
             self.do(action, what)
         self._poll_export()
         seconds = time.perf_counter() - started
+        self.stage.finished(seconds, state.rays)
         if report.changed or state.playing:
             self._frame_times.append(max(seconds, self._now - before if report.moving else 0))
-            self._draw_times.append(report.seconds.get("draw", 0.0))
-            self.stage.finished(seconds, state.rays)
+            self._draw_times.append(report.seconds["draw"])
         self._ask_for_more(report.busy)
 
     def _prepare(self, state: State) -> None:
