@@ -1,6 +1,7 @@
 """The command line: options into the library's words, errors into one line and an exit code.
 
-Exit codes: 0 done, 1 some frames failed, 2 usage or input, 3 no adapter, 130 interrupted.
+Exit codes: 0 done, 1 some frames failed, 2 usage or input, 3 no adapter or display,
+130 interrupted.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Annotated
 import cyclopts
 import numpy as np
 from cyclopts import Parameter
+from cyclopts.config import Toml
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -61,12 +63,12 @@ app = cyclopts.App(
 @app.command
 def blur(
     pattern: str,
-    /,
     output: OutputOptions,
     look: BlurOptions | None = None,
     when: ShutterOptions | None = None,
     given: InputOptions | None = None,
     *,
+    config: Path | None = None,
     adapter: str | None = None,
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
@@ -79,6 +81,8 @@ def blur(
     ----------
     pattern
         Frames to blur: shot.####.exr, shot.%04d.exr, or one file.
+    config
+        TOML file whose table [blur] holds options, as `wgmb view` saves it.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     verbose
@@ -180,7 +184,6 @@ def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, ver
 @app.command
 def render(
     scene: str,
-    /,
     output: OutputOptions,
     what: SceneOptions | None = None,
     look: BlurOptions | None = None,
@@ -188,6 +191,7 @@ def render(
     *,
     sharp: bool = False,
     passes: bool = False,
+    config: Path | None = None,
     adapter: str | None = None,
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
@@ -206,6 +210,8 @@ def render(
         Without blur.
     passes
         EXR: with depth, motion, normal and object index, so that `wgmb blur` can take it on.
+    config
+        TOML file whose table [render] holds options, as `wgmb view` saves it.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     verbose
@@ -215,7 +221,7 @@ def render(
     """
     what, look, when = what or SceneOptions(), look or BlurOptions(), when or ShutterOptions()
     fps = float(output.rate)
-    picture = scenes.make(scene, **what.settings())
+    picture = what.make(scene)
     look, when = look.settled(picture), when.settled(picture, fps)
     if look.keep or look.scale:
         raise InputError("--keep and --scale are for files: wgmb render has no layers to name")
@@ -251,6 +257,51 @@ def render(
         seconds, made = time.perf_counter() - started, len(moments) - skipped
         done = f"{made} frames in {seconds:.1f} s -> {files.pattern}"
         say.print(done + (f", {skipped} were there" if skipped else ""), markup=False)
+    return DONE
+
+
+@app.command
+def view(
+    what: str | None = None,
+    given: InputOptions | None = None,
+    look: BlurOptions | None = None,
+    when: ShutterOptions | None = None,
+    *,
+    config: Path | None = None,
+    window: str = "1280x720",
+    adapter: str | None = None,
+) -> int:
+    """Look at a scene or at frames interactively.
+
+    Example: wgmb view wheel
+    Example: wgmb view 'shot.####.exr' --method reproject
+
+    Parameters
+    ----------
+    what
+        A scene, a file or a pattern; crossing if there is no --config either.
+    config
+        TOML file that the viewer saved: begin as it says.
+    window
+        Width x height of the window.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    """
+    try:
+        from . import viewer
+    except ImportError as error:  # of a system library: the packages are required
+        raise DeviceError(
+            f"the viewer cannot be loaded: {error}; on Debian, Ubuntu: "
+            "apt-get install libx11-6 libxext6"
+        ) from None
+    state = viewer.State()
+    if config is not None:
+        state = viewer.State.of_toml(config.read_text(encoding="utf-8"))
+    if what is not None:
+        state = state.opened(what)
+    given, look, when = given or InputOptions(), look or BlurOptions(), when or ShutterOptions()
+    state = state.told(vars(given) | vars(look) | vars(when))
+    viewer.view(state, adapter=adapter, size=size_of(window))
     return DONE
 
 
@@ -539,7 +590,9 @@ def main(arguments: list[str] | None = None) -> int:
     warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)
     try:
-        result = app(arguments, exit_on_error=False, print_error=False)
+        words = sys.argv[1:] if arguments is None else arguments
+        app.config = _config(words)
+        result = app(words, exit_on_error=False, print_error=False)
         sys.stdout.flush()
         return result if isinstance(result, int) else DONE
     except cyclopts.CycloptsError as error:
@@ -553,6 +606,18 @@ def main(arguments: list[str] | None = None) -> int:
         return _say_why(str(error), SOME_FAILED)
     except KeyboardInterrupt:
         return _say_why("interrupted", INTERRUPTED)
+
+
+def _config(words: list[str]) -> tuple[Toml, ...]:
+    """The file named by --config; what stands on the command line wins over it."""
+    for i, word in enumerate(words if words[:1] != ["view"] else []):
+        name, _, path = word.partition("=")
+        if name == "--config":
+            path = path or "".join(words[i + 1 : i + 2])
+            if not Path(path).is_file():
+                raise InputError(f"--config {path}: no such file")
+            return (Toml(path, must_exist=True, search_parents=False),)
+    return ()
 
 
 def _interrupted(*_) -> None:

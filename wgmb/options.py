@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from . import sequence, shutter, vectors
+from . import scenes, sequence, shutter, vectors
 from .errors import InputError
 from .numbering import frame_numbers
 from .perceive import Cone
@@ -207,7 +208,7 @@ class SceneOptions:
     """Which moments of a scene, and how large."""
 
     time: float | None = None
-    "The one picture's time in seconds (0 if there are no --frames either)."
+    "The one picture's time in seconds, where there are no --frames."
     frames: str | None = None
     "Frames such as 0-99; frame N is at N / fps seconds."
     size: str = "640x360"
@@ -216,6 +217,20 @@ class SceneOptions:
     "Antialiasing of what image methods start from: rays a pixel's side, 1 to 8."
     set: tuple[str, ...] = ()
     "A parameter of the scene as NAME=VALUE; may be repeated."
+    orbit: tuple[float, float] = (0.0, 0.0)
+    "Turn the camera round what it looks at: degrees to the right, and up."
+    pan: tuple[float, float] = (0.0, 0.0)
+    "Then move it to the right, and up [scene units]."
+    dolly: float = 1.0
+    "Times its distance to what it looks at."
+
+    def make(self, name: str) -> Scene:
+        """The scene `name` with these parameters and this camera."""
+        scene = scenes.make(name, **self.settings())
+        if (self.orbit, self.pan, self.dolly) == ((0.0, 0.0), (0.0, 0.0), 1.0):
+            return scene
+        aside, up = map(math.radians, self.orbit)
+        return scene.seen_from((aside, up), self.pan, self.dolly)
 
     def settings(self) -> dict[str, str]:
         """The scene's parameters by name."""
@@ -223,8 +238,6 @@ class SceneOptions:
 
     def moments(self, fps: float) -> dict[int, float]:
         """Times in seconds by frame number."""
-        if self.time is not None and self.frames is not None:
-            raise InputError("give --time or --frames, not both")
         if self.frames is None:
             return {0: self.time or 0.0}
         return {n: n / fps for n in frame_numbers(self.frames)}

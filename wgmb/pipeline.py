@@ -242,7 +242,7 @@ class Blur:
         self._require(frame.has)
         output = self._images.texture("output", frame.size, self.output)
         encoder = self.device.create_command_encoder(label="wgmb")
-        self.encode(encoder, output=output.create_view(), **self._upload(frame))
+        self.encode(encoder, output=output.create_view(), **self.upload(frame))
         return self._images.download(encoder, output)[..., : frame.color.shape[2]].astype(
             "f4", copy=False
         )
@@ -252,15 +252,29 @@ class Blur:
         if "motion" not in frame.has:
             raise InputError("there is no motion: give to_next, to_prev, or depth and a camera")
         encoder = self.device.create_command_encoder(label="wgmb motion")
-        given = self.given(frame.size, frame.number, None)
         motion = self._images.texture("motion", frame.size, "rgba32float")
-        moving = _moving(self._upload_moving(frame))
-        limited = self.max_blur is not None
-        self._velocity.encode(encoder, given, moving, limited, motion.create_view())
+        moving = self._upload_moving(frame)
+        self.encode_motion(encoder, frame.size, motion.create_view(), frame.number, **moving)
         return self._images.download(encoder, motion)
 
-    def _upload(self, frame: Frame) -> dict:
-        """The frame's arrays as textures, under the names that `encode` takes."""
+    def encode_motion(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        size: tuple[int, int],
+        output: View,
+        number: int = 0,
+        **moving,
+    ) -> None:
+        """Record to_prev and to_next [px] into `output`, rgba32float; `moving` as in `encode`."""
+        given = self.given(size, number)
+        limited = self.max_blur is not None
+        self._velocity.encode(encoder, given, _moving(moving), limited, output)
+
+    def upload(self, frame: Frame) -> dict:
+        """The frame's arrays as textures, under the names that `encode` takes.
+
+        They are kept: the next frame's go into the same textures.
+        """
         rgba, four = self._rgba(frame)
         return {
             "size": frame.size,

@@ -252,13 +252,30 @@ class Shot:
     roll: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
     zoom: Callable[[np.ndarray], np.ndarray] = lambda t: 1.6 + 0 * t
     """Focal length in halves of the picture's height."""
+    orbit: tuple[float, float] = (0.0, 0.0)
+    """Angles by which a viewer went round the pivot: to the right, and up [radians]."""
+    pan: tuple[float, float] = (0.0, 0.0)
+    """How far a viewer then went to the right, and up [scene units]."""
+    dolly: float = 1.0
+    """Times the distance to the pivot."""
+    pivot: float = 5.0
+    """How far in front of the camera the pivot is [scene units]."""
 
     def world_from_camera(self, t) -> np.ndarray:
         """(n, 4, 4); the camera looks along -z, y up."""
         t = _times(t)
         x, y, z = self.position(t)
         turned = rotation("y", self.yaw(t), t) @ rotation("x", self.pitch(t), t)
-        return translation(x, y, z, t) @ turned @ rotation("z", self.roll(t), t)
+        own = translation(x, y, z, t) @ turned @ rotation("z", self.roll(t), t)
+        if (self.orbit, self.pan, self.dolly) == ((0.0, 0.0), (0.0, 0.0), 1.0):
+            return own
+        px, py, pz = (own @ np.array([0, 0, -self.pivot, 1.0]))[:, :3].T
+        aside, up = self.orbit
+        round_ = (
+            translation(px, py, pz, t) @ rotation("y", aside, t) @ translation(-px, -py, -pz, t)
+        )
+        over = translation(0, 0, -self.pivot, t) @ rotation("x", -up, t)
+        return round_ @ own @ over @ translation(*self.pan, self.pivot * self.dolly, t)
 
     def clip_from_camera(self, t, aspect: float, near: float = 0.05, far: float = 1000.0):
         """(n, 4, 4) OpenGL projections."""
@@ -349,6 +366,15 @@ class Scene:
         there = [v for v in volumes if v.facing is None or v.opacity == most]
         bodies = [_since(v.solid(), time) for v in there]
         return replace(self, bodies=(*self.bodies, *bodies, stage.body()), stage=stage)
+
+    def seen_from(
+        self, orbit: tuple[float, float], pan: tuple[float, float], dolly: float
+    ) -> Scene:
+        """The same scene, its camera moved as `Shot.orbit`, `pan` and `dolly` say."""
+        values = (*orbit, *pan, dolly)
+        if not all(map(math.isfinite, values)) or not 0 < dolly <= 1000:
+            raise InputError(f"orbit, pan and dolly must be finite, dolly over 0, got {values}")
+        return replace(self, shot=replace(self.shot, orbit=orbit, pan=pan, dolly=dolly))
 
 
 def _since(body: Body, time: float) -> Body:
