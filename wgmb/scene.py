@@ -84,8 +84,9 @@ class Orbit:
     """A sphere of `radius` whose centre runs on a circle of radius `orbit` about an axis along y.
 
     `phase`: its angle at time 0 [rad], right-handed from +x. `speed`: [rad/s], any size and sign.
-    `opacity`: multiplies its density. `facing`: how much it counts in the normals of all the
-    volumes that are blended; None: as much as its density at the place.
+    `opacity`: multiplies its density; more than 1 makes fast ones visible, as what is seen goes
+    with the square of density. `facing`: how much it counts in the normals of all the volumes
+    that are blended; None: as much as its density at the place.
     """
 
     radius: float
