@@ -85,7 +85,7 @@ def blur(
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     clip = given.open(pattern, look.keep, look.scale)
     made = look.make(when.make(), adapter)
-    settings = _settings(look, when, given) | {"bits": output.bits}
+    settings = _settings(look, when, given) | {"samples": _samples(made), "bits": output.bits}
     files = Output(
         output.output,
         settings=settings,
@@ -143,6 +143,10 @@ def _progress(say: Console, frames: int, quiet: bool, doing: str = "blurring"):
         yield tick
 
 
+def _samples(blur: Blur) -> int | str:
+    return "auto" if blur.auto else blur.samples
+
+
 def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, verbose: bool) -> int:
     """Say what became of the run; return the exit code."""
 
@@ -157,6 +161,8 @@ def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, ver
             line(f"frame {number}: pixels that are not finite were given no weight: {what}")
         if verbose or "because" in clip.finding or "check them" in clip.finding:
             line(f"vectors: {clip.finding}")
+        if clip.cuts:
+            line(f"camera cut before frame {', '.join(map(str, sorted(clip.cuts)))}")
         done = f"{len(report.done)} frames in {seconds:.1f} s -> {files.pattern}"
         line(done + (f", {len(report.skipped)} were there" if report.skipped else ""))
     if report.failed:
@@ -214,6 +220,7 @@ def render(
     renderer = Render(what.make(scene), made, size=size_of(what.size), fps=fps, rays=what.rays)
     settings = {"scene": scene, "sharp": sharp, "passes": passes, "bits": output.bits}
     settings |= _plain(look) | _plain(when) | _plain(what) | {"wgmb": __version__, "fps": fps}
+    settings["samples"] = _samples(made)
     files = Output(
         output.output,
         settings=settings,
@@ -342,7 +349,7 @@ def devices() -> int:
 def bench(
     *,
     method: str = "tap",
-    samples: int = 16,
+    samples: int | None = None,
     size: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     rounds: int = 9,
     adapter: str | None = None,
@@ -361,7 +368,7 @@ def bench(
     from . import bench as measure
 
     blur = Blur(method, samples=samples, device=adapter)
-    sys.stdout.write(f"{blur.device.adapter.summary}, {method}, {samples} samples\n")
+    sys.stdout.write(f"{blur.device.adapter.summary}, {method}, {blur.samples} samples\n")
     for text in size or ["1920x1080"]:
         width, height = size_of(text)
         found = measure.bench(blur, width, height, rounds)

@@ -121,15 +121,19 @@ class InputOptions:
         )
 
 
+OWN = ("path", "form", "show", "facing", "depth_test", "splat", "weights", "alpha_front",
+       "alpha_back", "tau", "seed")  # fmt: skip
+
+
 @Parameter(name="*", group=_LOOK)
 @dataclass(frozen=True, kw_only=True)
 class BlurOptions:
     """How to blur."""
 
     method: str = "tap"
-    "tap: average along each pixel's own path. Scenes: also accumulate, distributed."
-    samples: int = 16
-    "Taps, pictures or rays a pixel."
+    "tap, tiles, fusion, reproject. Scenes: also accumulate, distributed. See the README's table."
+    samples: int | Literal["auto"] | None = None
+    "Taps, pictures or rays a pixel: 16, for fusion 8; auto: one a pixel of a streak, 64 at most."
     jitter: float = 0.0
     "0 to 1: trades bands for noise."
     keep: str | None = None
@@ -140,17 +144,33 @@ class BlurOptions:
     "Longest streak in pixels."
     path: Literal["curved", "straight"] | None = None
     "tap: through the previous and the next place (curved), or along the mean velocity."
-    form: Literal["shutter", "slices", "published"] | None = None
-    "tap (shutter), reproject (slices): published is the form of the paper, without the shutter."
+    form: Literal["shutter", "even", "slices", "published"] | None = None
+    "tap, fusion (shutter), tiles (even), reproject (slices): published is the paper's."
     show: Literal["color", "count"] | None = None
     "reproject: count shows how often a pixel was reached."
+    facing: bool = False
+    "reproject, published: leave out what faces away from the interpolated camera."
+    depth_test: bool = False
+    "reproject, published: only the nearest of the samples on a pixel."
+    splat: Literal["point", "line"] | None = None
+    "reproject, published: lines between the steps, or points."
+    weights: Literal["normalised", "published"] | None = None
+    "fusion: with the sum 1, or as printed."
+    alpha_front: float | None = None
+    "fusion: factor of faces that lead, 0.02 to 0.10; a greater one blurs them less."
+    alpha_back: float | None = None
+    "fusion: factor of all other faces."
+    tau: float | None = None
+    "fusion: weight of a sample over the next newer one's, to 1."
     seed: int | None = None
     "distributed: another seed is other noise."
 
     def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
         """The Blur these options describe; an option its method does not have is an error."""
-        options = {"path": self.path, "form": self.form, "show": self.show, "seed": self.seed}
-        given = {name: value for name, value in options.items() if value is not None}
+        own = {name: getattr(self, name) for name in OWN}
+        given = {
+            name: value for name, value in own.items() if value is not None and value is not False
+        }
         return Blur(
             self.method,
             shutter=shutter_,

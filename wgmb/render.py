@@ -145,7 +145,7 @@ class Render:
         if "motion" not in textures:
             motion = self._images.texture("motion", self.size, "rgba32float")
             encoder = self.blur.device.create_command_encoder(label="motion")
-            moving = {k: v for k, v in here.items() if k != "color"}
+            moving = {k: v for k, v in here.items() if k not in ("color", "normal")}
             self.blur.encode_motion(encoder, self.size, motion.create_view(), number, **moving)
             gpu.submit(self.blur.device, encoder)
             textures["motion"] = motion
@@ -182,6 +182,7 @@ class Render:
         return {
             "color": seen["color"].create_view(),
             "depth": seen["depth"].create_view(),
+            "normal": seen["normal"].create_view(),
             "object_id": seen["object"].create_view(),
             "camera": seen["camera"],
         }

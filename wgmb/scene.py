@@ -7,7 +7,6 @@ wgsl/scene/pattern.wgsl. Every function of time takes an array of times.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -18,6 +17,7 @@ from .errors import InputError
 Color = tuple[float, float, float]
 Place = Callable[[np.ndarray], np.ndarray]  # times (n,) -> world_from_body (n, 4, 4)
 SHAPES = ("sphere", "box", "cylinder")
+PATTERNS = ("PLAIN", "CHECKER", "STRIPES", "BRICKS", "DOTS")
 
 
 # ---- matrices over time ---------------------------------------------------------------------
@@ -147,8 +147,19 @@ class Scene:
         for body in self.bodies:
             if body.shape not in SHAPES:
                 raise InputError(f"shape must be one of {', '.join(SHAPES)}, got {body.shape!r}")
-            if not all(s > 0 and math.isfinite(s) for s in body.size):
+            if not all(1e-15 < s < 1e15 for s in body.size):
                 raise InputError(f"a {body.shape} needs positive sizes, got {body.size}")
+            if body.pattern not in PATTERNS:
+                raise InputError(
+                    f"pattern must be one of {', '.join(PATTERNS)}, got {body.pattern!r}"
+                )
+            looks = (*body.color, *body.other, *body.repeats, body.light, body.gloss)
+            if not _all_finite(looks):
+                raise InputError(f"a {body.shape} needs colours and lights in f32, got {looks}")
+        if not _all_finite((*self.sun, *self.sky, *self.horizon)) or not any(self.sun[:3]):
+            raise InputError(
+                f"sun and sky must be finite and somewhere, got {self.sun}, {self.sky}"
+            )
         # Bodies come by shape on the GPU; the stable order keeps indices.
         object.__setattr__(
             self, "bodies", tuple(sorted(self.bodies, key=lambda b: SHAPES.index(b.shape)))
@@ -159,6 +170,11 @@ class Scene:
     ) -> Scene:
         """The same scene, its camera moved as `Shot.orbit`, `pan` and `dolly` say."""
         values = (*orbit, *pan, dolly)
-        if not all(map(math.isfinite, values)) or not 0 < dolly <= 1000:
+        if not _all_finite(values) or not 0 < dolly <= 1000:
             raise InputError(f"orbit, pan and dolly must be finite, dolly over 0, got {values}")
         return replace(self, shot=replace(self.shot, orbit=orbit, pan=pan, dolly=dolly))
+
+
+def _all_finite(numbers) -> bool:
+    """As the GPU has them, with room for a product."""
+    return all(abs(x) < 1e30 for x in numbers)

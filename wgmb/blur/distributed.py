@@ -10,7 +10,7 @@ import wgpu
 from .. import gpu
 from ..images import Scratch
 
-TIMES = 256  # equal shares of the exposure between which times are interpolated
+TIMES = 4096  # equal shares of the exposure between which times are interpolated
 
 
 class Distributed:
@@ -38,7 +38,7 @@ class Distributed:
         kernel = gpu.kernel(self._device, "blur/distributed.wgsl", {"Output": self._output})
         data = np.zeros((), kernel.source.dtype("Progress"))
         data["first"], data["count"] = inputs.progress
-        data["seed"], data["times"] = self._seed, TIMES
+        data["seed"] = self._seed
         create = self._device.create_buffer_with_data
         width, height = inputs.given.size
         kernel.run(
