@@ -373,7 +373,7 @@ class Scene:
     ) -> Scene:
         """The same scene, its camera moved as `Shot.orbit`, `pan` and `dolly` say."""
         values = (*orbit, *pan, dolly)
-        if not all(map(math.isfinite, values)) or not 0 < dolly <= 1000:
+        if not _all_finite(values) or not 0 < dolly <= 1000:
             raise InputError(f"orbit, pan and dolly must be finite, dolly over 0, got {values}")
         return replace(self, shot=replace(self.shot, orbit=orbit, pan=pan, dolly=dolly))
 

@@ -6,17 +6,21 @@ import inspect
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import imgui_bundle
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from .. import scenes, shutter
+from ..blur import METHODS
 from ..errors import InputError
 from ..numbering import frame_numbers
+from ..pipeline import SAMPLES
 from .controls import KEYS, MOUSE, Box
 from .stage import REFERENCE_SAMPLES, Report, shutter_of
 from .state import COMPARE, REFERENCE, TONES, State, command_line
+from .subject import Option
 
 WIDTH = 320.0  # of the panel [logical px]
 _LABEL = 96.0  # of the words before a slider [logical px]
@@ -60,7 +64,7 @@ class Info:
     methods: list[str]
     looks: list[str]
     rivals: list[str]
-    options: dict[str, object]
+    options: dict[str, Option]
     frame_times: np.ndarray  # seconds, the last one last
     draw_times: np.ndarray
     passes: dict[str, float] = field(default_factory=dict)
@@ -199,35 +203,37 @@ class Panel:
         state = self._slide(state, "fps", 1, 120, "%.0f", log=True)
         return self._slide(state, "speed", 0.02, 4, "x %.2f", log=True)
 
-    def _setting(self, name: str, value: float, default) -> float:
+    def _setting(self, name: str, value, default):
+        """A parameter of the scene as it now stands."""
         self._label(name)
-        if isinstance(default, int):
-            most = max(4 * abs(default), 10)
-            _, new = imgui.slider_int(f"##set {name}", int(value), 1, most)
+        if isinstance(default, str):
+            flag = imgui.InputTextFlags_.enter_returns_true
+            changed, new = imgui.input_text(f"##set {name}", str(value), flag)
+        elif isinstance(default, int):
+            changed, new = imgui.slider_int(f"##set {name}", int(value), 1, max(4 * default, 10))
         else:
             most = max(4 * abs(default), 2.0)
-            _, new = imgui.drag_float(f"##set {name}", value, most / 300, -most, most, "%.2f")
+            step = most / 300
+            changed, new = imgui.drag_float(f"##set {name}", value, step, -most, most, "%.2f")
         self._keep(f"set {name}")
-        return new
+        return new if changed else value
 
     def _blur(self, state: State, info: Info) -> State:
         state = state.with_method(self._combo("method", state.method, info.methods))
-        state = self._slide_int(state, "samples", 1, 256)
+        state = self._samples(state)
         chosen = dict(state.options)
-        for name, choices in info.options.items():
+        for name, option in info.options.items():
             if name == "show":
                 continue  # looked at by View
-            if isinstance(choices, list):
-                now = str(chosen.get(name, choices[0]))
-                new = self._combo(name, now, choices)
-                if new != now:
-                    state = state.with_option(name, new if new != choices[0] else None)
-            elif choices is int:
-                self._label(name)
-                changed, number = imgui.input_int(f"##{name}", int(str(chosen.get(name, 0))))
-                self._keep(name)
-                if changed:
-                    state = state.with_option(name, max(number, 0) or None)
+            value: Any = chosen.get(name, option.default)
+            if option.choices:
+                word = self._combo(name, str(value), list(option.choices))
+                if word != value:
+                    state = state.with_option(name, word if word != option.default else None)
+                continue
+            changed, value = self._number(name, value, option.default)
+            if changed:
+                state = state.with_option(name, value if value != option.default else None)
         state = self._slide(state, "jitter", 0, 1, "%.2f")
         self._label("longest")
         limited, on = state.max_blur is not None, state.max_blur or 40.0
@@ -236,16 +242,47 @@ class Panel:
         imgui.same_line()
         imgui.set_next_item_width(-1)
         imgui.begin_disabled(not limit)
-        _, most = imgui.slider_float("##max_blur", on, 1, 400, "%.0f px", _LOG)
+        changed, most = imgui.slider_float("##max_blur", on, 1, 400, "%.0f px", _LOG)
         self._keep("max_blur")
         imgui.end_disabled()
-        return replace(state, max_blur=most if limit else None)
+        return replace(state, max_blur=(most if changed else on) if limit else None)
+
+    def _number(self, name: str, value, default: bool | int | float) -> tuple[bool, object]:
+        """Whether an option was changed, and to what."""
+        self._label(name.replace("_", " "))
+        if isinstance(default, bool):
+            changed, value = imgui.checkbox(f"##{name}", bool(value))
+        elif isinstance(default, int):
+            changed, value = imgui.input_int(f"##{name}", int(value))
+            value = max(value, 0)
+        else:
+            most = max(4 * default, 0.01)
+            changed, value = imgui.slider_float(f"##{name}", float(value), 0, most, "%.3f")
+        self._keep(name)
+        return changed, value
+
+    def _samples(self, state: State) -> State:
+        auto = state.samples == "auto"
+        own = getattr(METHODS[state.method], "samples", SAMPLES)
+        self._label("samples")
+        imgui.set_next_item_width(-64)
+        imgui.begin_disabled(auto)
+        now = state.samples if isinstance(state.samples, int) else own
+        changed, number = imgui.slider_int("##samples", now, 1, 256, "auto" if auto else "%d", _LOG)
+        self._keep("samples")
+        imgui.end_disabled()
+        imgui.same_line()
+        toggled, auto = imgui.checkbox("auto", auto)
+        self._keep("auto")
+        if toggled:
+            return replace(state, samples="auto" if auto else None)
+        return replace(state, samples=max(number, 1)) if changed else state
 
     def _shutter(self, state: State, info: Info) -> State:
         self._label("angle")
-        _, angle = imgui.slider_float("##shutter", state.shutter, 0, 720, "%.0f deg")
+        changed, angle = imgui.slider_float("##shutter", state.shutter, 0, 720, "%.0f deg")
         self._keep("shutter")
-        if angle != state.shutter:
+        if changed:
             state = replace(state, shutter=float(round(angle)))
         names = ["start", "centre", "end"]
         own = state.phase not in shutter.PHASES
@@ -256,9 +293,10 @@ class Panel:
             state = replace(state, phase=phase)
         else:
             self._label("")
-            _, middle = imgui.slider_float("##phase at", float(state.phase), -1, 1, "%.2f frames")
+            now = float(state.phase)
+            changed, middle = imgui.slider_float("##phase at", now, -1, 1, "%.2f frames")
             self._keep("phase at")
-            state = replace(state, phase=f"{middle:.2f}")
+            state = replace(state, phase=f"{middle:.2f}") if changed else state
         curves = list(shutter.CURVES)
         curves += [] if state.curve in curves else [state.curve]
         state = replace(state, curve=self._combo("curve", state.curve, curves))
@@ -306,10 +344,10 @@ class Panel:
         elif state.look == "velocity":
             self._label("full colour")
             height = max(info.report.full[1], 1)
-            _, fast = imgui.slider_float("##fastest", state.fastest * height, 1, height, "%.0f px",
-                                         _LOG)  # fmt: skip
+            now = state.fastest * height
+            changed, fast = imgui.slider_float("##fastest", now, 1, height, "%.0f px", _LOG)
             self._keep("fastest")
-            state = replace(state, fastest=fast / height)
+            state = replace(state, fastest=fast / height) if changed else state
         else:
             state = self._slide(state, "exposure", -8, 8, "%+.1f stops")
             state = replace(state, tone=self._combo("tone", state.tone, list(TONES)))
@@ -488,8 +526,9 @@ class Panel:
 
     def _combo(self, name: str, now: str, names: list[str], shown: str = "") -> str:
         self._label(name)
+        start, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+        self.places[name] = (start.x, start.y, wide, imgui.get_frame_height())
         opened = imgui.begin_combo(f"##{name}", shown or now)
-        self._keep(name)
         if opened:
             for item in names:
                 picked, _ = imgui.selectable(_name(item), item == now)
@@ -509,12 +548,6 @@ class Panel:
         )
         self._keep(name)
         return replace(state, **{name: value}) if changed else state
-
-    def _slide_int(self, state: State, name: str, low: int, high: int) -> State:
-        self._label(name)
-        changed, value = imgui.slider_int(f"##{name}", getattr(state, name), low, high, "%d", _LOG)
-        self._keep(name)
-        return replace(state, **{name: max(value, low)}) if changed else state
 
     def _text(self, name: str, now: str, state: State) -> str:
         self._label(name)

@@ -20,10 +20,10 @@ from ..blur import METHODS
 from ..errors import InputError
 from ..images import Images
 from ..options import ShutterOptions
-from ..pipeline import MOST_SAMPLES, Blur
+from ..pipeline import Blur
 from ..timing import Timing
 from .state import LOOKS, REFERENCE, State
-from .subject import ClipSubject, SceneSubject, Subject, methods_for, options_of
+from .subject import ClipSubject, Option, SceneSubject, Subject, methods_for, options_of
 
 REFERENCE_SAMPLES = 1024
 ENOUGH = 64  # rays of the reference before it is worth measuring against
@@ -145,7 +145,7 @@ class Stage:
         self._timing = Timing(device) if Timing.usable(device) else None
         self._worker = ThreadPoolExecutor(1, "flip")
         self._measured: tuple[tuple, Measured] | None = None
-        self._options: dict[str, dict] = {}
+        self._options: dict[str, dict[str, Option]] = {}
 
     # ---- what there is -------------------------------------------------------------------
 
@@ -163,7 +163,7 @@ class Stage:
         """Names of the methods that can be used."""
         return methods_for(self.subject(state).has)
 
-    def options(self, method: str) -> dict:
+    def options(self, method: str) -> dict[str, Option]:
         """The method's own options; see `options_of`."""
         if method not in self._options:
             self._options[method] = options_of(self.device, method)
@@ -174,8 +174,7 @@ class Stage:
         has = self.subject(state).has
         needs = {"depth": "depth", "velocity": "motion", "error": "scene"}
         looks = [look for look in LOOKS if needs.get(look, "color") in has]
-        shows = self.options(state.method).get("show", ())
-        return looks + [show for show in shows if show != "color"]
+        return looks + self._shows(state)
 
     def rivals(self, state: State) -> list[str]:
         """What the result can be compared with."""
@@ -288,7 +287,9 @@ class Stage:
         return f"{state.method}: {name}" if name in self._shows(state) else name
 
     def _shows(self, state: State) -> list[str]:
-        return self.options(state.method).get("show", [])
+        """What the method can show of its inner life instead of its result."""
+        show = self.options(state.method).get("show")
+        return [word for word in show.choices if word != show.default] if show else []
 
     def _blur(self, name: str, state: State, quick: bool) -> Blur:
         """The compiled method called `name`, kept for the next time it is asked for."""
@@ -303,14 +304,14 @@ class Stage:
         if method not in (allowed := self.methods(state)):
             raise InputError(f"method {method!r} cannot be used here, only {', '.join(allowed)}")
         if quick and "scene" in METHODS[method].needs:
-            samples = min(samples, QUICK)
+            samples = min(samples, QUICK) if isinstance(samples, int) else QUICK
         key = (name == REFERENCE, method, samples, state.jitter, state.max_blur, *options.items())
         if key not in self._blurs:
             while len(self._blurs) >= 12:
                 del self._blurs[next(iter(self._blurs))]
             self._blurs[key] = Blur(
                 method,
-                samples=min(samples, MOST_SAMPLES),
+                samples=samples,
                 jitter=state.jitter,
                 max_blur=state.max_blur,
                 device=self.device,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import typing
 from collections import OrderedDict
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -14,10 +17,11 @@ from ..blur import METHODS
 from ..errors import InputError
 from ..frame import Frame
 from ..images import Images
-from ..options import BlurOptions, InputOptions, SceneOptions, size_of
+from ..options import OWN, BlurOptions, InputOptions, SceneOptions, size_of
 from ..pipeline import Blur
 from ..render import Render
 from ..timing import Timing
+from ..velocity import Moving
 from .state import State
 
 _FRAMES_KEPT = 16
@@ -44,7 +48,7 @@ class SceneSubject:
         seen = (state.source, state.settings, state.orbit, state.pan, state.dolly)
         if seen != self._seen:
             given = SceneOptions(
-                set=tuple(f"{name}={value:g}" for name, value in state.settings),
+                set=state.set_arguments(),
                 orbit=state.orbit,
                 pan=state.pan,
                 dolly=state.dolly,
@@ -73,7 +77,9 @@ class ClipSubject:
 
     def __init__(self, device: wgpu.GPUDevice, state: State):
         self._device, self._images = device, Images(device)
-        self._clip = InputOptions(**dict(state.given)).open(state.source)  # pyright: ignore
+        given: dict[str, Any] = dict(state.given)
+        masks = given.pop("keep", None), given.pop("scale", None)
+        self._clip = InputOptions(**given).open(state.source, *masks)
         self._frames: OrderedDict[int, Frame] = OrderedDict()
         self._sharp = Blur(device=device)
         self._number = self._clip.numbers[0]
@@ -117,7 +123,7 @@ class ClipSubject:
             found["depth"] = images.texture("depth", frame.size, "r32float")
         if "motion" in frame.has:
             motion = images.texture("motion", frame.size, "rgba32float")
-            moving = {k: v for k, v in inputs.items() if k not in _NOT_MOVING}
+            moving = {k: v for k, v in inputs.items() if k in _MOVING}
             encoder = self._device.create_command_encoder(label="motion")
             self._sharp.encode_motion(encoder, frame.size, motion.create_view(), **moving)
             gpu.submit(self._device, encoder)
@@ -138,7 +144,7 @@ class ClipSubject:
         return blur.samples
 
 
-_NOT_MOVING = ("size", "color", "keep", "check", "number", "neighbours")
+_MOVING = {f.name for f in fields(Moving)}
 Subject = SceneSubject | ClipSubject
 
 
@@ -147,24 +153,38 @@ def methods_for(has: frozenset[str]) -> list[str]:
     return [name for name, method in METHODS.items() if method.needs <= has]
 
 
-def options_of(device: wgpu.GPUDevice, method: str) -> dict[str, object]:
-    """The method's own options: the values one can choose from, or the default's type."""
+@dataclass(frozen=True)
+class Option:
+    """What one option of a method is by default, and the words one can choose from."""
+
+    default: Any
+    choices: tuple[str, ...] = ()
+
+
+def options_of(device: wgpu.GPUDevice, method: str) -> dict[str, Option]:
+    """The method's own options, those that the command line has."""
     kinds = typing.get_type_hints(BlurOptions)
-    found: dict[str, object] = {}
-    for name, parameter in inspect.signature(METHODS[method]).parameters.items():
-        if name in ("device", "output"):
+    found: dict[str, Option] = {}
+    known = inspect.signature(METHODS[method]).parameters
+    for name, parameter in known.items():
+        if name not in OWN:
             continue
-        literals = [a for kind in typing.get_args(kinds.get(name)) for a in typing.get_args(kind)]
-        if isinstance(parameter.default, str):
-            found[name] = [v for v in literals if _takes(device, method, name, v)]
-        else:
-            found[name] = type(parameter.default)
+        forms = _words(kinds["form"]) if "form" in known else ()
+        taken = tuple(w for w in _words(kinds[name]) if _takes(device, method, name, w, forms))
+        if taken or isinstance(parameter.default, (bool, int, float)):
+            found[name] = Option(parameter.default, taken)
     return found
 
 
-def _takes(device: wgpu.GPUDevice, method: str, name: str, value: str) -> bool:
-    try:
-        METHODS[method](device, **{name: value})
-    except InputError:
-        return False
-    return True
+def _words(kind) -> tuple[str, ...]:
+    """Of `Literal[...] | None`."""
+    return tuple(word for part in typing.get_args(kind) for word in typing.get_args(part))
+
+
+def _takes(device, method: str, name: str, word: str, forms: tuple[str, ...]) -> bool:
+    """Whether the option can be `word`, in one of the method's forms at least."""
+    for form in ({}, *({"form": form} for form in forms if name != "form")):
+        with contextlib.suppress(InputError):
+            METHODS[method](device, **{**form, name: word})
+            return True
+    return False
