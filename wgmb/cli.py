@@ -8,10 +8,13 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import shlex
 import signal
 import sys
 import time
 import warnings
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -20,11 +23,14 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from . import __version__, gpu, scenes
+from . import __version__, compare, gpu, scenes
+from . import report as report_
 from .errors import DeviceError, Error, InputError
+from .experiments import EXPERIMENTS
 from .info import describe
 from .options import (
     BlurOptions,
+    CompareOptions,
     InputOptions,
     OutputOptions,
     SceneOptions,
@@ -287,6 +293,116 @@ def devices() -> int:
     if chosen is None:
         gpu.choose_adapter()  # says why
     return DONE
+
+
+@app.command(name="compare")
+def compare_(
+    *scene: str,
+    output: Annotated[Path, Parameter(alias="-o")],
+    who: CompareOptions | None = None,
+    when: ShutterOptions | None = None,
+    given: InputOptions | None = None,
+    size: str = "480x270",
+    time: float = 0.0,
+    rays: int = 3,
+    truth: Path | None = None,
+    inputs: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    frame: int | None = None,
+    peer: tuple[str, ...] = (),
+    experiment: str | None = None,
+    adapter: str | None = None,
+    overwrite: bool = False,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+) -> int:
+    """Judge and time methods against a truth; writes a page, and JSON and CSV beside it.
+
+    Example: wgmb compare crossing fence:speed=5 --methods tap,reproject -o report.html
+
+    Example: wgmb compare --truth t.exr --inputs 'shot.####.exr' --frame 2 -o report.html
+
+    Parameters
+    ----------
+    scene
+        Built-in scenes, NAME[:SETTING=VALUE]...
+    output
+        The page, .html.
+    size
+        Of scenes' pictures.
+    time
+        Moment of the scenes in seconds.
+    rays
+        Antialiasing of scenes' sharp frames: rays a pixel's side.
+    truth
+        What the blurred frame should look like.
+    inputs
+        Rendered frames: a pattern, or the files of the frame before, this one and the next.
+    frame
+        Number of the pattern's frame that the truth shows.
+    peer
+        NAME=FILE: another program's picture of it; may be repeated.
+    experiment
+        Repeat a paper's experiment instead: taylor, chen or rosado.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    overwrite
+        Replace files that exist.
+    quiet
+        Print errors only.
+    """
+    who, when, given = who or CompareOptions(), when or ShutterOptions(), given or InputOptions()
+    pages = [output.with_suffix(suffix) for suffix in (".html", ".json", ".csv")]
+    if output.suffix != ".html":
+        raise InputError(f"output must be a page such as report.html, got {output}")
+    for file in pages:
+        if file.exists() and not overwrite:
+            raise InputError(f"{file} exists; --overwrite replaces it")
+    if (truth is None) != (not inputs) or bool(scene) + bool(inputs) + bool(experiment) != 1:
+        raise InputError("give scenes, or --truth with --inputs, or --experiment")
+    device = gpu.open_device(adapter)
+    say = Console(stderr=True, highlight=False, soft_wrap=True)
+
+    def tell(text: str) -> None:
+        if not quiet:
+            say.print(text, markup=False)
+
+    lab = compare.Laboratory(device, rounds=who.rounds, tell=tell)
+    report = compare.Report("", _command_line(), compare.machine(device), who.samples)
+    wanted, contenders = size_of(size), who.contenders()
+    steps, budgets = who.steps(), who.budgets()
+    if experiment:
+        if experiment not in EXPERIMENTS:
+            known = ", ".join(EXPERIMENTS)
+            raise InputError(f"experiment must be one of {known}, got {experiment!r}")
+        report.title = f"{experiment.capitalize()}'s experiment"
+        EXPERIMENTS[experiment](lab, report, wanted)
+        report_.write(report, output)
+        tell(f"-> {output}")
+        return DONE
+    reference = compare.Contender.parse(who.reference)
+    peers = {name: Path(file) for name, _, file in (p.partition("=") for p in peer)}
+    cases: list[Callable[[], compare.Case]] = []
+    for degrees, shutter in who.exposures(when).items():
+        for name, made in map(compare.make_scene, scene):
+            staged = compare.Staged(made, time, wanted, rays=rays)
+            cases.append(partial(compare.scene_case, f"{name}, {degrees}", shutter, reference,
+                                 staged, device, tell))  # fmt: skip
+        if truth is not None and inputs:
+            cases.append(partial(compare.clip_case, f"{truth.parent.name or truth.stem}, {degrees}",
+                                 shutter, inputs, frame, truth, peers, given.open))  # fmt: skip
+    able = contenders if who.methods or scene else [c for c in contenders if not c.needs_scene]
+    for make in cases:
+        case = make()
+        lab.compare(report, case, able, steps, budgets)
+        if found := compare.crossings(report, case):
+            report.tables.append(found)
+    report.title = "Motion blur compared: " + ", ".join(c.name for c in report.cases)
+    report_.write(report, output)
+    tell(f"-> {output}")
+    return DONE
+
+
+def _command_line() -> str:
+    return shlex.join(["wgmb", *sys.argv[1:]])
 
 
 @app.command

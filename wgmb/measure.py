@@ -16,6 +16,8 @@ from .errors import InputError
 
 TILE = 16  # [px] where `energy_error` adds light up
 _SSIM_SIGMA, _SSIM_REACH = 1.5, 5  # Wang et al. 2004: 11 x 11 Gaussian window
+FLIP_GAIN = 3.0  # of error maps, which would be dark
+_HEAT = ((0, 0, 0), (0.33, 0.06, 0.45), (0.8, 0.2, 0.3), (0.98, 0.6, 0.2), (1, 1, 0.8))
 _LUMA = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709
 
 
@@ -62,12 +64,14 @@ def flip(picture: np.ndarray, truth: np.ndarray) -> float:
     P. Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", 2020: what a
     viewer sees when the two alternate, at 67 pixels a degree.
     """
-    return _flip(picture, truth, colors=False)[1]
+    return _flip(picture, truth)[1]
 
 
-def flip_colors(picture: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """(height, width, 3) 0..1, display values: FLIP of every pixel, dark is alike."""
-    return _flip(picture, truth, colors=True)[0]
+def flip_colors(picture: np.ndarray, truth: np.ndarray, gain: float = FLIP_GAIN) -> np.ndarray:
+    """(height, width, 3) 0..1, display values: `gain` times FLIP, from black over red to white."""
+    error = np.clip(gain * _flip(picture, truth)[0][..., 0], 0, 1)
+    where, colors = np.linspace(0, 1, len(_HEAT)), np.array(_HEAT).T
+    return np.dstack([np.interp(error, where, channel) for channel in colors]).astype(np.float32)
 
 
 def energy_error(picture: np.ndarray, truth: np.ndarray) -> float:
@@ -164,12 +168,11 @@ def _window(planes: np.ndarray) -> np.ndarray:
     return planes
 
 
-def _flip(picture, truth, colors: bool) -> tuple[np.ndarray, float]:
+def _flip(picture, truth) -> tuple[np.ndarray, float]:
     try:
         from flip_evaluator import evaluate  # pyright: ignore[reportMissingImports]
     except ImportError:
         raise InputError("FLIP is missing: pip install 'wgmb[compare]'") from None
     a, b = _pair(picture, truth, display)
-    shown = [np.ascontiguousarray(p, np.float32) for p in (b, a)]
-    image, mean, _ = evaluate(*shown, "LDR", applyMagma=colors)
+    image, mean, _ = evaluate(b.astype(np.float32), a.astype(np.float32), "LDR", applyMagma=False)
     return np.asarray(image), float(mean)

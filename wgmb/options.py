@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,6 +11,8 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from . import sequence, shutter, vectors
+from .blur import METHODS
+from .compare import Case, Contender, Report
 from .errors import InputError
 from .numbering import frame_numbers
 from .pipeline import Blur
@@ -18,6 +21,7 @@ _IN = Group("Input", sort_key=1)
 _LOOK = Group("Blur", sort_key=2)
 _SHUTTER = Group("Shutter", sort_key=3)
 _OUT = Group("Output", sort_key=4)
+_WHO = Group("Compare", sort_key=2)
 
 
 @Parameter(name="*", group=_SHUTTER)
@@ -190,6 +194,55 @@ class SceneOptions:
         if self.frames is None:
             return {0: self.time or 0.0}
         return {n: n / fps for n in frame_numbers(self.frames)}
+
+
+@Parameter(name="*", group=_WHO)
+@dataclass(frozen=True, kw_only=True)
+class CompareOptions:
+    """Who is compared, and how."""
+
+    methods: str | None = None
+    "NAME[:SAMPLES][:OPTION=VALUE]..., separated by commas; all by default."
+    reference: str = "distributed:1024"
+    "What renders the truth of scenes."
+    samples: int = 16
+    "Of every method, where samples are equal."
+    ladder: str = "4,8,16,32,64"
+    "Numbers of samples for the curves."
+    budget: float | None = None
+    "Milliseconds where time is equal; by default those of the slowest method of pictures."
+    shutters: str | None = None
+    "Several in degrees, such as 90,180,360, instead of --shutter."
+    rounds: int = 3
+    "How often everything is timed; the least counts."
+
+    def contenders(self) -> list[Contender]:
+        """Who takes part."""
+        return [Contender.parse(text) for text in (self.methods or ",".join(METHODS)).split(",")]
+
+    def steps(self) -> list[int]:
+        """Numbers of samples."""
+        try:
+            return [int(n) for n in self.ladder.split(",")]
+        except ValueError:
+            raise InputError(f"ladder must be like 4,8,16, got {self.ladder!r}") from None
+
+    def budgets(self) -> Callable[[Report, Case], list[float]] | None:
+        """The times that everyone is to fit [s], if they are asked for."""
+        if self.budget is None:
+            return None
+        if not self.budget > 0:
+            raise InputError(f"budget must be over 0 ms, got {self.budget}")
+        seconds = self.budget / 1e3
+        return lambda report, case: [seconds]
+
+    def exposures(self, when: ShutterOptions) -> dict[str, shutter.Shutter]:
+        """The shutters, by what to call them."""
+        try:
+            degrees = [float(d) for d in (self.shutters or str(when.shutter)).split(",")]
+        except ValueError:
+            raise InputError(f"shutters must be like 90,180, got {self.shutters!r}") from None
+        return {f"{d:g}°": replace(when, shutter=d).make() for d in degrees}
 
 
 def size_of(text: str) -> tuple[int, int]:

@@ -224,7 +224,7 @@ class Blur:
         self._require(frame.has)
         output = self._images.texture("output", frame.size, self.output)
         encoder = self.device.create_command_encoder(label="wgmb")
-        self.encode(encoder, output=output.create_view(), **self._upload(frame))
+        self.encode(encoder, output=output.create_view(), **self.upload(frame))
         return self._images.download(encoder, output)[..., : frame.color.shape[2]].astype(
             "f4", copy=False
         )
@@ -241,8 +241,11 @@ class Blur:
         self._velocity.encode(encoder, given, moving, limited, motion.create_view())
         return self._images.download(encoder, motion)
 
-    def _upload(self, frame: Frame) -> dict:
-        """The frame's arrays as textures, under the names that `encode` takes."""
+    def upload(self, frame: Frame) -> dict:
+        """The frame's arrays as textures, under the names that `encode` takes.
+
+        They are kept: the next frame's go into the same textures.
+        """
         rgba, four = self._rgba(frame)
         return {
             "size": frame.size,
