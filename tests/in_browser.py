@@ -19,7 +19,7 @@ ACT = """<script>
 addEventListener("load", () => {
   const said = [], is = (what, ok) => said.push((ok ? "ok " : "FAILED ") + what);
   const all = selector => [...document.querySelectorAll(selector)];
-  is("pictures are there", all(".card img").length > 0
+  is("pictures are there", all(".card img").length > 0 === all(".viewer").length > 0
     && all("img").every(i => i.complete && i.naturalWidth > 0));
   for (const viewer of all(".viewer")) {
     const range = viewer.querySelector("[type=range]"), left = viewer.querySelector("img.left");

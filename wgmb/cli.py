@@ -25,6 +25,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from . import __version__, compare, gpu, scenes
 from . import report as report_
+from .blur import METHODS
 from .errors import DeviceError, Error, InputError
 from .experiments import EXPERIMENTS
 from .info import describe
@@ -36,9 +37,9 @@ from .options import (
     SceneOptions,
     ShutterOptions,
     size_of,
+    whole_numbers,
 )
 from .output import Output
-from .pipeline import Blur
 from .render import Render, render_frames
 from .run import Report, blur_sequence
 
@@ -408,36 +409,59 @@ def _command_line() -> str:
 @app.command
 def bench(
     *,
-    method: str = "tap",
-    samples: int = 16,
+    methods: str | None = None,
+    samples: str = "16",
     size: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     rounds: int = 9,
+    output: Annotated[Path | None, Parameter(alias="-o")] = None,
+    save: Path | None = None,
+    against: Path | None = None,
     adapter: str | None = None,
 ) -> int:
-    """Time a method on this machine: median milliseconds a frame.
+    """Time methods on this machine: median milliseconds a frame, transfers apart.
 
-    Example: wgmb bench --size 1920x1080 3840x2160 --samples 16
+    Example: wgmb bench --methods tap,reproject --size 960x540 1920x1080 --samples 4,16,64
 
     Parameters
     ----------
+    methods
+        NAME[:OPTION=VALUE]..., separated by commas; all that blur rendered frames by default.
+    samples
+        Numbers of samples, separated by commas.
     size
         Pictures to time it on; 1920x1080 by default.
     rounds
         How often everything is done.
+    output
+        A page with tables and plots, .html; JSON and CSV beside it.
+    save
+        Keep the figures, for --against.
+    against
+        Compare with figures kept earlier.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
     """
     from . import bench as measure
 
-    blur = Blur(method, samples=samples, device=adapter)
-    sys.stdout.write(f"{blur.device.adapter.summary}, {method}, {samples} samples\n")
-    for text in size or ["1920x1080"]:
-        width, height = size_of(text)
-        found = measure.bench(blur, width, height, rounds)
-        sys.stdout.write(f"{width} x {height}\n")
-        for name, milliseconds in found.items():
-            each = 1e6 * milliseconds / (width * height)
-            sys.stdout.write(f"  {name:24}{milliseconds:9.2f} ms {each:8.1f} ns a pixel\n")
-        if "numba" in found:
-            sys.stdout.write(f"  gpu / numba{found['gpu'] / found['numba']:22.2f}\n")
+    every = map(compare.Contender, METHODS)
+    contenders = (
+        [compare.Contender.parse(text) for text in methods.split(",")]
+        if methods
+        else [c for c in every if not c.needs_scene]
+    )
+    counts = whole_numbers("samples", samples)
+    sizes = [size_of(text) for text in size or ["1920x1080"]]
+    before = measure.Bench.load(against) if against else None
+    run = measure.bench(gpu.open_device(adapter), contenders, sizes, counts, rounds)
+    sys.stdout.write(measure.text(run))
+    if before:
+        table = measure.against(run, before)
+        for row in (table.columns, *table.rows):
+            sys.stdout.write("".join(f"{cell!s:>20}" for cell in row) + "\n")
+    if output:
+        report_.write(measure.report(run, _command_line(), before), output)
+    if save:
+        run.save(save)
     return DONE
 
 

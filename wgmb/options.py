@@ -222,10 +222,7 @@ class CompareOptions:
 
     def steps(self) -> list[int]:
         """Numbers of samples."""
-        try:
-            return [int(n) for n in self.ladder.split(",")]
-        except ValueError:
-            raise InputError(f"ladder must be like 4,8,16, got {self.ladder!r}") from None
+        return whole_numbers("ladder", self.ladder)
 
     def budgets(self) -> Callable[[Report, Case], list[float]] | None:
         """The times that everyone is to fit [s], if they are asked for."""
@@ -243,6 +240,14 @@ class CompareOptions:
         except ValueError:
             raise InputError(f"shutters must be like 90,180, got {self.shutters!r}") from None
         return {f"{d:g}°": replace(when, shutter=d).make() for d in degrees}
+
+
+def whole_numbers(name: str, text: str) -> list[int]:
+    """`4,8,16` -> numbers."""
+    try:
+        return [int(n) for n in text.split(",")]
+    except ValueError:
+        raise InputError(f"{name} must be like 4,8,16, got {text!r}") from None
 
 
 def size_of(text: str) -> tuple[int, int]:

@@ -18,7 +18,7 @@ class Timing:
     around a submit is the only honest clock, and `Timing.usable` says so.
     """
 
-    MOST = 64  # passes a frame
+    MOST = 2048  # passes a frame; what has more is not timed by pass
 
     def __init__(self, device: wgpu.GPUDevice):
         self.device, self.labels = device, []
@@ -30,10 +30,12 @@ class Timing:
         hardware = device.adapter_info["adapter_type"] != SOFTWARE
         return hardware and "timestamp-query" in device.features
 
-    def of(self, label: str) -> dict:
-        """The `timestamp_writes` of the pass called `label`."""
+    def of(self, label: str) -> dict | None:
+        """The `timestamp_writes` of the pass called `label`; None if there are too many."""
         first = 2 * len(self.labels)
         self.labels.append(label)
+        if len(self.labels) > self.MOST:
+            return None
         return {
             "query_set": self.queries,
             "beginning_of_pass_write_index": first,
@@ -41,7 +43,12 @@ class Timing:
         }
 
     def read(self) -> dict[str, float]:
-        """Seconds per pass, after the work was submitted; passes of one name are added up."""
+        """Seconds per pass, after the work was submitted; passes of one name are added up.
+
+        Nothing if there were none, or more than MOST.
+        """
+        if not 0 < len(self.labels) <= self.MOST:
+            return {}
         usage = wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
         buffer = self.device.create_buffer(size=16 * len(self.labels), usage=usage)
         encoder = self.device.create_command_encoder()
