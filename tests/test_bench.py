@@ -101,3 +101,13 @@ def test_wrong_usage_is_one_line_and_2(capsys, options):
     code, out, err = make.inside(capsys, "bench", *options.split())
     assert (code, out) == (2, "")
     assert err.startswith("wgmb: ") and err.count("\n") == 1
+
+
+def test_passes_are_told_where_the_clock_is_believed(device, monkeypatch):
+    monkeypatch.setattr(bench.Timing, "usable", lambda device: True)
+    run = bench.bench(device, [Contender("tap"), Contender("reproject")], SIZES[:1], (64,), 1)
+    for figure in run.figures:
+        assert figure.passes
+        assert all(v >= 0 for v in figure.passes.values())
+    titles = [t.title for t in bench.report(run, "").tables]
+    assert titles == ["Every method", "Every pass"]

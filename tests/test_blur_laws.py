@@ -237,6 +237,23 @@ def test_a_lone_good_pixel_fills_its_bad_neighbours(method):
     assert not out[0].any()
 
 
+@pytest.mark.parametrize("curve", ["box", "cosine"])
+def test_auto_takes_as_many_samples_as_it_needs(method, noise, curve):
+    """7.5 px of streak, a little jitter: as good as 64 samples to a pixel's own share of it."""
+    smooth = np.repeat(np.repeat(noise[::4, ::4], 4, axis=0), 4, axis=1)
+    shutter = Shutter(180, curve=curve)
+    auto, all_ = (
+        blurred(smooth, moving(smooth, 15), samples=n, shutter=shutter, method=method)
+        for n in ("auto", 64)
+    )
+    few = blurred(smooth, moving(smooth, 15), samples=2, shutter=shutter, method=method)
+    assert np.abs(auto - all_).mean() < 0.15 * np.abs(few - all_).mean()
+
+
+def test_auto_leaves_what_stands_still_to_the_bit(method, noise):
+    assert np.array_equal(blurred(noise, moving(noise, 0), samples="auto", method=method), noise)
+
+
 def test_missing_inputs_are_named(method, noise):
     with pytest.raises(wgmb.InputError, match=r"needs .*motion"):
         wgmb.blur(noise, method=method)

@@ -1,12 +1,16 @@
 """Every kernel against its slow, obvious twin; the largest differences measured are 5e-5."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import wgmb
+from twins import fusion as fusion_twin
 from twins import keep as keep_twin
 from twins import reproject as reproject_twin
 from twins import tap as tap_twin
+from twins import tiles as tiles_twin
 from twins import velocity as velocity_twin
 from wgmb import Camera, Reprojections, Shutter
 
@@ -46,6 +50,20 @@ def test_straight_taps_are_their_twin(close, size, samples):
     close(got, tap_twin.tap(color, motion, times, curved=False), TOLERANCE)
 
 
+@pytest.mark.parametrize("curve", ["box", "triangle"])
+def test_auto_taps_are_their_twin(close, curve):
+    """One a pixel of streak from opening to closing, two at least."""
+    color, motion = pictures((17, 23), speed=15.0)
+    motion[..., 2:] = -motion[..., :2]
+    shutter = Shutter(360, curve=curve)
+    want = np.zeros(color.shape)
+    for y, x in np.ndindex(color.shape[:2]):
+        count = int(np.clip(np.ceil(np.hypot(*motion[y, x, 2:])), 2, 64))
+        times = shutter.time((np.arange(count) + 0.5) / count)
+        want[y, x] = tap_twin.pixel(color, motion, x, y, times)
+    close(wgmb.blur(color, motion=motion, shutter=shutter, samples="auto"), want, 1e-3)
+
+
 @pytest.mark.parametrize("size", SIZES)
 def test_the_published_form_is_its_twin(close, size):
     color, motion = pictures(size)
@@ -72,13 +90,83 @@ def test_jittered_taps_are_their_twin(close, curve):
     color, motion = pictures((17, 23))
     shutter, number = Shutter(360, "start", curve), 5
     got = wgmb.blur(color, motion=motion, shutter=shutter, samples=3, jitter=0.8, number=number)
-    want = np.zeros(color.shape)
+    want, noise = np.zeros(color.shape), noise_of((17, 23), number)
     for y, x in np.ndindex(color.shape[:2]):
-        at = 0.06711056 * (x + 5.588238 * number) + 0.00583715 * (y + 5.588238 * number)
-        shift = 0.8 * (52.9829189 * (at % 1) % 1 - 0.5)
+        shift = 0.8 * (noise[y, x] - 0.5)
         times = shutter.sample_times(3, shift).astype(float)
         want[y, x] = tap_twin.pixel(color, motion, x, y, times)
     close(got, want, 2e-4)
+
+
+def depths(size, seed=0):
+    depth = np.random.default_rng(seed).uniform(1, 9, size).astype("f4")
+    depth[::5, ::7] = np.inf
+    return depth
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("shutter", SHUTTERS)
+def test_fusion_is_its_twin(close, size, shutter):
+    color, motion = pictures(size, speed=4.0)
+    motion[::3] *= 0.05
+    depth = depths(size)
+    got = wgmb.blur(color, motion=motion, depth=depth, shutter=shutter, samples=5, method="fusion")
+    times, middle = shutter.sample_times(5).astype(float), float(shutter.time(np.array(0.5)))
+    want = fusion_twin.fusion(color, motion, depth, times, middle, (0.08, 0.04),
+                              span=shutter.span, delay=shutter.delay)  # fmt: skip
+    close(got, want, TOLERANCE)
+
+
+@pytest.mark.parametrize("form", ["shutter", "published"])
+@pytest.mark.parametrize("weights, tau", [("published", 0.5), ("normalised", 1.0),
+                                          ("published", 0.9), ("normalised", 0.7)])  # fmt: skip
+def test_every_form_of_fusion_is_its_twin(close, form, weights, tau):
+    color, motion = pictures((24, 33))
+    motion[::4, ::3] = 0
+    depth = depths((24, 33))
+    got = wgmb.blur(color, motion=motion, depth=depth, method="fusion", form=form, weights=weights,
+                    tau=tau, alpha_front=0.1, alpha_back=0.02)  # fmt: skip
+    times, span = Shutter(180).sample_times(8).astype(float), (-0.25, 0.25)
+    if form == "published":
+        times, span = (np.arange(8) - 7) / 16, None
+    want = fusion_twin.fusion(color, motion, depth, times, 0.0, (0.1, 0.02), span=span,
+                              printed=weights == "published", tau=tau)  # fmt: skip
+    close(got, want, TOLERANCE)
+
+
+def test_fusion_of_kept_pixels_by_normals_is_its_twin(close):
+    size = (24, 33)
+    color, motion = pictures(size)
+    rng = np.random.default_rng(4)
+    normal = rng.normal(size=(*size, 3)).astype("f4")
+    normal[::6] = 0
+    keep = (rng.random(size) < 0.2).astype("f4")
+    around = Reprojections(camera((0, 0, 0), 0.7, 0.3), camera((0, 0, 0)))
+    depth = np.minimum(depths(size), 9)
+    got = wgmb.blur(color, motion=motion, depth=depth, normal=normal, camera=around,
+                    keep=keep, method="fusion")  # fmt: skip
+    view = around.here.view_from_world[:3, :3]
+    seen = (normal @ view.T) * (1, -1, 1)
+    lifted, weight = keep_twin.before(color, keep)
+    times = Shutter(180).sample_times(8).astype(float)
+    blurred = fusion_twin.fusion(lifted, motion, depth, times, 0.0, (0.08, 0.04),
+                                 span=(-0.25, 0.25), normal=seen, weight=weight)  # fmt: skip
+    close(got, keep_twin.after(color, keep, blurred), 5e-4)
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_fusion_by_depth_after_projection_is_that_by_planar_depth(close, orthographic):
+    size = (24, 33)
+    color, motion = pictures(size)
+    planar = np.random.default_rng(8).uniform(1, 9, size).astype("f4")
+    here = camera((1, 2, 3), 0.7, 0.3, orthographic=orthographic)
+    clip = (0.02 * planar - 1) if orthographic else (1.02 - 0.2 / planar)
+    a, b = (
+        wgmb.blur(color, motion=motion, depth=depth.astype("f4"), method="fusion",
+                  camera=Reprojections(here, here, depth_kind=kind))
+        for kind, depth in (("planar", planar), ("clip", clip))
+    )  # fmt: skip
+    close(a, b, 0)
 
 
 @pytest.mark.parametrize("neighbours", [False, True])
@@ -107,6 +195,99 @@ def test_reproject_is_its_twin(size, neighbours):
     assert np.array_equal(np.rint(4 * share), count)
     wrong = (np.abs(got - want) > TOLERANCE).any(axis=2)
     assert wrong.mean() < 0.01
+
+
+@pytest.mark.parametrize(
+    "form, depths, speed",
+    [("even", True, 6.0), ("even", False, 60.0), ("published", True, 60.0)],
+)
+def test_tiles_is_its_twin(form, depths, speed):
+    """Taps that land on a texel's edge may read the next one; all other pixels agree."""
+    size = (44, 84)  # tiles of 40 px: two rows, three columns
+    color, motion = pictures(size, speed)
+    motion[:, 20:60] *= 0.02
+    depth = np.random.default_rng(4).uniform(1, 9, size).astype("f4") if depths else None
+    shutter = Shutter(300, "start", "triangle")
+    got = wgmb.blur(color, motion=motion, depth=depth, method="tiles", shutter=shutter, samples=5,
+                    number=2, form=form)  # fmt: skip
+    times = shutter.sample_times(5).astype(float)
+    want = tiles_twin.tiles(
+        color, motion, depth, times, shutter.span, noise_of(size, 2), 40, form == "published"
+    )
+    wrong = (np.abs(got - want) > 1e-3).any(axis=2)
+    assert wrong.mean() < 0.01
+
+
+def noise_of(size, number):
+    """Interleaved gradient noise (Jimenez 2014)."""
+    y, x = np.mgrid[: size[0], : size[1]]
+    at = 0.06711056 * (x + 5.588238 * number) + 0.00583715 * (y + 5.588238 * number)
+    return 52.9829189 * (at % 1) % 1
+
+
+def published_pair(size, speed=3.0):
+    """Two frames' colours, motions and depths, and the Frame of the second one."""
+    frames = [(*pictures(size, speed, seed), depths(size, seed)) for seed in (0, 1)]
+    prev = wgmb.Frame(frames[1][0], motion=frames[1][1], depth=frames[1][2])
+    color, motion, depth = frames[0]
+    return frames, wgmb.Frame(color, motion=motion, depth=depth, prev=prev)
+
+
+def agree(got, want, few=0.01):
+    """Samples that lie on the border of two pixels to a hair may go to either."""
+    assert np.isfinite(got).all()
+    assert (np.abs(got - want) > TOLERANCE).any(axis=2).mean() <= few
+
+
+@pytest.mark.parametrize("options", [{}, {"depth_test": True}, {"splat": "line"}])
+@pytest.mark.parametrize("size", [(24, 32), (17, 23), (1, 1), (3, 130)])
+def test_published_reprojection_along_vectors_is_its_twin(size, options):
+    frames, frame = published_pair(size)
+    movers = [
+        (color, reproject_twin.along(motion, depth, sign))
+        for sign, (color, motion, depth) in zip((-1, 1), frames, strict=True)
+    ]
+    flags = {"nearest": "depth_test" in options, "line": "splat" in options}
+    want, count = reproject_twin.published(frame.color, 4, movers, **flags)
+    blur = [
+        wgmb.Blur("reproject", form="published", samples=4, show=show, **options)
+        for show in ("color", "count")
+    ]
+    agree(blur[0](frame), want)
+    agree(blur[1](frame)[..., :1], count[..., None])
+
+
+@pytest.mark.parametrize("options", [{}, {"depth_test": True}, {"splat": "line"}, {"facing": True},
+                                     {"facing": True, "splat": "line"}])  # fmt: skip
+@pytest.mark.parametrize("normals", [True, False])
+def test_published_reprojection_by_cameras_is_its_twin(options, normals):
+    size = (20, 30)
+    rng = np.random.default_rng(5)
+    y, x = np.mgrid[: size[0], : size[1]]
+    way = [camera((0.9, 0.1, -0.3), 0.25, 0.02, 0.1), camera((0, 0, 0))]
+    kinds, frames, movers = [way[1], way[0]], [], []
+    for here, there in (kinds, kinds[::-1]):
+        color = rng.random((*size, 4)).astype("f4")
+        depth = (3 + np.sin(x / 3) + np.cos(y / 2) + 0.1 * rng.random(size)).astype("f4")
+        normal = rng.normal(size=(*size, 3)).astype("f4")
+        normal[0] = 0
+        around = Reprojections(here, there if here is way[1] else None,
+                               there if here is way[0] else None)  # fmt: skip
+        frames.append(wgmb.Frame(color, depth=depth, camera=around,
+                                 normal=normal if normals else None))  # fmt: skip
+        mover = reproject_twin.by_camera(depth, normal if normals else None, here, there,
+                                         "facing" in options)  # fmt: skip
+        movers.append((color, mover))
+    flags = {"nearest": "depth_test" in options, "line": "splat" in options}
+    want, count = reproject_twin.published(frames[0].color, 3, movers, **flags)
+    frame = replace(frames[0], prev=frames[1])
+    for show, twin in (("color", want), ("count", count[..., None])):
+        got = wgmb.Blur("reproject", form="published", samples=3, show=show, **options)(frame)
+        agree(got if show == "color" else got[..., :1], twin, 0.02)
+    if "facing" in options:
+        plain = {k: v for k, v in options.items() if k != "facing"}
+        free = wgmb.Blur("reproject", form="published", samples=3, show="count", **plain)(frame)
+        assert free[..., 0].mean() > count.mean() + 0.005
 
 
 def camera(position, yaw=0.0, pitch=0.0, roll=0.0, zoom=1.7, orthographic=False, bodies=None):

@@ -6,6 +6,7 @@ turns, and medians are reported.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import statistics
 import sys
@@ -24,9 +25,13 @@ from .errors import InputError
 from .frame import Frame
 from .images import Images, numpy_of
 from .pipeline import Blur
+from .render import Render
 from .shutter import Shutter
 from .timing import Timing
 
+# Milliseconds by iTime [s] of the article's own fragment shader of the torusphere, 640 x 360,
+# software OpenGL (Mesa 22.3) on two cores; another machine's figures are another matter.
+ARTICLE = {31.0: 13.7, 20.5: 20.2, 16.0: 22.7, 12.0: 24.9, 7.5: 27.7, 0.0: 35.0}
 MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
 _COPY = 64 << 20  # bytes, of the copy that tells the machine's bandwidth
 
@@ -130,8 +135,7 @@ def _figures(device, contenders, frame: Frame, samples: int, rounds: int) -> lis
         blur, name = c.blur(samples, Shutter(180), device), c.label
         found[name] = Figure(name, *frame.size, samples, 0.0)
         if c.needs_scene:
-            render = Staged(scenes.make("crossing"), size=frame.size).render(blur)
-            jobs[name] = partial(render, 0.0)
+            jobs[name] = partial(_scene_for(blur, frame.size), 0.0)
         else:
             one = filters[name] = _Filter(blur, frame)
             found[name] = replace(found[name], bytes=_bytes(one.views, one.output))
@@ -153,6 +157,16 @@ def _figures(device, contenders, frame: Frame, samples: int, rounds: int) -> lis
             peak=_peak(),
         )
     return list(found.values())
+
+
+def _scene_for(blur: Blur, size: tuple[int, int]) -> Render:
+    """The first of two scenes that the method can draw: bodies, or volumes."""
+    for name in ("crossing", "torusphere"):
+        render = Staged(scenes.make(name), size=size).render(blur)
+        with contextlib.suppress(InputError):
+            render(0.0)
+            return render
+    raise InputError(f"method {blur.method.name!r} draws none of the scenes that it is timed on")
 
 
 class _Filter:
@@ -322,6 +336,38 @@ def _first(f: Figure) -> list:
 
 def _round(value: float | None) -> float | None:
     return None if value is None else round(value, 2)
+
+
+def bench_torusphere(
+    blur: Blur, width: int, height: int, rounds: int = 9
+) -> dict[float, tuple[float, ...]]:
+    """By iTime [s]: milliseconds a frame, of those recording it, and of all cores' work.
+
+    Published density, the shutter that the scene is made for. Medians; all times take turns.
+    """
+    device = blur.device
+    token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
+    scene = scenes.make("torusphere", density="published")
+    render = Render(scene, blur, size=(width, height), fps=60)
+    output = Images(device).texture("output", (width, height), blur.output)
+    work: dict[float, list[float]] = {t: [] for t in ARTICLE}
+    recording: dict[float, list[float]] = {t: [] for t in ARTICLE}
+
+    def frame(t: float) -> None:
+        cores, started = time.process_time(), time.perf_counter()
+        on_gpu = render.on_gpu(t)
+        encoder = device.create_command_encoder()
+        blur.encode(encoder, size=render.size, output=output.create_view(), scene=on_gpu)
+        recording[t].append(time.perf_counter() - started)
+        gpu.submit(device, encoder)
+        device.queue.read_buffer(token)
+        work[t].append(time.process_time() - cores)
+
+    seconds = alternate({str(t): partial(frame, t) for t in ARTICLE}, rounds)
+    return {
+        t: tuple(1e3 * statistics.median(s) for s in (seconds[str(t)], recording[t], work[t]))
+        for t in ARTICLE
+    }
 
 
 def alternate(jobs: dict[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:

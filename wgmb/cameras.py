@@ -90,7 +90,7 @@ class Reprojections:
             raise InputError("clip_from_world has no inverse")
         if not self.far > 0:
             raise InputError(f"far must be over 0, got {self.far}")
-        self._world_from_pixel()  # refuses what is no camera
+        self.world_from_pixel()  # refuses what is no camera
 
     def matrices(self) -> np.ndarray:
         """(bodies, 2, 4, 4): clip position in the previous, the next frame from the pixel.
@@ -105,15 +105,34 @@ class Reprojections:
             table[k] = [self._reprojection(self.prev, k), self._reprojection(self.next, k)]
         return table
 
+    def displacement(self, size: tuple[int, int], x, y, depth, side: int) -> np.ndarray:
+        """(n, 2) way of the world at pixels x, y [px] to the previous (side -1), next (1) frame.
+
+        NaN where there is no such frame, or it is behind its camera; bodies count as the world.
+        """
+        left, top, width, height = self.window or (0, 0, *size)
+        scale = np.array([width / 2, -height / 2])
+        ndc = (np.stack([x, y], axis=1) + 0.5 + (left, top)) / scale + (-1, 1)
+        z = np.asarray(depth, np.float64)[:, None]
+        one = np.ones_like(z)
+        with np.errstate(all="ignore"):
+            planar = self.depth_kind == "planar" and not self.here.orthographic
+            nothing = ~np.isfinite(z) | (z >= self.far) | (z <= 0)
+            inverse = np.where(nothing, 0.0, 1 / z)
+            pixel = np.hstack([ndc, one, inverse] if planar else [ndc, z, one])
+            clip = pixel @ self._reprojection(self.prev if side < 0 else self.next, None).T
+            way = (clip[:, :2] / clip[:, 3:] - ndc) * scale
+        return np.where(clip[:, 3:] > 0, way, np.nan)
+
     def _reprojection(self, there: Camera | None, body: int | None) -> np.ndarray:
         if there is None:
             return np.diag([0.0, 0.0, 0.0, 0.0])
         moved = np.eye(4)
         if body is not None and body in there.bodies:
             moved = np.asarray(there.bodies[body]) @ np.linalg.inv(self.here.bodies[body])
-        return np.asarray(there.clip_from_world) @ moved @ self._world_from_pixel()
+        return np.asarray(there.clip_from_world) @ moved @ self.world_from_pixel()
 
-    def _world_from_pixel(self) -> np.ndarray:
+    def world_from_pixel(self) -> np.ndarray:
         """World position from (x d, y d, d, 1), or (x, y, d, 1) without perspective."""
         clip = np.asarray(self.here.clip_from_world, np.float64)
         if self.depth_kind == "clip":

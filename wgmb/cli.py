@@ -1,6 +1,7 @@
 """The command line: options into the library's words, errors into one line and an exit code.
 
-Exit codes: 0 done, 1 some frames failed, 2 usage or input, 3 no adapter, 130 interrupted.
+Exit codes: 0 done, 1 some frames failed, 2 usage or input, 3 no adapter or display,
+130 interrupted.
 """
 
 from __future__ import annotations
@@ -8,38 +9,32 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import shlex
 import signal
 import sys
 import time
 import warnings
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import cyclopts
 from cyclopts import Parameter
+from cyclopts.config import Toml
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from . import __version__, compare, gpu, scenes
-from . import report as report_
-from .blur import METHODS
+from . import __version__, gpu, lab
 from .errors import DeviceError, Error, InputError
-from .experiments import EXPERIMENTS
 from .info import describe
 from .options import (
     BlurOptions,
-    CompareOptions,
     InputOptions,
     OutputOptions,
     SceneOptions,
     ShutterOptions,
     size_of,
-    whole_numbers,
 )
 from .output import Output
+from .pipeline import Blur
 from .render import Render, render_frames
 from .run import Report, blur_sequence
 
@@ -59,12 +54,12 @@ app = cyclopts.App(
 @app.command
 def blur(
     pattern: str,
-    /,
     output: OutputOptions,
     look: BlurOptions | None = None,
     when: ShutterOptions | None = None,
     given: InputOptions | None = None,
     *,
+    config: Path | None = None,
     adapter: str | None = None,
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
@@ -77,6 +72,8 @@ def blur(
     ----------
     pattern
         Frames to blur: shot.####.exr, shot.%04d.exr, or one file.
+    config
+        TOML file whose table [blur] holds options, as `wgmb view` saves it.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     verbose
@@ -84,11 +81,12 @@ def blur(
     quiet
         Print errors only.
     """
-    look, when, given = look or BlurOptions(), when or ShutterOptions(), given or InputOptions()
+    look, given = (look or BlurOptions()).settled(), given or InputOptions()
+    when = (when or ShutterOptions()).settled()
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     clip = given.open(pattern, look.keep, look.scale)
     made = look.make(when.make(), adapter)
-    settings = _settings(look, when, given) | {"bits": output.bits}
+    settings = _settings(look, when, given) | {"samples": _samples(made), "bits": output.bits}
     files = Output(
         output.output,
         settings=settings,
@@ -146,6 +144,10 @@ def _progress(say: Console, frames: int, quiet: bool, doing: str = "blurring"):
         yield tick
 
 
+def _samples(blur: Blur) -> int | str:
+    return "auto" if blur.auto else blur.samples
+
+
 def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, verbose: bool) -> int:
     """Say what became of the run; return the exit code."""
 
@@ -160,6 +162,8 @@ def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, ver
             line(f"frame {number}: pixels that are not finite were given no weight: {what}")
         if verbose or "because" in clip.finding or "check them" in clip.finding:
             line(f"vectors: {clip.finding}")
+        if clip.cuts:
+            line(f"camera cut before frame {', '.join(map(str, sorted(clip.cuts)))}")
         done = f"{len(report.done)} frames in {seconds:.1f} s -> {files.pattern}"
         line(done + (f", {len(report.skipped)} were there" if report.skipped else ""))
     if report.failed:
@@ -171,7 +175,6 @@ def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, ver
 @app.command
 def render(
     scene: str,
-    /,
     output: OutputOptions,
     what: SceneOptions | None = None,
     look: BlurOptions | None = None,
@@ -179,13 +182,14 @@ def render(
     *,
     sharp: bool = False,
     passes: bool = False,
+    config: Path | None = None,
     adapter: str | None = None,
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
     """Render a built-in scene with motion blur.
 
-    Scenes: translation, scaling, rotation, crossing, wheel, fence, bounce, hdr.
+    Scenes: translation, scaling, rotation, crossing, wheel, fence, bounce, hdr; torusphere.
 
     Example: wgmb render crossing -o crossing.png --method distributed --samples 256
 
@@ -197,6 +201,8 @@ def render(
         Without blur.
     passes
         EXR: with depth, motion, normal and object index, so that `wgmb blur` can take it on.
+    config
+        TOML file whose table [render] holds options, as `wgmb view` saves it.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     verbose
@@ -205,18 +211,19 @@ def render(
         Print errors only.
     """
     what, look, when = what or SceneOptions(), look or BlurOptions(), when or ShutterOptions()
+    fps = float(output.rate)
+    picture = what.make(scene)
+    look, when = look.settled(picture), when.settled(picture, fps)
     if look.keep or look.scale:
         raise InputError("--keep and --scale are for files: wgmb render has no layers to name")
     if passes and not output.output.lower().endswith(".exr"):
         raise InputError(f"--passes need an .exr output, got {output.output}")
-    fps = float(output.rate)
     moments = what.moments(fps)
-    picture = scenes.make(scene, **what.settings())
-    renderer = Render(
-        picture, look.make(when.make(), adapter), size=size_of(what.size), fps=fps, rays=what.rays
-    )
+    made = look.make(when.make(), adapter)
+    renderer = Render(picture, made, size=size_of(what.size), fps=fps, rays=what.rays)
     settings = {"scene": scene, "sharp": sharp, "passes": passes, "bits": output.bits}
     settings |= _plain(look) | _plain(when) | _plain(what) | {"wgmb": __version__, "fps": fps}
+    settings["samples"] = _samples(made)
     files = Output(
         output.output,
         settings=settings,
@@ -241,6 +248,51 @@ def render(
         seconds, made = time.perf_counter() - started, len(moments) - skipped
         done = f"{made} frames in {seconds:.1f} s -> {files.pattern}"
         say.print(done + (f", {skipped} were there" if skipped else ""), markup=False)
+    return DONE
+
+
+@app.command
+def view(
+    what: str | None = None,
+    given: InputOptions | None = None,
+    look: BlurOptions | None = None,
+    when: ShutterOptions | None = None,
+    *,
+    config: Path | None = None,
+    window: str = "1280x720",
+    adapter: str | None = None,
+) -> int:
+    """Look at a scene or at frames interactively.
+
+    Example: wgmb view wheel
+    Example: wgmb view 'shot.####.exr' --method reproject
+
+    Parameters
+    ----------
+    what
+        A scene, a file or a pattern; crossing if there is no --config either.
+    config
+        TOML file that the viewer saved: begin as it says.
+    window
+        Width x height of the window.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    """
+    try:
+        from . import viewer
+    except ImportError as error:  # of a system library: the packages are required
+        raise DeviceError(
+            f"the viewer cannot be loaded: {error}; on Debian, Ubuntu: "
+            "apt-get install libx11-6 libxext6"
+        ) from None
+    state = viewer.State()
+    if config is not None:
+        state = viewer.State.of_toml(config.read_text(encoding="utf-8"))
+    if what is not None:
+        state = state.opened(what)
+    given, look, when = given or InputOptions(), look or BlurOptions(), when or ShutterOptions()
+    state = state.told(vars(given) | vars(look) | vars(when))
+    viewer.view(state, adapter=adapter, size=size_of(window))
     return DONE
 
 
@@ -296,173 +348,8 @@ def devices() -> int:
     return DONE
 
 
-@app.command(name="compare")
-def compare_(
-    *scene: str,
-    output: Annotated[Path, Parameter(alias="-o")],
-    who: CompareOptions | None = None,
-    when: ShutterOptions | None = None,
-    given: InputOptions | None = None,
-    size: str = "480x270",
-    time: float = 0.0,
-    rays: int = 3,
-    truth: Path | None = None,
-    inputs: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
-    frame: int | None = None,
-    peer: tuple[str, ...] = (),
-    experiment: str | None = None,
-    adapter: str | None = None,
-    overwrite: bool = False,
-    quiet: Annotated[bool, Parameter(alias="-q")] = False,
-) -> int:
-    """Judge and time methods against a truth; writes a page, and JSON and CSV beside it.
-
-    Example: wgmb compare crossing fence:speed=5 --methods tap,reproject -o report.html
-
-    Example: wgmb compare --truth t.exr --inputs 'shot.####.exr' --frame 2 -o report.html
-
-    Parameters
-    ----------
-    scene
-        Built-in scenes, NAME[:SETTING=VALUE]...
-    output
-        The page, .html.
-    size
-        Of scenes' pictures.
-    time
-        Moment of the scenes in seconds.
-    rays
-        Antialiasing of scenes' sharp frames: rays a pixel's side.
-    truth
-        What the blurred frame should look like.
-    inputs
-        Rendered frames: a pattern, or the files of the frame before, this one and the next.
-    frame
-        Number of the pattern's frame that the truth shows.
-    peer
-        NAME=FILE: another program's picture of it; may be repeated.
-    experiment
-        Repeat a paper's experiment instead: taylor, chen or rosado.
-    adapter
-        GPU to use: a number or part of a name from `wgmb devices`.
-    overwrite
-        Replace files that exist.
-    quiet
-        Print errors only.
-    """
-    who, when, given = who or CompareOptions(), when or ShutterOptions(), given or InputOptions()
-    pages = [output.with_suffix(suffix) for suffix in (".html", ".json", ".csv")]
-    if output.suffix != ".html":
-        raise InputError(f"output must be a page such as report.html, got {output}")
-    for file in pages:
-        if file.exists() and not overwrite:
-            raise InputError(f"{file} exists; --overwrite replaces it")
-    if (truth is None) != (not inputs) or bool(scene) + bool(inputs) + bool(experiment) != 1:
-        raise InputError("give scenes, or --truth with --inputs, or --experiment")
-    device = gpu.open_device(adapter)
-    say = Console(stderr=True, highlight=False, soft_wrap=True)
-
-    def tell(text: str) -> None:
-        if not quiet:
-            say.print(text, markup=False)
-
-    lab = compare.Laboratory(device, rounds=who.rounds, tell=tell)
-    report = compare.Report("", _command_line(), compare.machine(device), who.samples)
-    wanted, contenders = size_of(size), who.contenders()
-    steps, budgets = who.steps(), who.budgets()
-    if experiment:
-        if experiment not in EXPERIMENTS:
-            known = ", ".join(EXPERIMENTS)
-            raise InputError(f"experiment must be one of {known}, got {experiment!r}")
-        report.title = f"{experiment.capitalize()}'s experiment"
-        EXPERIMENTS[experiment](lab, report, wanted)
-        report_.write(report, output)
-        tell(f"-> {output}")
-        return DONE
-    reference = compare.Contender.parse(who.reference)
-    peers = {name: Path(file) for name, _, file in (p.partition("=") for p in peer)}
-    cases: list[Callable[[], compare.Case]] = []
-    for degrees, shutter in who.exposures(when).items():
-        for name, made in map(compare.make_scene, scene):
-            staged = compare.Staged(made, time, wanted, rays=rays)
-            cases.append(partial(compare.scene_case, f"{name}, {degrees}", shutter, reference,
-                                 staged, device, tell))  # fmt: skip
-        if truth is not None and inputs:
-            cases.append(partial(compare.clip_case, f"{truth.parent.name or truth.stem}, {degrees}",
-                                 shutter, inputs, frame, truth, peers, given.open))  # fmt: skip
-    able = contenders if who.methods or scene else [c for c in contenders if not c.needs_scene]
-    for make in cases:
-        case = make()
-        lab.compare(report, case, able, steps, budgets)
-        if found := compare.crossings(report, case):
-            report.tables.append(found)
-    report.title = "Motion blur compared: " + ", ".join(c.name for c in report.cases)
-    report_.write(report, output)
-    tell(f"-> {output}")
-    return DONE
-
-
-def _command_line() -> str:
-    return shlex.join(["wgmb", *sys.argv[1:]])
-
-
-@app.command
-def bench(
-    *,
-    methods: str | None = None,
-    samples: str = "16",
-    size: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
-    rounds: int = 9,
-    output: Annotated[Path | None, Parameter(alias="-o")] = None,
-    save: Path | None = None,
-    against: Path | None = None,
-    adapter: str | None = None,
-) -> int:
-    """Time methods on this machine: median milliseconds a frame, transfers apart.
-
-    Example: wgmb bench --methods tap,reproject --size 960x540 1920x1080 --samples 4,16,64
-
-    Parameters
-    ----------
-    methods
-        NAME[:OPTION=VALUE]..., separated by commas; all that blur rendered frames by default.
-    samples
-        Numbers of samples, separated by commas.
-    size
-        Pictures to time it on; 1920x1080 by default.
-    rounds
-        How often everything is done.
-    output
-        A page with tables and plots, .html; JSON and CSV beside it.
-    save
-        Keep the figures, for --against.
-    against
-        Compare with figures kept earlier.
-    adapter
-        GPU to use: a number or part of a name from `wgmb devices`.
-    """
-    from . import bench as measure
-
-    every = map(compare.Contender, METHODS)
-    contenders = (
-        [compare.Contender.parse(text) for text in methods.split(",")]
-        if methods
-        else [c for c in every if not c.needs_scene]
-    )
-    counts = whole_numbers("samples", samples)
-    sizes = [size_of(text) for text in size or ["1920x1080"]]
-    before = measure.Bench.load(against) if against else None
-    run = measure.bench(gpu.open_device(adapter), contenders, sizes, counts, rounds)
-    sys.stdout.write(measure.text(run))
-    if before:
-        table = measure.against(run, before)
-        for row in (table.columns, *table.rows):
-            sys.stdout.write("".join(f"{cell!s:>20}" for cell in row) + "\n")
-    if output:
-        report_.write(measure.report(run, _command_line(), before), output)
-    if save:
-        run.save(save)
-    return DONE
+app.command(lab.compare)
+app.command(lab.bench)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -473,7 +360,9 @@ def main(arguments: list[str] | None = None) -> int:
     warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)
     try:
-        result = app(arguments, exit_on_error=False, print_error=False)
+        words = sys.argv[1:] if arguments is None else arguments
+        app.config = _config(words)
+        result = app(words, exit_on_error=False, print_error=False)
         sys.stdout.flush()
         return result if isinstance(result, int) else DONE
     except cyclopts.CycloptsError as error:
@@ -487,6 +376,18 @@ def main(arguments: list[str] | None = None) -> int:
         return _say_why(str(error), SOME_FAILED)
     except KeyboardInterrupt:
         return _say_why("interrupted", INTERRUPTED)
+
+
+def _config(words: list[str]) -> tuple[Toml, ...]:
+    """The file named by --config; what stands on the command line wins over it."""
+    for i, word in enumerate(words if words[:1] != ["view"] else []):
+        name, _, path = word.partition("=")
+        if name == "--config":
+            path = path or "".join(words[i + 1 : i + 2])
+            if not Path(path).is_file():
+                raise InputError(f"--config {path}: no such file")
+            return (Toml(path, must_exist=True, search_parents=False),)
+    return ()
 
 
 def _interrupted(*_) -> None:

@@ -205,6 +205,8 @@ class Entry:
     samples: int | None = None
     seconds: float | None = None
     """From rendered frames, or from the scene, to the picture on the GPU."""
+    frame_seconds: float = 0.0
+    """Of them, rendering one sharp frame of the scene."""
     budget: float | None = None
     """Seconds it was to fit, of kind "time"."""
     traced: bool = False
@@ -356,9 +358,10 @@ class Laboratory:
             )  # fmt: skip
             timed.append(self.timer(case, blur, c))
         seconds = self.least(timed)
+        frames = [0.0 if c.needs_scene else frame_seconds for c in jobs]
         return [
-            replace(entry, seconds=s + (0.0 if c.needs_scene else frame_seconds))
-            for entry, c, s in zip(found, jobs, seconds, strict=True)
+            replace(entry, seconds=s + f, frame_seconds=f)
+            for entry, s, f in zip(found, seconds, frames, strict=True)
         ]
 
     def _fitting(self, case: Case, c: Contender, known, budget: float, frame_seconds: float) -> int:

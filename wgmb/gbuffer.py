@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import wgpu
 
@@ -13,6 +15,7 @@ from .scene import SHAPES, Scene
 
 ROWS = 257  # poses between which the GPU interpolates
 MOST_RAYS = 8  # a side, for antialiasing
+MOST = 1e15  # coordinates and zooms: the square of a number must fit into f32
 MOST_LOOPS = 32_768  # turns of a shader's loops: lavapipe ends them all at twice that, silently
 
 
@@ -31,48 +34,71 @@ class SceneOnGpu:
         rays: int,
     ):
         """`time` of the frame [s]; `span` of interest around it [frame intervals]."""
-        self.device, self.scene, self.size, self.time, self.fps = device, scene, size, time, fps
+        self.device, self.size, self.time, self.fps = device, size, time, fps
+        self.shown = scene
+        self.scene = scene = scene.solid(time)
         n = len(scene.bodies)
-        # Of one ray and its shadow: both sift, then meet, all bodies.
-        self.loops = 4 * n + n // 16 + 4
-        if self.loops * rays * rays > MOST_LOOPS:
-            raise InputError(f"{n} bodies are too many for {rays} x {rays} rays")
         source = shader.load("scene/trace.wgsl")
+        # Of one ray and its shadow: both sift, then meet, all bodies.
+        rings = sum(b.shape == "ring" for b in scene.bodies)
+        self.loops = 4 * n + n // 16 + 4 + 2 * rings * int(source.constant("RING_STEPS"))
         if n > (most := source.constant("MOST_BODIES")):
             raise InputError(f"a scene has at most {most} bodies, got {n}")
-        first, last = span
+        self.rays, self.span = rays, span
+        self.constants = {"RINGS": rings > 0, "STAGED": scene.stage is not None}
+
+    @cached_property
+    def resources(self) -> dict[str, wgpu.GPUBuffer]:
+        """The buffers, made when the first kernel binds them."""
+        if self.scene.figure is not None:
+            raise InputError(f"scene {self.scene.name!r} is flat: only method 'volume' draws it")
+        scene, size, time, source = (
+            self.scene,
+            self.size,
+            self.time,
+            shader.load("scene/trace.wgsl"),
+        )
+        first, last = self.span
         step = max((last - first) / (ROWS - 1), 1e-6)
-        times = time + (first + step * np.arange(ROWS)) / fps
-        places = [body.world_from_body(times) for body in scene.bodies]
+        times = time + (first + step * np.arange(ROWS)) / self.fps
+        with np.errstate(all="ignore"):
+            places = [body.world_from_body(times) for body in scene.bodies]
+            camera = _world_from_picture(scene, times, size)
+        _check_finite(camera, places)
         data = np.zeros((), source.dtype("Scene"))
         sun = np.array(scene.sun[:3]) / np.linalg.norm(scene.sun[:3])
         data["sun"], data["sky"] = (*sun, scene.sun[3]), scene.sky
         data["horizon"] = (*scene.horizon, 0)
         data["first"], data["step"], data["rows"] = first, step, ROWS
-        data["bodies"] = n
+        data["bodies"] = len(scene.bodies)
         shapes = [b.shape for b in scene.bodies]
-        data["spheres"], data["boxes"] = (shapes.count(s) for s in SHAPES[:2])
+        data["spheres"], data["boxes"], data["cylinders"] = map(shapes.count, SHAPES[:3])
+        if scene.stage is not None:
+            scene.stage.fill(data["stage"])
         zoom = float(np.ravel(scene.shot.zoom(np.array([time])))[0])
         data["pixel"] = 2 / (zoom * size[1])
-        data["rays"] = rays
+        data["rays"] = self.rays
         for bounds, place in zip(data["bounds"], places, strict=False):
             bounds["low"][:3], bounds["high"][:3] = _bounds(place)
-        buffer = device.create_buffer_with_data
-        self.resources = {
+        buffer = self.device.create_buffer_with_data
+        return {
             "scene": buffer(label="scene", data=data, usage=wgpu.BufferUsage.UNIFORM),
             "bodies": buffer(
                 label="bodies", data=_bodies(scene, source), usage=wgpu.BufferUsage.STORAGE
             ),
             "poses": buffer(
                 label="poses",
-                data=_poses(scene, source, times, places, size),
+                data=_poses(source, camera, places),
                 usage=wgpu.BufferUsage.STORAGE,
             ),
         }
 
     def encode(self, encoder, given: gpu.Given, images: Images, name: str, time: float) -> dict:
         """Record the picture at `time` [frame intervals from this frame]; its textures."""
-        kernel = gpu.kernel(self.device, "gbuffer.wgsl")
+        rays, bodies = self.rays, len(self.scene.bodies)
+        if self.loops * rays * rays > MOST_LOOPS:
+            raise InputError(f"{bodies} bodies are too many for {rays} x {rays} rays")
+        kernel = gpu.kernel(self.device, "gbuffer.wgsl", None, **self.constants)
         view = np.zeros((), kernel.source.dtype("View"))
         view["time"] = time
         buffer = self.device.create_buffer_with_data(
@@ -122,21 +148,31 @@ def _bounds(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (middle - reach).min(axis=0) - margin, (middle + reach).max(axis=0) + margin
 
 
-def _poses(
-    scene: Scene, source: shader.Source, times: np.ndarray, places: list[np.ndarray], size
-) -> np.ndarray:
-    """(rows, 1 + bodies) matrices: of the picture into the world, then of the world into bodies."""
-    dtype = source.dtype("Pose")
-    if len(times) * (1 + len(scene.bodies)) * dtype.itemsize > 128 << 20:
-        raise InputError(f"a scene of {len(scene.bodies)} bodies is too large")
-    table = np.zeros((len(times), 1 + len(scene.bodies)), dtype)
+def _world_from_picture(scene: Scene, times: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """(rows, 4, 4) from -1..1, y up, and 1: the ray's direction; from the origin: its start."""
     zoom = np.broadcast_to(scene.shot.zoom(times), times.shape)
+    if not ((zoom > 1 / MOST) & (zoom < MOST)).all():
+        raise InputError(f"the camera's zoom must be over 0, got {zoom.min():g} to {zoom.max():g}")
     lens = np.zeros((len(times), 4, 4))
     lens[:, 0, 0], lens[:, 1, 1] = size[0] / size[1] / zoom, 1 / zoom
     lens[:, 2, 2], lens[:, 3, 3] = -1, 1  # looking along -z
-    matrices = [scene.shot.world_from_camera(times) @ lens]
-    matrices += [np.linalg.inv(place) for place in places]
-    for i, matrix in enumerate(matrices):
+    return scene.shot.world_from_camera(times) @ lens
+
+
+def _check_finite(camera: np.ndarray, places: list[np.ndarray]) -> None:
+    for i, matrix in enumerate([camera, *places]):
+        name = f"body {i}" if i else "the camera"
+        if not np.abs(matrix).max() < MOST:  # NaN is not
+            raise InputError(f"{name} must stay within {MOST:g} of the middle, all finite")
+
+
+def _poses(source: shader.Source, camera: np.ndarray, places: list[np.ndarray]) -> np.ndarray:
+    """(rows, 1 + bodies) matrices: of the picture into the world, then of the world into bodies."""
+    dtype = source.dtype("Pose")
+    if len(camera) * (1 + len(places)) * dtype.itemsize > 128 << 20:
+        raise InputError(f"a scene of {len(places)} bodies is too large")
+    table = np.zeros((len(camera), 1 + len(places)), dtype)
+    for i, matrix in enumerate([camera, *map(np.linalg.inv, places)]):
         for row, name in enumerate("xyz"):
             table[name][:, i] = matrix[:, row]
     return table

@@ -185,7 +185,7 @@ class Kernel:
         resources = given.resources | own
         timing = given.timing
         label = f"{self.source.name}:{entry}"
-        stamps = {"timestamp_writes": timing.of(label)} if timing else {}
+        stamps = timing.of(label) if timing else {}
         compute = encoder.begin_compute_pass(label=label, **stamps)
         compute.set_pipeline(self.pipelines[entry])
         for group, layout in zip(self.groups, self.layouts, strict=True):

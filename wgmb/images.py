@@ -36,7 +36,9 @@ class Scratch:
             raise InputError(f"the picture needs a buffer of {size} bytes, the adapter has {most}")
         if self._buffer is None or self._buffer.size < size:
             self._buffer = self._device.create_buffer(
-                label="scratch", size=size, usage=wgpu.BufferUsage.STORAGE
+                label="scratch",
+                size=size,
+                usage=wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_DST,
             )
         return self._buffer
 

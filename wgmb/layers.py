@@ -20,6 +20,7 @@ _COMPONENTS = (
     {"red": 0, "green": 1, "blue": 2, "alpha": 3},
 )
 _COLOR = ("combined", "rgba", "rgb", "beauty", "color", "colour", "image", "final", "noisy image")
+_NORMAL = ("normal", "normals", "n")
 _DEPTH = ("depth", "z", "zdepth", "vrayzdepth", "z-depth", "z_depth", "worlddepth")
 
 
@@ -88,6 +89,16 @@ def find_depth(
         return "Z"
     named = [k for word in _DEPTH for k in by_layer if stem(k) == word]
     return by_layer[named[0]][0] if named else None
+
+
+def find_normal(names: Iterable[str], near: str | None = None) -> list[str]:
+    """The three channels (x, y, z or r, g, b) of a layer called normal, normals or n, in any
+    case, beside the channel `near`; none if no name says so.
+    """
+    for layer, members in layers(names, near).items():
+        if stem(layer) in _NORMAL and len(members) == 3:
+            return members
+    return []
 
 
 def pick(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:

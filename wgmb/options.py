@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -10,18 +11,21 @@ from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from . import sequence, shutter, vectors
+from . import scenes, sequence, shutter, vectors
 from .blur import METHODS
 from .compare import Case, Contender, Report
 from .errors import InputError
 from .numbering import frame_numbers
+from .perceive import Cone
 from .pipeline import Blur
+from .scene import Scene
 
 _IN = Group("Input", sort_key=1)
 _LOOK = Group("Blur", sort_key=2)
 _SHUTTER = Group("Shutter", sort_key=3)
-_OUT = Group("Output", sort_key=4)
 _WHO = Group("Compare", sort_key=2)
+_PERCEPTION = Group("Perception", sort_key=4)
+_OUT = Group("Output", sort_key=5)
 
 
 @Parameter(name="*", group=_SHUTTER)
@@ -29,19 +33,31 @@ _WHO = Group("Compare", sort_key=2)
 class ShutterOptions:
     """When the shutter is open."""
 
-    shutter: float = 180.0
-    "Degrees it is open: 360 is one frame interval, more is allowed."
+    shutter: float | None = None
+    "Degrees it is open: 360 is one frame interval, more is allowed. 180, or what a scene asks for."
     phase: str = "centre"
     "start (opens at the frame), centre, end (closes at it), or the middle's time in frames."
-    curve: str = "box"
-    "box, trapezoid, triangle, cosine, gaussian, or a CSV file of time, weight."
+    curve: str | None = None
+    "box (default), trapezoid, triangle, cosine, gaussian, or a CSV file of time, weight."
     rolling: Literal["up", "down", "left", "right"] | None = None
     "Rolling shutter: the way the exposure runs over the picture."
     rolling_duration: float = 1.0
     "Time from the first row or column to the last, in frame intervals."
 
+    def settled(self, scene: Scene | None = None, fps: float = 24.0) -> ShutterOptions:
+        """What was left open taken from the scene, or 180 degrees and a box."""
+        degrees, curve = 180.0, "box"
+        if scene is not None and scene.exposure is not None:
+            seconds, curve = scene.exposure
+            degrees = round(360 * seconds * fps, 9)
+        return replace(
+            self,
+            shutter=degrees if self.shutter is None else self.shutter,
+            curve=curve if self.curve is None else self.curve,
+        )
+
     def make(self) -> shutter.Shutter:
-        """The Shutter these options describe."""
+        """The Shutter these options describe, once they are settled."""
         phase: str | float = self.phase
         if phase not in shutter.PHASES:
             try:
@@ -51,6 +67,7 @@ class ShutterOptions:
                     f"phase must be start, centre, end or a number, got {phase!r}"
                 ) from None
         curve = self.curve
+        assert self.shutter is not None and curve is not None
         if curve not in shutter.CURVES:
             if not Path(curve).is_file():
                 known = ", ".join(shutter.CURVES)
@@ -123,15 +140,19 @@ class InputOptions:
         )
 
 
+OWN = ("path", "form", "show", "facing", "depth_test", "splat", "weights", "alpha_front",
+       "alpha_back", "tau", "seed")  # fmt: skip
+
+
 @Parameter(name="*", group=_LOOK)
 @dataclass(frozen=True, kw_only=True)
 class BlurOptions:
     """How to blur."""
 
-    method: str = "tap"
-    "tap: average along each pixel's own path. Scenes: also accumulate, distributed."
-    samples: int = 16
-    "Taps, pictures or rays a pixel."
+    method: str | None = None
+    "tap (default), tiles, fusion, reproject. Scenes: also accumulate, distributed, volume."
+    samples: int | Literal["auto"] | None = None
+    "Taps, pictures or rays a pixel: 16, for fusion 8; auto: one a pixel of a streak, 64 at most."
     jitter: float = 0.0
     "0 to 1: trades bands for noise."
     keep: str | None = None
@@ -142,19 +163,40 @@ class BlurOptions:
     "Longest streak in pixels."
     path: Literal["curved", "straight"] | None = None
     "tap: through the previous and the next place (curved), or along the mean velocity."
-    form: Literal["shutter", "slices", "published"] | None = None
-    "tap (shutter), reproject (slices): published is the form of the paper, without the shutter."
+    form: Literal["shutter", "even", "slices", "published"] | None = None
+    "tap, fusion (shutter), tiles (even), reproject (slices): published is the paper's."
     show: Literal["color", "count"] | None = None
     "reproject: count shows how often a pixel was reached."
+    facing: bool = False
+    "reproject, published: leave out what faces away from the interpolated camera."
+    depth_test: bool = False
+    "reproject, published: only the nearest of the samples on a pixel."
+    splat: Literal["point", "line"] | None = None
+    "reproject, published: lines between the steps, or points."
+    weights: Literal["normalised", "published"] | None = None
+    "fusion: with the sum 1, or as printed."
+    alpha_front: float | None = None
+    "fusion: factor of faces that lead, 0.02 to 0.10; a greater one blurs them less."
+    alpha_back: float | None = None
+    "fusion: factor of all other faces."
+    tau: float | None = None
+    "fusion: weight of a sample over the next newer one's, to 1."
     seed: int | None = None
     "distributed: another seed is other noise."
 
+    def settled(self, scene: Scene | None = None) -> BlurOptions:
+        """The method, where it was left open, that suits the scene."""
+        suited = "volume" if scene is not None and scene.has_volumes else "tap"
+        return replace(self, method=self.method or suited)
+
     def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
         """The Blur these options describe; an option its method does not have is an error."""
-        options = {"path": self.path, "form": self.form, "show": self.show, "seed": self.seed}
-        given = {name: value for name, value in options.items() if value is not None}
+        own = {name: getattr(self, name) for name in OWN}
+        given = {
+            name: value for name, value in own.items() if value is not None and value is not False
+        }
         return Blur(
-            self.method,
+            self.settled().method or "",
             shutter=shutter_,
             samples=self.samples,
             jitter=self.jitter,
@@ -170,7 +212,7 @@ class SceneOptions:
     """Which moments of a scene, and how large."""
 
     time: float | None = None
-    "The one picture's time in seconds (0 if there are no --frames either)."
+    "The one picture's time in seconds, where there are no --frames."
     frames: str | None = None
     "Frames such as 0-99; frame N is at N / fps seconds."
     size: str = "640x360"
@@ -179,18 +221,27 @@ class SceneOptions:
     "Antialiasing of what image methods start from: rays a pixel's side, 1 to 8."
     set: tuple[str, ...] = ()
     "A parameter of the scene as NAME=VALUE; may be repeated."
+    orbit: tuple[float, float] = (0.0, 0.0)
+    "Turn the camera round what it looks at: degrees to the right, and up."
+    pan: tuple[float, float] = (0.0, 0.0)
+    "Then move it to the right, and up [scene units]."
+    dolly: float = 1.0
+    "Times its distance to what it looks at."
+
+    def make(self, name: str) -> Scene:
+        """The scene `name` with these parameters and this camera."""
+        scene = scenes.make(name, **self.settings())
+        if (self.orbit, self.pan, self.dolly) == ((0.0, 0.0), (0.0, 0.0), 1.0):
+            return scene
+        aside, up = map(math.radians, self.orbit)
+        return scene.seen_from((aside, up), self.pan, self.dolly)
 
     def settings(self) -> dict[str, str]:
         """The scene's parameters by name."""
-        pairs = [text.partition("=") for text in self.set]
-        if wrong := [name for name, equals, _ in pairs if not equals]:
-            raise InputError(f"--set takes NAME=VALUE, got {wrong[0]!r}")
-        return {name: value for name, _, value in pairs}
+        return settings_of(self.set)
 
     def moments(self, fps: float) -> dict[int, float]:
         """Times in seconds by frame number."""
-        if self.time is not None and self.frames is not None:
-            raise InputError("give --time or --frames, not both")
         if self.frames is None:
             return {0: self.time or 0.0}
         return {n: n / fps for n in frame_numbers(self.frames)}
@@ -233,13 +284,16 @@ class CompareOptions:
         seconds = self.budget / 1e3
         return lambda report, case: [seconds]
 
-    def exposures(self, when: ShutterOptions) -> dict[str, shutter.Shutter]:
-        """The shutters, by what to call them."""
+    def exposures(
+        self, when: ShutterOptions, scene: Scene | None = None
+    ) -> dict[str, shutter.Shutter]:
+        """The shutters, by what to call them; what is left open is the scene's."""
+        settled = when.settled(scene)
         try:
-            degrees = [float(d) for d in (self.shutters or str(when.shutter)).split(",")]
+            degrees = [float(d) for d in (self.shutters or str(settled.shutter)).split(",")]
         except ValueError:
             raise InputError(f"shutters must be like 90,180, got {self.shutters!r}") from None
-        return {f"{d:g}°": replace(when, shutter=d).make() for d in degrees}
+        return {f"{d:g}°": replace(settled, shutter=d).make() for d in degrees}
 
 
 def whole_numbers(name: str, text: str) -> list[int]:
@@ -250,12 +304,42 @@ def whole_numbers(name: str, text: str) -> list[int]:
         raise InputError(f"{name} must be like 4,8,16, got {text!r}") from None
 
 
+@Parameter(name="*", group=_PERCEPTION)
+@dataclass(frozen=True, kw_only=True)
+class PerceptionOptions:
+    """Who looks, and at what."""
+
+    cone_rate: float = 50.0
+    "How fast a cone cell's answer to a flash fades, 1/s."
+    cone_peak: float = 0.05
+    "When it is strongest, seconds after the flash."
+    nature: float = 480.0
+    "Scenes: pictures a second that stand for a world without frames."
+    size: str = "640x360"
+    "Scenes: width x height in pixels."
+    set: tuple[str, ...] = ()
+    "Scenes: a parameter as NAME=VALUE; may be repeated."
+
+    @property
+    def cone(self) -> Cone:
+        """The cone cell."""
+        return Cone(self.cone_rate, self.cone_peak)
+
+
 def size_of(text: str) -> tuple[int, int]:
     """`1920x1080` -> width, height."""
     width, _, height = text.partition("x")
     if not (width.isdigit() and height.isdigit() and int(width) and int(height)):
         raise InputError(f"size must be like 1920x1080, got {text!r}")
     return int(width), int(height)
+
+
+def settings_of(texts: tuple[str, ...]) -> dict[str, str]:
+    """`NAME=VALUE` each -> values by name."""
+    pairs = [text.partition("=") for text in texts]
+    if wrong := [name for name, equals, _ in pairs if not equals]:
+        raise InputError(f"--set takes NAME=VALUE, got {wrong[0]!r}")
+    return {name: value for name, _, value in pairs}
 
 
 @Parameter(name="*", group=_OUT)

@@ -21,6 +21,9 @@ from .timing import Timing
 from .velocity import Moving, VelocityPass
 
 MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
+SAMPLES = 16
+AUTO_SAMPLES = 64  # the most that "auto" takes a pixel
+AUTO_STRATA = 256  # equal shares of the exposure that times are interpolated in
 OUTPUTS = ("rgba32float", "rgba16float")
 View = wgpu.GPUTextureView
 
@@ -33,6 +36,7 @@ class Neighbour:
     color: View
     motion: View
     depth: View
+    normal: View | None
 
 
 @dataclass(frozen=True)
@@ -48,12 +52,15 @@ class Inputs:
     motion: View  # to_prev, to_next [px]
     depth: View | None
     camera: Reprojections | None
+    by_camera: bool  # the motion is the camera's alone: there are no vectors
+    normal: View | None  # unit vectors in the world
     weight: View | None  # None: every pixel counts
     neighbours: tuple[Neighbour, ...]
     none: View  # bound where an input is not there
     one: View  # bound where a weight is not there
     linear: wgpu.GPUSampler
     even: bool  # the shutter is a box
+    auto: bool  # `samples` is the most a pixel may take
     scene: SceneOnGpu | None
     progress: tuple[int, int]  # samples done before, samples to do now
 
@@ -63,7 +70,8 @@ class Blur:
 
     `method`: a name in METHODS; its own options follow as keywords.
     `shutter`: degrees (180 is open for half a frame interval), or a Shutter.
-    `samples`: taps a pixel, 1 to 4096.
+    `samples`: taps a pixel, 1 to 4096; 16, or what the method's source says, by default; "auto"
+    takes one a pixel of a streak, 64 at most (methods that cannot tell pixels apart take 64).
     `jitter`: 0 to 1, trades bands for noise: how far a tap may move within its share of time.
     `max_blur`: longest streak [px]; None leaves it free.
     `device`: a wgpu device of yours, the name of an adapter, or None for the best.
@@ -75,7 +83,7 @@ class Blur:
         method: str = "tap",
         *,
         shutter: Shutter | float = 180,
-        samples: int = 16,
+        samples: int | str | None = None,
         jitter: float = 0.0,
         max_blur: float | None = None,
         device: wgpu.GPUDevice | str | None = None,
@@ -84,8 +92,12 @@ class Blur:
     ):
         if method not in METHODS:
             raise InputError(f"unknown method {method!r}, one of {', '.join(METHODS)}")
+        self.auto = samples == "auto" and getattr(METHODS[method], "adaptive", False)
+        if samples is None:
+            samples = getattr(METHODS[method], "samples", SAMPLES)
+        samples = AUTO_SAMPLES if samples == "auto" else samples
         if not isinstance(samples, (int, np.integer)) or not 1 <= samples <= MOST_SAMPLES:
-            raise InputError(f"samples must be 1 to {MOST_SAMPLES}, got {samples!r}")
+            raise InputError(f"samples must be 1 to {MOST_SAMPLES} or auto, got {samples!r}")
         if not 0 <= jitter <= 1:
             raise InputError(f"jitter must be 0 to 1, got {jitter}")
         if max_blur is not None and not max_blur >= 0:
@@ -136,7 +148,7 @@ class Blur:
             "shutter": create(label="shutter", data=data, usage=wgpu.BufferUsage.UNIFORM),
             "strata": create(
                 label="strata",
-                data=self._shutter.strata(self.samples),
+                data=self._shutter.strata(AUTO_STRATA if self.auto else self.samples),
                 usage=wgpu.BufferUsage.STORAGE,
             ),
         }
@@ -152,6 +164,7 @@ class Blur:
         progress: tuple[int, int] | None = None,
         neighbours: dict[int, dict] | None = None,
         keep: View | None = None,
+        normal: View | None = None,
         check: bool = False,
         number: int = 0,
         timing: Timing | None = None,
@@ -160,21 +173,23 @@ class Blur:
         """Record the passes into `encoder`; nothing is submitted or waited for.
 
         Views are of your textures: `color` filterable float (rgba16float always is), `keep`
-        0..1, `output` a storage texture of the format that Blur was made for. `moving` are
+        0..1, `normal` unit vectors in the world, `output` a storage texture of the format that
+        Blur was made for. `moving` are
         the inputs of velocity.Moving: `to_next` and `to_prev` with the displacement [px] in
         x and y, or `motion` with to_prev and to_next together, which saves a pass; or
         `camera` and `depth`. `check` gives pixels that are not finite no weight, at the
         price of three small passes.
 
-        `neighbours`: -1 and 1, each with `color` and its own `moving` inputs and depth, for
-        methods that use them.
+        `neighbours`: -1 and 1, each with `color`, its own `moving` inputs and depth, and
+        `normal` if there is one, for methods that use them.
 
         `scene` instead of `color`, for the methods that need one, which may be recorded
         bit by bit: `progress` is how many samples were done before, and are to be done now.
         """
         gpu.check_size(self.device, *size)
         motions = _moving(moving)
-        _check_views(size, {"output": output, "color": color, "keep": keep, **moving})
+        views = {"output": output, "color": color, "keep": keep, "normal": normal}
+        _check_views(size, views | moving)
         given_inputs = {"color": color, "motion": motions.known or None, "depth": motions.depth}
         given_inputs["scene"] = scene
         self._require({name for name, input_ in given_inputs.items() if input_ is not None})
@@ -201,13 +216,16 @@ class Blur:
             color=color or self._none,
             motion=motion or self._none,
             depth=motions.depth,
-            camera=motions.camera if not motions.has_vectors else None,
+            camera=motions.camera,
+            by_camera=motions.camera is not None and not motions.has_vectors,
+            normal=normal,
             weight=weight,
             neighbours=near,
             none=self._none,
             one=self._one,
             linear=self._linear,
             even=self._shutter.curve == "box",
+            auto=self.auto,
             scene=scene,
             progress=progress or (0, self.samples),
         )
@@ -234,12 +252,23 @@ class Blur:
         if "motion" not in frame.has:
             raise InputError("there is no motion: give to_next, to_prev, or depth and a camera")
         encoder = self.device.create_command_encoder(label="wgmb motion")
-        given = self.given(frame.size, frame.number, None)
         motion = self._images.texture("motion", frame.size, "rgba32float")
-        moving = _moving(self._upload_moving(frame))
-        limited = self.max_blur is not None
-        self._velocity.encode(encoder, given, moving, limited, motion.create_view())
+        moving = self._upload_moving(frame)
+        self.encode_motion(encoder, frame.size, motion.create_view(), frame.number, **moving)
         return self._images.download(encoder, motion)
+
+    def encode_motion(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        size: tuple[int, int],
+        output: View,
+        number: int = 0,
+        **moving,
+    ) -> None:
+        """Record to_prev and to_next [px] into `output`, rgba32float; `moving` as in `encode`."""
+        given = self.given(size, number)
+        limited = self.max_blur is not None
+        self._velocity.encode(encoder, given, _moving(moving), limited, output)
 
     def upload(self, frame: Frame) -> dict:
         """The frame's arrays as textures, under the names that `encode` takes.
@@ -251,6 +280,7 @@ class Blur:
             "size": frame.size,
             "color": self._images.upload("color", rgba, four),
             "keep": self._view("keep", frame.keep, "r32float"),
+            "normal": self._normal(frame),
             "check": bool(frame.bad.keys() - {"depth"}),
             "number": frame.number,
             "neighbours": self._upload_neighbours(frame),
@@ -278,11 +308,12 @@ class Blur:
             ):
                 rgba, texel = self._rgba(near)
                 color = self._images.upload(f"color {offset}", rgba, texel)
-                found[offset] = {"color": color, **self._upload_moving(near, f" {offset}")}
+                found[offset] = {"color": color, "normal": self._normal(near, f" {offset}")}
+                found[offset] |= self._upload_moving(near, f" {offset}")
         return found
 
     def _upload_moving(self, frame: Frame, which: str = "") -> dict:
-        deep = frame.camera is not None or "depth" in self.method.needs
+        deep = frame.camera is not None or "depth" in self.method.needs | self.method.uses
         return {
             "to_next": self._view("to_next" + which, frame.to_next, "rg32float"),
             "to_prev": self._view("to_prev" + which, frame.to_prev, "rg32float"),
@@ -297,9 +328,16 @@ class Blur:
     def _view(self, name: str, array: np.ndarray | None, format: str) -> View | None:
         return None if array is None else self._images.upload(name, array, format)
 
+    def _normal(self, frame: Frame, which: str = "") -> View | None:
+        if frame.normal is None or "normal" not in self.method.uses:
+            return None
+        four = np.zeros((*frame.normal.shape[:2], 4), np.float32)
+        four[..., :3] = frame.normal
+        return self._images.upload("normal" + which, four, "rgba32float")
+
     def _neighbour(self, encoder, given, offset: int, inputs: dict) -> Neighbour:
-        color = inputs.pop("color")
-        _check_views(given.size, {"color": color, **inputs})
+        color, normal = inputs.pop("color"), inputs.pop("normal", None)
+        _check_views(given.size, {"color": color, "normal": normal, **inputs})
         moving = _moving(inputs)
         motion, limited = moving.motion, self.max_blur is not None
         if not moving.known or moving.depth is None:
@@ -307,7 +345,7 @@ class Blur:
         if motion is None or not moving.ready or limited:
             motion = self._images.view(f"motion {offset}", given.size, "rgba32float")
             self._velocity.encode(encoder, given, moving, limited, motion)
-        return Neighbour(offset, color, motion, moving.depth)
+        return Neighbour(offset, color, motion, moving.depth, normal)
 
     def _require(self, there) -> None:
         if missing := self.method.needs - there:
@@ -354,7 +392,7 @@ def blur(
     *,
     method: str = "tap",
     shutter: Shutter | float = 180,
-    samples: int = 16,
+    samples: int | str | None = None,
     **more,
 ) -> np.ndarray:
     """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time as clock
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +19,7 @@ from .output import Output
 from .pipeline import Blur
 from .scene import Scene
 from .source import Source
+from .timing import Timing
 
 _BUSY = 0.1  # seconds of GPU work handed over at once, so that Ctrl-C is heard
 Progress = Callable[[int, int], None]
@@ -48,87 +50,76 @@ class Render:
         self.scene, self.blur, self.size, self.fps, self.rays = scene, blur, size, fps, rays
         self._images = Images(blur.device)
         self._token = blur.device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
+        self._moment: tuple = ()
+        self._spans: dict[tuple[float, float], SceneOnGpu] = {}
+        self._pictures: dict[int, dict] = {}
 
     def __call__(
         self, time: float, number: int = 0, progress: Progress | None = None
     ) -> np.ndarray:
         """(height, width, 4) float32, linear: the frame whose instant is `time` [s]."""
-        on_gpu, blur = self._on_gpu(time), self.blur
-        output = self._images.texture("output", self.size, blur.output)
+        output = self._images.texture("output", self.size, self.blur.output)
+        self.draw(output.create_view(), time, number, progress=progress)
+        return self._images.download(self.blur.device.create_command_encoder(), output)
+
+    def draw(
+        self,
+        output: wgpu.GPUTextureView,
+        time: float,
+        number: int = 0,
+        *,
+        blur: Blur | None = None,
+        progress: Progress | None = None,
+        timing: Timing | None = None,
+    ) -> None:
+        """Draw that frame into a texture of yours, of `size` and the blur's `output` format.
+
+        `blur`: another one than the Render's own, of the same device. What several draw of
+        one moment starts from the same pictures. `timing`: of the passes, not of rays.
+        """
+        blur = blur or self.blur
+        if "progress" in blur.method.uses:
+            self.refine(output, time, number, blur=blur, progress=progress)
+            return
         if "scene" in blur.method.needs:
-            self._in_steps(on_gpu, output.create_view(), number, progress)
-            return self._images.download(blur.device.create_command_encoder(), output)
-        encoder = blur.device.create_command_encoder(label="render")
-        seen = {k: self._see(encoder, on_gpu, number, k) for k in self._offsets}
-        gpu.submit(blur.device, encoder)
+            encoder = blur.device.create_command_encoder(label="scene")
+            blur.encode(encoder, size=self.size, output=output, scene=self.on_gpu(time, blur),
+                        number=number, timing=timing)  # fmt: skip
+            gpu.submit(blur.device, encoder)
+            return
+        seen = {k: self._see(time, number, k, blur, timing) for k in _offsets(blur)}
         encoder = blur.device.create_command_encoder(label="blur")
         here = seen.pop(0)
         blur.encode(
             encoder,
             size=self.size,
-            output=output.create_view(),
+            output=output,
             number=number,
             neighbours=seen,
+            timing=timing,
             **here,
         )
-        return self._images.download(encoder, output)
+        gpu.submit(blur.device, encoder)
 
-    @property
-    def _offsets(self) -> tuple[int, ...]:
-        """The frames that the method is given [frame intervals]."""
-        return (0, -1, 1) if "neighbours" in self.blur.method.uses else (0,)
+    def refine(
+        self,
+        output: wgpu.GPUTextureView,
+        time: float,
+        number: int = 0,
+        *,
+        done: int = 0,
+        seconds: float = math.inf,
+        blur: Blur | None = None,
+        progress: Progress | None = None,
+    ) -> int:
+        """Add samples to the `done` so far, for about `seconds`; how many there are now.
 
-    def _see(self, encoder, on_gpu: SceneOnGpu, number: int, offset: int) -> dict:
-        """Record one frame's picture; what Blur.encode takes of it."""
-        given = self.blur.given(self.size, number)
-        name = f"frame {offset}"
-        seen = on_gpu.encode(encoder, given, self._images, name, float(offset))
-        return {
-            "color": seen["color"].create_view(),
-            "depth": seen["depth"].create_view(),
-            "object_id": seen["object"].create_view(),
-            "camera": on_gpu.reprojections(offset),
-        }
-
-    def frame(self, time: float, number: int = 0) -> Frame:
-        """The sharp picture at `time` [s] with its depth, normals, object indices and motion."""
-        on_gpu, blur = self._on_gpu(time), self.blur
-        encoder = blur.device.create_command_encoder(label="render")
-        seen = on_gpu.encode(encoder, blur.given(self.size, number), self._images, "frame", 0.0)
-        arrays = {}
-        for name, texture in seen.items():
-            arrays[name] = self._images.download(encoder, texture)
-            encoder = blur.device.create_command_encoder(label="download")
-        return Frame(
-            arrays["color"],
-            depth=arrays["depth"][..., 0],
-            normal=np.ascontiguousarray(arrays["normal"][..., :3]),
-            object_id=arrays["object"][..., 0],
-            camera=on_gpu.reprojections(),
-            number=number,
-        )
-
-    def _on_gpu(self, time: float) -> SceneOnGpu:
-        if not np.isfinite(time):
-            raise InputError(f"time must be finite, got {time}")
-        opens, closes = self.blur.shutter.span
-        delay = max(map(abs, self.blur.shutter.delay)) / 2
-        most = max(self._offsets)
-        span = min(opens, -most) - delay, max(closes, most) + delay
-        return SceneOnGpu(
-            self.blur.device,
-            self.scene,
-            size=self.size,
-            time=time,
-            fps=self.fps,
-            span=span,
-            rays=self.rays,
-        )
-
-    def _in_steps(self, on_gpu: SceneOnGpu, output, number: int, progress: Progress | None):
-        """Submit the samples bit by bit, each bit about _BUSY seconds of work."""
-        blur, done, count = self.blur, 0, 1
+        For methods that need a scene. `output` holds the mean of all samples so far.
+        """
+        blur = blur or self.blur
+        on_gpu, count = self.on_gpu(time, blur), 1
         most = max(1, MOST_LOOPS // on_gpu.loops)
+        end = clock.perf_counter() + seconds
         while done < blur.samples:
             count = min(count, most, blur.samples - done)
             started = clock.perf_counter()
@@ -137,11 +128,106 @@ class Render:
                         progress=(done, count), number=number)  # fmt: skip
             gpu.submit(blur.device, encoder)
             blur.device.queue.read_buffer(self._token)  # waits
-            took = clock.perf_counter() - started
+            now = clock.perf_counter()
             done += count
-            count = max(1, min(2 * count, int(count * _BUSY / max(took, 1e-4))))
             if progress:
                 progress(done, blur.samples)
+            if now >= end:
+                break
+            share = min(_BUSY, end - now) / max(now - started, 1e-4)
+            count = max(1, min(2 * count, int(count * share)))
+        return done
+
+    def passes(
+        self, time: float, number: int = 0, timing: Timing | None = None
+    ) -> dict[str, wgpu.GPUTexture]:
+        """The sharp picture at `time` [s] and what lies under it, kept until the next moment.
+
+        "color", "depth" [scene units], "normal", "object" (0: none), and "motion": to_prev,
+        to_next [px].
+        """
+        here = self._see(time, number, 0, self.blur, timing)
+        textures = self._pictures[0]
+        if "motion" not in textures:
+            motion = self._images.texture("motion", self.size, "rgba32float")
+            encoder = self.blur.device.create_command_encoder(label="motion")
+            moving = {k: v for k, v in here.items() if k not in ("color", "normal")}
+            self.blur.encode_motion(encoder, self.size, motion.create_view(), number, **moving)
+            gpu.submit(self.blur.device, encoder)
+            textures["motion"] = motion
+        return {name: texture for name, texture in textures.items() if name != "camera"}
+
+    def frame(self, time: float, number: int = 0) -> Frame:
+        """The sharp picture at `time` [s] with its depth, normals, object indices and motion."""
+        camera = self._see(time, number, 0, self.blur)["camera"]
+        arrays = {}
+        for name in ("color", "depth", "normal", "object"):
+            encoder = self.blur.device.create_command_encoder(label="download")
+            arrays[name] = self._images.download(encoder, self._pictures[0][name])
+        return Frame(
+            arrays["color"],
+            depth=arrays["depth"][..., 0],
+            normal=np.ascontiguousarray(arrays["normal"][..., :3]),
+            object_id=arrays["object"][..., 0],
+            camera=camera,
+            number=number,
+        )
+
+    def sharp(self, time: float) -> np.ndarray:
+        """(height, width, 4) float32, linear: the picture at `time` [s] without any blur."""
+        if not self.scene.has_volumes:
+            return self.frame(time).color
+        still = Blur("volume", shutter=0, device=self.blur.device)
+        return Render(self.scene, still, size=self.size, fps=self.fps)(time)
+
+    def _see(
+        self, time: float, number: int, offset: int, blur: Blur, timing: Timing | None = None
+    ) -> dict:
+        """The picture `offset` frames from the moment; what Blur.encode takes of it."""
+        on_gpu = self.on_gpu(time, blur)
+        if offset not in self._pictures:
+            encoder = blur.device.create_command_encoder(label="render")
+            given, name = blur.given(self.size, number, timing), f"frame {offset}"
+            drawn = on_gpu.encode(encoder, given, self._images, name, float(offset))
+            gpu.submit(blur.device, encoder)
+            self._pictures[offset] = {**drawn, "camera": on_gpu.reprojections(offset)}
+        seen = self._pictures[offset]
+        return {
+            "color": seen["color"].create_view(),
+            "depth": seen["depth"].create_view(),
+            "normal": seen["normal"].create_view(),
+            "object_id": seen["object"].create_view(),
+            "camera": seen["camera"],
+        }
+
+    def on_gpu(self, time: float, blur: Blur | None = None) -> SceneOnGpu:
+        """The scene around `time` [s], as far as the blur looks."""
+        blur = blur or self.blur
+        if not np.isfinite(time):
+            raise InputError(f"time must be finite, got {time}")
+        moment = (time, id(self.scene), self.size, self.fps, self.rays)
+        if moment != self._moment:
+            self._moment, self._spans, self._pictures = moment, {}, {}
+        opens, closes = blur.shutter.span
+        delay = max(map(abs, blur.shutter.delay)) / 2
+        most = max(_offsets(blur))
+        span = min(opens, -most) - delay, max(closes, most) + delay
+        if span not in self._spans:
+            self._spans[span] = SceneOnGpu(
+                blur.device,
+                self.scene,
+                size=self.size,
+                time=time,
+                fps=self.fps,
+                span=span,
+                rays=self.rays,
+            )
+        return self._spans[span]
+
+
+def _offsets(blur: Blur) -> tuple[int, ...]:
+    """The frames that the method is given [frame intervals]."""
+    return (0, -1, 1) if "neighbours" in blur.method.uses else (0,)
 
 
 def render_frames(
@@ -163,8 +249,8 @@ def render_frames(
             skipped += 1
             tell(number, "skipped")
             continue
-        seen = render.frame(time, number) if sharp or passes else None
-        result = seen.color if sharp and seen else render(time, number)
+        seen = render.frame(time, number) if passes else None
+        result = render.sharp(time) if sharp else render(time, number)
         source = (
             _with_passes(render, seen, number)
             if passes and seen

@@ -69,7 +69,7 @@ def as_csv(report: Report) -> str:
 
 def _row(e: Entry) -> dict:
     own = {"case": e.case, "method": e.label, "kind": e.kind, "samples": e.samples,
-           "seconds": e.seconds, "budget": e.budget}  # fmt: skip
+           "seconds": e.seconds, "frame_seconds": e.frame_seconds, "budget": e.budget}  # fmt: skip
     return own | {name: _plain(value) for name, value in e.measures.items()}
 
 
@@ -206,13 +206,15 @@ def _uri(shown: np.ndarray) -> str:
 
 
 def _figures(entries: list[Entry], colors) -> str:
-    columns = ["method", "samples", "time [ms]", *(m.title for m in MEASURES.values())]
-    rows = [
-        [e.label, e.samples, None if e.seconds is None else round(1e3 * e.seconds, 2),
-         *e.measures.values()]
-        for e in entries
-    ]  # fmt: skip
-    return _grid(columns, rows, colors, judged=3)
+    columns = ["method", "samples", "time [ms]", "without frame [ms]"]
+    columns += [m.title for m in MEASURES.values()]
+    rows = []
+    for e in entries:
+        times = [None, None]
+        if e.seconds is not None:
+            times = [round(1e3 * s, 2) for s in (e.seconds, e.seconds - e.frame_seconds)]
+        rows.append([e.label, e.samples, *times, *e.measures.values()])
+    return _grid(columns, rows, colors, judged=4)
 
 
 def _table(table: Table, colors) -> str:

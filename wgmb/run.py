@@ -74,6 +74,7 @@ def blur_sequence(
     to_blur, to_write = _Handover(stop), _Handover(stop)
     neighbours = "neighbours" in blur.method.uses
     prepare = clip.with_neighbours if neighbours else clip.frame
+    normal = "normal" in blur.method.uses
     places = _Handover(stop)
     for _ in range(IN_FLIGHT):
         places.put(None)
@@ -93,7 +94,7 @@ def blur_sequence(
             places.get()
             try:
                 source = clip.source(number)
-                to_blur.put((source, prepare(source)))
+                to_blur.put((source, prepare(source, normal=normal)))
                 del source
             except (Error, OSError, MemoryError) as error:
                 fail(number, error)

@@ -14,6 +14,7 @@ import numpy as np
 
 from . import layers, stills, vectors
 from .cameras import CameraFile
+from .cuts import is_cut, jumps, straightened
 from .errors import InputError
 from .frame import Frame
 from .numbering import (
@@ -64,7 +65,8 @@ class Passes:
 class Clip:
     """A frame sequence, or one picture, being read.
 
-    Iterating gives Frames. `finding` says what the vectors were found to mean.
+    Iterating gives Frames. `finding` says what the vectors were found to mean; `cuts` has the
+    frames read so far that come after a camera cut.
     """
 
     def __init__(
@@ -81,6 +83,7 @@ class Clip:
         self.pattern, self.passes = str(pattern), passes or Passes()
         self.numbers = self._numbers(frames, skip_missing)
         self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
+        self.cuts: set[int] = set()
         self._kept: OrderedDict[int, Source] = OrderedDict()
         self._found: vectors.Finding | None = None
 
@@ -177,7 +180,7 @@ class Clip:
             if not wanted:
                 self.forget(number)
 
-    def with_neighbours(self, source: Source) -> Frame:
+    def with_neighbours(self, source: Source, normal: bool = True) -> Frame:
         """`frame`, and the frames before and after as far as they can be read."""
         near = {}
         for side, number in (("prev", source.number - 1), ("next", source.number + 1)):
@@ -186,11 +189,28 @@ class Clip:
                 with contextlib.suppress(InputError, OSError):  # its turn to fail comes
                     other = self.source(number)
                     if other.size == source.size:
-                        near[side] = self.frame(other)
-        return replace(self.frame(source), **near)
+                        near[side] = self.frame(other, normal=normal)
+        frame = self.frame(source, normal=normal)
+        for side in list(near):
+            if is_cut(frame, near[side], -1 if side == "prev" else 1):
+                del near[side]
+                self.cuts.add(source.number if side == "prev" else source.number + 1)
+        return replace(frame, **near)
 
-    def frame(self, source: Source, picture: bool = True) -> Frame:
-        """What a method is given of `source`; without `picture`, all but the colour (0)."""
+    def frame(self, source: Source, picture: bool = True, normal: bool = True) -> Frame:
+        """What a method is given of `source`; without `picture`, all but the colour (0); without
+        `normal`, no normals.
+
+        Motion that leads across a camera cut is left out (see cuts.jumps).
+        """
+        frame = self._frame(source, picture, normal)
+        for side in (-1, 1):
+            if jumps(frame, side):
+                self.cuts.add(source.number + (side > 0))
+                frame = straightened(frame, side)
+        return frame
+
+    def _frame(self, source: Source, picture: bool, normal: bool) -> Frame:
         meaning = self._decide().vectors
         with about(source.path):
             if meaning is None:  # where a layer was asked for, this says why there is none
@@ -212,6 +232,7 @@ class Clip:
                 source.rgba if picture else np.zeros((*source.size[::-1], 3), np.float16),
                 motion=motion,
                 depth=depth,
+                normal=self._normal(source) if normal else None,
                 camera=reprojections,
                 object_id=ids,
                 keep=self._mask(source, self.passes.keep),
@@ -229,6 +250,12 @@ class Clip:
             with np.errstate(divide="ignore"):
                 depth = np.where(depth > 0, 1 / depth, np.inf).astype(np.float32)
         return depth
+
+    def _normal(self, source: Source) -> np.ndarray | None:
+        names = layers.find_normal(source.channels, source.beside)
+        if not names:
+            return None
+        return np.stack([source.channels[name] for name in names], 2, dtype=np.float32)
 
     def _object_ids(self, source: Source) -> np.ndarray | None:
         by_layer = layers.layers(source.channels, near=source.beside)

@@ -18,7 +18,7 @@ class Timing:
     around a submit is the only honest clock, and `Timing.usable` says so.
     """
 
-    MOST = 2048  # passes a frame; what has more is not timed by pass
+    MOST = 2048  # passes a frame: a query set holds 4096; later ones are not timed
 
     def __init__(self, device: wgpu.GPUDevice):
         self.device, self.labels = device, []
@@ -30,24 +30,26 @@ class Timing:
         hardware = device.adapter_info["adapter_type"] != SOFTWARE
         return hardware and "timestamp-query" in device.features
 
-    def of(self, label: str) -> dict | None:
-        """The `timestamp_writes` of the pass called `label`; None if there are too many."""
+    def of(self, label: str) -> dict:
+        """What makes the pass called `label` write its times: arguments of begin_compute_pass."""
         first = 2 * len(self.labels)
+        if len(self.labels) >= self.MOST:
+            return {}
         self.labels.append(label)
-        if len(self.labels) > self.MOST:
-            return None
         return {
-            "query_set": self.queries,
-            "beginning_of_pass_write_index": first,
-            "end_of_pass_write_index": first + 1,
+            "timestamp_writes": {
+                "query_set": self.queries,
+                "beginning_of_pass_write_index": first,
+                "end_of_pass_write_index": first + 1,
+            }
         }
 
     def read(self) -> dict[str, float]:
         """Seconds per pass, after the work was submitted; passes of one name are added up.
 
-        Nothing if there were none, or more than MOST.
+        It begins anew with the next pass.
         """
-        if not 0 < len(self.labels) <= self.MOST:
+        if not self.labels:
             return {}
         usage = wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
         buffer = self.device.create_buffer(size=16 * len(self.labels), usage=usage)
@@ -58,6 +60,7 @@ class Timing:
         seconds: dict[str, float] = {}
         for label, (begin, end) in zip(self.labels, stamps, strict=True):
             seconds[label] = seconds.get(label, 0.0) + (int(end) - int(begin)) * 1e-9
+        self.labels.clear()
         return seconds
 
 

@@ -6,8 +6,11 @@ from typing import TYPE_CHECKING, Protocol
 
 from .accumulate import Accumulate
 from .distributed import Distributed
+from .fusion import Fusion
 from .reproject import Reproject
 from .tap import Tap
+from .tiles import Tiles
+from .volume import Volume
 
 if TYPE_CHECKING:
     import wgpu
@@ -16,14 +19,19 @@ if TYPE_CHECKING:
 
 
 class Method(Protocol):
-    """What a method is: a name, the inputs it needs, and how it is recorded."""
+    """What a method is: a name, the inputs it needs, and how it is recorded.
+
+    It may also have `samples`, its own default number of them, and `adaptive`: it can take as
+    many samples as each pixel's streak needs (AUTO of wgsl/common/shutter.wgsl).
+    """
 
     name: str
     """Also the stem of its Python file, its WGSL file and its twin in the tests."""
     needs: frozenset[str]
     """Of "color", "motion", "depth", "scene"."""
     uses: frozenset[str]
-    """What it takes if it is there: "neighbours"."""
+    """What it takes if it is there: "neighbours", "depth", "normal"; "progress": its samples may
+    be recorded bit by bit."""
 
     def encode(
         self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView
@@ -32,4 +40,5 @@ class Method(Protocol):
         ...
 
 
-METHODS: dict[str, type] = {m.name: m for m in (Tap, Reproject, Accumulate, Distributed)}
+_ALL = (Tap, Tiles, Fusion, Reproject, Volume, Accumulate, Distributed)
+METHODS: dict[str, type] = {m.name: m for m in _ALL}

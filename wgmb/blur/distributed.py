@@ -10,7 +10,7 @@ import wgpu
 from .. import gpu
 from ..images import Scratch
 
-TIMES = 256  # equal shares of the exposure between which times are interpolated
+TIMES = 4096  # equal shares of the exposure between which times are interpolated
 
 
 class Distributed:
@@ -26,7 +26,7 @@ class Distributed:
 
     name = "distributed"
     needs = frozenset({"scene"})
-    uses: frozenset[str] = frozenset()
+    uses = frozenset({"progress"})
 
     def __init__(self, device, *, output="rgba32float", seed=0):
         self._device, self._output, self._seed = device, output, seed
@@ -35,10 +35,15 @@ class Distributed:
 
     def encode(self, encoder, inputs, output):
         """Record the rays of `inputs.progress`; `output` is the mean of all so far."""
-        kernel = gpu.kernel(self._device, "blur/distributed.wgsl", {"Output": self._output})
+        kernel = gpu.kernel(
+            self._device,
+            "blur/distributed.wgsl",
+            {"Output": self._output},
+            **inputs.scene.constants,
+        )
         data = np.zeros((), kernel.source.dtype("Progress"))
         data["first"], data["count"] = inputs.progress
-        data["seed"], data["times"] = self._seed, TIMES
+        data["seed"] = self._seed
         create = self._device.create_buffer_with_data
         width, height = inputs.given.size
         kernel.run(

@@ -16,6 +16,8 @@ from ..velocity import view_of
 GOLDEN = (5**0.5 - 1) / 2
 FORMS = ("slices", "published")
 SHOWN = ("color", "count")
+SPLATS = ("point", "line")
+LINKS = 64 << 20  # bytes of links between samples: how many steps are done together
 
 
 class Reproject:
@@ -29,7 +31,13 @@ class Reproject:
     camera and back in `samples` steps, are rounded to pixels and counted without a depth test,
     so the exposure is the interval between the two whatever the shutter. Cameras are
     interpolated; where there are vectors, samples follow those. Colour is summed in fixed
-    point: 0 to 262143 in steps of 1/16384, without overflow.
+    point of 64 bits: 0 to 262143 in steps of 1/16384, what is beyond is held to that range, and
+    60,000 samples on one pixel in a few steps do not overflow; more are not all counted.
+    What he describes and leaves out is optional there. `facing`: a sample whose surface faces
+    away from the interpolated camera is dropped; needs cameras; the surface is that of the
+    normals, or of the depth. `depth_test`: of the samples that a step puts on one pixel only
+    the nearest counts, the least number among equals. `splat`: "line" draws every sample from
+    its place at a step to that at the next, each pixel having its share of the step.
     `show`: "count" gives the share of slices that reached a pixel (his figure 4).
 
     Strong: blur goes over silhouettes, what is hidden appears, many samples cost little more
@@ -39,20 +47,37 @@ class Reproject:
 
     name = "reproject"
     needs = frozenset({"color", "motion", "depth"})
-    uses = frozenset({"neighbours"})
+    uses = frozenset({"neighbours", "normal"})
 
-    def __init__(self, device, *, output="rgba32float", show="color", form="slices"):
+    def __init__(
+        self,
+        device,
+        *,
+        output="rgba32float",
+        show="color",
+        form="slices",
+        facing=False,
+        depth_test=False,
+        splat="point",
+    ):
         if form not in FORMS:
             raise InputError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
         if show not in SHOWN:
             raise InputError(f"show must be one of {', '.join(SHOWN)}, got {show!r}")
+        if splat not in SPLATS:
+            raise InputError(f"splat must be one of {', '.join(SPLATS)}, got {splat!r}")
+        if form != "published" and (facing or depth_test or splat != "point"):
+            raise InputError("facing, depth_test and splat are options of the form 'published'")
+        if depth_test and splat == "line":
+            raise InputError("a line is at many depths: depth_test goes with splat 'point'")
+        self._facing, self._depth_test, self._splat = facing, depth_test, splat
         self._device, self._output, self._show, self._form = device, output, show, form
         self._nearest, self._winner = Scratch(device), Scratch(device)
         self._means, self._counts = Scratch(device), Scratch(device)
-        self._carries = Scratch(device)
+        self._carries, self._links, self._heads = (Scratch(device) for _ in range(3))
 
     def encode(self, encoder, inputs, output):
-        """Record four passes a slice and source, or one a step."""
+        """Record four passes a slice and source, or two for several steps."""
         record = self._published if self._form == "published" else self._slices
         record(encoder, inputs, output)
 
@@ -81,11 +106,11 @@ class Reproject:
         shift = inputs.jitter * (inputs.number * GOLDEN % 1 - 0.5)
         times = inputs.shutter.sample_times(inputs.samples, shift)
 
-        def run(entry: str, source: int, time: float, first: bool = False) -> None:
+        def run(entry: str, source: int, time: float) -> None:
             offset, color, motion, depth, weight = sources[source]
             data = np.zeros((), kernel.source.dtype("Slice"))
             data["time"], data["offset"], data["source"] = time, offset, source
-            data["first"] = first
+            data["last"] = source == len(sources) - 1
             kernel.run(
                 encoder,
                 entry,
@@ -100,18 +125,25 @@ class Reproject:
                 **shared,
             )
 
-        for i, time in enumerate(times):
-            run("clear", 0, time, first=i == 0)
+        run("clear", 0, 0.0)
+        for time in times:
             for entry in ("depths", "winners", "gather"):
                 for source in range(len(sources)):
                     run(entry, source, time)
         run("finish", 0, 0.0)
 
     def _published(self, encoder, inputs, output):
-        camera: Reprojections | None = inputs.camera
+        camera: Reprojections | None = inputs.camera if inputs.by_camera else None
         ways: list[tuple[Camera, Camera]] = []
         if camera and camera.prev and camera.here.view_from_world is not None:
             ways = [(camera.here, camera.prev), (camera.prev, camera.here)]
+        if self._facing and not ways:
+            raise InputError(
+                "facing needs the cameras of this and the previous frame with view_from_world, "
+                "and no vectors"
+            )
+        prev = [n for n in inputs.neighbours if n.offset == -1]
+        normals = inputs.normal is not None and all(n.normal is not None for n in prev)
         kernel = gpu.kernel(
             self._device,
             "blur/reproject_published.wgsl",
@@ -119,47 +151,82 @@ class Reproject:
             CAMERA=bool(ways),
             WEIGHTED=inputs.weight is not None,
             COUNTS=self._show == "count",
+            LINES=self._splat == "line",
+            FACING=self._facing,
+            NORMALS=normals,
+            NEAREST_ONLY=self._depth_test,
         )
-        pixels = inputs.given.size[0] * inputs.given.size[1]
+        width, height = inputs.given.size
+        bits = (width - 1).bit_length(), (width - 1).bit_length() + (height - 1).bit_length()
+        rows = int(kernel.source.constant("ROWS"))
+        most = max(
+            1, min(rows - 1, 2 ** (32 - bits[1]) - 2, LINKS // (4 * width * height), inputs.samples)
+        )
+        most = 1 if self._depth_test else most
         shared = {
             "own": inputs.color,
-            "sums": self._means.at_least(16 * pixels),
-            "carries": self._carries.at_least(16 * pixels),
-            "counts": self._counts.at_least(4 * pixels),
+            "heads": self._heads.at_least(4 * width * height),
+            "links": self._links.at_least(4 * most * width * height),
+            "sums": self._means.at_least(16 * width * height),
+            "carries": self._carries.at_least(16 * width * height),
+            "counts": self._counts.at_least(4 * width * height),
             "output": output,
         }
-        here = (inputs.color, inputs.motion, inputs.depth, inputs.weight or inputs.one)
+        encoder.clear_buffer(shared["heads"])
+        create = self._device.create_buffer_with_data
 
-        def run(entry: str, source, time: float, way: tuple[Camera, Camera] | None) -> None:
-            color, motion, depth, weight = source
-            data = np.zeros((), kernel.source.dtype("Step"))
-            data["time"] = time
+        def run(entry: str, source, steps: np.ndarray, way, first: bool, last: bool) -> None:
+            color, motion, depth, normal, weight = source
+            data = np.zeros((), kernel.source.dtype("Chunk"))
+            data["bits"], data["steps"] = bits, max(len(steps) - 1, 0)
+            data["first"], data["last"] = first, last
+            table = np.zeros(rows, kernel.source.dtype("Step"))
+            table["time"][: len(steps)] = steps
             if camera and way:
-                between = way[0].toward(way[1], abs(time))
-                seen = replace(camera, here=way[0], prev=None, next=between)
+                seen = replace(camera, here=way[0], prev=None, next=way[1])
                 data["view"] = view_of(seen, inputs.given.size)
-                data["clip_from_pixel"] = seen.matrices()[0, 1].T
+                data["world_from_pixel"] = seen.world_from_pixel().T
+                data["eye"] = _eye(way[0])
+                for row, share in zip(table, np.abs(steps), strict=False):
+                    between = way[0].toward(way[1], share)
+                    row["clip_from_pixel"] = replace(seen, next=between).matrices()[0, 1].T
+                    row["eye"] = _eye(between)
             kernel.run(
                 encoder,
                 entry,
                 inputs.given,
-                step_=self._device.create_buffer_with_data(
-                    label="step", data=data, usage=wgpu.BufferUsage.UNIFORM
-                ),
+                chunk=create(label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM),
+                steps=create(label="steps", data=table, usage=wgpu.BufferUsage.UNIFORM),
                 color=color,
                 motion=motion,
                 depth=depth,
+                normal=normal if self._facing and normals else inputs.none,
                 weight=weight,
                 **shared,
             )
 
-        cycles = [(here, -1)]
-        for near in inputs.neighbours:
-            if near.offset == -1:
-                cycles.append(((near.color, near.motion, near.depth, inputs.one), 1))
-        run("clear", here, 0, None)
-        for k, (source, direction) in enumerate(cycles):
-            for i in range(inputs.samples):
-                share = i / max(inputs.samples - 1, 1)
-                run("splat", source, direction * share, ways[k] if ways else None)
-        run("resolve", here, 0, None)
+        one = inputs.one
+        sources = [(inputs.color, inputs.motion, inputs.depth, inputs.normal, inputs.weight or one)]
+        sources += [(n.color, n.motion, n.depth, n.normal, one) for n in prev]
+        shares = np.linspace(0, 1, inputs.samples) if inputs.samples > 1 else np.zeros(1)
+        jobs = []
+        for k, source in enumerate(sources):
+            times = (-1, 1)[k] * np.append(shares, shares[-1])  # what is one too many ends a line
+            for i in range(0, inputs.samples, most):
+                jobs.append((source, times[i : i + most + 1], ways[k] if ways else None))
+        if self._splat == "line":
+            run("gather", sources[0], shares[:0], None, True, False)
+        for i, (source, steps, way) in enumerate(jobs):
+            if self._splat == "line":
+                run("lines", source, steps, way, False, False)
+            else:
+                run("link", source, steps, way, False, False)
+                run("gather", source, steps, way, i == 0, i == len(jobs) - 1)
+        if self._splat == "line":
+            run("gather", sources[0], shares[:0], None, False, True)
+
+
+def _eye(camera: Camera) -> np.ndarray:
+    """A camera's place in the world, or the direction to it where it is orthographic."""
+    assert camera.view_from_world is not None
+    return np.linalg.inv(camera.view_from_world)[:, 2 if camera.orthographic else 3]

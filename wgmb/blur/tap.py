@@ -25,6 +25,7 @@ class Tap:
     name = "tap"
     needs = frozenset({"color", "motion"})
     uses: frozenset[str] = frozenset()
+    adaptive = True
 
     def __init__(self, device, *, output="rgba32float", path="curved", form="shutter"):
         if path not in PATHS:
@@ -41,6 +42,7 @@ class Tap:
             "blur/tap.wgsl",
             {"Output": self._output},
             EVEN=inputs.even,
+            AUTO=inputs.auto,
             WEIGHTED=inputs.weight is not None,
             **self._constants,
         )

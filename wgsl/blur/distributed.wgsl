@@ -11,7 +11,6 @@ struct Progress {
     first: u32,         // rays a pixel has had already; 0 begins anew
     count: u32,         // rays to add now
     seed: u32,
-    times: u32,         // entries of `strata`
 }
 
 // Powers of the inverse of the root of x^4 = x + 1: any first n points of this sequence are
@@ -28,7 +27,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < progress.count; i++) {
         let point = fract(shift + fract(f32(progress.first + i) * SPREAD));
         let x = vec2f(id.xy) + point.xy;
-        let now = instant(open_time(point.z) + dot(shutter.rolling, x / vec2f(frame.size) - 0.5));
+        let now = instant(time_of(point.z) + dot(shutter.rolling, x / vec2f(frame.size) - 0.5));
         let ray = camera_ray(x, now);
         sum += vec4f(radiance(nearest(ray, now), ray, now), 1.0);
     }
@@ -36,16 +35,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     textureStore(output, id.xy, vec4f(sum.rgb / sum.w, 1.0));
 }
 
-/// When the share `u` of the exposure has passed.
-fn open_time(u: f32) -> f32 {
-    let x = u * f32(progress.times);
-    let i = min(u32(x), progress.times - 1u);
-    return within(strata[i], x - f32(i) - 0.5);
-}
-
-/// Three numbers in [0, 1) for a pixel and a seed (PCG3D: Jarzynski and Olano 2020).
+/// Three numbers in [0, 1) for a pixel, a frame and a seed (PCG3D: Jarzynski and Olano 2020).
 fn random3(px: vec2u) -> vec3f {
-    var v = vec3u(px, progress.seed) * 1664525u + 1013904223u;
+    var v = vec3u(px, progress.seed + 0x9E3779B1u * frame.index) * 1664525u + 1013904223u;
     v.x += v.y * v.z;
     v.y += v.z * v.x;
     v.z += v.x * v.y;

@@ -9,7 +9,7 @@ struct Slice {
     time: f32,          // of this slice [frame intervals]
     offset: f32,        // of the source frame [frame intervals]
     source: u32,        // its number among the sources; 0 is the frame itself
-    first: u32,         // 1: the first slice of a picture
+    last: u32,          // 1: the last of the sources
 }
 
 @group(1) @binding(0) var<uniform> slice: Slice;
@@ -32,19 +32,18 @@ const NOTHING: u32 = 0xffffffffu;
 const FAR: f32 = 1e10;              // depth of what has none; also that of nothing
 const OFF_CENTRE: f32 = 0.004;      // share of depth by which a sample stands back per pixel off its place
 const NEIGHBOUR: u32 = 0x80000000u;
-const SOURCE_BITS: u32 = 30u;       // the source stands above the sample's index
+const ROW_BIT: u32 = 15u;           // in a sample's number its column comes first, then its row,
+const SOURCE_BITS: u32 = 30u;       // then the source
 
-/// Before every slice.
+/// Before the first slice.
 @compute @workgroup_size(WG_X, WG_Y)
 fn clear(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let at = index_of(id.xy);
     atomicStore(&nearest[at], NOTHING);
     atomicStore(&winner[at], NOTHING);
-    if slice.first == 1u {
-        means[at] = vec4f(0.0);
-        counts[at] = 0.0;
-    }
+    means[at] = vec4f(0.0);
+    counts[at] = 0.0;
 }
 
 /// The least depth at every pixel.
@@ -67,9 +66,12 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let at = index_of(id.xy);
     let seen = atomicLoad(&winner[at]);
+    if slice.last == 1u {       // of the sources: ready for the next slice
+        atomicStore(&nearest[at], NOTHING);
+        atomicStore(&winner[at], NOTHING);
+    }
     if seen == NOTHING || seen >> SOURCE_BITS != slice.source { return; }
-    let index = seen & ((1u << SOURCE_BITS) - 1u);
-    let px = vec2u(index % frame.size.x, index / frame.size.x);
+    let px = vec2u(seen & ((1u << ROW_BIT) - 1u), (seen & ((1u << SOURCE_BITS) - 1u)) >> ROW_BIT);
     let moved = way(px);
     let uv = (vec2f(id.xy) + 0.5 - moved) / vec2f(frame.size);
     let still = all(moved == vec2f(0.0));       // to the bit
@@ -111,20 +113,25 @@ fn splat(px: vec2u, decide: bool) {
     if WEIGHTED { if textureLoad(weight, px, 0).x <= 0.0 { return; } }
     let x = vec2f(px) + way(px);        // in pixels whose centres are integers
     if any(abs(x) > vec2f(1e6)) { return; }
-    let base = floor(x);
+    let base = vec2i(floor(x));
+    let size = vec2i(frame.size);
+    let behind = select(0u, NEIGHBOUR, slice.source > 0u);
+    let number = (slice.source << SOURCE_BITS) | (px.y << ROW_BIT) | px.x;
     for (var i = 0u; i < 4u; i++) {
-        let to = vec2i(base) + vec2i(vec2u(i & 1u, i >> 1u));
-        if any(to < vec2i(0)) || any(to >= vec2i(frame.size)) { continue; }
+        let to = base + vec2i(vec2u(i & 1u, i >> 1u));
+        if any(to < vec2i(0)) || any(to >= size) { continue; }
         let off = abs(vec2f(to) - x);
         if off.x >= 1.0 || off.y >= 1.0 { continue; }
-        let at = index_of(vec2u(to));
+        let at = to.y * size.x + to.x;
         // Bits of positive floats are in their order; a neighbouring frame's come after all of the
         // frame's own: its samples fill what the frame itself does not show, and spoil nothing.
-        let key = bitcast<u32>(z * (1.0 + OFF_CENTRE * (off.x + off.y))) | select(0u, NEIGHBOUR, slice.source > 0u);
+        let key = bitcast<u32>(z * (1.0 + OFF_CENTRE * (off.x + off.y))) | behind;
         if !decide {
             atomicMin(&nearest[at], key);
-        } else if key == atomicLoad(&nearest[at]) {
-            atomicMin(&winner[at], (slice.source << SOURCE_BITS) | index_of(px));
+        } else {
+            // Only loops that are not entered save time on every driver.
+            let wins = select(0u, 1u, key == atomicLoad(&nearest[at]));
+            for (var k = 0u; k < wins; k++) { atomicMin(&winner[at], number); }
         }
     }
 }

@@ -25,17 +25,19 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if PUBLISHED { path = Path(-textureLoad(motion, id.xy, 0).xy, vec2f(0.0)); }
 
     // A loop that ends early is the only branch that saves time on every driver.
-    let times = shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5));
-    let opens = shutter.span.x + times.delay;
-    let closes = shutter.span.y + times.delay;
+    let shift = frame.jitter * (pixel_noise(id.xy) - 0.5);
+    let all = shutter_times(x, shift);
+    let opens = shutter.span.x + all.delay;
+    let closes = shutter.span.y + all.delay;
     let opening = displacement(path, opens);
     let closing = displacement(path, closes);
     let turn = displacement(path, turning(path, opens, closes));
     let farthest = max(dot(turn, turn), max(dot(opening, opening), dot(closing, closing)));
     let still = !PUBLISHED && farthest < STILL * STILL;
-    let count = select(frame.samples, 0u, still);
+    let times = enough_times(all, distance(opening, turn) + distance(turn, closing));
+    let count = select(times.count, 0u, still);
 
-    let share = 1.0 / f32(frame.samples);   // before adding, so that no sum of finite colours overflows
+    let share = 1.0 / f32(times.count);   // before adding, so that no sum of finite colours overflows
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
     let back = Path(-path.velocity * texel, path.curvature * texel);    // in time

@@ -1,0 +1,708 @@
+"""The viewer offscreen: events in, pictures out."""
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from wgmb import (
+    Blur,
+    Clip,
+    DeviceError,
+    InputError,
+    Render,
+    cli,
+    display,
+    exr,
+    gpu,
+    scenes,
+    stills,
+)
+from wgmb.blur import METHODS
+from wgmb.timing import Timing
+from wgmb.viewer import State, controls, offscreen
+from wgmb.viewer.stage import Pace
+from wgmb.viewer.window import frame
+
+SIZE = 640, 1010  # tall enough for the whole panel; the picture is 320 x 180
+PLAIN = State(rays=1, samples=4)
+SAMPLE = str(Path(__file__).parent.parent / "sample" / "crossing.####.exr")
+
+
+class Hand:
+    """A viewer and somebody at its mouse and keys; the clock is theirs."""
+
+    def __init__(self, state=PLAIN, size=SIZE, ratio=1.0):
+        self.now = 100.0
+        self.viewer = offscreen(state, size, ratio, clock=lambda: self.now)
+        self.look()
+
+    @property
+    def state(self):
+        return self.viewer.state
+
+    def submit(self, kind, **event):
+        self.viewer.canvas.submit_event({"event_type": kind, "modifiers": (), **event})
+
+    def look(self, seconds=0.02):
+        self.now += seconds
+        return frame(self.viewer)[..., :3].astype(int)
+
+    def picture(self):
+        """What is shown when all is done, without the panel."""
+        for _ in range(400):
+            self.look(0.4)
+            if not self.viewer.stage.report.busy:
+                return self.viewer.stage.picture()
+        raise AssertionError("never done")
+
+    def drag(self, start, end, button=1, modifiers=()):
+        press = {"button": button, "modifiers": modifiers}
+        self.submit("pointer_move", x=start[0], y=start[1], button=0, buttons=())
+        self.submit("pointer_down", x=start[0], y=start[1], buttons=(button,), **press)
+        self.look()
+        for share in (0.5, 1.0):
+            x, y = (a + (b - a) * share for a, b in zip(start, end, strict=True))
+            self.submit("pointer_move", x=x, y=y, button=0, buttons=(button,))
+            self.look()
+        self.submit("pointer_up", x=end[0], y=end[1], buttons=(), **press)
+        self.look()
+
+    def click(self, at):
+        self.drag(at, at)
+
+    def touch(self, name, share=0.5):
+        """Put a finger on a widget, without having come over it before."""
+        x, y, width, height = self.viewer.panel.places[name]
+        at = x + share * width, y + height / 2
+        for kind in ("pointer_down", "pointer_up"):
+            self.submit("pointer_move", x=at[0], y=at[1], button=0, buttons=())
+            self.submit(kind, x=at[0], y=at[1], button=1, buttons=(1,))
+            self.look()
+        self.look()
+
+    def choose(self, name, item):
+        self.touch(name)
+        self.look()
+        self.touch(f"{name}: {item}")
+        self.look()
+
+    def press(self, key):
+        self.submit("key_down", key=key)
+        self.submit("key_up", key=key)
+        self.look()
+
+
+@pytest.fixture(scope="module")
+def shared():
+    """One hand for the tests that begin by putting everything back."""
+    return Hand()
+
+
+@pytest.fixture
+def hand(shared):
+    shared.viewer.state = PLAIN
+    shared.viewer.canvas.set_logical_size(*SIZE)
+    shared.look()
+    return shared
+
+
+# ---- the picture ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["tap", "distributed"])
+def test_the_picture_is_what_render_writes(hand, method):
+    hand.viewer.state = replace(PLAIN, method=method, frame=2.0)
+    got = hand.picture()
+    want = Render(
+        scenes.make("crossing"), Blur(method, samples=4), size=(320, 180), rays=1
+    )(2 / 24, 2)  # fmt: skip
+    assert got.shape == (180, 320, 3)
+    assert np.abs(got - stills.srgb(want[..., :3])).max() < 2e-3
+
+
+def test_the_window_shows_the_picture_in_its_place(hand):
+    want = hand.picture()
+    x, y, width, height = hand.viewer.stage.report.place
+    shown = hand.look()[y : y + height, x : x + width]
+    assert np.abs(shown / 255 - want).max() < 0.01
+
+
+def test_every_method_and_scene_can_be_chosen(hand):
+    seen = []
+    for method in METHODS:
+        hand.choose("method", method)
+        assert hand.state.method == method
+        seen.append(hand.picture())
+    for name in scenes.SCENES:
+        if name != hand.state.source:
+            hand.choose("scene", name)
+            assert hand.state.source == name
+        assert hand.picture().std() > 0.01
+
+
+@pytest.mark.parametrize("tone", ["clip", "soft"])
+def test_exposure_and_tone(hand, tone):
+    hand.viewer.state = replace(PLAIN, exposure=1.5, tone=tone, look="sharp")
+    light = Render(scenes.make("crossing"), Blur(samples=4), size=(320, 180), rays=1).frame(0.0)
+    want = light.color[..., :3] * 2**1.5
+    want = want / (1 + want) if tone == "soft" else want
+    assert np.abs(hand.picture() - stills.srgb(want)).max() < 2e-3
+
+
+def test_velocity_has_the_colours_of_display(hand):
+    hand.viewer.state = replace(PLAIN, look="velocity")
+    shown = hand.picture()
+    render = Render(scenes.make("crossing"), Blur(), size=(320, 180), rays=1)
+    motion = render.blur.motion(render.frame(0.0))[..., 2:]
+    want = stills.srgb(display.motion_colors(motion, PLAIN.fastest * 180))
+    apart = np.abs(shown - want).max(axis=2)
+    wheel = slice(110, None), slice(240, None)
+    assert apart[wheel].max() > 0.5  # the legend
+    apart[wheel] = 0
+    assert apart.max() < 5e-3
+
+
+def test_depth_is_grey_and_nearer_is_brighter(hand):
+    hand.viewer.state = replace(PLAIN, look="depth")
+    shown = hand.picture()
+    depth = Render(scenes.make("crossing"), Blur(), size=(320, 180), rays=1).frame(0.0).depth
+    want = np.where(np.isfinite(depth), 5 / (5 + depth), 0)
+    apart = np.abs(shown - want[..., None])
+    apart[150:, :160] = 0  # the legend
+    assert apart.max() < 2e-3
+
+
+def test_what_a_method_shows_of_itself_can_be_looked_at(hand):
+    hand.viewer.state = replace(PLAIN, method="reproject")
+    result = hand.picture()
+    assert "count" in hand.viewer.stage.looks(hand.state)
+    hand.choose("look at", "count")
+    assert np.abs(hand.picture() - result).max() > 0.1
+
+
+def test_all_that_can_be_looked_at_can_be_drawn(hand):
+    for method in METHODS:
+        for look in hand.viewer.stage.looks(replace(PLAIN, method=method)):
+            if look != "error":
+                hand.viewer.state = replace(PLAIN, method=method, look=look)
+                assert np.isfinite(hand.picture()).all()
+
+
+# ---- mouse and keys -------------------------------------------------------------------------
+
+
+def test_left_drag_orbits_and_r_puts_it_back(hand):
+    before = hand.picture()
+    hand.drag((100, 500), (180, 520))
+    aside, up = hand.state.orbit
+    assert aside == pytest.approx(-80 / 320 * np.degrees(4.0))
+    assert up == pytest.approx(20 / 1010 * np.degrees(4.0))
+    assert np.abs(hand.picture() - before).mean() > 0.02
+    hand.press("r")
+    assert hand.state.orbit == (0, 0)
+    assert np.array_equal(hand.picture(), before)
+
+
+@pytest.mark.parametrize("button, modifiers", [(2, ()), (1, ("Shift",))])
+def test_right_or_shift_drag_moves_the_picture_with_the_hand(hand, button, modifiers):
+    hand.drag((100, 500), (132, 500), button, modifiers)
+    assert hand.state.orbit == (0, 0)
+    assert hand.state.pan == pytest.approx((-32 / 180 * 6.25, 0))
+
+
+def test_wheel_comes_nearer_and_is_continuous(hand):
+    hand.submit("wheel", x=100, y=500, dx=0, dy=-100, buttons=())
+    hand.look()
+    whole = hand.state.dolly
+    hand.viewer.state = PLAIN
+    for _ in range(10):
+        hand.submit("wheel", x=100, y=500, dx=0, dy=-10, buttons=())
+        hand.look()
+    assert whole < 1
+    assert hand.state.dolly == pytest.approx(whole)
+
+
+def test_elevation_and_distance_are_held(hand):
+    layout = controls.Layout((0, 0, 320, 1010), (0, 400, 320, 180))
+    up = controls.drag(PLAIN, layout, "orbit", 0, 5000)
+    down = controls.drag(PLAIN, layout, "orbit", 0, -5000)
+    assert (down.orbit[1], up.orbit[1]) == controls.ELEVATION
+    far = controls.wheel(PLAIN, layout, 5, 5, 0, 1e5)
+    assert far.dolly == 10
+    assert controls.wheel(PLAIN, layout, 500, 5, 0, 100) == PLAIN  # not over the picture
+
+
+def test_a_scene_with_a_camera_of_its_own_is_turned_by_it(monkeypatch):
+    def own(cam_x: float = 0.0, cam_y: float = 0.0):
+        return scenes.crossing()
+
+    monkeypatch.setitem(scenes.SCENES, "own", own)
+    state, layout = State(source="own"), controls.Layout((0, 0, 400, 200), (0, 0, 400, 200))
+    moved = controls.drag(state, layout, "orbit", 100, 20)
+    assert dict(moved.settings) == pytest.approx({"cam_x": -1.0, "cam_y": 0.4})
+    assert moved.orbit == (0, 0)
+    held = controls.drag(moved, layout, "orbit", 0, -1000)
+    assert dict(held.settings)["cam_y"] == -1.0
+    assert controls.key(held, layout, "r")[0].settings == ()
+
+
+def test_keys(hand):
+    for key, name, value in (
+        ("2", "method", list(METHODS)[1]),
+        ("1", "method", next(iter(METHODS))),
+        ("ArrowRight", "frame", 1.0),
+        ("ArrowUp", "frame", 1.1),
+        ("ArrowDown", "frame", 1.0),
+        ("ArrowLeft", "frame", 0.0),
+        ("ArrowLeft", "frame", 11.0),  # round
+        ("h", "help", True),
+        ("h", "help", False),
+        ("Tab", "panel", False),
+        ("Tab", "panel", True),
+        ("c", "compare", "wipe"),
+        ("l", "look", "sharp"),
+        (" ", "playing", True),
+        (" ", "playing", False),
+    ):
+        hand.press(key)
+        assert getattr(hand.state, name) == pytest.approx(value), key
+
+
+def test_every_key_of_the_help_does_something():
+    layout = controls.Layout((0, 0, 9, 9), (0, 0, 9, 9), tuple(METHODS), ("result", "sharp"),
+                             ("off", "wipe"))  # fmt: skip
+    names = {"space": " ", "left, right": "ArrowLeft", "up, down": "ArrowUp", "1 - 9": "2",
+             "Esc": "Escape", "r": "R"}  # fmt: skip
+    moved = replace(PLAIN, orbit=(5.0, 5.0))
+    for name in controls.KEYS:
+        state, action = controls.key(moved, layout, names.get(name, name))
+        assert state != moved or action, name
+
+
+def test_escape_closes(hand):
+    own = Hand(size=(320, 180))
+    own.submit("key_down", key="Escape")
+    own.viewer.canvas._process_events()
+    assert own.viewer.canvas.get_closed()
+
+
+def test_playing_goes_on_with_the_clock(hand):
+    hand.viewer.state = replace(PLAIN, playing=True, speed=0.5)
+    hand.look(0.0)
+    hand.look(0.25)
+    assert hand.state.frame == pytest.approx(0.25 * 24 * 0.5)
+    hand.look(0.5)
+    hand.look(0.5)
+    assert hand.state.frame == pytest.approx(1.25 * 24 * 0.5 - 12)  # of 12 frames
+
+
+# ---- the panel ------------------------------------------------------------------------------
+
+SLIDERS = ("frame", "samples", "jitter", "shutter", "exposure", "fps", "speed")
+
+
+@pytest.mark.parametrize("name", SLIDERS)
+def test_a_slider_sets_its_value_and_never_moves_the_camera(hand, name):
+    before = getattr(hand.state, name)
+    x, y, width, height = hand.viewer.panel.places[name]
+    hand.touch(name, 0.15)
+    low = getattr(hand.state, name)
+    hand.drag((x + 0.15 * width, y + height / 2), (x - 150, y - 80))  # off, over the picture
+    hand.touch(name, 0.9)
+    high = getattr(hand.state, name)
+    assert low < high
+    assert before in (low, high) or low != before
+    assert (hand.state.orbit, hand.state.pan, hand.state.dolly) == ((0, 0), (0, 0), 1)
+
+
+def test_shutter_phase_curve_rolling_and_longest(hand):
+    hand.choose("phase", "end")
+    hand.choose("curve", "gaussian")
+    hand.choose("rolling", "down")
+    hand.touch("limited")
+    state = hand.state
+    assert (state.phase, state.curve, state.rolling) == ("end", "gaussian", "down")
+    assert state.max_blur == 40
+    hand.touch("max_blur", 0.9)
+    assert hand.state.max_blur > 100
+    hand.touch("rolling_duration", 0.9)
+    assert hand.state.rolling_duration > 1.5
+    hand.choose("phase", "at")
+    hand.touch("phase at", 0.9)
+    assert float(hand.state.phase) > 0.5
+
+
+def test_options_of_the_method(hand):
+    hand.choose("path", "straight")
+    assert dict(hand.state.options) == {"path": "straight"}
+    hand.choose("path", "curved")
+    assert hand.state.options == ()
+
+
+def test_a_parameter_of_the_scene(hand):
+    before = hand.picture()
+    x, y, _, _ = hand.viewer.panel.places["set speed"]
+    hand.drag((x + 20, y + 8), (x + 120, y + 8))
+    assert dict(hand.state.settings)["speed"] > 1.2
+    assert np.abs(hand.picture() - before).mean() > 1e-3
+
+
+def test_a_value_that_is_refused_is_said_and_undone(hand):
+    before = hand.state
+    hand.viewer.state = replace(PLAIN, source="fence", settings=(("posts", 900),))
+    hand.look()
+    assert hand.state == before
+    assert "posts" in hand.viewer._message[0]
+
+
+def test_nothing_is_drawn_when_nothing_changes(hand):
+    hand.picture()
+    hand.look()
+    assert hand.viewer.stage.report.seconds.keys() == {"draw"}
+    assert not hand.viewer.stage.report.changed
+
+
+# ---- comparing ------------------------------------------------------------------------------
+
+
+def pictures(hand):
+    """The result, and the sharp picture."""
+    hand.viewer.state = PLAIN
+    first = hand.picture()
+    hand.viewer.state = replace(PLAIN, look="sharp")
+    return first, hand.picture()
+
+
+def test_wipe_shows_either_side_and_its_line_is_dragged(hand):
+    first, second = pictures(hand)
+    hand.viewer.state = replace(PLAIN, compare="wipe", against="sharp", wipe=0.5)
+    shown = hand.picture()
+    assert np.array_equal(shown[:, :158], first[:, :158])
+    assert np.array_equal(shown[:, 162:], second[:, 162:])
+    hand.drag((160, 500), (80, 540))
+    assert hand.state.wipe == pytest.approx(0.25)
+    assert hand.state.orbit == (0, 0)
+    shown = hand.picture()
+    assert np.array_equal(shown[:, 82:], second[:, 82:])
+
+
+def test_split_shows_both_whole(hand):
+    hand.viewer.state = replace(PLAIN, compare="split", against=PLAIN.method)
+    hand.picture()
+    width = 320
+    whole = hand.look()[:, :width]
+    left, right = whole[460:550, 5:155], whole[460:550, 165:315]
+    assert np.abs(left - right).max() <= 2
+    assert left.std() > 10
+
+
+def test_difference_of_the_same_is_black_and_of_others_is_not(hand):
+    hand.viewer.state = replace(PLAIN, compare="difference", against=PLAIN.method)
+    assert hand.picture().max() == 0
+    hand.viewer.state = replace(PLAIN, compare="difference", against="sharp", gain=2.0)
+    got, (first, second) = hand.picture(), pictures(hand)
+    assert np.abs(got - np.clip(2 * np.abs(first - second), 0, 1)).max() < 5e-3
+
+
+def test_flicker_changes_with_the_clock(hand):
+    first, second = pictures(hand)
+    hand.viewer.state = replace(PLAIN, compare="flicker", against="sharp")
+    hand.picture()
+    seen = []
+    for _ in range(4):
+        hand.look(0.5)
+        seen.append(hand.viewer.stage.picture())
+    assert np.array_equal(seen[0], seen[2]) and np.array_equal(seen[1], seen[3])
+    assert {a.tobytes() for a in seen} == {first.tobytes(), second.tobytes()}
+
+
+def test_the_reference_converges_and_is_measured(hand):
+    hand.viewer.state = replace(PLAIN, look="error", gain=1.0)
+    rays = []
+    for _ in range(600):
+        hand.look(0.4)
+        rays.append(hand.viewer.stage.report.reference)
+        if (found := hand.viewer.stage.report.measured) and found.rays >= 128:
+            break
+    assert rays == sorted(rays) and len(set(rays)) > 3
+    render = Render(scenes.make("crossing"), Blur(samples=4), size=(320, 180), rays=1)
+    truth = Render(
+        render.scene, Blur("distributed", samples=found.rays), size=(320, 180), rays=1
+    )(0.0)  # fmt: skip
+    apart = stills.srgb(render(0.0)[..., :3]) - stills.srgb(truth[..., :3])
+    assert found.psnr == pytest.approx(-10 * np.log10(np.mean(apart.astype("f8") ** 2)), abs=0.01)
+    if found.flip:
+        assert 0 < found.flip.result(60) < 1
+    hand.submit("pointer_move", x=10, y=10, button=0, buttons=())
+    hand.viewer.state = replace(hand.state, frame=1.0)
+    hand.look()
+    assert hand.viewer.stage.report.reference < rays[-1]  # begun anew
+
+
+# ---- the window -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size, ratio", [((900, 500), 1.0), ((500, 300), 2.0), ((700, 333), 1.25)])
+def test_sizes_and_hidpi(size, ratio):
+    hand = Hand(replace(PLAIN, look="velocity"), size, ratio)
+    shown = hand.picture()
+    whole = hand.look()
+    assert whole.shape[:2] == (round(size[1] * ratio), round(size[0] * ratio))
+    _, _, width, height = hand.viewer.stage.report.place
+    assert shown.shape[:2] == (height, width) and abs(width / height - 16 / 9) < 0.02
+    x, y, wide, high = hand.viewer.panel.places["method"]
+    assert x + wide <= size[0] and y + high <= size[1]
+
+
+def test_resizing(hand):
+    before = hand.picture()
+    for size in ((900, 600), (60, 40), (3, 2), (1, 1), SIZE):
+        hand.viewer.canvas.set_logical_size(*size)
+        assert hand.look().shape[:2] == size[::-1]
+    assert np.array_equal(hand.picture(), before)
+
+
+def test_an_error_while_drawing_is_not_swallowed(monkeypatch):
+    hand = Hand(size=(320, 180))
+
+    def broken(*_):
+        raise ZeroDivisionError("broken")
+
+    monkeypatch.setattr(hand.viewer.stage, "compose", broken)
+    with pytest.raises(ZeroDivisionError):
+        hand.look()
+    assert hand.viewer.canvas.get_closed()
+
+
+def test_a_lost_gpu_is_told():
+    wanted = ["float32-filterable"]
+    device = gpu.choose_adapter().request_device_sync(required_features=wanted)
+    viewer = offscreen(PLAIN, (320, 180), device=device)
+    frame(viewer)
+    device.destroy()
+    with pytest.raises(DeviceError, match="lost"):
+        frame(viewer)
+
+
+def test_times_of_the_gpu_are_told_by_pass(monkeypatch):
+    monkeypatch.setattr(Timing, "usable", staticmethod(lambda device: True))
+    hand = Hand(replace(PLAIN, method="reproject", samples=64))
+    passes = hand.viewer.stage.report.passes
+    assert {"gbuffer.wgsl:main", "blur/reproject.wgsl:gather"} <= passes.keys()
+    hand.look()
+    assert passes.keys() <= hand.viewer._info.passes.keys()
+
+
+# ---- quick while moving ---------------------------------------------------------------------
+
+
+def test_moving_is_coarse_and_stillness_is_fine(hand):
+    hand.viewer.stage.pace = Pace(5)
+    hand.submit("pointer_down", x=100, y=500, button=1, buttons=(1,))
+    hand.submit("pointer_move", x=110, y=500, button=0, buttons=(1,))
+    hand.look()
+    assert hand.viewer.stage.report.size[0] < 320
+    hand.submit("pointer_up", x=110, y=500, button=1, buttons=())
+    hand.look()
+    assert hand.viewer.stage.report.size == (320, 180)
+
+
+def test_pace_finds_what_keeps_to_its_target():
+    for cost in (0.02, 0.3, 2.0):  # seconds of a full picture
+        pace = Pace()
+
+        def took(level, cost=cost, pace=pace):
+            scale, rays = pace.quality(level, 2)
+            return 0.02, cost * scale**2 * (rays**2 + 1) / 5
+
+        for _ in range(120):
+            rest, drawing = took(pace.level)
+            pace.observe(rest + drawing, drawing, 2)
+        assert sum(took(pace.level)) < 1.1 * pace.TARGET
+        if pace.level:
+            assert sum(took(pace.level - 1)) > 0.8 * pace.TARGET
+        settled = pace.level
+        for _ in range(50):
+            rest, drawing = took(pace.level)
+            pace.observe(rest + drawing, drawing, 2)
+        assert pace.level == settled  # nothing jumps
+
+
+def test_one_slow_frame_changes_nothing():
+    pace = Pace(3)
+    for seconds in (0.07, 0.07, 1.0, 0.07, 0.07):
+        pace.observe(seconds, seconds - 0.02, 2)
+    assert pace.level == 3
+
+
+# ---- files ----------------------------------------------------------------------------------
+
+MANY = State(
+    source="fence",
+    settings=(("speed", 4.5), ("posts", 11.0)),
+    orbit=(10.5, -3.0),
+    pan=(0.25, -0.5),
+    dolly=0.8,
+    frame=3.5,
+    size="320x180",
+    rays=1,
+    fps=30.0,
+    method="reproject",
+    samples=5,
+    jitter=0.5,
+    max_blur=33.0,
+    options=(("form", "slices"),),
+    shutter=270.0,
+    phase="0.1",
+    curve="cosine",
+    compare="split",
+    against="tap",
+    exposure=-0.5,
+    tone="soft",
+    playing=True,
+    speed=0.5,
+)
+
+
+@pytest.mark.parametrize("state", [State(), MANY, State().opened(SAMPLE)])
+def test_settings_come_back_as_they_were_saved(state):
+    assert State.of_toml(state.toml()) == state
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("[render", "settings"),
+        ("", r"\[render\]"),
+        ("[render]\nscene = 3", "scene"),
+        ('[render]\nscene = "nowhere"', "nowhere"),
+        ('[render]\nscene = "crossing"\nsamples = "many"', "samples"),
+        ('[render]\nscene = "crossing"\nmethod = "magic"', "magic"),
+        ('[render]\nscene = "crossing"\norbit = [1]', "orbit"),
+        ('[render]\nscene = "crossing"\nset = ["speed=x"]', "speed=x"),
+        ('[render]\nscene = "crossing"\nsamples = nan', "samples"),
+        ('[render]\nscene = "crossing"\ncolour = 1', "colour"),
+        ('[render]\nscene = "crossing"\n[view]\ncompare = "both"', "both"),
+        ('[render]\nscene = "crossing"\n[view]\nzoo = 1', "zoo"),
+        ('[render]\nscene = "crossing"\n[view]\nframes = "x-y"', "x-y"),
+    ],
+)
+def test_settings_that_make_no_sense_are_told(text, said):
+    with pytest.raises(InputError, match=said):
+        State.of_toml(text)
+
+
+def test_render_takes_the_saved_settings(hand, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plain = {"compare": "off", "exposure": 0.0, "tone": "clip"}
+    hand.viewer.state = replace(MANY, playing=False, jitter=0.0, **plain)
+    shown = hand.picture()
+    hand.viewer.do("save", "wgmb.toml")
+    assert tomllib.loads(Path("wgmb.toml").read_text())["render"]["samples"] == 5
+    assert cli.main(["render", "--config", "wgmb.toml", "-o", "still.png", "--quiet"]) == 0
+    written = iio.imread("still.png")[..., :3] / 255
+    assert np.abs(written - shown).max() < 0.02
+    hand.viewer.state = PLAIN
+    hand.viewer.do("load", "wgmb.toml")
+    assert hand.state.source == "fence"
+    hand.viewer.do("load", "nowhere.toml")
+    assert "nowhere" in hand.viewer._message[0]
+
+
+@pytest.mark.parametrize("state", [MANY, replace(PLAIN.opened(SAMPLE), shutter=90.0)])
+def test_the_command_line_is_one(state, tmp_path):
+    state = replace(state, frames="9-10") if not state.is_scene else replace(state, frames="0-1")
+    out = tmp_path / "out.####.png"
+    assert cli.main([*state.command(str(out)), "--quiet"]) == 0
+    assert len(list(tmp_path.glob("out.*.png"))) == 2
+
+
+def test_screenshot_and_recording(hand, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shown = hand.picture()
+    hand.press("s")
+    assert np.abs(iio.imread("wgmb-001.png") / 255 - shown).max() < 0.01
+    whole = exr.read(Path("wgmb-001.exr")).parts[0]
+    want = Render(scenes.make("crossing"), Blur(samples=4), size=(320, 180), rays=1)(0.0)
+    assert np.abs(whole.channels["R"].astype("f4") - want[..., 0]).max() < 2e-3
+    hand.press("v")
+    for _ in range(3):
+        hand.look()
+    hand.press("v")
+    frames = iio.imread("wgmb-001.mp4", plugin="pyav")
+    assert frames.shape[1:] == (180, 320, 3) and len(frames) >= 3
+    assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 0.5  # it moves
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_export_runs_the_command_line(hand, tmp_path, monkeypatch):
+    hand.viewer.state = replace(PLAIN, size="64x36", frames="0-1")
+    hand.look()
+    hand.viewer.do("export", str(tmp_path / "out.####.png"))
+    child = hand.viewer._export[0]
+    assert child.wait(60) == 0
+    hand.look()
+    assert "made" in hand.viewer._export_said
+    assert len(list(tmp_path.glob("*.png"))) == 2
+
+
+# ---- frames on disk -------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def reel():
+    return Hand(replace(PLAIN, rays=1).opened(SAMPLE))
+
+
+def test_frames_on_disk_are_blurred_as_the_library_does(reel):
+    want = Blur(samples=4)(next(iter(Clip(SAMPLE))))
+    reel.viewer.state = replace(reel.state, frame=9.0)
+    reel.picture()
+    got = reel.viewer.stage.download()[..., :3]
+    assert np.abs(got - want[..., :3]).max() < 1e-5
+
+
+def test_scrubbing_shutter_zoom_and_pan(reel):
+    first = reel.picture()
+    reel.press("ArrowRight")
+    assert reel.state.frame == 10
+    second = reel.picture()
+    assert np.abs(first - second).mean() > 0.005
+    reel.touch("shutter", 0.9)
+    assert np.abs(reel.picture() - second).mean() > 0.005
+    reel.submit("wheel", x=100, y=500, dx=0, dy=-300, buttons=())
+    reel.look()
+    assert reel.state.zoom > 1.2
+    across = reel.state.center[0]
+    reel.drag((100, 500), (50, 500))
+    assert reel.state.center[0] > across
+    reel.press("r")
+    assert (reel.state.zoom, reel.state.center) == (1, (0.5, 0.5))
+
+
+def test_frames_on_disk_have_no_reference(reel):
+    stage, state = reel.viewer.stage, reel.state
+    assert "error" not in stage.looks(state)
+    assert set(stage.methods(state)) == {n for n, m in METHODS.items() if "scene" not in m.needs}
+    assert "reference" not in stage.rivals(state)
+    for look in stage.looks(state):
+        reel.viewer.state = replace(state, look=look)
+        assert np.isfinite(reel.picture()).all()
+
+
+def test_what_cannot_be_opened_is_told(tmp_path):
+    with pytest.raises(InputError, match="nowhere"):
+        State().opened("nowhere")
+    assert cli.main(["view", str(tmp_path / "nowhere.####.exr")]) == 2
+
+
+def test_options_of_the_command_line_reach_the_state():
+    state = State().told(
+        {"method": "reproject", "samples": 8, "form": "published", "shutter": 90.0}
+    )
+    assert (state.method, state.samples, state.shutter) == ("reproject", 8, 90)
+    assert dict(state.options) == {"form": "published"}

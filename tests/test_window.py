@@ -1,0 +1,226 @@
+"""The real window, on a display of its own: xdotool's mouse and keys in, pictures out."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import ImageGrab
+
+from wgmb.viewer import State, offscreen
+from wgmb.viewer.window import frame
+
+ROOT = Path(__file__).parent.parent
+SIZE = 800, 720  # of the window; its picture is 480 wide
+PATIENCE = 90  # seconds: a busy machine without a GPU is slow
+BROKEN = """
+from wgmb.viewer import State, view
+from wgmb.viewer.stage import Stage
+def compose(*_): raise ZeroDivisionError("broken")
+Stage.compose = compose
+view(State())
+"""
+CLOSE = """
+import ctypes, sys
+x = ctypes.CDLL("libX11.so.6")
+x.XOpenDisplay.restype = x.XInternAtom.restype = ctypes.c_void_p
+display = ctypes.c_void_p(x.XOpenDisplay(None))
+atom = lambda name: x.XInternAtom(display, name, 0)
+class Message(ctypes.Structure):
+    _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("sent", ctypes.c_int),
+                ("display", ctypes.c_void_p), ("window", ctypes.c_ulong),
+                ("message", ctypes.c_ulong), ("format", ctypes.c_int),
+                ("data", ctypes.c_long * 5), ("rest", ctypes.c_long * 16)]
+window = int(sys.argv[1])
+event = Message(33, 0, 1, display, window, atom(b"WM_PROTOCOLS"), 32)
+event.data[0] = atom(b"WM_DELETE_WINDOW")
+x.XSendEvent(display, ctypes.c_ulong(window), 0, ctypes.c_long(0), ctypes.byref(event))
+x.XSync(display, 0)
+"""
+
+
+@pytest.fixture(scope="module")
+def display():
+    """An X server without a screen: its name."""
+    if not (shutil.which("Xvfb") and shutil.which("xdotool")):
+        missing = "needs Xvfb and xdotool; `./run test` installs them"
+        if os.environ.get("CI"):
+            pytest.fail(missing)
+        pytest.skip(missing)
+    ours, theirs = os.pipe()
+    screen = ["-screen", "0", "1200x900x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(theirs), *screen],
+        pass_fds=[theirs],
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(theirs)
+    with os.fdopen(ours) as number:
+        yield f":{number.readline().strip()}"
+    server.terminate()
+    server.wait(10)
+
+
+class Desk:
+    """The program on a display, and somebody at its mouse and keys."""
+
+    def __init__(self, display, *words, cwd):
+        self.display = display
+        self.env = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
+        self.program = subprocess.Popen(
+            [sys.executable, *words], env=self.env, cwd=cwd, stderr=subprocess.PIPE, text=True
+        )
+
+    def do(self, *words):
+        done = subprocess.run(
+            ["xdotool", *map(str, words)], env=self.env, capture_output=True, text=True, timeout=60
+        )
+        return done.stdout.split()
+
+    def wait_for_window(self):
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            assert self.program.poll() is None, self.program.communicate()[1]
+            if found := self.do("search", "--name", "^wgmb$"):
+                self.window = found[0]
+                return
+            time.sleep(0.2)
+        raise AssertionError("no window")
+
+    def grab(self, size=SIZE):
+        picture = ImageGrab.grab(bbox=(0, 0, *size), xdisplay=self.display)
+        return np.asarray(picture.convert("RGB")).astype(int)
+
+    def settled(self, size=SIZE, unlike=None):
+        """The window's picture once it does not change for a second, and is not `unlike`."""
+        until, last, since = time.monotonic() + PATIENCE, None, time.monotonic()
+        while time.monotonic() < until:
+            assert self.program.poll() is None, self.program.communicate()[1]
+            now = self.grab(size)
+            left = now[:, : size[0] - 320]
+            if last is None or not np.array_equal(last, left):
+                last, since = left, time.monotonic()
+            done = time.monotonic() - since > 1.0 and left.std() > 5
+            if done and (unlike is None or np.abs(left - unlike[:, : left.shape[1]]).max() > 30):
+                return now
+            time.sleep(0.1)
+        raise AssertionError("nothing new was shown")
+
+    def drag(self, start, end):
+        self.do("mousemove", *start, "mousedown", 1)
+        for share in (0.3, 0.6, 1.0):
+            self.do(
+                "mousemove", *(round(a + (b - a) * share) for a, b in zip(start, end, strict=True))
+            )
+            time.sleep(0.1)
+        self.do("mouseup", 1)
+
+    def ask_to_close(self):
+        """What a window manager sends when its cross is clicked."""
+        subprocess.run([sys.executable, "-c", CLOSE, self.window], env=self.env, check=True)
+
+    def end(self):
+        said = self.program.communicate(timeout=PATIENCE)[1]
+        return self.program.returncode, said
+
+
+@pytest.fixture
+def desk(display, tmp_path):
+    made = []
+
+    def start(*words):
+        made.append(Desk(display, *words, cwd=tmp_path))
+        return made[-1]
+
+    yield start
+    for each in made:
+        if each.program.poll() is None:
+            each.program.kill()
+            each.program.communicate()
+
+
+def picture_of(whole):
+    return whole[:, : SIZE[0] - 320]
+
+
+def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
+    words = [ROOT / "app.py", "--window", "{}x{}".format(*SIZE), "--samples", "4"]
+    it = desk(*map(str, words))
+    it.wait_for_window()
+    first = it.settled()
+
+    it.drag((150, 360), (300, 380))
+    dragged = it.settled(unlike=first)
+    it.do("key", "r")
+    assert np.array_equal(picture_of(it.settled(unlike=dragged)), picture_of(first))
+
+    it.do("mousemove", 200, 360, "click", 4, "click", 4)
+    nearer = it.settled(unlike=first)
+    it.do("key", "r")
+    assert np.array_equal(picture_of(it.settled(unlike=nearer)), picture_of(first))
+
+    twin = offscreen(State(samples=4), SIZE)
+    frame(twin)
+    x, y, width, height = twin.panel.places["shutter"]
+    it.drag((x + width * 0.25, y + height / 2), (x + width * 0.8, y + height / 2 + 100))
+    longer = it.settled(unlike=first)
+    it.do("key", "r")  # there is nothing to put back: the camera never moved
+    time.sleep(1)
+    assert np.array_equal(picture_of(it.settled()), picture_of(longer))
+
+    it.do("key", "2")
+    it.settled(unlike=longer)
+    it.do("key", "s")
+    until = time.monotonic() + PATIENCE
+    while not (tmp_path / "wgmb-001.exr").exists() and time.monotonic() < until:
+        time.sleep(0.1)
+    assert (tmp_path / "wgmb-001.png").exists()
+
+    it.do("windowsize", it.window, 1000, 600)
+    time.sleep(1)
+    assert it.settled((1000, 600))[:, -20:].max() < 120  # the panel has moved to the edge
+    it.do("windowunmap", it.window)
+    time.sleep(0.5)
+    it.do("windowmap", it.window)
+    it.settled((1000, 600))
+    it.do("key", "f")
+    time.sleep(1)
+    assert it.settled((1200, 900)).std() > 5
+    it.do("key", "f")
+    time.sleep(1)
+    it.settled((1000, 600))
+    it.do("key", "Escape")
+    code, said = it.end()
+    assert (code, said) == (0, "")
+
+
+def test_closing_the_window_ends_the_program(desk):
+    it = desk(str(ROOT / "app.py"), "wheel", "--window", "500x300")
+    it.wait_for_window()
+    time.sleep(1)
+    it.ask_to_close()
+    assert it.end()[0] == 0
+
+
+def test_an_error_while_drawing_ends_the_program(desk):
+    it = desk("-c", BROKEN)
+    code, said = it.end()
+    assert code == 1
+    assert "ZeroDivisionError: broken" in said
+
+
+def test_without_a_display_it_says_so(tmp_path):
+    env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "app.py")],
+        env=env,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 3
+    assert done.stderr.startswith("wgmb: no display") and done.stderr.count("\n") == 1

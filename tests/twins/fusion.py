@@ -1,0 +1,97 @@
+"""Weighted fusion, one pixel and one sample at a time."""
+
+import numpy as np
+
+from twins.tap import bilinear, displacement
+
+SLOPE, SIDEWAYS = 2e-5, 1e-3
+
+
+def fusion(color, motion, depth, times, middle, alphas, *, span=None, delay=(0.0, 0.0),
+           printed=False, tau=1.0, normal=None, weight=None):  # fmt: skip
+    """`times` of the samples and `middle` of the exposure; without `span`, the paper's steps.
+
+    `alphas`: in front, behind. `normal`: (height, width, 2) in the picture, x right, y down.
+    """
+    height, width = depth.shape
+    soft = gaussian(color)
+    soft_weight = None if weight is None else gaussian(weight[..., None])[..., 0]
+    count = len(times)
+    fade = np.array([tau ** (count - 1 - i) for i in range(count)])
+    out = np.zeros(color.shape)
+    for y in range(height):
+        for x in range(width):
+            path = motion[y, x].astype(float)
+            opens, closes = span or (-0.5, 0.0)
+            if span is None:
+                path = np.concatenate([path[:2], -path[:2]])
+            late = delay[0] * ((x + 0.5) / width - 0.5) + delay[1] * ((y + 0.5) / height - 0.5)
+            ends = [displacement(path, t) for t in _instants(path, opens + late, closes + late)]
+            if max(map(np.linalg.norm, ends)) < 0.01:
+                out[y, x] = color[y, x]
+                continue
+            velocity = (path[2:] - path[:2]) / 2
+            if normal is not None and normal[y, x].any():
+                n = normal[y, x]
+                ahead = n[:2] @ velocity > SIDEWAYS * np.linalg.norm(n) * np.linalg.norm(velocity)
+            else:
+                ahead = leads(depth, x, y, velocity)
+            alpha = alphas[0] if ahead else alphas[1]
+            if printed:  # equation 8
+                sharp, each = 1.0, alpha * (1 - tau) * fade
+            else:
+                share = min(alphas) / alpha
+                sharp, each = 1 - share, share * fade / fade.sum()
+            if span is not None:
+                streak = min(1.0, max(np.linalg.norm(a - b) for a in ends for b in ends))
+                sharp, each = sharp + each.sum() * (1 - streak), each * streak
+            here = np.array([x + 0.5, y + 0.5])
+            at = here + displacement(path, -(middle + late))
+            total = sharp * bilinear(color, *at)
+            counted = sharp * (1.0 if weight is None else bilinear(weight, *at))
+            for t, share in zip(times, each, strict=True):
+                at = here + displacement(path, -(t + late))
+                total = total + share * bilinear(soft, *at)
+                counted += share * (1.0 if weight is None else bilinear(soft_weight, *at))
+            if weight is not None:
+                if counted <= 0:
+                    total, counted, sharp = color[y, x], max(weight[y, x], 1e-30), 1 - each.sum()
+                total = total / counted * (sharp + each.sum())
+            out[y, x] = total
+    return out
+
+
+def _instants(path, opens, closes):
+    """When the shutter opens and closes, and when between the two the path turns."""
+    velocity, curvature = (path[2:] - path[:2]) / 2, (path[2:] + path[:2]) / 2
+    turn = -0.5 * (velocity @ curvature) / max(curvature @ curvature, 1e-30)
+    return opens, min(max(turn, opens), closes), closes
+
+
+def gaussian(image):
+    """1 2 1 along rows and columns, edges repeated; sixteenths."""
+    padded = np.pad(image.astype(float), ((1, 1), (1, 1), (0, 0)), mode="edge")
+    out = np.zeros(image.shape)
+    for j, a in enumerate((1, 2, 1)):
+        for i, b in enumerate((1, 2, 1)):
+            out += a * b / 16 * padded[j : j + image.shape[0], i : i + image.shape[1]]
+    return out
+
+
+def leads(depth, x, y, velocity):
+    """Whether depth grows the way this pixel moves."""
+    z = float(depth[y, x])
+    if not np.isfinite(z) or z <= 0:
+        return False
+    slope = np.array([_slope(depth, x, y, 1, 0), _slope(depth, x, y, 0, 1)])
+    return slope @ velocity > SLOPE * z * np.linalg.norm(velocity)
+
+
+def _slope(depth, x, y, dx, dy):
+    height, width = depth.shape
+    here, sides = float(depth[y, x]), []
+    for sign in (1, -1):
+        i, j = x + sign * dx, y + sign * dy
+        if 0 <= i < width and 0 <= j < height and np.isfinite(depth[j, i]) and depth[j, i] > 0:
+            sides.append(sign * (float(depth[j, i]) - here))
+    return min(sides, key=abs, default=0.0)

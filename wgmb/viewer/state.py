@@ -1,0 +1,316 @@
+"""All that the viewer is set to, in one frozen value; as TOML and as a command line.
+
+`wgmb render --config` (scenes) and `wgmb blur --config` (frames on disk) read the same file.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+import tomllib
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from pathlib import Path
+
+from .. import numbering, scenes
+from ..blur import METHODS
+from ..errors import InputError
+from ..options import BlurOptions, InputOptions, OutputOptions, SceneOptions, ShutterOptions
+
+COMPARE = ("off", "wipe", "split", "difference", "flicker")
+LOOKS = ("result", "sharp", "depth", "velocity", "error")
+TONES = ("clip", "soft")
+REFERENCE = "reference"
+_GROUPS = (BlurOptions, ShutterOptions, SceneOptions, OutputOptions, InputOptions)
+DEFAULTS = {f.name: f.default for group in _GROUPS for f in fields(group)}
+"""What every option of the command line is when it is not given."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A scene or frames on disk, how they are blurred, and how that is shown."""
+
+    source: str = "crossing"
+    """A scene's name, or a file or pattern."""
+    settings: tuple[tuple[str, float], ...] = ()
+    """The scene's parameters that differ from their defaults."""
+    given: tuple[tuple[str, object], ...] = ()
+    """InputOptions of frames on disk that differ from their defaults."""
+    orbit: tuple[float, float] = (0.0, 0.0)  # degrees to the right, up
+    pan: tuple[float, float] = (0.0, 0.0)  # scene units to the right, up
+    dolly: float = 1.0
+    frames: str = "0-11"
+    frame: float = 0.0  # the moment [frame intervals]
+    size: str = "1280x720"
+    rays: int = 2
+    fps: float = 24.0
+
+    method: str = "tap"
+    samples: int = 16
+    jitter: float = 0.0
+    max_blur: float | None = None
+    options: tuple[tuple[str, object], ...] = ()
+    """Of the method: path, form, show, seed, ..."""
+    shutter: float = 180.0
+    phase: str = "centre"
+    curve: str = "box"
+    rolling: str | None = None
+    rolling_duration: float = 1.0
+
+    look: str = "result"
+    compare: str = "off"
+    against: str = "sharp"
+    wipe: float = 0.5  # of the picture's width
+    gain: float = 4.0
+    fastest: float = 0.05  # at full brightness [picture heights per frame]
+    middle: float = 5.0  # depth shown as middle grey [scene units]
+    exposure: float = 0.0  # stops
+    tone: str = "clip"
+    zoom: float = 1.0  # of the picture on the screen, frames on disk only
+    center: tuple[float, float] = (0.5, 0.5)
+    playing: bool = False
+    speed: float = 0.25
+    panel: bool = True
+    help: bool = False
+
+    @property
+    def is_scene(self) -> bool:
+        """Whether `source` is a built-in scene."""
+        return self.source in scenes.SCENES
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """First and last frame of `frames`."""
+        numbers = numbering.frame_numbers(self.frames)
+        return min(numbers), max(numbers)
+
+    def opened(self, source: str) -> State:
+        """The same state with another scene or other frames, seen anew."""
+        if source not in scenes.SCENES and not (
+            Path(source).is_file() or numbering.is_pattern(source)
+        ):
+            known = ", ".join(scenes.SCENES)
+            raise InputError(f"no file or scene {source!r}; scenes: {known}")
+        state = replace(self.unmoved(), source=source, settings=(), given=())
+        if state.is_scene:
+            return replace(state, frames="0-11", frame=0.0)
+        return replace(state, frames=_on_disk(source), frame=float("nan")).settled()
+
+    def settled(self) -> State:
+        """The same, its moment within its frames and its method one that the source can feed."""
+        first, last = self.span
+        frame = min(max(self.frame, first), last) if math.isfinite(self.frame) else float(first)
+        return replace(self, frame=frame)
+
+    def unmoved(self) -> State:
+        """The same, seen from where the scene's own camera is."""
+        return replace(self, orbit=(0.0, 0.0), pan=(0.0, 0.0), dolly=1.0, zoom=1.0,
+                       center=(0.5, 0.5))  # fmt: skip
+
+    def with_setting(self, name: str, value: float) -> State:
+        """The same with a parameter of the scene changed."""
+        return replace(self, settings=_changed(self.settings, name, value))
+
+    def with_option(self, name: str, value: object) -> State:
+        """The same with an option of the method changed; None is its default."""
+        return replace(self, options=_changed(self.options, name, value))
+
+    def with_method(self, method: str) -> State:
+        """The same with another method, whose options are its own."""
+        return replace(self, method=method, options=()) if method != self.method else self
+
+    def told(self, given: dict[str, object]) -> State:
+        """The same with options of the command line, those that are not their defaults."""
+        said = {name: value for name, value in given.items() if value != DEFAULTS[name]}
+        own = {f.name for f in fields(self)} - {"frames"}
+        state = replace(self, **{n: v for n, v in said.items() if n in own})
+        inputs = {f.name for f in fields(InputOptions)}
+        if not self.is_scene:
+            found = tuple((n, v) for n, v in said.items() if n in inputs)
+            state = replace(state, given=found, frames=str(said.get("frames", state.frames)))
+        elif "frames" in said:
+            state = replace(state, frames=str(said["frames"]))
+        for name in {f.name for f in fields(BlurOptions)} - own - {"keep", "scale"}:
+            if name in said:
+                state = state.with_option(name, said[name])
+        if state.method not in METHODS:
+            raise InputError(f"unknown method {state.method!r}, one of {', '.join(METHODS)}")
+        return state.settled()
+
+    # ---- what the command line is told ---------------------------------------------------
+
+    def arguments(self) -> dict[str, object]:
+        """Every option of `wgmb render` or `wgmb blur` that this state sets, by its name."""
+        look: dict[str, object] = {
+            "method": self.method,
+            "samples": self.samples,
+            "jitter": self.jitter,
+            "max_blur": self.max_blur,
+            **dict(self.options),
+            "shutter": self.shutter,
+            "phase": self.phase,
+            "curve": self.curve,
+            "rolling": self.rolling,
+            "rolling_duration": self.rolling_duration,
+            "fps": f"{self.fps:g}",
+        }
+        if not self.is_scene:
+            return {"pattern": self.source, **dict(self.given), **look}
+        return {
+            "scene": self.source,
+            "set": [f"{name}={value:g}" for name, value in self.settings],
+            "size": self.size,
+            "rays": self.rays,
+            "orbit": list(self.orbit),
+            "pan": list(self.pan),
+            "dolly": self.dolly,
+            **look,
+        }
+
+    def command(self, output: str) -> list[str]:
+        """The words after `wgmb` that make `output` of all `frames` as they are seen here."""
+        given = self.arguments()
+        source = str(given.pop("scene" if self.is_scene else "pattern"))
+        words = ["render" if self.is_scene else "blur", source, "-o", output]
+        if self.is_scene or self.frames != _on_disk(source):
+            words += ["--frames", self.frames]
+        for name, value in given.items():
+            default = DEFAULTS[name]
+            plain = list(value) if isinstance(value, (list, tuple)) else value
+            if plain == (list(default) if isinstance(default, tuple) else default):
+                continue
+            flag = "--" + name.replace("_", "-")
+            repeated = name in ("set", "also")
+            if repeated:
+                for item in value:  # pyright: ignore[reportGeneralTypeIssues]
+                    words += [flag, str(item)]
+            elif value is True:
+                words += [flag]
+            elif isinstance(plain, list):
+                words += [flag, *(f"{x:g}" for x in plain)]
+            else:
+                words += [flag, f"{value:g}" if isinstance(value, float) else str(value)]
+        return words
+
+    # ---- TOML ----------------------------------------------------------------------------
+
+    def toml(self) -> str:
+        """A table for the command line, [render] or [blur], and [view] for the rest."""
+        given = self.arguments()
+        if self.is_scene:
+            given["time"] = self.frame / self.fps
+        names = set(_VIEW)
+        view = {f.name: getattr(self, f.name) for f in fields(self) if f.name in names}
+        tables = {"render" if self.is_scene else "blur": given, "view": view}
+        return "\n".join(
+            f"[{name}]\n" + "".join(_line(k, v) for k, v in table.items())
+            for name, table in tables.items()
+        )
+
+    @staticmethod
+    def of_toml(text: str) -> State:
+        """The state that `toml` wrote; `InputError` names what is wrong with it."""
+        try:
+            tables = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"settings: {error}") from None
+        if unknown := tables.keys() - {"render", "blur", "view"}:
+            raise InputError(f"settings have no table {', '.join(sorted(unknown))}")
+        if ("render" in tables) == ("blur" in tables):
+            raise InputError("settings need one of the tables [render] and [blur]")
+        return _of_tables(tables.get("render"), tables.get("blur"), tables.get("view", {}))
+
+
+_VIEW = (
+    "frames", "frame", "look", "compare", "against", "wipe", "gain", "fastest", "middle",
+    "exposure", "tone", "zoom", "center", "playing", "speed", "panel",
+)  # fmt: skip
+_CHOICES = {"look": None, "compare": COMPARE, "against": None, "tone": TONES}
+
+
+def _changed(pairs: tuple, name: str, value: object) -> tuple:
+    kept = tuple(pair for pair in pairs if pair[0] != name)
+    return kept if value is None else (*kept, (name, value))
+
+
+def _on_disk(source: str) -> str:
+    if not numbering.is_pattern(source):
+        return str(numbering.number_in(Path(source)))
+    return numbering.frame_range(numbering.numbers_on_disk(source))
+
+
+def _line(name: str, value: object) -> str:
+    if value is None or value == []:
+        return ""
+    plain = list(value) if isinstance(value, tuple) else value
+    return f"{name} = {json.dumps(plain, ensure_ascii=False)}\n"
+
+
+def _of_tables(render: dict | None, blur: dict | None, view: dict) -> State:
+    given = dict(render if render is not None else blur or {})
+    source = given.pop("scene" if render is not None else "pattern", None)
+    if not isinstance(source, str):
+        raise InputError("settings: [render] needs scene, [blur] needs pattern")
+    if (render is not None) != (source in scenes.SCENES):
+        raise InputError(f"settings: {source!r} is no scene" if render else f"{source!r}: a scene")
+    kinds = {f.name: f for f in fields(State)}
+    given.pop("time", None)
+    values: dict[str, object] = {"source": source}
+    inputs = {f.name for f in fields(InputOptions)}
+    own = {f.name for f in fields(BlurOptions)} - kinds.keys()
+    pairs: dict[str, list] = {"options": [], "given": []}
+    for name, value in given.items():
+        if name == "set":
+            pairs["settings"] = [_setting(text) for text in value]
+        elif name in kinds and name not in _VIEW:
+            values[name] = _typed(name, value, kinds[name].default)
+        elif name in own:
+            pairs["options"].append((name, value))
+        elif blur is not None and name in inputs:
+            pairs["given"].append((name, tuple(value) if isinstance(value, list) else value))
+        else:
+            raise InputError(f"settings have no {name!r}")
+    for name, value in view.items():
+        if name not in _VIEW:
+            raise InputError(f"settings: [view] has no {name!r}; it has {', '.join(_VIEW)}")
+        values[name] = _typed(name, value, kinds[name].default)
+    values |= {name: tuple(found) for name, found in pairs.items()}
+    state = State(**values)  # pyright: ignore[reportArgumentType]
+    if state.method not in METHODS:
+        raise InputError(f"unknown method {state.method!r}, one of {', '.join(METHODS)}")
+    return state.settled()
+
+
+def _setting(text: str) -> tuple[str, float]:
+    name, _, value = str(text).partition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise InputError(f"settings: set takes NAME=NUMBER, got {text!r}") from None
+
+
+def _typed(name: str, value: object, default: object) -> object:
+    """`value` as the field `name` holds it."""
+    if (choices := _CHOICES.get(name)) and value not in choices:
+        raise InputError(f"settings: {name} must be one of {', '.join(choices)}, got {value!r}")
+    try:
+        if isinstance(default, tuple):
+            x, y = value  # pyright: ignore[reportGeneralTypeIssues]
+            return float(x), float(y)
+        if isinstance(default, bool) or default is None or isinstance(default, str):
+            if isinstance(default, (bool, str)) and not isinstance(value, type(default)):
+                raise TypeError
+            return value
+        if isinstance(value, str) and name == "fps":  # "24", "30000/1001"
+            value = float(Fraction(value))
+        if isinstance(value, (bool, str)) or not math.isfinite(number := float(value)):  # pyright: ignore
+            raise TypeError
+        return int(number) if isinstance(default, int) else number
+    except (TypeError, ValueError, ZeroDivisionError):
+        raise InputError(f"settings: {name} cannot be {value!r}") from None
+
+
+def command_line(words: list[str]) -> str:
+    """For a shell."""
+    return shlex.join(["wgmb", *words])

@@ -1,0 +1,170 @@
+"""What is looked at: a built-in scene, or frames on disk; drawn into textures on the GPU."""
+
+from __future__ import annotations
+
+import inspect
+import typing
+from collections import OrderedDict
+
+import numpy as np
+import wgpu
+
+from .. import gpu, scenes
+from ..blur import METHODS
+from ..errors import InputError
+from ..frame import Frame
+from ..images import Images
+from ..options import BlurOptions, InputOptions, SceneOptions, size_of
+from ..pipeline import Blur
+from ..render import Render
+from ..timing import Timing
+from .state import State
+
+_FRAMES_KEPT = 16
+Texture = wgpu.GPUTexture
+Budget = tuple[int, float]
+"""Samples done before, and seconds to spend on more."""
+
+
+class SceneSubject:
+    """A built-in scene: any size, any moment, every method."""
+
+    has = frozenset({"color", "motion", "depth", "scene"})
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._render = Render(scenes.make(next(iter(scenes.SCENES))), Blur(device=device))
+        self._seen: tuple = ()
+
+    def size(self, state: State) -> tuple[int, int]:
+        """Width and height that give the picture its shape [px]."""
+        return size_of(state.size)
+
+    def look_at(self, state: State, size: tuple[int, int], rays: int) -> None:
+        """What the next draws are of."""
+        seen = (state.source, state.settings, state.orbit, state.pan, state.dolly)
+        if seen != self._seen:
+            given = SceneOptions(
+                set=tuple(f"{name}={value:g}" for name, value in state.settings),
+                orbit=state.orbit,
+                pan=state.pan,
+                dolly=state.dolly,
+            )
+            self._render.scene, self._seen = given.make(state.source), seen
+        self._render.size, self._render.rays, self._render.fps = size, rays, state.fps
+        self._time, self._number = state.frame / state.fps, int(state.frame // 1)
+
+    def passes(self) -> dict[str, Texture]:
+        """The sharp picture and what lies under it, by name."""
+        return self._render.passes(self._time, self._number)
+
+    def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Timing | None) -> int:
+        """Draw with `blur`; samples done, which may be less than it has where it is slow."""
+        view, (done, seconds) = output.create_view(), budget
+        if "scene" in blur.method.needs:
+            return self._render.refine(
+                view, self._time, self._number, done=done, seconds=seconds, blur=blur
+            )
+        self._render.draw(view, self._time, self._number, blur=blur, timing=timing)
+        return blur.samples
+
+
+class ClipSubject:
+    """Frames on disk: their own size, their own moments, the methods they have passes for."""
+
+    def __init__(self, device: wgpu.GPUDevice, state: State):
+        self._device, self._images = device, Images(device)
+        self._clip = InputOptions(**dict(state.given)).open(state.source)  # pyright: ignore
+        self._frames: OrderedDict[int, Frame] = OrderedDict()
+        self._sharp = Blur(device=device)
+        self._number = self._clip.numbers[0]
+        self._uploaded: dict[int, tuple[int, dict]] = {}
+        self.has = self._frame().has
+        self.finding = self._clip.finding
+
+    def size(self, state: State) -> tuple[int, int]:
+        """Width and height of the frames [px]."""
+        return self._frame().size
+
+    def look_at(self, state: State, size: tuple[int, int], rays: int) -> None:
+        """What the next draws are of."""
+        numbers = self._clip.numbers
+        self._number = min(numbers, key=lambda n: abs(n - state.frame))
+
+    def _frame(self) -> Frame:
+        number = self._number
+        if number not in self._frames:
+            while len(self._frames) >= _FRAMES_KEPT:
+                self._frames.popitem(last=False)
+            self._frames[number] = self._clip.with_neighbours(self._clip.source(number))
+        self._frames.move_to_end(number)
+        return self._frames[number]
+
+    def _inputs(self, blur: Blur) -> dict:
+        number, inputs = self._uploaded.get(id(blur), (None, {}))
+        if number != self._number:
+            inputs = blur.upload(self._frame())
+            self._uploaded[id(blur)] = self._number, inputs
+        return dict(inputs)
+
+    def passes(self) -> dict[str, Texture]:
+        """The sharp picture and what lies under it, by name; only what there is."""
+        frame, images = self._frame(), self._images
+        inputs = self._inputs(self._sharp)
+        images.upload("color", self._sharp_rgba(frame), "rgba32float")
+        found = {"color": images.texture("color", frame.size, "rgba32float")}
+        if frame.depth is not None:
+            images.upload("depth", frame.depth, "r32float")
+            found["depth"] = images.texture("depth", frame.size, "r32float")
+        if "motion" in frame.has:
+            motion = images.texture("motion", frame.size, "rgba32float")
+            moving = {k: v for k, v in inputs.items() if k not in _NOT_MOVING}
+            encoder = self._device.create_command_encoder(label="motion")
+            self._sharp.encode_motion(encoder, frame.size, motion.create_view(), **moving)
+            gpu.submit(self._device, encoder)
+            found["motion"] = motion
+        return found
+
+    def _sharp_rgba(self, frame: Frame) -> np.ndarray:
+        rgba = np.ones((*frame.color.shape[:2], 4), np.float32)
+        rgba[..., : frame.color.shape[2]] = frame.color
+        return rgba
+
+    def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Timing | None) -> int:
+        """Draw with `blur`, all its samples."""
+        encoder = self._device.create_command_encoder(label="blur")
+        view = output.create_view()
+        blur.encode(encoder, output=view, timing=timing, **self._inputs(blur))
+        gpu.submit(self._device, encoder)
+        return blur.samples
+
+
+_NOT_MOVING = ("size", "color", "keep", "check", "number", "neighbours")
+Subject = SceneSubject | ClipSubject
+
+
+def methods_for(has: frozenset[str]) -> list[str]:
+    """The methods that can be fed with what there is."""
+    return [name for name, method in METHODS.items() if method.needs <= has]
+
+
+def options_of(device: wgpu.GPUDevice, method: str) -> dict[str, object]:
+    """The method's own options: the values one can choose from, or the default's type."""
+    kinds = typing.get_type_hints(BlurOptions)
+    found: dict[str, object] = {}
+    for name, parameter in inspect.signature(METHODS[method]).parameters.items():
+        if name in ("device", "output"):
+            continue
+        literals = [a for kind in typing.get_args(kinds.get(name)) for a in typing.get_args(kind)]
+        if isinstance(parameter.default, str):
+            found[name] = [v for v in literals if _takes(device, method, name, v)]
+        else:
+            found[name] = type(parameter.default)
+    return found
+
+
+def _takes(device: wgpu.GPUDevice, method: str, name: str, value: str) -> bool:
+    try:
+        METHODS[method](device, **{name: value})
+    except InputError:
+        return False
+    return True
