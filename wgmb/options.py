@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -11,6 +12,8 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from . import scenes, sequence, shutter, vectors
+from .blur import METHODS
+from .compare import Case, Contender, Report
 from .errors import InputError
 from .numbering import frame_numbers
 from .perceive import Cone
@@ -20,6 +23,7 @@ from .scene import Scene
 _IN = Group("Input", sort_key=1)
 _LOOK = Group("Blur", sort_key=2)
 _SHUTTER = Group("Shutter", sort_key=3)
+_WHO = Group("Compare", sort_key=2)
 _PERCEPTION = Group("Perception", sort_key=4)
 _OUT = Group("Output", sort_key=5)
 
@@ -241,6 +245,63 @@ class SceneOptions:
         if self.frames is None:
             return {0: self.time or 0.0}
         return {n: n / fps for n in frame_numbers(self.frames)}
+
+
+@Parameter(name="*", group=_WHO)
+@dataclass(frozen=True, kw_only=True)
+class CompareOptions:
+    """Who is compared, and how."""
+
+    methods: str | None = None
+    "NAME[:SAMPLES][:OPTION=VALUE]..., separated by commas; all by default."
+    reference: str = "distributed:1024"
+    "What renders the truth of scenes."
+    samples: int = 16
+    "Of every method, where samples are equal."
+    ladder: str = "4,8,16,32,64"
+    "Numbers of samples for the curves."
+    budget: float | None = None
+    "Milliseconds where time is equal; by default those of the slowest method of pictures."
+    shutters: str | None = None
+    "Several in degrees, such as 90,180,360, instead of --shutter."
+    rounds: int = 3
+    "How often everything is timed; the least counts."
+
+    def contenders(self) -> list[Contender]:
+        """Who takes part."""
+        return [Contender.parse(text) for text in (self.methods or ",".join(METHODS)).split(",")]
+
+    def steps(self) -> list[int]:
+        """Numbers of samples."""
+        return whole_numbers("ladder", self.ladder)
+
+    def budgets(self) -> Callable[[Report, Case], list[float]] | None:
+        """The times that everyone is to fit [s], if they are asked for."""
+        if self.budget is None:
+            return None
+        if not self.budget > 0:
+            raise InputError(f"budget must be over 0 ms, got {self.budget}")
+        seconds = self.budget / 1e3
+        return lambda report, case: [seconds]
+
+    def exposures(
+        self, when: ShutterOptions, scene: Scene | None = None
+    ) -> dict[str, shutter.Shutter]:
+        """The shutters, by what to call them; what is left open is the scene's."""
+        settled = when.settled(scene)
+        try:
+            degrees = [float(d) for d in (self.shutters or str(settled.shutter)).split(",")]
+        except ValueError:
+            raise InputError(f"shutters must be like 90,180, got {self.shutters!r}") from None
+        return {f"{d:g}°": replace(settled, shutter=d).make() for d in degrees}
+
+
+def whole_numbers(name: str, text: str) -> list[int]:
+    """`4,8,16` -> numbers."""
+    try:
+        return [int(n) for n in text.split(",")]
+    except ValueError:
+        raise InputError(f"{name} must be like 4,8,16, got {text!r}") from None
 
 
 @Parameter(name="*", group=_PERCEPTION)
