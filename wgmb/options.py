@@ -371,4 +371,5 @@ class OutputOptions:
 
 
 def plain(options) -> dict:
+    """The options by name, as JSON can hold them."""
     return {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items()}
