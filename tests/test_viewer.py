@@ -24,7 +24,7 @@ from wgmb import (
 from wgmb.blur import METHODS
 from wgmb.timing import Timing
 from wgmb.viewer import State, controls, offscreen
-from wgmb.viewer.stage import Pace
+from wgmb.viewer.pace import Pace
 from wgmb.viewer.window import frame
 
 SIZE = 640, 1010  # tall enough for the whole panel; the picture is 320 x 180
@@ -704,6 +704,23 @@ def test_frames_on_disk_have_no_reference(reel):
     for look in stage.looks(state):
         reel.viewer.state = replace(state, look=look)
         assert np.isfinite(reel.picture()).all()
+
+
+def test_a_picture_without_passes_is_shown_as_it_is(tmp_path, hand):
+    image = np.random.default_rng(0).integers(0, 256, (36, 64, 3), np.uint8)
+    iio.imwrite(tmp_path / "plain.png", image)
+    hand.viewer.state = PLAIN.opened(str(tmp_path / "plain.png"))
+    hand.look()
+    assert hand.state.look == "sharp"
+    assert hand.viewer.stage.looks(hand.state) == ["sharp"]
+    assert np.abs(stills.srgb(hand.viewer.stage.download()[..., :3]) - image / 255).max() < 0.01
+
+
+def test_a_method_that_needs_a_scene_gives_way_to_one_that_does_not(reel):
+    reel.viewer.state = replace(PLAIN.opened(SAMPLE), method="distributed", look="error")
+    reel.look()
+    assert (reel.state.method, reel.state.look) == (next(iter(METHODS)), "result")
+    assert "distributed" in reel.viewer._message[0]
 
 
 def test_what_cannot_be_opened_is_told(tmp_path):
