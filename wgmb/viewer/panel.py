@@ -129,7 +129,8 @@ class Panel:
 
     def _scene(self, state: State, info: Info) -> State:
         names = list(scenes.SCENES) if state.is_scene else [state.source, *scenes.SCENES]
-        chosen = self._combo("scene", state.source, names, shown=_name(state.source))
+        label = "scene" if state.is_scene else "shown"
+        chosen = self._combo(label, state.source, names, shown=_name(state.source))
         if chosen != state.source:
             return state.opened(chosen)
         if state.is_scene:

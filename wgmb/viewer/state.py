@@ -95,11 +95,12 @@ class State:
             raise InputError(f"no file or scene {source!r}; scenes: {known}")
         state = replace(self.unmoved(), source=source, settings=(), given=())
         if state.is_scene:
-            return replace(state, frames="0-11", frame=0.0)
-        return replace(state, frames=_on_disk(source), frame=float("nan")).settled()
+            plain = State()
+            return replace(state, frames=plain.frames, frame=0.0, speed=plain.speed)
+        return replace(state, frames=_on_disk(source), frame=math.nan, speed=1.0).settled()
 
     def settled(self) -> State:
-        """The same, its moment within its frames and its method one that the source can feed."""
+        """The same, its moment within its frames."""
         first, last = self.span
         frame = min(max(self.frame, first), last) if math.isfinite(self.frame) else float(first)
         return replace(self, frame=frame)

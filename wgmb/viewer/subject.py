@@ -24,7 +24,8 @@ from ..timing import Timing
 from ..velocity import Moving
 from .state import State
 
-_FRAMES_KEPT = 16
+_MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
+_FRAMES_KEPT = 2, 16  # but so many at least, at most
 Texture = wgpu.GPUTexture
 Budget = tuple[int, float]
 """Samples done before, and seconds to spend on more."""
@@ -83,7 +84,8 @@ class ClipSubject:
         self._frames: OrderedDict[int, Frame] = OrderedDict()
         self._sharp = Blur(device=device)
         self._number = self._clip.numbers[0]
-        self._uploaded: dict[int, tuple[int, dict]] = {}
+        self._uploaders: dict[tuple, Blur] = {}
+        self._uploaded: dict[tuple, tuple[int, dict]] = {}
         self.has = self._frame().has
         self.finding = self._clip.finding
 
@@ -99,17 +101,22 @@ class ClipSubject:
     def _frame(self) -> Frame:
         number = self._number
         if number not in self._frames:
-            while len(self._frames) >= _FRAMES_KEPT:
+            frame = self._clip.with_neighbours(self._clip.source(number))
+            least, most = _FRAMES_KEPT
+            kept = min(max(_MEMORY // (3 * _bytes(frame)), least), most)  # with its neighbours
+            while len(self._frames) >= kept:
                 self._frames.popitem(last=False)
-            self._frames[number] = self._clip.with_neighbours(self._clip.source(number))
+            self._frames[number] = frame
         self._frames.move_to_end(number)
         return self._frames[number]
 
     def _inputs(self, blur: Blur) -> dict:
-        number, inputs = self._uploaded.get(id(blur), (None, {}))
+        """The frame's textures, one set for all methods that take the same."""
+        key = blur.method.needs, blur.method.uses
+        number, inputs = self._uploaded.get(key, (None, {}))
         if number != self._number:
-            inputs = blur.upload(self._frame())
-            self._uploaded[id(blur)] = self._number, inputs
+            inputs = self._uploaders.setdefault(key, blur).upload(self._frame())
+            self._uploaded[key] = self._number, inputs
         return dict(inputs)
 
     def passes(self) -> dict[str, Texture]:
@@ -142,6 +149,11 @@ class ClipSubject:
         blur.encode(encoder, output=view, timing=timing, **self._inputs(blur))
         gpu.submit(self._device, encoder)
         return blur.samples
+
+
+def _bytes(frame: Frame) -> int:
+    arrays = (getattr(frame, f.name) for f in fields(frame))
+    return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
 
 
 _MOVING = {f.name for f in fields(Moving)}
