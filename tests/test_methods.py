@@ -15,7 +15,7 @@ def test_contract(name):
     assert method.__module__ == f"wgmb.blur.{name}"
     assert method.needs
     assert method.needs <= {"color", "motion", "depth", "scene"}
-    assert method.uses <= {"neighbours", "depth", "normal"}
+    assert method.uses <= {"neighbours", "depth", "normal", "progress"}
     assert list(inspect.signature(method.encode).parameters) == [
         "self", "encoder", "inputs", "output",
     ]  # fmt: skip

@@ -16,7 +16,7 @@ BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.S)
 def test_python_blocks_run_in_their_order(tmp_path, monkeypatch):
     monkeypatch.chdir(HERE)
     names: dict = {}
-    assert len(BLOCKS) == 3
+    assert len(BLOCKS) == 4
     for block in BLOCKS:
         exec(compile(block.replace('"out/', f'"{tmp_path}/'), "README.md", "exec"), names)
     assert names["out"].shape == (270, 480, 3)
@@ -29,6 +29,9 @@ def test_every_option_that_is_named_exists():
         for name in getattr(group, "__dataclass_fields__", ()):
             known.add("--" + name.replace("_", "-"))
     known |= {"--adapter", "--size", "--rounds", "--verbose", "--sharp", "--passes", "--config"}
+    known |= {"--truth", "--inputs", "--frame", "--peer", "--experiment", "--save"}
+    known |= {"--against", "--article"}
+    known |= {"--method", "--report", "--speed"}
     named = set(re.findall(r"--[a-z][a-z-]+", TEXT))
     assert named - known == set()
 

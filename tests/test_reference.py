@@ -194,7 +194,7 @@ def test_more_rays_refine_the_same_picture():
 def test_bit_by_bit_is_the_same_as_at_once(method):
     blur = wgmb.Blur(method, samples=24, shutter=Shutter(270, "start", "triangle"))
     render = wgmb.Render(scenes.make("crossing"), blur, size=(40, 23), rays=1)
-    on_gpu = render._on_gpu(0.1)
+    on_gpu = render.on_gpu(0.1)
     pictures = []
     for bits in ([(0, 24)], [(0, 7), (7, 1), (8, 16)]):
         output = render._images.texture("output", render.size, blur.output)

@@ -5,11 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
+import make_frames as make
 from wgmb import InputError, Shutter
-from wgmb.shutter import CURVES, read_curve
+from wgmb.shutter import CURVES, OVERLAPS, read_curve
 
 DEGREES = (1.0, 90.0, 180.0, 360.0, 540.0, 720.0, 1500.0)
-OVERLAP = {"box": 360, "trapezoid": 540, "triangle": 720, "cosine": 720}
 
 
 def weight(shutter: Shutter, times: np.ndarray) -> np.ndarray:
@@ -47,12 +47,50 @@ def test_phase_says_when_a_shutter_opens(phase, span):
     assert Shutter(180, phase).span == pytest.approx(span)
 
 
-@pytest.mark.parametrize("curve", OVERLAP)
+@pytest.mark.parametrize("curve", OVERLAPS)
 def test_windows_of_neighbouring_frames_add_up_to_one(curve):
-    shutter = Shutter(OVERLAP[curve], curve=curve)
+    shutter = Shutter(OVERLAPS[curve], curve=curve)
     t = np.linspace(0.001, 0.999, 500)
     total = sum(weight(shutter, t - n) for n in range(-3, 5))
     np.testing.assert_allclose(total, 1, atol=1e-3)
+    np.testing.assert_allclose(shutter.overlap(t), 1, atol=1e-3)
+
+
+@pytest.mark.parametrize("curve", CURVES)
+@pytest.mark.parametrize("degrees", [90.0, 360.0, 720.0])
+@pytest.mark.parametrize("phase", ["start", "centre", 0.3])
+def test_weights_are_those_of_the_curve(curve, degrees, phase):
+    shutter = Shutter(degrees, phase, curve)
+    t = np.linspace(-2, 3, 2000)
+    np.testing.assert_allclose(shutter.weight(t), weight(shutter, t), atol=0.01)
+
+
+def test_a_closed_shutter_has_no_weights():
+    with pytest.raises(InputError, match="0 degrees"):
+        Shutter(0).weight(np.zeros(1))
+
+
+@pytest.mark.parametrize("options, says", [
+    (["--curve", "cosine"], "cosine, 720 degrees: all frames' windows add up to 1"),
+    (["--curve", "trapezoid"], "trapezoid, 540 degrees: all frames' windows add up to 1"),
+    (["--curve", "trapezoid", "--shutter", "720"], "add up to 0.75 to 1.125"),
+    ([], "box, 360 degrees: all frames' windows add up to 1"),
+])  # fmt: skip
+def test_a_shutter_is_drawn_and_its_sum_told(tmp_path, capsys, options, says):
+    code, out, err = make.inside(capsys, "shutter", *options, "-o", tmp_path / "s.svg")
+    assert (code, err) == (0, "")
+    assert says in out
+    text = (tmp_path / "s.svg").read_text()
+    assert all(f">{word}<" in text for word in ("curve", "integral", "sum"))
+    assert make.inside(capsys, "shutter", "-o", tmp_path / "s.svg")[0] == 2  # it is there
+
+
+@pytest.mark.parametrize("options", ["--shutter 0 -o s.svg", "-o s.png", "--curve hat -o s.svg"])
+def test_a_senseless_drawing_is_one_line(tmp_path, capsys, monkeypatch, options):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = make.inside(capsys, "shutter", *options.split())
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert make.names_in(tmp_path) == []
 
 
 def test_windows_that_do_not_add_up_are_told_apart():

@@ -1,4 +1,4 @@
-"""How fast a method is: GPU work alone, transfers apart, beside the same filter in numba.
+"""How fast the methods are: GPU work alone, transfers apart, beside the same filter in numba.
 
 Figures of different days or machines say little; ratios of one run do. Candidates take
 turns, and medians are reported.
@@ -6,21 +6,91 @@ turns, and medians are reported.
 
 from __future__ import annotations
 
+import contextlib
+import json
 import statistics
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache, partial
+from pathlib import Path
 
 import numpy as np
 import wgpu
 
-from . import gpu
+from . import gpu, scenes, timing
+from .compare import Contender, Plot, Report, Staged, Table, Tell, machine
 from .errors import InputError
 from .frame import Frame
-from .images import Images
+from .images import Images, numpy_of
 from .pipeline import Blur
+from .render import Render
+from .shutter import Shutter
 from .timing import Timing
 
+# Milliseconds by iTime [s] of the article's own fragment shader of the torusphere, 640 x 360,
+# software OpenGL (Mesa 22.3) on two cores; another machine's figures are another matter.
+ARTICLE = {31.0: 13.7, 20.5: 20.2, 16.0: 22.7, 12.0: 24.9, 7.5: 27.7, 0.0: 35.0}
 MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
+_COPY = 64 << 20  # bytes, of the copy that tells the machine's bandwidth
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One method at one size with one number of samples; milliseconds."""
+
+    method: str
+    width: int
+    height: int
+    samples: int
+    gpu: float
+    """All passes, from recording to the end of the work."""
+    call: float | None = None
+    """Arrays in, array out."""
+    upload: float | None = None
+    readback: float | None = None
+    passes: dict[str, float] = field(default_factory=dict)
+    """Every pass, where the adapter's clock can be believed."""
+    bytes: int = 0
+    """Of all inputs and the output, each once: the least that must be moved."""
+    numba: float | None = None
+    """The tap blur on the CPU with as many samples, in the same rounds."""
+    peak: int = 0
+    """The process's largest memory so far [bytes]."""
+
+    @property
+    def key(self) -> tuple:
+        """What another run's figure must share to be compared."""
+        return self.method, self.width, self.height, self.samples
+
+    @property
+    def bandwidth(self) -> float:
+        """`bytes` over `gpu` [GB/s]."""
+        return self.bytes / self.gpu / 1e6
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A run's figures, and the copy bandwidth [GB/s] that went with them."""
+
+    machine: dict[str, str]
+    copy: float
+    figures: list[Figure]
+
+    def save(self, path: Path) -> None:
+        """As JSON, for `load`."""
+        path.write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path) -> Bench:
+        """What `save` wrote; the error names the file."""
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+            figures = [Figure(**f) for f in data["figures"]]
+            return cls(data["machine"], float(data["copy"]), figures)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise InputError(f"{path}: not a saved bench: {error}") from None
 
 
 def synthetic_frame(width: int, height: int) -> Frame:
@@ -35,63 +105,273 @@ def synthetic_frame(width: int, height: int) -> Frame:
     return Frame(color, motion=np.concatenate([-motion, motion], axis=2), depth=depth)
 
 
-def bench(blur: Blur, width: int, height: int, rounds: int = 9) -> dict[str, float]:
-    """Median milliseconds by name: `gpu` (all passes), every pass where the adapter can time
-    them, `upload`, `readback`, `call` (arrays in, array out), and `numba` for tap if numba is
-    installed.
-    """
-    frame = synthetic_frame(width, height)
-    images, device = Images(blur.device), blur.device
-    color = images.upload("color", frame.color, gpu.texel(device, 4))
-    motion = images.upload("motion", _motion(frame), "rgba32float")
-    depth = images.upload("depth", np.asarray(frame.depth), "r32float")
-    output = images.texture("output", frame.size, blur.output)
-    token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
-    passes: dict[str, list[float]] = {}
+def bench(
+    device: wgpu.GPUDevice,
+    contenders: Iterable[Contender],
+    sizes: Iterable[tuple[int, int]] = ((1920, 1080),),
+    samples: Iterable[int] = (16,),
+    rounds: int = 9,
+    tell: Tell = lambda text: None,
+) -> Bench:
+    """Time every contender at every size with every number of samples."""
+    if rounds < 1:
+        raise InputError(f"rounds must be 1 or more, got {rounds}")
+    contenders, samples, figures = list(contenders), list(samples), []
+    for size in sizes:
+        gpu.check_size(device, *size)
+        frame = synthetic_frame(*size)
+        for count in samples:
+            tell(f"{size[0]} x {size[1]}, {count} samples")
+            figures += _figures(device, contenders, frame, count, rounds)
+    return Bench(machine(device), copy_bandwidth(device), figures)
 
-    def work() -> None:
-        timing = Timing(device) if Timing.usable(device) else None
-        encoder = device.create_command_encoder()
-        view = output.create_view()
-        blur.encode(
-            encoder,
-            size=frame.size,
-            color=color,
-            motion=motion,
-            depth=depth,
-            output=view,
-            timing=timing,
-        )
-        gpu.submit(device, encoder)
-        device.queue.read_buffer(token)  # waits for the work
-        for label, seconds in timing.read().items() if timing else ():
-            passes.setdefault(label, []).append(seconds)
 
-    def upload() -> None:
-        images.upload("color", frame.color, gpu.texel(device, 4))
-        images.upload("motion", _motion(frame), "rgba32float")
-        gpu.submit(device, device.create_command_encoder())
-        device.queue.read_buffer(token)
-
-    def readback() -> None:
-        images.download(device.create_command_encoder(), output)
-
-    jobs: dict[str, Callable[[], object]] = {
-        "gpu": work,
-        "upload": upload,
-        "readback": readback,
-        "call": lambda: blur(frame),
-    }
-    if blur.method.name == "tap" and (peer := _numba_peer(frame, blur.samples)):
+def _figures(device, contenders, frame: Frame, samples: int, rounds: int) -> list[Figure]:
+    """All contenders in turns, and the numba peer with them."""
+    jobs: dict[str, Callable[[], object]] = {}
+    found: dict[str, Figure] = {}
+    filters: dict[str, _Filter] = {}
+    for c in contenders:
+        blur, name = c.blur(samples, Shutter(180), device), c.label
+        found[name] = Figure(name, *frame.size, samples, 0.0)
+        if c.needs_scene:
+            jobs[name] = partial(_scene_for(blur, frame.size), 0.0)
+        else:
+            one = filters[name] = _Filter(blur, frame)
+            found[name] = replace(found[name], bytes=_bytes(one.views, one.output))
+            jobs[name] = one.work
+            for part in (one.call, one.upload, one.readback):
+                jobs[f"{name} {part.__name__}"] = part
+    if peer := _numba_peer(frame, samples):
         jobs["numba"] = peer
-    seconds = alternate(jobs, rounds)
-    return {k: 1e3 * statistics.median(v) for k, v in (seconds | passes).items()}
+    median = {k: 1e3 * statistics.median(v) for k, v in alternate(jobs, rounds).items()}
+    for name, figure in found.items():
+        parts = {part: median.get(f"{name} {part}") for part in ("call", "upload", "readback")}
+        stamps = filters[name].passes if name in filters else {}
+        found[name] = replace(
+            figure,
+            gpu=median[name],
+            **parts,
+            passes={k: 1e3 * statistics.median(v) for k, v in stamps.items()},
+            numba=median.get("numba"),
+            peak=_peak(),
+        )
+    return list(found.values())
+
+
+def _scene_for(blur: Blur, size: tuple[int, int]) -> Render:
+    """The first of two scenes that the method can draw: bodies, or volumes."""
+    for name in ("crossing", "torusphere"):
+        render = Staged(scenes.make(name), size=size).render(blur)
+        with contextlib.suppress(InputError):
+            render(0.0)
+            return render
+    raise InputError(f"method {blur.method.name!r} draws none of the scenes that it is timed on")
+
+
+class _Filter:
+    """One method of pictures on one frame, in the parts that are timed."""
+
+    def __init__(self, blur: Blur, frame: Frame):
+        self.blur, self.frame = blur, frame
+        if "neighbours" in blur.method.uses:
+            near = {"prev": replace(frame, number=-1), "next": replace(frame, number=1)}
+            self.frame = replace(frame, **near)
+        self.views, self.images = blur.upload(self.frame), Images(blur.device)
+        self.output = self.images.texture("output", frame.size, blur.output)
+        self.passes: dict[str, list[float]] = {}
+
+    def work(self) -> None:
+        """All passes, and the time of each where the adapter tells it."""
+        blur, output = self.blur, self.output.create_view()
+        clock = Timing(blur.device) if Timing.usable(blur.device) else None
+
+        def record(encoder) -> None:
+            blur.encode(encoder, output=output, timing=clock, **self.views)
+
+        timing.work(blur.device, record)
+        for label, seconds in clock.read().items() if clock else ():
+            self.passes.setdefault(label, []).append(seconds)
+
+    def call(self) -> None:
+        """Arrays in, array out."""
+        self.blur(self.frame)
+
+    def upload(self) -> None:
+        """The frame's arrays as textures."""
+        self.blur.upload(self.frame)
+        timing.work(self.blur.device, lambda encoder: None)
+
+    def readback(self) -> None:
+        """The result as an array."""
+        self.images.download(self.blur.device.create_command_encoder(), self.output)
+
+
+def _peak() -> int:
+    """The process's largest memory so far [bytes]; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return 0
+    unit = 1 if sys.platform == "darwin" else 1024
+    return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def _bytes(views: dict, output: wgpu.GPUTexture) -> int:
+    """What all textures of `encode`'s inputs and the output hold."""
+    near = [view for inputs in views["neighbours"].values() for view in inputs.values()]
+    read = [v.texture for v in (*views.values(), *near) if isinstance(v, wgpu.GPUTextureView)]
+    total = 0
+    for texture in (*read, output):
+        kind, channels = numpy_of(texture.format)
+        total += texture.size[0] * texture.size[1] * channels * kind.itemsize
+    return total
+
+
+def copy_bandwidth(device: wgpu.GPUDevice, rounds: int = 7) -> float:
+    """GB/s that a copy from buffer to buffer reads and writes."""
+    usage = wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
+    a, b = (device.create_buffer(size=_COPY, usage=usage) for _ in range(2))
+
+    def copy(encoder) -> None:
+        encoder.copy_buffer_to_buffer(a, 0, b, 0, _COPY)
+
+    seconds = [timing.work(device, copy) for _ in range(rounds + 1)][1:]
+    return 2 * _COPY / statistics.median(seconds) / 1e9
+
+
+def text(run: Bench) -> str:
+    """A run's figures for people."""
+    lines = [f"{run.machine['adapter']}; a copy moves {run.copy:.1f} GB/s"]
+    for f in run.figures:
+        pixels = f.width * f.height
+        lines.append(f"{f.width} x {f.height}, {f.method}, {f.samples} samples")
+        rows = [("gpu", f.gpu), *((f"  {k}", v) for k, v in f.passes.items()),
+                ("upload", f.upload), ("readback", f.readback), ("call", f.call),
+                ("numba tap", f.numba)]  # fmt: skip
+        for name, milliseconds in rows:
+            if milliseconds is not None:
+                each = 1e6 * milliseconds / pixels
+                lines.append(f"  {name:34}{milliseconds:9.2f} ms {each:8.1f} ns a pixel")
+        if f.numba:
+            lines.append(f"  gpu / numba tap{f.gpu / f.numba:31.2f}")
+        if f.bytes:
+            share = f.bandwidth / run.copy
+            lines.append(f"  at least{f.bandwidth:38.2f} GB/s {share:6.0%} of a copy")
+    return "\n".join(lines) + "\n"
+
+
+def against(run: Bench, before: Bench) -> Table:
+    """This run over an earlier one: under 1 is faster now."""
+    old = {f.key: f for f in before.figures}
+    rows = []
+    for f in run.figures:
+        if (was := old.get(f.key)) is None:
+            continue
+        peers = f.gpu / f.numba / (was.gpu / was.numba) if f.numba and was.numba else None
+        rows.append([*_first(f), round(was.gpu, 2), round(f.gpu, 2), round(f.gpu / was.gpu, 2),
+                     None if peers is None else round(peers, 2)])  # fmt: skip
+    if not rows:
+        raise InputError("the two runs have no method, size and samples in common")
+    columns = ["method", "size", "samples", "before [ms]", "now [ms]", "now / before",
+               "the same, by numba"]  # fmt: skip
+    note = f"Before: {before.machine.get('adapter')}, {before.machine.get('made')}."
+    return Table("Against an earlier run", columns, rows, note)
+
+
+def report(run: Bench, command: str, before: Bench | None = None) -> Report:
+    """The figures as tables and plots, for report.py."""
+    made = Report("Speed of the methods", command, run.machine, 0)
+    columns = ["method", "size", "samples", "GPU [ms]", "ns a pixel", "/ numba tap"]
+    columns += ["upload [ms]", "readback [ms]", "call [ms]", "at least [GB/s]", "of a copy"]
+    rows = []
+    for f in run.figures:
+        each, moved = 1e6 * f.gpu / (f.width * f.height), f.bandwidth if f.bytes else None
+        values = (f.gpu, each, f.numba and f.gpu / f.numba, f.upload, f.readback, f.call, moved,
+                  moved and moved / run.copy)  # fmt: skip
+        rows.append([*_first(f), *map(_round, values), f.peak >> 20])
+    columns.append("peak memory [MB]")
+    note = (
+        f"A copy moves {run.copy:.1f} GB/s. Bytes are those of inputs and output, each once. "
+        "Memory is the process's largest so far, sizes in this order."
+    )
+    made.tables.append(Table("Every method", columns, rows, note))
+    if passes := [[*_first(f), k, round(v, 3)] for f in run.figures for k, v in f.passes.items()]:
+        columns = ["method", "size", "samples", "pass", "GPU [ms]"]
+        made.tables.append(Table("Every pass", columns, passes, "By timestamp queries."))
+    else:
+        made.notes.append("Passes are not timed apart: this adapter's clock cannot be believed.")
+    if before:
+        made.tables.append(against(run, before))
+    made.plots += _curves(run.figures)
+    return made
+
+
+def _curves(figures: Sequence[Figure]) -> list[Plot]:
+    """Time a pixel against size, and time against samples, where there are several."""
+    sizes = sorted({(f.width * f.height, f.width, f.height) for f in figures})
+    counts = sorted({f.samples for f in figures})
+    plots = []
+    if len(sizes) > 1:
+        curves: dict[str, list[tuple[float, float]]] = {}
+        for f in figures:
+            if f.samples == counts[len(counts) // 2]:
+                pixels = f.width * f.height
+                curves.setdefault(f.method, []).append((pixels / 1e6, 1e6 * f.gpu / pixels))
+        title = f"Time a pixel, {counts[len(counts) // 2]} samples"
+        plots.append(Plot(title, "megapixels", "ns a pixel", curves))
+    if len(counts) > 1:
+        _, width, height = sizes[len(sizes) // 2]
+        curves = {}
+        for f in figures:
+            if (f.width, f.height) == (width, height):
+                curves.setdefault(f.method, []).append((f.samples, f.gpu))
+        plots.append(Plot(f"Time against samples, {width} x {height}", "samples", "ms", curves))
+    return plots
+
+
+def _first(f: Figure) -> list:
+    return [f.method, f"{f.width} x {f.height}", f.samples]
+
+
+def _round(value: float | None) -> float | None:
+    return None if value is None else round(value, 2)
+
+
+def bench_torusphere(
+    blur: Blur, width: int, height: int, rounds: int = 9
+) -> dict[float, tuple[float, ...]]:
+    """By iTime [s]: milliseconds a frame, of those recording it, and of all cores' work.
+
+    Published density, the shutter that the scene is made for. Medians; all times take turns.
+    """
+    device = blur.device
+    token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
+    scene = scenes.make("torusphere", density="published")
+    render = Render(scene, blur, size=(width, height), fps=60)
+    output = Images(device).texture("output", (width, height), blur.output)
+    work: dict[float, list[float]] = {t: [] for t in ARTICLE}
+    recording: dict[float, list[float]] = {t: [] for t in ARTICLE}
+
+    def frame(t: float) -> None:
+        cores, started = time.process_time(), time.perf_counter()
+        on_gpu = render.on_gpu(t)
+        encoder = device.create_command_encoder()
+        blur.encode(encoder, size=render.size, output=output.create_view(), scene=on_gpu)
+        recording[t].append(time.perf_counter() - started)
+        gpu.submit(device, encoder)
+        device.queue.read_buffer(token)
+        work[t].append(time.process_time() - cores)
+
+    seconds = alternate({str(t): partial(frame, t) for t in ARTICLE}, rounds)
+    return {
+        t: tuple(1e3 * statistics.median(s) for s in (seconds[str(t)], recording[t], work[t]))
+        for t in ARTICLE
+    }
 
 
 def alternate(jobs: dict[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
     """Seconds of every job in every round; all jobs take turns after one round for warmth."""
-    if rounds < 1:
-        raise InputError(f"rounds must be 1 or more, got {rounds}")
     seconds: dict[str, list[float]] = {name: [] for name in jobs}
     for job in jobs.values():
         job()
@@ -110,6 +390,16 @@ def _motion(frame: Frame) -> np.ndarray:
 
 def _numba_peer(frame: Frame, samples: int) -> Callable[[], object] | None:
     """The tap blur as one would write it for the CPU: curved paths, bilinear, all cores."""
+    if (tap := _numba_tap()) is None:
+        return None
+    times = -(((np.arange(samples) + 0.5) / samples - 0.5) * 0.5).astype(np.float32)
+    out = np.empty_like(frame.color)
+    return lambda: tap(frame.color, _motion(frame), times, out)
+
+
+@cache
+def _numba_tap():
+    """It, compiled; None without numba."""
     try:
         from numba import njit, prange  # pyright: ignore[reportMissingImports]
     except ImportError:
@@ -147,6 +437,4 @@ def _numba_peer(frame: Frame, samples: int) -> Callable[[], object] | None:
                 out[y, x, 2] = b * share
                 out[y, x, 3] = a * share
 
-    times = -(((np.arange(samples) + 0.5) / samples - 0.5) * 0.5).astype(np.float32)
-    out = np.empty_like(frame.color)
-    return lambda: tap(frame.color, _motion(frame), times, out)
+    return tap

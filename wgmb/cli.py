@@ -22,7 +22,7 @@ from cyclopts.config import Toml
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from . import __version__, gpu
+from . import __version__, gpu, lab
 from .errors import DeviceError, Error, InputError
 from .info import describe
 from .options import (
@@ -81,7 +81,8 @@ def blur(
     quiet
         Print errors only.
     """
-    look, when, given = look or BlurOptions(), when or ShutterOptions(), given or InputOptions()
+    look, given = (look or BlurOptions()).settled(), given or InputOptions()
+    when = (when or ShutterOptions()).settled()
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     clip = given.open(pattern, look.keep, look.scale)
     made = look.make(when.make(), adapter)
@@ -188,7 +189,7 @@ def render(
 ) -> int:
     """Render a built-in scene with motion blur.
 
-    Scenes: translation, scaling, rotation, crossing, wheel, fence, bounce, hdr.
+    Scenes: translation, scaling, rotation, crossing, wheel, fence, bounce, hdr; torusphere.
 
     Example: wgmb render crossing -o crossing.png --method distributed --samples 256
 
@@ -210,14 +211,16 @@ def render(
         Print errors only.
     """
     what, look, when = what or SceneOptions(), look or BlurOptions(), when or ShutterOptions()
+    fps = float(output.rate)
+    picture = what.make(scene)
+    look, when = look.settled(picture), when.settled(picture, fps)
     if look.keep or look.scale:
         raise InputError("--keep and --scale are for files: wgmb render has no layers to name")
     if passes and not output.output.lower().endswith(".exr"):
         raise InputError(f"--passes need an .exr output, got {output.output}")
-    fps = float(output.rate)
     moments = what.moments(fps)
     made = look.make(when.make(), adapter)
-    renderer = Render(what.make(scene), made, size=size_of(what.size), fps=fps, rays=what.rays)
+    renderer = Render(picture, made, size=size_of(what.size), fps=fps, rays=what.rays)
     settings = {"scene": scene, "sharp": sharp, "passes": passes, "bits": output.bits}
     settings |= _plain(look) | _plain(when) | _plain(what) | {"wgmb": __version__, "fps": fps}
     settings["samples"] = _samples(made)
@@ -345,40 +348,8 @@ def devices() -> int:
     return DONE
 
 
-@app.command
-def bench(
-    *,
-    method: str = "tap",
-    samples: int | None = None,
-    size: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
-    rounds: int = 9,
-    adapter: str | None = None,
-) -> int:
-    """Time a method on this machine: median milliseconds a frame.
-
-    Example: wgmb bench --size 1920x1080 3840x2160 --samples 16
-
-    Parameters
-    ----------
-    size
-        Pictures to time it on; 1920x1080 by default.
-    rounds
-        How often everything is done.
-    """
-    from . import bench as measure
-
-    blur = Blur(method, samples=samples, device=adapter)
-    sys.stdout.write(f"{blur.device.adapter.summary}, {method}, {blur.samples} samples\n")
-    for text in size or ["1920x1080"]:
-        width, height = size_of(text)
-        found = measure.bench(blur, width, height, rounds)
-        sys.stdout.write(f"{width} x {height}\n")
-        for name, milliseconds in found.items():
-            each = 1e6 * milliseconds / (width * height)
-            sys.stdout.write(f"  {name:24}{milliseconds:9.2f} ms {each:8.1f} ns a pixel\n")
-        if "numba" in found:
-            sys.stdout.write(f"  gpu / numba{found['gpu'] / found['numba']:22.2f}\n")
-    return DONE
+app.command(lab.compare)
+app.command(lab.bench)
 
 
 def main(arguments: list[str] | None = None) -> int:

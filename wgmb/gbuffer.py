@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import wgpu
 
@@ -32,17 +34,33 @@ class SceneOnGpu:
         rays: int,
     ):
         """`time` of the frame [s]; `span` of interest around it [frame intervals]."""
-        self.device, self.scene, self.size, self.time, self.fps = device, scene, size, time, fps
-        self.rays = rays
+        self.device, self.size, self.time, self.fps = device, size, time, fps
+        self.shown = scene
+        self.scene = scene = scene.solid(time)
         n = len(scene.bodies)
-        # Of one ray and its shadow: both sift, then meet, all bodies.
-        self.loops = 4 * n + n // 16 + 4
         source = shader.load("scene/trace.wgsl")
+        # Of one ray and its shadow: both sift, then meet, all bodies.
+        rings = sum(b.shape == "ring" for b in scene.bodies)
+        self.loops = 4 * n + n // 16 + 4 + 2 * rings * int(source.constant("RING_STEPS"))
         if n > (most := source.constant("MOST_BODIES")):
             raise InputError(f"a scene has at most {most} bodies, got {n}")
-        first, last = span
+        self.rays, self.span = rays, span
+        self.constants = {"RINGS": rings > 0, "STAGED": scene.stage is not None}
+
+    @cached_property
+    def resources(self) -> dict[str, wgpu.GPUBuffer]:
+        """The buffers, made when the first kernel binds them."""
+        if self.scene.figure is not None:
+            raise InputError(f"scene {self.scene.name!r} is flat: only method 'volume' draws it")
+        scene, size, time, source = (
+            self.scene,
+            self.size,
+            self.time,
+            shader.load("scene/trace.wgsl"),
+        )
+        first, last = self.span
         step = max((last - first) / (ROWS - 1), 1e-6)
-        times = time + (first + step * np.arange(ROWS)) / fps
+        times = time + (first + step * np.arange(ROWS)) / self.fps
         with np.errstate(all="ignore"):
             places = [body.world_from_body(times) for body in scene.bodies]
             camera = _world_from_picture(scene, times, size)
@@ -52,16 +70,18 @@ class SceneOnGpu:
         data["sun"], data["sky"] = (*sun, scene.sun[3]), scene.sky
         data["horizon"] = (*scene.horizon, 0)
         data["first"], data["step"], data["rows"] = first, step, ROWS
-        data["bodies"] = n
+        data["bodies"] = len(scene.bodies)
         shapes = [b.shape for b in scene.bodies]
-        data["spheres"], data["boxes"] = (shapes.count(s) for s in SHAPES[:2])
+        data["spheres"], data["boxes"], data["cylinders"] = map(shapes.count, SHAPES[:3])
+        if scene.stage is not None:
+            scene.stage.fill(data["stage"])
         zoom = float(np.ravel(scene.shot.zoom(np.array([time])))[0])
         data["pixel"] = 2 / (zoom * size[1])
-        data["rays"] = rays
+        data["rays"] = self.rays
         for bounds, place in zip(data["bounds"], places, strict=False):
             bounds["low"][:3], bounds["high"][:3] = _bounds(place)
-        buffer = device.create_buffer_with_data
-        self.resources = {
+        buffer = self.device.create_buffer_with_data
+        return {
             "scene": buffer(label="scene", data=data, usage=wgpu.BufferUsage.UNIFORM),
             "bodies": buffer(
                 label="bodies", data=_bodies(scene, source), usage=wgpu.BufferUsage.STORAGE
@@ -78,7 +98,7 @@ class SceneOnGpu:
         rays, bodies = self.rays, len(self.scene.bodies)
         if self.loops * rays * rays > MOST_LOOPS:
             raise InputError(f"{bodies} bodies are too many for {rays} x {rays} rays")
-        kernel = gpu.kernel(self.device, "gbuffer.wgsl")
+        kernel = gpu.kernel(self.device, "gbuffer.wgsl", None, **self.constants)
         view = np.zeros((), kernel.source.dtype("View"))
         view["time"] = time
         buffer = self.device.create_buffer_with_data(

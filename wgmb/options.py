@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,15 +12,20 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from . import scenes, sequence, shutter, vectors
+from .blur import METHODS
+from .compare import Case, Contender, Report
 from .errors import InputError
 from .numbering import frame_numbers
+from .perceive import Cone
 from .pipeline import Blur
 from .scene import Scene
 
 _IN = Group("Input", sort_key=1)
 _LOOK = Group("Blur", sort_key=2)
 _SHUTTER = Group("Shutter", sort_key=3)
-_OUT = Group("Output", sort_key=4)
+_WHO = Group("Compare", sort_key=2)
+_PERCEPTION = Group("Perception", sort_key=4)
+_OUT = Group("Output", sort_key=5)
 
 
 @Parameter(name="*", group=_SHUTTER)
@@ -27,19 +33,31 @@ _OUT = Group("Output", sort_key=4)
 class ShutterOptions:
     """When the shutter is open."""
 
-    shutter: float = 180.0
-    "Degrees it is open: 360 is one frame interval, more is allowed."
+    shutter: float | None = None
+    "Degrees it is open: 360 is one frame interval, more is allowed. 180, or what a scene asks for."
     phase: str = "centre"
     "start (opens at the frame), centre, end (closes at it), or the middle's time in frames."
-    curve: str = "box"
-    "box, trapezoid, triangle, cosine, gaussian, or a CSV file of time, weight."
+    curve: str | None = None
+    "box (default), trapezoid, triangle, cosine, gaussian, or a CSV file of time, weight."
     rolling: Literal["up", "down", "left", "right"] | None = None
     "Rolling shutter: the way the exposure runs over the picture."
     rolling_duration: float = 1.0
     "Time from the first row or column to the last, in frame intervals."
 
+    def settled(self, scene: Scene | None = None, fps: float = 24.0) -> ShutterOptions:
+        """What was left open taken from the scene, or 180 degrees and a box."""
+        degrees, curve = 180.0, "box"
+        if scene is not None and scene.exposure is not None:
+            seconds, curve = scene.exposure
+            degrees = round(360 * seconds * fps, 9)
+        return replace(
+            self,
+            shutter=degrees if self.shutter is None else self.shutter,
+            curve=curve if self.curve is None else self.curve,
+        )
+
     def make(self) -> shutter.Shutter:
-        """The Shutter these options describe."""
+        """The Shutter these options describe, once they are settled."""
         phase: str | float = self.phase
         if phase not in shutter.PHASES:
             try:
@@ -49,6 +67,7 @@ class ShutterOptions:
                     f"phase must be start, centre, end or a number, got {phase!r}"
                 ) from None
         curve = self.curve
+        assert self.shutter is not None and curve is not None
         if curve not in shutter.CURVES:
             if not Path(curve).is_file():
                 known = ", ".join(shutter.CURVES)
@@ -130,8 +149,8 @@ OWN = ("path", "form", "show", "facing", "depth_test", "splat", "weights", "alph
 class BlurOptions:
     """How to blur."""
 
-    method: str = "tap"
-    "tap, tiles, fusion, reproject. Scenes: also accumulate, distributed. See the README's table."
+    method: str | None = None
+    "tap (default), tiles, fusion, reproject. Scenes: also accumulate, distributed, volume."
     samples: int | Literal["auto"] | None = None
     "Taps, pictures or rays a pixel: 16, for fusion 8; auto: one a pixel of a streak, 64 at most."
     jitter: float = 0.0
@@ -165,6 +184,11 @@ class BlurOptions:
     seed: int | None = None
     "distributed: another seed is other noise."
 
+    def settled(self, scene: Scene | None = None) -> BlurOptions:
+        """The method, where it was left open, that suits the scene."""
+        suited = "volume" if scene is not None and scene.has_volumes else "tap"
+        return replace(self, method=self.method or suited)
+
     def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
         """The Blur these options describe; an option its method does not have is an error."""
         own = {name: getattr(self, name) for name in OWN}
@@ -172,7 +196,7 @@ class BlurOptions:
             name: value for name, value in own.items() if value is not None and value is not False
         }
         return Blur(
-            self.method,
+            self.settled().method or "",
             shutter=shutter_,
             samples=self.samples,
             jitter=self.jitter,
@@ -214,10 +238,7 @@ class SceneOptions:
 
     def settings(self) -> dict[str, str]:
         """The scene's parameters by name."""
-        pairs = [text.partition("=") for text in self.set]
-        if wrong := [name for name, equals, _ in pairs if not equals]:
-            raise InputError(f"--set takes NAME=VALUE, got {wrong[0]!r}")
-        return {name: value for name, _, value in pairs}
+        return settings_of(self.set)
 
     def moments(self, fps: float) -> dict[int, float]:
         """Times in seconds by frame number."""
@@ -226,12 +247,99 @@ class SceneOptions:
         return {n: n / fps for n in frame_numbers(self.frames)}
 
 
+@Parameter(name="*", group=_WHO)
+@dataclass(frozen=True, kw_only=True)
+class CompareOptions:
+    """Who is compared, and how."""
+
+    methods: str | None = None
+    "NAME[:SAMPLES][:OPTION=VALUE]..., separated by commas; all by default."
+    reference: str = "distributed:1024"
+    "What renders the truth of scenes."
+    samples: int = 16
+    "Of every method, where samples are equal."
+    ladder: str = "4,8,16,32,64"
+    "Numbers of samples for the curves."
+    budget: float | None = None
+    "Milliseconds where time is equal; by default those of the slowest method of pictures."
+    shutters: str | None = None
+    "Several in degrees, such as 90,180,360, instead of --shutter."
+    rounds: int = 3
+    "How often everything is timed; the least counts."
+
+    def contenders(self) -> list[Contender]:
+        """Who takes part."""
+        return [Contender.parse(text) for text in (self.methods or ",".join(METHODS)).split(",")]
+
+    def steps(self) -> list[int]:
+        """Numbers of samples."""
+        return whole_numbers("ladder", self.ladder)
+
+    def budgets(self) -> Callable[[Report, Case], list[float]] | None:
+        """The times that everyone is to fit [s], if they are asked for."""
+        if self.budget is None:
+            return None
+        if not self.budget > 0:
+            raise InputError(f"budget must be over 0 ms, got {self.budget}")
+        seconds = self.budget / 1e3
+        return lambda report, case: [seconds]
+
+    def exposures(
+        self, when: ShutterOptions, scene: Scene | None = None
+    ) -> dict[str, shutter.Shutter]:
+        """The shutters, by what to call them; what is left open is the scene's."""
+        settled = when.settled(scene)
+        try:
+            degrees = [float(d) for d in (self.shutters or str(settled.shutter)).split(",")]
+        except ValueError:
+            raise InputError(f"shutters must be like 90,180, got {self.shutters!r}") from None
+        return {f"{d:g}°": replace(settled, shutter=d).make() for d in degrees}
+
+
+def whole_numbers(name: str, text: str) -> list[int]:
+    """`4,8,16` -> numbers."""
+    try:
+        return [int(n) for n in text.split(",")]
+    except ValueError:
+        raise InputError(f"{name} must be like 4,8,16, got {text!r}") from None
+
+
+@Parameter(name="*", group=_PERCEPTION)
+@dataclass(frozen=True, kw_only=True)
+class PerceptionOptions:
+    """Who looks, and at what."""
+
+    cone_rate: float = 50.0
+    "How fast a cone cell's answer to a flash fades, 1/s."
+    cone_peak: float = 0.05
+    "When it is strongest, seconds after the flash."
+    nature: float = 480.0
+    "Scenes: pictures a second that stand for a world without frames."
+    size: str = "640x360"
+    "Scenes: width x height in pixels."
+    set: tuple[str, ...] = ()
+    "Scenes: a parameter as NAME=VALUE; may be repeated."
+
+    @property
+    def cone(self) -> Cone:
+        """The cone cell."""
+        return Cone(self.cone_rate, self.cone_peak)
+
+
 def size_of(text: str) -> tuple[int, int]:
     """`1920x1080` -> width, height."""
     width, _, height = text.partition("x")
     if not (width.isdigit() and height.isdigit() and int(width) and int(height)):
         raise InputError(f"size must be like 1920x1080, got {text!r}")
     return int(width), int(height)
+
+
+def settings_of(texts: tuple[str, ...]) -> dict[str, str]:
+    """`NAME=VALUE` each -> values by name."""
+    pairs = [text.partition("=") for text in texts]
+    if wrong := [name for name, equals, _ in pairs if not equals]:
+        raise InputError(f"--set takes NAME=VALUE, got {wrong[0]!r}")
+    return {name: value for name, _, value in pairs}
 
 
 @Parameter(name="*", group=_OUT)

@@ -78,8 +78,14 @@ class Render:
         one moment starts from the same pictures. `timing`: of the passes, not of rays.
         """
         blur = blur or self.blur
-        if "scene" in blur.method.needs:
+        if "progress" in blur.method.uses:
             self.refine(output, time, number, blur=blur, progress=progress)
+            return
+        if "scene" in blur.method.needs:
+            encoder = blur.device.create_command_encoder(label="scene")
+            blur.encode(encoder, size=self.size, output=output, scene=self.on_gpu(time, blur),
+                        number=number, timing=timing)  # fmt: skip
+            gpu.submit(blur.device, encoder)
             return
         seen = {k: self._see(time, number, k, blur, timing) for k in _offsets(blur)}
         encoder = blur.device.create_command_encoder(label="blur")
@@ -111,7 +117,7 @@ class Render:
         For methods that need a scene. `output` holds the mean of all samples so far.
         """
         blur = blur or self.blur
-        on_gpu, count = self._on_gpu(time, blur), 1
+        on_gpu, count = self.on_gpu(time, blur), 1
         most = max(1, MOST_LOOPS // on_gpu.loops)
         end = clock.perf_counter() + seconds
         while done < blur.samples:
@@ -167,11 +173,18 @@ class Render:
             number=number,
         )
 
+    def sharp(self, time: float) -> np.ndarray:
+        """(height, width, 4) float32, linear: the picture at `time` [s] without any blur."""
+        if not self.scene.has_volumes:
+            return self.frame(time).color
+        still = Blur("volume", shutter=0, device=self.blur.device)
+        return Render(self.scene, still, size=self.size, fps=self.fps)(time)
+
     def _see(
         self, time: float, number: int, offset: int, blur: Blur, timing: Timing | None = None
     ) -> dict:
         """The picture `offset` frames from the moment; what Blur.encode takes of it."""
-        on_gpu = self._on_gpu(time, blur)
+        on_gpu = self.on_gpu(time, blur)
         if offset not in self._pictures:
             encoder = blur.device.create_command_encoder(label="render")
             given, name = blur.given(self.size, number, timing), f"frame {offset}"
@@ -187,7 +200,9 @@ class Render:
             "camera": seen["camera"],
         }
 
-    def _on_gpu(self, time: float, blur: Blur) -> SceneOnGpu:
+    def on_gpu(self, time: float, blur: Blur | None = None) -> SceneOnGpu:
+        """The scene around `time` [s], as far as the blur looks."""
+        blur = blur or self.blur
         if not np.isfinite(time):
             raise InputError(f"time must be finite, got {time}")
         moment = (time, id(self.scene), self.size, self.fps, self.rays)
@@ -234,8 +249,8 @@ def render_frames(
             skipped += 1
             tell(number, "skipped")
             continue
-        seen = render.frame(time, number) if sharp or passes else None
-        result = seen.color if sharp and seen else render(time, number)
+        seen = render.frame(time, number) if passes else None
+        result = render.sharp(time) if sharp else render(time, number)
         source = (
             _with_passes(render, seen, number)
             if passes and seen

@@ -12,7 +12,9 @@ from collections.abc import Callable
 import numpy as np
 
 from .errors import InputError
+from .figures import cone, disk, spiric
 from .scene import Body, Scene, Shot, at, moving, rotation, translation
+from .torusphere import torusphere
 
 RED, ORANGE, YELLOW = (0.72, 0.10, 0.07), (0.85, 0.36, 0.08), (0.90, 0.72, 0.18)
 GREEN, TEAL, BLUE = (0.12, 0.42, 0.16), (0.08, 0.45, 0.46), (0.08, 0.20, 0.58)
@@ -281,6 +283,10 @@ SCENES: dict[str, Callable[..., Scene]] = {
     "fence": fence,
     "bounce": bounce,
     "hdr": hdr,
+    "torusphere": torusphere,
+    "disk": disk,
+    "cone": cone,
+    "spiric": spiric,
 }
 
 
@@ -298,7 +304,7 @@ def make(name: str, **settings: float | str) -> Scene:
             value = kind(text)
         except ValueError:
             raise InputError(f"{key} must be a number, got {text!r}") from None
-        if not math.isfinite(value):
+        if kind is not str and not math.isfinite(value):
             raise InputError(f"{key} must be finite, got {text!r}")
         values[key] = value
     return SCENES[name](**values)

@@ -107,6 +107,7 @@ def load(name: str) -> Source:
     return Source(text, tuple(files))
 
 
+@cache
 def layout(kind: str, text: str) -> tuple[np.dtype, int]:
     """Numpy dtype and alignment of a WGSL type (WGSL specification, "Alignment and Size")."""
     kind = kind.replace(" ", "")

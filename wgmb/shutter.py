@@ -51,6 +51,8 @@ CURVES: dict[str, Weight] = {
     "cosine": _cosine,
     "gaussian": _gaussian,
 }
+OVERLAPS = {"box": 360.0, "trapezoid": 540.0, "triangle": 720.0, "cosine": 720.0}
+"""Degrees at which the windows of all frames add up to 1 at every instant (Cusa 2022)."""
 PHASES = {"start": 0.5, "centre": 0.0, "center": 0.0, "end": -0.5}
 ROLLING = {"down": (0, 1), "up": (0, -1), "right": (1, 0), "left": (-1, 0)}
 
@@ -114,6 +116,24 @@ class Shutter:
         share = np.concatenate([[0.0], np.cumsum((w[1:] + w[:-1]) / 2)])
         opens, closes = self.span
         return opens + (closes - opens) * x, share / share[-1]
+
+    def weight(self, times: np.ndarray) -> np.ndarray:
+        """How much each time [frame intervals] counts, per frame interval; 0 while closed."""
+        edges, integral = self.integral()
+        if edges[0] == edges[-1]:
+            raise InputError("a shutter of 0 degrees has no weights")
+        slopes = np.diff(integral) / np.diff(edges)
+        times = np.asarray(times, np.float64)
+        inside = (times >= edges[0]) & (times < edges[-1])
+        at = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(slopes) - 1)
+        return np.where(inside, slopes[at], 0.0)
+
+    def overlap(self, times: np.ndarray) -> np.ndarray:
+        """Sum of the weights of this and all other frames at the times [frame intervals]."""
+        opens, closes = self.span
+        times = np.asarray(times, np.float64)
+        first, last = math.floor(times.min() - closes), math.ceil(times.max() - opens)
+        return np.sum([self.weight(times - n) for n in range(first, last + 1)], axis=0)
 
     def time(self, shares: np.ndarray) -> np.ndarray:
         """When each share of the exposure (0..1) has passed [frame intervals]."""

@@ -1,6 +1,9 @@
-"""GPU time of every pass, by timestamp queries."""
+"""How long GPU work takes: wall clock around a submit, and every pass by timestamp queries."""
 
 from __future__ import annotations
+
+import time
+from collections.abc import Callable
 
 import numpy as np
 import wgpu
@@ -59,3 +62,14 @@ class Timing:
             seconds[label] = seconds.get(label, 0.0) + (int(end) - int(begin)) * 1e-9
         self.labels.clear()
         return seconds
+
+
+def work(device: wgpu.GPUDevice, record: Callable[[wgpu.GPUCommandEncoder], None]) -> float:
+    """Seconds from recording to the end of the work on the GPU."""
+    token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
+    started = time.perf_counter()
+    encoder = device.create_command_encoder(label="timed")
+    record(encoder)
+    submit(device, encoder)
+    device.queue.read_buffer(token)  # waits
+    return time.perf_counter() - started

@@ -10,6 +10,7 @@ from .fusion import Fusion
 from .reproject import Reproject
 from .tap import Tap
 from .tiles import Tiles
+from .volume import Volume
 
 if TYPE_CHECKING:
     import wgpu
@@ -29,7 +30,8 @@ class Method(Protocol):
     needs: frozenset[str]
     """Of "color", "motion", "depth", "scene"."""
     uses: frozenset[str]
-    """What it takes if it is there: "neighbours", "depth", "normal"."""
+    """What it takes if it is there: "neighbours", "depth", "normal"; "progress": its samples may
+    be recorded bit by bit."""
 
     def encode(
         self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView
@@ -38,5 +40,5 @@ class Method(Protocol):
         ...
 
 
-_ALL = (Tap, Tiles, Fusion, Reproject, Accumulate, Distributed)
+_ALL = (Tap, Tiles, Fusion, Reproject, Volume, Accumulate, Distributed)
 METHODS: dict[str, type] = {m.name: m for m in _ALL}

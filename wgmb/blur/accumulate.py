@@ -21,7 +21,7 @@ class Accumulate:
 
     name = "accumulate"
     needs = frozenset({"scene"})
-    uses: frozenset[str] = frozenset()
+    uses = frozenset({"progress"})
 
     def __init__(self, device, *, output="rgba32float"):
         self._device, self._output = device, output

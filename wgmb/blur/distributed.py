@@ -26,7 +26,7 @@ class Distributed:
 
     name = "distributed"
     needs = frozenset({"scene"})
-    uses: frozenset[str] = frozenset()
+    uses = frozenset({"progress"})
 
     def __init__(self, device, *, output="rgba32float", seed=0):
         self._device, self._output, self._seed = device, output, seed
@@ -35,7 +35,12 @@ class Distributed:
 
     def encode(self, encoder, inputs, output):
         """Record the rays of `inputs.progress`; `output` is the mean of all so far."""
-        kernel = gpu.kernel(self._device, "blur/distributed.wgsl", {"Output": self._output})
+        kernel = gpu.kernel(
+            self._device,
+            "blur/distributed.wgsl",
+            {"Output": self._output},
+            **inputs.scene.constants,
+        )
         data = np.zeros((), kernel.source.dtype("Progress"))
         data["first"], data["count"] = inputs.progress
         data["seed"] = self._seed

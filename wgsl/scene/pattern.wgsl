@@ -5,6 +5,7 @@ const CHECKER: u32 = 1u;
 const STRIPES: u32 = 2u;
 const BRICKS: u32 = 3u;
 const DOTS: u32 = 4u;
+const GROUND: u32 = 5u;         // of a stage
 
 const FLAT: u32 = 0u;           // how a pattern lies: on faces, round a sphere, round a cylinder
 const BALL: u32 = 1u;

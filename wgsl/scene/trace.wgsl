@@ -1,6 +1,7 @@
 // What a ray meets among rigid bodies at an instant, and the light that comes from there.
 //#include common/frame.wgsl
 //#include scene/pattern.wgsl
+//#include scene/stage.wgsl
 
 struct Body {
     size: vec4f,            // half extents [scene units]; w unused
@@ -30,10 +31,12 @@ struct Scene {
     step: f32,              // between two rows [frame intervals]
     rows: u32,
     bodies: u32,
-    spheres: u32,           // bodies come by shape: spheres, boxes, cylinders
+    spheres: u32,           // bodies come by shape: spheres, boxes, cylinders, rings
     boxes: u32,
     pixel: f32,             // width of a pixel at distance 1
     rays: u32,              // a pixel's rays for antialiasing: this number squared
+    cylinders: u32,
+    stage: Stage,           // where STAGED
     bounds: array<Bounds, MOST_BODIES>,     // around each body wherever it is at any of the rows
 }
 
@@ -44,6 +47,12 @@ struct Scene {
 const FAR: f32 = 1e10;      // depth where nothing is, as Blender writes it
 const CLOSE: f32 = 1e-3;    // hits nearer than this to a ray's start are the surface it left [scene units]
 const MOST_BODIES: u32 = 1024u;    // bounds are uniforms, which are 64 KiB at most: storage is a third slower on lavapipe
+const RING_STEPS: u32 = 64u;        // towards a ring's surface at most
+const RING_CLOSE: f32 = 1e-4;       // distance from it that counts as there [scene units]
+
+override RINGS: bool = false;       // whether there are any
+override STAGED: bool = false;      // bodies are volumes' solids on a stage, lit as those are
+
 const SHADE: f32 = 0.18;    // share of the sun that is left in a shadow's core
 
 struct Ray {
@@ -91,6 +100,7 @@ fn nearest(ray: Ray, now: Instant) -> Hit {
     var hit = Hit(FAR, 0u, Pose());
     let boxes = scene.spheres;
     let cylinders = boxes + scene.boxes;
+    let rings = cylinders + scene.cylinders;
     let end = scene.bodies;
     for (var first = 0u; first < end; first += 32u) {
         for (var near = sift(first, min(end - first, 32u), ray); near != 0u; near &= near - 1u) {
@@ -100,6 +110,7 @@ fn nearest(ray: Ray, now: Instant) -> Hit {
             var t = box(local);
             if index < boxes { t = sphere(local); }
             if index >= cylinders { t = cylinder(local); }
+            if RINGS { t = select(t, ring(local, bodies[index].size.xyz, index >= rings), index >= rings); }
             if t >= CLOSE && t < hit.depth { hit = Hit(t, index, p); }
         }
     }
@@ -170,6 +181,27 @@ fn cylinder(ray: Ray) -> f32 {
     return select(t, 0.0, miss <= 0.0 || leave < enter);
 }
 
+/// A torus about y of half extents `size`, approached by its distance; 0 turns if it is not `there`.
+fn ring(ray: Ray, size: vec3f, there: bool) -> f32 {
+    let o = ray.origin * size;
+    let d = ray.direction * size;
+    let a = dot(d, d);
+    let b = dot(o, d);
+    let root = b * b - a * (dot(o, o) - size.x * size.x);
+    let half = sqrt(max(root, 0.0));
+    let leave = (-b + half) / a;
+    var t = max((-b - half) / a, CLOSE);
+    var met = false;
+    for (var i = 0u; i < select(0u, RING_STEPS, there && root > 0.0); i++) {
+        let p = o + t * d;
+        let apart = length(vec2f(length(p.xz) - (size.x - size.y), p.y)) - size.y;
+        met = apart < RING_CLOSE;
+        if met || t > leave { break; }
+        t += apart * inverseSqrt(a);
+    }
+    return select(0.0, t, met);
+}
+
 struct Surface {
     at: vec3f,              // in the body's own space, where it is a unit sphere, cube or cylinder
     normal: vec3f,          // there, not normalised
@@ -188,6 +220,12 @@ fn surface(hit: Hit, ray: Ray) -> Surface {
         let cap = abs(at.z) > dot(at.xy, at.xy);    // of the two surfaces, the one that at is closer to
         normal = select(vec3f(at.xy, 0.0), vec3f(0.0, 0.0, sign(at.z)), cap);
     }
+    if RINGS && hit.body >= scene.spheres + scene.boxes + scene.cylinders {
+        let size = bodies[hit.body].size.xyz;
+        let q = at * size;
+        let inward = 1.0 - (size.x - size.y) / max(length(q.xz), 1e-9);
+        normal = size * vec3f(q.x * inward, q.y, q.z * inward);
+    }
     let n = normalize(normal.x * p.x.xyz + normal.y * p.y.xyz + normal.z * p.z.xyz);
     return Surface(at, normal, select(n, -n, dot(n, ray.direction) > 0.0));
 }
@@ -200,6 +238,7 @@ fn world_normal(hit: Hit, ray: Ray, now: Instant) -> vec3f {
 /// Light that comes along the ray backwards: sun with shadow, light from all round, gloss.
 fn radiance(hit: Hit, ray: Ray, now: Instant) -> vec3f {
     let view = normalize(ray.direction);
+    if STAGED { return staged(hit, ray, view, now); }
     if hit.depth >= FAR { return mix(scene.horizon.rgb, scene.sky.rgb, smoothstep(0.0, 0.6, view.y)); }
     let body = bodies[hit.body];
     let met = surface(hit, ray);
@@ -218,4 +257,23 @@ fn radiance(hit: Hit, ray: Ray, now: Instant) -> vec3f {
     let round = scene.sky.w * mix(0.55, 1.0, 0.5 + 0.5 * n.y);
     let shine = body.other.w * pow(max(dot(reflect(view, n), towards), 0.0), 40.0) * select(1.0, 0.0, blocked);
     return color * (sun + round + body.color.w) + vec3f(shine * scene.sun.w);
+}
+
+/// The same for the solids of volumes: as the method "volume" shows them, but one instant.
+fn staged(hit: Hit, ray: Ray, view: vec3f, now: Instant) -> vec3f {
+    let stage = scene.stage;
+    let light = stage.light.xyz;
+    let there = hit.depth < FAR;
+    let body = bodies[hit.body];
+    let at = ray.origin + hit.depth * ray.direction;
+    let n = surface(hit, ray).world_normal;
+    let is_ground = there && body.pattern == GROUND;
+    let pixel = hit.depth * scene.pixel;
+    let away = normalize(view.xz + vec2f(0.0, 1e-9));
+    let width = max(pixel * max(abs(away.yx), abs(away) / max(abs(view.y), 1e-3)), vec2f(1e-6));
+    let blocked = nearest(Ray(at + 4.0 * CLOSE * n, light), now).depth < FAR;
+    var ground = ground_color(stage, at.xz, width) * select(1.0, 0.3, blocked);
+    ground = haze(stage, select(stage.tint.rgb, ground, is_ground), view.y);
+    let color = material(body.color.rgb, n, light, view);
+    return linear_light(select(ground, color, there && !is_ground));
 }
