@@ -484,7 +484,8 @@ class Panel:
         self._label(name)
         start, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
         self.places[name] = (start.x, start.y, wide, imgui.get_frame_height())
-        opened = imgui.begin_combo(f"##{name}", shown or now)
+        whole = imgui.ComboFlags_.height_largest
+        opened = imgui.begin_combo(f"##{name}", shown or now, whole)
         if opened:
             for item in names:
                 picked, _ = imgui.selectable(_name(item), item == now)

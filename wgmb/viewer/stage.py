@@ -20,10 +20,11 @@ from ..errors import InputError
 from ..images import Images
 from ..options import ShutterOptions
 from ..pipeline import SAMPLES, Blur
+from ..shutter import Shutter
 from ..timing import Timing
 from .pace import QUICK, Pace
 from .state import LOOKS, REFERENCE, State
-from .subject import ClipSubject, Option, SceneSubject, Subject, methods_for, options_of
+from .subject import ClipSubject, Option, SceneSubject, Subject, options_of
 
 REFERENCE_SAMPLES = 1024
 ENOUGH = 64  # rays of the reference before it is worth measuring against
@@ -114,7 +115,7 @@ class Stage:
 
     def methods(self, state: State) -> list[str]:
         """Names of the methods that can be used."""
-        return methods_for(self.subject(state).has)
+        return self.subject(state).methods(state)
 
     def options(self, method: str) -> dict[str, Option]:
         """The method's own options; see `options_of`."""
@@ -124,17 +125,23 @@ class Stage:
 
     def looks(self, state: State) -> list[str]:
         """What can be looked at: also what the method shows of its inner life."""
-        has, methods = self.subject(state).has, self.methods(state)
-        needs = {"depth": "depth", "velocity": "motion", "error": "scene"}
-        looks = [look for look in LOOKS if needs.get(look, "color") in has]
-        if state.method not in methods:
-            return [look for look in looks if look not in ("result", "error")]
-        return looks + self._shows(state)
+        has, methods = self.subject(state).has(state), self.methods(state)
+        blurred = state.method in methods
+        can = {
+            "result": blurred,
+            "sharp": "color" in has,
+            "depth": "depth" in has,
+            "velocity": "motion" in has,
+            "error": blurred and "distributed" in methods,
+        }
+        return [look for look in LOOKS if can[look]] + (self._shows(state) if blurred else [])
 
     def rivals(self, state: State) -> list[str]:
         """What the result can be compared with."""
-        reference = [REFERENCE] if "scene" in self.subject(state).has else []
-        return ["sharp", *reference, *self.methods(state)]
+        methods = self.methods(state)
+        sharp = ["sharp"] if "sharp" in self.looks(state) else []
+        reference = [REFERENCE] if "distributed" in methods else []
+        return [*sharp, *reference, *methods]
 
     def possible(self, state: State) -> State:
         """The same state; a method or look that is not to be had is replaced by one that is."""
@@ -144,7 +151,7 @@ class Stage:
         if state.look not in (looks := self.looks(state)):
             state = replace(state, look=looks[0])
         if state.against not in self.rivals(state):
-            state = replace(state, against="sharp")
+            state = replace(state, against=self.rivals(state)[0])
         return state
 
     # ---- drawing -------------------------------------------------------------------------
@@ -227,7 +234,8 @@ class Stage:
         if shown.ready:
             return
         started = time.perf_counter()
-        if name in ("sharp", "depth", "velocity"):
+        volumes = state.is_scene and "volume" in self.methods(state)
+        if name in ("depth", "velocity") or (name == "sharp" and not volumes):
             pass_ = {"sharp": "color", "depth": "depth", "velocity": "motion"}[name]
             passes = subject.passes()
             if pass_ not in passes:
@@ -265,16 +273,25 @@ class Stage:
             options, method, samples = {}, "distributed", REFERENCE_SAMPLES
         elif name in self._shows(state):
             options["show"] = name
+        elif name == "sharp":
+            options, method = {}, "volume"
         elif name not in ("result", state.method):
             options, method = {}, name
         if method not in (allowed := self.methods(state)):
             raise InputError(f"method {method!r} cannot be used here, only {', '.join(allowed)}")
         if quick:
             count = samples if isinstance(samples, int) else SAMPLES
-            scene = "scene" in METHODS[method].needs
-            fewer = min(count, QUICK) if scene else self.pace.samples(self._level, count)
+            traced = "progress" in METHODS[method].uses
+            fewer = min(count, QUICK) if traced else self.pace.samples(self._level, count)
             samples = fewer if fewer < count else samples
-        key = (name == REFERENCE, method, samples, state.jitter, state.max_blur, *options.items())
+        key = (
+            name in (REFERENCE, "sharp"),
+            method,
+            samples,
+            state.jitter,
+            state.max_blur,
+            *options.items(),
+        )
         if key not in self._blurs:
             while len(self._blurs) >= 12:
                 del self._blurs[next(iter(self._blurs))]
@@ -287,7 +304,7 @@ class Stage:
                 **options,
             )
         blur = self._blurs[key] = self._blurs.pop(key)
-        shutter = shutter_of(state)
+        shutter = shutter_of(state) if name != "sharp" else Shutter(0)
         if blur.shutter != shutter:
             blur.shutter = shutter
         return blur
