@@ -12,6 +12,7 @@ import tomllib
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 from .. import numbering, scenes
 from ..blur import METHODS
@@ -94,12 +95,26 @@ class State:
             known = ", ".join(scenes.SCENES)
             raise InputError(f"no file or scene {source!r}; scenes: {known}")
         state = replace(self.unmoved(), source=source, settings=(), given=())
+        before, after = self.suited(), state.suited()
+        for name, value in after.items():  # what was as the last scene asks for follows the new one
+            if getattr(self, name) == before[name]:
+                state = replace(state, **{name: value})
+        if state.method != self.method:
+            state = replace(state, options=())
         if state.is_scene:
-            return replace(state, frames="0-11", frame=0.0)
-        return replace(state, frames=_on_disk(source), frame=float("nan")).settled()
+            plain = State()
+            return replace(state, frames=plain.frames, frame=0.0, speed=plain.speed)
+        return replace(state, frames=_on_disk(source), frame=math.nan, speed=1.0).settled()
+
+    def suited(self) -> dict[str, Any]:
+        """Method, shutter and curve that the scene asks for; else those that are usual."""
+        scene = scenes.make(self.source) if self.is_scene else None
+        when = ShutterOptions().settled(scene, self.fps)
+        method = BlurOptions().settled(scene).method
+        return {"method": method, "shutter": when.shutter, "curve": when.curve}
 
     def settled(self) -> State:
-        """The same, its moment within its frames and its method one that the source can feed."""
+        """The same, its moment within its frames."""
         first, last = self.span
         frame = min(max(self.frame, first), last) if math.isfinite(self.frame) else float(first)
         return replace(self, frame=frame)

@@ -20,24 +20,37 @@ from ..images import Images
 from ..options import OWN, BlurOptions, InputOptions, SceneOptions, size_of
 from ..pipeline import Blur
 from ..render import Render
+from ..scene import Scene
 from ..timing import Timing
 from ..velocity import Moving
 from .state import State
 
-_FRAMES_KEPT = 16
+_MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
+_FRAMES_KEPT = 2, 16  # but so many at least, at most
 Texture = wgpu.GPUTexture
 Budget = tuple[int, float]
 """Samples done before, and seconds to spend on more."""
 
 
 class SceneSubject:
-    """A built-in scene: any size, any moment, every method."""
-
-    has = frozenset({"color", "motion", "depth", "scene"})
+    """A built-in scene: any size, any moment, every method that it has what to show for."""
 
     def __init__(self, device: wgpu.GPUDevice):
         self._render = Render(scenes.make(next(iter(scenes.SCENES))), Blur(device=device))
         self._seen: tuple = ()
+        self._made = self._render.scene
+
+    def has(self, state: State) -> frozenset[str]:
+        """What a method may ask for; figures are flat: they have no pictures of instants."""
+        flat = self._scene(state).figure is not None
+        return frozenset({"scene"} if flat else {"color", "motion", "depth", "scene"})
+
+    def methods(self, state: State) -> list[str]:
+        """Names of the methods that can draw it."""
+        scene, can = self._scene(state), methods_for(self.has(state))
+        if scene.figure is not None:
+            return ["volume"]
+        return can if scene.has_volumes else [name for name in can if name != "volume"]
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height that give the picture its shape [px]."""
@@ -45,6 +58,11 @@ class SceneSubject:
 
     def look_at(self, state: State, size: tuple[int, int], rays: int) -> None:
         """What the next draws are of."""
+        self._render.scene = self._scene(state)
+        self._render.size, self._render.rays, self._render.fps = size, rays, state.fps
+        self._time, self._number = state.frame / state.fps, int(state.frame // 1)
+
+    def _scene(self, state: State) -> Scene:
         seen = (state.source, state.settings, state.orbit, state.pan, state.dolly)
         if seen != self._seen:
             given = SceneOptions(
@@ -53,9 +71,8 @@ class SceneSubject:
                 pan=state.pan,
                 dolly=state.dolly,
             )
-            self._render.scene, self._seen = given.make(state.source), seen
-        self._render.size, self._render.rays, self._render.fps = size, rays, state.fps
-        self._time, self._number = state.frame / state.fps, int(state.frame // 1)
+            self._made, self._seen = given.make(state.source), seen
+        return self._made
 
     def passes(self) -> dict[str, Texture]:
         """The sharp picture and what lies under it, by name."""
@@ -64,7 +81,7 @@ class SceneSubject:
     def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Timing | None) -> int:
         """Draw with `blur`; samples done, which may be less than it has where it is slow."""
         view, (done, seconds) = output.create_view(), budget
-        if "scene" in blur.method.needs:
+        if "progress" in blur.method.uses:
             return self._render.refine(
                 view, self._time, self._number, done=done, seconds=seconds, blur=blur
             )
@@ -83,9 +100,17 @@ class ClipSubject:
         self._frames: OrderedDict[int, Frame] = OrderedDict()
         self._sharp = Blur(device=device)
         self._number = self._clip.numbers[0]
-        self._uploaded: dict[int, tuple[int, dict]] = {}
-        self.has = self._frame().has
+        self._uploaders: dict[tuple, Blur] = {}
+        self._uploaded: dict[tuple, tuple[int, dict]] = {}
         self.finding = self._clip.finding
+
+    def has(self, state: State) -> frozenset[str]:
+        """What a method may ask for."""
+        return self._frame().has
+
+    def methods(self, state: State) -> list[str]:
+        """Names of the methods that can be fed."""
+        return methods_for(self.has(state))
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height of the frames [px]."""
@@ -99,17 +124,22 @@ class ClipSubject:
     def _frame(self) -> Frame:
         number = self._number
         if number not in self._frames:
-            while len(self._frames) >= _FRAMES_KEPT:
+            frame = self._clip.with_neighbours(self._clip.source(number))
+            least, most = _FRAMES_KEPT
+            kept = min(max(_MEMORY // (3 * _bytes(frame)), least), most)  # with its neighbours
+            while len(self._frames) >= kept:
                 self._frames.popitem(last=False)
-            self._frames[number] = self._clip.with_neighbours(self._clip.source(number))
+            self._frames[number] = frame
         self._frames.move_to_end(number)
         return self._frames[number]
 
     def _inputs(self, blur: Blur) -> dict:
-        number, inputs = self._uploaded.get(id(blur), (None, {}))
+        """The frame's textures, one set for all methods that take the same."""
+        key = blur.method.needs, blur.method.uses
+        number, inputs = self._uploaded.get(key, (None, {}))
         if number != self._number:
-            inputs = blur.upload(self._frame())
-            self._uploaded[id(blur)] = self._number, inputs
+            inputs = self._uploaders.setdefault(key, blur).upload(self._frame())
+            self._uploaded[key] = self._number, inputs
         return dict(inputs)
 
     def passes(self) -> dict[str, Texture]:
@@ -142,6 +172,11 @@ class ClipSubject:
         blur.encode(encoder, output=view, timing=timing, **self._inputs(blur))
         gpu.submit(self._device, encoder)
         return blur.samples
+
+
+def _bytes(frame: Frame) -> int:
+    arrays = (getattr(frame, f.name) for f in fields(frame))
+    return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
 
 
 _MOVING = {f.name for f in fields(Moving)}
