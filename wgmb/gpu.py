@@ -236,9 +236,11 @@ def _layout_entry(b: shader.Binding, source: shader.Source) -> dict:
         return entry | {"storage_texture": {"format": m[1], "access": access}}
     if b.type == "sampler":
         return entry | {"sampler": {"type": "filtering"}}
-    if b.type == "texture_2d<f32>":
+    if b.type in ("texture_2d<f32>", "texture_2d_array<f32>"):
         sampled = re.search(rf"textureSample\w*\(\s*{b.name}\b", source.text)
-        return entry | {"texture": {"sample_type": "float" if sampled else "unfilterable-float"}}
+        kind = {"sample_type": "float" if sampled else "unfilterable-float"}
+        dimension = "2d-array" if "array" in b.type else "2d"
+        return entry | {"texture": kind | {"view_dimension": dimension}}
     if b.type == "texture_2d<u32>":
         return entry | {"texture": {"sample_type": "uint"}}
     raise ShaderError(f"{source.name}: cannot bind {b.name}: {b.type}")

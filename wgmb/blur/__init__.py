@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from .accumulate import Accumulate
 from .distributed import Distributed
+from .gather import Gather
 from .reproject import Reproject
 from .tap import Tap
 
@@ -32,4 +33,4 @@ class Method(Protocol):
         ...
 
 
-METHODS: dict[str, type] = {m.name: m for m in (Tap, Reproject, Accumulate, Distributed)}
+METHODS: dict[str, type] = {m.name: m for m in (Tap, Gather, Reproject, Accumulate, Distributed)}

@@ -1,0 +1,16 @@
+// What a tile of a frame may show over the exposure: the few motions that stand for all in it.
+
+const TILE: u32 = 32u;          // side [px]
+const PATHS: u32 = 4u;          // motions kept a tile
+
+struct Tile {
+    paths: array<vec4f, 4>,     // velocity, curvature: the longest, then always the most different
+    count: u32,                 // of them; fewer where the rest is like these or like standing still
+    nearest: f32,               // the least depth
+    split: u32,                 // 1: has pixels that show two surfaces
+    longest: f32,               // the longest displacement over the exposure [px]
+}
+
+fn tiles_of(size: vec2u) -> vec2u {
+    return (size + TILE - 1u) / TILE;
+}

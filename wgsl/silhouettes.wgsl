@@ -1,0 +1,186 @@
+// Silhouettes as two layers. A renderer mixes colours and vectors of the surfaces that a pixel shows;
+// here they are parted again: a near layer with its coverage, and what is behind it.
+//#include common/finite.wgsl
+//#include common/frame.wgsl
+//#include common/path.wgsl
+
+@group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
+@group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
+@group(1) @binding(2) var depth: texture_2d<f32>;
+@group(1) @binding(3) var weight: texture_2d<f32>;
+@group(1) @binding(4) var mixed: texture_2d<f32>;       // what `mark` wrote: 1 where two surfaces may show
+@group(1) @binding(5) var marks: Marks;
+@group(1) @binding(6) var near_color: Color;            // premultiplied by coverage too
+@group(1) @binding(7) var near_path: Exact;             // velocity, curvature
+@group(1) @binding(8) var far_color: Rough;
+@group(1) @binding(9) var far_path: Rough;
+@group(1) @binding(10) var surface: Exact;              // near depth; far depth, see below; coverage; weight
+
+// Far depth: over 0 it is that of a split pixel; PLAIN: no silhouette within two pixels; else BESIDE one.
+alias Marks = texture_storage_2d<r32float, write>;
+alias Color = texture_storage_2d<rgba32float, write>;
+alias Exact = texture_storage_2d<rgba32float, write>;
+alias Rough = texture_storage_2d<rgba16float, write>;
+
+override WEIGHTED: bool = false;
+
+const FAR: f32 = 1e10;          // depth of what has none
+const PLAIN: f32 = 0.0;
+const BESIDE: f32 = -1.0;
+const APART: f32 = 1.1;         // ratio of depths that makes two surfaces
+const DIFFERENT: f32 = 0.5;     // of their motions [px]
+const WHOLE: f32 = 0.98;        // coverage from here on is all
+const HALF_MAX: f32 = 65504.0;  // largest finite f16
+
+fn held(px: vec2i) -> vec2i {
+    return clamp(px, vec2i(0), vec2i(frame.size) - 1);
+}
+
+fn depth_at(px: vec2i) -> f32 {
+    let z = textureLoad(depth, held(px), 0).x;
+    return select(FAR, min(z, FAR), is_finite(z) && z > 0.0);
+}
+
+fn weight_at(px: vec2i) -> f32 {
+    if !WEIGHTED { return 1.0; }
+    return textureLoad(weight, held(px), 0).x;
+}
+
+/// Around one pixel: depths lie apart, and so do motions.
+@compute @workgroup_size(WG_X, WG_Y)
+fn mark(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let px = vec2i(id.xy);
+    var nearest = FAR;
+    var farthest = 0.0;
+    for (var i = 0; i < 9; i++) {
+        let z = depth_at(px + vec2i(i % 3, i / 3) - 1);
+        nearest = min(nearest, z);
+        farthest = max(farthest, z);
+    }
+    let here = textureLoad(motion, px, 0);
+    var most = 0.0;
+    let count = select(0, 9, farthest > nearest * APART);
+    for (var i = 0; i < count; i++) {
+        let other = textureLoad(motion, held(px + vec2i(i % 3, i / 3) - 1), 0) - here;
+        most = max(most, dot(other, other));
+    }
+    textureStore(marks, px, vec4f(select(0.0, 1.0, most > DIFFERENT * DIFFERENT)));
+}
+
+struct Side {       // the mean of what lies on one side of a silhouette
+    total: f32,
+    motion: vec4f,
+    depth: f32,
+    color: vec4f,
+    counted: f32,   // weight of the colour
+}
+
+/// The two layers of every pixel.
+@compute @workgroup_size(WG_X, WG_Y)
+fn split(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let px = vec2i(id.xy);
+    var beside = false;
+    for (var i = 0; i < 25; i++) {
+        beside = beside || textureLoad(mixed, held(px + vec2i(i % 5, i / 5) - 2), 0).x > 0.0;
+    }
+    let own = textureLoad(color, px, 0);
+    let own_motion = textureLoad(motion, px, 0);
+    let counts = weight_at(px);
+    var z = depth_at(px);
+    var near = own;
+    var near_motion = own_motion;
+    var far = vec4f(0.0);
+    var far_motion = own_motion;
+    var far_z = select(PLAIN, BESIDE, beside);
+    var coverage = 1.0;
+
+    let marked = textureLoad(mixed, px, 0).x > 0.0;
+    var nearest = FAR;
+    var farthest = 0.0;
+    let around = select(0, 9, marked);
+    for (var i = 0; i < around; i++) {
+        let other = depth_at(px + vec2i(i % 3, i / 3) - 1);
+        nearest = min(nearest, other);
+        farthest = max(farthest, other);
+    }
+    let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= FAR);
+    var front = Side();
+    var back = Side();
+    let wide = select(0, 25, marked);
+    for (var i = 0; i < wide; i++) { collect(px, i, between, true, true, true, &front, &back); }
+    let thin = front.total == 0.0;      // a wire: nothing near is unmixed
+    let rest = select(0, 25, marked && (thin || back.total == 0.0));
+    let no_back = back.total == 0.0;
+    for (var i = 0; i < rest; i++) { collect(px, i, between, false, thin, no_back, &front, &back); }
+
+    if marked && front.total > 0.0 && back.total > 0.0 && back.counted > 0.0 {
+        let behind = back.motion / back.total;
+        var before = front.motion / front.total;
+        if thin { before = most_different(px, between, behind); }
+        let way = before - behind;
+        if dot(way, way) >= DIFFERENT * DIFFERENT {
+            coverage = clamp(dot(own_motion - behind, way) / dot(way, way), 0.0, 1.0);
+            if coverage > WHOLE { coverage = 1.0; }
+            far = back.color / back.counted;
+            near = max(own - (1.0 - coverage) * counts * far, vec4f(0.0));
+            near_motion = before;
+            far_motion = behind;
+            z = front.depth / front.total;
+            far_z = back.depth / back.total;
+        }
+    }
+    textureStore(near_color, px, near);
+    textureStore(near_path, px, as_path(near_motion));
+    textureStore(far_color, px, min(far, vec4f(HALF_MAX)));
+    textureStore(far_path, px, clamp(as_path(far_motion), vec4f(-HALF_MAX), vec4f(HALF_MAX)));
+    textureStore(surface, px, vec4f(z, far_z, coverage, coverage * counts));
+}
+
+fn as_path(way: vec4f) -> vec4f {
+    let path = path_of(way);
+    return vec4f(path.velocity, path.curvature);
+}
+
+/// Add pixel `i` of the 5 x 5 around `px` to its side, the less the farther it is.
+fn collect(px: vec2i, i: i32, between: f32, pure_only: bool, to_front: bool, to_back: bool,
+           front: ptr<function, Side>, back: ptr<function, Side>) {
+    let off = vec2i(i % 5, i / 5) - 2;
+    let at = px + off;
+    if any(at < vec2i(0)) || any(at >= vec2i(frame.size)) { return; }
+    if pure_only && textureLoad(mixed, at, 0).x > 0.0 { return; }
+    let z = depth_at(at);
+    let is_front = z < between;
+    if !select(to_back, to_front, is_front) { return; }
+    let distance2 = f32(off.x * off.x + off.y * off.y);
+    let share = 1.0 / (1.0 + distance2 * distance2);
+    let way = share * textureLoad(motion, at, 0);
+    if is_front {
+        (*front).total += share;
+        (*front).motion += way;
+        (*front).depth += share * z;
+    } else {
+        (*back).total += share;
+        (*back).motion += way;
+        (*back).depth += share * z;
+        (*back).color += share * textureLoad(color, at, 0);
+        (*back).counted += share * weight_at(at);
+    }
+}
+
+/// Of the near motions in the 3 x 3, the one most unlike that of the background.
+fn most_different(px: vec2i, between: f32, behind: vec4f) -> vec4f {
+    var found = behind;
+    var most = 0.0;
+    for (var i = 0; i < 9; i++) {
+        let at = held(px + vec2i(i % 3, i / 3) - 1);
+        let way = textureLoad(motion, at, 0);
+        let apart = dot(way - behind, way - behind);
+        if apart > most && depth_at(at) < between {
+            most = apart;
+            found = way;
+        }
+    }
+    return found;
+}
