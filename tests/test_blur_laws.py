@@ -208,6 +208,18 @@ def test_a_bad_value_spoils_nothing(method, noise, where, value):
     np.testing.assert_allclose(out[far], clean[far], atol=ZERO)
 
 
+@pytest.mark.parametrize("value", [*BAD, 0.0, -1.0])
+def test_a_bad_depth_spoils_nothing(method, noise, value):
+    depth = np.full(noise.shape[:2], 5, "f4")
+    clean = wgmb.blur(noise, moving(noise, 6, 2), depth=depth, method=method)
+    depth[20, 30] = value
+    out = wgmb.blur(noise, moving(noise, 6, 2), depth=depth, method=method)
+    far = np.ones(noise.shape[:2], bool)
+    far[12:28, 22:38] = False
+    np.testing.assert_allclose(out[far], clean[far], atol=ZERO)
+    assert np.isfinite(out).all()
+
+
 def test_bad_pixels_are_counted(noise):
     color, motion = noise.copy(), moving(noise)
     color[3, 4] = np.nan
@@ -228,3 +240,58 @@ def test_a_lone_good_pixel_fills_its_bad_neighbours(method):
 def test_missing_inputs_are_named(method, noise):
     with pytest.raises(wgmb.InputError, match=r"needs .*motion"):
         wgmb.blur(noise, method=method)
+
+
+@pytest.mark.parametrize("phase", [0.5, "centre"])
+def test_constant_colour_stays_constant_around_what_is_kept(method, phase):
+    grey = np.full((48, 64, 3), 0.25, "f4")
+    keep = np.zeros((48, 64), "f4")
+    keep[:, 20:] = 1
+    keep[:, 30] = 0
+    out = blurred(grey, moving(grey, -20), keep=keep, shutter=Shutter(90, phase), method=method)
+    np.testing.assert_allclose(out[:, :60], 0.25, atol=2**-12)
+
+
+def test_what_comes_back_to_its_place_has_moved(method, noise):
+    """Next frame it is where it is now; in between it was 5 px away."""
+    out = blurred(noise, moving(noise, 0), to_prev=moving(noise, 40), samples=64,
+                  shutter=Shutter(360, "start"), method=method)  # fmt: skip
+    assert np.abs(out - noise).max() > 0.1
+
+
+def test_jitter_keeps_samples_within_their_share_of_time(method):
+    """A shutter that opens at 0 sees nothing from before; the edge moves right."""
+    picture = 1 - edge()
+    shutter = Shutter(360, "start", lambda x: np.exp(-5 * x))
+    out = blurred(picture, moving(picture, 16), shutter=shutter, samples=1, jitter=1.0,
+                  method=method)  # fmt: skip
+    assert out[:, :63].max() == 0
+
+
+@pytest.mark.parametrize("curve", ["box", "triangle", "cosine"])
+@pytest.mark.parametrize("way", ["down", "up"])
+def test_every_curve_rolls(method, curve, way):
+    """An instant at the edges of the picture is 0.4 intervals off, and things move by it."""
+    picture = edge(height=128)
+    shutter = Shutter(1, curve=curve, rolling=way, rolling_duration=0.8)
+    out = blurred(picture, moving(picture, 20), shutter=shutter, method=method)
+    lines = out[..., 0].sum(axis=1)
+    sign = 1 if way == "down" else -1
+    assert sign * (lines[120] - lines[7]) == pytest.approx(20 * 0.8 * 113 / 128, abs=0.5)
+
+
+@pytest.mark.parametrize("curve", ["triangle", "cosine"])
+def test_jitter_moves_the_samples_of_every_curve(method, noise, curve):
+    shutter = Shutter(360, curve=curve)
+    still, moved = (
+        blurred(noise, moving(noise), shutter=shutter, jitter=j, method=method, number=3)
+        for j in (0.0, 1.0)
+    )
+    assert np.abs(still - moved).max() > 0.01
+
+
+def test_a_pixel_is_not_still_because_it_ends_at_rest(method, noise):
+    """Rolling lets the first row, which would open at 0, close at 0."""
+    shutter = Shutter(180, "start", rolling="down", rolling_duration=48 / 47)
+    out = blurred(noise, moving(noise, 20), shutter=shutter, method=method)
+    assert np.abs(out - noise)[0].max() > 0.1

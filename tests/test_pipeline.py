@@ -8,8 +8,11 @@ import pytest
 import wgpu
 
 import wgmb
-from wgmb import InputError, gpu
+from wgmb import Camera, InputError, Reprojections, gpu
 from wgmb.images import Images
+
+STILL = Reprojections(*[Camera(np.array([[1, 0, 0, 0], [0, 1.3, 0, 0], [0, 0, -1.02, -0.2],
+                                         [0, 0, -1, 0]]))] * 3)  # fmt: skip
 
 
 def motion(x=6.0, y=2.0, size=(48, 64)):
@@ -209,3 +212,65 @@ def test_an_adapter_is_chosen_by_the_environment(monkeypatch):
     monkeypatch.setenv("WGMB_ADAPTER", gpu.adapters()[0].summary[:6])
     assert gpu.choose_adapter().summary == gpu.adapters()[0].summary
     assert isinstance(gpu.choose_adapter(), wgpu.GPUAdapter)
+
+
+@pytest.mark.parametrize("kind", ["i1", "u1", "i2", "u2", "i4"])
+def test_object_ids_of_every_integer_type_are_taken(noise, kind):
+    ids = np.zeros((48, 64), kind)
+    depth = np.full((48, 64), 5, "f4")
+    out = wgmb.blur(noise, depth=depth, camera=STILL, object_id=ids)
+    assert np.array_equal(out, noise)
+
+
+def test_the_device_is_the_same_one_every_time():
+    assert gpu.open_device() is gpu.open_device(None)
+
+
+@pytest.mark.parametrize(
+    "inputs, words",
+    [
+        ({"camera": STILL}, "needs depth"),
+        ({"motion": (64, 48), "to_next": (64, 48)}, "instead of to_next"),
+        ({"motion": (64, 47)}, "motion is 64 x 47, the image 64 x 48"),
+        ({"to_next": (64, 48), "keep": (32, 48)}, "keep is 32 x 48"),
+        ({"to_next": (64, 48), "output": (65, 48)}, "output is 65 x 48"),
+        ({"to_next": (64, 48), "color": (63, 48)}, "color is 63 x 48"),
+    ],
+)
+def test_encode_refuses_what_does_not_fit_together(inputs, words):
+    blur = wgmb.Blur()
+    images, encoder = Images(blur.device), blur.device.create_command_encoder()
+    inputs = {"color": (64, 48), "output": (64, 48), **inputs}
+    views = {
+        name: images.view(name, size, "rgba32float") if isinstance(size, tuple) else size
+        for name, size in inputs.items()
+    }
+    with pytest.raises(InputError, match=words):
+        blur.encode(encoder, size=(64, 48), **views)
+
+
+@pytest.mark.parametrize("shutter", ["abc", None])
+def test_a_shutter_that_is_no_number_is_named(shutter):
+    with pytest.raises(InputError, match="shutter"):
+        wgmb.Blur(shutter=shutter)
+
+
+def test_a_picture_of_many_bands_comes_back_as_it_was(device):
+    """More than 4 MiB are written piece by piece."""
+    images = Images(device)
+    picture = np.arange(700 * 500 * 4, dtype="f4").reshape(700, 500, 4)
+    images.upload("big", picture, "rgba32float")
+    got = images.download(
+        device.create_command_encoder(), images.texture("big", (500, 700), "rgba32float")
+    )
+    assert np.array_equal(got, picture)
+
+
+def test_f16_textures_take_the_greatest_number_they_have(device):
+    images = Images(device)
+    picture = np.full((2, 2, 4), (1e5, -1e5, np.inf, 1.0), "f4")
+    images.upload("half", picture, "rgba16float")
+    got = images.download(
+        device.create_command_encoder(), images.texture("half", (2, 2), "rgba16float")
+    )
+    np.testing.assert_array_equal(got[0, 0], np.array([65504, -65504, np.inf, 1], "f2"))

@@ -31,9 +31,9 @@ def test_strata_are_equal_shares_of_the_exposure(curve, degrees, phase):
     opens, closes = shutter.span
     assert closes - opens == pytest.approx(degrees / 360)
     strata = shutter.strata(16).astype(float)
-    assert strata[:, 1].sum() == pytest.approx(closes - opens, rel=1e-5)
-    assert (np.diff(strata[:, 0]) > 0).all()
-    edges = opens + np.concatenate([[0], np.cumsum(strata[:, 1])])
+    assert (strata[:, 2] - strata[:, 0]).sum() == pytest.approx(closes - opens, rel=1e-5)
+    assert (np.diff(strata.ravel()) >= 0).all()
+    edges = np.append(strata[:, 0], strata[-1, 2])
     for begin, end in itertools.pairwise(edges):
         t = np.linspace(begin, end, 2001)
         assert np.trapezoid(weight(shutter, t), t) == pytest.approx(1 / 16, abs=1e-3)
@@ -71,13 +71,13 @@ def test_the_integral_of_the_raised_cosine_is_its_closed_form():
 def test_time_inverts_the_integral_over_a_gap():
     """A curve that is closed in the middle: no sample falls there."""
     shutter = Shutter(360, curve=lambda x: np.where(np.abs(x - 0.5) < 0.25, 0.0, 1.0))
-    middles = shutter.strata(8)[:, 0]
+    middles = shutter.sample_times(8)
     assert (np.abs(middles) > 0.24).all()
     assert (np.diff(middles) > 0).all()
 
 
 def test_a_closed_shutter_has_one_time():
-    np.testing.assert_array_equal(Shutter(0).strata(4), np.zeros((4, 2), "f4"))
+    np.testing.assert_array_equal(Shutter(0).strata(4), np.zeros((4, 3), "f4"))
 
 
 @pytest.mark.parametrize(
@@ -123,3 +123,8 @@ def test_a_senseless_curve_file_is_named(tmp_path, text):
 def test_a_missing_curve_file_is_named():
     with pytest.raises(InputError, match=r"none\.csv"):
         read_curve("none.csv")
+
+
+def test_the_gaussian_is_cut_at_three_deviations():
+    x = np.linspace(0, 1, 101)
+    np.testing.assert_allclose(CURVES["gaussian"](x), np.exp(-4.5 * (2 * x - 1) ** 2), rtol=1e-12)

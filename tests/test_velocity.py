@@ -5,7 +5,7 @@ import pytest
 from test_twins import body, camera
 
 import wgmb
-from wgmb import Camera, InputError, Reprojections
+from wgmb import Camera, InputError, Reprojections, Shutter
 
 SIZE = (40, 60)  # height, width: the lens of `camera` makes 1.7 half heights of distance 1
 FOCAL = 1.7 * SIZE[0] / 2  # [px]
@@ -29,6 +29,7 @@ def positions():
 
 
 STILL = camera((0, 0, 0))
+PICTURE = np.random.default_rng(1).random((*SIZE, 3), "f4")
 
 
 def test_a_still_camera_moves_nothing_to_the_bit():
@@ -184,3 +185,62 @@ def test_a_camera_without_neighbours_is_refused():
 def test_a_matrix_must_be_finite_and_4_by_4(matrix):
     with pytest.raises(InputError, match="4 x 4"):
         Camera(matrix)
+
+
+def test_the_longest_streak_is_limited_on_the_way_out_and_back():
+    """6.25 px out and back within the exposure; its ends are in one place."""
+    blur = wgmb.Blur(max_blur=1.0)
+    got = blur.motion(
+        wgmb.Frame(PICTURE, given_vectors((100, 0)), to_prev=given_vectors((100, 0)))
+    )[0, 0]
+    assert got[2] == pytest.approx(16, rel=1e-4)
+
+
+@pytest.mark.parametrize("phase", ["start", "centre", "end"])
+def test_no_motion_is_too_large_to_be_limited(phase):
+    forth = given_vectors((6, 2))
+    forth[20, 30, 0] = 3e38
+    blur = wgmb.Blur(shutter=Shutter(180, phase), max_blur=5.0)
+    got = blur.motion(wgmb.Frame(PICTURE, forth, to_prev=-forth))[20, 30]
+    assert np.abs(got).max() <= 10
+
+
+@pytest.mark.parametrize("kind, value", [("clip", np.nan), ("clip", np.inf), ("planar", 1e-39)])
+def test_no_depth_makes_motion_bad(kind, value):
+    depth = np.full(SIZE, 0.5, "f4")
+    depth[20, 30] = value
+    frame = wgmb.Frame(
+        PICTURE, depth=depth, camera=Reprojections(STILL, STILL, STILL, depth_kind=kind)
+    )
+    assert np.isfinite(wgmb.Blur().motion(frame)).all()
+    assert np.array_equal(wgmb.Blur()(frame), PICTURE)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("where", ["to_next", "to_prev", "scale"])
+def test_bad_motion_stands_still(where, bad):
+    inputs = {
+        "to_next": given_vectors((6, 2)),
+        "to_prev": given_vectors((-6, -2)),
+        "scale": np.ones(SIZE, "f4"),
+    }
+    inputs[where][20, 30] = bad
+    got = wgmb.Blur().motion(wgmb.Frame(PICTURE, **inputs))
+    assert not got[20, 30].any()
+    assert np.isfinite(got).all()
+
+
+@pytest.mark.parametrize("phase", ["start", "centre", "end"])
+@pytest.mark.parametrize("degrees", [90, 360])
+def test_the_limit_is_of_the_streak_while_the_shutter_is_open(degrees, phase):
+    blur = wgmb.Blur(shutter=Shutter(degrees, phase), max_blur=5.0)
+    got = blur.motion(wgmb.Frame(PICTURE, given_vectors((400, 300))))[..., 2:]
+    length = np.hypot(*got[0, 0]) * degrees / 360
+    assert length == pytest.approx(5, rel=1e-5)
+
+
+def test_the_limit_follows_a_bent_path_as_the_shutter_sees_it():
+    """From 0 to 1 of this path are (20, 0) px, whatever it did before."""
+    blur = wgmb.Blur(shutter=Shutter(360, "start"), max_blur=5.0)
+    got = blur.motion(wgmb.Frame(PICTURE, given_vectors((20, 0)), to_prev=given_vectors(0)))
+    np.testing.assert_allclose(got[0, 0], (0, 0, 5, 0), atol=1e-4)

@@ -65,7 +65,8 @@ class Frame:
     bad: dict[str, int] = field(init=False, default_factory=dict)
     """How many pixels of each input are not finite, or have no depth in front of the camera.
 
-    Bad colours weigh nothing, bad motion stands still, bad depth is infinitely far.
+    Bad colours weigh nothing, bad motion stands still, bad depth is infinitely far (values of
+    a depth buffer that are not finite stand still).
     """
 
     def __post_init__(self):
@@ -84,7 +85,9 @@ class Frame:
                 raise InputError(f"object_id must be integers, got {ids.dtype}")
             if ids.size and ids.min() < 0:
                 raise InputError(f"object_id must be 0 or more, got {ids.min()}")
-            object.__setattr__(self, "object_id", _shaped("object_id", ids, color.shape[:2]))
+            ids = ids if ids.dtype.itemsize <= 4 else np.minimum(ids, 2**32 - 1)
+            ids = _shaped("object_id", ids, color.shape[:2]).astype(np.uint32, copy=False)
+            object.__setattr__(self, "object_id", ids)
         if self.camera is not None and self.depth is None:
             raise InputError("motion from a camera needs depth")
         if self.object_id is not None and self.camera is None:
@@ -97,10 +100,12 @@ class Frame:
         for name in ("color", "to_next", "to_prev", "motion", "scale", "keep"):
             if given := _count_bad(getattr(self, name)):
                 self.bad[name] = given
-        if self.camera is not None and self.depth is not None and self.camera.depth_kind != "clip":
+        if self.camera is not None and self.depth is not None:
             with np.errstate(invalid="ignore"):
-                if given := int(np.count_nonzero(~(self.depth > 0))):
-                    self.bad["depth"] = given
+                clip = self.camera.depth_kind == "clip"
+                good = np.isfinite(self.depth) if clip else self.depth > 0
+            if given := int(np.count_nonzero(~good)):
+                self.bad["depth"] = given
 
     @property
     def size(self) -> tuple[int, int]:

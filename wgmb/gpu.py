@@ -73,9 +73,13 @@ def _is_opengl(adapter: wgpu.GPUAdapter) -> bool:
     return adapter.info["backend_type"].startswith("OpenGL")
 
 
-@cache
 def open_device(name: str | None = None) -> wgpu.GPUDevice:
     """A device of the chosen adapter with all it can do; the same one every time."""
+    return _device(name or os.environ.get("WGMB_ADAPTER") or "")
+
+
+@cache
+def _device(name: str) -> wgpu.GPUDevice:
     adapter = choose_adapter(name)
     wanted = ("float32-filterable", "timestamp-query")
     limits = ("max-texture-dimension-2d", "max-buffer-size", "max-storage-buffer-binding-size")

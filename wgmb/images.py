@@ -75,7 +75,8 @@ class Images:
         kind, channels = numpy_of(format)
         if kind == np.float16 and image.dtype != np.float16:
             image = np.where(np.isinf(image), image, np.clip(image, -_HALF_MAX, _HALF_MAX))
-        image = np.ascontiguousarray(image, kind)
+        with np.errstate(over="ignore"):  # what f32 cannot hold is infinite, and counted as bad
+            image = np.ascontiguousarray(image, kind)
         texture = self.texture(name, (width, height), format)
         row = width * channels * kind.itemsize
         band = max(1, _BAND // row)

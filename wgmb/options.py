@@ -125,7 +125,7 @@ class BlurOptions:
     """How to blur."""
 
     method: str = "tap"
-    "tap: average along each pixel's own path. Scenes: also accumulate, distributed."
+    "tap, tiles, reproject. Scenes: also accumulate, distributed. See the README's table."
     samples: int = 16
     "Taps, pictures or rays a pixel."
     jitter: float = 0.0
@@ -138,8 +138,8 @@ class BlurOptions:
     "Longest streak in pixels."
     path: Literal["curved", "straight"] | None = None
     "tap: through the previous and the next place (curved), or along the mean velocity."
-    form: Literal["shutter", "slices", "published"] | None = None
-    "tap (shutter), reproject (slices): published is the form of the paper, without the shutter."
+    form: Literal["shutter", "even", "slices", "published"] | None = None
+    "tap (shutter), tiles (even), reproject (slices): published is the form of the paper."
     show: Literal["color", "count"] | None = None
     "reproject: count shows how often a pixel was reached."
     seed: int | None = None

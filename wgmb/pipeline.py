@@ -118,7 +118,14 @@ class Blur:
 
     @shutter.setter
     def shutter(self, shutter: Shutter | float) -> None:
-        self._shutter = shutter if isinstance(shutter, Shutter) else Shutter(float(shutter))
+        if not isinstance(shutter, Shutter):
+            try:
+                degrees = float(shutter)
+            except (TypeError, ValueError):
+                wanted = "degrees or a Shutter"
+                raise InputError(f"shutter must be {wanted}, got {shutter!r}") from None
+            shutter = Shutter(degrees)
+        self._shutter = shutter
         data = np.zeros((), shader.load("common/shutter.wgsl").dtype("Shutter"))
         opens, closes = self._shutter.span
         data["span"] = opens, closes
@@ -167,6 +174,7 @@ class Blur:
         """
         gpu.check_size(self.device, *size)
         motions = _moving(moving)
+        _check_views(size, {"output": output, "color": color, "keep": keep, **moving})
         given_inputs = {"color": color, "motion": motions.known or None, "depth": motions.depth}
         given_inputs["scene"] = scene
         self._require({name for name, input_ in given_inputs.items() if input_ is not None})
@@ -271,15 +279,14 @@ class Blur:
         return found
 
     def _upload_moving(self, frame: Frame, which: str = "") -> dict:
-        deep = frame.camera is not None or "depth" in self.method.needs
-        ids = None if frame.object_id is None else np.minimum(frame.object_id, 2**32 - 1)
+        deep = frame.camera is not None or "depth" in self.method.needs | self.method.uses
         return {
             "to_next": self._view("to_next" + which, frame.to_next, "rg32float"),
             "to_prev": self._view("to_prev" + which, frame.to_prev, "rg32float"),
             "motion": self._view("to_prev, to_next" + which, frame.motion, "rgba32float"),
             "depth": self._view("depth" + which, frame.depth if deep else None, "r32float"),
             "camera": frame.camera,
-            "object_id": self._view("object" + which, ids, "r32uint"),
+            "object_id": self._view("object" + which, frame.object_id, "r32uint"),
             "scale": self._view("scale" + which, frame.scale, "r32float"),
             "object_motion": frame.object_motion,
         }
@@ -288,7 +295,9 @@ class Blur:
         return None if array is None else self._images.upload(name, array, format)
 
     def _neighbour(self, encoder, given, offset: int, inputs: dict) -> Neighbour:
-        color, moving = inputs.pop("color"), _moving(inputs)
+        color = inputs.pop("color")
+        _check_views(given.size, {"color": color, **inputs})
+        moving = _moving(inputs)
         motion, limited = moving.motion, self.max_blur is not None
         if not moving.known or moving.depth is None:
             raise InputError("a neighbouring frame needs color, motion and depth")
@@ -321,7 +330,19 @@ def _moving(given: dict) -> Moving:
         raise InputError(
             f"encode has no input {', '.join(sorted(unknown))}; it has {', '.join(sorted(known))}"
         )
-    return Moving(**given)
+    moving = Moving(**given)
+    if moving.camera is not None and moving.depth is None:
+        raise InputError("motion from a camera needs depth")
+    if moving.motion is not None and not (moving.to_next is None and moving.to_prev is None):
+        raise InputError("motion stands instead of to_next and to_prev: give one or the other")
+    return moving
+
+
+def _check_views(size: tuple[int, int], views: dict) -> None:
+    for name, view in views.items():
+        if isinstance(view, View) and view.size[:2] != tuple(size):
+            width, height = view.size[:2]
+            raise InputError(f"{name} is {width} x {height}, the image {size[0]} x {size[1]}")
 
 
 def blur(

@@ -57,7 +57,7 @@ class Source:
         m = re.search(rf"^const {name}\s*:\s*\w+\s*=\s*([-\d.eExXa-fA-F]+?)u?;", self.text, re.M)
         if not m:
             raise ShaderError(f"no constant {name} in {self.name}")
-        return float(m[1]) if "." in m[1] else int(m[1], 0)
+        return int(m[1], 0) if re.fullmatch(r"-?(\d+|0[xX].+)", m[1]) else float(m[1])
 
     def dtype(self, name: str) -> np.dtype:
         """The numpy dtype with exactly the layout the GPU gives struct `name`."""
@@ -114,7 +114,7 @@ def layout(kind: str, text: str) -> tuple[np.dtype, int]:
         return np.dtype(_SCALAR[kind]), 4
     if m := re.fullmatch(r"atomic<(\w+)>", kind):
         return layout(m[1], text)
-    if m := re.fullmatch(r"vec([234])(?:([fiu])|<(\w+)>)", kind):
+    if m := re.fullmatch(r"vec([234])(?:([fiu])|<([fiu]32)>)", kind):
         n = int(m[1])
         return np.dtype((_SCALAR[m[3] or _SUFFIX[m[2]]], (n,))), 4 * (2 if n == 2 else 4)
     if kind in ("mat4x4f", "mat4x4<f32>"):

@@ -124,10 +124,14 @@ class Shutter:
         return np.interp(shares, integral[used], times[used])
 
     def strata(self, samples: int) -> np.ndarray:
-        """(samples, 2) float32: the middle and the length of equal shares of the exposure."""
-        edges = self.time(np.arange(samples + 1) / samples)
-        middles = self.time((np.arange(samples) + 0.5) / samples)
-        return np.stack([middles, np.diff(edges)], 1).astype(np.float32)
+        """(samples, 3) float32: begin, middle and end of equal shares of the exposure."""
+        edges = self.time(np.arange(2 * samples + 1) / (2 * samples))
+        return np.stack([edges[:-1:2], edges[1::2], edges[2::2]], 1).astype(np.float32)
+
+    def sample_times(self, samples: int, shift: float = 0.0) -> np.ndarray:
+        """(samples,) one time in every stratum, `shift` -0.5..0.5 from its middle."""
+        begin, middle, end = self.strata(samples).T
+        return middle + 2 * shift * (middle - begin if shift < 0 else end - middle)
 
 
 def read_curve(path: str | Path) -> Weight:

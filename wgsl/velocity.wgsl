@@ -24,6 +24,8 @@ struct Velocity {
 @group(1) @binding(6) var<storage, read> reprojections: array<Reprojection>;
 @group(1) @binding(7) var motion: texture_storage_2d<rgba32float, write>;   // to_prev, to_next [px]
 
+const HUGE: f32 = 1e12;             // longer motion [px] is shortened to this before it is limited
+
 override PREV: bool = false;        // which inputs there are
 override NEXT: bool = false;
 override PAIRED: bool = false;
@@ -67,7 +69,7 @@ fn camera_motion(px: vec2u, z: f32, nothing_there: bool) -> vec4f {
     if body >= velocity.bodies { body = 0u; }
     let view = velocity.view;
     let ndc = ndc_of(view, px);
-    if nothing_there && view.depth_kind == ORTHOGRAPHIC { return vec4f(0.0); }
+    if nothing_there && view.depth_kind != PLANAR { return vec4f(0.0); }
     let here = homogeneous(view, ndc, z, nothing_there);
     let prev = reprojections[body].prev * here;
     let next = reprojections[body].next * here;
@@ -75,14 +77,20 @@ fn camera_motion(px: vec2u, z: f32, nothing_there: bool) -> vec4f {
     let ahead = to_pixels(view, next, ndc);
     // A point that is behind the camera in one of the frames goes on as in the other.
     if prev.w <= NEAREST && next.w <= NEAREST { return vec4f(0.0); }
-    if prev.w <= NEAREST { return vec4f(-ahead, ahead); }
-    if next.w <= NEAREST { return vec4f(back, -back); }
-    return vec4f(back, ahead);
+    var way = vec4f(back, ahead);
+    if prev.w <= NEAREST { way = vec4f(-ahead, ahead); }
+    if next.w <= NEAREST { way = vec4f(back, -back); }
+    return select(vec4f(0.0), way, is_finite4(way));
 }
 
 /// The motion shortened so that the streak over the exposure is at most frame.max_blur.
 fn limited(way: vec4f) -> vec4f {
-    let path = path_of(way);
-    let streak = distance(displacement(path, shutter.span.x), displacement(path, shutter.span.y));
-    return way * min(1.0, frame.max_blur / max(streak, 1e-6));
+    let most = max(max(abs(way.x), abs(way.y)), max(abs(way.z), abs(way.w)));
+    let safe = way * min(1.0, HUGE / max(most, 1.0));   // its square is finite
+    let path = path_of(safe);
+    let opening = displacement(path, shutter.span.x);
+    let turn = displacement(path, turning(path, shutter.span.x, shutter.span.y));
+    let closing = displacement(path, shutter.span.y);
+    let streak = max(distance(opening, closing), max(distance(opening, turn), distance(turn, closing)));
+    return safe * min(1.0, frame.max_blur / max(streak, 1e-6));
 }

@@ -32,18 +32,25 @@ def tap(color, motion, times, delay=(0.0, 0.0), curved=True, weight=None):
     out = np.zeros(color.shape)
     for y in range(height):
         for x in range(width):
-            path = motion[y, x].astype(float)
-            if not curved:
-                mean = (path[2:] - path[:2]) / 2
-                path = np.concatenate([-mean, mean])
             late = delay[0] * ((x + 0.5) / width - 0.5) + delay[1] * ((y + 0.5) / height - 0.5)
-            total, counted = 0.0, 0.0
-            for t in times:
-                at = np.array([x + 0.5, y + 0.5]) + displacement(path, -(t + late))
-                total = total + bilinear(color, *at)
-                counted += 1.0 if weight is None else bilinear(weight, *at)
-            out[y, x] = total / counted if counted > 0 else 0.0
+            out[y, x] = pixel(color, motion, x, y, np.asarray(times) + late, curved, weight)
     return out
+
+
+def pixel(color, motion, x, y, times, curved=True, weight=None):
+    """One pixel of `tap`."""
+    path = motion[y, x].astype(float)
+    if not curved:
+        mean = (path[2:] - path[:2]) / 2
+        path = np.concatenate([-mean, mean])
+    total, counted = 0.0, 0.0
+    for t in times:
+        at = np.array([x + 0.5, y + 0.5]) + displacement(path, -t)
+        total = total + bilinear(color, *at)
+        counted += 1.0 if weight is None else bilinear(weight, *at)
+    if counted <= 0:
+        total, counted = color[y, x], weight[y, x]
+    return total / counted if counted > 0 else 0.0
 
 
 def published(color, to_prev, samples):

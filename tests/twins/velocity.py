@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from twins.tap import displacement
+
 NEAREST = 1e-4  # of its distance: closer to the camera plane than this is behind it
 
 
@@ -13,6 +15,25 @@ def velocity(depth, ids, here, prev, next_, *, window, kind="planar", far=1e9):
         for x in range(width):
             out[y, x] = _pixel(x, y, float(depth[y, x]), int(ids[y, x]), here, prev, next_,
                                window, kind, far)  # fmt: skip
+    return out
+
+
+def combined(camera, vectors, nothing, *, added=False, scale=None, max_blur=None, span=(0, 0)):
+    """Vectors before the camera's motion, or added to it; scaled; the streak limited."""
+    out = np.array(camera, float)
+    for y, x in np.ndindex(out.shape[:2]):
+        if added:
+            out[y, x] += vectors[y, x]
+        elif not nothing[y, x]:
+            out[y, x] = vectors[y, x]
+        if scale is not None:
+            out[y, x] *= scale[y, x]
+        if max_blur is not None:
+            times = np.linspace(*span, 401)
+            places = np.array([displacement(out[y, x], t) for t in times])
+            ends = places[[0, -1]]
+            streak = max(np.hypot(*(places - end).T).max() for end in ends)
+            out[y, x] *= min(1, max_blur / max(streak, 1e-6))
     return out
 
 

@@ -9,6 +9,7 @@ from .distributed import Distributed
 from .gather import Gather
 from .reproject import Reproject
 from .tap import Tap
+from .tiles import Tiles
 
 if TYPE_CHECKING:
     import wgpu
@@ -24,7 +25,7 @@ class Method(Protocol):
     needs: frozenset[str]
     """Of "color", "motion", "depth", "scene"."""
     uses: frozenset[str]
-    """What it takes if it is there: "neighbours"."""
+    """What it takes if it is there: "neighbours", "depth"."""
 
     def encode(
         self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView
@@ -33,4 +34,5 @@ class Method(Protocol):
         ...
 
 
-METHODS: dict[str, type] = {m.name: m for m in (Tap, Gather, Reproject, Accumulate, Distributed)}
+_CLASSES = (Tap, Tiles, Gather, Reproject, Accumulate, Distributed)
+METHODS: dict[str, type] = {m.name: m for m in _CLASSES}

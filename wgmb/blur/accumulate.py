@@ -32,7 +32,7 @@ class Accumulate:
         if inputs.shutter.rolling:
             raise InputError("accumulate exposes whole pictures: it cannot roll the shutter")
         kernel = gpu.kernel(self._device, "blur/accumulate.wgsl", {"Output": self._output})
-        times = inputs.shutter.strata(inputs.samples)[:, 0]
+        times = inputs.shutter.sample_times(inputs.samples)
         width, height = inputs.given.size
         first, count = inputs.progress
         for i in range(first, first + count):

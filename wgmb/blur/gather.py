@@ -40,7 +40,7 @@ class Gather:
             raise InputError(f"show must be one of {', '.join(SHOWN)}, got {show!r}")
         self._device, self._output, self._show = device, output, show
         self._images = Images(device)
-        self._within, self._reaching = Scratch(device), Scratch(device)
+        self._contents, self._reaching = Scratch(device), Scratch(device)
 
     def encode(self, encoder, inputs, output):
         """Record silhouettes and tiles of every frame, then the search."""
@@ -92,7 +92,7 @@ class Gather:
         _, color, motion, depth, weight = frame
         kernel = gpu.kernel(
             self._device,
-            "silhouettes.wgsl",
+            "blur/gather_silhouettes.wgsl",
             {"Color": gpu.texel(self._device, 4)},
             WEIGHTED=weight is not None,
         )
@@ -114,14 +114,14 @@ class Gather:
             )
 
     def _tiles(self, encoder, inputs, offset: int, index: int, count: int, views):
-        kernel = gpu.kernel(self._device, "tiles.wgsl")
+        kernel = gpu.kernel(self._device, "blur/gather_tiles.wgsl")
         side = int(kernel.source.constant("TILE"))
         across, down = (-(-n // side) for n in inputs.given.size)
         tiles = kernel.source.dtype("Tile").itemsize * across * down
         data = np.zeros((), kernel.source.dtype("Source"))
         data["offset"], data["first"] = offset, index * across * down
         source = self._uniform("source", data)
-        within = self._within.at_least(tiles)
+        contents = self._contents.at_least(tiles)
         reaching = self._reaching.at_least(tiles * count)
         for entry in ("local", "reach"):
             kernel.run(
@@ -131,7 +131,7 @@ class Gather:
                 source=source,
                 paths=views["near_path"],
                 surface=views["surface"],
-                within=within,
+                contents=contents,
                 reaching=reaching,
             )
 

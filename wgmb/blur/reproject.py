@@ -79,7 +79,7 @@ class Reproject:
         sources += [(n.offset, n.color, n.motion, n.depth, None) for n in inputs.neighbours]
         # All pixels share a slice's time, so jitter is the frame's: its next golden section.
         shift = inputs.jitter * (inputs.number * GOLDEN % 1 - 0.5)
-        times = inputs.shutter.strata(inputs.samples) @ (1, shift)
+        times = inputs.shutter.sample_times(inputs.samples, shift)
 
         def run(entry: str, source: int, time: float, first: bool = False) -> None:
             offset, color, motion, depth, weight = sources[source]

@@ -40,7 +40,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 fn open_time(u: f32) -> f32 {
     let x = u * f32(progress.times);
     let i = min(u32(x), progress.times - 1u);
-    return strata[i].x + strata[i].y * (x - f32(i) - 0.5);
+    return within(strata[i], x - f32(i) - 0.5);
 }
 
 /// Three numbers in [0, 1) for a pixel and a seed (PCG3D: Jarzynski and Olano 2020).

@@ -4,7 +4,7 @@
 //#include common/noise.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
-//#include common/tiles.wgsl
+//#include blur/gather_tile.wgsl
 
 struct Sources {
     offsets: vec4f,         // of the frames [frame intervals]; the first is 0, the frame itself

@@ -26,9 +26,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 
     // A loop that ends early is the only branch that saves time on every driver.
     let times = shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5));
-    let opening = displacement(path, shutter.span.x + times.delay);
-    let closing = displacement(path, shutter.span.y + times.delay);
-    let still = !PUBLISHED && max(dot(opening, opening), dot(closing, closing)) < STILL * STILL;
+    let opens = shutter.span.x + times.delay;
+    let closes = shutter.span.y + times.delay;
+    let opening = displacement(path, opens);
+    let closing = displacement(path, closes);
+    let turn = displacement(path, turning(path, opens, closes));
+    let farthest = max(dot(turn, turn), max(dot(opening, opening), dot(closing, closing)));
+    let still = !PUBLISHED && farthest < STILL * STILL;
     let count = select(frame.samples, 0u, still);
 
     let share = 1.0 / f32(frame.samples);   // before adding, so that no sum of finite colours overflows
@@ -44,7 +48,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         sum += share * textureSampleLevel(color, linear, at, 0.0);
         if WEIGHTED { total += share * textureSampleLevel(weight, linear, at, 0.0).x; }
     }
-    if still {      // to the bit
+    if still || (WEIGHTED && total <= 0.0) {    // its own colour, to the bit
         sum = textureLoad(color, id.xy, 0);
         if WEIGHTED { total = textureLoad(weight, id.xy, 0).x; }
     }

@@ -9,7 +9,13 @@ struct Shutter {
 }
 
 @group(0) @binding(1) var<uniform> shutter: Shutter;
-@group(0) @binding(2) var<storage, read> strata: array<vec2f>;  // middle, length of each equal share of the exposure
+struct Stratum {            // an equal share of the exposure [frame intervals]
+    begin: f32,
+    middle: f32,            // when half of it has passed
+    end: f32,
+}
+
+@group(0) @binding(2) var<storage, read> strata: array<Stratum>;
 
 override EVEN: bool = false;    // a box: all shares are equally long, and no table is needed
 
@@ -29,6 +35,11 @@ fn shutter_times(x: vec2f, shift: f32) -> Times {
 /// Time of sample `i` of frame.samples [frame intervals].
 fn shutter_time(times: Times, i: u32) -> f32 {
     if EVEN { return times.first + f32(i) * times.step; }
-    let stratum = strata[i];
-    return stratum.x + stratum.y * times.shift + times.delay;
+    return within(strata[i], times.shift) + times.delay;
+}
+
+/// Time at `shift`, -0.5..0.5, from the middle of a stratum.
+fn within(stratum: Stratum, shift: f32) -> f32 {
+    let side = select(stratum.end - stratum.middle, stratum.middle - stratum.begin, shift < 0.0);
+    return stratum.middle + 2.0 * shift * side;
 }

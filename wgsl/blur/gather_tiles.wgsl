@@ -2,7 +2,7 @@
 //#include common/frame.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
-//#include common/tiles.wgsl
+//#include blur/gather_tile.wgsl
 
 struct Source {
     offset: f32,        // of the frame [frame intervals]
@@ -12,7 +12,7 @@ struct Source {
 @group(1) @binding(0) var<uniform> source: Source;
 @group(1) @binding(1) var paths: texture_2d<f32>;       // velocity, curvature of the near layer
 @group(1) @binding(2) var surface: texture_2d<f32>;     // depth; over 0: that of a far layer
-@group(1) @binding(3) var<storage, read_write> within: array<Tile>;     // of every tile's own pixels
+@group(1) @binding(3) var<storage, read_write> contents: array<Tile>;     // of every tile's own pixels
 @group(1) @binding(4) var<storage, read_write> reaching: array<Tile>;   // of all that reaches it
 
 const ALIKE: f32 = 0.5;         // displacements closer than this [px] stand for each other
@@ -50,14 +50,14 @@ fn displaced(path: vec4f, u: f32) -> vec2f {
 fn local(@builtin(global_invocation_id) id: vec3u) {
     let tiles = tiles_of(frame.size);
     if any(id.xy >= tiles) { return; }
-    let from = id.xy * TILE;
-    let size = min(from + TILE, frame.size) - from;
+    let there = id.xy * TILE;
+    let size = min(there + TILE, frame.size) - there;
     let pixels = size.x * size.y;
     let u = longest_time();
     var tile = Tile();
     tile.nearest = 3e38;
     for (var i = 0u; i < pixels; i++) {
-        let seen = textureLoad(surface, from + vec2u(i % size.x, i / size.x), 0);
+        let seen = textureLoad(surface, there + vec2u(i % size.x, i / size.x), 0);
         tile.nearest = min(tile.nearest, seen.x);
         if seen.y > 0.0 { tile.split = 1u; }
     }
@@ -65,7 +65,7 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
     for (var k = 0u; k < PATHS; k++) {
         var most = 0.0;
         for (var i = 0u; i < pixels; i++) {
-            let path = textureLoad(paths, from + vec2u(i % size.x, i / size.x), 0);
+            let path = textureLoad(paths, there + vec2u(i % size.x, i / size.x), 0);
             let least = unlike(path, chosen, u);
             if least > most && least < WILD * WILD {
                 most = least;
@@ -77,7 +77,7 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
         tile.count = k + 1u;
     }
     tile.paths = chosen;
-    within[id.y * tiles.x + id.x] = tile;
+    contents[id.y * tiles.x + id.x] = tile;
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -93,15 +93,15 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
     var tile = Tile();
     tile.nearest = 3e38;
     for (var i = 0; i < count; i++) {
-        let from = low + vec2i(i % size.x, i / size.x);
-        let at = u32(from.y) * tiles.x + u32(from.x);
+        let there = low + vec2i(i % size.x, i / size.x);
+        let at = u32(there.y) * tiles.x + u32(there.x);
         // The box of all places that its motions lead to.
-        let off = vec2f((here - from) * i32(TILE));
+        let off = vec2f((here - there) * i32(TILE));
         var least = vec2f(0.0);
         var most = vec2f(0.0);
-        let paths_there = within[at].count;
+        let paths_there = contents[at].count;
         for (var k = 0u; k < paths_there; k++) {
-            let path = within[at].paths[k];
+            let path = contents[at].paths[k];
             let a = displaced(path, span.x);
             let b = displaced(path, span.y);
             least = min(least, min(a, b));
@@ -109,21 +109,21 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
         }
         let margin = f32(TILE) + 2.0;
         if all(off + margin > least) && all(off - margin < most) {
-            tile.nearest = min(tile.nearest, within[at].nearest);
-            tile.split = max(tile.split, within[at].split);
-            tile.longest = max(tile.longest, within[at].longest);
+            tile.nearest = min(tile.nearest, contents[at].nearest);
+            tile.split = max(tile.split, contents[at].split);
+            tile.longest = max(tile.longest, contents[at].longest);
         }
     }
     var chosen = array<vec4f, 4>();
     for (var k = 0u; k < PATHS; k++) {
         var best = 0.0;
         for (var i = 0; i < count; i++) {
-            let from = low + vec2i(i % size.x, i / size.x);
-            let at = u32(from.y) * tiles.x + u32(from.x);
-            let off = vec2f((here - from) * i32(TILE));
-            let paths_there = within[at].count;
+            let there = low + vec2i(i % size.x, i / size.x);
+            let at = u32(there.y) * tiles.x + u32(there.x);
+            let off = vec2f((here - there) * i32(TILE));
+            let paths_there = contents[at].count;
             for (var n = 0u; n < paths_there; n++) {
-                let path = within[at].paths[n];
+                let path = contents[at].paths[n];
                 let least = unlike(path, chosen, u);
                 if least > best && lands(path, span, off) {
                     best = least;

@@ -1,0 +1,151 @@
+"""Guertin, McGuire and Nowrouzezahrai 2014, one tile, one pixel and one tap at a time."""
+
+import numpy as np
+
+from twins.tap import bilinear, displacement
+
+KAPPA, GAMMA, SHORT, FAR = 40.0, 1.5, 0.5, 1e10
+
+
+def tiles(color, motion, depth, times, span, noise, edge, published=False, weight=None):
+    """`span`: opens, closes; `noise` (height, width) moves the tile look-up."""
+    height, width = color.shape[:2]
+    motion = motion.astype(float)
+    fastest = _fastest(motion, span, edge)
+    dominant = _dominant(fastest, span)
+    out = np.zeros(color.shape)
+    for y, x in np.ndindex(height, width):
+        tile = _tile(x, y, noise[y, x], edge, dominant.shape)
+        fast = _held(dominant[tile], span, edge)
+        reach = max(_streak(fast, span), SHORT)
+        if reach <= SHORT:
+            out[y, x] = _own(color, weight, y, x)
+            continue
+        own = motion[y, x]
+        here = np.clip(_streak(own, span), SHORT, edge)
+        share = (1.0 if published else 0.25) / (KAPPA * here)
+        total = share * color[y, x]
+        counted = share * (1 if weight is None else weight[y, x])
+        for i, t in enumerate(times):
+            offset = displacement(fast, t)
+            far = np.hypot(*offset)
+            if i % 2:
+                trust = np.clip((here - SHORT) / GAMMA, 0, 1)
+                odd = _own_direction(_direction(own, span), _direction(fast, span), trust)
+                offset = far * np.sign(t) * odd
+            at = np.array([x + 0.5, y + 0.5]) - offset
+            column = int(np.clip(np.floor(at[0]), 0, width - 1))
+            row = int(np.clip(np.floor(at[1]), 0, height - 1))
+            there = np.clip(_streak(motion[row, column], span), SHORT, edge)
+            w = _weight(far, offset, here, there, _direction(own, span),
+                        _direction(motion[row, column], span),
+                        _depth(depth, y, x), _depth(depth, row, column))  # fmt: skip
+            if not published:
+                w /= max(2 * _cone(far, reach) + 2 * _cylinder(far, reach), 1e-3)
+            total = total + w / len(times) * bilinear(color, *at)
+            counted += w / len(times) * (1 if weight is None else bilinear(weight, *at))
+        out[y, x] = total / counted if counted > 0 else _own(color, weight, y, x)
+    return out
+
+
+def _weight(far, offset, here, there, own_way, way, z, z_there):
+    front = np.clip(1 - (z_there - z) / min(z, z_there), 0, 1)
+    behind = np.clip(1 - (z - z_there) / min(z, z_there), 0, 1)
+    direction = _unit(offset)
+    along_here = abs(own_way @ direction) if here > SHORT and far > 0 else 1.0
+    along_there = abs(way @ direction) if there > SHORT and far > 0 else 1.0
+    return (
+        front * _cone(far, there) * along_there
+        + behind * _cone(far, here) * along_here
+        + 2 * _cylinder(far, min(there, here)) * max(along_here, along_there)
+    )
+
+
+def _farthest(motion, span):
+    """When it is farthest from its place: at an end, or where it turns."""
+    velocity, curvature = (motion[2:] - motion[:2]) / 2, (motion[2:] + motion[:2]) / 2
+    bend = curvature @ curvature
+    turn = np.clip(-0.5 * (velocity @ curvature) / max(bend, 1e-30), *span)
+    return max((span[1], span[0], turn), key=lambda t: np.hypot(*displacement(motion, t)))
+
+
+def _streak(motion, span):
+    return np.hypot(*displacement(motion, _farthest(motion, span)))
+
+
+def _direction(motion, span):
+    """Of the farthest place, as it is after time 0."""
+    when = _farthest(motion, span)
+    return np.sign(when) * _unit(displacement(motion, when))
+
+
+def _held(motion, span, edge):
+    return motion * min(1, edge / max(_streak(motion, span), 1e-6))
+
+
+def _fastest(motion, span, edge):
+    height, width = motion.shape[:2]
+    found = np.zeros((-(-height // edge), -(-width // edge), 4))
+    for j, i in np.ndindex(found.shape[:2]):
+        inside = motion[j * edge : (j + 1) * edge, i * edge : (i + 1) * edge].reshape(-1, 4)
+        found[j, i] = max(inside, key=lambda m: _streak(m, span))
+    return found
+
+
+def _dominant(fastest, span):
+    found = np.zeros_like(fastest)
+    rows, columns = fastest.shape[:2]
+    for j, i in np.ndindex(rows, columns):
+        candidates = []
+        for dj in (-1, 0, 1):
+            for di in (-1, 0, 1):
+                if not (0 <= j + dj < rows and 0 <= i + di < columns):
+                    continue
+                motion = fastest[j + dj, i + di]
+                along = displacement(motion, span[1]) - displacement(motion, span[0])
+                if di and dj and along[0] * di * along[1] * dj <= 0:
+                    continue  # it does not come this way
+                candidates.append(motion)
+        found[j, i] = max(candidates, key=lambda m: _streak(m, span))
+    return found
+
+
+def _tile(x, y, noise, edge, shape):
+    at = np.array([x + 0.5, y + 0.5]) / edge
+    at += 0.5 * (np.array([noise, (8 * noise + 0.5) % 1]) - 0.5)
+    i, j = (int(np.clip(np.floor(v), 0, n - 1)) for v, n in zip(at, shape[1::-1], strict=True))
+    return j, i
+
+
+def _own_direction(own, dominant, trust):
+    along = _unit(dominant)
+    across = np.array([-along[1], along[0]])
+    if across @ own < 0:
+        across = -across
+    return _unit((1 - trust) * across + trust * own)
+
+
+def _own(color, weight, y, x):
+    if weight is None:
+        return color[y, x]
+    return color[y, x] / weight[y, x] if weight[y, x] > 0 else 0 * color[y, x]
+
+
+def _unit(v):
+    return v / max(np.hypot(*v), 1e-6)
+
+
+def _depth(depth, y, x):
+    if depth is None:
+        return 1.0
+    z = float(depth[y, x])
+    return min(z, FAR) if np.isfinite(z) and z > 0 else FAR
+
+
+def _cone(far, length):
+    return np.clip(1 - far / length, 0, 1)
+
+
+def _cylinder(far, length):
+    u = np.clip((far - 0.95 * length) / (0.1 * length), 0, 1)
+    return 1 - u * u * (3 - 2 * u)
