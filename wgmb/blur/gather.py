@@ -40,7 +40,7 @@ class Gather:
             raise InputError(f"show must be one of {', '.join(SHOWN)}, got {show!r}")
         self._device, self._output, self._show = device, output, show
         self._images = Images(device)
-        self._contents, self._reaching = Scratch(device), Scratch(device)
+        self._contents = Scratch(device)
 
     def encode(self, encoder, inputs, output):
         """Record silhouettes and tiles of every frame, then the search."""
@@ -49,7 +49,13 @@ class Gather:
         frames += [(n.offset, n.color, n.motion, n.depth, None) for n in inputs.neighbours]
         layers = self._layers(inputs.given.size, len(frames))
         for i, frame in enumerate(frames):
-            views = {k: _layer(texture, i) for k, texture in layers.items()}
+            views = {
+                "near_color": _layer(layers["colors"], 2 * i),
+                "far_color": _layer(layers["colors"], 2 * i + 1),
+                "near_path": _layer(layers["paths"], 2 * i),
+                "far_path": _layer(layers["paths"], 2 * i + 1),
+                "surface": _layer(layers["surfaces"], i),
+            }
             self._silhouettes(encoder, inputs, frame, views)
             self._tiles(encoder, inputs, frame[0], i, len(frames), views)
         kernel = gpu.kernel(
@@ -64,12 +70,12 @@ class Gather:
         data["offsets"][: len(frames)] = [frame[0] for frame in frames]
         data["count"] = len(frames)
         arrays = {k: t.create_view(dimension="2d-array") for k, t in layers.items()}
+        arrays["tiles"] = self._reaching(inputs.given.size, len(frames))
         kernel.run(
             encoder,
             "main",
             inputs.given,
             sources=self._uniform("sources", data),
-            tiles=self._reaching.at_least(0),
             own=inputs.color,
             own_weight=inputs.weight or inputs.none,
             linear=inputs.linear,
@@ -78,15 +84,20 @@ class Gather:
         )
 
     def _layers(self, size, count: int) -> dict[str, wgpu.GPUTexture]:
-        exact, rough = "rgba32float", "rgba16float"
-        formats = {
-            "near_color": gpu.texel(self._device, 4),
-            "near_path": exact,
-            "far_color": rough,
-            "far_path": rough,
-            "surface": exact,
+        """Two layers a frame, near and far, and what there is to know of both."""
+        color, exact = gpu.texel(self._device, 4), "rgba32float"
+        return {
+            "colors": self._images.texture("colors", size, color, 2 * count),
+            "paths": self._images.texture("paths", size, exact, 2 * count),
+            "surfaces": self._images.texture("surfaces", size, exact, count),
         }
-        return {k: self._images.texture(k, size, f, count) for k, f in formats.items()}
+
+    def _reaching(self, size, count: int) -> wgpu.GPUTextureView:
+        source = shader.load("blur/gather_tile.wgsl")
+        side, layers = (int(source.constant(n)) for n in ("TILE", "LAYERS"))
+        grid = -(-size[0] // side), -(-size[1] // side)
+        texture = self._images.texture("reaching", grid, "rgba32float", layers * count)
+        return texture.create_view(dimension="2d-array")
 
     def _silhouettes(self, encoder, inputs, frame, views):
         _, color, motion, depth, weight = frame
@@ -119,10 +130,11 @@ class Gather:
         across, down = (-(-n // side) for n in inputs.given.size)
         tiles = kernel.source.dtype("Tile").itemsize * across * down
         data = np.zeros((), kernel.source.dtype("Source"))
-        data["offset"], data["first"] = offset, index * across * down
+        data["offset"] = offset
+        data["first"] = index * int(kernel.source.constant("LAYERS"))
         source = self._uniform("source", data)
         contents = self._contents.at_least(tiles)
-        reaching = self._reaching.at_least(tiles * count)
+        reaching = self._reaching(inputs.given.size, count)
         for entry in ("local", "reach"):
             kernel.run(
                 encoder,

@@ -12,16 +12,14 @@ struct Sources {
 }
 
 @group(1) @binding(0) var<uniform> sources: Sources;
-@group(1) @binding(1) var near_color: texture_2d_array<f32>;    // premultiplied by alpha, coverage, weight
-@group(1) @binding(2) var near_path: texture_2d_array<f32>;     // velocity, curvature
-@group(1) @binding(3) var far_color: texture_2d_array<f32>;
-@group(1) @binding(4) var far_path: texture_2d_array<f32>;
-@group(1) @binding(5) var surface: texture_2d_array<f32>;       // near depth, far depth, coverage, weight
-@group(1) @binding(6) var<storage, read> tiles: array<Tile>;    // of the frames, one after the other
-@group(1) @binding(7) var own: texture_2d<f32>;                 // the frame as it came
-@group(1) @binding(8) var own_weight: texture_2d<f32>;
-@group(1) @binding(9) var linear: sampler;
-@group(1) @binding(10) var output: Output;
+@group(1) @binding(1) var colors: texture_2d_array<f32>;    // premultiplied by alpha, coverage, weight; near, far, a frame
+@group(1) @binding(2) var paths: texture_2d_array<f32>;     // velocity, curvature; near, far, a frame
+@group(1) @binding(3) var surfaces: texture_2d_array<f32>;  // near depth, far depth, coverage, weight
+@group(1) @binding(4) var tiles: texture_2d_array<f32>;     // LAYERS a frame
+@group(1) @binding(5) var own: texture_2d<f32>;             // the frame as it came
+@group(1) @binding(6) var own_weight: texture_2d<f32>;
+@group(1) @binding(7) var linear: sampler;
+@group(1) @binding(8) var output: Output;
 
 override WEIGHTED: bool = false;
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
@@ -54,33 +52,33 @@ struct Seen {           // the nearest ones, in order
     c: Sample,
 }
 
+// Throughout, `for (; condition; condition = false)` is an `if` that also saves time on lavapipe.
+
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let x = vec2f(id.xy) + 0.5;
-    let across = tiles_of(frame.size);
-    let tile = (id.y / TILE) * across.x + id.x / TILE;
-    let stride = across.x * across.y;
+    let tile = id.xy / TILE;
     let source_count = sources.count;
+    let offsets = sources.offsets;
 
     // What the tile may show of each frame, and the pixel's own paths there.
-    var longest = 0.0;
-    var counts = vec3u(0u);
-    var nearest = vec3f(NONE);
-    var splits = vec3u(0u);
-    var paths = array<vec4f, 3>();
-    var far_paths = array<vec4f, 3>();
-    for (var f = 0u; f < source_count; f++) {
-        let at = f * stride + tile;
-        longest = max(longest, tiles[at].longest);
-        counts[f] = tiles[at].count;
-        nearest[f] = tiles[at].nearest;
-        splits[f] = tiles[at].split;
-        paths[f] = textureLoad(near_path, id.xy, f, 0);
-        far_paths[f] = textureLoad(far_path, id.xy, f, 0);
+    let about0 = textureLoad(tiles, tile, 0u, 0);
+    var about1 = vec4f(0.0, NONE, 0.0, 0.0);
+    var about2 = about1;
+    let path0 = textureLoad(paths, id.xy, 0u, 0);
+    var path1 = vec4f(0.0);
+    var path2 = path1;
+    if source_count > 1u {
+        about1 = textureLoad(tiles, tile, LAYERS, 0);
+        path1 = textureLoad(paths, id.xy, 2u, 0);
+    }
+    if source_count > 2u {
+        about2 = textureLoad(tiles, tile, 2u * LAYERS, 0);
+        path2 = textureLoad(paths, id.xy, 4u, 0);
     }
     let times = shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5));
-    let still = longest < STILL;
+    let still = max(about0.w, max(about1.w, about2.w)) < STILL;
     let samples = select(frame.samples, 0u, still);
 
     var sum = vec4f(0.0);
@@ -95,53 +93,47 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         for (var s = 0u; s < source_count; s++) {
             // The frame itself, then the neighbour on the side of `t`, then the other one.
             let f = select(s, 3u - s, s > 0u && source_count == 3u && t > 0.0);
-            let u = t - sources.offsets[f];
+            let about = select(select(about2, about1, f == 1u), about0, f == 0u);
+            let path_here = select(select(path2, path1, f == 1u), path0, f == 0u);
+            let offset = select(select(offsets.z, offsets.y, f == 1u), 0.0, f == 0u);
+            let u = t - offset;
             let handicap = select(NEIGHBOUR, 1.0, s == 0u);
-            // Nothing there could be nearer than what is seen already.
-            let closed = s > 0u && seen.a.plain && seen.a.depth <= nearest[f] * handicap;
-            let layers = select(1u + splits[f], 0u, closed);
-            for (var layer = 0u; layer < layers; layer++) {
-                let seeds = counts[f] + select(1u, 2u, splits[f] > 0u);
-                let first = moved(paths[f], u);
-                for (var k = 0u; k < seeds; k++) {
-                    var d = first;
-                    if k > 0u {
-                        if k <= counts[f] {
-                            d = moved(tiles[f * stride + tile].paths[k - 1u], u);
-                        } else {
-                            d = moved(far_paths[f], u);
-                        }
-                        let apart = d - first;
-                        if dot(apart, apart) < FOUND * FOUND { continue; }
-                    }
-                    // The fixed point of q = x - displacement(q).
+            let first = moved(path_here, u);
+            let seeds = u32(about.x) + select(1u, 2u, about.z > 0.0);
+            for (var layer = 0u; layer < 1u + u32(about.z); layer++) {
+                let penalty = handicap * select(1.0, GUESSED, layer == 1u);
+                var d = first;
+                // Once nothing there could be nearer than what is seen already, the search ends.
+                for (var k = 0u; k < seeds && !(seen.a.plain && seen.a.depth <= about.y * penalty); k++) {
                     var miss = NONE;
                     var q = x;
                     var path = vec4f(0.0);
-                    for (var n = 0u; n < STEPS; n++) {
+                    let apart = d - first;
+                    var going = k == 0u || dot(apart, apart) >= FOUND * FOUND;
+                    // The fixed point of q = x - displacement(q).
+                    for (var n = 0u; n < STEPS && going; n++) {
                         q = x - d;
-                        if !inside(q) {
-                            miss = NONE;
-                            break;
-                        }
-                        if layer == 0u {
-                            path = textureLoad(near_path, vec2u(q), f, 0);
-                        } else {
-                            path = textureLoad(far_path, vec2u(q), f, 0);
-                        }
+                        path = textureLoad(paths, vec2i(floor(q)), 2u * f + layer, 0);
                         let next = moved(path, u);
                         miss = distance(next, d);
+                        going = miss >= FOUND && inside(q);
                         d = next;
-                        if miss < FOUND { break; }
                     }
-                    if miss > MISS { continue; }
-                    let there = textureLoad(surface, vec2u(q), f, 0);
-                    if layer == 1u && there.y <= 0.0 { continue; }
-                    let z = select(there.x, there.y, layer == 1u);
-                    let place = x - d;
-                    let home = place + moved(path, -sources.offsets[f]);
-                    let guess = select(1.0, GUESSED, layer == 1u);
-                    insert(&seen, Sample(z * handicap * guess, miss, place, home, f, layer, there.y == 0.0, z));
+                    var hit = miss <= MISS && inside(q);
+                    for (; hit; hit = false) {
+                        let there = textureLoad(surfaces, vec2u(q), f, 0);
+                        if layer == 0u || there.y > 0.0 {
+                            let z = select(there.x, there.y, layer == 1u);
+                            let place = x - d;
+                            let home = place + moved(path, -offset);
+                            insert(&seen, Sample(z * penalty, miss, place, home, f, layer, there.y == 0.0, z));
+                        }
+                    }
+                    let more = k < u32(about.x);
+                    let seed = textureLoad(tiles, tile, f * LAYERS + 1u + min(k, PATHS - 1u), 0);
+                    d = moved(seed, u);
+                    var own_far = !more && k + 2u == seeds;
+                    for (; own_far; own_far = false) { d = moved(textureLoad(paths, id.xy, 2u * f + 1u, 0), u); }
                 }
             }
         }
@@ -151,35 +143,37 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         var color = vec4f(0.0);
         var weight = 0.0;
         var last = nothing();
-        for (var n = 0u; n < 3u; n++) {
+        for (var n = 0u; n < 3u && seen.a.depth < NONE && clear >= 0.01; n++) {
             let now = seen.a;
             seen.a = seen.b;
             seen.b = seen.c;
-            seen.c = nothing();
-            if now.depth >= NONE || clear < 0.01 { break; }
+            seen.c.depth = NONE;
             let same_frame = now.source == last.source;
-            var step = BEHIND;
-            if !same_frame { step *= NEIGHBOUR; }
-            if same_frame && now.far != last.far { step = 0.0; }
-            if n > 0u && last.depth < NONE && now.depth < last.depth * step { continue; }
-            var part = fetch(now);
-            if part.cover < 0.01 { continue; }
-            color += clear * part.color;
-            weight += clear * part.weight;
-            if CONFIDENCE {
-                missed += clear * part.cover * now.miss;
-                if now.source > 0u { others += clear * part.cover; }
+            var apart = select(BEHIND * NEIGHBOUR, BEHIND, same_frame);
+            if last.depth >= NONE || (same_frame && now.far != last.far) { apart = 0.0; }
+            var another = now.depth >= last.depth * apart;
+            for (; another; another = false) {
+                let part = fetch(now);
+                if part.cover >= 0.01 {
+                    color += clear * part.color;
+                    weight += clear * part.weight;
+                    if CONFIDENCE {
+                        missed += clear * part.cover * now.miss;
+                        if now.source > 0u { others += clear * part.cover; }
+                    }
+                    clear *= 1.0 - part.cover;
+                    last = now;
+                }
             }
-            clear *= 1.0 - part.cover;
-            last = now;
         }
-        if clear < 0.5 {
+        var nobody = clear >= 0.5;
+        if !nobody {
             sum += color / (1.0 - clear);
             total += weight / (1.0 - clear);
             accepted += 1.0;
-        } else {
-            // The pixel's own path through the frame.
-            let q = x - moved(paths[0], t);
+        }
+        for (; nobody; nobody = false) {        // the pixel's own path through the frame
+            let q = x - moved(path0, t);
             sum += textureSampleLevel(own, linear, q / vec2f(frame.size), 0.0);
             if WEIGHTED {
                 total += textureSampleLevel(own_weight, linear, q / vec2f(frame.size), 0.0).x;
@@ -257,40 +251,37 @@ struct Part {
 fn fetch(now: Sample) -> Part {
     let size = vec2f(frame.size);
     var part = Part();
-    if now.plain {
-        part.color = textureSampleLevel(near_color, linear, now.at / size, now.source, 0.0);
+    let layer = 2u * now.source + now.far;
+    var plain = now.plain;
+    for (; plain; plain = false) {
+        part.color = textureSampleLevel(colors, linear, now.at / size, layer, 0.0);
         part.weight = 1.0;
-        if WEIGHTED { part.weight = textureSampleLevel(surface, linear, now.at / size, now.source, 0.0).w; }
+        if WEIGHTED { part.weight = textureSampleLevel(surfaces, linear, now.at / size, now.source, 0.0).w; }
         part.cover = 1.0;
-        return part;
     }
     let corner = floor(now.at - 0.5);
     let share = now.at - 0.5 - corner;
-    var shares = 0.0;
-    for (var i = 0u; i < 4u; i++) {
+    let count = select(4u, 0u, now.plain);
+    for (var i = 0u; i < count; i++) {
         let step = vec2f(vec2u(i & 1u, i >> 1u));
         let px = vec2u(clamp(corner + step, vec2f(0.0), size - 1.0));
         let both = mix(1.0 - share, share, step);
-        let amount = both.x * both.y;
-        let there = textureLoad(surface, px, now.source, 0);
-        if now.far == 0u {
-            if there.x > now.true_depth * BEHIND { continue; }
-            part.color += amount * textureLoad(near_color, px, now.source, 0);
-            part.weight += amount * there.w;
-            part.cover += amount * there.z;
-        } else if there.y > 0.0 {
-            part.color += amount * textureLoad(far_color, px, now.source, 0);
-            part.weight += amount;
-            shares += amount;
-        } else if there.x >= now.true_depth / BEHIND && there.x <= now.true_depth * BEHIND {
-            part.color += amount * textureLoad(near_color, px, now.source, 0);
-            part.weight += amount * there.w;
-            shares += amount;
-        }
+        let there = textureLoad(surfaces, px, now.source, 0);
+        let is_split = there.y > 0.0;
+        let from_far = now.far == 1u && is_split;
+        let z = there.x;
+        // Near: what is not behind it. Far: guessed backgrounds, and what lies as deep.
+        let too_far = z > now.true_depth * BEHIND;
+        let too_near = now.far == 1u && z < now.true_depth / BEHIND;
+        let counts = from_far || !(too_far || too_near);
+        let amount = select(0.0, both.x * both.y, counts);
+        part.color += amount * textureLoad(colors, px, 2u * now.source + u32(from_far), 0);
+        part.weight += amount * select(there.w, 1.0, from_far);
+        part.cover += amount * select(there.z, 1.0, now.far == 1u);
     }
-    if now.far == 1u && shares > 1e-4 {
-        part.color /= shares;
-        part.weight /= shares;
+    if now.far == 1u && part.cover > 1e-4 {
+        part.color /= part.cover;
+        part.weight /= part.cover;
         part.cover = 1.0;
     }
     return part;

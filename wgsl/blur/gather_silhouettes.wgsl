@@ -12,15 +12,14 @@
 @group(1) @binding(5) var marks: Marks;
 @group(1) @binding(6) var near_color: Color;            // premultiplied by coverage too
 @group(1) @binding(7) var near_path: Exact;             // velocity, curvature
-@group(1) @binding(8) var far_color: Rough;
-@group(1) @binding(9) var far_path: Rough;
+@group(1) @binding(8) var far_color: Color;
+@group(1) @binding(9) var far_path: Exact;
 @group(1) @binding(10) var surface: Exact;              // near depth; far depth, see below; coverage; weight
 
 // Far depth: over 0 it is that of a split pixel; PLAIN: no silhouette within two pixels; else BESIDE one.
 alias Marks = texture_storage_2d<r32float, write>;
 alias Color = texture_storage_2d<rgba32float, write>;
 alias Exact = texture_storage_2d<rgba32float, write>;
-alias Rough = texture_storage_2d<rgba16float, write>;
 
 override WEIGHTED: bool = false;
 
@@ -30,7 +29,6 @@ const BESIDE: f32 = -1.0;
 const APART: f32 = 1.1;         // ratio of depths that makes two surfaces
 const DIFFERENT: f32 = 0.5;     // of their motions [px]
 const WHOLE: f32 = 0.98;        // coverage from here on is all
-const HALF_MAX: f32 = 65504.0;  // largest finite f16
 
 fn held(px: vec2i) -> vec2i {
     return clamp(px, vec2i(0), vec2i(frame.size) - 1);
@@ -133,8 +131,8 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
     }
     textureStore(near_color, px, near);
     textureStore(near_path, px, as_path(near_motion));
-    textureStore(far_color, px, min(far, vec4f(HALF_MAX)));
-    textureStore(far_path, px, clamp(as_path(far_motion), vec4f(-HALF_MAX), vec4f(HALF_MAX)));
+    textureStore(far_color, px, far);
+    textureStore(far_path, px, as_path(far_motion));
     textureStore(surface, px, vec4f(z, far_z, coverage, coverage * counts));
 }
 

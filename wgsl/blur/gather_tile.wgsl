@@ -2,6 +2,7 @@
 
 const TILE: u32 = 32u;          // side [px]
 const PATHS: u32 = 4u;          // motions kept a tile
+const LAYERS: u32 = 5u;         // of the texture that holds them: what is below, then the paths
 
 struct Tile {
     paths: array<vec4f, 4>,     // velocity, curvature: the longest, then always the most different

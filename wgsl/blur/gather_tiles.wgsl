@@ -6,14 +6,16 @@
 
 struct Source {
     offset: f32,        // of the frame [frame intervals]
-    first: u32,         // where its tiles begin in `reaching`
+    first: u32,         // where its layers begin in `reaching`
 }
 
 @group(1) @binding(0) var<uniform> source: Source;
 @group(1) @binding(1) var paths: texture_2d<f32>;       // velocity, curvature of the near layer
 @group(1) @binding(2) var surface: texture_2d<f32>;     // depth; over 0: that of a far layer
 @group(1) @binding(3) var<storage, read_write> contents: array<Tile>;     // of every tile's own pixels
-@group(1) @binding(4) var<storage, read_write> reaching: array<Tile>;   // of all that reaches it
+@group(1) @binding(4) var reaching: Reaching;            // of all that reaches it, LAYERS a frame
+
+alias Reaching = texture_storage_2d_array<rgba32float, write>;
 
 const ALIKE: f32 = 0.5;         // displacements closer than this [px] stand for each other
 const WILD: f32 = 1e5;          // motions beyond this [px] are errors
@@ -134,8 +136,9 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
         if best <= ALIKE * ALIKE { break; }
         tile.count = k + 1u;
     }
-    tile.paths = chosen;
-    reaching[source.first + id.y * tiles.x + id.x] = tile;
+    let about = vec4f(f32(tile.count), tile.nearest, f32(tile.split), tile.longest);
+    textureStore(reaching, id.xy, source.first, about);
+    for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id.xy, source.first + 1u + k, chosen[k]); }
 }
 
 /// Whether a tile moving along `path` touches the one that lies `off` [px] away.
