@@ -27,23 +27,24 @@ override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 const STILL: f32 = 0.01;        // paths shorter than this [px] need no search
 const STEPS: u32 = 4u;          // of a search, at most
 const FOUND: f32 = 0.25;        // a step shorter than this [px] ends the search
+const ALIKE: f32 = 0.25;        // searches that come closer than this [px] lead to the same
 const MISS: f32 = 1.0;          // a sample farther than this [px] from the pixel is none of it
 const SAME: f32 = 0.75;         // samples of one layer closer than this [px] are one
 const SAME_PLACE: f32 = 2.0;    // the same across frames, by their place in the frame itself
 const BEHIND: f32 = 1.05;       // ratio of depths that makes two surfaces
 const NEIGHBOUR: f32 = 1.1;     // a neighbouring frame's sample counts as this much farther
 const GUESSED: f32 = 1.2;       // and a background that was only inferred as this much
+const TRUSTED: f32 = 0.25;     // times up to which the frame itself needs no second opinion [frame intervals]
 const NONE: f32 = 3e38;         // depth of no sample
 
 struct Sample {
     depth: f32,         // that it competes with
+    true_depth: f32,
     miss: f32,          // distance of its place from the pixel [px]
+    plain: bool,        // one opaque surface all around
     at: vec2f,          // where in its frame [px]
     home: vec2f,        // where that is in the frame itself [px]
-    source: u32,        // frame
-    far: u32,           // 1: of the far layer
-    plain: bool,        // one opaque surface all around
-    true_depth: f32,
+    layer: u32,         // near, far, of the frames one after the other
 }
 
 struct Seen {           // the nearest ones, in order
@@ -90,7 +91,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < samples; i++) {
         let t = shutter_time(times, i);
         var seen = Seen(nothing(), nothing(), nothing());
-        for (var s = 0u; s < source_count; s++) {
+        var settled = false;
+        for (var s = 0u; s < source_count && !(settled && abs(t) <= TRUSTED); s++) {
             // The frame itself, then the neighbour on the side of `t`, then the other one.
             let f = select(s, 3u - s, s > 0u && source_count == 3u && t > 0.0);
             let about = select(select(about2, about1, f == 1u), about0, f == 0u);
@@ -100,25 +102,26 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             let handicap = select(NEIGHBOUR, 1.0, s == 0u);
             let first = moved(path_here, u);
             let seeds = u32(about.x) + select(1u, 2u, about.z > 0.0);
-            for (var layer = 0u; layer < 1u + u32(about.z); layer++) {
+            for (var layer = 0u; layer < 1u + u32(about.z) && !(settled && layer == 1u); layer++) {
                 let penalty = handicap * select(1.0, GUESSED, layer == 1u);
                 var d = first;
+                var base = first;
                 // Once nothing there could be nearer than what is seen already, the search ends.
                 for (var k = 0u; k < seeds && !(seen.a.plain && seen.a.depth <= about.y * penalty); k++) {
                     var miss = NONE;
                     var q = x;
                     var path = vec4f(0.0);
-                    let apart = d - first;
-                    var going = k == 0u || dot(apart, apart) >= FOUND * FOUND;
+                    var going = k == 0u || !alike(d, base);
                     // The fixed point of q = x - displacement(q).
                     for (var n = 0u; n < STEPS && going; n++) {
                         q = x - d;
                         path = textureLoad(paths, vec2i(floor(q)), 2u * f + layer, 0);
                         let next = moved(path, u);
                         miss = distance(next, d);
-                        going = miss >= FOUND && inside(q);
+                        going = miss >= FOUND && inside(q) && (k == 0u || !alike(next, base));
                         d = next;
                     }
+                    if k == 0u { base = d; }
                     var hit = miss <= MISS && inside(q);
                     for (; hit; hit = false) {
                         let there = textureLoad(surfaces, vec2u(q), f, 0);
@@ -126,7 +129,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                             let z = select(there.x, there.y, layer == 1u);
                             let place = x - d;
                             let home = place + moved(path, -offset);
-                            insert(&seen, Sample(z * penalty, miss, place, home, f, layer, there.y == 0.0, z));
+                            let plain = there.y == 0.0;
+                            settled = settled || plain;
+                            let found = Sample(z * penalty, z, miss, plain, place, home, 2u * f + layer);
+                            var others_known = seen.a.depth < NONE;
+                            if !others_known { seen.a = found; }
+                            for (; others_known; others_known = false) { insert(&seen, found); }
                         }
                     }
                     let more = k < u32(about.x);
@@ -148,9 +156,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             seen.a = seen.b;
             seen.b = seen.c;
             seen.c.depth = NONE;
-            let same_frame = now.source == last.source;
+            let same_frame = now.layer / 2u == last.layer / 2u;
             var apart = select(BEHIND * NEIGHBOUR, BEHIND, same_frame);
-            if last.depth >= NONE || (same_frame && now.far != last.far) { apart = 0.0; }
+            if last.depth >= NONE || (same_frame && now.layer != last.layer) { apart = 0.0; }
             var another = now.depth >= last.depth * apart;
             for (; another; another = false) {
                 let part = fetch(now);
@@ -159,7 +167,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                     weight += clear * part.weight;
                     if CONFIDENCE {
                         missed += clear * part.cover * now.miss;
-                        if now.source > 0u { others += clear * part.cover; }
+                        if now.layer > 1u { others += clear * part.cover; }
                     }
                     clear *= 1.0 - part.cover;
                     last = now;
@@ -198,11 +206,16 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }
 
 fn nothing() -> Sample {
-    return Sample(NONE, NONE, vec2f(-9.0), vec2f(-9.0), 99u, 0u, false, NONE);
+    return Sample(NONE, NONE, NONE, false, vec2f(-9.0), vec2f(-9.0), 99u);
 }
 
 fn inside(q: vec2f) -> bool {
     return all(q >= vec2f(0.0)) && all(q < vec2f(frame.size));
+}
+
+/// Whether two displacements lead to the same place.
+fn alike(a: vec2f, b: vec2f) -> bool {
+    return all(abs(a - b) < vec2f(ALIKE));
 }
 
 fn moved(path: vec4f, u: f32) -> vec2f {
@@ -211,8 +224,8 @@ fn moved(path: vec4f, u: f32) -> vec2f {
 
 /// Whether `new` shows the same as `old`, which then stays, or is bettered.
 fn is_known(old: ptr<function, Sample>, new_: Sample) -> bool {
-    if (*old).depth >= NONE || (*old).far != new_.far { return false; }
-    if (*old).source != new_.source {
+    if (*old).depth >= NONE || (*old).layer % 2u != new_.layer % 2u { return false; }
+    if (*old).layer != new_.layer {
         return all(abs((*old).home - new_.home) < vec2f(SAME_PLACE));
     }
     if any(abs((*old).at - new_.at) >= vec2f(SAME)) { return false; }
@@ -251,35 +264,36 @@ struct Part {
 fn fetch(now: Sample) -> Part {
     let size = vec2f(frame.size);
     var part = Part();
-    let layer = 2u * now.source + now.far;
-    var plain = now.plain;
+    let source = now.layer / 2u;
+    let is_far = now.layer % 2u == 1u;
+    let simple = now.plain && !WEIGHTED;
+    var plain = simple;
     for (; plain; plain = false) {
-        part.color = textureSampleLevel(colors, linear, now.at / size, layer, 0.0);
+        part.color = textureSampleLevel(colors, linear, now.at / size, now.layer, 0.0);
         part.weight = 1.0;
-        if WEIGHTED { part.weight = textureSampleLevel(surfaces, linear, now.at / size, now.source, 0.0).w; }
         part.cover = 1.0;
     }
     let corner = floor(now.at - 0.5);
     let share = now.at - 0.5 - corner;
-    let count = select(4u, 0u, now.plain);
+    let count = select(4u, 0u, simple);
     for (var i = 0u; i < count; i++) {
         let step = vec2f(vec2u(i & 1u, i >> 1u));
         let px = vec2u(clamp(corner + step, vec2f(0.0), size - 1.0));
         let both = mix(1.0 - share, share, step);
-        let there = textureLoad(surfaces, px, now.source, 0);
+        let there = textureLoad(surfaces, px, source, 0);
         let is_split = there.y > 0.0;
-        let from_far = now.far == 1u && is_split;
+        let from_far = is_far && is_split;
         let z = there.x;
         // Near: what is not behind it. Far: guessed backgrounds, and what lies as deep.
         let too_far = z > now.true_depth * BEHIND;
-        let too_near = now.far == 1u && z < now.true_depth / BEHIND;
+        let too_near = is_far && z < now.true_depth / BEHIND;
         let counts = from_far || !(too_far || too_near);
         let amount = select(0.0, both.x * both.y, counts);
-        part.color += amount * textureLoad(colors, px, 2u * now.source + u32(from_far), 0);
+        part.color += amount * textureLoad(colors, px, 2u * source + u32(from_far), 0);
         part.weight += amount * select(there.w, 1.0, from_far);
-        part.cover += amount * select(there.z, 1.0, now.far == 1u);
+        part.cover += amount * select(there.z, 1.0, is_far);
     }
-    if now.far == 1u && part.cover > 1e-4 {
+    if is_far && part.cover > 1e-4 {
         part.color /= part.cover;
         part.weight /= part.cover;
         part.cover = 1.0;

@@ -16,7 +16,7 @@
 @group(1) @binding(9) var far_path: Exact;
 @group(1) @binding(10) var surface: Exact;              // near depth; far depth, see below; coverage; weight
 
-// Far depth: over 0 it is that of a split pixel; PLAIN: no silhouette within two pixels; else BESIDE one.
+// Far depth: over 0 it is that of a split pixel; PLAIN: no silhouette in the 3 x 3; else BESIDE one.
 alias Marks = texture_storage_2d<r32float, write>;
 alias Color = texture_storage_2d<rgba32float, write>;
 alias Exact = texture_storage_2d<rgba32float, write>;
@@ -80,8 +80,8 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let px = vec2i(id.xy);
     var beside = false;
-    for (var i = 0; i < 25; i++) {
-        beside = beside || textureLoad(mixed, held(px + vec2i(i % 5, i / 5) - 2), 0).x > 0.0;
+    for (var i = 0; i < 9; i++) {
+        beside = beside || textureLoad(mixed, held(px + vec2i(i % 3, i / 3) - 1), 0).x > 0.0;
     }
     let own = textureLoad(color, px, 0);
     let own_motion = textureLoad(motion, px, 0);

@@ -6,11 +6,12 @@ const LAYERS: u32 = 5u;         // of the texture that holds them: what is below
 
 struct Tile {
     paths: array<vec4f, 4>,     // velocity, curvature: the longest, then always the most different
-    count: u32,                 // of them; fewer where the rest is like these or like standing still
-    nearest: f32,               // the least depth
-    split: u32,                 // 1: has pixels that show two surfaces
-    longest: f32,               // the longest displacement over the exposure [px]
+    box: vec4f,                 // least, greatest displacement of any while the frame is shown [px]
+    about: vec4f,               // see below
 }
+
+// `about`: how many paths there are, fewer where the rest is like these or like standing still; the
+// least depth; 1 if there are pixels that show two surfaces; the longest displacement [px].
 
 fn tiles_of(size: vec2u) -> vec2u {
     return (size + TILE - 1u) / TILE;

@@ -52,33 +52,45 @@ fn displaced(path: vec4f, u: f32) -> vec2f {
 fn local(@builtin(global_invocation_id) id: vec3u) {
     let tiles = tiles_of(frame.size);
     if any(id.xy >= tiles) { return; }
-    let there = id.xy * TILE;
-    let size = min(there + TILE, frame.size) - there;
+    let corner = id.xy * TILE;
+    let size = min(corner + TILE, frame.size) - corner;
     let pixels = size.x * size.y;
+    let span = shown();
     let u = longest_time();
-    var tile = Tile();
-    tile.nearest = 3e38;
+    var nearest = 3e38;
+    var split = 0.0;
     for (var i = 0u; i < pixels; i++) {
-        let seen = textureLoad(surface, there + vec2u(i % size.x, i / size.x), 0);
-        tile.nearest = min(tile.nearest, seen.x);
-        if seen.y > 0.0 { tile.split = 1u; }
+        let seen = textureLoad(surface, corner + vec2u(i % size.x, i / size.x), 0);
+        nearest = min(nearest, seen.x);
+        if seen.y > 0.0 { split = 1.0; }
     }
-    var chosen = array<vec4f, 4>();
-    for (var k = 0u; k < PATHS; k++) {
+    var tile = Tile();
+    var count = 0.0;
+    var longest = 0.0;
+    var more = true;
+    for (var k = 0u; k < PATHS && more; k++) {
+        let chosen = tile.paths;
         var most = 0.0;
+        var found = vec4f(0.0);
         for (var i = 0u; i < pixels; i++) {
-            let path = textureLoad(paths, there + vec2u(i % size.x, i / size.x), 0);
+            let path = textureLoad(paths, corner + vec2u(i % size.x, i / size.x), 0);
             let least = unlike(path, chosen, u);
             if least > most && least < WILD * WILD {
                 most = least;
-                chosen[k] = path;
+                found = path;
             }
         }
-        if k == 0u { tile.longest = sqrt(most); }
-        if most <= ALIKE * ALIKE { break; }
-        tile.count = k + 1u;
+        if k == 0u { longest = sqrt(most); }
+        more = most > ALIKE * ALIKE;
+        if more {
+            count += 1.0;
+            tile.paths[k] = found;
+            let a = displaced(found, span.x);
+            let b = displaced(found, span.y);
+            tile.box = vec4f(min(tile.box.xy, min(a, b)), max(tile.box.zw, max(a, b)));
+        }
     }
-    tile.paths = chosen;
+    tile.about = vec4f(count, nearest, split, longest);
     contents[id.y * tiles.x + id.x] = tile;
 }
 
@@ -88,57 +100,62 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= tiles) { return; }
     let span = shown();
     let u = longest_time();
+    let all = tiles.x * tiles.y;
+    var longest = 0.0;
+    for (var i = 0u; i < all; i++) { longest = max(longest, contents[i].about.w); }
+    let around = min(i32(ceil(longest / f32(TILE))) + 1, FARTHEST);
     let here = vec2i(id.xy);
-    let low = max(here - FARTHEST, vec2i(0));
-    let size = min(here + FARTHEST, vec2i(tiles) - 1) - low + 1;
+    let low = max(here - around, vec2i(0));
+    let size = min(here + around, vec2i(tiles) - 1) - low + 1;
     let count = size.x * size.y;
-    var tile = Tile();
-    tile.nearest = 3e38;
+    var nearest = 3e38;
+    var split = 0.0;
+    longest = 0.0;
     for (var i = 0; i < count; i++) {
         let there = low + vec2i(i % size.x, i / size.x);
         let at = u32(there.y) * tiles.x + u32(there.x);
-        // The box of all places that its motions lead to.
-        let off = vec2f((here - there) * i32(TILE));
-        var least = vec2f(0.0);
-        var most = vec2f(0.0);
-        let paths_there = contents[at].count;
-        for (var k = 0u; k < paths_there; k++) {
-            let path = contents[at].paths[k];
-            let a = displaced(path, span.x);
-            let b = displaced(path, span.y);
-            least = min(least, min(a, b));
-            most = max(most, max(a, b));
-        }
-        let margin = f32(TILE) + 2.0;
-        if all(off + margin > least) && all(off - margin < most) {
-            tile.nearest = min(tile.nearest, contents[at].nearest);
-            tile.split = max(tile.split, contents[at].split);
-            tile.longest = max(tile.longest, contents[at].longest);
+        if meets(contents[at].box, vec2f((here - there) * i32(TILE))) {
+            let about = contents[at].about;
+            nearest = min(nearest, about.y);
+            split = max(split, about.z);
+            longest = max(longest, about.w);
         }
     }
     var chosen = array<vec4f, 4>();
-    for (var k = 0u; k < PATHS; k++) {
+    var chosen_count = 0u;
+    var more = true;
+    for (var k = 0u; k < PATHS && more; k++) {
         var best = 0.0;
+        var found = vec4f(0.0);
         for (var i = 0; i < count; i++) {
             let there = low + vec2i(i % size.x, i / size.x);
             let at = u32(there.y) * tiles.x + u32(there.x);
             let off = vec2f((here - there) * i32(TILE));
-            let paths_there = contents[at].count;
+            let paths_there = select(0u, u32(contents[at].about.x), meets(contents[at].box, off));
             for (var n = 0u; n < paths_there; n++) {
                 let path = contents[at].paths[n];
                 let least = unlike(path, chosen, u);
                 if least > best && lands(path, span, off) {
                     best = least;
-                    chosen[k] = path;
+                    found = path;
                 }
             }
         }
-        if best <= ALIKE * ALIKE { break; }
-        tile.count = k + 1u;
+        more = best > ALIKE * ALIKE;
+        if more {
+            chosen[k] = found;
+            chosen_count = k + 1u;
+        }
     }
-    let about = vec4f(f32(tile.count), tile.nearest, f32(tile.split), tile.longest);
+    let about = vec4f(f32(chosen_count), nearest, split, longest);
     textureStore(reaching, id.xy, source.first, about);
     for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id.xy, source.first + 1u + k, chosen[k]); }
+}
+
+/// Whether any motion of a tile, by its box, leads to the one that lies `off` [px] away.
+fn meets(box: vec4f, off: vec2f) -> bool {
+    let margin = f32(TILE) + 2.0;
+    return all(off + margin > box.xy) && all(off - margin < box.zw);
 }
 
 /// Whether a tile moving along `path` touches the one that lies `off` [px] away.
