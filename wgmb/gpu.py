@@ -245,6 +245,6 @@ def _layout_entry(b: shader.Binding, source: shader.Source) -> dict:
         sampled = re.search(rf"textureSample\w*\(\s*{b.name}\b", source.text)
         kind = {"sample_type": "float" if sampled else "unfilterable-float"}
         return entry | {"texture": kind | dimension}
-    if b.type == "texture_2d<u32>":
-        return entry | {"texture": {"sample_type": "uint"}}
+    if b.type in ("texture_2d<u32>", "texture_2d_array<u32>"):
+        return entry | {"texture": {"sample_type": "uint"} | dimension}
     raise ShaderError(f"{source.name}: cannot bind {b.name}: {b.type}")

@@ -12,7 +12,7 @@ _BAND = 4 << 20  # bytes written at once: five times faster at 4K than all at on
 _HALF_MAX = 65504.0  # largest finite f16
 _USAGE = wgpu.TextureUsage
 _NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4"}
-_STORABLE = ("rgba16float", "rgba32float", "r32float", "r32uint")
+_STORABLE = ("rgba16float", "rgba32float", "r32float", "r32uint", "rgba32uint")
 _CHANNELS = {"r": 1, "rg": 2, "rgba": 4}
 
 

@@ -85,11 +85,11 @@ class Gather:
 
     def _layers(self, size, count: int) -> dict[str, wgpu.GPUTexture]:
         """Two layers a frame, near and far, and what there is to know of both."""
-        color, exact = gpu.texel(self._device, 4), "rgba32float"
+        color = gpu.texel(self._device, 4)
         return {
             "colors": self._images.texture("colors", size, color, 2 * count),
-            "paths": self._images.texture("paths", size, exact, 2 * count),
-            "surfaces": self._images.texture("surfaces", size, exact, count),
+            "paths": self._images.texture("paths", size, "rgba32uint", 2 * count),
+            "surfaces": self._images.texture("surfaces", size, "rgba32float", count),
         }
 
     def _reaching(self, size, count: int) -> wgpu.GPUTextureView:
@@ -141,8 +141,7 @@ class Gather:
                 entry,
                 replace(inputs.given, size=(across, down)),
                 source=source,
-                paths=views["near_path"],
-                surface=views["surface"],
+                near=views["near_path"],
                 contents=contents,
                 reaching=reaching,
             )

@@ -13,7 +13,7 @@ struct Sources {
 
 @group(1) @binding(0) var<uniform> sources: Sources;
 @group(1) @binding(1) var colors: texture_2d_array<f32>;    // premultiplied by alpha, coverage, weight; near, far, a frame
-@group(1) @binding(2) var paths: texture_2d_array<f32>;     // velocity, curvature; near, far, a frame
+@group(1) @binding(2) var paths: texture_2d_array<u32>;     // see packed(); near, far, a frame
 @group(1) @binding(3) var surfaces: texture_2d_array<f32>;  // near depth, far depth, coverage, weight
 @group(1) @binding(4) var tiles: texture_2d_array<f32>;     // LAYERS a frame
 @group(1) @binding(5) var own: texture_2d<f32>;             // the frame as it came
@@ -67,16 +67,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let about0 = textureLoad(tiles, tile, 0u, 0);
     var about1 = vec4f(0.0, NONE, 0.0, 0.0);
     var about2 = about1;
-    let path0 = textureLoad(paths, id.xy, 0u, 0);
-    var path1 = vec4f(0.0);
-    var path2 = path1;
+    let path0 = path_in(textureLoad(paths, id.xy, 0u, 0));
+    let depths0 = textureLoad(tiles, tile, 1u, 0);
+    var depths1 = vec4f(0.0);
+    var depths2 = vec4f(0.0);
+    var path1 = path0;
+    var path2 = path0;
     if source_count > 1u {
         about1 = textureLoad(tiles, tile, LAYERS, 0);
-        path1 = textureLoad(paths, id.xy, 2u, 0);
+        depths1 = textureLoad(tiles, tile, LAYERS + 1u, 0);
+        path1 = path_in(textureLoad(paths, id.xy, 2u, 0));
     }
     if source_count > 2u {
         about2 = textureLoad(tiles, tile, 2u * LAYERS, 0);
-        path2 = textureLoad(paths, id.xy, 4u, 0);
+        depths2 = textureLoad(tiles, tile, 2u * LAYERS + 1u, 0);
+        path2 = path_in(textureLoad(paths, id.xy, 4u, 0));
     }
     let times = shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5));
     let still = max(about0.w, max(about1.w, about2.w)) < STILL;
@@ -96,52 +101,57 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             // The frame itself, then the neighbour on the side of `t`, then the other one.
             let f = select(s, 3u - s, s > 0u && source_count == 3u && t > 0.0);
             let about = select(select(about2, about1, f == 1u), about0, f == 0u);
-            let path_here = select(select(path2, path1, f == 1u), path0, f == 0u);
+            let depths = select(select(depths2, depths1, f == 1u), depths0, f == 0u);
+            let path_here = chosen(f, path0, path1, path2);
             let offset = select(select(offsets.z, offsets.y, f == 1u), 0.0, f == 0u);
             let u = t - offset;
             let handicap = select(NEIGHBOUR, 1.0, s == 0u);
-            let first = moved(path_here, u);
+            let first = displacement(path_here, u);
             let seeds = u32(about.x) + select(1u, 2u, about.z > 0.0);
             for (var layer = 0u; layer < 1u + u32(about.z) && !(settled && layer == 1u); layer++) {
                 let penalty = handicap * select(1.0, GUESSED, layer == 1u);
                 var d = first;
                 var base = first;
-                // Once nothing there could be nearer than what is seen already, the search ends.
-                for (var k = 0u; k < seeds && !(seen.a.plain && seen.a.depth <= about.y * penalty); k++) {
+                var bound = about.y;
+                // The nearest first: once none could be nearer than what is seen already, the search ends.
+                for (var k = 0u; k < seeds && !(seen.a.plain && seen.a.depth <= bound * penalty); k++) {
                     var miss = NONE;
                     var q = x;
-                    var path = vec4f(0.0);
+                    var texel = vec4u(0u);
                     var going = k == 0u || !alike(d, base);
                     // The fixed point of q = x - displacement(q).
                     for (var n = 0u; n < STEPS && going; n++) {
                         q = x - d;
-                        path = textureLoad(paths, vec2i(floor(q)), 2u * f + layer, 0);
-                        let next = moved(path, u);
+                        texel = textureLoad(paths, vec2i(floor(q)), 2u * f + layer, 0);
+                        let next = displacement(path_in(texel), u);
                         miss = distance(next, d);
                         going = miss >= FOUND && inside(q) && (k == 0u || !alike(next, base));
                         d = next;
                     }
                     if k == 0u { base = d; }
-                    var hit = miss <= MISS && inside(q);
+                    let z = depth_in(texel);
+                    var hit = miss <= MISS && inside(q) && z != 0.0;
                     for (; hit; hit = false) {
-                        let there = textureLoad(surfaces, vec2u(q), f, 0);
-                        if layer == 0u || there.y > 0.0 {
-                            let z = select(there.x, there.y, layer == 1u);
-                            let place = x - d;
-                            let home = place + moved(path, -offset);
-                            let plain = there.y == 0.0;
-                            settled = settled || plain;
-                            let found = Sample(z * penalty, z, miss, plain, place, home, 2u * f + layer);
-                            var others_known = seen.a.depth < NONE;
-                            if !others_known { seen.a = found; }
-                            for (; others_known; others_known = false) { insert(&seen, found); }
-                        }
+                        let place = x - d;
+                        let home = place + displacement(path_in(texel), -offset);
+                        let plain = layer == 0u && z > 0.0;
+                        settled = settled || plain;
+                        let found = Sample(abs(z) * penalty, abs(z), miss, plain, place, home, 2u * f + layer);
+                        var others_known = seen.a.depth < NONE;
+                        if !others_known { seen.a = found; }
+                        for (; others_known; others_known = false) { insert(&seen, found); }
                     }
                     let more = k < u32(about.x);
-                    let seed = textureLoad(tiles, tile, f * LAYERS + 1u + min(k, PATHS - 1u), 0);
-                    d = moved(seed, u);
-                    var own_far = !more && k + 2u == seeds;
-                    for (; own_far; own_far = false) { d = moved(textureLoad(paths, id.xy, 2u * f + 1u, 0), u); }
+                    bound = select(NONE, select(select(depths.w, depths.z, k == 2u), select(depths.y, depths.x, k == 0u), k < 2u), more);
+                    var next_seed = k + 1u < seeds && !(seen.a.plain && seen.a.depth <= bound * penalty);
+                    for (; next_seed; next_seed = false) {
+                        let seed = textureLoad(tiles, tile, f * LAYERS + 2u + min(k, PATHS - 1u), 0);
+                        d = displacement(Path(seed.xy, seed.zw), u);
+                        var own_far = !more;
+                        for (; own_far; own_far = false) {
+                            d = displacement(path_in(textureLoad(paths, id.xy, 2u * f + 1u, 0)), u);
+                        }
+                    }
                 }
             }
         }
@@ -181,7 +191,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             accepted += 1.0;
         }
         for (; nobody; nobody = false) {        // the pixel's own path through the frame
-            let q = x - moved(path0, t);
+            let q = x - displacement(path0, t);
             sum += textureSampleLevel(own, linear, q / vec2f(frame.size), 0.0);
             if WEIGHTED {
                 total += textureSampleLevel(own_weight, linear, q / vec2f(frame.size), 0.0).x;
@@ -218,8 +228,10 @@ fn alike(a: vec2f, b: vec2f) -> bool {
     return all(abs(a - b) < vec2f(ALIKE));
 }
 
-fn moved(path: vec4f, u: f32) -> vec2f {
-    return displacement(Path(path.xy, path.zw), u);
+fn chosen(f: u32, a: Path, b: Path, c: Path) -> Path {
+    if f == 0u { return a; }
+    if f == 1u { return b; }
+    return c;
 }
 
 /// Whether `new` shows the same as `old`, which then stays, or is bettered.

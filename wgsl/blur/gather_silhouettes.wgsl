@@ -3,6 +3,7 @@
 //#include common/finite.wgsl
 //#include common/frame.wgsl
 //#include common/path.wgsl
+//#include blur/gather_tile.wgsl
 
 @group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
 @group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
@@ -11,14 +12,15 @@
 @group(1) @binding(4) var mixed: texture_2d<f32>;       // what `mark` wrote: 1 where two surfaces may show
 @group(1) @binding(5) var marks: Marks;
 @group(1) @binding(6) var near_color: Color;            // premultiplied by coverage too
-@group(1) @binding(7) var near_path: Exact;             // velocity, curvature
+@group(1) @binding(7) var near_path: Packed;            // see packed()
 @group(1) @binding(8) var far_color: Color;
-@group(1) @binding(9) var far_path: Exact;
+@group(1) @binding(9) var far_path: Packed;
 @group(1) @binding(10) var surface: Exact;              // near depth; far depth, see below; coverage; weight
 
 // Far depth: over 0 it is that of a split pixel; PLAIN: no silhouette in the 3 x 3; else BESIDE one.
 alias Marks = texture_storage_2d<r32float, write>;
 alias Color = texture_storage_2d<rgba32float, write>;
+alias Packed = texture_storage_2d<rgba32uint, write>;
 alias Exact = texture_storage_2d<rgba32float, write>;
 
 override WEIGHTED: bool = false;
@@ -130,15 +132,10 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     textureStore(near_color, px, near);
-    textureStore(near_path, px, as_path(near_motion));
+    textureStore(near_path, px, packed(path_of(near_motion), select(z, -z, beside)));
     textureStore(far_color, px, far);
-    textureStore(far_path, px, as_path(far_motion));
+    textureStore(far_path, px, packed(path_of(far_motion), max(far_z, 0.0)));
     textureStore(surface, px, vec4f(z, far_z, coverage, coverage * counts));
-}
-
-fn as_path(way: vec4f) -> vec4f {
-    let path = path_of(way);
-    return vec4f(path.velocity, path.curvature);
 }
 
 /// Add pixel `i` of the 5 x 5 around `px` to its side, the less the farther it is.

@@ -10,14 +10,14 @@ struct Source {
 }
 
 @group(1) @binding(0) var<uniform> source: Source;
-@group(1) @binding(1) var paths: texture_2d<f32>;       // velocity, curvature of the near layer
-@group(1) @binding(2) var surface: texture_2d<f32>;     // depth; over 0: that of a far layer
-@group(1) @binding(3) var<storage, read_write> contents: array<Tile>;     // of every tile's own pixels
-@group(1) @binding(4) var reaching: Reaching;            // of all that reaches it, LAYERS a frame
+@group(1) @binding(1) var near: texture_2d<u32>;        // see packed()
+@group(1) @binding(2) var<storage, read_write> contents: array<Tile>;     // of every tile's own pixels
+@group(1) @binding(3) var reaching: Reaching;            // of all that reaches it, LAYERS a frame
 
 alias Reaching = texture_storage_2d_array<rgba32float, write>;
 
 const ALIKE: f32 = 0.5;         // displacements closer than this [px] stand for each other
+const NOWHERE: f32 = 3e38;    // depth of nothing
 const WILD: f32 = 1e5;          // motions beyond this [px] are errors
 const FARTHEST: i32 = 16;       // tiles that a motion is followed over
 
@@ -44,6 +44,18 @@ fn unlike(path: vec4f, chosen: array<vec4f, 4>, u: f32) -> f32 {
                min(apart(path, chosen[2], u), apart(path, chosen[3], u)));
 }
 
+/// Which of `chosen` is most like `path`.
+fn most_alike(path: vec4f, chosen: array<vec4f, 4>, u: f32) -> vec4<bool> {
+    let d = vec4f(apart(path, chosen[0], u), apart(path, chosen[1], u),
+                  apart(path, chosen[2], u), apart(path, chosen[3], u));
+    let least = min(min(d.x, d.y), min(d.z, d.w));
+    return d == vec4f(least);
+}
+
+fn as_vec4(path: Path) -> vec4f {
+    return vec4f(path.velocity, path.curvature);
+}
+
 fn displaced(path: vec4f, u: f32) -> vec2f {
     return displacement(Path(path.xy, path.zw), u);
 }
@@ -57,13 +69,6 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
     let pixels = size.x * size.y;
     let span = shown();
     let u = longest_time();
-    var nearest = 3e38;
-    var split = 0.0;
-    for (var i = 0u; i < pixels; i++) {
-        let seen = textureLoad(surface, corner + vec2u(i % size.x, i / size.x), 0);
-        nearest = min(nearest, seen.x);
-        if seen.y > 0.0 { split = 1.0; }
-    }
     var tile = Tile();
     var count = 0.0;
     var longest = 0.0;
@@ -73,7 +78,7 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
         var most = 0.0;
         var found = vec4f(0.0);
         for (var i = 0u; i < pixels; i++) {
-            let path = textureLoad(paths, corner + vec2u(i % size.x, i / size.x), 0);
+            let path = as_vec4(path_in(textureLoad(near, corner + vec2u(i % size.x, i / size.x), 0)));
             let least = unlike(path, chosen, u);
             if least > most && least < WILD * WILD {
                 most = least;
@@ -89,6 +94,16 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
             let b = displaced(found, span.y);
             tile.box = vec4f(min(tile.box.xy, min(a, b)), max(tile.box.zw, max(a, b)));
         }
+    }
+    var nearest = NOWHERE;
+    var split = 0.0;
+    tile.depths = vec4f(NOWHERE);
+    for (var i = 0u; i < pixels; i++) {
+        let texel = textureLoad(near, corner + vec2u(i % size.x, i / size.x), 0);
+        let z = abs(depth_in(texel));
+        nearest = min(nearest, z);
+        if depth_in(texel) < 0.0 { split = 1.0; }
+        tile.depths = min(tile.depths, select(vec4f(NOWHERE), vec4f(z), most_alike(as_vec4(path_in(texel)), tile.paths, u)));
     }
     tile.about = vec4f(count, nearest, split, longest);
     contents[id.y * tiles.x + id.x] = tile;
@@ -108,7 +123,7 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
     let low = max(here - around, vec2i(0));
     let size = min(here + around, vec2i(tiles) - 1) - low + 1;
     let count = size.x * size.y;
-    var nearest = 3e38;
+    var nearest = NOWHERE;
     var split = 0.0;
     longest = 0.0;
     for (var i = 0; i < count; i++) {
@@ -147,9 +162,37 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
             chosen_count = k + 1u;
         }
     }
+    var depths = vec4f(NOWHERE);
+    for (var i = 0; i < count; i++) {
+        let there = low + vec2i(i % size.x, i / size.x);
+        let at = u32(there.y) * tiles.x + u32(there.x);
+        let off = vec2f((here - there) * i32(TILE));
+        let paths_there = select(0u, u32(contents[at].about.x), meets(contents[at].box, off));
+        for (var n = 0u; n < paths_there; n++) {
+            let path = contents[at].paths[n];
+            if lands(path, span, off) {
+                let z = vec4f(contents[at].depths[n]);
+                depths = min(depths, select(vec4f(NOWHERE), z, most_alike(path, chosen, u)));
+            }
+        }
+    }
+    // The nearest first.
+    for (var i = 0u; i < PATHS; i++) {
+        for (var k = 0u; k + 1u < chosen_count; k++) {
+            if depths[k] > depths[k + 1u] {
+                let path = chosen[k];
+                chosen[k] = chosen[k + 1u];
+                chosen[k + 1u] = path;
+                let z = depths[k];
+                depths[k] = depths[k + 1u];
+                depths[k + 1u] = z;
+            }
+        }
+    }
     let about = vec4f(f32(chosen_count), nearest, split, longest);
     textureStore(reaching, id.xy, source.first, about);
-    for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id.xy, source.first + 1u + k, chosen[k]); }
+    textureStore(reaching, id.xy, source.first + 1u, depths);
+    for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id.xy, source.first + 2u + k, chosen[k]); }
 }
 
 /// Whether any motion of a tile, by its box, leads to the one that lies `off` [px] away.
