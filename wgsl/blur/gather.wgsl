@@ -27,9 +27,8 @@ override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 const STILL: f32 = 0.01;        // paths shorter than this [px] need no search
 const STEPS: u32 = 4u;          // of a search, at most
 const FOUND: f32 = 0.25;        // a step shorter than this [px] ends the search
-const ALIKE: f32 = 0.25;        // searches that come closer than this [px] lead to the same
 const MISS: f32 = 1.0;          // a sample farther than this [px] from the pixel is none of it
-const SAME: f32 = 0.75;         // samples of one layer closer than this [px] are one
+const SAME: f32 = 0.75;         // searches, and samples of one layer, closer than this [px] are one
 const SAME_PLACE: f32 = 2.0;    // the same across frames, by their place in the frame itself
 const BEHIND: f32 = 1.05;       // ratio of depths that makes two surfaces
 const NEIGHBOUR: f32 = 1.1;     // a neighbouring frame's sample counts as this much farther
@@ -96,7 +95,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < samples; i++) {
         let t = shutter_time(times, i);
         var seen = Seen(nothing(), nothing(), nothing());
-        var settled = false;
+        var settled = false;        // an opaque sample was found
+        var solid = NONE;           // the depth of the nearest such
         for (var s = 0u; s < source_count && !(settled && abs(t) <= TRUSTED); s++) {
             // The frame itself, then the neighbour on the side of `t`, then the other one.
             let f = select(s, 3u - s, s > 0u && source_count == 3u && t > 0.0);
@@ -114,7 +114,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                 var base = first;
                 var bound = about.y;
                 // The nearest first: once none could be nearer than what is seen already, the search ends.
-                for (var k = 0u; k < seeds && !(seen.a.plain && seen.a.depth <= bound * penalty); k++) {
+                for (var k = 0u; k < seeds && solid > bound * penalty; k++) {
                     var miss = NONE;
                     var q = x;
                     var texel = vec4u(0u);
@@ -135,7 +135,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                         let place = x - d;
                         let home = place + displacement(path_in(texel), -offset);
                         let plain = layer == 0u && z > 0.0;
-                        settled = settled || plain;
+                        if plain {
+                            settled = true;
+                            solid = min(solid, z * penalty);
+                        }
                         let found = Sample(abs(z) * penalty, abs(z), miss, plain, place, home, 2u * f + layer);
                         var others_known = seen.a.depth < NONE;
                         if !others_known { seen.a = found; }
@@ -143,7 +146,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                     }
                     let more = k < u32(about.x);
                     bound = select(NONE, select(select(depths.w, depths.z, k == 2u), select(depths.y, depths.x, k == 0u), k < 2u), more);
-                    var next_seed = k + 1u < seeds && !(seen.a.plain && seen.a.depth <= bound * penalty);
+                    var next_seed = k + 1u < seeds && solid > bound * penalty;
                     for (; next_seed; next_seed = false) {
                         let seed = textureLoad(tiles, tile, f * LAYERS + 2u + min(k, PATHS - 1u), 0);
                         d = displacement(Path(seed.xy, seed.zw), u);
@@ -225,7 +228,7 @@ fn inside(q: vec2f) -> bool {
 
 /// Whether two displacements lead to the same place.
 fn alike(a: vec2f, b: vec2f) -> bool {
-    return all(abs(a - b) < vec2f(ALIKE));
+    return all(abs(a - b) < vec2f(SAME));
 }
 
 fn chosen(f: u32, a: Path, b: Path, c: Path) -> Path {

@@ -1,7 +1,7 @@
 // What a tile of a frame may show over the exposure: the few motions that stand for all in it.
 //#include common/path.wgsl
 
-const TILE: u32 = 32u;          // side [px]
+const TILE: u32 = 16u;          // side [px]
 const PATHS: u32 = 4u;          // motions kept a tile
 const LAYERS: u32 = 6u;         // of the texture that holds them: about, depths, then the paths
 
