@@ -41,6 +41,7 @@ struct Sample {
     true_depth: f32,
     miss: f32,          // distance of its place from the pixel [px]
     plain: bool,        // one opaque surface all around
+    calm: bool,         // and of one weight, nothing brighter than white
     at: vec2f,          // where in its frame [px]
     home: vec2f,        // where that is in the frame itself [px]
     layer: u32,         // near, far, of the frames one after the other
@@ -86,6 +87,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let still = max(about0.w, max(about1.w, about2.w)) < STILL;
     let samples = select(frame.samples, 0u, still);
 
+    let share = 1.0 / f32(frame.samples);   // before adding, so that no sum of finite colours overflows
     var sum = vec4f(0.0);
     var total = 0.0;
     var accepted = 0.0;
@@ -139,7 +141,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                             settled = true;
                             solid = min(solid, z * penalty);
                         }
-                        let found = Sample(abs(z) * penalty, abs(z), miss, plain, place, home, 2u * f + layer);
+                        let found = Sample(abs(z) * penalty, abs(z), miss, plain, is_calm(texel), place, home, 2u * f + layer);
                         var others_known = seen.a.depth < NONE;
                         if !others_known { seen.a = found; }
                         for (; others_known; others_known = false) { insert(&seen, found); }
@@ -189,27 +191,28 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
         var nobody = clear >= 0.5;
         if !nobody {
-            sum += color / (1.0 - clear);
-            total += weight / (1.0 - clear);
+            sum += share / (1.0 - clear) * color;
+            total += share / (1.0 - clear) * weight;
             accepted += 1.0;
         }
         for (; nobody; nobody = false) {        // the pixel's own path through the frame
             let q = x - displacement(path0, t);
-            sum += textureSampleLevel(own, linear, q / vec2f(frame.size), 0.0);
+            sum += share * textureSampleLevel(own, linear, q / vec2f(frame.size), 0.0);
             if WEIGHTED {
-                total += textureSampleLevel(own_weight, linear, q / vec2f(frame.size), 0.0).x;
+                total += share * textureSampleLevel(own_weight, linear, q / vec2f(frame.size), 0.0).x;
             } else {
-                total += 1.0;
+                total += share;
             }
             if !inside(q) { left += 1.0; }
         }
     }
-    var result = textureLoad(own, id.xy, 0);
-    if samples > 0u {
-        result = select(vec4f(0.0), sum / total, total > 0.0);
-    } else if WEIGHTED {
-        let counted = textureLoad(own_weight, id.xy, 0).x;
-        result = select(vec4f(0.0), result / counted, counted > 0.0);
+    var result = max(sum, vec4f(0.0)) / total;
+    if total <= 0.0 {       // to the bit
+        result = textureLoad(own, id.xy, 0);
+        if WEIGHTED {
+            let counted = textureLoad(own_weight, id.xy, 0).x;
+            result = select(vec4f(0.0), result / counted, counted > 0.0);
+        }
     }
     if CONFIDENCE {
         result = vec4f(1.0, 0.0, 0.0, 0.0);
@@ -219,7 +222,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }
 
 fn nothing() -> Sample {
-    return Sample(NONE, NONE, NONE, false, vec2f(-9.0), vec2f(-9.0), 99u);
+    return Sample(NONE, NONE, NONE, false, false, vec2f(-9.0), vec2f(-9.0), 99u);
 }
 
 fn inside(q: vec2f) -> bool {
@@ -281,13 +284,18 @@ fn fetch(now: Sample) -> Part {
     var part = Part();
     let source = now.layer / 2u;
     let is_far = now.layer % 2u == 1u;
-    let simple = now.plain && !WEIGHTED;
-    var plain = simple;
-    for (; plain; plain = false) {
-        part.color = textureSampleLevel(colors, linear, now.at / size, now.layer, 0.0);
+    let simple = now.plain && (now.calm || !WEIGHTED);
+    if simple {
         part.weight = 1.0;
+        if WEIGHTED { part.weight = textureLoad(surfaces, vec2u(now.at), source, 0).w; }
         part.cover = 1.0;
     }
+    var smooth_ = simple && !now.calm;
+    for (; smooth_; smooth_ = false) {
+        part.color = textureSampleLevel(colors, linear, now.at / size, now.layer, 0.0);
+    }
+    var sharp = simple && now.calm;
+    for (; sharp; sharp = false) { part.color = cubic(now.at, now.layer); }
     let corner = floor(now.at - 0.5);
     let share = now.at - 0.5 - corner;
     let count = select(4u, 0u, simple);
@@ -314,4 +322,26 @@ fn fetch(now: Sample) -> Part {
         part.cover = 1.0;
     }
     return part;
+}
+
+/// Catmull-Rom interpolation by five bilinear samples; the corners of the 4 x 4, which weigh next to
+/// nothing, are left out.
+fn cubic(at: vec2f, layer: u32) -> vec4f {
+    let one = floor(at - 0.5) + 0.5;
+    let f = at - one;
+    let w0 = f * (-0.5 + f * (1.0 - 0.5 * f));
+    let w2 = f * (0.5 + f * (2.0 - 1.5 * f));
+    let w3 = f * f * (-0.5 + 0.5 * f);
+    let middle = 1.0 - w0 - w3;         // of the two inner texels together
+    let texel = 1.0 / vec2f(frame.size);
+    let inner = (one + w2 / middle) * texel;
+    let first = (one - 1.0) * texel;
+    let last = (one + 2.0) * texel;
+    let both = middle.x * middle.y;
+    let sum = both * textureSampleLevel(colors, linear, inner, layer, 0.0)
+        + w0.x * middle.y * textureSampleLevel(colors, linear, vec2f(first.x, inner.y), layer, 0.0)
+        + w3.x * middle.y * textureSampleLevel(colors, linear, vec2f(last.x, inner.y), layer, 0.0)
+        + w0.y * middle.x * textureSampleLevel(colors, linear, vec2f(inner.x, first.y), layer, 0.0)
+        + w3.y * middle.x * textureSampleLevel(colors, linear, vec2f(inner.x, last.y), layer, 0.0);
+    return sum / (both + (w0.x + w3.x) * middle.y + (w0.y + w3.y) * middle.x);
 }

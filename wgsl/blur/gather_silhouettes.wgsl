@@ -30,6 +30,7 @@ const PLAIN: f32 = 0.0;
 const BESIDE: f32 = -1.0;
 const APART: f32 = 1.1;         // ratio of depths that makes two surfaces
 const DIFFERENT: f32 = 0.5;     // of their motions [px]
+const WHITE: f32 = 1.0;
 const WHOLE: f32 = 0.98;        // coverage from here on is all
 
 fn held(px: vec2i) -> vec2i {
@@ -81,13 +82,18 @@ struct Side {       // the mean of what lies on one side of a silhouette
 fn split(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let px = vec2i(id.xy);
+    let counts = weight_at(px);
     var beside = false;
-    for (var i = 0; i < 9; i++) {
-        beside = beside || textureLoad(mixed, held(px + vec2i(i % 3, i / 3) - 1), 0).x > 0.0;
+    var calm = true;        // one surface and weight, nothing brighter than white, in the 5 x 5
+    for (var i = 0; i < 25; i++) {
+        let off = vec2i(i % 5, i / 5) - 2;
+        let is_mixed = textureLoad(mixed, held(px + off), 0).x > 0.0;
+        let bright = any(textureLoad(color, held(px + off), 0) > vec4f(WHITE));
+        calm = calm && !is_mixed && !bright && weight_at(px + off) == counts;
+        beside = beside || (is_mixed && all(abs(off) < vec2i(2)));
     }
     let own = textureLoad(color, px, 0);
     let own_motion = textureLoad(motion, px, 0);
-    let counts = weight_at(px);
     var z = depth_at(px);
     var near = own;
     var near_motion = own_motion;
@@ -132,9 +138,9 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     textureStore(near_color, px, near);
-    textureStore(near_path, px, packed(path_of(near_motion), select(z, -z, beside)));
+    textureStore(near_path, px, packed(path_of(near_motion), select(z, -z, beside), calm));
     textureStore(far_color, px, far);
-    textureStore(far_path, px, packed(path_of(far_motion), max(far_z, 0.0)));
+    textureStore(far_path, px, packed(path_of(far_motion), max(far_z, 0.0), false));
     textureStore(surface, px, vec4f(z, far_z, coverage, coverage * counts));
 }
 

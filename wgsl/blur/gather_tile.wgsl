@@ -21,12 +21,13 @@ fn tiles_of(size: vec2u) -> vec2u {
     return (size + TILE - 1u) / TILE;
 }
 
-/// A place of a surface: all that the search needs in one texel, rgba32uint.
-/// Velocity, curvature in half floats, depth; a depth under 0 is that of a pixel at a silhouette;
-/// in a far layer, 0 says that there is none.
-fn packed(path: Path, depth: f32) -> vec4u {
+/// A place of a surface: all that the search needs in one texel, rgba32uint. Velocity, curvature in
+/// half floats, depth; a depth under 0 is that of a pixel at a silhouette; in a far layer, 0 says that
+/// there is none. The last bit of the depth says whether the pixel is calm.
+fn packed(path: Path, depth: f32, calm: bool) -> vec4u {
     let curvature = clamp(path.curvature, vec2f(-HALF_MAX), vec2f(HALF_MAX));
-    return vec4u(bitcast<vec2u>(path.velocity), pack2x16float(curvature), bitcast<u32>(depth));
+    let bits = (bitcast<u32>(depth) & ~1u) | u32(calm);
+    return vec4u(bitcast<vec2u>(path.velocity), pack2x16float(curvature), bits);
 }
 
 fn path_in(texel: vec4u) -> Path {
@@ -34,5 +35,9 @@ fn path_in(texel: vec4u) -> Path {
 }
 
 fn depth_in(texel: vec4u) -> f32 {
-    return bitcast<f32>(texel.w);
+    return bitcast<f32>(texel.w & ~1u);
+}
+
+fn is_calm(texel: vec4u) -> bool {
+    return (texel.w & 1u) == 1u;
 }
