@@ -127,14 +127,18 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
         if thin { before = most_different(px, between, behind); }
         let way = before - behind;
         if dot(way, way) >= DIFFERENT * DIFFERENT {
-            coverage = clamp(dot(own_motion - behind, way) / dot(way, way), 0.0, 1.0);
-            if coverage > WHOLE { coverage = 1.0; }
-            far = back.color / back.counted;
-            near = max(own - (1.0 - coverage) * counts * far, vec4f(0.0));
-            near_motion = before;
-            far_motion = behind;
-            z = front.depth / front.total;
-            far_z = back.depth / back.total;
+            let part = clamp(dot(own_motion - behind, way) / dot(way, way), 0.0, 1.0);
+            if part < 1.0 - WHOLE {     // all background, whatever the depth's one sample says
+                z = select(back.depth / back.total, z, z >= between);
+            } else {
+                coverage = select(part, 1.0, part > WHOLE);
+                far = back.color / back.counted;
+                near = max(own - (1.0 - coverage) * counts * far, vec4f(0.0));
+                near_motion = before;
+                far_motion = behind;
+                z = front.depth / front.total;
+                far_z = back.depth / back.total;
+            }
         }
     }
     textureStore(near_color, px, near);
