@@ -128,8 +128,10 @@ def crossing(size, offset, seed=0):
     color = np.zeros((*which.shape, 4))
     for k in (0, 1):
         px, py = x - way[k][0], y - way[k][1]
-        tone = sum(np.sin(0.3 * (n + 1) * (px * np.cos(n + k) + py * np.sin(n + k)))[..., None] * waves[k, n]
-                   for n in range(4))  # fmt: skip
+        tone = np.zeros((*x.shape, 3))
+        for n in range(4):
+            along = px * np.cos(n + k) + py * np.sin(n + k)
+            tone += np.sin(0.3 * (n + 1) * along)[..., None] * waves[k, n]
         shade = np.concatenate([0.5 + 0.1 * tone, np.ones((*tone.shape[:2], 1))], axis=2)
         color[which == k] = shade[which == k]
     velocity = speeds + 2 * bend * offset

@@ -131,10 +131,17 @@ def part(color, motion, z, mixed, y, x):
     if way @ way < 0.25:
         return None
     coverage = np.clip((motion[y, x] - behind) @ way / (way @ way), 0, 1)
-    coverage = 1.0 if coverage > 0.98 else coverage
+    far_z = mean(z, back)
+    if coverage < 1 - 0.98:
+        own_z = z[y, x] if z[y, x] >= between else far_z
+        return color[y, x], motion[y, x], own_z, 1.0, 0.0, motion[y, x], 0.0
+    whole = coverage > 0.98
+    coverage = 1.0 if whole else coverage
     far_color = mean(color, back)
     near_color = np.maximum(color[y, x] - (1 - coverage) * far_color, 0)
-    return near_color, before, mean(z, front), coverage, far_color, behind, mean(z, back)
+    near_motion = motion[y, x] if whole else before
+    near_z = z[y, x] if whole and z[y, x] < between else mean(z, front)
+    return near_color, near_motion, near_z, coverage, far_color, behind, far_z
 
 
 # ---- tiles ----------------------------------------------------------------------------------
@@ -237,9 +244,8 @@ def instant(layers, tiles, x, y, t, color):
     for s in samples:
         if clear < 0.01:
             break
-        if last and not (s.frame == last.frame and s.far != last.far):
-            if s.depth < last.depth * (1.05 if s.frame == last.frame else 1.05 * 1.1):
-                continue
+        if last and is_same_surface(s, last):
+            continue
         got, cover = fetch(layers[s.frame], s)
         if cover < 0.01:
             continue
@@ -250,6 +256,13 @@ def instant(layers, tiles, x, y, t, color):
         return sum_ / (1 - clear)
     way = moved(layers[0].path[0][y, x], t)
     return bilinear(color.astype(float), x + 0.5 - way[0], y + 0.5 - way[1])
+
+
+def is_same_surface(new, last):
+    """Whether the next sample is too near behind the last one to be another surface."""
+    if new.frame == last.frame:
+        return new.far == last.far and new.depth < 1.05 * last.depth
+    return new.depth < 1.05 * 1.1 * last.depth
 
 
 def find(layers, tiles, x, y, t):
@@ -337,7 +350,7 @@ def fetch(frame, s):
     color, cover = 0.0, 0.0
     for dj in (0, 1):
         for di in (0, 1):
-            i, j = (*corner, di, dj)
+            i, j = corner[0] + di, corner[1] + dj
             share = np.prod(1 - np.abs(s.at - 0.5 - (i, j)))
             p = min(max(j, 0), height - 1), min(max(i, 0), width - 1)
             z, behind = frame.depth[0][p], frame.depth[1][p] > 0

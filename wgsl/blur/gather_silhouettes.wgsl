@@ -134,9 +134,9 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
                 coverage = select(part, 1.0, part > WHOLE);
                 far = back.color / back.counted;
                 near = max(own - (1.0 - coverage) * counts * far, vec4f(0.0));
-                near_motion = before;
                 far_motion = behind;
-                z = front.depth / front.total;
+                if part <= WHOLE { near_motion = before; }
+                if part <= WHOLE || z >= between { z = front.depth / front.total; }
                 far_z = back.depth / back.total;
             }
         }
