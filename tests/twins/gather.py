@@ -18,6 +18,7 @@ class Layers:
     path: list  # velocity, curvature
     depth: list  # far: 0 where there is none
     coverage: np.ndarray
+    guessed: np.ndarray  # the far layer was not seen
     plain: np.ndarray  # no silhouette in the 3 x 3
     calm: np.ndarray  # none, and nothing brighter than white, in the 5 x 5
 
@@ -81,10 +82,11 @@ def split(offset, color, motion, depth):
             mixed[y, x] = max(depths) > 1.1 * min(depths) and apart > 0.25
     found = [color.copy(), motion.copy(), z.copy(), np.ones((height, width))]
     far = [np.zeros_like(color), motion.copy(), np.zeros((height, width))]
+    guessed = np.zeros((height, width), bool)
     for y, x in np.argwhere(mixed):
         parted = part(color, motion, z, mixed, y, x)
         if parted:
-            for array, value in zip(found + far, parted, strict=True):
+            for array, value in zip([*found, *far, guessed], parted, strict=True):
                 array[y, x] = value
     plain, calm = np.ones((2, height, width), bool)
     for y in range(height):
@@ -94,7 +96,8 @@ def split(offset, color, motion, depth):
                 mixed[p] or (color[p] > 1).any() for p in around(height, width, y, x, 2)
             )
     paths = [stored(found[1]), stored(far[1])]
-    return Layers(offset, [found[0], far[0]], paths, [found[2], far[2]], found[3], plain, calm)
+    depths = [found[2], far[2]]
+    return Layers(offset, [found[0], far[0]], paths, depths, found[3], guessed, plain, calm)
 
 
 def stored(motion):
@@ -105,7 +108,7 @@ def stored(motion):
 
 
 def part(color, motion, z, mixed, y, x):
-    """Near colour, motion, depth, coverage; far colour, motion, depth."""
+    """Near colour, motion, depth, coverage; far colour, motion, depth; whether that is a guess."""
     height, width = z.shape
     inner = list(around(height, width, y, x, 1))
     nearest, farthest = min(z[p] for p in inner), max(z[p] for p in inner)
@@ -133,15 +136,15 @@ def part(color, motion, z, mixed, y, x):
     coverage = np.clip((motion[y, x] - behind) @ way / (way @ way), 0, 1)
     far_z = mean(z, back)
     if coverage < 1 - 0.98:
-        own_z = z[y, x] if z[y, x] >= between else far_z
-        return color[y, x], motion[y, x], own_z, 1.0, 0.0, motion[y, x], 0.0
+        far_z = z[y, x] if z[y, x] >= between else far_z
+        return 0.0, before, mean(z, front), 0.0, color[y, x], motion[y, x], far_z, False
     whole = coverage > 0.98
     coverage = 1.0 if whole else coverage
     far_color = mean(color, back)
     near_color = np.maximum(color[y, x] - (1 - coverage) * far_color, 0)
     near_motion = motion[y, x] if whole else before
     near_z = z[y, x] if whole and z[y, x] < between else mean(z, front)
-    return near_color, near_motion, near_z, coverage, far_color, behind, far_z
+    return near_color, near_motion, near_z, coverage, far_color, behind, far_z, True
 
 
 # ---- tiles ----------------------------------------------------------------------------------
@@ -281,7 +284,7 @@ def find(layers, tiles, x, y, t):
         for far in (False, True):
             if far and (not tile["edges"] or np.isfinite(solid)):
                 continue
-            penalty = (1.1 if f else 1.0) * (1.2 if far else 1.0)
+            penalty = 1.1 if f else 1.0
             own = moved(frame.path[0][y, x], u)
             seeds = [(own, tile["nearest"])]
             seeds += [(moved(p, u), z) for p, z in zip(tile["paths"], tile["depths"], strict=True)]
@@ -301,7 +304,8 @@ def find(layers, tiles, x, y, t):
                     solid = min(solid, z * penalty)
                 at = centre - place
                 home = at + moved(frame.path[int(far)][pixel], -frame.offset)
-                insert(kept, Sample(z * penalty, z, miss, at, home, f, far, pixel))
+                guess = 1.2 if far and frame.guessed[pixel] else 1.0
+                insert(kept, Sample(z * penalty * guess, z, miss, at, home, f, far, pixel))
     return kept
 
 

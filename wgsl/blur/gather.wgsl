@@ -111,12 +111,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             let first = displacement(path_here, u);
             let seeds = u32(about.x) + select(1u, 2u, about.z > 0.0);
             for (var layer = 0u; layer < 1u + u32(about.z) && !(settled && layer == 1u); layer++) {
-                let penalty = handicap * select(1.0, GUESSED, layer == 1u);
                 var d = first;
                 var base = first;
                 var bound = about.y;
                 // The nearest first: once none could be nearer than what is seen already, the search ends.
-                for (var k = 0u; k < seeds && solid > bound * penalty; k++) {
+                for (var k = 0u; k < seeds && solid > bound * handicap; k++) {
                     var miss = NONE;
                     var q = x;
                     var texel = vec4u(0u);
@@ -139,16 +138,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                         let plain = layer == 0u && z > 0.0;
                         if plain {
                             settled = true;
-                            solid = min(solid, z * penalty);
+                            solid = min(solid, z * handicap);
                         }
-                        let found = Sample(abs(z) * penalty, abs(z), miss, plain, is_calm(texel), place, home, 2u * f + layer);
+                        let guess = select(1.0, GUESSED, layer == 1u && !is_calm(texel));
+                        let found = Sample(abs(z) * handicap * guess, abs(z), miss, plain, is_calm(texel), place, home, 2u * f + layer);
                         var others_known = seen.a.depth < NONE;
                         if !others_known { seen.a = found; }
                         for (; others_known; others_known = false) { insert(&seen, found); }
                     }
                     let more = k < u32(about.x);
                     bound = select(NONE, select(select(depths.w, depths.z, k == 2u), select(depths.y, depths.x, k == 0u), k < 2u), more);
-                    var next_seed = k + 1u < seeds && solid > bound * penalty;
+                    var next_seed = k + 1u < seeds && solid > bound * handicap;
                     for (; next_seed; next_seed = false) {
                         let seed = textureLoad(tiles, tile, f * LAYERS + 2u + min(k, PATHS - 1u), 0);
                         d = displacement(Path(seed.xy, seed.zw), u);

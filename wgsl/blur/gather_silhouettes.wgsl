@@ -101,6 +101,7 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
     var far_motion = own_motion;
     var far_z = select(PLAIN, BESIDE, beside);
     var coverage = 1.0;
+    var seen = false;       // the far layer is no guess
 
     let marked = textureLoad(mixed, px, 0).x > 0.0;
     var nearest = FAR;
@@ -128,8 +129,15 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
         let way = before - behind;
         if dot(way, way) >= DIFFERENT * DIFFERENT {
             let part = clamp(dot(own_motion - behind, way) / dot(way, way), 0.0, 1.0);
+            far_z = back.depth / back.total;
             if part < 1.0 - WHOLE {     // all background, whatever the depth's one sample says
-                z = select(back.depth / back.total, z, z >= between);
+                seen = true;
+                coverage = 0.0;
+                far = own / max(counts, 1e-6);
+                near = vec4f(0.0);
+                near_motion = before;
+                if z >= between { far_z = z; }
+                z = front.depth / front.total;
             } else {
                 coverage = select(part, 1.0, part > WHOLE);
                 far = back.color / back.counted;
@@ -137,14 +145,13 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
                 far_motion = behind;
                 if part <= WHOLE { near_motion = before; }
                 if part <= WHOLE || z >= between { z = front.depth / front.total; }
-                far_z = back.depth / back.total;
             }
         }
     }
     textureStore(near_color, px, near);
     textureStore(near_path, px, packed(path_of(near_motion), select(z, -z, beside), calm));
     textureStore(far_color, px, far);
-    textureStore(far_path, px, packed(path_of(far_motion), max(far_z, 0.0), false));
+    textureStore(far_path, px, packed(path_of(far_motion), max(far_z, 0.0), seen));
     textureStore(surface, px, vec4f(z, far_z, coverage, coverage * counts));
 }
 
