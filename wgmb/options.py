@@ -140,8 +140,8 @@ class BlurOptions:
     "tap: through the previous and the next place (curved), or along the mean velocity."
     form: Literal["shutter", "even", "slices", "published"] | None = None
     "tap (shutter), tiles (even), reproject (slices): published is the form of the paper."
-    show: Literal["color", "count"] | None = None
-    "reproject: count shows how often a pixel was reached."
+    show: Literal["color", "count", "confidence"] | None = None
+    "reproject: count shows how often a pixel was reached. gather: confidence shows how sure it is."
     seed: int | None = None
     "distributed: another seed is other noise."
 
