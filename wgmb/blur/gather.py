@@ -40,7 +40,7 @@ class Gather:
             raise InputError(f"show must be one of {', '.join(SHOWN)}, got {show!r}")
         self._device, self._output, self._show = device, output, show
         self._images = Images(device)
-        self._contents = Scratch(device)
+        self._contents, self._farthest = Scratch(device), Scratch(device)
 
     def encode(self, encoder, inputs, output):
         """Record silhouettes and tiles of every frame, then the search."""
@@ -135,7 +135,7 @@ class Gather:
         source = self._uniform("source", data)
         contents = self._contents.at_least(tiles)
         reaching = self._reaching(inputs.given.size, count)
-        for entry in ("local", "reach"):
+        for entry in ("clear", "local", "reach"):
             kernel.run(
                 encoder,
                 entry,
@@ -144,6 +144,7 @@ class Gather:
                 near=views["near_path"],
                 contents=contents,
                 reaching=reaching,
+                farthest=self._farthest.at_least(4),
             )
 
     def _uniform(self, name: str, data: np.ndarray) -> wgpu.GPUBuffer:

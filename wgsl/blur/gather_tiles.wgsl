@@ -12,6 +12,7 @@ struct Source {
 @group(1) @binding(0) var<uniform> source: Source;
 @group(1) @binding(1) var near: texture_2d<u32>;        // see packed()
 @group(1) @binding(2) var<storage, read_write> contents: array<Tile>;     // of every tile's own pixels
+@group(1) @binding(4) var<storage, read_write> farthest: atomic<u32>;   // bits of the longest displacement of all
 @group(1) @binding(3) var reaching: Reaching;            // of all that reaches it, LAYERS a frame
 
 alias Reaching = texture_storage_2d_array<rgba32float, write>;
@@ -61,6 +62,12 @@ fn displaced(path: vec4f, u: f32) -> vec2f {
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
+fn clear(@builtin(global_invocation_id) id: vec3u) {
+    if all(id.xy == vec2u(0u)) { atomicStore(&farthest, 0u); }
+}
+
+/// The few motions of a tile's own pixels.
+@compute @workgroup_size(WG_X, WG_Y)
 fn local(@builtin(global_invocation_id) id: vec3u) {
     let tiles = tiles_of(frame.size);
     if any(id.xy >= tiles) { return; }
@@ -107,25 +114,24 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
     }
     tile.about = vec4f(count, nearest, split, longest);
     contents[id.y * tiles.x + id.x] = tile;
+    atomicMax(&farthest, bitcast<u32>(longest));
 }
 
+/// The few motions that lead to a tile, from wherever they come.
 @compute @workgroup_size(WG_X, WG_Y)
 fn reach(@builtin(global_invocation_id) id: vec3u) {
     let tiles = tiles_of(frame.size);
     if any(id.xy >= tiles) { return; }
     let span = shown();
     let u = longest_time();
-    let all = tiles.x * tiles.y;
-    var longest = 0.0;
-    for (var i = 0u; i < all; i++) { longest = max(longest, contents[i].about.w); }
-    let around = min(i32(ceil(longest / f32(TILE))) + 1, FARTHEST);
+    let around = min(i32(ceil(bitcast<f32>(atomicLoad(&farthest)) / f32(TILE))) + 1, FARTHEST);
     let here = vec2i(id.xy);
     let low = max(here - around, vec2i(0));
     let size = min(here + around, vec2i(tiles) - 1) - low + 1;
     let count = size.x * size.y;
     var nearest = NOWHERE;
     var split = 0.0;
-    longest = 0.0;
+    var longest = 0.0;
     for (var i = 0; i < count; i++) {
         let there = low + vec2i(i % size.x, i / size.x);
         let at = u32(there.y) * tiles.x + u32(there.x);
