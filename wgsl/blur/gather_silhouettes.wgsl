@@ -15,9 +15,8 @@
 @group(1) @binding(7) var near_path: Packed;            // see packed()
 @group(1) @binding(8) var far_color: Color;
 @group(1) @binding(9) var far_path: Packed;
-@group(1) @binding(10) var surface: Exact;              // near depth; far depth, see below; coverage; weight
+@group(1) @binding(10) var surface: Exact;              // near depth; far depth, 0 where there is none; coverage; weight
 
-// Far depth: over 0 it is that of a split pixel; PLAIN: no silhouette in the 3 x 3; else BESIDE one.
 alias Marks = texture_storage_2d<r32float, write>;
 alias Color = texture_storage_2d<rgba32float, write>;
 alias Packed = texture_storage_2d<rgba32uint, write>;
@@ -26,8 +25,6 @@ alias Exact = texture_storage_2d<rgba32float, write>;
 override WEIGHTED: bool = false;
 
 const FAR: f32 = 1e10;          // depth of what has none
-const PLAIN: f32 = 0.0;
-const BESIDE: f32 = -1.0;
 const APART: f32 = 1.1;         // ratio of depths that makes two surfaces
 const DIFFERENT: f32 = 0.5;     // of their motions [px]
 const WHITE: f32 = 1.0;
@@ -99,7 +96,7 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
     var near_motion = own_motion;
     var far = vec4f(0.0);
     var far_motion = own_motion;
-    var far_z = select(PLAIN, BESIDE, beside);
+    var far_z = 0.0;
     var coverage = 1.0;
     var seen = false;       // the far layer is no guess
 
