@@ -145,6 +145,7 @@ def chen(lab: Laboratory, report: Report, size: tuple[int, int], moments: int = 
     """
     if "fusion" not in METHODS:
         raise InputError(f"this experiment needs the method fusion; there is {', '.join(METHODS)}")
+    report.samples = 8
     tap, fusion = (Contender(m, (("form", "published"),)) for m in ("tap", "fusion"))
     printed = Contender("fusion", (("form", "published"), ("weights", "published")))
     both = [tap, fusion, printed, Contender("tap"), Contender("fusion")]
