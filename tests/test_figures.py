@@ -101,7 +101,7 @@ def test_screen_cone_is_the_sum_of_ten_frames(video):
     "arguments",
     ["disk --set speed=-1", "disk --set speed=nan", "disk --set speed=1e9", "cone --set video=film",
      "spiric --set minor_radius=-0.1", "spiric --set minor_radius=0.4", "disk --method tap",
-     "spiric --set slice=inf", "disk --sharp", "disk --rolling up"],
+     "spiric --set slice=inf", "disk --rolling up"],
 )  # fmt: skip
 def test_senseless_settings_are_one_line(capsys, tmp_path, arguments):
     code, out, err = make.inside(

@@ -28,7 +28,7 @@ def test_every_option_that_is_named_exists():
     for group in vars(options).values():
         for name in getattr(group, "__dataclass_fields__", ()):
             known.add("--" + name.replace("_", "-"))
-    known |= {"--adapter", "--size", "--rounds", "--verbose", "--sharp", "--passes"}
+    known |= {"--adapter", "--size", "--rounds", "--verbose", "--sharp", "--passes", "--config"}
     known |= {"--truth", "--inputs", "--frame", "--peer", "--experiment", "--save"}
     known |= {"--against", "--article"}
     known |= {"--method", "--report", "--speed"}

@@ -24,7 +24,8 @@ from wgmb import (
 from wgmb.blur import METHODS
 from wgmb.timing import Timing
 from wgmb.viewer import State, controls, offscreen
-from wgmb.viewer.stage import Pace
+from wgmb.viewer.pace import Pace
+from wgmb.viewer.stage import shutter_of
 from wgmb.viewer.window import frame
 
 SIZE = 640, 1010  # tall enough for the whole panel; the picture is 320 x 180
@@ -132,11 +133,12 @@ def test_the_window_shows_the_picture_in_its_place(hand):
 
 
 def test_every_method_and_scene_can_be_chosen(hand):
-    seen = []
-    for method in METHODS:
+    methods = hand.viewer.stage.methods(PLAIN)
+    assert set(METHODS) - set(methods) == {"volume"}  # there is none in the scene
+    for method in methods:
         hand.choose("method", method)
         assert hand.state.method == method
-        seen.append(hand.picture())
+        assert hand.picture().std() > 0.01
     for name in scenes.SCENES:
         if name != hand.state.source:
             hand.choose("scene", name)
@@ -185,7 +187,7 @@ def test_what_a_method_shows_of_itself_can_be_looked_at(hand):
 
 
 def test_all_that_can_be_looked_at_can_be_drawn(hand):
-    for method in METHODS:
+    for method in hand.viewer.stage.methods(PLAIN):
         for look in hand.viewer.stage.looks(replace(PLAIN, method=method)):
             if look != "error":
                 hand.viewer.state = replace(PLAIN, method=method, look=look)
@@ -234,6 +236,23 @@ def test_elevation_and_distance_are_held(hand):
     far = controls.wheel(PLAIN, layout, 5, 5, 0, 1e5)
     assert far.dolly == 10
     assert controls.wheel(PLAIN, layout, 500, 5, 0, 100) == PLAIN  # not over the picture
+
+
+def test_the_torusphere_asks_for_its_method_and_shutter_and_is_turned(hand):
+    hand.choose("scene", "torusphere")
+    assert (hand.state.method, hand.state.curve) == ("volume", "cosine")
+    before = hand.picture()
+    want = Render(scenes.make("torusphere"), Blur(**blur_of(hand.state)), size=(320, 180))(0.0)
+    assert np.abs(before - stills.srgb(want[..., :3])).max() < 2e-3
+    hand.drag((100, 500), (180, 500))
+    assert dict(hand.state.settings)["cam_x"] == pytest.approx(-1.0)
+    assert np.abs(hand.picture() - before).mean() > 0.005
+    hand.choose("scene", "crossing")
+    assert (hand.state.method, hand.state.shutter, hand.state.curve) == ("tap", 180, "box")
+
+
+def blur_of(state):
+    return {"method": state.method, "shutter": shutter_of(state), "samples": state.samples}
 
 
 def test_a_scene_with_a_camera_of_its_own_is_turned_by_it(monkeypatch):
@@ -349,6 +368,21 @@ def test_a_parameter_of_the_scene(hand):
     hand.drag((x + 20, y + 8), (x + 120, y + 8))
     assert dict(hand.state.settings)["speed"] > 1.2
     assert np.abs(hand.picture() - before).mean() > 1e-3
+
+
+@pytest.mark.parametrize("name", list(scenes.SCENES))
+def test_the_panel_changes_nothing_by_itself(hand, name):
+    opened = PLAIN.opened(name)
+    for method in hand.viewer.stage.methods(opened):
+        odd = {"fastest": 0.0431, "max_blur": 33.3, "phase": "0.123", "shutter": 123.4}
+        state = hand.viewer.stage.possible(replace(opened, method=method, **odd))
+        hand.viewer.state = state
+        hand.look()
+        assert hand.state == state
+        if "velocity" in hand.viewer.stage.looks(state):
+            hand.viewer.state = replace(state, look="velocity")
+            hand.look()
+            assert hand.state == replace(state, look="velocity")
 
 
 def test_a_value_that_is_refused_is_said_and_undone(hand):
@@ -583,7 +617,7 @@ def test_settings_come_back_as_they_were_saved(state):
         ('[render]\nscene = "crossing"\nsamples = "many"', "samples"),
         ('[render]\nscene = "crossing"\nmethod = "magic"', "magic"),
         ('[render]\nscene = "crossing"\norbit = [1]', "orbit"),
-        ('[render]\nscene = "crossing"\nset = ["speed=x"]', "speed=x"),
+        ('[render]\nscene = "crossing"\nset = ["speed"]', "speed"),
         ('[render]\nscene = "crossing"\nsamples = nan', "samples"),
         ('[render]\nscene = "crossing"\ncolour = 1', "colour"),
         ('[render]\nscene = "crossing"\n[view]\ncompare = "both"', "both"),
@@ -692,6 +726,23 @@ def test_frames_on_disk_have_no_reference(reel):
     for look in stage.looks(state):
         reel.viewer.state = replace(state, look=look)
         assert np.isfinite(reel.picture()).all()
+
+
+def test_a_picture_without_passes_is_shown_as_it_is(tmp_path, hand):
+    image = np.random.default_rng(0).integers(0, 256, (36, 64, 3), np.uint8)
+    iio.imwrite(tmp_path / "plain.png", image)
+    hand.viewer.state = PLAIN.opened(str(tmp_path / "plain.png"))
+    hand.look()
+    assert hand.state.look == "sharp"
+    assert hand.viewer.stage.looks(hand.state) == ["sharp"]
+    assert np.abs(stills.srgb(hand.viewer.stage.download()[..., :3]) - image / 255).max() < 0.01
+
+
+def test_a_method_that_needs_a_scene_gives_way_to_one_that_does_not(reel):
+    reel.viewer.state = replace(PLAIN.opened(SAMPLE), method="distributed", look="error")
+    reel.look()
+    assert (reel.state.method, reel.state.look) == (next(iter(METHODS)), "result")
+    assert "distributed" in reel.viewer._message[0]
 
 
 def test_what_cannot_be_opened_is_told(tmp_path):

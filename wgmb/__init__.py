@@ -16,6 +16,7 @@ from .cameras import Camera, CameraFile, Reprojections
 from .errors import DeviceError, Error, InputError, ShaderError
 from .frame import Frame
 from .output import Output
+from .perceive import Cone, Viewer
 from .pipeline import Blur, blur
 from .render import Render
 from .run import Report, blur_sequence
@@ -31,6 +32,7 @@ __all__ = [
     "Camera",
     "CameraFile",
     "Clip",
+    "Cone",
     "DeviceError",
     "Error",
     "Frame",
@@ -45,6 +47,7 @@ __all__ = [
     "Shot",
     "Shutter",
     "Vectors",
+    "Viewer",
     "blur",
     "blur_sequence",
 ]

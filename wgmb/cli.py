@@ -20,9 +20,8 @@ import cyclopts
 from cyclopts import Parameter
 from cyclopts.config import Toml
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from . import __version__, gpu, lab
+from . import __version__, gpu, lab, seeing
 from .errors import DeviceError, Error, InputError
 from .info import describe
 from .options import (
@@ -31,12 +30,14 @@ from .options import (
     OutputOptions,
     SceneOptions,
     ShutterOptions,
+    plain,
     size_of,
 )
 from .output import Output
 from .pipeline import Blur
 from .render import Render, render_frames
 from .run import Report, blur_sequence
+from .terminal import progress
 
 DONE, SOME_FAILED, USAGE, NO_DEVICE, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -100,48 +101,17 @@ def blur(
         say.print(f"adapter: {made.device.adapter.summary}", markup=False)
         say.print(f"settings: {files.settings}", markup=False)
     started = time.perf_counter()
-    with _progress(say, len(clip.numbers), quiet) as tick:
+    with progress(say, len(clip.numbers), quiet) as tick:
         report = blur_sequence(clip, made, files, resume=output.resume, progress=tick)
     return _conclude(say, clip, files, report, time.perf_counter() - started, quiet, verbose)
 
 
 def _settings(look: BlurOptions, when: ShutterOptions, given: InputOptions) -> dict:
     """Everything that changes a result, as it is written into the files."""
-    every = {"wgmb": __version__} | _plain(look) | _plain(when) | _plain(given)
+    every = {"wgmb": __version__} | plain(look) | plain(when) | plain(given)
     for not_a_look in ("frames", "skip_missing"):
         del every[not_a_look]
     return every
-
-
-def _plain(options) -> dict:
-    return {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items()}
-
-
-@contextlib.contextmanager
-def _progress(say: Console, frames: int, quiet: bool, doing: str = "blurring"):
-    """A bar with frames/s and time left where somebody watches; nothing elsewhere."""
-    if quiet or not say.is_terminal:
-        yield None
-        return
-    columns = (
-        "{task.description}",
-        BarColumn(),
-        "{task.completed}/{task.total}",
-        TextColumn("{task.fields[speed]}"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=say, transient=True) as bar:
-        task = bar.add_task(doing, total=frames, speed="")
-        started, made = time.perf_counter(), [0]
-
-        def tick(number: int, what: str) -> None:
-            made[0] += what == "done"
-            speed = made[0] / (time.perf_counter() - started)
-            bar.update(
-                task, advance=1, description=f"frame {number}", speed=f"{speed:.1f} frames/s"
-            )
-
-        yield tick
 
 
 def _samples(blur: Blur) -> int | str:
@@ -222,7 +192,7 @@ def render(
     made = look.make(when.make(), adapter)
     renderer = Render(picture, made, size=size_of(what.size), fps=fps, rays=what.rays)
     settings = {"scene": scene, "sharp": sharp, "passes": passes, "bits": output.bits}
-    settings |= _plain(look) | _plain(when) | _plain(what) | {"wgmb": __version__, "fps": fps}
+    settings |= plain(look) | plain(when) | plain(what) | {"wgmb": __version__, "fps": fps}
     settings["samples"] = _samples(made)
     files = Output(
         output.output,
@@ -238,7 +208,7 @@ def render(
         say.print(f"adapter: {renderer.blur.device.adapter.summary}", markup=False)
         say.print(f"settings: {files.settings}", markup=False)
     started = time.perf_counter()
-    with _progress(say, len(moments), quiet, "rendering") as tick:
+    with progress(say, len(moments), quiet, "rendering") as tick:
         try:
             skipped = render_frames(renderer, moments, files, sharp, passes, output.resume, tick)
         except BaseException:
@@ -350,6 +320,8 @@ def devices() -> int:
 
 app.command(lab.compare)
 app.command(lab.bench)
+app.command(seeing.perceive)
+app.command(seeing.shutter)
 
 
 def main(arguments: list[str] | None = None) -> int:

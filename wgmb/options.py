@@ -368,3 +368,8 @@ class OutputOptions:
         if not 0 < fps <= 1000:
             raise InputError(f"fps must be over 0 and at most 1000, got {self.fps}")
         return fps
+
+
+def plain(options) -> dict:
+    """The options by name, as JSON can hold them."""
+    return {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items()}

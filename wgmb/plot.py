@@ -10,7 +10,7 @@ import numpy as np
 
 COLORS = ("#1f6fb4", "#d1495b", "#3a8f5c", "#8a5aa8", "#c77f1a", "#555555")
 WIDTH, HEIGHT = 640, 260  # of a chart with its margins [px]
-_LEFT, _RIGHT, _TOP, _BOTTOM = 64, 120, 34, 44
+_LEFT, _RIGHT, _TOP, _BOTTOM = 64, 120, 38, 44
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,11 @@ class Chart:
 
 
 def svg(*charts: Chart) -> str:
-    """The charts one below the other, as the text of an SVG file."""
+    """The charts one below the other, a label in one colour in all, as the text of an SVG file."""
+    strong = dict.fromkeys(k for chart in charts for k in chart.lines if k not in chart.faint)
+    colors = {label: COLORS[i % len(COLORS)] for i, label in enumerate(strong)}
     parts = [
-        f'<g transform="translate(0 {i * HEIGHT})">{_chart(chart)}</g>'
+        f'<g transform="translate(0 {i * HEIGHT})">{_chart(chart, colors)}</g>'
         for i, chart in enumerate(charts)
     ]
     height = HEIGHT * len(charts)
@@ -38,7 +40,7 @@ def svg(*charts: Chart) -> str:
     )
 
 
-def _chart(chart: Chart) -> str:
+def _chart(chart: Chart, colors: Mapping[str, str]) -> str:
     every_x = np.concatenate([x for x, _ in chart.lines.values()])
     every_y = np.concatenate([y for _, y in chart.lines.values()])
     low_x, high_x = float(every_x.min()), float(every_x.max())
@@ -51,7 +53,7 @@ def _chart(chart: Chart) -> str:
     def above(y):
         return bottom - y / high_y * (bottom - _TOP)
 
-    drawn = [_text(WIDTH / 2 - 30, 18, chart.title, "middle", "bold")]
+    drawn = [_text(_LEFT, 14, chart.title, weight="bold")]
     for x in _ticks(low_x, high_x):
         drawn.append(_line(across(x), bottom, across(x), _TOP, "#e4e4e4"))
         drawn.append(_text(across(x), bottom + 16, f"{x:g}", "middle"))
@@ -60,11 +62,11 @@ def _chart(chart: Chart) -> str:
         drawn.append(_text(_LEFT - 6, above(y) + 4, f"{y:g}", "end"))
     drawn.append(_line(_LEFT, bottom, right, bottom, "#333"))
     drawn.append(_text((_LEFT + right) / 2, HEIGHT - 10, chart.x, "middle"))
-    drawn.append(_text(_LEFT, _TOP - 8, chart.y, "middle"))
+    drawn.append(_text(4, _TOP - 4, chart.y))
     strong = [label for label in chart.lines if label not in chart.faint]
     for label, (x, y) in chart.lines.items():
         shown = label in strong
-        color = COLORS[strong.index(label) % len(COLORS)] if shown else "#bbbbbb"
+        color = colors[label] if shown else "#bbbbbb"
         way = " ".join(f"{across(a):.2f},{above(b):.2f}" for a, b in zip(x, y, strict=True))
         wide = 2 if shown else 1
         drawn.append(

@@ -84,8 +84,9 @@ class Orbit:
     """A sphere of `radius` whose centre runs on a circle of radius `orbit` about an axis along y.
 
     `phase`: its angle at time 0 [rad], right-handed from +x. `speed`: [rad/s], any size and sign.
-    `opacity`: multiplies its density. `facing`: how much it counts in the normals of all the
-    volumes that are blended; None: as much as its density at the place.
+    `opacity`: multiplies its density; more than 1 makes fast ones visible, as what is seen goes
+    with the square of density. `facing`: how much it counts in the normals of all the volumes
+    that are blended; None: as much as its density at the place.
     """
 
     radius: float
@@ -372,7 +373,7 @@ class Scene:
     ) -> Scene:
         """The same scene, its camera moved as `Shot.orbit`, `pan` and `dolly` say."""
         values = (*orbit, *pan, dolly)
-        if not all(map(math.isfinite, values)) or not 0 < dolly <= 1000:
+        if not _all_finite(values) or not 0 < dolly <= 1000:
             raise InputError(f"orbit, pan and dolly must be finite, dolly over 0, got {values}")
         return replace(self, shot=replace(self.shot, orbit=orbit, pan=pan, dolly=dolly))
 

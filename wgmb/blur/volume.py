@@ -44,9 +44,9 @@ class Volume:
             raise InputError(f"method 'volume' needs volumes, scene {shown.name!r} has none")
         if shown.bodies:
             raise InputError("method 'volume' shows volumes only, the scene has rigid bodies too")
-        if shutter.rolling:
-            raise InputError("volume exposes whole pictures: it cannot roll the shutter")
         if shown.figure is not None:
+            if shutter.rolling:
+                raise InputError("a figure is exposed at once: it cannot roll the shutter")
             self._figure(encoder, inputs, shown.figure, output)
         else:
             self._volumes(encoder, inputs, output)
@@ -63,6 +63,7 @@ class Volume:
             "EXACT": exact,
             "ORBITS": sum(isinstance(v, scene.Orbit) for v in volumes),
             "TORI": sum(isinstance(v, scene.Torus) for v in volumes),
+            "ROLLING": shutter.rolling is not None,
             "BLENDED": all(v.facing is not None for v in volumes),
         }
         source = shader.load("blur/volume.wgsl")
@@ -134,15 +135,21 @@ class Volume:
         return self._device.create_buffer_with_data(label=label, data=data, usage=usage)
 
 
-def volume_row(row: np.ndarray, v: scene.Volume, way: Way, middle_of: float) -> None:
-    """Fill a `Volume` of the shader, all but `turning`; `middle_of` the exposure [s]."""
+def volume_row(
+    row: np.ndarray, v: scene.Volume, way: Way, middle_of: float, delay: tuple[float, float]
+) -> None:
+    """Fill a `Volume` of the shader, all but `turning`.
+
+    `middle_of` the exposure, `delay` of a rolling shutter across width and height [s].
+    """
     angle, swept = math.fmod(v.phase + v.speed * middle_of, TURN), way.swept
     c, s = math.cos(angle), math.sin(angle)
     side = -1 if v.speed < 0 else 1
     speed = 30 * swept  # at the exposure that the pseudo distances were made for
     row["centre"], row["color"], row["opacity"] = v.centre, v.color, v.opacity
     row["facing"] = 1 if v.facing is None else v.facing
-    half = min(swept / 2, math.pi / 2)
+    row["drift"] = [abs(v.speed) * d for d in delay]
+    half = min((swept + np.abs(row["drift"]).sum()) / 2, math.pi / 2)
     middle, reach = np.array(v.centre), v.reach
     if isinstance(v, scene.Orbit):
         row["turn"] = c, -s, -side * s, -side * c
@@ -189,8 +196,9 @@ def _uniforms(
     data["strobe"], data["grain"] = stage.strobe, stage.grain
     stage.fill(data["stage"])
     middle_of = sum(shutter.span) / 2 / on_gpu.fps
+    delay = shutter.delay[0] / on_gpu.fps, shutter.delay[1] / on_gpu.fps
     for i, (row, volume, way) in enumerate(zip(data["volumes"], volumes, ways, strict=False)):
-        volume_row(row, volume, way, middle_of)
+        volume_row(row, volume, way, middle_of, delay)
         way.fill(row["turning"], i)
     return data
 

@@ -4,7 +4,8 @@ state     what the viewer is set to; as TOML and as a command line
 controls  mouse and keys: an event and a State make a State
 subject   a scene or frames on disk, drawn into textures
 stage     a State becomes a picture, a bit at a time
-panel     the sliders and the words
+pace      how finely, while something moves
+panel     the sliders and the words; theme: their colours and font
 window    events in, pictures out; a desktop window, or none
 """
 

@@ -161,7 +161,7 @@ def _own_camera(state: State) -> tuple[float, float] | None:
     if not {"cam_x", "cam_y"} <= known.keys():
         return None
     values = {name: known[name].default for name in ("cam_x", "cam_y")} | dict(state.settings)
-    return values["cam_x"], values["cam_y"]
+    return float(values["cam_x"]), float(values["cam_y"])
 
 
 def _inside(box: Box, x: float, y: float) -> bool:

@@ -6,49 +6,25 @@ import inspect
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
-import imgui_bundle
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from .. import scenes, shutter
+from ..blur import METHODS
 from ..errors import InputError
 from ..numbering import frame_numbers
+from ..pipeline import SAMPLES
 from .controls import KEYS, MOUSE, Box
 from .stage import REFERENCE_SAMPLES, Report, shutter_of
 from .state import COMPARE, REFERENCE, TONES, State, command_line
+from .subject import Option
+from .theme import ACCENT, COLORS, DIM, INK, packed
 
 WIDTH = 320.0  # of the panel [logical px]
 _LABEL = 96.0  # of the words before a slider [logical px]
-_FONT = 15.0
 _TALL = 1000.0  # a window so high shows everything opened [logical px]
-
-_INK = (0.90, 0.91, 0.93, 1.0)
-_DIM = (0.56, 0.58, 0.62, 1.0)
-_ACCENT = (0.98, 0.70, 0.28, 1.0)
-_COLORS = {
-    "text": _INK,
-    "text_disabled": _DIM,
-    "window_bg": (0.105, 0.110, 0.122, 1.0),
-    "popup_bg": (0.135, 0.140, 0.155, 1.0),
-    "border": (0.22, 0.23, 0.25, 1.0),
-    "frame_bg": (0.165, 0.172, 0.190, 1.0),
-    "frame_bg_hovered": (0.21, 0.22, 0.245, 1.0),
-    "frame_bg_active": (0.24, 0.25, 0.28, 1.0),
-    "slider_grab": (0.62, 0.64, 0.68, 1.0),
-    "slider_grab_active": _ACCENT,
-    "check_mark": _ACCENT,
-    "button": (0.20, 0.21, 0.235, 1.0),
-    "button_hovered": (0.27, 0.28, 0.31, 1.0),
-    "button_active": (0.34, 0.35, 0.39, 1.0),
-    "header": (0.145, 0.150, 0.166, 1.0),
-    "header_hovered": (0.19, 0.20, 0.22, 1.0),
-    "header_active": (0.22, 0.23, 0.26, 1.0),
-    "plot_lines": _ACCENT,
-    "plot_histogram": _ACCENT,
-    "scrollbar_bg": (0.0, 0.0, 0.0, 0.0),
-    "scrollbar_grab": (0.25, 0.26, 0.29, 1.0),
-}
 
 
 @dataclass
@@ -60,7 +36,7 @@ class Info:
     methods: list[str]
     looks: list[str]
     rivals: list[str]
-    options: dict[str, object]
+    options: dict[str, Option]
     frame_times: np.ndarray  # seconds, the last one last
     draw_times: np.ndarray
     passes: dict[str, float] = field(default_factory=dict)
@@ -69,21 +45,6 @@ class Info:
     message: str = ""
     finding: str = ""
     flicked: bool = False
-
-
-def style() -> None:
-    """Dark, flat, one accent; a font for reading. For the current ImGui context."""
-    look = imgui.get_style()
-    for name, color in _COLORS.items():
-        look.set_color_(getattr(imgui.Col_, name), imgui.ImVec4(*color))
-    look.window_padding, look.frame_padding = ImVec2(14, 10), ImVec2(8, 3)
-    look.item_spacing, look.item_inner_spacing = ImVec2(8, 4), ImVec2(6, 4)
-    look.frame_rounding = look.grab_rounding = look.popup_rounding = 4
-    look.scrollbar_size, look.scrollbar_rounding, look.grab_min_size = 9, 4, 12
-    look.window_border_size, look.popup_border_size, look.window_rounding = 0, 1, 0
-    font = Path(imgui_bundle.__file__).parent / "assets/fonts/Roboto/Roboto-Regular.ttf"
-    if font.is_file():
-        imgui.get_io().fonts.add_font_from_file_ttf(str(font), _FONT)
 
 
 class Panel:
@@ -168,7 +129,8 @@ class Panel:
 
     def _scene(self, state: State, info: Info) -> State:
         names = list(scenes.SCENES) if state.is_scene else [state.source, *scenes.SCENES]
-        chosen = self._combo("scene", state.source, names, shown=_name(state.source))
+        label = "scene" if state.is_scene else "shown"
+        chosen = self._combo(label, state.source, names, shown=_name(state.source))
         if chosen != state.source:
             return state.opened(chosen)
         if state.is_scene:
@@ -199,35 +161,37 @@ class Panel:
         state = self._slide(state, "fps", 1, 120, "%.0f", log=True)
         return self._slide(state, "speed", 0.02, 4, "x %.2f", log=True)
 
-    def _setting(self, name: str, value: float, default) -> float:
+    def _setting(self, name: str, value, default):
+        """A parameter of the scene as it now stands."""
         self._label(name)
-        if isinstance(default, int):
-            most = max(4 * abs(default), 10)
-            _, new = imgui.slider_int(f"##set {name}", int(value), 1, most)
+        if isinstance(default, str):
+            flag = imgui.InputTextFlags_.enter_returns_true
+            changed, new = imgui.input_text(f"##set {name}", str(value), flag)
+        elif isinstance(default, int):
+            changed, new = imgui.slider_int(f"##set {name}", int(value), 1, max(4 * default, 10))
         else:
             most = max(4 * abs(default), 2.0)
-            _, new = imgui.drag_float(f"##set {name}", value, most / 300, -most, most, "%.2f")
+            step = most / 300
+            changed, new = imgui.drag_float(f"##set {name}", value, step, -most, most, "%.2f")
         self._keep(f"set {name}")
-        return new
+        return new if changed else value
 
     def _blur(self, state: State, info: Info) -> State:
         state = state.with_method(self._combo("method", state.method, info.methods))
-        state = self._slide_int(state, "samples", 1, 256)
+        state = self._samples(state)
         chosen = dict(state.options)
-        for name, choices in info.options.items():
+        for name, option in info.options.items():
             if name == "show":
                 continue  # looked at by View
-            if isinstance(choices, list):
-                now = str(chosen.get(name, choices[0]))
-                new = self._combo(name, now, choices)
-                if new != now:
-                    state = state.with_option(name, new if new != choices[0] else None)
-            elif choices is int:
-                self._label(name)
-                changed, number = imgui.input_int(f"##{name}", int(str(chosen.get(name, 0))))
-                self._keep(name)
-                if changed:
-                    state = state.with_option(name, max(number, 0) or None)
+            value: Any = chosen.get(name, option.default)
+            if option.choices:
+                word = self._combo(name, str(value), list(option.choices))
+                if word != value:
+                    state = state.with_option(name, word if word != option.default else None)
+                continue
+            changed, value = self._number(name, value, option.default)
+            if changed:
+                state = state.with_option(name, value if value != option.default else None)
         state = self._slide(state, "jitter", 0, 1, "%.2f")
         self._label("longest")
         limited, on = state.max_blur is not None, state.max_blur or 40.0
@@ -236,16 +200,47 @@ class Panel:
         imgui.same_line()
         imgui.set_next_item_width(-1)
         imgui.begin_disabled(not limit)
-        _, most = imgui.slider_float("##max_blur", on, 1, 400, "%.0f px", _LOG)
+        changed, most = imgui.slider_float("##max_blur", on, 1, 400, "%.0f px", _LOG)
         self._keep("max_blur")
         imgui.end_disabled()
-        return replace(state, max_blur=most if limit else None)
+        return replace(state, max_blur=(most if changed else on) if limit else None)
+
+    def _number(self, name: str, value, default: bool | int | float) -> tuple[bool, object]:
+        """Whether an option was changed, and to what."""
+        self._label(name.replace("_", " "))
+        if isinstance(default, bool):
+            changed, value = imgui.checkbox(f"##{name}", bool(value))
+        elif isinstance(default, int):
+            changed, value = imgui.input_int(f"##{name}", int(value))
+            value = max(value, 0)
+        else:
+            most = max(4 * default, 0.01)
+            changed, value = imgui.slider_float(f"##{name}", float(value), 0, most, "%.3f")
+        self._keep(name)
+        return changed, value
+
+    def _samples(self, state: State) -> State:
+        auto = state.samples == "auto"
+        own = getattr(METHODS[state.method], "samples", SAMPLES)
+        self._label("samples")
+        imgui.set_next_item_width(-64)
+        imgui.begin_disabled(auto)
+        now = state.samples if isinstance(state.samples, int) else own
+        changed, number = imgui.slider_int("##samples", now, 1, 256, "auto" if auto else "%d", _LOG)
+        self._keep("samples")
+        imgui.end_disabled()
+        imgui.same_line()
+        toggled, auto = imgui.checkbox("auto", auto)
+        self._keep("auto")
+        if toggled:
+            return replace(state, samples="auto" if auto else None)
+        return replace(state, samples=max(number, 1)) if changed else state
 
     def _shutter(self, state: State, info: Info) -> State:
         self._label("angle")
-        _, angle = imgui.slider_float("##shutter", state.shutter, 0, 720, "%.0f deg")
+        changed, angle = imgui.slider_float("##shutter", state.shutter, 0, 720, "%.0f deg")
         self._keep("shutter")
-        if angle != state.shutter:
+        if changed:
             state = replace(state, shutter=float(round(angle)))
         names = ["start", "centre", "end"]
         own = state.phase not in shutter.PHASES
@@ -256,9 +251,10 @@ class Panel:
             state = replace(state, phase=phase)
         else:
             self._label("")
-            _, middle = imgui.slider_float("##phase at", float(state.phase), -1, 1, "%.2f frames")
+            now = float(state.phase)
+            changed, middle = imgui.slider_float("##phase at", now, -1, 1, "%.2f frames")
             self._keep("phase at")
-            state = replace(state, phase=f"{middle:.2f}")
+            state = replace(state, phase=f"{middle:.2f}") if changed else state
         curves = list(shutter.CURVES)
         curves += [] if state.curve in curves else [state.curve]
         state = replace(state, curve=self._combo("curve", state.curve, curves))
@@ -276,17 +272,15 @@ class Panel:
         self._keep("curve drawn")
         x, y, width, height = self.places["curve drawn"]
         ink = imgui.get_window_draw_list()
-        ink.add_rect_filled((x, y), (x + width, y + height), _packed(_COLORS["frame_bg"]), 4)
+        ink.add_rect_filled((x, y), (x + width, y + height), packed(COLORS["frame_bg"]), 4)
         times, passed = shutter_of(state).integral(96)
         reach = max(1.0, 1.05 * float(np.abs(times).max()))
         for instant in range(-int(reach), int(reach) + 1):
             at = x + width * (0.5 + 0.5 * instant / reach)
-            ink.add_line(
-                (at, y), (at, y + height), _packed((1, 1, 1, 0.22 if not instant else 0.1))
-            )
+            ink.add_line((at, y), (at, y + height), packed((1, 1, 1, 0.22 if not instant else 0.1)))
             if instant:
                 room = 3 if instant < 0 else -21
-                ink.add_text((at + room, y + 1), _packed(_DIM), f"{instant:+d}")
+                ink.add_text((at + room, y + 1), packed(DIM), f"{instant:+d}")
         if times[-1] <= times[0]:
             return
         weight = np.gradient(passed, times)
@@ -295,9 +289,9 @@ class Panel:
         ys = y + height - 3 - (height - 9) * tall
         base = y + height - 3
         for left, right, top in zip(xs[:-1], xs[1:], (ys[:-1] + ys[1:]) / 2, strict=True):
-            ink.add_rect_filled((left, top), (right, base), _packed((*_ACCENT[:3], 0.25)))
+            ink.add_rect_filled((left, top), (right, base), packed((*ACCENT[:3], 0.25)))
         points = [(xs[0], base), *zip(xs, ys, strict=True), (xs[-1], base)]
-        ink.add_polyline([ImVec2(*p) for p in points], _packed(_ACCENT), 1.5, 0)
+        ink.add_polyline([ImVec2(*p) for p in points], packed(ACCENT), 1.5, 0)
 
     def _view(self, state: State, info: Info) -> State:
         state = replace(state, look=self._combo("look at", state.look, info.looks))
@@ -306,10 +300,10 @@ class Panel:
         elif state.look == "velocity":
             self._label("full colour")
             height = max(info.report.full[1], 1)
-            _, fast = imgui.slider_float("##fastest", state.fastest * height, 1, height, "%.0f px",
-                                         _LOG)  # fmt: skip
+            now = state.fastest * height
+            changed, fast = imgui.slider_float("##fastest", now, 1, height, "%.0f px", _LOG)
             self._keep("fastest")
-            state = replace(state, fastest=fast / height)
+            state = replace(state, fastest=fast / height) if changed else state
         else:
             state = self._slide(state, "exposure", -8, 8, "%+.1f stops")
             state = replace(state, tone=self._combo("tone", state.tone, list(TONES)))
@@ -446,13 +440,13 @@ class Panel:
             self._tag("0", x, y - 26)
             self._tag(f"{1 / state.gain:.2f}", x + width, y - 26, right=True)
 
-    def _tag(self, text: str, x: float, y: float, *, right=False, middle=False, color=_INK) -> None:
+    def _tag(self, text: str, x: float, y: float, *, right=False, middle=False, color=INK) -> None:
         size = imgui.calc_text_size(text)
         x -= size.x * (1.0 if right else 0.5 if middle else 0.0)
         ink = imgui.get_background_draw_list()
         ink.add_rect_filled((x - 7, y - 3), (x + size.x + 7, y + size.y + 3),
-                            _packed((0.05, 0.05, 0.06, 0.72)), 5)  # fmt: skip
-        ink.add_text((x, y), _packed(color), text)
+                            packed((0.05, 0.05, 0.06, 0.72)), 5)  # fmt: skip
+        ink.add_text((x, y), packed(color), text)
 
     def _help(self, area: Box) -> None:
         x, y, width, height = area
@@ -463,7 +457,7 @@ class Panel:
         imgui.begin("help", None, fixed | flags.no_inputs)
         for table in (MOUSE, KEYS):
             for name, what in table.items():
-                imgui.text_colored(_ACCENT, name)
+                imgui.text_colored(ACCENT, name)
                 imgui.same_line(160)
                 imgui.text(what)
             imgui.spacing()
@@ -488,8 +482,10 @@ class Panel:
 
     def _combo(self, name: str, now: str, names: list[str], shown: str = "") -> str:
         self._label(name)
-        opened = imgui.begin_combo(f"##{name}", shown or now)
-        self._keep(name)
+        start, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+        self.places[name] = (start.x, start.y, wide, imgui.get_frame_height())
+        whole = imgui.ComboFlags_.height_largest
+        opened = imgui.begin_combo(f"##{name}", shown or now, whole)
         if opened:
             for item in names:
                 picked, _ = imgui.selectable(_name(item), item == now)
@@ -510,12 +506,6 @@ class Panel:
         self._keep(name)
         return replace(state, **{name: value}) if changed else state
 
-    def _slide_int(self, state: State, name: str, low: int, high: int) -> State:
-        self._label(name)
-        changed, value = imgui.slider_int(f"##{name}", getattr(state, name), low, high, "%d", _LOG)
-        self._keep(name)
-        return replace(state, **{name: max(value, low)}) if changed else state
-
     def _text(self, name: str, now: str, state: State) -> str:
         self._label(name)
         changed, text = imgui.input_text(f"##{name}", now, imgui.InputTextFlags_.enter_returns_true)
@@ -535,7 +525,3 @@ _LOG = int(imgui.SliderFlags_.logarithmic)
 def _name(source: str) -> str:
     """A file's or scene's name; ImGui does not show what follows ##."""
     return re.sub("#+", "*", Path(source).name)
-
-
-def _packed(color: tuple[float, float, float, float]) -> int:
-    return imgui.color_convert_float4_to_u32(imgui.ImVec4(*color))

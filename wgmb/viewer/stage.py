@@ -7,7 +7,6 @@ is still the picture is drawn in full, and what converges (rays, the reference) 
 from __future__ import annotations
 
 import time
-from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -20,65 +19,20 @@ from ..blur import METHODS
 from ..errors import InputError
 from ..images import Images
 from ..options import ShutterOptions
-from ..pipeline import MOST_SAMPLES, Blur
+from ..pipeline import SAMPLES, Blur
+from ..shutter import Shutter
 from ..timing import Timing
+from .pace import QUICK, Pace
 from .state import LOOKS, REFERENCE, State
-from .subject import ClipSubject, SceneSubject, Subject, methods_for, options_of
+from .subject import ClipSubject, Option, SceneSubject, Subject, options_of
 
 REFERENCE_SAMPLES = 1024
 ENOUGH = 64  # rays of the reference before it is worth measuring against
-QUICK = 4  # samples of scene methods while something moves
 _STEP = 0.07  # seconds of work on what converges, between two frames of the window
 _SETTLE = 0.35  # seconds of stillness before antialiasing
 _WHEEL, _KEY_HEIGHT, _KEY_WIDTH, _MARGIN = 96, 8, 180, 16  # logical pixels
 
 Box = tuple[float, float, float, float]  # x, y, width, height [px]
-
-
-class Pace:
-    """How finely to draw while something moves: the finest level that keeps to TARGET."""
-
-    TARGET = 0.08  # seconds from one frame of the window to the next
-    SCALES = (1.0, 1.0, 0.85, 0.72, 0.6, 0.5, 0.42, 0.36, 0.3, 0.25, 0.2)
-
-    def __init__(self, level: int = 0):
-        self.level = level
-        self._took: deque[tuple[float, float]] = deque(maxlen=3)
-        self._patience = 0
-
-    def quality(self, level: int, rays: int) -> tuple[float, int]:
-        """Share of the full width, and rays a pixel's side."""
-        return self.SCALES[level], rays if level == 0 else 1
-
-    def observe(self, seconds: float, drawing: float, rays: int) -> None:
-        """A moving frame took so long, `drawing` of it for what depends on the level."""
-        self._took.append((seconds, drawing))
-        if len(self._took) < 3:
-            return
-        middle = sorted(self._took)[len(self._took) // 2]
-        rest, drew = max(middle[0] - middle[1], 0.0), middle[1]
-
-        def predicted(level: int) -> float:
-            return rest + drew * self._cost(level, rays) / self._cost(self.level, rays)
-
-        last = len(self.SCALES) - 1
-        if middle[0] > 1.1 * self.TARGET and self.level < last:
-            fits = [k for k in range(self.level + 1, last) if predicted(k) <= self.TARGET]
-            self._set(min(fits, default=last))
-        elif self.level and predicted(self.level - 1) < 0.85 * self.TARGET:
-            self._patience += 1
-            if self._patience >= 5:
-                self._set(self.level - 1)
-        else:
-            self._patience = 0
-
-    def _set(self, level: int) -> None:
-        self.level, self._patience = level, 0
-        self._took.clear()
-
-    def _cost(self, level: int, rays: int) -> float:
-        scale, rays = self.quality(level, rays)
-        return scale * scale * (rays * rays + 1)
 
 
 @dataclass
@@ -145,7 +99,7 @@ class Stage:
         self._timing = Timing(device) if Timing.usable(device) else None
         self._worker = ThreadPoolExecutor(1, "flip")
         self._measured: tuple[tuple, Measured] | None = None
-        self._options: dict[str, dict] = {}
+        self._options: dict[str, dict[str, Option]] = {}
 
     # ---- what there is -------------------------------------------------------------------
 
@@ -161,9 +115,9 @@ class Stage:
 
     def methods(self, state: State) -> list[str]:
         """Names of the methods that can be used."""
-        return methods_for(self.subject(state).has)
+        return self.subject(state).methods(state)
 
-    def options(self, method: str) -> dict:
+    def options(self, method: str) -> dict[str, Option]:
         """The method's own options; see `options_of`."""
         if method not in self._options:
             self._options[method] = options_of(self.device, method)
@@ -171,16 +125,34 @@ class Stage:
 
     def looks(self, state: State) -> list[str]:
         """What can be looked at: also what the method shows of its inner life."""
-        has = self.subject(state).has
-        needs = {"depth": "depth", "velocity": "motion", "error": "scene"}
-        looks = [look for look in LOOKS if needs.get(look, "color") in has]
-        shows = self.options(state.method).get("show", ())
-        return looks + [show for show in shows if show != "color"]
+        has, methods = self.subject(state).has(state), self.methods(state)
+        blurred = state.method in methods
+        can = {
+            "result": blurred,
+            "sharp": "color" in has,
+            "depth": "depth" in has,
+            "velocity": "motion" in has,
+            "error": blurred and "distributed" in methods,
+        }
+        return [look for look in LOOKS if can[look]] + (self._shows(state) if blurred else [])
 
     def rivals(self, state: State) -> list[str]:
         """What the result can be compared with."""
-        reference = [REFERENCE] if "scene" in self.subject(state).has else []
-        return ["sharp", *reference, *self.methods(state)]
+        methods = self.methods(state)
+        sharp = ["sharp"] if "sharp" in self.looks(state) else []
+        reference = [REFERENCE] if "distributed" in methods else []
+        return [*sharp, *reference, *methods]
+
+    def possible(self, state: State) -> State:
+        """The same state; a method or look that is not to be had is replaced by one that is."""
+        methods = self.methods(state)
+        if methods and state.method not in methods:
+            state = state.with_method(methods[0])
+        if state.look not in (looks := self.looks(state)):
+            state = replace(state, look=looks[0])
+        if state.against not in self.rivals(state):
+            state = replace(state, against=self.rivals(state)[0])
+        return state
 
     # ---- drawing -------------------------------------------------------------------------
 
@@ -255,14 +227,15 @@ class Stage:
         self, slot, name, state, subject, size, rays, quick: bool, full: bool, report: Report
     ) -> None:
         shown = self._shown[slot]
-        key = (name, picture_key(state), size, rays, quick)
+        key = (name, picture_key(state), size, rays, quick and self._level)
         if shown.key != key:
             shown = Shown(self._label(name, state), key=key, texture=shown.texture)
             self._shown[slot] = shown
         if shown.ready:
             return
         started = time.perf_counter()
-        if name in ("sharp", "depth", "velocity"):
+        volumes = state.is_scene and "volume" in self.methods(state)
+        if name in ("depth", "velocity") or (name == "sharp" and not volumes):
             pass_ = {"sharp": "color", "depth": "depth", "velocity": "motion"}[name]
             passes = subject.passes()
             if pass_ not in passes:
@@ -288,7 +261,9 @@ class Stage:
         return f"{state.method}: {name}" if name in self._shows(state) else name
 
     def _shows(self, state: State) -> list[str]:
-        return self.options(state.method).get("show", [])
+        """What the method can show of its inner life instead of its result."""
+        show = self.options(state.method).get("show")
+        return [word for word in show.choices if word != show.default] if show else []
 
     def _blur(self, name: str, state: State, quick: bool) -> Blur:
         """The compiled method called `name`, kept for the next time it is asked for."""
@@ -298,26 +273,38 @@ class Stage:
             options, method, samples = {}, "distributed", REFERENCE_SAMPLES
         elif name in self._shows(state):
             options["show"] = name
+        elif name == "sharp":
+            options, method = {}, "volume"
         elif name not in ("result", state.method):
             options, method = {}, name
         if method not in (allowed := self.methods(state)):
             raise InputError(f"method {method!r} cannot be used here, only {', '.join(allowed)}")
-        if quick and "scene" in METHODS[method].needs:
-            samples = min(samples, QUICK)
-        key = (name == REFERENCE, method, samples, state.jitter, state.max_blur, *options.items())
+        if quick:
+            count = samples if isinstance(samples, int) else SAMPLES
+            traced = "progress" in METHODS[method].uses
+            fewer = min(count, QUICK) if traced else self.pace.samples(self._level, count)
+            samples = fewer if fewer < count else samples
+        key = (
+            name in (REFERENCE, "sharp"),
+            method,
+            samples,
+            state.jitter,
+            state.max_blur,
+            *options.items(),
+        )
         if key not in self._blurs:
             while len(self._blurs) >= 12:
                 del self._blurs[next(iter(self._blurs))]
             self._blurs[key] = Blur(
                 method,
-                samples=min(samples, MOST_SAMPLES),
+                samples=samples,
                 jitter=state.jitter,
                 max_blur=state.max_blur,
                 device=self.device,
                 **options,
             )
         blur = self._blurs[key] = self._blurs.pop(key)
-        shutter = shutter_of(state)
+        shutter = shutter_of(state) if name != "sharp" else Shutter(0)
         if blur.shutter != shutter:
             blur.shutter = shutter
         return blur

@@ -12,11 +12,12 @@ import tomllib
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 from .. import numbering, scenes
 from ..blur import METHODS
 from ..errors import InputError
-from ..options import BlurOptions, InputOptions, OutputOptions, SceneOptions, ShutterOptions
+from ..options import OWN, BlurOptions, InputOptions, OutputOptions, SceneOptions, ShutterOptions
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
 LOOKS = ("result", "sharp", "depth", "velocity", "error")
@@ -33,10 +34,10 @@ class State:
 
     source: str = "crossing"
     """A scene's name, or a file or pattern."""
-    settings: tuple[tuple[str, float], ...] = ()
+    settings: tuple[tuple[str, float | str], ...] = ()
     """The scene's parameters that differ from their defaults."""
     given: tuple[tuple[str, object], ...] = ()
-    """InputOptions of frames on disk that differ from their defaults."""
+    """InputOptions, keep and scale of frames on disk that differ from their defaults."""
     orbit: tuple[float, float] = (0.0, 0.0)  # degrees to the right, up
     pan: tuple[float, float] = (0.0, 0.0)  # scene units to the right, up
     dolly: float = 1.0
@@ -47,7 +48,8 @@ class State:
     fps: float = 24.0
 
     method: str = "tap"
-    samples: int = 16
+    samples: int | str | None = None
+    """A number, "auto", or None for what the method has by default."""
     jitter: float = 0.0
     max_blur: float | None = None
     options: tuple[tuple[str, object], ...] = ()
@@ -93,12 +95,26 @@ class State:
             known = ", ".join(scenes.SCENES)
             raise InputError(f"no file or scene {source!r}; scenes: {known}")
         state = replace(self.unmoved(), source=source, settings=(), given=())
+        before, after = self.suited(), state.suited()
+        for name, value in after.items():  # what was as the last scene asks for follows the new one
+            if getattr(self, name) == before[name]:
+                state = replace(state, **{name: value})
+        if state.method != self.method:
+            state = replace(state, options=())
         if state.is_scene:
-            return replace(state, frames="0-11", frame=0.0)
-        return replace(state, frames=_on_disk(source), frame=float("nan")).settled()
+            plain = State()
+            return replace(state, frames=plain.frames, frame=0.0, speed=plain.speed)
+        return replace(state, frames=_on_disk(source), frame=math.nan, speed=1.0).settled()
+
+    def suited(self) -> dict[str, Any]:
+        """Method, shutter and curve that the scene asks for; else those that are usual."""
+        scene = scenes.make(self.source) if self.is_scene else None
+        when = ShutterOptions().settled(scene, self.fps)
+        method = BlurOptions().settled(scene).method
+        return {"method": method, "shutter": when.shutter, "curve": when.curve}
 
     def settled(self) -> State:
-        """The same, its moment within its frames and its method one that the source can feed."""
+        """The same, its moment within its frames."""
         first, last = self.span
         frame = min(max(self.frame, first), last) if math.isfinite(self.frame) else float(first)
         return replace(self, frame=frame)
@@ -108,7 +124,7 @@ class State:
         return replace(self, orbit=(0.0, 0.0), pan=(0.0, 0.0), dolly=1.0, zoom=1.0,
                        center=(0.5, 0.5))  # fmt: skip
 
-    def with_setting(self, name: str, value: float) -> State:
+    def with_setting(self, name: str, value: float | str) -> State:
         """The same with a parameter of the scene changed."""
         return replace(self, settings=_changed(self.settings, name, value))
 
@@ -125,13 +141,13 @@ class State:
         said = {name: value for name, value in given.items() if value != DEFAULTS[name]}
         own = {f.name for f in fields(self)} - {"frames"}
         state = replace(self, **{n: v for n, v in said.items() if n in own})
-        inputs = {f.name for f in fields(InputOptions)}
+        inputs = {*(f.name for f in fields(InputOptions)), *_MASKS}
         if not self.is_scene:
             found = tuple((n, v) for n, v in said.items() if n in inputs)
             state = replace(state, given=found, frames=str(said.get("frames", state.frames)))
         elif "frames" in said:
             state = replace(state, frames=str(said["frames"]))
-        for name in {f.name for f in fields(BlurOptions)} - own - {"keep", "scale"}:
+        for name in OWN:
             if name in said:
                 state = state.with_option(name, said[name])
         if state.method not in METHODS:
@@ -159,7 +175,7 @@ class State:
             return {"pattern": self.source, **dict(self.given), **look}
         return {
             "scene": self.source,
-            "set": [f"{name}={value:g}" for name, value in self.settings],
+            "set": self.set_arguments(),
             "size": self.size,
             "rays": self.rays,
             "orbit": list(self.orbit),
@@ -167,6 +183,13 @@ class State:
             "dolly": self.dolly,
             **look,
         }
+
+    def set_arguments(self) -> tuple[str, ...]:
+        """The scene's parameters as --set takes them."""
+        return tuple(
+            f"{name}={value}" if isinstance(value, str) else f"{name}={value:g}"
+            for name, value in self.settings
+        )
 
     def command(self, output: str) -> list[str]:
         """The words after `wgmb` that make `output` of all `frames` as they are seen here."""
@@ -226,6 +249,7 @@ _VIEW = (
     "frames", "frame", "look", "compare", "against", "wipe", "gain", "fastest", "middle",
     "exposure", "tone", "zoom", "center", "playing", "speed", "panel",
 )  # fmt: skip
+_MASKS = ("keep", "scale")
 _CHOICES = {"look": None, "compare": COMPARE, "against": None, "tone": TONES}
 
 
@@ -257,15 +281,14 @@ def _of_tables(render: dict | None, blur: dict | None, view: dict) -> State:
     kinds = {f.name: f for f in fields(State)}
     given.pop("time", None)
     values: dict[str, object] = {"source": source}
-    inputs = {f.name for f in fields(InputOptions)}
-    own = {f.name for f in fields(BlurOptions)} - kinds.keys()
+    inputs = {*(f.name for f in fields(InputOptions)), *_MASKS}
     pairs: dict[str, list] = {"options": [], "given": []}
     for name, value in given.items():
         if name == "set":
             pairs["settings"] = [_setting(text) for text in value]
         elif name in kinds and name not in _VIEW:
             values[name] = _typed(name, value, kinds[name].default)
-        elif name in own:
+        elif name in OWN:
             pairs["options"].append((name, value))
         elif blur is not None and name in inputs:
             pairs["given"].append((name, tuple(value) if isinstance(value, list) else value))
@@ -282,12 +305,14 @@ def _of_tables(render: dict | None, blur: dict | None, view: dict) -> State:
     return state.settled()
 
 
-def _setting(text: str) -> tuple[str, float]:
-    name, _, value = str(text).partition("=")
+def _setting(text: str) -> tuple[str, float | str]:
+    name, equals, value = str(text).partition("=")
+    if not equals:
+        raise InputError(f"settings: set takes NAME=VALUE, got {text!r}")
     try:
         return name, float(value)
     except ValueError:
-        raise InputError(f"settings: set takes NAME=NUMBER, got {text!r}") from None
+        return name, value
 
 
 def _typed(name: str, value: object, default: object) -> object:
@@ -298,6 +323,10 @@ def _typed(name: str, value: object, default: object) -> object:
         if isinstance(default, tuple):
             x, y = value  # pyright: ignore[reportGeneralTypeIssues]
             return float(x), float(y)
+        if name == "samples":
+            if value != "auto" and (isinstance(value, bool) or not isinstance(value, int)):
+                raise TypeError
+            return value
         if isinstance(default, bool) or default is None or isinstance(default, str):
             if isinstance(default, (bool, str)) and not isinstance(value, type(default)):
                 raise TypeError

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import typing
 from collections import OrderedDict
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -14,26 +17,40 @@ from ..blur import METHODS
 from ..errors import InputError
 from ..frame import Frame
 from ..images import Images
-from ..options import BlurOptions, InputOptions, SceneOptions, size_of
+from ..options import OWN, BlurOptions, InputOptions, SceneOptions, size_of
 from ..pipeline import Blur
 from ..render import Render
+from ..scene import Scene
 from ..timing import Timing
+from ..velocity import Moving
 from .state import State
 
-_FRAMES_KEPT = 16
+_MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
+_FRAMES_KEPT = 2, 16  # but so many at least, at most
 Texture = wgpu.GPUTexture
 Budget = tuple[int, float]
 """Samples done before, and seconds to spend on more."""
 
 
 class SceneSubject:
-    """A built-in scene: any size, any moment, every method."""
-
-    has = frozenset({"color", "motion", "depth", "scene"})
+    """A built-in scene: any size, any moment, every method that it has what to show for."""
 
     def __init__(self, device: wgpu.GPUDevice):
         self._render = Render(scenes.make(next(iter(scenes.SCENES))), Blur(device=device))
         self._seen: tuple = ()
+        self._made = self._render.scene
+
+    def has(self, state: State) -> frozenset[str]:
+        """What a method may ask for; figures are flat: they have no pictures of instants."""
+        flat = self._scene(state).figure is not None
+        return frozenset({"scene"} if flat else {"color", "motion", "depth", "scene"})
+
+    def methods(self, state: State) -> list[str]:
+        """Names of the methods that can draw it."""
+        scene, can = self._scene(state), methods_for(self.has(state))
+        if scene.figure is not None:
+            return ["volume"]
+        return can if scene.has_volumes else [name for name in can if name != "volume"]
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height that give the picture its shape [px]."""
@@ -41,17 +58,21 @@ class SceneSubject:
 
     def look_at(self, state: State, size: tuple[int, int], rays: int) -> None:
         """What the next draws are of."""
+        self._render.scene = self._scene(state)
+        self._render.size, self._render.rays, self._render.fps = size, rays, state.fps
+        self._time, self._number = state.frame / state.fps, int(state.frame // 1)
+
+    def _scene(self, state: State) -> Scene:
         seen = (state.source, state.settings, state.orbit, state.pan, state.dolly)
         if seen != self._seen:
             given = SceneOptions(
-                set=tuple(f"{name}={value:g}" for name, value in state.settings),
+                set=state.set_arguments(),
                 orbit=state.orbit,
                 pan=state.pan,
                 dolly=state.dolly,
             )
-            self._render.scene, self._seen = given.make(state.source), seen
-        self._render.size, self._render.rays, self._render.fps = size, rays, state.fps
-        self._time, self._number = state.frame / state.fps, int(state.frame // 1)
+            self._made, self._seen = given.make(state.source), seen
+        return self._made
 
     def passes(self) -> dict[str, Texture]:
         """The sharp picture and what lies under it, by name."""
@@ -60,7 +81,7 @@ class SceneSubject:
     def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Timing | None) -> int:
         """Draw with `blur`; samples done, which may be less than it has where it is slow."""
         view, (done, seconds) = output.create_view(), budget
-        if "scene" in blur.method.needs:
+        if "progress" in blur.method.uses:
             return self._render.refine(
                 view, self._time, self._number, done=done, seconds=seconds, blur=blur
             )
@@ -73,13 +94,23 @@ class ClipSubject:
 
     def __init__(self, device: wgpu.GPUDevice, state: State):
         self._device, self._images = device, Images(device)
-        self._clip = InputOptions(**dict(state.given)).open(state.source)  # pyright: ignore
+        given: dict[str, Any] = dict(state.given)
+        masks = given.pop("keep", None), given.pop("scale", None)
+        self._clip = InputOptions(**given).open(state.source, *masks)
         self._frames: OrderedDict[int, Frame] = OrderedDict()
         self._sharp = Blur(device=device)
         self._number = self._clip.numbers[0]
-        self._uploaded: dict[int, tuple[int, dict]] = {}
-        self.has = self._frame().has
+        self._uploaders: dict[tuple, Blur] = {}
+        self._uploaded: dict[tuple, tuple[int, dict]] = {}
         self.finding = self._clip.finding
+
+    def has(self, state: State) -> frozenset[str]:
+        """What a method may ask for."""
+        return self._frame().has
+
+    def methods(self, state: State) -> list[str]:
+        """Names of the methods that can be fed."""
+        return methods_for(self.has(state))
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height of the frames [px]."""
@@ -93,17 +124,22 @@ class ClipSubject:
     def _frame(self) -> Frame:
         number = self._number
         if number not in self._frames:
-            while len(self._frames) >= _FRAMES_KEPT:
+            frame = self._clip.with_neighbours(self._clip.source(number))
+            least, most = _FRAMES_KEPT
+            kept = min(max(_MEMORY // (3 * _bytes(frame)), least), most)  # with its neighbours
+            while len(self._frames) >= kept:
                 self._frames.popitem(last=False)
-            self._frames[number] = self._clip.with_neighbours(self._clip.source(number))
+            self._frames[number] = frame
         self._frames.move_to_end(number)
         return self._frames[number]
 
     def _inputs(self, blur: Blur) -> dict:
-        number, inputs = self._uploaded.get(id(blur), (None, {}))
+        """The frame's textures, one set for all methods that take the same."""
+        key = blur.method.needs, blur.method.uses
+        number, inputs = self._uploaded.get(key, (None, {}))
         if number != self._number:
-            inputs = blur.upload(self._frame())
-            self._uploaded[id(blur)] = self._number, inputs
+            inputs = self._uploaders.setdefault(key, blur).upload(self._frame())
+            self._uploaded[key] = self._number, inputs
         return dict(inputs)
 
     def passes(self) -> dict[str, Texture]:
@@ -117,7 +153,7 @@ class ClipSubject:
             found["depth"] = images.texture("depth", frame.size, "r32float")
         if "motion" in frame.has:
             motion = images.texture("motion", frame.size, "rgba32float")
-            moving = {k: v for k, v in inputs.items() if k not in _NOT_MOVING}
+            moving = {k: v for k, v in inputs.items() if k in _MOVING}
             encoder = self._device.create_command_encoder(label="motion")
             self._sharp.encode_motion(encoder, frame.size, motion.create_view(), **moving)
             gpu.submit(self._device, encoder)
@@ -138,7 +174,12 @@ class ClipSubject:
         return blur.samples
 
 
-_NOT_MOVING = ("size", "color", "keep", "check", "number", "neighbours")
+def _bytes(frame: Frame) -> int:
+    arrays = (getattr(frame, f.name) for f in fields(frame))
+    return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
+
+
+_MOVING = {f.name for f in fields(Moving)}
 Subject = SceneSubject | ClipSubject
 
 
@@ -147,24 +188,38 @@ def methods_for(has: frozenset[str]) -> list[str]:
     return [name for name, method in METHODS.items() if method.needs <= has]
 
 
-def options_of(device: wgpu.GPUDevice, method: str) -> dict[str, object]:
-    """The method's own options: the values one can choose from, or the default's type."""
+@dataclass(frozen=True)
+class Option:
+    """What one option of a method is by default, and the words one can choose from."""
+
+    default: Any
+    choices: tuple[str, ...] = ()
+
+
+def options_of(device: wgpu.GPUDevice, method: str) -> dict[str, Option]:
+    """The method's own options, those that the command line has."""
     kinds = typing.get_type_hints(BlurOptions)
-    found: dict[str, object] = {}
-    for name, parameter in inspect.signature(METHODS[method]).parameters.items():
-        if name in ("device", "output"):
+    found: dict[str, Option] = {}
+    known = inspect.signature(METHODS[method]).parameters
+    for name, parameter in known.items():
+        if name not in OWN:
             continue
-        literals = [a for kind in typing.get_args(kinds.get(name)) for a in typing.get_args(kind)]
-        if isinstance(parameter.default, str):
-            found[name] = [v for v in literals if _takes(device, method, name, v)]
-        else:
-            found[name] = type(parameter.default)
+        forms = _words(kinds["form"]) if "form" in known else ()
+        taken = tuple(w for w in _words(kinds[name]) if _takes(device, method, name, w, forms))
+        if taken or isinstance(parameter.default, (bool, int, float)):
+            found[name] = Option(parameter.default, taken)
     return found
 
 
-def _takes(device: wgpu.GPUDevice, method: str, name: str, value: str) -> bool:
-    try:
-        METHODS[method](device, **{name: value})
-    except InputError:
-        return False
-    return True
+def _words(kind) -> tuple[str, ...]:
+    """Of `Literal[...] | None`."""
+    return tuple(word for part in typing.get_args(kind) for word in typing.get_args(part))
+
+
+def _takes(device, method: str, name: str, word: str, forms: tuple[str, ...]) -> bool:
+    """Whether the option can be `word`, in one of the method's forms at least."""
+    for form in ({}, *({"form": form} for form in forms if name != "form")):
+        with contextlib.suppress(InputError):
+            METHODS[method](device, **{**form, name: word})
+            return True
+    return False

@@ -24,9 +24,10 @@ from ..errors import DeviceError, Error, InputError
 from ..output import SETTINGS, replace_file, temporary_name
 from ..video import Video
 from . import controls
-from .panel import Info, Panel, style
+from .panel import Info, Panel
 from .stage import Stage, picture_key
 from .state import COMPARE, State
+from .theme import style
 
 TITLE = "wgmb"
 _AFTER_WHEEL = 0.3  # seconds for which turning the wheel counts as moving
@@ -162,11 +163,14 @@ class Viewer:
         if state.playing or self._video:
             step = 1 / state.fps if self._video else min(self._now - before, 0.5)
             state = controls.played(state, step)
-        self.state = state
         try:
+            possible = self.stage.possible(state)
+            if possible.method != state.method:
+                self.say(f"method {state.method!r} cannot be used here")
+            self.state = state = possible
             self._prepare(state)
-            self._good = replace(state, playing=state.playing)
-        except InputError as error:
+            self._good = state
+        except (InputError, OSError) as error:
             self.say(str(error))
             if self.state == self._good:
                 raise

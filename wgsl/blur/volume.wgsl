@@ -14,6 +14,7 @@ override SHADOW: bool = true;
 
 override ORBITS: u32 = 1;           // volumes that are spheres on circles; they come first
 override TORI: u32 = 1;             // volumes that are tori
+override ROLLING: bool = false;     // every pixel has its own delay
 override BLENDED: bool = true;      // normals are mixed alike everywhere, not by density
 
 struct Volume {
@@ -29,6 +30,8 @@ struct Volume {
     turning: Turning,
     bound: vec4f,       // sphere that holds it throughout the exposure: centre, radius
     slab: vec4f,        // and a slab: its normal, half its thickness
+    drift: vec2f,       // rolling shutter: turning across the width, the height [rad]
+    unused: vec2f,
 }
 
 struct Volumes {
@@ -64,8 +67,16 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local
     if tile >= arrayLength(&tiles) { return; }
     let id = tiles[tile] * vec2u(WG_X, WG_Y) + local.xy;
     if any(id >= frame.size) { return; }
-    for (var i = 0u; i < ORBITS + TORI; i++) { volumes[i] = scene.volumes[i]; }
     let size = vec2f(frame.size);
+    for (var i = 0u; i < ORBITS + TORI; i++) {
+        volumes[i] = scene.volumes[i];
+        if ROLLING {
+            let on = dot(volumes[i].drift, (vec2f(id) + 0.5) / size - 0.5);
+            let u = volumes[i].turn.xy;
+            let v = volumes[i].turn.zw;
+            volumes[i].turn = vec4f(cos(on) * u + sin(on) * v, cos(on) * v - sin(on) * u);
+        }
+    }
     let x = (vec2f(id) + 0.5) / size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
     let ray = x.x * scene.right.xyz + x.y * scene.up.xyz + scene.forward.xyz;
     let direction = normalize(ray);
