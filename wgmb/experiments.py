@@ -5,7 +5,7 @@ Each takes a Laboratory, an empty Report and a picture size, and fills the repor
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +24,12 @@ ALPHAS = (0.02, 0.04, 0.06, 0.08, 0.10)  # chen, figure 5
 TAPS = (4, 8, 12, 16, 24, 32)  # rosado
 
 
-def taylor(lab: Laboratory, report: Report, size: tuple[int, int], rays: int = 1) -> None:
+def taylor(
+    lab: Laboratory,
+    report: Report,
+    size: tuple[int, int],
+    moves: Iterable[str] = ("translation", "scaling", "rotation"),
+) -> None:
     """Taylor's comparison: three camera moves, two budgets in ratio 1 : 5, reference 1,000 rays.
 
     The exposure is the interval between the previous frame and this one, as in the paper.
@@ -39,8 +44,8 @@ def taylor(lab: Laboratory, report: Report, size: tuple[int, int], rays: int = 1
     names = ("distributed", "accumulate", "reproject:form=published", "reproject", "tap")
     contenders = [Contender.parse(name) for name in names]
     claims, fixed, worth = [], [], []
-    for name in ("translation", "scaling", "rotation"):
-        staged = Staged(scenes.make(name), size=size, rays=rays)
+    for name in moves:
+        staged = Staged(scenes.make(name), size=size, rays=1)
         reference = Contender("distributed", (("seed", 1),), 1000)
         case = scene_case(name, Shutter(360, "end"), reference, staged, lab.device, lab.tell)
         lab.compare(report, case, contenders, (1, 2, 4, UNIT_RAYS, 16, 5 * UNIT_RAYS), _budgets)
@@ -145,6 +150,7 @@ def chen(lab: Laboratory, report: Report, size: tuple[int, int], moments: int = 
     """
     if "fusion" not in METHODS:
         raise InputError(f"this experiment needs the method fusion; there is {', '.join(METHODS)}")
+    report.samples = 8
     tap, fusion = (Contender(m, (("form", "published"),)) for m in ("tap", "fusion"))
     printed = Contender("fusion", (("form", "published"), ("weights", "published")))
     both = [tap, fusion, printed, Contender("tap"), Contender("fusion")]

@@ -231,8 +231,9 @@ def _grid(columns, rows, colors, judged: int | None = None) -> str:
     if judged is not None and len(rows) > 1:
         for i, m in enumerate(MEASURES.values(), judged):
             best[i] = (max if m.more_is_better else min)(row[i] for row in rows)
-    digits = {} if judged is None else {
-        i: m.digits for i, m in enumerate(MEASURES.values(), judged)}  # fmt: skip
+    digits = {i: _digits(row[i] for row in rows) for i in range(len(columns))}
+    if judged is not None:
+        digits |= {i: m.digits for i, m in enumerate(MEASURES.values(), judged)}
     lines = []
     for row in rows:
         cells = []
@@ -240,7 +241,7 @@ def _grid(columns, rows, colors, judged: int | None = None) -> str:
             mark = " class=best" if i in best and value == best[i] else ""
             key = f' data-value="{value}"' if isinstance(value, int | float) else ""
             key = ' data-value=""' if value is None else key
-            text = escape(_text(value, digits.get(i)))
+            text = escape(_text(value, digits[i]))
             if i == 0 and str(value) in colors:
                 text = f'<span class="dot" style="background:{colors[value]}"></span>{text}'
             cells.append(f"<td{mark}{key}>{text}</td>")
@@ -251,13 +252,19 @@ def _grid(columns, rows, colors, judged: int | None = None) -> str:
     )
 
 
-def _text(value, digits: int | None) -> str:
+def _digits(values: Iterable[object]) -> int:
+    """Decimals that the numbers of a column need, four at most."""
+    numbers = [f"{v:.4f}".rstrip("0") for v in values if isinstance(v, float) and math.isfinite(v)]
+    return max((len(n.partition(".")[2]) for n in numbers), default=0)
+
+
+def _text(value, digits: int) -> str:
     if value is None:
         return "-"
     if isinstance(value, float):
         if math.isinf(value):
             return "∞"
-        return f"{value:.{digits}f}" if digits is not None else f"{value:g}"
+        return f"{value + 0.0:.{digits}f}"
     return str(value)
 
 

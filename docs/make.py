@@ -1,0 +1,145 @@
+"""Make the gallery: python docs/make.py. Every picture and figure comes from the program.
+
+Every method draws every scene; the page shows its picture of the first, its error map, and
+the place of all scenes where it is worst, beside the truth.
+"""
+
+import inspect
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from wgmb import METHODS, compare, gpu
+from wgmb.compare import Contender, Entry, Report, Staged
+from wgmb.measure import FLIP_GAIN, MEASURES, display, flip_colors
+from wgmb.options import ShutterOptions
+
+HERE = Path(__file__).parent
+SCENES = {"crossing:speed=3": 0.0, "fence:speed=6": 0.0, "wheel": 0.0, "torusphere": 16.0}
+"""At these seconds."""
+SIZE, DETAIL = (480, 270), (120, 68)  # [px], of pictures, of the worst place
+REFERENCE, SAMPLES, RAYS = "distributed:512", 16, 4
+
+
+def main() -> None:
+    """Render, judge, and write gallery.md with its pictures."""
+    device = gpu.open_device()
+    lab = compare.Laboratory(device, tell=lambda text: print(text, file=sys.stderr))
+    found = Report("Gallery", "python docs/make.py", compare.machine(device), SAMPLES)
+    contenders = [Contender(name) for name in METHODS]
+    for text, time in SCENES.items():
+        name, scene = compare.make_scene(text)
+        exposure, staged = (
+            ShutterOptions().settled(scene).make(),
+            Staged(scene, time, SIZE, rays=RAYS),
+        )
+        case = compare.scene_case(
+            name, exposure, Contender.parse(REFERENCE), staged, device, lab.tell
+        )
+        # Image methods have nothing to start from where there are volumes alone.
+        able = contenders if scene.bodies else [c for c in contenders if c.needs_scene]
+        lab.compare(found, case, able, (SAMPLES,), budgets=lambda *_: [])
+    (HERE / "gallery").mkdir(exist_ok=True)
+    (HERE / "gallery.md").write_text(_page(found), encoding="utf-8")
+
+
+def _page(found: Report) -> str:
+    about = ", ".join(f"{k} {v}" for k, v in found.machine.items())
+    sections = [_section(found, name) for name in METHODS]
+    return (
+        "# The methods, side by side\n\n"
+        f"Made by `{found.command}` ({about}). Scenes of {SIZE[0]} x {SIZE[1]}, {SAMPLES} samples, "
+        f"truth: {REFERENCE.replace(':', ', ')} rays a pixel. Times are of the blur alone, on the "
+        "adapter named above, and say little about yours; `wgmb compare` makes such a page for "
+        "your frames.\n\n" + _table(found) + "\nUnder every method: its picture; its error, "
+        f"{FLIP_GAIN:g} times FLIP, black is alike; the place where it is worst; the truth "
+        "there.\n\n" + "\n".join(sections)
+    )
+
+
+def _table(found: Report) -> str:
+    """FLIP by method and scene, and the time of the first scene."""
+    head = ["method", *(c.name for c in found.cases), "PSNR [dB] of the first", "ms", "to `tap`"]
+    lines = [head, ["---"] * len(head)]
+    for label in ("sharp", *METHODS):
+        row, first = [f"`{label}`"], None
+        for case in found.cases:
+            entries = [e for e in found.of(case.name, label=label) if case.staged.scene.bodies
+                       or e.kind != "sharp"]  # fmt: skip
+            row.append(f"{entries[0].measures['flip']:.4f}" if entries else "")
+            first = first or next(iter(entries), None)
+        row += [f"{first.measures['psnr']:.1f}", _time(first), _times_tap(found, first)]
+        lines.append(row)
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def _time(entry: Entry) -> str:
+    return f"{1e3 * (entry.seconds - entry.frame_seconds):.1f}" if entry.seconds else ""
+
+
+def _times_tap(found: Report, entry: Entry) -> str:
+    """How many times as long as `tap` took for the same scene."""
+    tap = found.of(entry.case, label="tap", kind="samples")
+    if not tap or not entry.seconds:
+        return ""
+    ratio = (entry.seconds - entry.frame_seconds) / (tap[0].seconds - tap[0].frame_seconds)
+    return f"{ratio:.1f}"
+
+
+def _section(found: Report, name: str) -> str:
+    entries = [e for e in found.entries if e.label == name]
+    cases = {c.name: c for c in found.cases}
+    picture = HERE / "gallery" / f"{name}.jpg"
+    errors = [flip_colors(e.picture, cases[e.case].truth) for e in entries]
+    worst, corner = max(
+        ((i, *_worst(error)) for i, error in enumerate(errors)), key=lambda place: place[1]
+    )[::2]
+    shown = [display(entries[0].picture), errors[0]]
+    shown += [_detail(display(p), corner)
+              for p in (entries[worst].picture, cases[entries[worst].case].truth)]  # fmt: skip
+    strip = np.vstack([np.hstack(shown[:2]), np.hstack(shown[2:])])
+    levels = (255 * np.clip(strip, 0, 1) + 0.5).astype(np.uint8)
+    Image.fromarray(levels).save(picture, quality=82, optimize=True)
+    first, strong, artefacts = _words(METHODS[name])
+    figures = ", ".join(
+        f"{m.title} {entries[0].measures[k]:.{m.digits}f}" for k, m in MEASURES.items()
+    )
+    return (
+        f"## {name}\n\n{first}\n\n- Strong: {strong}\n- Artefacts: {artefacts}\n"
+        f"- {entries[0].case}: {figures}\n\n"
+        f"![{name}: picture, error, the worst place ({entries[worst].case}), the truth there]"
+        f"(gallery/{name}.jpg)\n"
+    )
+
+
+def _words(method: type) -> tuple[str, str, str]:
+    """The first line of a method's docstring, and what it says of strength and artefacts."""
+    text = " ".join(inspect.cleandoc(method.__doc__ or "").split())
+    strong = re.search(r"Strong: (.*?)(?= Artefacts:|$)", text)
+    artefacts = re.search(r"Artefacts: (.*)$", text)
+    assert strong and artefacts, f"{method.__name__} does not say its strength and artefacts"
+    return inspect.cleandoc(method.__doc__ or "").splitlines()[0], strong[1], artefacts[1]
+
+
+def _worst(error: np.ndarray) -> tuple[float, tuple[int, int]]:
+    """The mean error of the worst window of DETAIL, and its upper left corner (x, y)."""
+    width, height = DETAIL
+    sums = np.pad(error.mean(axis=2), ((1, 0), (1, 0))).cumsum(axis=0).cumsum(axis=1)
+    window = sums[height:, width:] - sums[:-height, width:] - sums[height:, :-width]
+    window += sums[:-height, :-width]
+    y, x = np.unravel_index(np.argmax(window), window.shape)
+    return float(window[y, x]) / (width * height), (int(x), int(y))
+
+
+def _detail(shown: np.ndarray, corner: tuple[int, int]) -> np.ndarray:
+    """The window enlarged to a whole picture's size, pixels as squares."""
+    (x, y), (width, height) = corner, DETAIL
+    levels = (255 * np.clip(shown[y : y + height, x : x + width], 0, 1) + 0.5).astype(np.uint8)
+    return np.asarray(Image.fromarray(levels).resize(SIZE, Image.Resampling.NEAREST)) / 255
+
+
+if __name__ == "__main__":
+    main()

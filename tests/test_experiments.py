@@ -1,0 +1,75 @@
+"""The papers' experiments run, and read their findings off their figures."""
+
+import numpy as np
+import pytest
+
+from wgmb import compare, experiments, report
+from wgmb.compare import Case, Entry, Report
+from wgmb.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def lab(device):
+    return compare.Laboratory(device, rounds=1)
+
+
+def made(lab, name, size=(48, 32), **options):
+    found = Report(name, "", compare.machine(lab.device), 16)
+    experiments.EXPERIMENTS[name](lab, found, size, **options)
+    assert "<svg" in report.page(found)
+    for table in found.tables:
+        assert all(len(row) == len(table.columns) for row in table.rows)
+    return found
+
+
+def test_taylor_has_two_budgets_and_his_findings(lab):
+    found = made(lab, "taylor", moves=["rotation"])
+    (case,) = found.cases
+    small, large = sorted({e.budget for e in found.of(case.name, kind="time")})
+    assert large == pytest.approx(5 * small)
+    assert case.shutter.span == (-1, 0)  # from the previous frame to this one
+    claims, fixed, worth = found.tables
+    assert len(claims.rows) == len(worth.rows) == 2
+    assert {v for row in claims.rows for v in row[2:]} <= {"holds", "does not hold"}
+    assert len(fixed.rows) == 4
+
+
+def test_chen_compares_rates_faces_and_alphas(lab):
+    found = made(lab, "chen", moments=2)
+    titles = [t.title for t in found.tables]
+    assert titles[0].startswith("Table 1")
+    for scene in ("scaling", "crossing"):
+        (figure,) = (t for t in found.tables if t.title == f"Figure 5, {scene}: alpha")
+        assert len(figure.rows) == 2 * len(experiments.ALPHAS)
+        faces = next(t for t in found.tables if t.title.startswith(f"{scene}: front and back"))
+        assert len({row[2] for row in faces.rows}) > 1  # telling faces apart changes the blur
+
+
+def test_chen_without_fusion_says_so(lab, monkeypatch):
+    monkeypatch.delitem(experiments.METHODS, "fusion")
+    with pytest.raises(InputError, match="needs the method fusion"):
+        made(lab, "chen")
+
+
+def test_rosado_finds_that_the_mask_or_the_velocity_buffer_helps(lab):
+    found = made(lab, "rosado", (160, 90))
+    error = {row[0]: row[3] for row in found.tables[0].rows}
+    assert error["camera only, mask"] < error["camera only"]
+    assert error["velocity buffer"] < error["camera only"]
+    (plot,) = found.plots
+    assert [n for n, _ in plot.curves["velocity buffer"]] == sorted({*experiments.TAPS, 16})
+
+
+@pytest.mark.parametrize(("limit", "rays"), [(0.2, 4.0), (0.1, 16.0), (0.05, "> 16")])
+def test_worth_in_rays_is_read_off_the_curve(limit, rays):
+    """Error 0.4 / sqrt(rays), time 10 ms a ray."""
+    case = Case("x", None, None, None, "")  # pyright: ignore[reportArgumentType]
+    entries = [Entry("x", "distributed", "samples", {"flip": 0.4 / np.sqrt(n)}, n, 0.01 * n)
+               for n in (1, 2, 8, 16)]  # fmt: skip
+    entries += [Entry("x", "reproject, form published", "samples", {"flip": error}, n, 0.001 * n)
+                for n, error in ((1, 2 * limit), (8, 1.01 * limit), (16, limit))]  # fmt: skip
+    ((_, _, best, after, enough, _),) = experiments._worth(
+        Report("", "", {}, 1, entries=entries), case, "flip"
+    )
+    assert (best, after) == (round(1.01 * limit, 4), 8.0)  # the first that is nearly its best
+    assert enough == (pytest.approx(rays, rel=0.03) if rays != "> 16" else rays)
