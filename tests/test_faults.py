@@ -420,16 +420,16 @@ def test_without_a_vulkan_driver_it_is_one_line_and_3(tmp_path, opengl):
 
 @pytest.fixture(scope="module")
 def long_shot(tmp_path_factory):
-    """80 frames (of three pictures), and what an unbroken run makes of them."""
+    """240 frames (of three pictures), and what an unbroken run makes of them."""
     folder = tmp_path_factory.mktemp("long")
     for n in range(1, 4):
         make.write_exr(folder / f"of.{n}.exr", make.frame(n))
-    for n in range(1, 81):
+    for n in range(1, 241):
         (folder / f"shot.{n:04d}.exr").hardlink_to(folder / f"of.{(n - 1) % 3 + 1}.exr")
     pattern = str(folder / "shot.####.exr")
     assert make.command(*arguments(pattern, folder / "whole")).returncode == 0
     whole = {p.name: p.read_bytes() for p in (folder / "whole").iterdir()}
-    assert len(whole) == 80
+    assert len(whole) == 240
     return pattern, whole
 
 
@@ -485,7 +485,7 @@ def test_an_interrupted_run_ends_with_130_one_line_and_whole_files(
     assert (process.returncode, said) == (130, "")
     assert lines(err) == ["wgmb: interrupted"]
     got = {p.name: p.read_bytes() for p in out.iterdir()}
-    assert 5 <= len(got) < 80
+    assert 5 <= len(got) < 240
     assert got.items() <= whole.items()
 
 

@@ -82,10 +82,11 @@ def blur(
     quiet
         Print errors only.
     """
-    look, given = (look or BlurOptions()).settled(), given or InputOptions()
+    look, given = look or BlurOptions(), given or InputOptions()
     when = (when or ShutterOptions()).settled()
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     clip = given.open(pattern, look.keep, look.scale)
+    look = look.settled(clip=clip)
     made = look.make(when.make(), adapter)
     settings = _settings(look, when, given) | {"samples": _samples(made), "bits": output.bits}
     files = Output(
@@ -103,7 +104,8 @@ def blur(
     started = time.perf_counter()
     with progress(say, len(clip.numbers), quiet) as tick:
         report = blur_sequence(clip, made, files, resume=output.resume, progress=tick)
-    return _conclude(say, clip, files, report, time.perf_counter() - started, quiet, verbose)
+    took = f"{time.perf_counter() - started:.1f} s with {made.method.name}"
+    return _conclude(say, clip, files, report, took, quiet, verbose)
 
 
 def _settings(look: BlurOptions, when: ShutterOptions, given: InputOptions) -> dict:
@@ -118,7 +120,7 @@ def _samples(blur: Blur) -> int | str:
     return "auto" if blur.auto else blur.samples
 
 
-def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, verbose: bool) -> int:
+def _conclude(say, clip, files, report: Report, took: str, quiet: bool, verbose: bool) -> int:
     """Say what became of the run; return the exit code."""
 
     def line(text: str) -> None:
@@ -134,7 +136,7 @@ def _conclude(say, clip, files, report: Report, seconds: float, quiet: bool, ver
             line(f"vectors: {clip.finding}")
         if clip.cuts:
             line(f"camera cut before frame {', '.join(map(str, sorted(clip.cuts)))}")
-        done = f"{len(report.done)} frames in {seconds:.1f} s -> {files.pattern}"
+        done = f"{len(report.done)} frames in {took} -> {files.pattern}"
         line(done + (f", {len(report.skipped)} were there" if report.skipped else ""))
     if report.failed:
         line(f"wgmb: {len(report.failed)} of {len(clip.numbers)} frames failed")

@@ -150,7 +150,7 @@ class BlurOptions:
     """How to blur."""
 
     method: str | None = None
-    "tap (default), tiles, fusion, reproject. Scenes: also accumulate, distributed, volume."
+    "gather (default), tap (if no depth), tiles, fusion, reproject, accumulate, distributed, volume."
     samples: int | Literal["auto"] | None = None
     "Taps, pictures or rays a pixel: 16, for fusion 8; auto: one a pixel of a streak, 64 at most."
     jitter: float = 0.0
@@ -184,9 +184,11 @@ class BlurOptions:
     seed: int | None = None
     "distributed: another seed is other noise."
 
-    def settled(self, scene: Scene | None = None) -> BlurOptions:
-        """The method, where it was left open, that suits the scene."""
-        suited = "volume" if scene is not None and scene.has_volumes else "tap"
+    def settled(self, scene: Scene | None = None, clip: sequence.Clip | None = None) -> BlurOptions:
+        """With a method that suits the scene or what the files hold, if it was left open."""
+        suited = "tap" if clip is not None and not clip.has >= {"motion", "depth"} else "gather"
+        if scene is not None and scene.has_volumes:
+            suited = "volume"
         return replace(self, method=self.method or suited)
 
     def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
@@ -196,7 +198,7 @@ class BlurOptions:
             name: value for name, value in own.items() if value is not None and value is not False
         }
         return Blur(
-            self.settled().method or "",
+            self.method or "tap",
             shutter=shutter_,
             samples=self.samples,
             jitter=self.jitter,

@@ -111,6 +111,14 @@ class Clip:
         for number in self.numbers:
             yield self.frame(self.source(number))
 
+    @property
+    def has(self) -> frozenset[str]:
+        """What the first frame that can be read has for methods (see Frame.has)."""
+        for number in self.numbers:
+            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                return self.frame(self.source(number), picture=False, normal=False).has
+        return frozenset()
+
     def files(self, number: int) -> list[Path]:
         """Every file that the result of frame `number` depends on."""
         passes = self.passes

@@ -110,7 +110,7 @@ class State:
         """Method, shutter and curve that the scene asks for; else those that are usual."""
         scene = scenes.make(self.source) if self.is_scene else None
         when = ShutterOptions().settled(scene, self.fps)
-        method = BlurOptions().settled(scene).method
+        method = "volume" if scene.has_volumes else "tap"  # quick; `wgmb render` takes gather
         return {"method": method, "shutter": when.shutter, "curve": when.curve}
 
     def settled(self) -> State:
