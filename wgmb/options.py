@@ -150,7 +150,7 @@ class BlurOptions:
     """How to blur."""
 
     method: str | None = None
-    "gather (default), tap (if no depth), tiles, fusion, reproject, accumulate, distributed, volume."
+    "gather (default), tap (no depth), tiles, fusion, reproject, accumulate, distributed, volume."
     samples: int | Literal["auto"] | None = None
     "Taps, pictures or rays a pixel: 16, for fusion 8; auto: one a pixel of a streak, 64 at most."
     jitter: float = 0.0

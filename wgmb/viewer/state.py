@@ -110,7 +110,8 @@ class State:
         """Method, shutter and curve that the scene asks for; else those that are usual."""
         scene = scenes.make(self.source) if self.is_scene else None
         when = ShutterOptions().settled(scene, self.fps)
-        method = "volume" if scene.has_volumes else "tap"  # quick; `wgmb render` takes gather
+        volumes = scene is not None and scene.has_volumes
+        method = "volume" if volumes else "tap"  # quick; `wgmb render` takes gather
         return {"method": method, "shutter": when.shutter, "curve": when.curve}
 
     def settled(self) -> State:
