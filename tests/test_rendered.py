@@ -111,7 +111,7 @@ def test_nor_in_the_published_form():
     np.testing.assert_allclose(render(0.2), render.frame(0.2).color, atol=1e-4)
 
 
-@pytest.mark.parametrize("method", ["tap", "reproject"])
+@pytest.mark.parametrize("method", ["tap", "reproject", "gather"])
 @pytest.mark.parametrize("name", ["crossing", "fence"])
 def test_rendering_passes_and_blurring_them_is_rendering_with_blur(tmp_path, capsys, name, method):
     """Colour and motion go through half floats in between: 2.4e-4 measured."""
@@ -137,7 +137,7 @@ def test_passes_hold_what_the_frame_holds(tmp_path, capsys):
         capsys, "render", "crossing", "--size", "48x27", "--time", 0.1, "--passes", "-o", path
     )
     got = make.plain_read(path)
-    render = wgmb.Render(scenes.make("crossing"), wgmb.Blur(), size=(48, 27))
+    render = wgmb.Render(scenes.make("crossing"), wgmb.Blur("gather"), size=(48, 27))
     frame = render.frame(0.1)
     assert np.array_equal(got["Z"], frame.depth)
     assert np.array_equal(got["object_id.X"], frame.object_id)
