@@ -7,6 +7,7 @@ import pytest
 
 import wgmb
 from twins import fusion as fusion_twin
+from twins import gather as gather_twin
 from twins import keep as keep_twin
 from twins import reproject as reproject_twin
 from twins import tap as tap_twin
@@ -194,6 +195,54 @@ def test_reproject_is_its_twin(size, neighbours):
     want, count = reproject_twin.reproject(sources, times)
     assert np.array_equal(np.rint(4 * share), count)
     wrong = (np.abs(got - want) > TOLERANCE).any(axis=2)
+    assert wrong.mean() < 0.01
+
+
+def crossing(size, offset, seed=0):
+    """A box over a wall, both moving and textured, as a renderer with antialiasing sees it."""
+    rng = np.random.default_rng(seed)
+    height, width = size
+    fine = 4
+    y, x = (np.mgrid[: height * fine, : width * fine] + 0.5) / fine
+    waves = rng.normal(size=(2, 4, 3))
+    speeds = np.array([[1.5, -0.5], [-14.0, 6.0]])  # of wall and box [px a frame]
+    depths = np.array([9.0, 4.0])
+    bend = np.array([[0, 0], [0.5, 1.0]])
+    way = [v * offset + b * offset**2 for v, b in zip(speeds, bend, strict=True)]
+    box = (abs(x - width / 2 - way[1][0]) < width / 6) & (
+        abs(y - height / 2 - way[1][1]) < height / 4
+    )
+    which = box.astype(int)
+    color = np.zeros((*which.shape, 4))
+    for k in (0, 1):
+        px, py = x - way[k][0], y - way[k][1]
+        tone = np.zeros((*x.shape, 3))
+        for n in range(4):
+            along = px * np.cos(n + k) + py * np.sin(n + k)
+            tone += np.sin(0.3 * (n + 1) * along)[..., None] * waves[k, n]
+        shade = np.concatenate([0.5 + 0.1 * tone, np.ones((*tone.shape[:2], 1))], axis=2)
+        color[which == k] = shade[which == k]
+    velocity = speeds + 2 * bend * offset
+    vectors = np.concatenate([-velocity + bend, velocity + bend], axis=1)
+
+    def mean(a):
+        return a.reshape(height, fine, width, fine, -1).mean(axis=(1, 3)).astype("f4")
+
+    return mean(color), mean(vectors[which]), depths[which][::fine, ::fine].astype("f4")
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+@pytest.mark.parametrize("size", [(36, 52), (1, 1)])
+@pytest.mark.parametrize("degrees", [180, 400])
+def test_gather_is_its_twin(size, frames, degrees):
+    """Samples on a texel's edge may read the next one; nearly all pixels agree."""
+    sources = [(offset, *crossing(size, offset)) for offset in (0, -1, 1)[:frames]]
+    own, *near = [wgmb.Frame(c, motion=m, depth=d) for _, c, m, d in sources]
+    near = dict(zip(("prev", "next"), near, strict=False))
+    frame = wgmb.Frame(own.color, motion=own.motion, depth=own.depth, **near)
+    got = wgmb.Blur("gather", samples=4, shutter=degrees)(frame)
+    want = gather_twin.gather(sources, Shutter(degrees).sample_times(4).astype(float))
+    wrong = (np.abs(got - want) > 1e-3).any(axis=2)
     assert wrong.mean() < 0.01
 
 

@@ -235,14 +235,16 @@ def _layout_entry(b: shader.Binding, source: shader.Source) -> dict:
     if b.space.startswith("storage"):
         kind = "storage" if "read_write" in b.space else "read-only-storage"
         return entry | {"buffer": {"type": kind}}
-    if m := re.fullmatch(r"texture_storage_2d<(\w+),\s*(\w+)>", b.type):
+    dimension = {"view_dimension": "2d-array" if "_2d_array" in b.type else "2d"}
+    if m := re.fullmatch(r"texture_storage_2d(?:_array)?<(\w+),\s*(\w+)>", b.type):
         access = {"write": "write-only", "read": "read-only"}[m[2]]
-        return entry | {"storage_texture": {"format": m[1], "access": access}}
+        return entry | {"storage_texture": {"format": m[1], "access": access} | dimension}
     if b.type == "sampler":
         return entry | {"sampler": {"type": "filtering"}}
-    if b.type == "texture_2d<f32>":
+    if b.type in ("texture_2d<f32>", "texture_2d_array<f32>"):
         sampled = re.search(rf"textureSample\w*\(\s*{b.name}\b", source.text)
-        return entry | {"texture": {"sample_type": "float" if sampled else "unfilterable-float"}}
-    if b.type == "texture_2d<u32>":
-        return entry | {"texture": {"sample_type": "uint"}}
+        kind = {"sample_type": "float" if sampled else "unfilterable-float"}
+        return entry | {"texture": kind | dimension}
+    if b.type in ("texture_2d<u32>", "texture_2d_array<u32>"):
+        return entry | {"texture": {"sample_type": "uint"} | dimension}
     raise ShaderError(f"{source.name}: cannot bind {b.name}: {b.type}")

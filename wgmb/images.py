@@ -12,7 +12,7 @@ _BAND = 4 << 20  # bytes written at once: five times faster at 4K than all at on
 _HALF_MAX = 65504.0  # largest finite f16
 _USAGE = wgpu.TextureUsage
 _NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4"}
-_STORABLE = ("rgba16float", "rgba32float", "r32float", "r32uint")
+_STORABLE = ("rgba16float", "rgba32float", "r32float", "r32uint", "rgba32uint")
 _CHANNELS = {"r": 1, "rg": 2, "rgba": 4}
 
 
@@ -51,16 +51,18 @@ class Images:
         self._textures: dict[str, wgpu.GPUTexture] = {}
         self._staging: wgpu.GPUBuffer | None = None
 
-    def texture(self, name: str, size: tuple[int, int], format: str) -> wgpu.GPUTexture:
+    def texture(
+        self, name: str, size: tuple[int, int], format: str, layers: int = 1
+    ) -> wgpu.GPUTexture:
         """The texture called `name`; its contents are whatever was last put there."""
         kept = self._textures.get(name)
-        if kept is None or kept.size[:2] != tuple(size) or kept.format != format:
+        if kept is None or kept.size != (*size, layers) or kept.format != format:
             check_size(self.device, *size)
             usage = _USAGE.TEXTURE_BINDING | _USAGE.COPY_DST | _USAGE.COPY_SRC
             if format in _STORABLE:
                 usage |= _USAGE.STORAGE_BINDING
             kept = self.device.create_texture(
-                label=name, size=(*size, 1), format=format, usage=usage
+                label=name, size=(*size, layers), format=format, usage=usage
             )
             self._textures[name] = kept
         return kept

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 from .accumulate import Accumulate
 from .distributed import Distributed
 from .fusion import Fusion
+from .gather import Gather
 from .reproject import Reproject
 from .tap import Tap
 from .tiles import Tiles
@@ -40,5 +41,5 @@ class Method(Protocol):
         ...
 
 
-_ALL = (Tap, Tiles, Fusion, Reproject, Volume, Accumulate, Distributed)
+_ALL = (Tap, Tiles, Gather, Fusion, Reproject, Volume, Accumulate, Distributed)
 METHODS: dict[str, type] = {m.name: m for m in _ALL}

@@ -1,0 +1,94 @@
+"""What gather alone promises: the neighbouring frames show what the frame itself hides."""
+
+import numpy as np
+import pytest
+from test_twins import crossing
+
+import wgmb
+from wgmb import Shutter
+
+SIZE = (54, 96)
+SHUTTER = Shutter(180)
+
+
+def frame_of(sources):
+    """The first of (color, motion, depth) with the other two before and after it."""
+    own, prev, after = (wgmb.Frame(c, motion=m, depth=d) for c, m, d in sources)
+    return wgmb.Frame(own.color, motion=own.motion, depth=own.depth, prev=prev, next=after)
+
+
+@pytest.fixture(scope="module")
+def sources():
+    return [crossing(SIZE, offset) for offset in (0, -1, 1)]
+
+
+@pytest.fixture(scope="module")
+def truth():
+    times = SHUTTER.sample_times(64).astype(float)
+    return np.mean([crossing(SIZE, t)[0] for t in times], axis=0)
+
+
+def error(picture, truth):
+    return np.sqrt(np.mean((picture - truth) ** 2))
+
+
+def test_it_is_closer_to_the_truth_than_one_frame_can_be(sources, truth):
+    frame = frame_of(sources)
+    three = error(wgmb.Blur("gather")(frame), truth)
+    alone = wgmb.Frame(frame.color, motion=frame.motion, depth=frame.depth)
+    one = error(wgmb.Blur("gather")(alone), truth)
+    taps = error(wgmb.Blur("tap")(frame), truth)
+    assert three < 0.8 * one
+    assert three < 0.4 * taps
+
+
+def test_noise_in_vectors_breaks_no_surface(sources, truth):
+    rng = np.random.default_rng(3)
+    noisy = [(c, m + rng.normal(size=m.shape).astype("f4") * 0.5, d) for c, m, d in sources]
+    clean = error(wgmb.Blur("gather")(frame_of(sources)), truth)
+    assert error(wgmb.Blur("gather")(frame_of(noisy)), truth) < 1.5 * clean + 0.002
+    share = wgmb.Blur("gather", show="confidence")(frame_of(noisy))[..., 0]
+    assert share.mean() > 0.98
+
+
+def test_vectors_of_the_other_sign_are_worse(sources, truth):
+    right = error(wgmb.Blur("gather")(frame_of(sources)), truth)
+    turned = frame_of([(c, -m, d) for c, m, d in sources])
+    assert error(wgmb.Blur("gather")(turned), truth) > 3 * right
+
+
+def test_stillness_is_kept_to_the_bit_beside_neighbours(noise):
+    depth = np.ones(noise.shape[:2], "f4")
+    still = np.zeros((*depth.shape, 4), "f4")
+    others = [np.roll(noise, k, axis=1) for k in (1, 2)]
+    frame = frame_of([(c, still, depth) for c in (noise, *others)])
+    assert np.array_equal(wgmb.Blur("gather")(frame), noise)
+
+
+def test_energy_of_a_moving_spark_is_kept():
+    sources = []
+    for offset in (0, -1, 1):
+        color = np.zeros((48, 96, 3), "f4")
+        motion = np.zeros((48, 96, 4), "f4")
+        depth = np.full((48, 96), 9.0, "f4")
+        at = np.s_[22:26, 46 + 12 * offset : 50 + 12 * offset]
+        color[at], motion[at], depth[at] = 500.0, (-12, 0, 12, 0), 4.0
+        sources.append((color, motion, depth))
+    out = wgmb.Blur("gather", samples=64)(frame_of(sources))
+    assert out.sum() == pytest.approx(sources[0][0].sum(), rel=0.01)
+
+
+def test_confidence_tells_where_the_neighbours_were_needed(sources):
+    frame = frame_of(sources)
+    shown = wgmb.Blur("gather", show="confidence")(frame)
+    accepted, others, residual, left = np.moveaxis(shown, 2, 0)
+    assert accepted.min() > 0.9
+    assert 0.002 < others.mean() < 0.2
+    assert others[:8].max() < 0.01  # nothing is hidden up there
+    assert residual.max() <= 1
+    assert left.max() <= 1
+
+
+def test_what_can_be_shown_is_told():
+    with pytest.raises(wgmb.InputError, match="color, confidence"):
+        wgmb.Blur("gather", show="depth")

@@ -1,0 +1,389 @@
+"""Three-frame reconstruction: one pixel, one time, one frame, one seed at a time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twins.tap import bilinear
+
+FAR, TILE, PATHS = 1e10, 16, 4
+
+
+@dataclass
+class Layers:
+    """A frame whose silhouettes are parted; arrays of (height, width[, channels])."""
+
+    offset: float
+    color: list  # near, premultiplied by coverage, and far
+    path: list  # velocity, curvature
+    depth: list  # far: 0 where there is none
+    coverage: np.ndarray
+    guessed: np.ndarray  # the far layer was not seen
+    plain: np.ndarray  # no silhouette in the 3 x 3
+    calm: np.ndarray  # none, and nothing brighter than white, in the 5 x 5
+
+
+@dataclass
+class Sample:
+    """What may be seen at a pixel at a time."""
+
+    depth: float  # it competes with
+    true_depth: float
+    miss: float
+    at: np.ndarray
+    home: np.ndarray
+    frame: int
+    far: bool
+    pixel: tuple
+
+
+def gather(frames, times):
+    """Mean over `times`; frames: (offset, color, motion, depth), the frame itself first."""
+    layers = [split(*f) for f in frames]
+    span = times[0] - (times[1] - times[0]) / 2, times[-1] + (times[1] - times[0]) / 2
+    tiles = [reaching(f, span) for f in layers]
+    height, width = frames[0][1].shape[:2]
+    out = frames[0][1].astype(float)
+    for y in range(height):
+        for x in range(width):
+            here = [t[y // TILE][x // TILE] for t in tiles]
+            if max(tile["longest"] for tile in here) >= 0.01:
+                seen = [instant(layers, here, x, y, t, frames[0][1]) for t in times]
+                out[y, x] = np.maximum(np.mean(seen, axis=0), 0)
+    return out
+
+
+def moved(path, u):
+    """Displacement [px] after `u` frame intervals."""
+    return (path[:2] + path[2:] * u) * u
+
+
+# ---- silhouettes ----------------------------------------------------------------------------
+
+
+def around(height, width, y, x, radius):
+    """Pixels of the square around one, as far as they are in the picture."""
+    for j in range(max(0, y - radius), min(height, y + radius + 1)):
+        for i in range(max(0, x - radius), min(width, x + radius + 1)):
+            yield j, i
+
+
+def split(offset, color, motion, depth):
+    """Part pixels that show two surfaces into a near layer and what is behind it."""
+    height, width = depth.shape
+    color, motion = color.astype(float), motion.astype(float)
+    z = np.where(np.isfinite(depth) & (depth > 0), np.minimum(depth, FAR), FAR)
+    mixed = np.zeros((height, width), bool)
+    for y in range(height):
+        for x in range(width):
+            near = list(around(height, width, y, x, 1))
+            depths = [z[p] for p in near]
+            apart = max(np.sum((motion[p] - motion[y, x]) ** 2) for p in near)
+            mixed[y, x] = max(depths) > 1.1 * min(depths) and apart > 0.25
+    found = [color.copy(), motion.copy(), z.copy(), np.ones((height, width))]
+    far = [np.zeros_like(color), motion.copy(), np.zeros((height, width))]
+    guessed = np.zeros((height, width), bool)
+    for y, x in np.argwhere(mixed):
+        parted = part(color, motion, z, mixed, y, x)
+        if parted:
+            for array, value in zip([*found, *far, guessed], parted, strict=True):
+                array[y, x] = value
+    plain, calm = np.ones((2, height, width), bool)
+    for y in range(height):
+        for x in range(width):
+            plain[y, x] = not any(mixed[p] for p in around(height, width, y, x, 1))
+            calm[y, x] = not any(
+                mixed[p] or (color[p] > 1).any() for p in around(height, width, y, x, 2)
+            )
+    paths = [stored(found[1]), stored(far[1])]
+    depths = [found[2], far[2]]
+    return Layers(offset, [found[0], far[0]], paths, depths, found[3], guessed, plain, calm)
+
+
+def stored(motion):
+    """Velocity and curvature, the latter in half precision."""
+    velocity = (motion[..., 2:] - motion[..., :2]) / 2
+    curvature = (motion[..., 2:] + motion[..., :2]) / 2
+    return np.concatenate([velocity, curvature.astype("f2").astype(float)], axis=-1)
+
+
+def part(color, motion, z, mixed, y, x):
+    """Near colour, motion, depth, coverage; far colour, motion, depth; whether that is a guess."""
+    height, width = z.shape
+    inner = list(around(height, width, y, x, 1))
+    nearest, farthest = min(z[p] for p in inner), max(z[p] for p in inner)
+    between = 1.5 * nearest if farthest >= FAR else np.sqrt(nearest * farthest)
+    outer = list(around(height, width, y, x, 2))
+    front = [p for p in outer if z[p] < between and not mixed[p]]
+    back = [p for p in outer if z[p] >= between and not mixed[p]]
+    thin = not front
+    front = front or [p for p in outer if z[p] < between]
+    back = back or [p for p in outer if z[p] >= between]
+    if not front or not back:
+        return None
+
+    def mean(array, pixels):
+        shares = [1 / (1 + ((j - y) ** 2 + (i - x) ** 2) ** 2) for j, i in pixels]
+        return np.average([array[p] for p in pixels], axis=0, weights=shares)
+
+    behind, before = mean(motion, back), mean(motion, front)
+    if thin:
+        candidates = [motion[p] for p in inner if z[p] < between]
+        before = max(candidates, key=lambda m: np.sum((m - behind) ** 2), default=behind)
+    way = before - behind
+    if way @ way < 0.25:
+        return None
+    coverage = np.clip((motion[y, x] - behind) @ way / (way @ way), 0, 1)
+    far_z = mean(z, back)
+    if coverage < 1 - 0.98:
+        far_z = z[y, x] if z[y, x] >= between else far_z
+        return 0.0, before, mean(z, front), 0.0, color[y, x], motion[y, x], far_z, False
+    whole = coverage > 0.98
+    coverage = 1.0 if whole else coverage
+    far_color = mean(color, back)
+    near_color = np.maximum(color[y, x] - (1 - coverage) * far_color, 0)
+    near_motion = motion[y, x] if whole else before
+    near_z = z[y, x] if whole and z[y, x] < between else mean(z, front)
+    return near_color, near_motion, near_z, coverage, far_color, behind, far_z, True
+
+
+# ---- tiles ----------------------------------------------------------------------------------
+
+
+def apart(a, b, u):
+    """How far two paths come apart by the time `u` [px]."""
+    return (np.hypot(*(a - b)[:2]) + np.hypot(*(a - b)[2:]) * u) * u
+
+
+def choose(paths, u):
+    """The longest, then always the one that is most unlike those chosen and standing still."""
+    chosen, longest = [], 0.0
+    for _ in range(PATHS):
+        unlike = [min(apart(p, c, u) for c in [np.zeros(4), *chosen]) for p in paths]
+        most = max(unlike, default=0.0)
+        longest = longest if chosen else most
+        if most <= 0.5:
+            break
+        chosen.append(paths[int(np.argmax(unlike))])
+    return chosen, longest
+
+
+def most_alike(path, chosen, u):
+    """Index of the chosen path, or None if it stands still rather."""
+    all_ = list(chosen) + [np.zeros(4)] * (PATHS - len(chosen))
+    best = int(np.argmin([apart(path, c, u) for c in all_]))
+    return best if best < len(chosen) else None
+
+
+def reaching(frame, span):
+    """What every tile may show: chosen paths, nearest first, and what is known of them."""
+    height, width = frame.plain.shape
+    u0, u1 = span[0] - frame.offset, span[1] - frame.offset
+    u = max(abs(u0), abs(u1))
+    rows, columns = -(-height // TILE), -(-width // TILE)
+    own = {}
+    for j in range(rows):
+        for i in range(columns):
+            box = np.s_[j * TILE : (j + 1) * TILE, i * TILE : (i + 1) * TILE]
+            paths = list(frame.path[0][box].reshape(-1, 4))
+            z = frame.depth[0][box].ravel()
+            chosen, longest = choose(paths, u)
+            depths = [np.inf] * len(chosen)
+            for path, depth in zip(paths, z, strict=True):
+                k = most_alike(path, chosen, u)
+                if k is not None:
+                    depths[k] = min(depths[k], depth)
+            own[j, i] = {"paths": chosen, "depths": depths, "longest": longest,
+                         "nearest": z.min(), "edges": not frame.plain[box].all()}  # fmt: skip
+
+    def lands(path, off):
+        """Whether a tile that moves along the path touches the one `off` away."""
+        bend = np.hypot(*path[2:]) * (u1 - u0) ** 2 / 4
+        steps = np.linspace(0, 1, 2001)[:, None]
+        at = moved(path, u0) + steps * (moved(path, u1) - moved(path, u0)) - off
+        return (np.abs(at) <= TILE + 2 + bend).all(axis=1).any()
+
+    def meets(tile, off):
+        places = [np.zeros(2)] + [moved(p, t) for p in tile["paths"] for t in (u0, u1)]
+        low, high = np.min(places, axis=0), np.max(places, axis=0)
+        return (off + TILE + 2 > low).all() and (off - TILE - 2 < high).all()
+
+    out = []
+    for j in range(rows):
+        out.append([])
+        for i in range(columns):
+            offs = {k: np.array([i - k[1], j - k[0]]) * TILE for k in own}
+            met = [k for k in own if meets(own[k], offs[k])]
+            landing = [
+                (path, z)
+                for k in met
+                for path, z in zip(own[k]["paths"], own[k]["depths"], strict=True)
+                if lands(path, offs[k])
+            ]
+            chosen, _ = choose([path for path, _ in landing], u)
+            depths = [np.inf] * len(chosen)
+            for path, z in landing:
+                k = most_alike(path, chosen, u)
+                if k is not None:
+                    depths[k] = min(depths[k], z)
+            order = np.argsort(depths, kind="stable")
+            out[-1].append({
+                "paths": [chosen[k] for k in order],
+                "depths": [depths[k] for k in order],
+                "nearest": min((own[k]["nearest"] for k in met), default=np.inf),
+                "edges": any(own[k]["edges"] for k in met),
+                "longest": max((own[k]["longest"] for k in met), default=0.0),
+            })  # fmt: skip
+    return out
+
+
+# ---- search ---------------------------------------------------------------------------------
+
+
+def instant(layers, tiles, x, y, t, color):
+    """What is seen at the pixel at time `t`."""
+    samples = find(layers, tiles, x, y, t)
+    clear, sum_, last = 1.0, 0.0, None
+    for s in samples:
+        if clear < 0.01:
+            break
+        if last and is_same_surface(s, last):
+            continue
+        got, cover = fetch(layers[s.frame], s)
+        if cover < 0.01:
+            continue
+        sum_ = sum_ + clear * got
+        clear *= 1 - cover
+        last = s
+    if clear < 0.5:
+        return sum_ / (1 - clear)
+    way = moved(layers[0].path[0][y, x], t)
+    return bilinear(color.astype(float), x + 0.5 - way[0], y + 0.5 - way[1])
+
+
+def is_same_surface(new, last):
+    """Whether the next sample is too near behind the last one to be another surface."""
+    if new.frame == last.frame:
+        return new.far == last.far and new.depth < 1.05 * last.depth
+    return new.depth < 1.05 * 1.1 * last.depth
+
+
+def find(layers, tiles, x, y, t):
+    """The three nearest samples that are at the pixel at time `t`, nearest first."""
+    _height, _width = layers[0].plain.shape
+    centre = np.array([x + 0.5, y + 0.5])
+    order = range(len(layers))
+    if len(layers) == 3 and t > 0:
+        order = (0, 2, 1)
+    kept, solid = [], np.inf
+    for f in order:
+        frame, tile = layers[f], tiles[f]
+        u = t - frame.offset
+        if np.isfinite(solid) and abs(t) <= 0.25:
+            break
+        for far in (False, True):
+            if far and (not tile["edges"] or np.isfinite(solid)):
+                continue
+            penalty = 1.1 if f else 1.0
+            own = moved(frame.path[0][y, x], u)
+            seeds = [(own, tile["nearest"])]
+            seeds += [(moved(p, u), z) for p, z in zip(tile["paths"], tile["depths"], strict=True)]
+            if tile["edges"]:
+                seeds.append((moved(frame.path[1][y, x], u), np.inf))
+            settled = None
+            for seed, bound in seeds:
+                if solid <= bound * penalty or (np.isinf(bound) and np.isfinite(solid)):
+                    break
+                place, miss, pixel = follow(frame.path[int(far)], centre, seed, u, settled)
+                if settled is None:
+                    settled = place
+                if pixel is None or miss > 1.0 or frame.depth[int(far)][pixel] == 0:
+                    continue
+                z = frame.depth[int(far)][pixel]
+                if not far and frame.plain[pixel]:
+                    solid = min(solid, z * penalty)
+                at = centre - place
+                home = at + moved(frame.path[int(far)][pixel], -frame.offset)
+                guess = 1.2 if far and frame.guessed[pixel] else 1.0
+                insert(kept, Sample(z * penalty * guess, z, miss, at, home, f, far, pixel))
+    return kept
+
+
+def follow(paths, centre, seed, u, settled):
+    """Fixed point of q = x - displacement(q): displacement, last step, pixel."""
+    height, width = paths.shape[:2]
+    d, miss, pixel = seed, np.inf, None
+    if settled is not None and (np.abs(d - settled) < 0.75).all():
+        return d, miss, None
+    for _ in range(4):
+        q = centre - d
+        if not (0 <= q[0] < width and 0 <= q[1] < height):
+            return d, miss, None
+        pixel = int(q[1]), int(q[0])
+        step = moved(paths[pixel], u)
+        miss, d = np.hypot(*(step - d)), step
+        if miss < 0.25 or (settled is not None and (np.abs(d - settled) < 0.75).all()):
+            break
+    return d, miss, pixel
+
+
+def insert(kept, new):
+    """Into the three nearest, unless what it shows is there already."""
+    for i, old in enumerate(kept):
+        if old.far != new.far:
+            continue
+        if old.frame != new.frame and (np.abs(old.home - new.home) < 2).all():
+            return
+        if old.frame == new.frame and (np.abs(old.at - new.at) < 0.75).all():
+            if new.miss < old.miss:
+                kept[i] = new
+            return
+    place = next((i for i, old in enumerate(kept) if new.depth < old.depth), len(kept))
+    kept.insert(place, new)
+    del kept[3:]
+
+
+def fetch(frame, s):
+    """Colour and coverage of a sample, from the texels of its own surface."""
+    if not s.far and frame.plain[s.pixel]:
+        if frame.calm[s.pixel]:
+            return cubic(frame.color[0], *s.at), 1.0
+        return bilinear(frame.color[0], *s.at), 1.0
+    height, width = frame.plain.shape
+    corner = np.floor(s.at - 0.5).astype(int)
+    color, cover = 0.0, 0.0
+    for dj in (0, 1):
+        for di in (0, 1):
+            i, j = corner[0] + di, corner[1] + dj
+            share = np.prod(1 - np.abs(s.at - 0.5 - (i, j)))
+            p = min(max(j, 0), height - 1), min(max(i, 0), width - 1)
+            z, behind = frame.depth[0][p], frame.depth[1][p] > 0
+            if s.far and behind:
+                color, cover = color + share * frame.color[1][p], cover + share
+            elif z <= 1.05 * s.true_depth and (not s.far or z >= s.true_depth / 1.05):
+                color = color + share * frame.color[0][p]
+                cover += share * (1.0 if s.far else frame.coverage[p])
+    if s.far and cover > 1e-4:
+        return color / cover, 1.0
+    return color, cover
+
+
+def cubic(image, x, y):
+    """Catmull-Rom over the 4 x 4 without its corners."""
+    height, width = image.shape[:2]
+
+    def weights(f):
+        return (-f + 2 * f**2 - f**3) / 2, (2 - 5 * f**2 + 3 * f**3) / 2, \
+            (f + 4 * f**2 - 3 * f**3) / 2, (f**3 - f**2) / 2  # fmt: skip
+
+    i, j = int(np.floor(x - 0.5)), int(np.floor(y - 0.5))
+    across, down = weights(x - 0.5 - i), weights(y - 0.5 - j)
+    sum_, total = 0.0, 0.0
+    for n in range(4):
+        for m in range(4):
+            if n in (0, 3) and m in (0, 3):
+                continue
+            p = min(max(j + n - 1, 0), height - 1), min(max(i + m - 1, 0), width - 1)
+            sum_ = sum_ + across[m] * down[n] * image[p]
+            total += across[m] * down[n]
+    return sum_ / total

@@ -1,0 +1,43 @@
+// What a tile of a frame may show over the exposure: the few motions that stand for all in it.
+//#include common/path.wgsl
+
+const TILE: u32 = 16u;          // side [px]
+const PATHS: u32 = 4u;          // motions kept a tile
+const LAYERS: u32 = 6u;         // of the texture that holds them: about, depths, then the paths
+
+const HALF_MAX: f32 = 65504.0;  // largest finite f16
+
+struct Tile {
+    paths: array<vec4f, 4>,     // velocity, curvature: the longest, then always the most different
+    box: vec4f,                 // least, greatest displacement of any while the frame is shown [px]
+    depths: vec4f,              // the least depth of what moves like each path
+    about: vec4f,               // see below
+}
+
+// `about`: how many paths there are, fewer where the rest is like these or like standing still; the
+// least depth; 1 if there are silhouettes; the longest displacement [px].
+
+fn tiles_of(size: vec2u) -> vec2u {
+    return (size + TILE - 1u) / TILE;
+}
+
+/// A place of a surface: all that the search needs in one texel, rgba32uint. Velocity, curvature in
+/// half floats, depth; a depth under 0 is that of a pixel at a silhouette; in a far layer, 0 says that
+/// there is none. The last bit of the depth says whether the pixel is calm.
+fn packed(path: Path, depth: f32, calm: bool) -> vec4u {
+    let curvature = clamp(path.curvature, vec2f(-HALF_MAX), vec2f(HALF_MAX));
+    let bits = (bitcast<u32>(depth) & ~1u) | u32(calm);
+    return vec4u(bitcast<vec2u>(path.velocity), pack2x16float(curvature), bits);
+}
+
+fn path_in(texel: vec4u) -> Path {
+    return Path(bitcast<vec2f>(texel.xy), unpack2x16float(texel.z));
+}
+
+fn depth_in(texel: vec4u) -> f32 {
+    return bitcast<f32>(texel.w & ~1u);
+}
+
+fn is_calm(texel: vec4u) -> bool {
+    return (texel.w & 1u) == 1u;
+}

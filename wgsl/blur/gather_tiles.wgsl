@@ -1,0 +1,223 @@
+// The motions of every tile, then of every tile that they reach while the shutter is open.
+//#include common/frame.wgsl
+//#include common/path.wgsl
+//#include common/shutter.wgsl
+//#include blur/gather_tile.wgsl
+
+struct Source {
+    offset: f32,        // of the frame [frame intervals]
+    first: u32,         // where its layers begin in `reaching`
+}
+
+@group(1) @binding(0) var<uniform> source: Source;
+@group(1) @binding(1) var near: texture_2d<u32>;        // see packed()
+@group(1) @binding(2) var<storage, read_write> contents: array<Tile>;     // of every tile's own pixels
+@group(1) @binding(4) var<storage, read_write> farthest: atomic<u32>;   // bits of the longest displacement of all
+@group(1) @binding(3) var reaching: Reaching;            // of all that reaches it, LAYERS a frame
+
+alias Reaching = texture_storage_2d_array<rgba32float, write>;
+
+const ALIKE: f32 = 0.5;         // displacements closer than this [px] stand for each other
+const NOWHERE: f32 = 3e38;    // depth of nothing
+const WILD: f32 = 1e5;          // motions beyond this [px] are errors
+const FARTHEST: i32 = 16;       // tiles that a motion is followed over
+
+/// From when to when, after its own instant, a frame's samples are shown [frame intervals].
+fn shown() -> vec2f {
+    let late = 0.5 * (abs(shutter.rolling.x) + abs(shutter.rolling.y));
+    return shutter.span + vec2f(-late, late) - source.offset;
+}
+
+fn longest_time() -> f32 {
+    let span = abs(shown());
+    return max(span.x, span.y);
+}
+
+/// How far apart two motions come by the time `u`, at most, squared.
+fn apart(a: vec4f, b: vec4f, u: f32) -> f32 {
+    let d = length(a.xy - b.xy) + length(a.zw - b.zw) * u;
+    return d * d * u * u;
+}
+
+/// The same to the most similar one of `chosen`; those not chosen yet are 0, which stands still.
+fn unlike(path: vec4f, chosen: array<vec4f, 4>, u: f32) -> f32 {
+    return min(min(apart(path, chosen[0], u), apart(path, chosen[1], u)),
+               min(apart(path, chosen[2], u), apart(path, chosen[3], u)));
+}
+
+/// Which of `chosen` is most like `path`.
+fn most_alike(path: vec4f, chosen: array<vec4f, 4>, u: f32) -> vec4<bool> {
+    let d = vec4f(apart(path, chosen[0], u), apart(path, chosen[1], u),
+                  apart(path, chosen[2], u), apart(path, chosen[3], u));
+    let least = min(min(d.x, d.y), min(d.z, d.w));
+    return d == vec4f(least);
+}
+
+fn as_vec4(path: Path) -> vec4f {
+    return vec4f(path.velocity, path.curvature);
+}
+
+fn displaced(path: vec4f, u: f32) -> vec2f {
+    return displacement(Path(path.xy, path.zw), u);
+}
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn clear(@builtin(global_invocation_id) id: vec3u) {
+    if all(id.xy == vec2u(0u)) { atomicStore(&farthest, 0u); }
+}
+
+/// The few motions of a tile's own pixels.
+@compute @workgroup_size(WG_X, WG_Y)
+fn local(@builtin(global_invocation_id) id: vec3u) {
+    let tiles = tiles_of(frame.size);
+    if any(id.xy >= tiles) { return; }
+    let corner = id.xy * TILE;
+    let size = min(corner + TILE, frame.size) - corner;
+    let pixels = size.x * size.y;
+    let span = shown();
+    let u = longest_time();
+    var tile = Tile();
+    var count = 0.0;
+    var longest = 0.0;
+    var more = true;
+    for (var k = 0u; k < PATHS && more; k++) {
+        let chosen = tile.paths;
+        var most = 0.0;
+        var found = vec4f(0.0);
+        for (var i = 0u; i < pixels; i++) {
+            let path = as_vec4(path_in(textureLoad(near, corner + vec2u(i % size.x, i / size.x), 0)));
+            let least = unlike(path, chosen, u);
+            if least > most && least < WILD * WILD {
+                most = least;
+                found = path;
+            }
+        }
+        if k == 0u { longest = sqrt(most); }
+        more = most > ALIKE * ALIKE;
+        if more {
+            count += 1.0;
+            tile.paths[k] = found;
+            let a = displaced(found, span.x);
+            let b = displaced(found, span.y);
+            tile.box = vec4f(min(tile.box.xy, min(a, b)), max(tile.box.zw, max(a, b)));
+        }
+    }
+    var nearest = NOWHERE;
+    var split = 0.0;
+    tile.depths = vec4f(NOWHERE);
+    for (var i = 0u; i < pixels; i++) {
+        let texel = textureLoad(near, corner + vec2u(i % size.x, i / size.x), 0);
+        let z = abs(depth_in(texel));
+        nearest = min(nearest, z);
+        if depth_in(texel) < 0.0 { split = 1.0; }
+        tile.depths = min(tile.depths, select(vec4f(NOWHERE), vec4f(z), most_alike(as_vec4(path_in(texel)), tile.paths, u)));
+    }
+    tile.about = vec4f(count, nearest, split, longest);
+    contents[id.y * tiles.x + id.x] = tile;
+    atomicMax(&farthest, bitcast<u32>(longest));
+}
+
+/// The few motions that lead to a tile, from wherever they come.
+@compute @workgroup_size(WG_X, WG_Y)
+fn reach(@builtin(global_invocation_id) id: vec3u) {
+    let tiles = tiles_of(frame.size);
+    if any(id.xy >= tiles) { return; }
+    let span = shown();
+    let u = longest_time();
+    let around = min(i32(ceil(bitcast<f32>(atomicLoad(&farthest)) / f32(TILE))) + 1, FARTHEST);
+    let here = vec2i(id.xy);
+    let low = max(here - around, vec2i(0));
+    let size = min(here + around, vec2i(tiles) - 1) - low + 1;
+    let count = size.x * size.y;
+    var nearest = NOWHERE;
+    var split = 0.0;
+    var longest = 0.0;
+    for (var i = 0; i < count; i++) {
+        let there = low + vec2i(i % size.x, i / size.x);
+        let at = u32(there.y) * tiles.x + u32(there.x);
+        if meets(contents[at].box, vec2f((here - there) * i32(TILE))) {
+            let about = contents[at].about;
+            nearest = min(nearest, about.y);
+            split = max(split, about.z);
+            longest = max(longest, about.w);
+        }
+    }
+    var chosen = array<vec4f, 4>();
+    var chosen_count = 0u;
+    var more = true;
+    for (var k = 0u; k < PATHS && more; k++) {
+        var best = 0.0;
+        var found = vec4f(0.0);
+        for (var i = 0; i < count; i++) {
+            let there = low + vec2i(i % size.x, i / size.x);
+            let at = u32(there.y) * tiles.x + u32(there.x);
+            let off = vec2f((here - there) * i32(TILE));
+            let paths_there = select(0u, u32(contents[at].about.x), meets(contents[at].box, off));
+            for (var n = 0u; n < paths_there; n++) {
+                let path = contents[at].paths[n];
+                let least = unlike(path, chosen, u);
+                if least > best && lands(path, span, off) {
+                    best = least;
+                    found = path;
+                }
+            }
+        }
+        more = best > ALIKE * ALIKE;
+        if more {
+            chosen[k] = found;
+            chosen_count = k + 1u;
+        }
+    }
+    var depths = vec4f(NOWHERE);
+    for (var i = 0; i < count; i++) {
+        let there = low + vec2i(i % size.x, i / size.x);
+        let at = u32(there.y) * tiles.x + u32(there.x);
+        let off = vec2f((here - there) * i32(TILE));
+        let paths_there = select(0u, u32(contents[at].about.x), meets(contents[at].box, off));
+        for (var n = 0u; n < paths_there; n++) {
+            let path = contents[at].paths[n];
+            if lands(path, span, off) {
+                let z = vec4f(contents[at].depths[n]);
+                depths = min(depths, select(vec4f(NOWHERE), z, most_alike(path, chosen, u)));
+            }
+        }
+    }
+    // The nearest first.
+    for (var i = 0u; i < PATHS; i++) {
+        for (var k = 0u; k + 1u < chosen_count; k++) {
+            if depths[k] > depths[k + 1u] {
+                let path = chosen[k];
+                chosen[k] = chosen[k + 1u];
+                chosen[k + 1u] = path;
+                let z = depths[k];
+                depths[k] = depths[k + 1u];
+                depths[k + 1u] = z;
+            }
+        }
+    }
+    let about = vec4f(f32(chosen_count), nearest, split, longest);
+    textureStore(reaching, id.xy, source.first, about);
+    textureStore(reaching, id.xy, source.first + 1u, depths);
+    for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id.xy, source.first + 2u + k, chosen[k]); }
+}
+
+/// Whether any motion of a tile, by its box, leads to the one that lies `off` [px] away.
+fn meets(box: vec4f, off: vec2f) -> bool {
+    let margin = f32(TILE) + 2.0;
+    return all(off + margin > box.xy) && all(off - margin < box.zw);
+}
+
+/// Whether a tile moving along `path` touches the one that lies `off` [px] away.
+fn lands(path: vec4f, span: vec2f, off: vec2f) -> bool {
+    let a = displaced(path, span.x) - off;
+    let way = displaced(path, span.y) - off - a;
+    let bend = length(path.zw) * (span.y - span.x) * (span.y - span.x) * 0.25;
+    let margin = f32(TILE) + 2.0 + bend;
+    // The part of the way between two parallel sides, for both pairs of sides.
+    let steps = select(way, vec2f(1e-6), abs(way) < vec2f(1e-6));
+    let one = (-margin - a) / steps;
+    let two = (margin - a) / steps;
+    let enters = min(one, two);
+    let leaves = max(one, two);
+    return max(max(enters.x, enters.y), 0.0) <= min(min(leaves.x, leaves.y), 1.0);
+}
