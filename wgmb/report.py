@@ -271,6 +271,8 @@ def _text(value, digits: int) -> str:
 
 def _foot(report: Report) -> str:
     notes = "".join(f"<p>{escape(n)}</p>" for n in report.notes)
+    if not report.cases:
+        return notes and f"<h2>Notes</h2>{notes}"
     judges = "".join(f"<dt>{m.title}</dt><dd>{m.about}</dd>" for m in MEASURES.values())
     return (
         f"<h2>How to read this</h2>{notes}<dl>{judges}<dt>error maps</dt>"
