@@ -119,7 +119,13 @@ def test_samples_for_a_budget_follow_a_straight_line(fixed, each):
 
 def test_samples_for_a_budget_stay_in_bounds_when_times_say_nothing():
     assert compare._guess([(4, 0.5), (16, 0.5)], 1e-6) == 1
-    assert compare._guess([(4, 0.5), (16, 0.4)], 1e6) == 4096
+    assert compare._guess([(4, 0.5), (16, 0.4)], 1e6) == 8 * 16
+    assert compare._guess([(1000, 0.4)], 1e6) == 4096
+
+
+def test_one_time_that_was_disturbed_does_not_mislead():
+    known = [(4, 0.04), (8, 3.0), (16, 0.16), (32, 0.32)]
+    assert 7 <= compare._guess(known, 0.08) <= 9
 
 
 def test_own_samples_hold_at_equal_samples_only(device, case):

@@ -9,7 +9,6 @@ written as a page, JSON and CSV by report.py.
 from __future__ import annotations
 
 import ast
-import math
 import platform
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -36,6 +35,7 @@ from .shutter import Shutter
 LADDER = (4, 8, 16, 32, 64)
 _LONG = 1.0  # seconds; what takes longer is timed once
 _NEAR = 0.15  # how far a time may be from its budget
+_FARTHER = 8  # times the most samples that were timed, tried at once
 
 Tell = Callable[[str], None]
 
@@ -429,11 +429,23 @@ def _slowest_of_pictures(report: Report, case: Case) -> list[float]:
 
 
 def _guess(known: list[tuple[int, float]], budget: float) -> int:
-    """Samples for `budget` seconds on the line through the two nearest times that are known."""
-    (n, s), *others = sorted(known, key=lambda point: abs(math.log(point[1] / budget)))
-    m, t = next(((m, t) for m, t in others if (m - n) * (t - s) > 0), (0, 0.0))
-    slope = (t - s) / (m - n) if m else s / n
-    return int(np.clip(round(n + (budget - s) / slope), 1, MOST_SAMPLES))
+    """Samples for `budget` seconds between the times that are known, or in line with them.
+
+    Other work makes times too long, never too short: a time that is longer than that of more
+    samples does not count.
+    """
+    counts, times = np.array(sorted(known), float).T
+    likely = times == np.minimum.accumulate(times[::-1])[::-1]
+    counts, times = counts[likely], times[likely]
+    if budget < times[0]:
+        wanted = counts[0] * budget / times[0]
+    elif budget < times[-1]:
+        wanted = np.interp(budget, times, counts)
+    else:
+        slope = (times[-1] - times[0]) / max(counts[-1] - counts[0], 1)
+        slope = max(slope, times[-1] / counts[-1] / 100)
+        wanted = min(counts[-1] + (budget - times[-1]) / slope, _FARTHER * counts[-1])
+    return int(np.clip(round(wanted), 1, MOST_SAMPLES))
 
 
 def crossings(report: Report, case: Case, judge: str = "flip") -> Table | None:

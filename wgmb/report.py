@@ -206,15 +206,16 @@ def _uri(shown: np.ndarray) -> str:
 
 
 def _figures(entries: list[Entry], colors) -> str:
-    columns = ["method", "samples", "time [ms]", "without frame [ms]"]
+    framed = any(e.frame_seconds for e in entries)
+    columns = ["method", "samples", "time [ms]", *["without frame [ms]"][: int(framed)]]
     columns += [m.title for m in MEASURES.values()]
     rows = []
     for e in entries:
-        times = [None, None]
+        times: list[float | None] = [None, None]
         if e.seconds is not None:
             times = [round(1e3 * s, 2) for s in (e.seconds, e.seconds - e.frame_seconds)]
-        rows.append([e.label, e.samples, *times, *e.measures.values()])
-    return _grid(columns, rows, colors, judged=4)
+        rows.append([e.label, e.samples, *times[: 1 + framed], *e.measures.values()])
+    return _grid(columns, rows, colors, judged=3 + framed)
 
 
 def _table(table: Table, colors) -> str:
@@ -270,6 +271,8 @@ def _text(value, digits: int) -> str:
 
 def _foot(report: Report) -> str:
     notes = "".join(f"<p>{escape(n)}</p>" for n in report.notes)
+    if not report.cases:
+        return notes and f"<h2>Notes</h2>{notes}"
     judges = "".join(f"<dt>{m.title}</dt><dd>{m.about}</dd>" for m in MEASURES.values())
     return (
         f"<h2>How to read this</h2>{notes}<dl>{judges}<dt>error maps</dt>"
