@@ -757,3 +757,9 @@ def test_options_of_the_command_line_reach_the_state():
     )
     assert (state.method, state.samples, state.shutter) == ("reproject", 8, 90)
     assert dict(state.options) == {"form": "published"}
+
+
+def test_a_scene_that_loops_is_there_for_its_whole_loop():
+    state = PLAIN.opened("torusphere")
+    assert (state.frames, state.speed) == ("0-1199", 1.0)
+    assert state.opened("fence").frames == PLAIN.frames

@@ -314,6 +314,8 @@ class Scene:
     density: str = "exact"
     exposure: tuple[float, str] | None = None
     """The shutter it is made for: seconds, curve."""
+    loop: float | None = None
+    """After this time it begins anew [s]."""
     figure: Figure | None = None
     """A flat picture instead, for the method "volume"."""
 

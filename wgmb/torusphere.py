@@ -108,4 +108,5 @@ def torusphere(cam_x: float = 0.0, cam_y: float = 0.0, density: str = "exact") -
         volumes=instant,
         density=density,
         exposure=(EXPOSURE, "cosine"),
+        loop=50.0,
     )

@@ -102,7 +102,10 @@ class State:
         if state.method != self.method:
             state = replace(state, options=())
         if state.is_scene:
-            plain = State()
+            plain, loop = State(), scenes.make(source).loop
+            if loop:
+                last = round(loop * state.fps) - 1
+                return replace(state, frames=f"0-{last}", frame=0.0, speed=1.0)
             return replace(state, frames=plain.frames, frame=0.0, speed=plain.speed)
         return replace(state, frames=_on_disk(source), frame=math.nan, speed=1.0).settled()
 
