@@ -1,6 +1,8 @@
 """Whatever is wrong with files, disks, devices or patience: an error that names it, and order."""
 
+import contextlib
 import io
+import itertools
 import json
 import os
 import resource
@@ -14,7 +16,7 @@ import pytest
 import tifffile
 
 import make_frames as make
-from wgmb import CameraFile, InputError, exr, stills
+from wgmb import Blur, CameraFile, InputError, cli, exr, stills, terminal
 
 READ = {".exr": exr.read, ".png": stills.read, ".jpg": stills.read, ".tif": stills.read}
 
@@ -500,3 +502,22 @@ def test_an_interrupted_video_leaves_nothing(tmp_path, long_shot, suffix):
     process.communicate(timeout=20)
     assert process.returncode == 130
     assert make.names_in(tmp_path) == []
+
+
+def test_an_interruption_that_python_lost_is_heard_at_the_next_frame(
+    tmp_path, long_shot, monkeypatch
+):
+    """Exceptions that a signal raises within a destructor are dropped."""
+    calls = itertools.count()
+    blur = Blur.__call__
+
+    def blurred(*given):
+        if next(calls) == 3:
+            with contextlib.suppress(KeyboardInterrupt):
+                terminal.interrupt()
+        return blur(*given)
+
+    monkeypatch.setattr(Blur, "__call__", blurred)
+    code = cli.main(list(map(str, arguments(long_shot[0], tmp_path / "out", "-q"))))
+    assert code == 130
+    assert 0 < len(list((tmp_path / "out").glob("o.*.exr"))) < 10

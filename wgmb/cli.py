@@ -21,7 +21,7 @@ from cyclopts import Parameter
 from cyclopts.config import Toml
 from rich.console import Console
 
-from . import __version__, gpu, lab, seeing
+from . import __version__, gpu, lab, seeing, terminal
 from .errors import DeviceError, Error, InputError
 from .info import describe
 from .options import (
@@ -329,8 +329,9 @@ app.command(seeing.shutter)
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     _own_streams()
-    signal.signal(signal.SIGTERM, _interrupted)
-    signal.signal(signal.SIGINT, _interrupted)  # a shell may have set it to be ignored
+    terminal.interrupted.clear()
+    signal.signal(signal.SIGTERM, terminal.interrupt)
+    signal.signal(signal.SIGINT, terminal.interrupt)  # a shell may have set it to be ignored
     warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)
     try:
@@ -362,10 +363,6 @@ def _config(words: list[str]) -> tuple[Toml, ...]:
                 raise InputError(f"--config {path}: no such file")
             return (Toml(path, must_exist=True, search_parents=False),)
     return ()
-
-
-def _interrupted(*_) -> None:
-    raise KeyboardInterrupt
 
 
 def _say_why(text: str, code: int) -> int:

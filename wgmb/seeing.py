@@ -101,8 +101,7 @@ def perceive(
                 for picture in shown:
                     viewer.look(picture)
                 files.write(viewer.sees()[..., : picture.shape[2]], source)
-                if tick:
-                    tick(number, "done")
+                tick(number, "done")
             files.close()
         except BaseException:
             files.abandon()

@@ -1,19 +1,35 @@
-"""What the commands show while they work."""
+"""What the commands show while they work, and how they are interrupted."""
 
 from __future__ import annotations
 
 import contextlib
+import threading
 import time
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+interrupted = threading.Event()
+"""Set by Ctrl-C: Python drops an exception that a signal raises within a destructor."""
+
+
+def interrupt(*_) -> None:
+    """The signals' handler."""
+    interrupted.set()
+    raise KeyboardInterrupt
+
+
+def check(*_) -> None:
+    """Interrupt now what should have been before."""
+    if interrupted.is_set():
+        raise KeyboardInterrupt
+
 
 @contextlib.contextmanager
 def progress(say: Console, frames: int, quiet: bool, doing: str = "blurring"):
-    """A bar with frames/s and time left where somebody watches; nothing elsewhere."""
+    """What to call after every frame: a bar with frames/s and time left where somebody watches."""
     if quiet or not say.is_terminal:
-        yield None
+        yield check
         return
     columns = (
         "{task.description}",
@@ -27,6 +43,7 @@ def progress(say: Console, frames: int, quiet: bool, doing: str = "blurring"):
         started, made = time.perf_counter(), [0]
 
         def tick(number: int, what: str) -> None:
+            check()
             made[0] += what == "done"
             speed = made[0] / (time.perf_counter() - started)
             bar.update(
