@@ -393,4 +393,5 @@ def _own_streams() -> None:
 
 def run() -> None:
     """The `wgmb` command."""
+    sys.unraisablehook = terminal.hush
     sys.exit(main())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import sys
 import threading
 import time
 
@@ -17,6 +18,12 @@ def interrupt(*_) -> None:
     """The signals' handler."""
     interrupted.set()
     raise KeyboardInterrupt
+
+
+def hush(unraisable) -> None:
+    """For sys.unraisablehook: nothing of interruptions that were dropped; they are kept here."""
+    if not (interrupted.is_set() and issubclass(unraisable.exc_type, KeyboardInterrupt)):
+        sys.__unraisablehook__(unraisable)
 
 
 def check(*_) -> None:
