@@ -27,14 +27,13 @@ class Layers:
 class Sample:
     """What may be seen at a pixel at a time."""
 
-    depth: float  # it competes with
-    true_depth: float
-    miss: float
-    at: np.ndarray
-    home: np.ndarray
-    frame: int
-    far: bool
-    pixel: tuple
+    depth: float = np.inf  # it competes with
+    true_depth: float = np.inf
+    miss: float = np.inf
+    at: np.ndarray | tuple = (np.nan, np.nan)
+    frame: int = -1
+    far: bool = False
+    pixel: tuple = ()
 
 
 def gather(frames, times):
@@ -194,14 +193,15 @@ def reaching(frame, span):
                 if k is not None:
                     depths[k] = min(depths[k], depth)
             own[j, i] = {"paths": chosen, "depths": depths, "longest": longest,
-                         "nearest": z.min(), "edges": not frame.plain[box].all()}  # fmt: skip
+                         "edges": not frame.plain[box].all()}  # fmt: skip
 
     def lands(path, off):
-        """Whether a tile that moves along the path touches the one `off` away."""
+        """From when to when a tile that moves along the path touches the one `off` away."""
         bend = np.hypot(*path[2:]) * (u1 - u0) ** 2 / 4
-        steps = np.linspace(0, 1, 2001)[:, None]
-        at = moved(path, u0) + steps * (moved(path, u1) - moved(path, u0)) - off
-        return (np.abs(at) <= TILE + 2 + bend).all(axis=1).any()
+        steps = np.linspace(0, 1, 2001)
+        at = moved(path, u0) + steps[:, None] * (moved(path, u1) - moved(path, u0)) - off
+        touching = steps[(np.abs(at) <= TILE + 2 + bend).all(axis=1)]
+        return u0 + (u1 - u0) * touching[[0, -1]] if len(touching) else None
 
     def meets(tile, off):
         places = [np.zeros(2)] + [moved(p, t) for p in tile["paths"] for t in (u0, u1)]
@@ -215,22 +215,24 @@ def reaching(frame, span):
             offs = {k: np.array([i - k[1], j - k[0]]) * TILE for k in own}
             met = [k for k in own if meets(own[k], offs[k])]
             landing = [
-                (path, z)
+                (path, z, lands(path, offs[k]))
                 for k in met
                 for path, z in zip(own[k]["paths"], own[k]["depths"], strict=True)
-                if lands(path, offs[k])
             ]
-            chosen, _ = choose([path for path, _ in landing], u)
+            landing = [entry for entry in landing if entry[2] is not None]
+            chosen, _ = choose([path for path, _, _ in landing], u)
             depths = [np.inf] * len(chosen)
-            for path, z in landing:
+            times = [[np.inf, -np.inf] for _ in chosen]
+            for path, z, (comes, goes) in landing:
                 k = most_alike(path, chosen, u)
                 if k is not None:
                     depths[k] = min(depths[k], z)
+                    times[k] = [min(times[k][0], comes), max(times[k][1], goes)]
             order = np.argsort(depths, kind="stable")
             out[-1].append({
                 "paths": [chosen[k] for k in order],
                 "depths": [depths[k] for k in order],
-                "nearest": min((own[k]["nearest"] for k in met), default=np.inf),
+                "times": [times[k] for k in order],
                 "edges": any(own[k]["edges"] for k in met),
                 "longest": max((own[k]["longest"] for k in met), default=0.0),
             })  # fmt: skip
@@ -241,106 +243,98 @@ def reaching(frame, span):
 
 
 def instant(layers, tiles, x, y, t, color):
-    """What is seen at the pixel at time `t`."""
-    samples = find(layers, tiles, x, y, t)
-    clear, sum_, last = 1.0, 0.0, None
-    for s in samples:
-        if clear < 0.01:
-            break
-        if last and is_same_surface(s, last):
-            continue
+    """What is seen at the pixel at time `t`: edge, the edge behind it, what is opaque."""
+    solid, edge, second = search(layers, tiles, x, y, t)
+    shown = []
+    if edge.depth < solid.depth / 1.05:
+        shown.append(edge)
+        apart = 1.05 * (1.0 if second.frame == edge.frame else 1.1)
+        if apart * edge.depth <= second.depth < solid.depth / 1.05:
+            shown.append(second)
+    if np.isfinite(solid.depth):
+        shown.append(solid)
+    clear, sum_ = 1.0, 0.0
+    for s in shown:
         got, cover = fetch(layers[s.frame], s)
-        if cover < 0.01:
-            continue
         sum_ = sum_ + clear * got
         clear *= 1 - cover
-        last = s
     if clear < 0.5:
         return sum_ / (1 - clear)
     way = moved(layers[0].path[0][y, x], t)
     return bilinear(color.astype(float), x + 0.5 - way[0], y + 0.5 - way[1])
 
 
-def is_same_surface(new, last):
-    """Whether the next sample is too near behind the last one to be another surface."""
-    if new.frame == last.frame:
-        return new.far == last.far and new.depth < 1.05 * last.depth
-    return new.depth < 1.05 * 1.1 * last.depth
-
-
-def find(layers, tiles, x, y, t):
-    """The three nearest samples that are at the pixel at time `t`, nearest first."""
-    _height, _width = layers[0].plain.shape
+def search(layers, tiles, x, y, t):
+    """The nearest opaque sample at the pixel at time `t`, the nearest two at silhouettes."""
     centre = np.array([x + 0.5, y + 0.5])
-    order = range(len(layers))
-    if len(layers) == 3 and t > 0:
-        order = (0, 2, 1)
-    kept, solid = [], np.inf
-    for f in order:
-        frame, tile = layers[f], tiles[f]
-        u = t - frame.offset
-        if np.isfinite(solid) and abs(t) <= 0.25:
-            break
-        for far in (False, True):
-            if far and (not tile["edges"] or np.isfinite(solid)):
-                continue
-            penalty = 1.1 if f else 1.0
-            own = moved(frame.path[0][y, x], u)
-            seeds = [(own, tile["nearest"])]
-            seeds += [(moved(p, u), z) for p, z in zip(tile["paths"], tile["depths"], strict=True)]
-            if tile["edges"]:
-                seeds.append((moved(frame.path[1][y, x], u), np.inf))
-            settled = None
-            for seed, bound in seeds:
-                if solid <= bound * penalty or (np.isinf(bound) and np.isfinite(solid)):
-                    break
-                place, miss, pixel = follow(frame.path[int(far)], centre, seed, u, settled)
-                if settled is None:
-                    settled = place
-                if pixel is None or miss > 1.0 or frame.depth[int(far)][pixel] == 0:
-                    continue
-                z = frame.depth[int(far)][pixel]
-                if not far and frame.plain[pixel]:
-                    solid = min(solid, z * penalty)
-                at = centre - place
-                home = at + moved(frame.path[int(far)][pixel], -frame.offset)
-                guess = 1.2 if far and frame.guessed[pixel] else 1.0
-                insert(kept, Sample(z * penalty * guess, z, miss, at, home, f, far, pixel))
-    return kept
+    order = [0, 2, 1] if len(layers) == 3 and t > 0 else list(range(len(layers)))
+    seen = [Sample(), Sample(), Sample()]
+
+    def look(f, far, seed, known):
+        """One search; where it led."""
+        frame, u = layers[f], t - layers[f].offset
+        d, miss, pixel = follow(frame.path[int(far)], centre, seed, u, known)
+        if pixel is not None and miss <= 1.0 and frame.depth[int(far)][pixel] > 0:
+            z = frame.depth[int(far)][pixel]
+            weight = (1.1 if f else 1.0) * (1.2 if far and frame.guessed[pixel] else 1.0)
+            found = Sample(z * weight, z, miss, centre - d, f, far, pixel)
+            note(seen, found, opaque=far or frame.plain[pixel])
+        return d
+
+    def near(f):
+        tile, u = tiles[f], t - layers[f].offset
+        own = look(f, False, None, None)
+        for path, z, when in zip(tile["paths"], tile["depths"], tile["times"], strict=True):
+            if z * (1.1 if f else 1.0) < seen[0].depth and when[0] <= u <= when[1]:
+                look(f, False, moved(path, u), own)
+
+    near(0)
+    hidden = np.isinf(seen[0].depth)
+    if len(order) > 1 and (hidden or abs(t) > 0.25):
+        near(order[1])
+    if len(order) > 2 and np.isinf(seen[0].depth):
+        near(order[2])
+    if hidden and any(tile["edges"] for tile in tiles):
+        for f in order:
+            look(f, True, None, None)
+    return seen
 
 
-def follow(paths, centre, seed, u, settled):
-    """Fixed point of q = x - displacement(q): displacement, last step, pixel."""
+def follow(paths, centre, seed, u, known):
+    """Fixed point of d = displacement(centre - d): d, the last step, pixel; None: from 0."""
     height, width = paths.shape[:2]
-    d, miss, pixel = seed, np.inf, None
-    if settled is not None and (np.abs(d - settled) < 0.75).all():
-        return d, miss, None
-    for _ in range(4):
+    d, steps = (np.zeros(2), 5) if seed is None else (seed, 4)
+    miss, pixel = np.inf, None
+    if known is not None and (np.abs(d - known) < 0.75).all():
+        return d, miss, pixel
+    for _ in range(steps):
         q = centre - d
         if not (0 <= q[0] < width and 0 <= q[1] < height):
-            return d, miss, None
+            return d, np.inf, None
         pixel = int(q[1]), int(q[0])
         step = moved(paths[pixel], u)
         miss, d = np.hypot(*(step - d)), step
-        if miss < 0.25 or (settled is not None and (np.abs(d - settled) < 0.75).all()):
+        if miss < 0.25 or (known is not None and (np.abs(d - known) < 0.75).all()):
             break
     return d, miss, pixel
 
 
-def insert(kept, new):
-    """Into the three nearest, unless what it shows is there already."""
-    for i, old in enumerate(kept):
-        if old.far != new.far:
-            continue
-        if old.frame != new.frame and (np.abs(old.home - new.home) < 2).all():
-            return
+def note(seen, new, opaque):
+    """Keep what is nearest; of one place at a silhouette, the sample that fits best."""
+    solid, edge, second = seen
+    if opaque:
+        if new.depth < solid.depth:
+            seen[0] = new
+        return
+    for i, old in ((1, edge), (2, second)):
         if old.frame == new.frame and (np.abs(old.at - new.at) < 0.75).all():
             if new.miss < old.miss:
-                kept[i] = new
+                seen[i] = new
             return
-    place = next((i for i, old in enumerate(kept) if new.depth < old.depth), len(kept))
-    kept.insert(place, new)
-    del kept[3:]
+    if new.depth < edge.depth:
+        seen[1:] = [new, edge]
+    elif new.depth < second.depth:
+        seen[2] = new
 
 
 def fetch(frame, s):

@@ -107,8 +107,8 @@ class Gather:
             {"Color": gpu.texel(self._device, 4)},
             WEIGHTED=weight is not None,
         )
-        marks = self._images.view("marks", inputs.given.size, "r32float")
-        idle = self._images.view("no marks", inputs.given.size, "r32float")
+        marks = self._images.view("marks", inputs.given.size, "r32uint")
+        idle = self._images.view("no marks", inputs.given.size, "r32uint")
         for entry in ("mark", "split"):
             marking = entry == "mark"
             kernel.run(
@@ -119,7 +119,7 @@ class Gather:
                 motion=motion,
                 depth=depth,
                 weight=weight or inputs.none,
-                mixed=inputs.none if marking else marks,
+                marked=idle if marking else marks,
                 marks=marks if marking else idle,
                 **views,
             )

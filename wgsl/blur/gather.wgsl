@@ -29,174 +29,117 @@ const STEPS: u32 = 4u;          // of a search, at most
 const FOUND: f32 = 0.25;        // a step shorter than this [px] ends the search
 const MISS: f32 = 1.0;          // a sample farther than this [px] from the pixel is none of it
 const SAME: f32 = 0.75;         // searches, and samples of one layer, closer than this [px] are one
-const SAME_PLACE: f32 = 2.0;    // the same across frames, by their place in the frame itself
 const BEHIND: f32 = 1.05;       // ratio of depths that makes two surfaces
 const NEIGHBOUR: f32 = 1.1;     // a neighbouring frame's sample counts as this much farther
 const GUESSED: f32 = 1.2;       // and a background that was only inferred as this much
-const TRUSTED: f32 = 0.25;     // times up to which the frame itself needs no second opinion [frame intervals]
+const TRUSTED: f32 = 0.25;      // times up to which the frame itself needs no second opinion [frame intervals]
 const NONE: f32 = 3e38;         // depth of no sample
+const ROUNDS: u32 = 6u;         // near layers of three frames, then their far layers
 
 struct Sample {
     depth: f32,         // that it competes with
     true_depth: f32,
     miss: f32,          // distance of its place from the pixel [px]
-    plain: bool,        // one opaque surface all around
-    calm: bool,         // and of one weight, nothing brighter than white
     at: vec2f,          // where in its frame [px]
-    home: vec2f,        // where that is in the frame itself [px]
     layer: u32,         // near, far, of the frames one after the other
+    calm: bool,         // one surface and weight, nothing brighter than white, all around
 }
 
-struct Seen {           // the nearest ones, in order
-    a: Sample,
-    b: Sample,
-    c: Sample,
+struct Seen {           // the nearest ones
+    solid: Sample,      // opaque
+    edge: Sample,       // at a silhouette
+    second: Sample,     // the silhouette behind that
 }
 
-// Throughout, `for (; condition; condition = false)` is an `if` that also saves time on lavapipe.
+struct Reach {          // what a tile may show of a frame, see gather_tile.wgsl
+    about: vec4f,
+    depths: vec4f,
+    comes: vec4f,
+    goes: vec4f,
+}
+
+// lavapipe executes the body of every `if` and of every loop at least once, and that of a `for` once more
+// than it has turns. So all searches of a time share one loop, and short loops are left from their end.
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let x = vec2f(id.xy) + 0.5;
     let tile = id.xy / TILE;
-    let source_count = sources.count;
-    let offsets = sources.offsets;
+    let reach0 = reach(tile, 0u);
+    let reach1 = reach(tile, 1u);
+    let reach2 = reach(tile, 2u);
+    let path = path_in(textureLoad(paths, id.xy, 0u, 0));
+    let longest = max(reach0.about.w, max(reach1.about.w, reach2.about.w));
+    let times = enough_times(shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5)), longest);
+    let share = 1.0 / f32(times.count);     // before adding, so that no sum of finite colours overflows
 
-    // What the tile may show of each frame, and the pixel's own paths there.
-    let about0 = textureLoad(tiles, tile, 0u, 0);
-    var about1 = vec4f(0.0, NONE, 0.0, 0.0);
-    var about2 = about1;
-    let path0 = path_in(textureLoad(paths, id.xy, 0u, 0));
-    let depths0 = textureLoad(tiles, tile, 1u, 0);
-    var depths1 = vec4f(0.0);
-    var depths2 = vec4f(0.0);
-    var path1 = path0;
-    var path2 = path0;
-    if source_count > 1u {
-        about1 = textureLoad(tiles, tile, LAYERS, 0);
-        depths1 = textureLoad(tiles, tile, LAYERS + 1u, 0);
-        path1 = path_in(textureLoad(paths, id.xy, 2u, 0));
-    }
-    if source_count > 2u {
-        about2 = textureLoad(tiles, tile, 2u * LAYERS, 0);
-        depths2 = textureLoad(tiles, tile, 2u * LAYERS + 1u, 0);
-        path2 = path_in(textureLoad(paths, id.xy, 4u, 0));
-    }
-    let times = shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5));
-    let still = max(about0.w, max(about1.w, about2.w)) < STILL;
-    let samples = select(frame.samples, 0u, still);
+    let still = longest < STILL;
+    let samples = select(times.count, 0u, still);
 
-    let share = 1.0 / f32(frame.samples);   // before adding, so that no sum of finite colours overflows
     var sum = vec4f(0.0);
     var total = 0.0;
-    var accepted = 0.0;
+    var accepted = select(0.0, f32(times.count), still);
     var others = 0.0;
     var missed = 0.0;
     var left = 0.0;
     for (var i = 0u; i < samples; i++) {
         let t = shutter_time(times, i);
-        var seen = Seen(nothing(), nothing(), nothing());
-        var settled = false;        // an opaque sample was found
-        var solid = NONE;           // the depth of the nearest such
-        for (var s = 0u; s < source_count && !(settled && abs(t) <= TRUSTED); s++) {
-            // The frame itself, then the neighbour on the side of `t`, then the other one.
-            let f = select(s, 3u - s, s > 0u && source_count == 3u && t > 0.0);
-            let about = select(select(about2, about1, f == 1u), about0, f == 0u);
-            let depths = select(select(depths2, depths1, f == 1u), depths0, f == 0u);
-            let path_here = chosen(f, path0, path1, path2);
-            let offset = select(select(offsets.z, offsets.y, f == 1u), 0.0, f == 0u);
-            let u = t - offset;
-            let handicap = select(NEIGHBOUR, 1.0, s == 0u);
-            let first = displacement(path_here, u);
-            let seeds = u32(about.x) + select(1u, 2u, about.z > 0.0);
-            for (var layer = 0u; layer < 1u + u32(about.z) && !(settled && layer == 1u); layer++) {
-                var d = first;
-                var base = first;
-                var bound = about.y;
-                // The nearest first: once none could be nearer than what is seen already, the search ends.
-                for (var k = 0u; k < seeds && solid > bound * handicap; k++) {
-                    var miss = NONE;
-                    var q = x;
-                    var texel = vec4u(0u);
-                    var going = k == 0u || !alike(d, base);
-                    // The fixed point of q = x - displacement(q).
-                    for (var n = 0u; n < STEPS && going; n++) {
-                        q = x - d;
-                        texel = textureLoad(paths, vec2i(floor(q)), 2u * f + layer, 0);
-                        let next = displacement(path_in(texel), u);
-                        miss = distance(next, d);
-                        going = miss >= FOUND && inside(q) && (k == 0u || !alike(next, base));
-                        d = next;
-                    }
-                    if k == 0u { base = d; }
-                    let z = depth_in(texel);
-                    var hit = miss <= MISS && inside(q) && z != 0.0;
-                    for (; hit; hit = false) {
-                        let place = x - d;
-                        let home = place + displacement(path_in(texel), -offset);
-                        let plain = layer == 0u && z > 0.0;
-                        if plain {
-                            settled = true;
-                            solid = min(solid, z * handicap);
-                        }
-                        let guess = select(1.0, GUESSED, layer == 1u && !is_calm(texel));
-                        let found = Sample(abs(z) * handicap * guess, abs(z), miss, plain, is_calm(texel), place, home, 2u * f + layer);
-                        var others_known = seen.a.depth < NONE;
-                        if !others_known { seen.a = found; }
-                        for (; others_known; others_known = false) { insert(&seen, found); }
-                    }
-                    let more = k < u32(about.x);
-                    bound = select(NONE, select(select(depths.w, depths.z, k == 2u), select(depths.y, depths.x, k == 0u), k < 2u), more);
-                    var next_seed = k + 1u < seeds && solid > bound * handicap;
-                    for (; next_seed; next_seed = false) {
-                        let seed = textureLoad(tiles, tile, f * LAYERS + 2u + min(k, PATHS - 1u), 0);
-                        d = displacement(Path(seed.xy, seed.zw), u);
-                        var own_far = !more;
-                        for (; own_far; own_far = false) {
-                            d = displacement(path_in(textureLoad(paths, id.xy, 2u * f + 1u, 0)), u);
-                        }
-                    }
-                }
-            }
-        }
+        let seen = search(x, tile, t, reach0, reach1, reach2);
 
-        // Front to back.
+        // Front to back: silhouettes by the texels of their own surface, then what is opaque.
+        let edge = seen.edge.depth < seen.solid.depth / BEHIND;
+        let room = BEHIND * select(NEIGHBOUR, 1.0, seen.second.layer == seen.edge.layer);
+        let second = edge && seen.second.depth < seen.solid.depth / BEHIND
+            && seen.second.depth >= seen.edge.depth * room;
+        let solid = seen.solid.depth < NONE;
+        let whole = solid && seen.solid.layer % 2u == 0u && (seen.solid.calm || !WEIGHTED);
+        let texels = 4u * (u32(edge) + u32(second) + u32(solid && !whole));
         var clear = 1.0;
         var color = vec4f(0.0);
         var weight = 0.0;
-        var last = nothing();
-        for (var n = 0u; n < 3u && seen.a.depth < NONE && clear >= 0.01; n++) {
-            let now = seen.a;
-            seen.a = seen.b;
-            seen.b = seen.c;
-            seen.c.depth = NONE;
-            let same_frame = now.layer / 2u == last.layer / 2u;
-            var apart = select(BEHIND * NEIGHBOUR, BEHIND, same_frame);
-            if last.depth >= NONE || (same_frame && now.layer != last.layer) { apart = 0.0; }
-            var another = now.depth >= last.depth * apart;
-            for (; another; another = false) {
-                let part = fetch(now);
-                if part.cover >= 0.01 {
-                    color += clear * part.color;
-                    weight += clear * part.weight;
-                    if CONFIDENCE {
-                        missed += clear * part.cover * now.miss;
-                        if now.layer > 1u { others += clear * part.cover; }
-                    }
-                    clear *= 1.0 - part.cover;
-                    last = now;
+        var part = Part();
+        var n = 0u;
+        loop {
+            var now = seen.solid;
+            if edge && n < 4u { now = seen.edge; }
+            if second && n / 4u == 1u { now = seen.second; }
+            if n < texels { add(&part, now, n % 4u); }
+            if n < texels && n % 4u == 3u {
+                if now.layer % 2u == 1u && part.cover > 1e-4 {
+                    part.color /= part.cover;
+                    part.weight /= part.cover;
+                    part.cover = 1.0;
                 }
+                color += clear * part.color;
+                weight += clear * part.weight;
+                if CONFIDENCE {
+                    missed += clear * part.cover * now.miss;
+                    if now.layer > 1u { others += clear * part.cover; }
+                }
+                clear *= 1.0 - part.cover;
+                part = Part();
             }
+            n++;
+            if n >= texels { break; }
         }
-        var nobody = clear >= 0.5;
-        if !nobody {
+        if whole {
+            color += clear * resampled(seen.solid.at, seen.solid.layer, seen.solid.calm);
+            var counts = 1.0;
+            if WEIGHTED { counts = textureLoad(surfaces, vec2u(seen.solid.at), seen.solid.layer / 2u, 0).w; }
+            weight += clear * counts;
+            if CONFIDENCE {
+                missed += clear * seen.solid.miss;
+                if seen.solid.layer > 1u { others += clear; }
+            }
+            clear = 0.0;
+        }
+        if clear < 0.5 {
             sum += share / (1.0 - clear) * color;
             total += share / (1.0 - clear) * weight;
             accepted += 1.0;
-        }
-        for (; nobody; nobody = false) {        // the pixel's own path through the frame
-            let q = x - displacement(path0, t);
+        } else {        // the pixel's own path through the frame
+            let q = x - displacement(path, t);
             sum += share * textureSampleLevel(own, linear, q / vec2f(frame.size), 0.0);
             if WEIGHTED {
                 total += share * textureSampleLevel(own_weight, linear, q / vec2f(frame.size), 0.0).x;
@@ -207,7 +150,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     var result = max(sum, vec4f(0.0)) / total;
-    if total <= 0.0 {       // to the bit
+    if still || total <= 0.0 {      // to the bit
         result = textureLoad(own, id.xy, 0);
         if WEIGHTED {
             let counted = textureLoad(own_weight, id.xy, 0).x;
@@ -215,61 +158,123 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     if CONFIDENCE {
-        result = vec4f(1.0, 0.0, 0.0, 0.0);
-        if samples > 0u { result = vec4f(accepted, others, missed / max(accepted, 1.0) * f32(samples), left) / f32(samples); }
+        result = vec4f(accepted, others, missed / max(accepted, 1.0) * f32(times.count), left) * share;
     }
     textureStore(output, id.xy, result);
 }
 
 fn nothing() -> Sample {
-    return Sample(NONE, NONE, NONE, false, false, vec2f(-9.0), vec2f(-9.0), 99u);
+    return Sample(NONE, NONE, NONE, vec2f(-9.0), 99u, false);
+}
+
+fn reach(tile: vec2u, f: u32) -> Reach {
+    if f >= sources.count { return Reach(vec4f(0.0), vec4f(NONE), vec4f(NONE), vec4f(-NONE)); }
+    let first = f * LAYERS;
+    return Reach(
+        textureLoad(tiles, tile, first, 0),
+        textureLoad(tiles, tile, first + 1u, 0),
+        textureLoad(tiles, tile, first + 2u, 0),
+        textureLoad(tiles, tile, first + 3u, 0),
+    );
+}
+
+fn of_frame(f: u32, a: vec4f, b: vec4f, c: vec4f) -> vec4f {
+    return select(select(c, b, f == 1u), a, f == 0u);
 }
 
 fn inside(q: vec2f) -> bool {
     return all(q >= vec2f(0.0)) && all(q < vec2f(frame.size));
 }
 
-/// Whether two displacements lead to the same place.
+/// Whether two displacements, or two places, are the same.
 fn alike(a: vec2f, b: vec2f) -> bool {
     return all(abs(a - b) < vec2f(SAME));
 }
 
-fn chosen(f: u32, a: Path, b: Path, c: Path) -> Path {
-    if f == 0u { return a; }
-    if f == 1u { return b; }
-    return c;
-}
-
-/// Whether `new` shows the same as `old`, which then stays, or is bettered.
-fn is_known(old: ptr<function, Sample>, new_: Sample) -> bool {
-    if (*old).depth >= NONE || (*old).layer % 2u != new_.layer % 2u { return false; }
-    if (*old).layer != new_.layer {
-        return all(abs((*old).home - new_.home) < vec2f(SAME_PLACE));
-    }
-    if any(abs((*old).at - new_.at) >= vec2f(SAME)) { return false; }
-    if new_.miss < (*old).miss { *old = new_; }
-    return true;
-}
-
-fn insert(seen: ptr<function, Seen>, found: Sample) {
-    var new_ = found;
-    var a = (*seen).a;
-    var b = (*seen).b;
-    var c = (*seen).c;
-    let known = is_known(&a, new_) || is_known(&b, new_) || is_known(&c, new_);
-    if !known {
-        if new_.depth < a.depth {
-            c = b;
-            b = a;
-            a = new_;
-        } else if new_.depth < b.depth {
-            c = b;
-            b = new_;
-        } else if new_.depth < c.depth {
-            c = new_;
+/// Samples that are at `x` by the time `t`, searched for in the near layer of the frame itself; then of
+/// the neighbour on the side of `t`, if that is far from the frame's instant or nothing opaque was found;
+/// then of the other one, if still nothing was. What the frame itself does not show is also searched for
+/// behind silhouettes.
+fn search(x: vec2f, tile: vec2u, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
+    let count = sources.count;
+    let offsets = sources.offsets;
+    let parted = max(a.about.z, max(b.about.z, c.about.z)) > 0.0;
+    var solid = nothing();
+    var edge = nothing();
+    var second = nothing();
+    var hidden = false;         // the frame itself shows nothing opaque
+    var round = 0u;
+    var f = 0u;
+    var u = t;                  // since that frame's instant
+    var k = 0u;                 // 0: from the pixel's own path; else from one of the tile's
+    var first = vec2f(NONE);    // what the former led to
+    loop {
+        let handicap = select(NEIGHBOUR, 1.0, f == 0u);
+        let layer = 2u * f + round / 3u;
+        let seed = textureLoad(tiles, tile, f * LAYERS + 3u + max(k, 1u), 0);
+        var d = displacement(Path(seed.xy, seed.zw), u);
+        if k == 0u { d = vec2f(0.0); }      // one step leads to the own path's
+        // The fixed point of d = displacement(x - d).
+        let steps = STEPS + u32(k == 0u);
+        let known = alike(d, first);
+        var texel = vec4u(0u);
+        var miss = NONE;
+        var n = 0u;
+        loop {
+            let q = x - d;
+            texel = textureLoad(paths, vec2i(floor(q)), layer, 0);
+            let next = displacement(path_in(texel), u);
+            miss = select(NONE, distance(next, d), inside(q));
+            d = next;
+            n++;
+            if miss < FOUND || miss >= NONE || n >= steps || alike(d, first) { break; }
         }
+        if k == 0u { first = d; }
+
+        let z = depth_in(texel);
+        let calm = is_calm(texel);
+        let guess = select(1.0, GUESSED, round >= 3u && !calm);
+        let found = Sample(abs(z) * handicap * guess, abs(z), miss, x - d, layer, calm && round < 3u);
+        let hit = miss <= MISS && !known;
+        if hit && z > 0.0 && found.depth < solid.depth { solid = found; }
+        if hit && z < 0.0 {
+            let is_edge = is_same(found, edge);
+            let is_second = is_same(found, second);
+            let in_front = !is_edge && !is_second && found.depth < edge.depth;
+            let behind = !is_edge && !in_front
+                && select(found.depth < second.depth, found.miss < second.miss, is_second);
+            if in_front { second = edge; }
+            if in_front || (is_edge && found.miss < edge.miss) { edge = found; }
+            if behind { second = found; }
+        }
+
+        // The next of the tile's motions that may come by then, and be nearer than what is seen already.
+        let depths = of_frame(f, a.depths, b.depths, c.depths) * handicap;
+        let comes = of_frame(f, a.comes, b.comes, c.comes);
+        let goes = of_frame(f, a.goes, b.goes, c.goes);
+        let worth = vec4<bool>(k < 1u, k < 2u, k < 3u, k < 4u) & (depths < vec4f(solid.depth))
+            & (comes <= vec4f(u)) & (vec4f(u) <= goes);
+        k = select(select(select(select(0u, 4u, worth.w), 3u, worth.z), 2u, worth.y), 1u, worth.x);
+        if round >= 3u || k == 0u {
+            let none = solid.depth >= NONE;
+            if round == 0u { hidden = none; }
+            round++;
+            let opinion = round < count && (none || (round == 1u && abs(t) > TRUSTED));
+            if round < 3u && !opinion { round = 3u; }
+            let neighbour = round % 3u;
+            if round >= 3u && !(hidden && parted && neighbour < count) { round = ROUNDS; }
+            f = select(neighbour, 3u - neighbour, neighbour > 0u && count == 3u && t > 0.0);
+            u = t - select(select(offsets.z, offsets.y, f == 1u), 0.0, f == 0u);
+            k = 0u;
+            first = vec2f(NONE);
+        }
+        if round >= ROUNDS { break; }
     }
-    *seen = Seen(a, b, c);
+    return Seen(solid, edge, second);
+}
+
+fn is_same(a: Sample, b: Sample) -> bool {
+    return a.layer == b.layer && alike(a.at, b.at);
 }
 
 struct Part {
@@ -278,60 +283,37 @@ struct Part {
     cover: f32,
 }
 
-/// The colour of a sample, from the texels of its own surface.
-fn fetch(now: Sample) -> Part {
-    let size = vec2f(frame.size);
-    var part = Part();
+/// One of the four texels around a sample, if it is of the same surface.
+fn add(part: ptr<function, Part>, now: Sample, i: u32) {
     let source = now.layer / 2u;
     let is_far = now.layer % 2u == 1u;
-    let simple = now.plain && (now.calm || !WEIGHTED);
-    if simple {
-        part.weight = 1.0;
-        if WEIGHTED { part.weight = textureLoad(surfaces, vec2u(now.at), source, 0).w; }
-        part.cover = 1.0;
-    }
-    var smooth_ = simple && !now.calm;
-    for (; smooth_; smooth_ = false) {
-        part.color = textureSampleLevel(colors, linear, now.at / size, now.layer, 0.0);
-    }
-    var sharp = simple && now.calm;
-    for (; sharp; sharp = false) { part.color = cubic(now.at, now.layer); }
     let corner = floor(now.at - 0.5);
     let share = now.at - 0.5 - corner;
-    let count = select(4u, 0u, simple);
-    for (var i = 0u; i < count; i++) {
-        let step = vec2f(vec2u(i & 1u, i >> 1u));
-        let px = vec2u(clamp(corner + step, vec2f(0.0), size - 1.0));
-        let both = mix(1.0 - share, share, step);
-        let there = textureLoad(surfaces, px, source, 0);
-        let is_split = there.y > 0.0;
-        let from_far = is_far && is_split;
-        let z = there.x;
-        // Near: what is not behind it. Far: guessed backgrounds, and what lies as deep.
-        let too_far = z > now.true_depth * BEHIND;
-        let too_near = is_far && z < now.true_depth / BEHIND;
-        let counts = from_far || !(too_far || too_near);
-        let amount = select(0.0, both.x * both.y, counts);
-        part.color += amount * textureLoad(colors, px, 2u * source + u32(from_far), 0);
-        part.weight += amount * select(there.w, 1.0, from_far);
-        part.cover += amount * select(there.z, 1.0, is_far);
-    }
-    if is_far && part.cover > 1e-4 {
-        part.color /= part.cover;
-        part.weight /= part.cover;
-        part.cover = 1.0;
-    }
-    return part;
+    let step = vec2f(vec2u(i & 1u, i >> 1u));
+    let px = vec2u(clamp(corner + step, vec2f(0.0), vec2f(frame.size) - 1.0));
+    let both = mix(1.0 - share, share, step);
+    let there = textureLoad(surfaces, px, source, 0);
+    let is_split = there.y > 0.0;
+    let from_far = is_far && is_split;
+    let z = there.x;
+    // Near: what is not behind it. Far: guessed backgrounds, and what lies as deep.
+    let too_far = z > now.true_depth * BEHIND;
+    let too_near = is_far && z < now.true_depth / BEHIND;
+    let counts = from_far || !(too_far || too_near);
+    let amount = select(0.0, both.x * both.y, counts);
+    (*part).color += amount * textureLoad(colors, px, 2u * source + u32(from_far), 0);
+    (*part).weight += amount * select(there.w, 1.0, from_far);
+    (*part).cover += amount * select(there.z, 1.0, is_far);
 }
 
-/// Catmull-Rom interpolation by five bilinear samples; the corners of the 4 x 4, which weigh next to
-/// nothing, are left out.
-fn cubic(at: vec2f, layer: u32) -> vec4f {
+/// Catmull-Rom interpolation where that is `safe`, linear elsewhere, by five bilinear samples; the corners
+/// of the 4 x 4, which weigh next to nothing, are left out.
+fn resampled(at: vec2f, layer: u32, safe: bool) -> vec4f {
     let one = floor(at - 0.5) + 0.5;
     let f = at - one;
-    let w0 = f * (-0.5 + f * (1.0 - 0.5 * f));
-    let w2 = f * (0.5 + f * (2.0 - 1.5 * f));
-    let w3 = f * f * (-0.5 + 0.5 * f);
+    let w0 = select(vec2f(0.0), f * (-0.5 + f * (1.0 - 0.5 * f)), safe);
+    let w2 = select(f, f * (0.5 + f * (2.0 - 1.5 * f)), safe);
+    let w3 = select(vec2f(0.0), f * f * (-0.5 + 0.5 * f), safe);
     let middle = 1.0 - w0 - w3;         // of the two inner texels together
     let texel = 1.0 / vec2f(frame.size);
     let inner = (one + w2 / middle) * texel;

@@ -9,7 +9,7 @@
 @group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
 @group(1) @binding(2) var depth: texture_2d<f32>;
 @group(1) @binding(3) var weight: texture_2d<f32>;
-@group(1) @binding(4) var mixed: texture_2d<f32>;       // what `mark` wrote: 1 where two surfaces may show
+@group(1) @binding(4) var marked: texture_2d<u32>;      // what `mark` wrote: MIXED, BRIGHT
 @group(1) @binding(5) var marks: Marks;
 @group(1) @binding(6) var near_color: Color;            // premultiplied by coverage too
 @group(1) @binding(7) var near_path: Packed;            // see packed()
@@ -17,13 +17,15 @@
 @group(1) @binding(9) var far_path: Packed;
 @group(1) @binding(10) var surface: Exact;              // near depth; far depth, 0 where there is none; coverage; weight
 
-alias Marks = texture_storage_2d<r32float, write>;
+alias Marks = texture_storage_2d<r32uint, write>;
 alias Color = texture_storage_2d<rgba32float, write>;
 alias Packed = texture_storage_2d<rgba32uint, write>;
 alias Exact = texture_storage_2d<rgba32float, write>;
 
 override WEIGHTED: bool = false;
 
+const MIXED: u32 = 1u;          // two surfaces may show
+const BRIGHT: u32 = 2u;         // some channel is over WHITE
 const FAR: f32 = 1e10;          // depth of what has none
 const APART: f32 = 1.1;         // ratio of depths that makes two surfaces
 const DIFFERENT: f32 = 0.5;     // of their motions [px]
@@ -37,6 +39,10 @@ fn held(px: vec2i) -> vec2i {
 fn depth_at(px: vec2i) -> f32 {
     let z = textureLoad(depth, held(px), 0).x;
     return select(FAR, min(z, FAR), is_finite(z) && z > 0.0);
+}
+
+fn is_mixed(px: vec2i) -> bool {
+    return (textureLoad(marked, px, 0).x & MIXED) != 0u;
 }
 
 fn weight_at(px: vec2i) -> f32 {
@@ -63,7 +69,8 @@ fn mark(@builtin(global_invocation_id) id: vec3u) {
         let other = textureLoad(motion, held(px + vec2i(i % 3, i / 3) - 1), 0) - here;
         most = max(most, dot(other, other));
     }
-    textureStore(marks, px, vec4f(select(0.0, 1.0, most > DIFFERENT * DIFFERENT)));
+    let bright = any(textureLoad(color, px, 0) > vec4f(WHITE));
+    textureStore(marks, px, vec4u(select(0u, MIXED, most > DIFFERENT * DIFFERENT) | select(0u, BRIGHT, bright)));
 }
 
 struct Side {       // the mean of what lies on one side of a silhouette
@@ -84,10 +91,9 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
     var calm = true;        // one surface and weight, nothing brighter than white, in the 5 x 5
     for (var i = 0; i < 25; i++) {
         let off = vec2i(i % 5, i / 5) - 2;
-        let is_mixed = textureLoad(mixed, held(px + off), 0).x > 0.0;
-        let bright = any(textureLoad(color, held(px + off), 0) > vec4f(WHITE));
-        calm = calm && !is_mixed && !bright && weight_at(px + off) == counts;
-        beside = beside || (is_mixed && all(abs(off) < vec2i(2)));
+        let mark = textureLoad(marked, held(px + off), 0).x;
+        calm = calm && mark == 0u && weight_at(px + off) == counts;
+        beside = beside || ((mark & MIXED) != 0u && all(abs(off) < vec2i(2)));
     }
     let own = textureLoad(color, px, 0);
     let own_motion = textureLoad(motion, px, 0);
@@ -100,10 +106,10 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
     var coverage = 1.0;
     var seen = false;       // the far layer is no guess
 
-    let marked = textureLoad(mixed, px, 0).x > 0.0;
+    let mixed = is_mixed(px);
     var nearest = FAR;
     var farthest = 0.0;
-    let around = select(0, 9, marked);
+    let around = select(0, 9, mixed);
     for (var i = 0; i < around; i++) {
         let other = depth_at(px + vec2i(i % 3, i / 3) - 1);
         nearest = min(nearest, other);
@@ -112,14 +118,14 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
     let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= FAR);
     var front = Side();
     var back = Side();
-    let wide = select(0, 25, marked);
+    let wide = select(0, 25, mixed);
     for (var i = 0; i < wide; i++) { collect(px, i, between, true, true, true, &front, &back); }
     let thin = front.total == 0.0;      // a wire: nothing near is unmixed
-    let rest = select(0, 25, marked && (thin || back.total == 0.0));
+    let rest = select(0, 25, mixed && (thin || back.total == 0.0));
     let no_back = back.total == 0.0;
     for (var i = 0; i < rest; i++) { collect(px, i, between, false, thin, no_back, &front, &back); }
 
-    if marked && front.total > 0.0 && back.total > 0.0 && back.counted > 0.0 {
+    if mixed && front.total > 0.0 && back.total > 0.0 && back.counted > 0.0 {
         let behind = back.motion / back.total;
         var before = front.motion / front.total;
         if thin { before = most_different(px, between, behind); }
@@ -158,7 +164,7 @@ fn collect(px: vec2i, i: i32, between: f32, pure_only: bool, to_front: bool, to_
     let off = vec2i(i % 5, i / 5) - 2;
     let at = px + off;
     if any(at < vec2i(0)) || any(at >= vec2i(frame.size)) { return; }
-    if pure_only && textureLoad(mixed, at, 0).x > 0.0 { return; }
+    if pure_only && is_mixed(at) { return; }
     let z = depth_at(at);
     let is_front = z < between;
     if !select(to_back, to_front, is_front) { return; }

@@ -3,7 +3,7 @@
 
 const TILE: u32 = 16u;          // side [px]
 const PATHS: u32 = 4u;          // motions kept a tile
-const LAYERS: u32 = 6u;         // of the texture that holds them: about, depths, then the paths
+const LAYERS: u32 = 8u;         // of the texture that holds them: about, depths, from when, till when, then the paths
 
 const HALF_MAX: f32 = 65504.0;  // largest finite f16
 

@@ -126,9 +126,11 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
     let u = longest_time();
     let around = min(i32(ceil(bitcast<f32>(atomicLoad(&farthest)) / f32(TILE))) + 1, FARTHEST);
     let here = vec2i(id.xy);
-    let low = max(here - around, vec2i(0));
-    let size = min(here + around, vec2i(tiles) - 1) - low + 1;
-    let count = size.x * size.y;
+    var low = max(here - around, vec2i(0));
+    var size = min(here + around, vec2i(tiles) - 1) - low + 1;
+    var count = size.x * size.y;
+    var least = here;       // of the tiles that move here
+    var most = here;
     var nearest = NOWHERE;
     var split = 0.0;
     var longest = 0.0;
@@ -140,8 +142,15 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
             nearest = min(nearest, about.y);
             split = max(split, about.z);
             longest = max(longest, about.w);
+            if about.x > 0.0 {
+                least = min(least, there);
+                most = max(most, there);
+            }
         }
     }
+    low = least;
+    size = most - least + 1;
+    count = size.x * size.y;
     var chosen = array<vec4f, 4>();
     var chosen_count = 0u;
     var more = true;
@@ -156,7 +165,8 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
             for (var n = 0u; n < paths_there; n++) {
                 let path = contents[at].paths[n];
                 let least = unlike(path, chosen, u);
-                if least > best && lands(path, span, off) {
+                let when = lands(path, span, off);
+                if least > best && when.x <= when.y {
                     best = least;
                     found = path;
                 }
@@ -169,6 +179,8 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     var depths = vec4f(NOWHERE);
+    var comes = vec4f(1.0);
+    var goes = vec4f(0.0);
     for (var i = 0; i < count; i++) {
         let there = low + vec2i(i % size.x, i / size.x);
         let at = u32(there.y) * tiles.x + u32(there.x);
@@ -176,9 +188,12 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
         let paths_there = select(0u, u32(contents[at].about.x), meets(contents[at].box, off));
         for (var n = 0u; n < paths_there; n++) {
             let path = contents[at].paths[n];
-            if lands(path, span, off) {
-                let z = vec4f(contents[at].depths[n]);
-                depths = min(depths, select(vec4f(NOWHERE), z, most_alike(path, chosen, u)));
+            let when = lands(path, span, off);
+            if when.x <= when.y {
+                let alike = most_alike(path, chosen, u);
+                depths = min(depths, select(vec4f(NOWHERE), vec4f(contents[at].depths[n]), alike));
+                comes = min(comes, select(vec4f(1.0), vec4f(when.x), alike));
+                goes = max(goes, select(vec4f(0.0), vec4f(when.y), alike));
             }
         }
     }
@@ -192,13 +207,22 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
                 let z = depths[k];
                 depths[k] = depths[k + 1u];
                 depths[k + 1u] = z;
+                let a = comes[k];
+                comes[k] = comes[k + 1u];
+                comes[k + 1u] = a;
+                let b = goes[k];
+                goes[k] = goes[k + 1u];
+                goes[k + 1u] = b;
             }
         }
     }
     let about = vec4f(f32(chosen_count), nearest, split, longest);
     textureStore(reaching, id.xy, source.first, about);
     textureStore(reaching, id.xy, source.first + 1u, depths);
-    for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id.xy, source.first + 2u + k, chosen[k]); }
+    let none = depths >= vec4f(NOWHERE);
+    textureStore(reaching, id.xy, source.first + 2u, select(span.x + (span.y - span.x) * comes, vec4f(NOWHERE), none));
+    textureStore(reaching, id.xy, source.first + 3u, select(span.x + (span.y - span.x) * goes, vec4f(-NOWHERE), none));
+    for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id.xy, source.first + 4u + k, chosen[k]); }
 }
 
 /// Whether any motion of a tile, by its box, leads to the one that lies `off` [px] away.
@@ -207,8 +231,9 @@ fn meets(box: vec4f, off: vec2f) -> bool {
     return all(off + margin > box.xy) && all(off - margin < box.zw);
 }
 
-/// Whether a tile moving along `path` touches the one that lies `off` [px] away.
-fn lands(path: vec4f, span: vec2f, off: vec2f) -> bool {
+/// From when to when, in shares of the `span`, a tile moving along `path` touches the one that lies
+/// `off` [px] away; the second is less where it never does.
+fn lands(path: vec4f, span: vec2f, off: vec2f) -> vec2f {
     let a = displaced(path, span.x) - off;
     let way = displaced(path, span.y) - off - a;
     let bend = length(path.zw) * (span.y - span.x) * (span.y - span.x) * 0.25;
@@ -219,5 +244,5 @@ fn lands(path: vec4f, span: vec2f, off: vec2f) -> bool {
     let two = (margin - a) / steps;
     let enters = min(one, two);
     let leaves = max(one, two);
-    return max(max(enters.x, enters.y), 0.0) <= min(min(leaves.x, leaves.y), 1.0);
+    return vec2f(max(max(enters.x, enters.y), 0.0), min(min(leaves.x, leaves.y), 1.0));
 }
