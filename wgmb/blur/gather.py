@@ -34,6 +34,7 @@ class Gather:
     name = "gather"
     needs = frozenset({"color", "motion", "depth"})
     uses = frozenset({"neighbours"})
+    adaptive = True
 
     def __init__(self, device, *, output="rgba32float", show="color"):
         if show not in SHOWN:

@@ -71,7 +71,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let reach2 = reach(tile, 2u);
     let path = path_in(textureLoad(paths, id.xy, 0u, 0));
     let longest = max(reach0.about.w, max(reach1.about.w, reach2.about.w));
-    let times = enough_times(shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5)), longest);
+    let streak = max(streak_of(reach0, 0u), max(streak_of(reach1, 1u), streak_of(reach2, 2u)));
+    let times = enough_times(shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5)), streak);
     let share = 1.0 / f32(times.count);     // before adding, so that no sum of finite colours overflows
 
     let still = longest < STILL;
@@ -176,6 +177,12 @@ fn reach(tile: vec2u, f: u32) -> Reach {
         textureLoad(tiles, tile, first + 2u, 0),
         textureLoad(tiles, tile, first + 3u, 0),
     );
+}
+
+/// How long a streak the longest motion of a frame leaves in the exposure [px].
+fn streak_of(here: Reach, f: u32) -> f32 {
+    let since = shutter.span - sources.offsets[f];
+    return here.about.w * (shutter.span.y - shutter.span.x) / max(abs(since.x), abs(since.y));
 }
 
 fn of_frame(f: u32, a: vec4f, b: vec4f, c: vec4f) -> vec4f {
