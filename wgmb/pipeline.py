@@ -33,10 +33,11 @@ class Neighbour:
     """The frame before or after, as far as a method needs it."""
 
     offset: int  # -1, 1 [frame intervals]
-    color: View
+    color: View  # premultiplied by alpha and by weight
     motion: View
     depth: View
     normal: View | None
+    weight: View | None  # there if the frame itself has one
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,6 @@ class Inputs:
     weight: View | None  # None: every pixel counts
     neighbours: tuple[Neighbour, ...]
     none: View  # bound where an input is not there
-    one: View  # bound where a weight is not there
     linear: wgpu.GPUSampler
     even: bool  # the shutter is a box
     auto: bool  # `samples` is the most a pixel may take
@@ -117,8 +117,6 @@ class Blur:
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
         self._none = self._images.view("none", (1, 1), gpu.texel(self.device, 4))
         no_object = self._images.view("no object", (1, 1), "r32uint")
-        ones = np.ones((1, 1, 4), np.float32)
-        self._one = self._images.upload("one", ones, gpu.texel(self.device, 4))
         self._velocity = VelocityPass(self.device, self._none, no_object)
         self._keep = KeepPass(self.device, self._images, self._none)
         self.shutter = shutter
@@ -181,7 +179,7 @@ class Blur:
         price of three small passes.
 
         `neighbours`: -1 and 1, each with `color`, its own `moving` inputs and depth, and
-        `normal` if there is one, for methods that use them.
+        `keep`, `normal` and `check` as above, for methods that use them.
 
         `scene` instead of `color`, for the methods that need one, which may be recorded
         bit by bit: `progress` is how many samples were done before, and are to be done now.
@@ -198,13 +196,15 @@ class Blur:
         if motions.known and (not motions.ready or limited or check):
             motion = self._images.view("motion", size, "rgba32float")
             self._velocity.encode(encoder, given, motions, limited, motion)
+        around = (neighbours or {}) if "neighbours" in self.method.uses else {}
+        masked = keep is not None or check
+        masked |= any(n.get("keep") is not None or n.get("check") for n in around.values())
         near = tuple(
-            self._neighbour(encoder, given, offset, dict(inputs))
-            for offset, inputs in (neighbours or {}).items()
-            if "neighbours" in self.method.uses
+            self._neighbour(encoder, given, offset, dict(inputs), masked)
+            for offset, inputs in around.items()
         )
         weight, result, own = None, output, color
-        if color is not None and (keep is not None or check):
+        if color is not None and masked:
             color, weight = self._keep.before(encoder, given, color, keep)
             result = self._images.view("blurred", size, self.output)
         inputs = Inputs(
@@ -222,7 +222,6 @@ class Blur:
             weight=weight,
             neighbours=near,
             none=self._none,
-            one=self._one,
             linear=self._linear,
             even=self._shutter.curve == "box",
             auto=self.auto,
@@ -275,16 +274,22 @@ class Blur:
 
         They are kept: the next frame's go into the same textures.
         """
-        rgba, four = self._rgba(frame)
         return {
             "size": frame.size,
-            "color": self._images.upload("color", rgba, four),
-            "keep": self._view("keep", frame.keep, "r32float"),
-            "normal": self._normal(frame),
-            "check": bool(frame.bad.keys() - {"depth"}),
             "number": frame.number,
             "neighbours": self._upload_neighbours(frame),
-            **self._upload_moving(frame),
+            **self._upload_one(frame),
+        }
+
+    def _upload_one(self, frame: Frame, which: str = "") -> dict:
+        """What there is of one frame, the frame itself or a neighbour."""
+        rgba, four = self._rgba(frame)
+        return {
+            "color": self._images.upload("color" + which, rgba, four),
+            "keep": self._view("keep" + which, frame.keep, "r32float"),
+            "normal": self._normal(frame, which),
+            "check": bool(frame.bad.keys() - {"depth"}),
+            **self._upload_moving(frame, which),
         }
 
     def _rgba(self, frame: Frame) -> tuple[np.ndarray, str]:
@@ -296,20 +301,13 @@ class Blur:
         return rgba, "rgba16float" if rgba.dtype == np.float16 else gpu.texel(self.device, 4)
 
     def _upload_neighbours(self, frame: Frame) -> dict[int, dict]:
-        """Those neighbours that the method uses and that have what it needs, without a fault."""
+        """Those neighbours that the method uses and that have what it needs."""
         if "neighbours" not in self.method.uses:
             return {}
         found = {}
         for offset, near in ((-1, frame.prev), (1, frame.next)):
-            if (
-                near is not None
-                and near.has >= self.method.needs
-                and not near.bad.keys() - {"depth"}
-            ):
-                rgba, texel = self._rgba(near)
-                color = self._images.upload(f"color {offset}", rgba, texel)
-                found[offset] = {"color": color, "normal": self._normal(near, f" {offset}")}
-                found[offset] |= self._upload_moving(near, f" {offset}")
+            if near is not None and near.has >= self.method.needs:
+                found[offset] = self._upload_one(near, f" {offset}")
         return found
 
     def _upload_moving(self, frame: Frame, which: str = "") -> dict:
@@ -335,17 +333,21 @@ class Blur:
         four[..., :3] = frame.normal
         return self._images.upload("normal" + which, four, "rgba32float")
 
-    def _neighbour(self, encoder, given, offset: int, inputs: dict) -> Neighbour:
+    def _neighbour(self, encoder, given, offset: int, inputs: dict, masked: bool) -> Neighbour:
         color, normal = inputs.pop("color"), inputs.pop("normal", None)
-        _check_views(given.size, {"color": color, "normal": normal, **inputs})
+        keep, check = inputs.pop("keep", None), inputs.pop("check", False)
+        _check_views(given.size, {"color": color, "normal": normal, "keep": keep, **inputs})
         moving = _moving(inputs)
         motion, limited = moving.motion, self.max_blur is not None
         if not moving.known or moving.depth is None:
             raise InputError("a neighbouring frame needs color, motion and depth")
-        if motion is None or not moving.ready or limited:
+        if motion is None or not moving.ready or limited or check:
             motion = self._images.view(f"motion {offset}", given.size, "rgba32float")
             self._velocity.encode(encoder, given, moving, limited, motion)
-        return Neighbour(offset, color, motion, moving.depth, normal)
+        weight = None
+        if masked:
+            color, weight = self._keep.before(encoder, given, color, keep, f" {offset}")
+        return Neighbour(offset, color, motion, moving.depth, normal, weight)
 
     def _require(self, there) -> None:
         if missing := self.method.needs - there:
