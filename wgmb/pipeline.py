@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 import wgpu
@@ -112,6 +113,7 @@ class Blur:
             )
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         self.method = METHODS[method](self.device, output=output, **options)
+        self._options = options
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._images = Images(self.device)
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
@@ -120,6 +122,20 @@ class Blur:
         self._velocity = VelocityPass(self.device, self._none, no_object)
         self._keep = KeepPass(self.device, self._images, self._none)
         self.shutter = shutter
+
+    @property
+    def confidence(self) -> tuple[str, ...]:
+        """What `with_confidence` tells of every pixel; InputError where a method cannot tell."""
+        if names := getattr(self.method, "confidence", ()):
+            return names
+        able = ", ".join(n for n, m in METHODS.items() if hasattr(m, "confidence"))
+        raise InputError(f"method {self.method.name!r} has no confidence; {able} has")
+
+    @cached_property
+    def _judge(self):
+        """The method once more, telling how sure it is."""
+        options = self._options | {"show": "confidence"}
+        return METHODS[self.method.name](self.device, output=self.output, **options)
 
     @property
     def shutter(self) -> Shutter:
@@ -163,6 +179,7 @@ class Blur:
         neighbours: dict[int, dict] | None = None,
         keep: View | None = None,
         normal: View | None = None,
+        confidence: View | None = None,
         check: bool = False,
         number: int = 0,
         timing: Timing | None = None,
@@ -172,7 +189,7 @@ class Blur:
 
         Views are of your textures: `color` filterable float (rgba16float always is), `keep`
         0..1, `normal` unit vectors in the world, `output` a storage texture of the format that
-        Blur was made for. `moving` are
+        Blur was made for, `confidence` another one for what `with_confidence` tells. `moving` are
         the inputs of velocity.Moving: `to_next` and `to_prev` with the displacement [px] in
         x and y, or `motion` with to_prev and to_next together, which saves a pass; or
         `camera` and `depth`. `check` gives pixels that are not finite no weight, at the
@@ -187,6 +204,7 @@ class Blur:
         gpu.check_size(self.device, *size)
         motions = _moving(moving)
         views = {"output": output, "color": color, "keep": keep, "normal": normal}
+        views["confidence"] = confidence
         _check_views(size, views | moving)
         given_inputs = {"color": color, "motion": motions.known or None, "depth": motions.depth}
         given_inputs["scene"] = scene
@@ -229,6 +247,8 @@ class Blur:
             progress=progress or (0, self.samples),
         )
         self.method.encode(encoder, inputs, result)
+        if confidence is not None and self.confidence:
+            self._judge.encode(encoder, inputs, confidence)
         if weight and own:
             self._keep.after(encoder, given, own, keep, result, output, self.output)
 
@@ -245,6 +265,25 @@ class Blur:
         return self._images.download(encoder, output)[..., : frame.color.shape[2]].astype(
             "f4", copy=False
         )
+
+    def with_confidence(self, frame: Frame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """The blurred frame, and how sure the method is of every pixel, at twice the cost.
+
+        The second by the names in `confidence`, each (height, width) float32; what they mean
+        is said where the method says what it can `show`.
+        """
+        names = self.confidence
+        self._require(frame.has)
+        size, channels = frame.size, frame.color.shape[2]
+        output = self._images.texture("output", size, self.output)
+        sure = self._images.texture("confidence", size, self.output)
+        encoder = self.device.create_command_encoder(label="wgmb")
+        views = {"output": output.create_view(), "confidence": sure.create_view()}
+        self.encode(encoder, **views, **self.upload(frame))
+        picture = self._images.download(encoder, output)[..., :channels]
+        told = self._images.download(self.device.create_command_encoder(), sure)
+        planes = np.moveaxis(told.astype("f4", copy=False), 2, 0)
+        return picture.astype("f4", copy=False), dict(zip(names, planes, strict=True))
 
     def motion(self, frame: Frame) -> np.ndarray:
         """What the methods are given to follow: (height, width, 4) to_prev, to_next [px]."""

@@ -34,6 +34,7 @@ class Gather:
     name = "gather"
     needs = frozenset({"color", "motion", "depth"})
     uses = frozenset({"neighbours"})
+    confidence = ("accepted", "disocclusion", "residual", "left")
 
     def __init__(self, device, *, output="rgba32float", show="color"):
         if show not in SHOWN:
