@@ -25,7 +25,7 @@ SIZE, FPS, FRAME = (640, 360), 24, 10
 SAMPLES = 192  # of a sharp frame, and of one half of a truth
 VECTOR_BLUR = 64  # samples of Blender's node
 SHUTTERS = {"050": 0.5, "100": 1.0}
-STEP = 0.125  # frames between keys
+SPAN, STEP = 2.25, 0.125  # frames from the middle one to the last key, between keys
 AMBIENT = 0.3
 
 
@@ -102,7 +102,7 @@ def limb(color, radius, length, at, parent=None):
 
 def animate(of, path: str, value, index: int = -1):
     """Key a property with `value(t)`, t in frames from the middle one."""
-    for i in range(int(-1.5 / STEP), int(1.5 / STEP) + 1):
+    for i in range(int(-SPAN / STEP), int(SPAN / STEP) + 1):
         t = i * STEP
         now = value(t)
         if index < 0:
@@ -349,12 +349,13 @@ def begin():
     return scene
 
 
-def save_to(scene, path: Path, layers: bool):
-    """Where the next picture goes: all layers, or its colour alone."""
+def shoot(scene, path: Path, layers: bool):
+    """Render into a file: all layers, or the colour alone."""
     image = scene.render.image_settings
     image.file_format = "OPEN_EXR_MULTILAYER" if layers else "OPEN_EXR"
     image.color_mode, image.color_depth, image.exr_codec = "RGBA" if layers else "RGB", "16", "ZIP"
     scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
 
 
 def render(folder: Path, name: str):
@@ -369,8 +370,7 @@ def render(folder: Path, name: str):
     (folder / "camera.json").write_text(json.dumps(cameras(scene, name), indent=1))
     for offset, file in ((-1, "prev"), (0, "curr"), (1, "next")):
         scene.frame_set(FRAME + offset)
-        save_to(scene, folder / f"{file}.exr", True)
-        bpy.ops.render.render(write_still=True)
+        shoot(scene, folder / f"{file}.exr", True)
     scene.frame_set(FRAME)
     scene.render.use_motion_blur = True
     scene.render.motion_blur_position = "CENTER"
@@ -380,8 +380,7 @@ def render(folder: Path, name: str):
         for seed, half in enumerate("ab", 1):
             scene.cycles.seed = seed
             halves.append(folder / f"truth_{text}.{half}.exr")
-            save_to(scene, halves[-1], False)
-            bpy.ops.render.render(write_still=True)
+            shoot(scene, halves[-1], False)
         save_mean(halves, folder / f"truth_{text}.exr")
 
 
@@ -447,8 +446,7 @@ def vector_blur(folder: Path):
         render_.resolution_x, render_.resolution_y = SIZE
         render_.resolution_percentage, render_.use_sequencer = 100, False
         render_.compositor_device, render_.compositor_precision = "CPU", "FULL"
-        save_to(scene, folder / f"blender_vecblur_{text}.exr", False)
-        bpy.ops.render.render(write_still=True)
+        shoot(scene, folder / f"blender_vecblur_{text}.exr", False)
 
 
 def main():
