@@ -1,7 +1,7 @@
 """Scenes with a path tracer's own motion blur: python docs/blender_scenes.py FOLDER [SCENE ...]
 
 Runs in an environment of its own (Python 3.11, `pip install bpy==4.5.15 OpenEXR`, 1 GB), on
-the CPU, about three minutes a scene on two cores. Into FOLDER/SCENE it writes
+the CPU, three to five minutes a scene on two cores. Into FOLDER/SCENE it writes
 prev.exr, curr.exr, next.exr    frames 9, 10, 11 without motion blur, with depth and vectors
 truth_050.exr, truth_100.exr    frame 10 with Cycles' motion blur: 180 and 360 degrees, box,
                                 centred on the frame; the mean of two halves, kept as .a and .b
@@ -25,7 +25,8 @@ SIZE, FPS, FRAME = (640, 360), 24, 10
 SAMPLES = 192  # of a sharp frame, and of one half of a truth
 VECTOR_BLUR = 64  # samples of Blender's node
 SHUTTERS = {"050": 0.5, "100": 1.0}
-SPAN, STEP = 2.25, 0.125  # frames from the middle one to the last key, between keys
+SPAN = 2.25  # frames from the middle one to the last key: vectors of 9 and 11 lead to 8 and 12
+STEP = 0.125  # frames between keys
 AMBIENT = 0.3
 
 

@@ -88,7 +88,11 @@ def page(device, table: str, sections: list[str]) -> str:
         f"`{PEER}`: the node of Blender's compositor, 64 samples. `{NOISE}`: one half of the "
         "truth's samples against the other, the floor.\n\n"
         + table
-        + "\nPictures, at 360°: the truth, gather with 16 samples; below, "
+        + "\nWhat is left of gather's error: shadows and shading that move over a surface, of "
+        "which no vector tells (runner, propeller); places hidden in all three frames "
+        "(c_crossing); paths that bend more than three positions can tell (flag: a wave turns by "
+        "up to 75° a frame).\n"
+        "\nPictures, at 360°: the truth, gather with 16 samples; below, "
         f"{measure.FLIP_GAIN:g} times FLIP of {PEER} and of gather.\n\n" + "\n".join(sections)
     )
 
