@@ -21,7 +21,8 @@ def test_contract(name):
     ]  # fmt: skip
     assert shader.load(f"blur/{name}.wgsl").text.startswith("// ")
     public = {n for n in vars(method) if not n.startswith("_")}
-    assert public - {"samples", "adaptive"} == {"name", "needs", "uses", "encode"}
+    assert len(set(getattr(method, "confidence", "rgba"))) == 4
+    assert public - {"samples", "adaptive", "confidence"} == {"name", "needs", "uses", "encode"}
     assert "Artefacts:" in (method.__doc__ or "")
 
 

@@ -194,6 +194,17 @@ def test_masks_come_from_layers_of_the_frame(tmp_path):
     np.testing.assert_array_equal(frame.scale, index == 1)
 
 
+def test_neighbours_have_masks_of_their_own(tmp_path):
+    index = {n: (np.arange(48 * 64).reshape(48, 64) % 5 == n).astype("f4") for n in (1, 2, 3)}
+    for n, plane in index.items():
+        channels = make.frame(n) | {"ViewLayer.IndexOB.X": plane}
+        make.write_exr(tmp_path / f"a.{n:04d}.exr", channels)
+    clip = Clip(tmp_path / "a.####.exr", passes=Passes(keep="IndexOB=1"))
+    frame = clip.with_neighbours(clip.source(2))
+    for n, one in ((1, frame.prev), (2, frame), (3, frame.next)):
+        np.testing.assert_array_equal(one.keep, index[n])
+
+
 @pytest.mark.parametrize(
     "passes",
     [Passes(color="nope"), Passes(keep="nope"), Passes(vectors=Vectors("nuke")),

@@ -60,6 +60,7 @@ def blur(
     when: ShutterOptions | None = None,
     given: InputOptions | None = None,
     *,
+    confidence: bool = False,
     config: Path | None = None,
     adapter: str | None = None,
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
@@ -73,6 +74,8 @@ def blur(
     ----------
     pattern
         Frames to blur: shot.####.exr, shot.%04d.exr, or one file.
+    confidence
+        EXR, gather: with how sure the result is, as layers confidence.*; takes twice as long.
     config
         TOML file whose table [blur] holds options, as `wgmb view` saves it.
     adapter
@@ -89,6 +92,9 @@ def blur(
     look = look.settled(clip=clip)
     made = look.make(when.make(), adapter)
     settings = _settings(look, when, given) | {"samples": _samples(made), "bits": output.bits}
+    if confidence:
+        _check_confidence(made, output)
+        settings["confidence"] = True
     files = Output(
         output.output,
         settings=settings,
@@ -103,7 +109,9 @@ def blur(
         say.print(f"settings: {files.settings}", markup=False)
     started = time.perf_counter()
     with progress(say, len(clip.numbers), quiet) as tick:
-        report = blur_sequence(clip, made, files, resume=output.resume, progress=tick)
+        report = blur_sequence(
+            clip, made, files, resume=output.resume, confidence=confidence, progress=tick
+        )
     took = f"{time.perf_counter() - started:.1f} s with {made.method.name}"
     return _conclude(say, clip, files, report, took, quiet, verbose)
 
@@ -114,6 +122,12 @@ def _settings(look: BlurOptions, when: ShutterOptions, given: InputOptions) -> d
     for not_a_look in ("frames", "skip_missing"):
         del every[not_a_look]
     return every
+
+
+def _check_confidence(made: Blur, output: OutputOptions) -> None:
+    layers = ", ".join(made.confidence)
+    if not output.output.lower().endswith(".exr"):
+        raise InputError(f"--confidence ({layers}) needs an .exr output, got {output.output}")
 
 
 def _samples(blur: Blur) -> int | str:
@@ -154,6 +168,7 @@ def render(
     *,
     sharp: bool = False,
     passes: bool = False,
+    confidence: bool = False,
     config: Path | None = None,
     adapter: str | None = None,
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
@@ -173,6 +188,8 @@ def render(
         Without blur.
     passes
         EXR: with depth, motion, normal and object index, so that `wgmb blur` can take it on.
+    confidence
+        EXR, gather: with how sure the result is, as layers confidence.*; takes twice as long.
     config
         TOML file whose table [render] holds options, as `wgmb view` saves it.
     adapter
@@ -191,11 +208,16 @@ def render(
     if passes and not output.output.lower().endswith(".exr"):
         raise InputError(f"--passes need an .exr output, got {output.output}")
     moments = what.moments(fps)
+    if confidence and sharp:
+        raise InputError("--sharp is without blur: there is no --confidence to tell")
     made = look.make(when.make(), adapter)
     renderer = Render(picture, made, size=size_of(what.size), fps=fps, rays=what.rays)
     settings = {"scene": scene, "sharp": sharp, "passes": passes, "bits": output.bits}
     settings |= plain(look) | plain(when) | plain(what) | {"wgmb": __version__, "fps": fps}
     settings["samples"] = _samples(made)
+    if confidence:
+        _check_confidence(made, output)
+        settings["confidence"] = True
     files = Output(
         output.output,
         settings=settings,
@@ -212,7 +234,9 @@ def render(
     started = time.perf_counter()
     with progress(say, len(moments), quiet, "rendering") as tick:
         try:
-            skipped = render_frames(renderer, moments, files, sharp, passes, output.resume, tick)
+            skipped = render_frames(
+                renderer, moments, files, sharp, passes, confidence, output.resume, tick
+            )
         except BaseException:
             files.abandon()
             raise

@@ -21,10 +21,10 @@ class KeepPass:
         one = gpu.texel(device, 1)
         self._weight = one if one == "r32float" else self._four
 
-    def before(self, encoder, given: gpu.Given, color: View, keep: View | None):
-        """The colour times its weight, and the weight."""
-        lifted = self._images.view("lifted", given.size, self._four)
-        weight = self._images.view("weight", given.size, self._weight)
+    def before(self, encoder, given: gpu.Given, color: View, keep: View | None, which: str = ""):
+        """The colour times its weight, and the weight, in textures of frame `which`."""
+        lifted = self._images.view("lifted" + which, given.size, self._four)
+        weight = self._images.view("weight" + which, given.size, self._weight)
         self._run("before", encoder, given, color, keep, self._none, weight, lifted, self._four)
         return lifted, weight
 

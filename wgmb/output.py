@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -122,16 +123,27 @@ class Output:
         except (OSError, InputError):
             return False
 
-    def write(self, result: np.ndarray, source: Source) -> None:
-        """Write one frame: into an EXR with all the other layers of `source`, if it is one."""
+    def write(
+        self,
+        result: np.ndarray,
+        source: Source,
+        confidence: Mapping[str, np.ndarray] | None = None,
+    ) -> None:
+        """Write one frame: into an EXR with all the other layers of `source`, if it is one.
+
+        `confidence`: from Blur.with_confidence, becomes channels `confidence.NAME` of an EXR.
+        """
         if self._abandoned:
             return
+        layers = {f"confidence.{name}": plane for name, plane in (confidence or {}).items()}
+        if layers and self.pattern.suffix.lower() != ".exr":
+            raise InputError(f"{self.pattern}: only an .exr has room for {', '.join(layers)}")
         if self._video is not None:
             self._video.add(result)
             return
         path = self.path(source.number)
         if path.suffix.lower() == ".exr":
-            data = exr.encode(_with_result(source, result, self.settings))
+            data = exr.encode(_with_result(source, result, self.settings, layers))
         else:
             data = stills.encode(result, path.suffix, self.bits, self.settings)
         replace_file(path, data)
@@ -156,10 +168,15 @@ class Output:
                 temporary_name(self.path(number)).unlink(missing_ok=True)
 
 
-def _with_result(source: Source, result: np.ndarray, settings: str) -> exr.Exr:
-    """The source's file with the picture replaced and the settings added."""
+def _with_result(
+    source: Source, result: np.ndarray, settings: str, layers: Mapping[str, np.ndarray]
+) -> exr.Exr:
+    """The source's file with the picture replaced, layers and the settings added."""
+    more = {name: exr.to_half(plane) for name, plane in layers.items()}
     if source.file is None:
-        return exr.new(result, {SETTINGS: settings})
+        made = exr.new(result, {SETTINGS: settings})
+        made.parts[0].channels |= more
+        return made
     new = {name: result[..., i] for i, name in enumerate(source.color)}
     parts = [
         replace(p, channels=dict(p.channels), attributes=dict(p.attributes))
@@ -174,4 +191,5 @@ def _with_result(source: Source, result: np.ndarray, settings: str) -> exr.Exr:
             twins[id(part)].channels[name] = (
                 exr.to_half(new[full]) if half else new[full].astype(kind)
             )
+    twins[id(source.part)].channels |= more
     return exr.Exr(source.path, parts)

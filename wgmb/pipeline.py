@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 import wgpu
@@ -33,10 +34,11 @@ class Neighbour:
     """The frame before or after, as far as a method needs it."""
 
     offset: int  # -1, 1 [frame intervals]
-    color: View
+    color: View  # premultiplied by alpha and by weight
     motion: View
     depth: View
     normal: View | None
+    weight: View | None  # there if the frame itself has one
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,6 @@ class Inputs:
     weight: View | None  # None: every pixel counts
     neighbours: tuple[Neighbour, ...]
     none: View  # bound where an input is not there
-    one: View  # bound where a weight is not there
     linear: wgpu.GPUSampler
     even: bool  # the shutter is a box
     auto: bool  # `samples` is the most a pixel may take
@@ -112,16 +113,29 @@ class Blur:
             )
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         self.method = METHODS[method](self.device, output=output, **options)
+        self._options = options
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._images = Images(self.device)
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
         self._none = self._images.view("none", (1, 1), gpu.texel(self.device, 4))
         no_object = self._images.view("no object", (1, 1), "r32uint")
-        ones = np.ones((1, 1, 4), np.float32)
-        self._one = self._images.upload("one", ones, gpu.texel(self.device, 4))
         self._velocity = VelocityPass(self.device, self._none, no_object)
         self._keep = KeepPass(self.device, self._images, self._none)
         self.shutter = shutter
+
+    @property
+    def confidence(self) -> tuple[str, ...]:
+        """What `with_confidence` tells of every pixel; InputError where a method cannot tell."""
+        if names := getattr(self.method, "confidence", ()):
+            return names
+        able = ", ".join(n for n, m in METHODS.items() if hasattr(m, "confidence"))
+        raise InputError(f"method {self.method.name!r} has no confidence; {able} has")
+
+    @cached_property
+    def _judge(self):
+        """The method once more, telling how sure it is."""
+        options = self._options | {"show": "confidence"}
+        return METHODS[self.method.name](self.device, output=self.output, **options)
 
     @property
     def shutter(self) -> Shutter:
@@ -165,6 +179,7 @@ class Blur:
         neighbours: dict[int, dict] | None = None,
         keep: View | None = None,
         normal: View | None = None,
+        confidence: View | None = None,
         check: bool = False,
         number: int = 0,
         timing: Timing | None = None,
@@ -174,14 +189,14 @@ class Blur:
 
         Views are of your textures: `color` filterable float (rgba16float always is), `keep`
         0..1, `normal` unit vectors in the world, `output` a storage texture of the format that
-        Blur was made for. `moving` are
+        Blur was made for, `confidence` another one for what `with_confidence` tells. `moving` are
         the inputs of velocity.Moving: `to_next` and `to_prev` with the displacement [px] in
         x and y, or `motion` with to_prev and to_next together, which saves a pass; or
         `camera` and `depth`. `check` gives pixels that are not finite no weight, at the
         price of three small passes.
 
         `neighbours`: -1 and 1, each with `color`, its own `moving` inputs and depth, and
-        `normal` if there is one, for methods that use them.
+        `keep`, `normal` and `check` as above, for methods that use them.
 
         `scene` instead of `color`, for the methods that need one, which may be recorded
         bit by bit: `progress` is how many samples were done before, and are to be done now.
@@ -189,6 +204,7 @@ class Blur:
         gpu.check_size(self.device, *size)
         motions = _moving(moving)
         views = {"output": output, "color": color, "keep": keep, "normal": normal}
+        views["confidence"] = confidence
         _check_views(size, views | moving)
         given_inputs = {"color": color, "motion": motions.known or None, "depth": motions.depth}
         given_inputs["scene"] = scene
@@ -198,13 +214,15 @@ class Blur:
         if motions.known and (not motions.ready or limited or check):
             motion = self._images.view("motion", size, "rgba32float")
             self._velocity.encode(encoder, given, motions, limited, motion)
+        around = (neighbours or {}) if "neighbours" in self.method.uses else {}
+        masked = keep is not None or check
+        masked |= any(n.get("keep") is not None or n.get("check") for n in around.values())
         near = tuple(
-            self._neighbour(encoder, given, offset, dict(inputs))
-            for offset, inputs in (neighbours or {}).items()
-            if "neighbours" in self.method.uses
+            self._neighbour(encoder, given, offset, dict(inputs), masked)
+            for offset, inputs in around.items()
         )
         weight, result, own = None, output, color
-        if color is not None and (keep is not None or check):
+        if color is not None and masked:
             color, weight = self._keep.before(encoder, given, color, keep)
             result = self._images.view("blurred", size, self.output)
         inputs = Inputs(
@@ -222,7 +240,6 @@ class Blur:
             weight=weight,
             neighbours=near,
             none=self._none,
-            one=self._one,
             linear=self._linear,
             even=self._shutter.curve == "box",
             auto=self.auto,
@@ -230,6 +247,8 @@ class Blur:
             progress=progress or (0, self.samples),
         )
         self.method.encode(encoder, inputs, result)
+        if confidence is not None and self.confidence:
+            self._judge.encode(encoder, inputs, confidence)
         if weight and own:
             self._keep.after(encoder, given, own, keep, result, output, self.output)
 
@@ -246,6 +265,25 @@ class Blur:
         return self._images.download(encoder, output)[..., : frame.color.shape[2]].astype(
             "f4", copy=False
         )
+
+    def with_confidence(self, frame: Frame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """The blurred frame, and how sure the method is of every pixel, at twice the cost.
+
+        The second by the names in `confidence`, each (height, width) float32; what they mean
+        is said where the method says what it can `show`.
+        """
+        names = self.confidence
+        self._require(frame.has)
+        size, channels = frame.size, frame.color.shape[2]
+        output = self._images.texture("output", size, self.output)
+        sure = self._images.texture("confidence", size, self.output)
+        encoder = self.device.create_command_encoder(label="wgmb")
+        views = {"output": output.create_view(), "confidence": sure.create_view()}
+        self.encode(encoder, **views, **self.upload(frame))
+        picture = self._images.download(encoder, output)[..., :channels]
+        told = self._images.download(self.device.create_command_encoder(), sure)
+        planes = np.moveaxis(told.astype("f4", copy=False), 2, 0)
+        return picture.astype("f4", copy=False), dict(zip(names, planes, strict=True))
 
     def motion(self, frame: Frame) -> np.ndarray:
         """What the methods are given to follow: (height, width, 4) to_prev, to_next [px]."""
@@ -275,16 +313,22 @@ class Blur:
 
         They are kept: the next frame's go into the same textures.
         """
-        rgba, four = self._rgba(frame)
         return {
             "size": frame.size,
-            "color": self._images.upload("color", rgba, four),
-            "keep": self._view("keep", frame.keep, "r32float"),
-            "normal": self._normal(frame),
-            "check": bool(frame.bad.keys() - {"depth"}),
             "number": frame.number,
             "neighbours": self._upload_neighbours(frame),
-            **self._upload_moving(frame),
+            **self._upload_one(frame),
+        }
+
+    def _upload_one(self, frame: Frame, which: str = "") -> dict:
+        """What there is of one frame, the frame itself or a neighbour."""
+        rgba, four = self._rgba(frame)
+        return {
+            "color": self._images.upload("color" + which, rgba, four),
+            "keep": self._view("keep" + which, frame.keep, "r32float"),
+            "normal": self._normal(frame, which),
+            "check": bool(frame.bad.keys() - {"depth"}),
+            **self._upload_moving(frame, which),
         }
 
     def _rgba(self, frame: Frame) -> tuple[np.ndarray, str]:
@@ -296,20 +340,13 @@ class Blur:
         return rgba, "rgba16float" if rgba.dtype == np.float16 else gpu.texel(self.device, 4)
 
     def _upload_neighbours(self, frame: Frame) -> dict[int, dict]:
-        """Those neighbours that the method uses and that have what it needs, without a fault."""
+        """Those neighbours that the method uses and that have what it needs."""
         if "neighbours" not in self.method.uses:
             return {}
         found = {}
         for offset, near in ((-1, frame.prev), (1, frame.next)):
-            if (
-                near is not None
-                and near.has >= self.method.needs
-                and not near.bad.keys() - {"depth"}
-            ):
-                rgba, texel = self._rgba(near)
-                color = self._images.upload(f"color {offset}", rgba, texel)
-                found[offset] = {"color": color, "normal": self._normal(near, f" {offset}")}
-                found[offset] |= self._upload_moving(near, f" {offset}")
+            if near is not None and near.has >= self.method.needs:
+                found[offset] = self._upload_one(near, f" {offset}")
         return found
 
     def _upload_moving(self, frame: Frame, which: str = "") -> dict:
@@ -335,17 +372,21 @@ class Blur:
         four[..., :3] = frame.normal
         return self._images.upload("normal" + which, four, "rgba32float")
 
-    def _neighbour(self, encoder, given, offset: int, inputs: dict) -> Neighbour:
+    def _neighbour(self, encoder, given, offset: int, inputs: dict, masked: bool) -> Neighbour:
         color, normal = inputs.pop("color"), inputs.pop("normal", None)
-        _check_views(given.size, {"color": color, "normal": normal, **inputs})
+        keep, check = inputs.pop("keep", None), inputs.pop("check", False)
+        _check_views(given.size, {"color": color, "normal": normal, "keep": keep, **inputs})
         moving = _moving(inputs)
         motion, limited = moving.motion, self.max_blur is not None
         if not moving.known or moving.depth is None:
             raise InputError("a neighbouring frame needs color, motion and depth")
-        if motion is None or not moving.ready or limited:
+        if motion is None or not moving.ready or limited or check:
             motion = self._images.view(f"motion {offset}", given.size, "rgba32float")
             self._velocity.encode(encoder, given, moving, limited, motion)
-        return Neighbour(offset, color, motion, moving.depth, normal)
+        weight = None
+        if masked:
+            color, weight = self._keep.before(encoder, given, color, keep, f" {offset}")
+        return Neighbour(offset, color, motion, moving.depth, normal, weight)
 
     def _require(self, there) -> None:
         if missing := self.method.needs - there:

@@ -62,6 +62,21 @@ class Render:
         self.draw(output.create_view(), time, number, progress=progress)
         return self._images.download(self.blur.device.create_command_encoder(), output)
 
+    def with_confidence(
+        self, time: float, number: int = 0
+    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """That frame, and how sure the method is of it; see Blur.with_confidence."""
+        names = self.blur.confidence
+        textures = [
+            self._images.texture(name, self.size, self.blur.output)
+            for name in ("output", "confidence")
+        ]
+        output, sure = (t.create_view() for t in textures)
+        self.draw(output, time, number, confidence=sure)
+        create = self.blur.device.create_command_encoder
+        picture, told = (self._images.download(create(), t) for t in textures)
+        return picture, dict(zip(names, np.moveaxis(told, 2, 0), strict=True))
+
     def draw(
         self,
         output: wgpu.GPUTextureView,
@@ -69,13 +84,15 @@ class Render:
         number: int = 0,
         *,
         blur: Blur | None = None,
+        confidence: wgpu.GPUTextureView | None = None,
         progress: Progress | None = None,
         timing: Timing | None = None,
     ) -> None:
         """Draw that frame into a texture of yours, of `size` and the blur's `output` format.
 
         `blur`: another one than the Render's own, of the same device. What several draw of
-        one moment starts from the same pictures. `timing`: of the passes, not of rays.
+        one moment starts from the same pictures. `confidence`: another such texture, for
+        methods of pictures that have one. `timing`: of the passes, not of rays.
         """
         blur = blur or self.blur
         if "progress" in blur.method.uses:
@@ -96,6 +113,7 @@ class Render:
             output=output,
             number=number,
             neighbours=seen,
+            confidence=confidence,
             timing=timing,
             **here,
         )
@@ -236,12 +254,14 @@ def render_frames(
     output: Output,
     sharp: bool,
     passes: bool,
+    confidence: bool,
     resume: bool,
     progress: Callable[[int, str], None] | None,
 ) -> int:
     """Render every moment into `output`; returns how many were there already (`resume`).
 
-    `sharp`: without blur. `passes`: EXR with all that `wgmb blur` can use.
+    `sharp`: without blur. `passes`: EXR with all that `wgmb blur` can use. `confidence`: EXR
+    with how sure the method is.
     """
     tell, skipped = progress or (lambda number, what: None), 0
     for number, time in moments.items():
@@ -250,13 +270,17 @@ def render_frames(
             tell(number, "skipped")
             continue
         seen = render.frame(time, number) if passes else None
-        result = render.sharp(time) if sharp else render(time, number)
+        told = {}
+        if confidence:
+            result, told = render.with_confidence(time, number)
+        else:
+            result = render.sharp(time) if sharp else render(time, number)
         source = (
             _with_passes(render, seen, number)
             if passes and seen
             else Source(number, Path(), None, {}, {})
         )
-        output.write(result, source)
+        output.write(result, source, told)
         tell(number, "done")
     output.close()
     return skipped

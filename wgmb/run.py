@@ -62,9 +62,10 @@ def blur_sequence(
     output: Output,
     *,
     resume: bool = False,
+    confidence: bool = False,
     progress: Progress | None = None,
 ) -> Report:
-    """Blur every frame of `clip` into `output`.
+    """Blur every frame of `clip` into `output`; with `confidence`, as layers beside the picture.
 
     Frames that cannot be read, blurred or written are in the report's `failed`, with the
     reason; the others are done. Interrupted, nothing half written is left and the
@@ -104,16 +105,16 @@ def blur_sequence(
 
     def write() -> None:
         while (item := to_write.get()) is not None:
-            source, result = item
+            source, result, told = item
             try:
-                output.write(result, source)
+                output.write(result, source, told)
             except (Error, OSError, MemoryError, RuntimeError) as error:
                 fail(source.number, error)
             else:
                 places.put(None)
                 report.done.append(source.number)
                 tell(source.number, "done")
-            del item, source, result
+            del item, source, result, told
 
     def guarded(work: Callable[[], None]) -> None:
         try:
@@ -133,7 +134,7 @@ def blur_sequence(
     try:
         while (item := to_blur.get()) is not None:
             source, frame = item
-            _blur_one(blur, source, frame, report, to_write, fail)
+            _blur_one(blur, source, frame, confidence, report, to_write, fail)
             del item, source, frame
         to_write.put(None)
         for thread in threads:
@@ -160,12 +161,18 @@ def blur_sequence(
     return report
 
 
-def _blur_one(blur: Blur, source: Source, frame: Frame, report: Report, to_write, fail) -> None:
+def _blur_one(
+    blur: Blur, source: Source, frame: Frame, confidence: bool, report: Report, to_write, fail
+) -> None:
+    told = {}
     try:
-        result = blur(frame)
+        if confidence:
+            result, told = blur.with_confidence(frame)
+        else:
+            result = blur(frame)
     except InputError as error:
         fail(source.number, InputError(f"{source.path}: {error}"))
         return
     if frame.bad:
         report.bad[source.number] = frame.bad
-    to_write.put((source, result))
+    to_write.put((source, result, told))

@@ -23,7 +23,8 @@ class Method(Protocol):
     """What a method is: a name, the inputs it needs, and how it is recorded.
 
     It may also have `samples`, its own default number of them, and `adaptive`: it can take as
-    many samples as each pixel's streak needs (AUTO of wgsl/common/shutter.wgsl).
+    many samples as each pixel's streak needs (AUTO of wgsl/common/shutter.wgsl); and `confidence`,
+    what the four channels of its `show="confidence"` are called.
     """
 
     name: str

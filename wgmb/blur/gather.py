@@ -35,6 +35,7 @@ class Gather:
     needs = frozenset({"color", "motion", "depth"})
     uses = frozenset({"neighbours"})
     adaptive = True
+    confidence = ("accepted", "disocclusion", "residual", "left")
 
     def __init__(self, device, *, output="rgba32float", show="color"):
         if show not in SHOWN:
@@ -47,7 +48,7 @@ class Gather:
         """Record silhouettes and tiles of every frame, then the search."""
         weighted = inputs.weight is not None
         frames = [(0, inputs.color, inputs.motion, inputs.depth, inputs.weight)]
-        frames += [(n.offset, n.color, n.motion, n.depth, None) for n in inputs.neighbours]
+        frames += [(n.offset, n.color, n.motion, n.depth, n.weight) for n in inputs.neighbours]
         layers = self._layers(inputs.given.size, len(frames))
         for i, frame in enumerate(frames):
             views = {

@@ -101,7 +101,7 @@ class Reproject:
             "output": output,
         }
         sources = [(0, inputs.color, inputs.motion, inputs.depth, inputs.weight)]
-        sources += [(n.offset, n.color, n.motion, n.depth, None) for n in inputs.neighbours]
+        sources += [(n.offset, n.color, n.motion, n.depth, n.weight) for n in inputs.neighbours]
         # All pixels share a slice's time, so jitter is the frame's: its next golden section.
         shift = inputs.jitter * (inputs.number * GOLDEN % 1 - 0.5)
         times = inputs.shutter.sample_times(inputs.samples, shift)
@@ -121,7 +121,7 @@ class Reproject:
                 color=color,
                 motion=motion,
                 depth=depth,
-                weight=weight or (inputs.one if weighted else inputs.none),
+                weight=weight or inputs.none,
                 **shared,
             )
 
@@ -201,13 +201,12 @@ class Reproject:
                 motion=motion,
                 depth=depth,
                 normal=normal if self._facing and normals else inputs.none,
-                weight=weight,
+                weight=weight or inputs.none,
                 **shared,
             )
 
-        one = inputs.one
-        sources = [(inputs.color, inputs.motion, inputs.depth, inputs.normal, inputs.weight or one)]
-        sources += [(n.color, n.motion, n.depth, n.normal, one) for n in prev]
+        sources = [(inputs.color, inputs.motion, inputs.depth, inputs.normal, inputs.weight)]
+        sources += [(n.color, n.motion, n.depth, n.normal, n.weight) for n in prev]
         shares = np.linspace(0, 1, inputs.samples) if inputs.samples > 1 else np.zeros(1)
         jobs = []
         for k, source in enumerate(sources):

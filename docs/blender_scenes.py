@@ -1,0 +1,463 @@
+"""Scenes with a path tracer's own motion blur: python docs/blender_scenes.py FOLDER [SCENE ...]
+
+Runs in an environment of its own (Python 3.11, `pip install bpy==4.5.15 OpenEXR`, 1 GB), on
+the CPU, three to five minutes a scene on two cores. Into FOLDER/SCENE it writes
+prev.exr, curr.exr, next.exr    frames 9, 10, 11 without motion blur, with depth and vectors
+truth_050.exr, truth_100.exr    frame 10 with Cycles' motion blur: 180 and 360 degrees, box,
+                                centred on the frame; the mean of two halves, kept as .a and .b
+blender_vecblur_050.exr, _100   what Blender's Vector Blur node makes of curr.exr
+camera.json                     the cameras of frames 9, 9.5, 10, 10.5, 11
+Light is direct and from one point, ambient light is emission: all noise is of edges.
+"""
+
+import json
+import math
+import random
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import OpenEXR
+from mathutils import Matrix, Vector
+
+SIZE, FPS, FRAME = (640, 360), 24, 10
+SAMPLES = 192  # of a sharp frame, and of one half of a truth
+VECTOR_BLUR = 64  # samples of Blender's node
+SHUTTERS = {"050": 0.5, "100": 1.0}
+SPAN = 2.25  # frames from the middle one to the last key: vectors of 9 and 11 lead to 8 and 12
+STEP = 0.125  # frames between keys
+AMBIENT = 0.3
+
+
+# ---- what scenes are made of ------------------------------------------------------------------
+
+
+def material(kind: str, a, b=(1, 1, 1), scale=4.0, space="Object"):
+    """Diffuse and a little emission of one colour, or of a pattern of two."""
+    made = bpy.data.materials.new(kind)
+    made.use_nodes = True
+    nodes, link = made.node_tree.nodes, made.node_tree.links.new
+    nodes.clear()
+    a, b = (*a, 1.0), (*b, 1.0)
+    diffuse, glow = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeEmission")
+    glow.inputs["Strength"].default_value = AMBIENT
+    both, out = nodes.new("ShaderNodeAddShader"), nodes.new("ShaderNodeOutputMaterial")
+    link(diffuse.outputs[0], both.inputs[0])
+    link(glow.outputs[0], both.inputs[1])
+    link(both.outputs[0], out.inputs["Surface"])
+    if kind == "plain":
+        diffuse.inputs["Color"].default_value = glow.inputs["Color"].default_value = a
+        return made
+    place = nodes.new("ShaderNodeTexCoord").outputs[space]
+    if kind == "brick":
+        texture = nodes.new("ShaderNodeTexBrick")
+        texture.inputs["Color1"].default_value = a
+        texture.inputs["Color2"].default_value = b
+        texture.inputs["Mortar"].default_value = (0.1, 0.1, 0.1, 1)
+        color = texture.outputs["Color"]
+    elif kind == "checker":
+        texture = nodes.new("ShaderNodeTexChecker")
+        texture.inputs["Color1"].default_value = a
+        texture.inputs["Color2"].default_value = b
+        color = texture.outputs["Color"]
+    else:  # noise, over a checker of a third of its frequency
+        texture, ramp = nodes.new("ShaderNodeTexNoise"), nodes.new("ShaderNodeValToRGB")
+        texture.inputs["Detail"].default_value = 4
+        ramp.color_ramp.elements[0].position, ramp.color_ramp.elements[1].position = 0.4, 0.6
+        ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = a, b
+        link(texture.outputs[0], ramp.inputs[0])
+        color = ramp.outputs["Color"]
+    texture.inputs["Scale"].default_value = scale
+    link(place, texture.inputs["Vector"])
+    link(color, diffuse.inputs["Color"])
+    link(color, glow.inputs["Color"])
+    return made
+
+
+def add(kind: str, color, **how):
+    """A Blender primitive of that material."""
+    getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**how)
+    bpy.context.object.data.materials.append(color)
+    return bpy.context.object
+
+
+def box(color, size, at, parent=None):
+    """A box of these sides around `at`."""
+    made = add("cube", color, size=1)
+    made.data.transform(Matrix.Diagonal((*size, 1)))
+    made.location, made.parent = at, parent
+    return made
+
+
+def limb(color, radius, length, at, parent=None):
+    """A rounded rod that hangs from its joint at `at`."""
+    made = add("cylinder", color, radius=radius, depth=length, vertices=24)
+    made.data.transform(Matrix.Translation((0, 0, -length / 2)))
+    for end in (0.0, -length):
+        ball = add("uv_sphere", color, radius=radius, segments=24, ring_count=12)
+        ball.location, ball.parent = (0, 0, end), made
+    made.location, made.parent = at, parent
+    return made
+
+
+def animate(of, path: str, value, index: int = -1):
+    """Key a property with `value(t)`, t in frames from the middle one."""
+    for i in range(int(-SPAN / STEP), int(SPAN / STEP) + 1):
+        t = i * STEP
+        now = value(t)
+        if index < 0:
+            setattr(of, path, now)
+        else:
+            getattr(of, path)[index] = now
+        of.keyframe_insert(path, index=index, frame=FRAME + t)
+    for curve in of.id_data.animation_data.action.fcurves:
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+
+
+def camera(at, toward, lens=35.0):
+    """A camera below an empty that looks `toward`; both, for animation."""
+    bpy.ops.object.empty_add(location=at)
+    head = bpy.context.object
+    head.rotation_euler = (Vector(toward) - Vector(at)).to_track_quat("-Z", "Y").to_euler()
+    bpy.ops.object.camera_add()
+    eye = bpy.context.object
+    eye.parent, eye.data.lens, eye.data.clip_end = head, lens, 300
+    bpy.context.scene.camera = eye
+    return head, eye
+
+
+def sun(toward, strength=3.0):
+    """Light from infinitely far, with hard shadows."""
+    bpy.ops.object.light_add(type="SUN")
+    lamp = bpy.context.object
+    lamp.rotation_euler = Vector(toward).to_track_quat("-Z", "Y").to_euler()
+    lamp.data.energy, lamp.data.angle = strength, 0
+
+
+# ---- the scenes -------------------------------------------------------------------------------
+
+
+def rotozoom():
+    """The camera rolls, zooms in and flies over a textured ground with things on it."""
+    ground = material("noise", (0.05, 0.12, 0.03), (0.5, 0.42, 0.25), 3.0)
+    add("plane", ground, size=60)
+    rng = random.Random(4)
+    hues = [(0.7, 0.1, 0.06), (0.05, 0.25, 0.6), (0.7, 0.5, 0.05), (0.6, 0.6, 0.6)]
+    for i in range(22):
+        angle, far = 2.4 * i, 0.7 + 0.95 * math.sqrt(i) * 1.1
+        x, y, high = far * math.cos(angle), far * math.sin(angle), rng.uniform(0.4, 1.6)
+        color = material(("checker", "noise", "brick")[i % 3], hues[i % 4], (0.9, 0.9, 0.8), 5)
+        if i % 4 == 0:
+            add("cone", color, radius1=0.4, depth=high, location=(x, y, high / 2))
+        elif i % 4 == 1:
+            add("cylinder", color, radius=0.12, depth=high, location=(x, y, high / 2))
+        elif i % 4 == 2:
+            turned = box(color, (0.5, 0.5, high), (x, y, high / 2))
+            turned.rotation_euler[2] = angle
+        else:
+            add("uv_sphere", color, radius=0.35, location=(x, y, 0.35), segments=48, ring_count=24)
+    head, eye = camera((0, -5.5, 6.5), (0, 0, 0.2), 35)
+    animate(eye, "rotation_euler", lambda t: math.radians(20 + 6 * t), 2)
+    animate(eye.data, "lens", lambda t: 35 * 1.07**t)
+    way = Vector((0.15, 0.35, -0.3))
+    animate(head, "location", lambda t: Vector((0, -5.5, 6.5)) + t * way)
+    sun((0.5, 0.4, -1))
+
+
+def propeller():
+    """Thin blades and spoked wheels, fast, before a wall; one behind a grid of bars."""
+    wall = material("brick", (0.5, 0.2, 0.12), (0.62, 0.32, 0.2), 2.2)
+    stands = add("plane", wall, size=30, location=(0, 5, 0))
+    stands.rotation_euler[0] = math.radians(90)
+    add("plane", material("noise", (0.12, 0.12, 0.12), (0.3, 0.3, 0.28), 4), size=40,
+        location=(0, 0, -1.7))  # fmt: skip
+    metal, dark = material("plain", (0.75, 0.75, 0.78)), material("plain", (0.04, 0.04, 0.05))
+    tips = material("checker", (0.8, 0.08, 0.04), (0.9, 0.85, 0.1), 6)
+
+    def rotor(at, blades, length, width, degrees, tilt=0.0, blade=metal):
+        bpy.ops.object.empty_add(location=at)
+        stand = bpy.context.object
+        stand.rotation_euler = (0, 0, math.radians(tilt))
+        hub = add("uv_sphere", dark, radius=0.13, segments=24, ring_count=12)
+        hub.parent = stand
+        for k in range(blades):
+            arm = box(blade, (length, 0.02, width), (0, 0, 0), hub)
+            arm.data.transform(Matrix.Translation((length / 2, 0, 0)))
+            arm.rotation_euler = (math.radians(25), -2 * math.pi * k / blades, 0)
+            arm.rotation_mode = "YXZ"
+        animate(hub, "rotation_euler", lambda t: math.radians(degrees * t + 11), 1)
+
+    rotor((-1.7, 0.5, 0.35), 3, 1.25, 0.14, 40, 0, tips)
+    rotor((1.15, 1.5, 0.75), 5, 0.95, 0.06, -30)
+    rotor((0.55, -0.6, -0.75), 2, 0.75, 0.05, 50, 50)
+    bpy.ops.object.empty_add(location=(2.0, -0.2, -1.0))
+    axle = bpy.context.object
+    tyre = add("torus", dark, major_radius=0.62, minor_radius=0.06, major_segments=64)
+    tyre.data.transform(Matrix.Rotation(math.radians(90), 4, "X"))
+    tyre.parent = axle
+    for k in range(10):
+        spoke = box(metal, (0.035, 0.02, 0.62), (0, 0, 0), tyre)
+        spoke.data.transform(Matrix.Translation((0, 0, 0.31)))
+        spoke.rotation_euler[1] = 2 * math.pi * k / 10
+    speed = -0.16
+    animate(axle, "location", lambda t: 2.0 + speed * t, 0)
+    animate(tyre, "rotation_euler", lambda t: speed * t / 0.68, 1)
+    for k in range(6):
+        box(material("plain", (0.1, 0.22, 0.12)), (0.05, 0.05, 1.6), (0.75 + 0.28 * k, 0.6, 0.75))
+    camera((0, -6.5, 0.2), (0, 0, 0), 42)
+    sun((0.35, 0.8, -0.6))
+
+
+def flag():
+    """Two cloths that wave, one before the other, seen by a camera that pans slowly."""
+    add("plane", material("noise", (0.06, 0.16, 0.03), (0.25, 0.3, 0.08), 2), size=200,
+        location=(0, 60, -2))  # fmt: skip
+    stone = material("noise", (0.25, 0.22, 0.18), (0.55, 0.5, 0.42), 5)
+    for k in range(5):
+        high = (2.2, 3.6, 1.6, 3.0, 2.4)[k]
+        box(stone, (1.8, 1, high), (-5.2 + 2.6 * k, 7, high / 2 - 2))
+
+    def cloth(at, width, height, color, amplitude, waves, degrees):
+        across, down = 96, 48
+        corners = [(width * i / across, 0.0, height * (0.5 - j / down))
+                   for j in range(down + 1) for i in range(across + 1)]  # fmt: skip
+        faces = []
+        for j in range(down):
+            for i in range(across):
+                k = j * (across + 1) + i
+                faces.append((k, k + 1, k + across + 2, k + across + 1))
+        mesh = bpy.data.meshes.new("cloth")
+        mesh.from_pydata(corners, [], faces)
+        uv = mesh.uv_layers.new()
+        for loop in mesh.loops:
+            x, _, z = corners[loop.vertex_index]
+            uv.data[loop.index].uv = x / width, z / width
+        mesh.polygons.foreach_set("use_smooth", [True] * len(faces))
+        made = bpy.data.objects.new("cloth", mesh)
+        bpy.context.collection.objects.link(made)
+        made.location = at
+        mesh.materials.append(color)
+        made.shape_key_add(name="rest")
+        for name, wave, sign in (("cos", math.sin, 1), ("sin", math.cos, -1)):
+            key = made.shape_key_add(name=name)
+            key.slider_min, key.slider_max = -1, 1
+            for corner, point in zip(corners, key.data, strict=True):
+                x, y, z = corner
+                phase = waves * 2 * math.pi * (x / width + 0.25 * z / height)
+                rise = amplitude * min(1, 1.6 * x / width) * sign * wave(phase)
+                point.co = (x - 0.15 * rise, y + rise, z + 0.35 * rise)
+        # sin(phase - w t) = sin(phase) cos(w t) - cos(phase) sin(w t)
+        turn = math.radians(degrees)
+        blocks = made.data.shape_keys.key_blocks
+        animate(blocks["cos"], "value", lambda t: math.cos(0.8 + turn * t))
+        animate(blocks["sin"], "value", lambda t: math.sin(0.8 + turn * t))
+        pole = material("plain", (0.5, 0.5, 0.52))
+        add("cylinder", pole, radius=0.035, depth=5, location=(at[0] - 0.03, at[1], at[2] - 1.6))
+
+    stripes = material("checker", (0.75, 0.05, 0.05), (0.9, 0.88, 0.82), 7, "UV")
+    spots = material("noise", (0.03, 0.08, 0.45), (0.95, 0.75, 0.1), 9, "UV")
+    cloth((-2.0, 0.0, 0.35), 2.5, 1.5, stripes, 0.36, 1.4, 55)
+    cloth((0.35, 1.6, 0.55), 2.6, 1.7, spots, 0.4, 1.2, 75)
+    head, _ = camera((-0.9, -6.2, -0.4), (0.1, 0, 0.1), 40)
+    turned = head.rotation_euler[2]
+    animate(head, "rotation_euler", lambda t: turned - math.radians(0.7 * t), 2)
+    sun((0.5, 0.8, -0.7))
+
+
+def runner():
+    """Two jointed figures run past each other; the camera goes along with one of them."""
+    add("plane", material("noise", (0.3, 0.2, 0.1), (0.5, 0.4, 0.25), 5), size=80)
+    bark, leaves = material("noise", (0.1, 0.05, 0.02), (0.25, 0.15, 0.08), 8), material(
+        "noise", (0.02, 0.08, 0.01), (0.15, 0.35, 0.06), 6)  # fmt: skip
+    rng = random.Random(2)
+    for k in range(12):
+        x, y = -7 + 1.3 * k + rng.uniform(-0.3, 0.3), 4 + 3 * rng.random()
+        add("cylinder", bark, radius=0.12, depth=2, location=(x, y, 1))
+        add("ico_sphere", leaves, radius=rng.uniform(0.6, 1), location=(x, y, 2.4), subdivisions=4)
+    for k in range(30):
+        box(material("plain", (0.7, 0.7, 0.65)), (0.06, 0.04, 0.7), (-7 + 0.5 * k, 2.2, 0.35))
+    box(material("plain", (0.7, 0.7, 0.65)), (20, 0.04, 0.07), (0, 2.2, 0.55))
+
+    def figure(x, y, speed, pace, phase, shirt, trousers):
+        skin = material("plain", (0.6, 0.36, 0.25))
+        way = 1 if speed > 0 else -1
+        body = limb(shirt, 0.17, 0.5, (x, y, 0))
+        body.rotation_euler[1] = way * 0.15
+        head = add("uv_sphere", skin, radius=0.13, segments=32, ring_count=16)
+        head.location, head.parent = (0.03 * way, 0, 0.28), body
+        turn = math.radians(pace)
+
+        def swing(of, amount, lead, rest=0.0):
+            def angle(t):
+                return -way * (rest + amount * math.sin(turn * t + phase + lead))
+
+            animate(of, "rotation_euler", angle, 1)
+
+        for side, lead in ((-1, 0.0), (1, math.pi)):
+            arm = limb(shirt, 0.055, 0.3, (0, 0.22 * side, -0.02), body)
+            fore = limb(skin, 0.045, 0.28, (0, 0, -0.3), arm)
+            thigh = limb(trousers, 0.09, 0.45, (0, 0.1 * side, -0.52), body)
+            shin = limb(skin, 0.06, 0.45, (0, 0, -0.45), thigh)
+            shoe = box(material("plain", (0.9, 0.9, 0.9)), (0.26, 0.1, 0.08), (0, 0, -0.47), shin)
+            shoe.location[0] = 0.06 * way
+            swing(arm, 0.9, lead + math.pi)
+            swing(fore, 0.3, lead + math.pi, 1.3)
+            swing(thigh, 0.8, lead, 0.25)
+            swing(shin, 0.75, lead - 1.4, -0.85)
+        animate(body, "location", lambda t: x + speed * t, 0)
+        animate(body, "location", lambda t: 1.36 + 0.05 * math.sin(2 * (turn * t + phase)), 2)
+
+    red = material("checker", (0.7, 0.05, 0.04), (0.85, 0.6, 0.1), 12)
+    blue = material("checker", (0.05, 0.15, 0.6), (0.8, 0.8, 0.85), 10)
+    grey = material("plain", (0.08, 0.08, 0.1))
+    figure(-0.5, 0.0, 0.26, 25, 0.6, red, grey)
+    figure(0.75, 0.9, -0.22, 28, 2.2, blue, material("plain", (0.25, 0.22, 0.12)))
+    head, _ = camera((0, -4.4, 1.35), (0, 0, 1.05), 36)
+    animate(head, "location", lambda t: 0.13 * t, 0)
+    sun((0.4, 0.7, -0.8))
+
+
+SCENES = {s.__name__: s for s in (rotozoom, propeller, flag, runner)}
+
+
+# ---- rendering --------------------------------------------------------------------------------
+
+
+def begin():
+    """An empty file with a sky, and Cycles set up."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.world = bpy.data.worlds.new("sky")
+    scene.world.use_nodes = True
+    background = scene.world.node_tree.nodes["Background"]
+    background.inputs["Color"].default_value = (0.45, 0.62, 0.85, 1)
+    seen = scene.world.cycles_visibility
+    seen.diffuse = seen.glossy = seen.transmission = seen.scatter = False
+    scene.frame_set(FRAME)
+    scene.render.engine, scene.render.fps = "CYCLES", FPS
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.render.resolution_percentage = 100
+    cycles = scene.cycles
+    cycles.device, cycles.samples, cycles.max_bounces = "CPU", SAMPLES, 0
+    cycles.use_adaptive_sampling = cycles.use_denoising = False
+    scene.render.film_transparent = False
+    layer = scene.view_layers[0]
+    layer.name = "ViewLayer"
+    layer.use_pass_z = layer.use_pass_vector = layer.use_pass_normal = True
+    layer.use_pass_object_index = True
+    return scene
+
+
+def shoot(scene, path: Path, layers: bool):
+    """Render into a file: all layers, or the colour alone."""
+    image = scene.render.image_settings
+    image.file_format = "OPEN_EXR_MULTILAYER" if layers else "OPEN_EXR"
+    image.color_mode, image.color_depth, image.exr_codec = "RGBA" if layers else "RGB", "16", "ZIP"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+
+
+def render(folder: Path, name: str):
+    """Everything of one scene but the vector blur."""
+    scene = begin()
+    SCENES[name]()
+    for i, thing in enumerate(bpy.data.objects):
+        thing.pass_index = i + 1
+        thing.cycles.use_motion_blur = thing.cycles.use_deform_motion = True
+        thing.cycles.motion_steps = 3
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "camera.json").write_text(json.dumps(cameras(scene, name), indent=1))
+    for offset, file in ((-1, "prev"), (0, "curr"), (1, "next")):
+        scene.frame_set(FRAME + offset)
+        shoot(scene, folder / f"{file}.exr", True)
+    scene.frame_set(FRAME)
+    scene.render.use_motion_blur = True
+    scene.render.motion_blur_position = "CENTER"
+    for text, shutter in SHUTTERS.items():
+        scene.render.motion_blur_shutter = shutter
+        halves = []
+        for seed, half in enumerate("ab", 1):
+            scene.cycles.seed = seed
+            halves.append(folder / f"truth_{text}.{half}.exr")
+            shoot(scene, halves[-1], False)
+        save_mean(halves, folder / f"truth_{text}.exr")
+
+
+def save_mean(files, onto: Path):
+    """The mean of pictures of R, G, B."""
+    planes = {}
+    for file in files:
+        with OpenEXR.File(str(file), separate_channels=True) as opened:
+            for name in "RGB":
+                plane = opened.channels()[name].pixels.astype(np.float32) / len(files)
+                planes[name] = planes.get(name, 0) + plane
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    half = {name: plane.astype(np.float16) for name, plane in planes.items()}
+    OpenEXR.File(header, half).write(str(onto))
+
+
+def cameras(scene, name: str) -> dict:
+    """camera.json: matrices in Blender's and OpenGL's sense."""
+    found = {}
+    for time in (9, 9.5, 10, 10.5, 11):
+        scene.frame_set(int(time), subframe=time % 1)
+        eye = scene.camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        projection = eye.calc_matrix_camera(
+            bpy.context.evaluated_depsgraph_get(), x=SIZE[0], y=SIZE[1]
+        )
+        found[f"{time:g}"] = {
+            "camera_matrix_world": [list(row) for row in eye.matrix_world],
+            "projection": [list(row) for row in projection],
+        }
+    return {
+        "doc": " ".join((SCENES[name].__doc__ or "").split()),
+        "frame": FRAME,
+        "fps": FPS,
+        "resolution": SIZE,
+        "conventions": {
+            "matrix": "row-major lists, column vectors: p_world = M @ p_camera; the camera "
+            "looks along -Z, +Y up",
+            "projection": "OpenGL clip space, z in [-1, 1]",
+            "depth": "distance along the view axis; background 1e10",
+            "vector": "pixels, y up; XY = P(n-1) - P(n); ZW = P(n) - P(n+1)",
+        },
+        "frames": found,
+    }
+
+
+def vector_blur(folder: Path):
+    """Blender's own filter on curr.exr, at every shutter."""
+    for text, shutter in SHUTTERS.items():
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        scene = bpy.context.scene
+        scene.use_nodes = True
+        nodes, link = scene.node_tree.nodes, scene.node_tree.links.new
+        nodes.clear()
+        given, out = nodes.new("CompositorNodeImage"), nodes.new("CompositorNodeComposite")
+        node = nodes.new("CompositorNodeVecBlur")
+        given.image = bpy.data.images.load(str(folder / "curr.exr"))
+        node.inputs["Samples"].default_value = VECTOR_BLUR
+        node.inputs["Shutter"].default_value = shutter
+        for layer, socket in (("Combined", "Image"), ("Depth", "Z"), ("Vector", "Speed")):
+            link(given.outputs[layer], node.inputs[socket])
+        link(node.outputs[0], out.inputs[0])
+        render_ = scene.render
+        render_.resolution_x, render_.resolution_y = SIZE
+        render_.resolution_percentage, render_.use_sequencer = 100, False
+        render_.compositor_device, render_.compositor_precision = "CPU", "FULL"
+        shoot(scene, folder / f"blender_vecblur_{text}.exr", False)
+
+
+def main():
+    """Render the scenes named, or all."""
+    into, *names = sys.argv[1:]
+    for name in names or SCENES:
+        folder = Path(into).resolve() / name
+        render(folder, name)
+        vector_blur(folder)
+
+
+if __name__ == "__main__":
+    main()
