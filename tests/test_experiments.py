@@ -37,12 +37,26 @@ def test_taylor_has_two_budgets_and_his_findings(lab):
 def test_chen_compares_rates_faces_and_alphas(lab):
     found = made(lab, "chen", moments=2)
     titles = [t.title for t in found.tables]
-    assert titles[0].startswith("Table 1")
+    assert titles[:3] == ["Table 1: frames per second of the blur over a dive",
+                          "Table 1, pass by pass", "Quality at 8 samples"]  # fmt: skip
+    by_pass, quality = found.tables[1:3]
+    for method in ("tap, form published", "fusion, form published"):
+        rows = [row for row in by_pass.rows if row[0] == method]
+        *parts, (_, name, times, whole, ratio) = rows
+        assert (name, times) == ("all", sum(row[2] for row in parts))
+        assert whole == pytest.approx(sum(row[3] for row in parts), abs=0.03)
+        assert ratio == 1 or method.startswith("fusion")
+    assert {"gaussian.wgsl:main", "blur/fusion.wgsl:main"} <= {row[1] for row in by_pass.rows}
+    for scene in ("scaling", "crossing"):
+        rows = {row[1]: row[2:] for row in quality.rows if row[0] == scene}
+        assert {"sharp", "noise floor", "tap, form published", "fusion"} <= rows.keys()
+        assert min(rows, key=lambda name: rows[name][0]) == "noise floor"
     for scene in ("scaling", "crossing"):
         (figure,) = (t for t in found.tables if t.title == f"Figure 5, {scene}: alpha")
         assert len(figure.rows) == 2 * len(experiments.ALPHAS)
         faces = next(t for t in found.tables if t.title.startswith(f"{scene}: front and back"))
         assert len({row[2] for row in faces.rows}) > 1  # telling faces apart changes the blur
+        assert faces.columns[-2:] == ["gaussian.wgsl:main [ms]", "blur/fusion.wgsl:main [ms]"]
 
 
 def test_chen_without_fusion_says_so(lab, monkeypatch):

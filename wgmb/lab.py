@@ -32,7 +32,7 @@ def compare(
     size: str = "480x270",
     time: float = 0.0,
     rays: int = 3,
-    truth: Path | None = None,
+    truth: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
     inputs: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     frame: int | None = None,
     peer: tuple[str, ...] = (),
@@ -60,7 +60,8 @@ def compare(
     rays
         Antialiasing of scenes' sharp frames: rays a pixel's side.
     truth
-        What the blurred frame should look like.
+        What the blurred frame should look like: a file, or two that were rendered with half the
+        samples and other seeds, whose mean it is: their difference tells how noisy it is.
     inputs
         Rendered frames: a pattern, or the files of the frame before, this one and the next.
     frame
@@ -109,7 +110,7 @@ def compare(
             cases.append(partial(laboratory.scene_case, f"{name}, {degrees}", shutter, reference,
                                  staged, device, tell))  # fmt: skip
     if truth is not None and inputs:
-        name = truth.parent.name or truth.stem
+        name = truth[0].parent.name or truth[0].stem
         for degrees, shutter in who.exposures(when).items():
             cases.append(partial(laboratory.clip_case, f"{name}, {degrees}", shutter, inputs, frame,
                                  truth, peers, given.open))  # fmt: skip
