@@ -1,11 +1,17 @@
 """The papers' experiments run, and read their findings off their figures."""
 
+import importlib.util
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from wgmb import compare, experiments, report
 from wgmb.compare import Case, Entry, Report
 from wgmb.errors import InputError
+
+DOCS = Path(__file__).parent.parent / "docs"
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +63,25 @@ def test_chen_compares_rates_faces_and_alphas(lab):
         faces = next(t for t in found.tables if t.title.startswith(f"{scene}: front and back"))
         assert len({row[2] for row in faces.rows}) > 1  # telling faces apart changes the blur
         assert faces.columns[-2:] == ["gaussian.wgsl:main [ms]", "blur/fusion.wgsl:main [ms]"]
+
+
+def test_the_page_of_experiments_takes_its_tables_from_reports(lab):
+    found = report.as_json(made(lab, "chen", moments=1))
+    spec = importlib.util.spec_from_file_location("make_docs", DOCS / "make.py")
+    docs = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(docs)
+    text = (DOCS / "experiments.md").read_text(encoding="utf-8")
+    places = re.findall(r"<!-- (.+?) -->\n", text)
+    tables = {t["title"]: t for t in found["tables"]}
+    assert places and set(places) <= tables.keys()
+    filled = docs.fill(text, [found])
+    for title in places:
+        lines = filled.partition(f"<!-- {title} -->\n")[2].partition("<!-- -->")[0].splitlines()
+        assert len(lines) == 2 + len(tables[title]["rows"])
+        assert lines[0] == f"| {' | '.join(tables[title]['columns'])} |"
+        assert str(tables[title]["rows"][-1][-1]) in lines[-1]
+    assert docs.fill(filled, [found]) == filled
+    assert docs.fill(text, []) == text
 
 
 def test_chen_without_fusion_says_so(lab, monkeypatch):

@@ -209,19 +209,19 @@ def _by_pass(
     lab: Laboratory, passes: dict[tuple[str, str], list[tuple[int, float]]], tap: str
 ) -> Table:
     """Table 1 by method and pass, over all moments; in proportion to all passes of `tap`."""
-    mean = {key: float(np.mean([s for _, s in found])) for key, found in passes.items()}
+    median = {key: float(np.median([s for _, s in found])) for key, found in passes.items()}
     whole: dict[str, float] = {}
-    for (method, _), s in mean.items():
+    for (method, _), s in median.items():
         whole[method] = whole.get(method, 0.0) + s
     rows: list[list] = []
     for method, total in whole.items():
         parts = [(label, passes[method, label][0][0], s)
-                 for (m, label), s in mean.items() if m == method]  # fmt: skip
+                 for (m, label), s in median.items() if m == method]  # fmt: skip
         rows += [
             [method, label, times, round(1e3 * s, 2), round(s / whole[tap], 2)]
             for label, times, s in [*parts, ("all", sum(t for _, t, _ in parts), total)]
         ]
-    columns = ["method", "pass", "times", "mean [ms]", "to the tap blur's"]
+    columns = ["method", "pass", "times", "median [ms]", "to the tap blur's"]
     note = f"By {lab.clock.name}, each pass by itself. Sums leave out what lies between passes."
     return Table("Table 1, pass by pass", columns, rows, note)
 
