@@ -86,10 +86,10 @@ def test_all_jobs_take_turns():
     assert {k: len(v) for k, v in seconds.items()} == {"a": 3, "b": 3}
 
 
-def test_a_job_that_has_used_its_budget_is_not_repeated(monkeypatch):
+def test_a_job_that_has_used_up_its_limit_is_not_repeated(monkeypatch):
     monkeypatch.setattr(bench, "_seconds", lambda job: job())
     jobs = {"quick": lambda: 1, "slow": lambda: 5, "slowest": lambda: 20}
-    seconds = bench.alternate(jobs, 3, budget=12)  # the round for warmth is spent too
+    seconds = bench.alternate(jobs, 3, limit=12)  # the round for warmth is spent too
     assert seconds == {"quick": [1, 1, 1], "slow": [5, 5], "slowest": [20]}
 
 
@@ -107,7 +107,7 @@ def test_the_command_prints_saves_and_compares(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("options", ["--rounds 0", "--samples x", "--methods smear",
-                                     "--against no.json", "--size big", "--budget 0"])  # fmt: skip
+                                     "--against no.json", "--size big", "--seconds 0"])  # fmt: skip
 def test_wrong_usage_is_one_line_and_2(capsys, options):
     code, out, err = make.inside(capsys, "bench", *options.split())
     assert (code, out) == (2, "")
@@ -155,7 +155,7 @@ def test_a_method_holds_its_pictures_and_what_it_needs_besides(run):
 def test_what_takes_too_long_is_left_out_and_said(device):
     said = []
     run = bench.bench(device, [Contender("tap"), Contender("gather")], SIZES[::-1], (2,),
-                      rounds=1, budget=1e-6, tell=said.append)  # fmt: skip
+                      rounds=1, limit=1e-6, tell=said.append)  # fmt: skip
     assert [(f.method, f.size) for f in run.figures] == [("tap", SIZES[0]), ("gather", SIZES[0])]
     assert [n.partition(" left out")[0] for n in run.notes] == [
         "96 x 54, 2 samples: tap", "96 x 54, 2 samples: gather"

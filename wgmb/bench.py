@@ -132,21 +132,21 @@ def bench(
     sizes: Iterable[tuple[int, int]] = ((1920, 1080),),
     samples: Iterable[int] = (16,),
     rounds: int = 9,
-    budget: float = math.inf,
+    limit: float = math.inf,
     tell: Tell = lambda text: None,
 ) -> Bench:
     """Time every contender at every size with every number of samples.
 
-    `budget`: seconds for one of them at one size and number. It gets fewer rounds where they
+    `limit`: seconds for one of them at one size and number. It gets fewer rounds where they
     would take longer, and is left out, which `notes` say, where three frames would, going by
     smaller figures; so is what the memory does not hold. What is interrupted (Ctrl-C) has the
     figures up to then.
     """
     if rounds < 1:
         raise InputError(f"rounds must be 1 or more, got {rounds}")
-    if not budget > 0:
-        raise InputError(f"budget must be over 0 seconds, got {budget}")
-    matrix = _Matrix(device, list(contenders), rounds, budget, tell)
+    if not limit > 0:
+        raise InputError(f"seconds must be over 0, got {limit}")
+    matrix = _Matrix(device, list(contenders), rounds, limit, tell)
     groups = list(itertools.product(sorted(sizes, key=math.prod), sorted(samples)))
     try:
         for i, (size, count) in enumerate(groups):
@@ -177,8 +177,8 @@ def _about(seconds: float) -> str:
 class _Matrix:
     """Figures of contenders at growing sizes, each telling what the next will take."""
 
-    def __init__(self, device, contenders, rounds: int, budget: float, tell: Tell):
-        self.device, self.contenders, self.rounds, self.budget = device, contenders, rounds, budget
+    def __init__(self, device, contenders, rounds: int, limit: float, tell: Tell):
+        self.device, self.contenders, self.rounds, self.limit = device, contenders, rounds, limit
         self.tell, self.clock = tell, timing.clock(device)
         self.figures: list[Figure] = []
         self.notes: list[str] = []
@@ -191,7 +191,7 @@ class _Matrix:
         """What all contenders will take, as far as figures tell."""
         runs = _HEAVY * (self.rounds + 1)
         each = (self._frame(c.label, size, samples) for c in self.contenders)
-        return sum(min(runs * s, self.budget) for s in each if _HEAVY * s <= self.budget)
+        return sum(min(runs * s, self.limit) for s in each if _HEAVY * s <= self.limit)
 
     def measure(self, size: tuple[int, int], samples: int) -> None:
         """All contenders that fit, in turns, and the numba peer with them."""
@@ -212,7 +212,7 @@ class _Matrix:
                 jobs[f"{name} {part}"] = getattr(one, part)
         if peer := _numba_peer(frame, samples):
             jobs["numba"] = peer
-        every = alternate(jobs, self.rounds, self.budget / _HEAVY)
+        every = alternate(jobs, self.rounds, self.limit / _HEAVY)
         median = {k: 1e3 * statistics.median(v) for k, v in every.items()}
         for name, one in timed.items():
             parts = {part: median.get(f"{name} {part}") for part in ("call", "upload", "readback")}
@@ -237,9 +237,9 @@ class _Matrix:
     def _check(self, name: str, size: tuple[int, int], samples: int, held: int) -> None:
         """Refuse what will take too long, or more memory than there is."""
         gpu.check_size(self.device, *size)
-        if _HEAVY * (seconds := self._frame(name, size, samples)) > self.budget:
-            raise InputError(f"a frame takes about {_about(seconds)}, the budget is "
-                             f"{self.budget:g} s for {_HEAVY}")  # fmt: skip
+        if (seconds := _HEAVY * self._frame(name, size, samples)) > self.limit:
+            raise InputError(f"{_HEAVY} frames would take about {_about(seconds)}, more than "
+                             f"{self.limit:g} s")  # fmt: skip
         known = [f for f in self.figures if f.method == name]
         wanted = min((f.memory * math.prod(size) / math.prod(f.size) for f in known), default=0)
         if wanted + held > (most := _MEMORY * _memory()):
@@ -543,17 +543,17 @@ def bench_torusphere(
 
 
 def alternate(
-    jobs: dict[str, Callable[[], object]], rounds: int, budget: float = math.inf
+    jobs: dict[str, Callable[[], object]], rounds: int, limit: float = math.inf
 ) -> dict[str, list[float]]:
     """Seconds of every job in every round; all jobs take turns after one round for warmth.
 
-    A job that has taken `budget` seconds is not repeated; at worst the round for warmth counts.
+    A job that has taken `limit` seconds is not repeated; at worst the round for warmth counts.
     """
     warm = {name: _seconds(job) for name, job in jobs.items()}
     seconds: dict[str, list[float]] = {name: [] for name in jobs}
     for _ in range(rounds):
         for name, job in jobs.items():
-            if warm[name] + sum(seconds[name]) < budget:
+            if warm[name] + sum(seconds[name]) < limit:
                 seconds[name].append(_seconds(job))
     return {name: seconds[name] or [warm[name]] for name in jobs}
 

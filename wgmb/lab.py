@@ -132,7 +132,7 @@ def bench(
     samples: str = "16",
     size: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     rounds: int = 9,
-    budget: float = 60.0,
+    seconds: float = 60.0,
     output: Annotated[Path | None, Parameter(alias="-o")] = None,
     save: Path | None = None,
     against: Path | None = None,
@@ -159,9 +159,9 @@ def bench(
         Pictures to time it on; 1920x1080 by default.
     rounds
         How often everything is done.
-    budget
-        Seconds for a method at one size with one number of samples: where it would take longer it
-        gets fewer rounds, or is left out.
+    seconds
+        For a method at one size with one number of samples: where it would take longer it gets
+        fewer rounds, or is left out.
     output
         A page with tables and plots, .html; JSON and CSV beside it.
     save
@@ -190,7 +190,7 @@ def bench(
         contenders = [laboratory.Contender.parse(text) for text in methods.split(",")]
     counts = whole_numbers("samples", samples)
     before = measure.Bench.load(against) if against else None
-    run = measure.bench(device, contenders, sizes, counts, rounds, budget, _teller(quiet))
+    run = measure.bench(device, contenders, sizes, counts, rounds, seconds, _teller(quiet))
     sys.stdout.write(measure.text(run))
     if before:
         table = measure.against(run, before)

@@ -106,7 +106,7 @@ class WallClock(_Clock):
 
     For adapters whose timestamps are missing or wrong. Passes run as they are recorded; what
     was recorded before `watch` has to be submitted before. `empty`: seconds that a submission
-    without a pass takes, the least of several; they are subtracted.
+    without a pass takes, the least of one before every pass; they are subtracted.
     """
 
     name = "wall clock"
@@ -115,7 +115,7 @@ class WallClock(_Clock):
         super().__init__(device)
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._took: list[float] = []
-        self.empty = min(self._run(device.create_command_encoder()) for _ in range(20))
+        self.empty = self._run(device.create_command_encoder())
 
     def watch(self, encoder) -> Any:
         """What takes the place of `encoder`: every command of it is submitted by itself."""
@@ -123,8 +123,9 @@ class WallClock(_Clock):
 
     def take(self, label: str, encoder) -> None:
         """Submit the one pass in `encoder`, and time it."""
-        self.device.queue.read_buffer(self._token)  # waits for all that came before
-        self._took.append(self._run(encoder) - self.empty)
+        empty = self._run(self.device.create_command_encoder())  # waits for all that came before
+        self.empty = min(self.empty, empty)
+        self._took.append(self._run(encoder))
         self.labels.append(label)
 
     def _run(self, encoder) -> float:
@@ -135,7 +136,7 @@ class WallClock(_Clock):
 
     def _seconds(self) -> list[float]:
         took, self._took = self._took, []
-        return took
+        return [seconds - self.empty for seconds in took]
 
 
 class _OneByOne:
