@@ -78,6 +78,13 @@ def test_text_and_page_tell_every_method(run):
     assert "blur/accumulate.wgsl:main x 4" in said
 
 
+def test_without_entries_the_tables_are_the_csv(run):
+    every, passes = report.as_csv(bench.report(run, "")).split("\n\n")
+    assert len(every.splitlines()) == 1 + len(run.figures)
+    assert len(passes.splitlines()) == 1 + sum(len(f.passes) for f in run.figures)
+    assert passes.startswith("method,size,samples,pass,times")
+
+
 def test_all_jobs_take_turns():
     order = []
     jobs = {name: lambda n=name: order.append(n) for name in "ab"}

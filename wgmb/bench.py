@@ -148,12 +148,16 @@ def bench(
         raise InputError(f"seconds must be over 0, got {limit}")
     matrix = _Matrix(device, list(contenders), rounds, limit, tell)
     groups = list(itertools.product(sorted(sizes, key=math.prod), sorted(samples)))
+    pace = 1.0  # what a group took in proportion to what was told
     try:
         for i, (size, count) in enumerate(groups):
-            left = [matrix.seconds(*group) for group in groups[i:]]
+            left = [pace * matrix.seconds(*group) for group in groups[i:]]
             about = f": about {_about(left[0])}, to the end {_about(sum(left))}" if i else ""
             tell(f"{_what(size, count)} ({i + 1} of {len(groups)}){about}")
+            started = time.perf_counter()
             matrix.measure(size, count)
+            if left[0]:
+                pace *= (time.perf_counter() - started) / left[0]
     except KeyboardInterrupt:
         if not matrix.figures:
             raise
@@ -499,7 +503,8 @@ def _pass_curves(figures: Sequence[Figure]) -> list[Plot]:
         plot = plots.setdefault(f.method, Plot(title, "samples", "ms", {}))
         for label, milliseconds in f.passes.items():
             plot.curves.setdefault(label, []).append((f.samples, milliseconds))
-    return [plot for plot in plots.values() if len(plot.curves) > 1]
+    several = (p for p in plots.values() if len(p.curves) > 1)
+    return [p for p in several if any(len(curve) > 1 for curve in p.curves.values())]
 
 
 def _first(f: Figure) -> list:

@@ -67,13 +67,16 @@ def as_json(report: Report) -> dict:
 
 
 def as_csv(report: Report) -> str:
-    """One line an entry."""
+    """One line an entry; where there are none, the tables one below the other."""
     text = io.StringIO()
     rows = [_row(e) for e in report.entries]
     if rows:
         writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
+    for i, table in enumerate([] if rows else report.tables):
+        lines = csv.writer(text, lineterminator="\n")
+        lines.writerows([*([[]] if i else []), table.columns, *table.rows])
     return text.getvalue()
 
 
