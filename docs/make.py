@@ -2,9 +2,13 @@
 
 Every method draws every scene; the page shows its picture of the first, its error map, and
 the place of all scenes where it is worst, beside the truth.
+
+python docs/make.py REPORT.json... instead puts tables of `wgmb compare --experiment` into
+experiments.md, between <!-- TITLE OF THE TABLE --> and <!-- -->.
 """
 
 import inspect
+import json
 import re
 import sys
 from pathlib import Path
@@ -44,6 +48,21 @@ def main() -> None:
         lab.compare(found, case, able, (SAMPLES,), budgets=lambda *_: [])
     (HERE / "gallery").mkdir(exist_ok=True)
     (HERE / "gallery.md").write_text(_page(found), encoding="utf-8")
+
+
+def fill(text: str, reports: list[dict]) -> str:
+    """The text with the tables of the reports at the places that bear their titles."""
+    tables = {table["title"]: table for report in reports for table in report["tables"]}
+
+    def filled(place: re.Match) -> str:
+        if (table := tables.get(place[1])) is None:
+            return place[0]
+        lines = [table["columns"], ["---"] * len(table["columns"]), *table["rows"]]
+        cells = [["-" if cell is None else str(cell) for cell in line] for line in lines]
+        drawn = "".join(f"| {' | '.join(line)} |\n" for line in cells)
+        return f"<!-- {place[1]} -->\n{drawn}<!-- -->"
+
+    return re.sub(r"<!-- (.+?) -->\n(?:\|.*\n)*<!-- -->", filled, text)
 
 
 def _page(found: Report) -> str:
@@ -142,4 +161,8 @@ def _detail(shown: np.ndarray, corner: tuple[int, int]) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    main()
+    if reports := [json.loads(Path(name).read_text("utf-8")) for name in sys.argv[1:]]:
+        page = HERE / "experiments.md"
+        page.write_text(fill(page.read_text("utf-8"), reports), encoding="utf-8")
+    else:
+        main()

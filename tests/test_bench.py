@@ -1,6 +1,7 @@
 """The stopwatch: what is timed and written down; how fast is nobody's business here."""
 
 import json
+import signal
 
 import pytest
 
@@ -71,7 +72,17 @@ def test_text_and_page_tell_every_method(run):
     for method in METHODS:
         assert f", {method}, 4 samples" in said
         assert page.count(f"{method}</td>") >= 4
-    assert page.count("<svg") == 2
+    several = {f.method for f in run.figures if len(f.passes) > 1}
+    assert {"tiles", "gather", "reproject", "accumulate"} <= several
+    assert page.count("<svg") == 2 + len(several)
+    assert "blur/accumulate.wgsl:main x 4" in said
+
+
+def test_without_entries_the_tables_are_the_csv(run):
+    every, passes = report.as_csv(bench.report(run, "")).split("\n\n")
+    assert len(every.splitlines()) == 1 + len(run.figures)
+    assert len(passes.splitlines()) == 1 + sum(len(f.passes) for f in run.figures)
+    assert passes.startswith("method,size,samples,pass,times")
 
 
 def test_all_jobs_take_turns():
@@ -80,6 +91,13 @@ def test_all_jobs_take_turns():
     seconds = bench.alternate(jobs, 3)
     assert order == list("ab" * 4)  # one round for warmth
     assert {k: len(v) for k, v in seconds.items()} == {"a": 3, "b": 3}
+
+
+def test_a_job_that_has_used_up_its_limit_is_not_repeated(monkeypatch):
+    monkeypatch.setattr(bench, "_seconds", lambda job: job())
+    jobs = {"quick": lambda: 1, "slow": lambda: 5, "slowest": lambda: 20}
+    seconds = bench.alternate(jobs, 3, limit=12)  # the round for warmth is spent too
+    assert seconds == {"quick": [1, 1, 1], "slow": [5, 5], "slowest": [20]}
 
 
 def test_the_command_prints_saves_and_compares(tmp_path, capsys):
@@ -92,22 +110,132 @@ def test_the_command_prints_saves_and_compares(tmp_path, capsys):
     assert code == 0
     assert "now / before" in out
     titles = [t["title"] for t in json.loads((tmp_path / "b.json").read_text())["tables"]]
-    assert titles == ["Every method", "Against an earlier run"] or "Every pass" in titles
+    assert titles == ["Every method", "Every pass", "Against an earlier run"]
 
 
 @pytest.mark.parametrize("options", ["--rounds 0", "--samples x", "--methods smear",
-                                     "--against no.json", "--size big"])  # fmt: skip
+                                     "--against no.json", "--size big", "--seconds 0"])  # fmt: skip
 def test_wrong_usage_is_one_line_and_2(capsys, options):
     code, out, err = make.inside(capsys, "bench", *options.split())
     assert (code, out) == (2, "")
     assert err.startswith("wgmb: ") and err.count("\n") == 1
 
 
-def test_passes_are_told_where_the_clock_is_believed(device, monkeypatch):
-    monkeypatch.setattr(bench.Timing, "usable", lambda device: True)
-    run = bench.bench(device, [Contender("tap"), Contender("reproject")], SIZES[:1], (64,), 1)
+def test_every_method_has_its_passes(run):
     for figure in run.figures:
-        assert figure.passes
-        assert all(v >= 0 for v in figure.passes.values())
-    titles = [t.title for t in bench.report(run, "").tables]
-    assert titles == ["Every method", "Every pass"]
+        assert figure.passes.keys() == figure.counts.keys()
+        assert any(label.startswith(f"blur/{figure.method}") for label in figure.passes)
+    every = bench.report(run, "").tables[1]
+    assert len(every.rows) == sum(len(f.passes) for f in run.figures)
+    for f in run.figures:
+        shares = [row[-1] for row in every.rows if row[:3] == bench._first(f)]
+        assert sum(shares) == pytest.approx(1, abs=0.01)
+
+
+@pytest.mark.parametrize("usable", [True, False])
+def test_both_clocks_tell_the_same_passes(device, monkeypatch, usable):
+    monkeypatch.setattr(bench.Timing, "usable", staticmethod(lambda device: usable))
+    several = [Contender(m) for m in ("tap", "tiles", "gather", "accumulate")]
+    run = bench.bench(device, several, SIZES[:1], (3,), 1)
+    assert run.clock == ("timestamps" if usable else "wall clock")
+    assert run.clock.split()[-1] in bench.report(run, "").tables[1].note
+    assert (run.empty > 0) != usable
+    counts = {f.method: f.counts for f in run.figures}
+    assert counts["tap"] == {"blur/tap.wgsl:main": 1}
+    assert counts["tiles"]["blur/tiles_moves.wgsl:main"] == 1
+    assert counts["gather"]["blur/gather_silhouettes.wgsl:mark"] == 3  # of three frames
+    assert counts["accumulate"] == {"gbuffer.wgsl:main": 3, "blur/accumulate.wgsl:main": 3}
+    if not usable:
+        assert all(v > 0 for f in run.figures for v in f.passes.values())
+
+
+def test_a_method_holds_its_pictures_and_what_it_needs_besides(run):
+    for f in run.figures:
+        pixels = f.width * f.height
+        assert f.memory >= max(f.bytes, 16 * pixels)
+        assert f.memory < 1000 * pixels + 8_000_000
+    tap = [f for f in run.figures if f.method == "tap" and f.size == SIZES[0]]
+    for f in tap:
+        assert f.memory == pytest.approx(f.bytes, rel=0.05)
+
+
+def test_what_takes_too_long_is_left_out_and_said(device):
+    said = []
+    run = bench.bench(device, [Contender("tap"), Contender("gather")], SIZES[::-1], (2,),
+                      rounds=1, limit=1e-6, tell=said.append)  # fmt: skip
+    assert [(f.method, f.size) for f in run.figures] == [("tap", SIZES[0]), ("gather", SIZES[0])]
+    assert [n.partition(" left out")[0] for n in run.notes] == [
+        "96 x 54, 2 samples: tap", "96 x 54, 2 samples: gather"
+    ]  # fmt: skip
+    assert set(run.notes) <= set(said)
+    assert all(note in bench.text(run) and note in bench.report(run, "").notes
+               for note in run.notes)  # fmt: skip
+
+
+def test_what_does_not_fit_into_memory_is_left_out(device, monkeypatch):
+    tap = bench.bench(device, [Contender("tap")], SIZES[:1], (2,), 1).figures[0]
+    monkeypatch.setattr(bench, "_memory", lambda: 2 * tap.memory)
+    run = bench.bench(device, [Contender("tap")], SIZES, (2,), 1)
+    assert [f.size for f in run.figures] == [SIZES[0]]
+    assert "left out: it would hold" in run.notes[0]
+
+
+def test_a_size_that_no_texture_has_is_left_out(device):
+    huge = 1 << 20, 4
+    run = bench.bench(device, [Contender("tap")], [huge, SIZES[0]], (2,), 1)
+    assert [f.size for f in run.figures] == [SIZES[0]]
+    assert "left out: image is 1048576 x 4" in run.notes[0]
+    with pytest.raises(InputError, match="1048576 x 4"):
+        bench.bench(device, [Contender("tap")], [huge], (2,), 1)
+
+
+def test_the_time_to_come_is_told(device):
+    said = []
+    bench.bench(device, [Contender("tap")], SIZES, (2, 4), 1, tell=said.append)
+    assert [text.partition(":")[0] for text in said] == [
+        "64 x 36, 2 samples (1 of 4)", "64 x 36, 4 samples (2 of 4)",
+        "96 x 54, 2 samples (3 of 4)", "96 x 54, 4 samples (4 of 4)",
+    ]  # fmt: skip
+    assert all("to the end" in text for text in said[1:])
+
+
+def test_what_is_interrupted_has_what_was_measured(device, monkeypatch):
+    measure = bench._Matrix.measure
+
+    def interrupt(matrix, size, samples):
+        if samples == 4:
+            raise KeyboardInterrupt
+        measure(matrix, size, samples)
+
+    monkeypatch.setattr(bench._Matrix, "measure", interrupt)
+    run = bench.bench(device, [Contender("tap")], SIZES[:1], (2, 4, 8), 1)
+    assert [f.samples for f in run.figures] == [2]
+    assert run.notes == ["interrupted: the rest is left out"]
+    with pytest.raises(KeyboardInterrupt):
+        bench.bench(device, [Contender("tap")], SIZES[:1], (4,), 1)
+
+
+def test_ctrl_c_writes_what_there_is_and_ends_with_130(tmp_path, capsys, monkeypatch):
+    measure = bench._Matrix.measure
+
+    def interrupt(matrix, size, samples):
+        measure(matrix, size, samples)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(bench._Matrix, "measure", interrupt)
+    code, out, err = make.inside(capsys, "bench", "--methods", "tap", "--size", "64x36", "--rounds",
+                                 1, "--samples", "2,4", "--save", tmp_path / "a.json")  # fmt: skip
+    assert code == 130
+    assert "64 x 36, tap, 2 samples" in out and "tap, 4 samples" not in out
+    assert err.splitlines()[-1] == "wgmb: interrupted"
+    assert len(bench.Bench.load(tmp_path / "a.json").figures) == 1
+
+
+def test_all_methods_are_timed_when_all_are_asked_for(tmp_path, capsys):
+    code, _, err = make.inside(
+        capsys, "bench", "--methods", "all", "--size", "32x18", "--samples", 1, "--rounds", 1,
+        "--quiet", "--save", tmp_path / "a.json",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    run = bench.Bench.load(tmp_path / "a.json")
+    assert [f.method for f in run.figures] == list(METHODS)

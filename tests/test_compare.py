@@ -7,6 +7,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
+import imageio.v3 as iio
 import numpy as np
 import pytest
 
@@ -160,6 +161,57 @@ def test_a_scene_is_compared_with_every_method(device, staged):
     assert len(table.rows[0]) == len(table.columns)
 
 
+def test_the_floor_is_what_a_perfect_picture_gets(device, staged):
+    """A picture with far less noise and rays of its own stands where the floor says."""
+    shutter, tell = Shutter(180), lambda text: None
+    few, more = (compare.scene_case("x", shutter, Contender.parse(f"distributed:{n}"), staged,
+                                    device, tell) for n in (32, 64))  # fmt: skip
+    much = Contender.parse("distributed:1024:seed=9")
+    clean = compare.scene_case("x", shutter, much, staged, device, tell).truth
+    assert list(few.floor) == list(MEASURES)
+    for case in (few, more):
+        perfect = measure(clean, case.truth)
+        assert case.floor["psnr"] == pytest.approx(
+            perfect["psnr"], abs=1.5
+        )  # halves among themselves: 6
+        assert case.floor["flip"] == pytest.approx(perfect["flip"], rel=0.2)
+    assert 2 < more.floor["psnr"] - few.floor["psnr"] < 9
+
+
+def test_halves_share_no_rays_with_each_other_or_with_who_is_judged():
+    for text, seeds in (("distributed:64", {1, 2}), ("distributed:64:seed=1", {3, 4})):
+        halves = compare._halves(Contender.parse(text), 64)
+        assert {dict(h.options)["seed"] for h in halves} == seeds
+        assert [h.samples for h in halves] == [32, 32]
+    assert [h.samples for h in compare._halves(Contender("distributed"), 3)] == [2, 1]
+    assert compare._halves(Contender("distributed"), 1) == []
+    assert compare._halves(Contender("accumulate"), 64) == []  # has no noise
+
+
+def test_the_floor_stands_in_table_files_and_plots(device, staged, tmp_path):
+    lab, got = compare.Laboratory(device, rounds=1), Report("", "", {}, 4)
+    case = compare.scene_case("x", Shutter(180), Contender.parse("distributed:32"), staged, device,
+                              lab.tell)  # fmt: skip
+    lab.compare(got, case, [Contender("tap")], (2,), budgets=lambda *_: [])
+    page, figures, table = report.write(got, tmp_path / "r.html")
+    text, data = page.read_text(), json.loads(figures.read_text())
+    assert data["cases"][0]["floor"] == case.floor
+    with table.open(newline="") as lines:
+        (row,) = (r for r in csv.DictReader(lines) if r["kind"] == "floor")
+    assert float(row["psnr"]) == case.floor["psnr"]
+    assert text.count('class="floor"') == 4  # FLIP and PSNR, against time and samples
+    cells = text[text.index("<td>noise floor</td>") :].partition("</tr>")[0]
+    assert f"{case.floor['flip']:.4f}" in cells and "best" not in cells
+
+
+def test_the_line_of_the_floor_lies_where_it_belongs():
+    plot = compare.Plot("p", "x", "y", {"a": [(1, 0.2), (10, 1.0)]}, floor=0.2)
+    drawn = report.svg(plot, {"a": "red"})
+    (at,) = re.findall(r'class="floor" [^>]*y1="([\d.]+)" y2="\1"', drawn)
+    assert at == re.findall(r'cy="([\d.]+)"', drawn)[0]
+    assert "floor" not in report.svg(replace(plot, floor=None), {"a": "red"})
+
+
 def test_a_reference_must_trace_the_scene(device, staged):
     with pytest.raises(InputError, match="reference must be"):
         compare.scene_case("x", Shutter(180), Contender("tap"), staged, device, print)
@@ -276,7 +328,7 @@ def test_files_are_compared_with_the_frames_around_them(tmp_path, capsys):
 def test_three_files_are_before_here_and_after(tmp_path):
     shot = make.write_sequence(tmp_path, range(1, 4))
     files = [shot.replace("####", f"{n:04d}") for n in (1, 2, 3)]
-    truth = Path(files[1])
+    truth = [Path(files[1])]
     three = compare.clip_case("x", Shutter(180), files, None, truth, {})
     one = compare.clip_case("x", Shutter(180), [shot], 2, truth, {})
     for made in (three.frame, three.frame.prev, three.frame.next):
@@ -288,6 +340,33 @@ def test_three_files_are_before_here_and_after(tmp_path):
         compare.clip_case("x", Shutter(180), [shot], 7, truth, {})
     with pytest.raises(InputError, match="one file or three, got 2"):
         compare.clip_case("x", Shutter(180), files[:2], None, truth, {})
+
+
+def test_two_halves_of_a_true_picture_tell_its_noise(tmp_path, capsys):
+    shot = make.write_sequence(tmp_path, range(1, 4))
+    files = [Path(shot.replace("####", f"{n:04d}")) for n in (1, 2, 3)]
+
+    def case(*truth):
+        return compare.clip_case("x", Shutter(180), [shot], 2, truth, {})
+
+    one, two = case(files[1]), case(files[0], files[2])
+    assert one.floor is None and "noise is not known" in one.about
+    a, b = (case(files[i]).truth for i in (0, 2))
+    np.testing.assert_allclose(two.truth, (a + b) / 2)
+    wanted = [measure(p, (a + b) / 2)["psnr"] for p in (a, b)]
+    assert two.floor["psnr"] == pytest.approx(np.mean(wanted))
+    with pytest.raises(InputError, match="one file or two halves of it, got 3"):
+        case(*files)
+    small = tmp_path / "small.png"
+    iio.imwrite(small, np.zeros((4, 5, 3), np.uint8))
+    with pytest.raises(InputError, match="of one size, got 64 x 48 and 5 x 4"):
+        case(files[0], small)
+    said = make.inside(
+        capsys, "compare", "--truth", *files[::2], "--inputs", shot, "--frame", 2, "--methods",
+        "tap", "--ladder", "2", "--samples", 2, "--rounds", 1, "-o", tmp_path / "r.html",
+    )  # fmt: skip
+    assert said[0] == 0
+    assert "noise floor of the truth: FLIP" in said[2]
 
 
 @pytest.mark.parametrize(

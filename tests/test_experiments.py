@@ -1,11 +1,17 @@
 """The papers' experiments run, and read their findings off their figures."""
 
+import importlib.util
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from wgmb import compare, experiments, report
 from wgmb.compare import Case, Entry, Report
 from wgmb.errors import InputError
+
+DOCS = Path(__file__).parent.parent / "docs"
 
 
 @pytest.fixture(scope="module")
@@ -37,12 +43,45 @@ def test_taylor_has_two_budgets_and_his_findings(lab):
 def test_chen_compares_rates_faces_and_alphas(lab):
     found = made(lab, "chen", moments=2)
     titles = [t.title for t in found.tables]
-    assert titles[0].startswith("Table 1")
+    assert titles[:3] == ["Table 1: frames per second of the blur over a dive",
+                          "Table 1, pass by pass", "Quality at 8 samples"]  # fmt: skip
+    by_pass, quality = found.tables[1:3]
+    for method in ("tap, form published", "fusion, form published"):
+        rows = [row for row in by_pass.rows if row[0] == method]
+        *parts, (_, name, times, whole, ratio) = rows
+        assert (name, times) == ("all", sum(row[2] for row in parts))
+        assert whole == pytest.approx(sum(row[3] for row in parts), abs=0.03)
+        assert ratio == 1 or method.startswith("fusion")
+    assert {"gaussian.wgsl:main", "blur/fusion.wgsl:main"} <= {row[1] for row in by_pass.rows}
+    for scene in ("scaling", "crossing"):
+        rows = {row[1]: row[2:] for row in quality.rows if row[0] == scene}
+        assert {"sharp", "noise floor", "tap, form published", "fusion"} <= rows.keys()
+        assert min(rows, key=lambda name: rows[name][0]) == "noise floor"
     for scene in ("scaling", "crossing"):
         (figure,) = (t for t in found.tables if t.title == f"Figure 5, {scene}: alpha")
         assert len(figure.rows) == 2 * len(experiments.ALPHAS)
         faces = next(t for t in found.tables if t.title.startswith(f"{scene}: front and back"))
         assert len({row[2] for row in faces.rows}) > 1  # telling faces apart changes the blur
+        assert faces.columns[-2:] == ["gaussian.wgsl:main [ms]", "blur/fusion.wgsl:main [ms]"]
+
+
+def test_the_page_of_experiments_takes_its_tables_from_reports(lab):
+    found = report.as_json(made(lab, "chen", moments=1))
+    spec = importlib.util.spec_from_file_location("make_docs", DOCS / "make.py")
+    docs = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(docs)
+    text = (DOCS / "experiments.md").read_text(encoding="utf-8")
+    places = re.findall(r"<!-- (.+?) -->\n", text)
+    tables = {t["title"]: t for t in found["tables"]}
+    assert places and set(places) <= tables.keys()
+    filled = docs.fill(text, [found])
+    for title in places:
+        lines = filled.partition(f"<!-- {title} -->\n")[2].partition("<!-- -->")[0].splitlines()
+        assert len(lines) == 2 + len(tables[title]["rows"])
+        assert lines[0] == f"| {' | '.join(tables[title]['columns'])} |"
+        assert str(tables[title]["rows"][-1][-1]) in lines[-1]
+    assert docs.fill(filled, [found]) == filled
+    assert docs.fill(text, []) == text
 
 
 def test_chen_without_fusion_says_so(lab, monkeypatch):

@@ -30,7 +30,7 @@ def test_every_option_that_is_named_exists():
             known.add("--" + name.replace("_", "-"))
     known |= {"--adapter", "--size", "--rounds", "--verbose", "--sharp", "--passes", "--config"}
     known |= {"--truth", "--inputs", "--frame", "--peer", "--experiment", "--save"}
-    known |= {"--against", "--article", "--confidence"}
+    known |= {"--against", "--article", "--confidence", "--seconds"}
     known |= {"--method", "--report", "--speed"}
     named = set(re.findall(r"--[a-z][a-z-]+", TEXT))
     assert named - known == set()

@@ -7,7 +7,11 @@ turns, and medians are reported.
 from __future__ import annotations
 
 import contextlib
+import gc
+import itertools
 import json
+import math
+import os
 import statistics
 import sys
 import time
@@ -34,6 +38,8 @@ from .timing import Timing
 ARTICLE = {31.0: 13.7, 20.5: 20.2, 16.0: 22.7, 12.0: 24.9, 7.5: 27.7, 0.0: 35.0}
 MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
 _COPY = 64 << 20  # bytes, of the copy that tells the machine's bandwidth
+_HEAVY = 3  # parts of a figure that draw a whole frame: work, passes, call
+_MEMORY = 0.75  # share of the machine's memory that textures and buffers may take
 
 
 @dataclass(frozen=True)
@@ -51,11 +57,15 @@ class Figure:
     upload: float | None = None
     readback: float | None = None
     passes: dict[str, float] = field(default_factory=dict)
-    """Every pass, where the adapter's clock can be believed."""
+    """Every pass, by name; those of one name together."""
+    counts: dict[str, int] = field(default_factory=dict)
+    """How many passes have that name."""
     bytes: int = 0
     """Of all inputs and the output, each once: the least that must be moved."""
     numba: float | None = None
     """The tap blur on the CPU with as many samples, in the same rounds."""
+    memory: int = 0
+    """Of all textures and buffers that the method holds, inputs and output too [bytes]."""
     peak: int = 0
     """The process's largest memory so far [bytes]."""
 
@@ -63,6 +73,11 @@ class Figure:
     def key(self) -> tuple:
         """What another run's figure must share to be compared."""
         return self.method, self.width, self.height, self.samples
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width, height [px]."""
+        return self.width, self.height
 
     @property
     def bandwidth(self) -> float:
@@ -77,6 +92,12 @@ class Bench:
     machine: dict[str, str]
     copy: float
     figures: list[Figure]
+    clock: str = Timing.name
+    """What timed the passes: "timestamps" of the GPU, or "wall clock" around each alone."""
+    empty: float = 0.0
+    """Milliseconds of an empty submission, taken from every pass that wall clock timed."""
+    notes: list[str] = field(default_factory=list)
+    """What was left out, and why."""
 
     def save(self, path: Path) -> None:
         """As JSON, for `load`."""
@@ -88,7 +109,7 @@ class Bench:
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
             figures = [Figure(**f) for f in data["figures"]]
-            return cls(data["machine"], float(data["copy"]), figures)
+            return cls(**data | {"copy": float(data["copy"]), "figures": figures})
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError(f"{path}: not a saved bench: {error}") from None
 
@@ -111,87 +132,195 @@ def bench(
     sizes: Iterable[tuple[int, int]] = ((1920, 1080),),
     samples: Iterable[int] = (16,),
     rounds: int = 9,
+    limit: float = math.inf,
     tell: Tell = lambda text: None,
 ) -> Bench:
-    """Time every contender at every size with every number of samples."""
+    """Time every contender at every size with every number of samples.
+
+    `limit`: seconds for one of them at one size and number. It gets fewer rounds where they
+    would take longer, and is left out, which `notes` say, where three frames would, going by
+    smaller figures; so is what the memory does not hold. What is interrupted (Ctrl-C) has the
+    figures up to then.
+    """
     if rounds < 1:
         raise InputError(f"rounds must be 1 or more, got {rounds}")
-    contenders, samples, figures = list(contenders), list(samples), []
-    for size in sizes:
-        gpu.check_size(device, *size)
-        frame = synthetic_frame(*size)
-        for count in samples:
-            tell(f"{size[0]} x {size[1]}, {count} samples")
-            figures += _figures(device, contenders, frame, count, rounds)
-    return Bench(machine(device), copy_bandwidth(device), figures)
+    if not limit > 0:
+        raise InputError(f"seconds must be over 0, got {limit}")
+    matrix = _Matrix(device, list(contenders), rounds, limit, tell)
+    groups = list(itertools.product(sorted(sizes, key=math.prod), sorted(samples)))
+    pace = 1.0  # what a group took in proportion to what was told
+    try:
+        for i, (size, count) in enumerate(groups):
+            left = [pace * matrix.seconds(*group) for group in groups[i:]]
+            about = f": about {_about(left[0])}, to the end {_about(sum(left))}" if i else ""
+            tell(f"{_what(size, count)} ({i + 1} of {len(groups)}){about}")
+            started = time.perf_counter()
+            matrix.measure(size, count)
+            if left[0]:
+                pace *= (time.perf_counter() - started) / left[0]
+    except KeyboardInterrupt:
+        if not matrix.figures:
+            raise
+        matrix.notes.append("interrupted: the rest is left out")
+    if not matrix.figures:
+        raise InputError(matrix.notes[-1] if matrix.notes else "no methods to time")
+    name, empty = matrix.clock.name, 1e3 * matrix.clock.empty
+    copy = copy_bandwidth(device)
+    return Bench(machine(device), copy, matrix.figures, name, empty, matrix.notes)
 
 
-def _figures(device, contenders, frame: Frame, samples: int, rounds: int) -> list[Figure]:
-    """All contenders in turns, and the numba peer with them."""
-    jobs: dict[str, Callable[[], object]] = {}
-    found: dict[str, Figure] = {}
-    filters: dict[str, _Filter] = {}
-    for c in contenders:
-        blur, name = c.blur(samples, Shutter(180), device), c.label
-        found[name] = Figure(name, *frame.size, samples, 0.0)
-        if c.needs_scene:
-            jobs[name] = partial(_scene_for(blur, frame.size), 0.0)
-        else:
-            one = filters[name] = _Filter(blur, frame)
-            found[name] = replace(found[name], bytes=_bytes(one.views, one.output))
-            jobs[name] = one.work
-            for part in (one.call, one.upload, one.readback):
-                jobs[f"{name} {part.__name__}"] = part
-    if peer := _numba_peer(frame, samples):
-        jobs["numba"] = peer
-    median = {k: 1e3 * statistics.median(v) for k, v in alternate(jobs, rounds).items()}
-    for name, figure in found.items():
-        parts = {part: median.get(f"{name} {part}") for part in ("call", "upload", "readback")}
-        stamps = filters[name].passes if name in filters else {}
-        found[name] = replace(
-            figure,
-            gpu=median[name],
-            **parts,
-            passes={k: 1e3 * statistics.median(v) for k, v in stamps.items()},
-            numba=median.get("numba"),
-            peak=_peak(),
-        )
-    return list(found.values())
+def _what(size: tuple[int, int], samples: int) -> str:
+    return f"{size[0]} x {size[1]}, {samples} samples"
 
 
-def _scene_for(blur: Blur, size: tuple[int, int]) -> Render:
-    """The first of two scenes that the method can draw: bodies, or volumes."""
-    for name in ("crossing", "torusphere"):
-        render = Staged(scenes.make(name), size=size).render(blur)
-        with contextlib.suppress(InputError):
-            render(0.0)
-            return render
-    raise InputError(f"method {blur.method.name!r} draws none of the scenes that it is timed on")
+def _about(seconds: float) -> str:
+    """A time to come, for people."""
+    return f"{seconds:.2g} s" if seconds < 99 else f"{seconds / 60:.0f} min"
 
 
-class _Filter:
-    """One method of pictures on one frame, in the parts that are timed."""
+class _Matrix:
+    """Figures of contenders at growing sizes, each telling what the next will take."""
 
-    def __init__(self, blur: Blur, frame: Frame):
-        self.blur, self.frame = blur, frame
+    def __init__(self, device, contenders, rounds: int, limit: float, tell: Tell):
+        self.device, self.contenders, self.rounds, self.limit = device, contenders, rounds, limit
+        self.tell, self.clock = tell, timing.clock(device)
+        self.figures: list[Figure] = []
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+        self.tell(text)
+
+    def seconds(self, size: tuple[int, int], samples: int) -> float:
+        """What all contenders will take, as far as figures tell."""
+        runs = _HEAVY * (self.rounds + 1)
+        each = (self._frame(c.label, size, samples) for c in self.contenders)
+        return sum(min(runs * s, self.limit) for s in each if _HEAVY * s <= self.limit)
+
+    def measure(self, size: tuple[int, int], samples: int) -> None:
+        """All contenders that fit, in turns, and the numba peer with them."""
+        gc.collect()  # what the last figures held
+        frame, jobs, timed = synthetic_frame(*size), {}, {}
+        for c in self.contenders:
+            blur, name = c.blur(samples, Shutter(180), self.device), c.label
+            try:
+                self._check(name, size, samples, sum(t.memory for t in timed.values()))
+                make = (
+                    partial(_Traced, size=size) if c.needs_scene else partial(_Filter, frame=frame)
+                )
+                timed[name] = one = make(blur, self.clock)
+            except (InputError, wgpu.GPUError) as error:
+                self.note(f"{_what(size, samples)}: {name} left out: {error}")
+                continue
+            for part in one.parts:
+                jobs[f"{name} {part}"] = getattr(one, part)
+        if peer := _numba_peer(frame, samples):
+            jobs["numba"] = peer
+        every = alternate(jobs, self.rounds, self.limit / _HEAVY)
+        median = {k: 1e3 * statistics.median(v) for k, v in every.items()}
+        for name, one in timed.items():
+            parts = {part: median.get(f"{name} {part}") for part in ("call", "upload", "readback")}
+            self.figures.append(
+                Figure(
+                    name,
+                    *size,
+                    samples,
+                    median[f"{name} work"],
+                    **parts,
+                    passes={
+                        k: 1e3 * s for k, s in timing.medians(one.runs[1:] or one.runs).items()
+                    },
+                    counts=one.counts,
+                    bytes=one.bytes,
+                    numba=median.get("numba"),
+                    memory=one.memory,
+                    peak=_peak(),
+                )
+            )
+
+    def _check(self, name: str, size: tuple[int, int], samples: int, held: int) -> None:
+        """Refuse what will take too long, or more memory than there is."""
+        gpu.check_size(self.device, *size)
+        if (seconds := _HEAVY * self._frame(name, size, samples)) > self.limit:
+            raise InputError(f"{_HEAVY} frames would take about {_about(seconds)}, more than "
+                             f"{self.limit:g} s")  # fmt: skip
+        known = [f for f in self.figures if f.method == name]
+        wanted = min((f.memory * math.prod(size) / math.prod(f.size) for f in known), default=0)
+        if wanted + held > (most := _MEMORY * _memory()):
+            raise InputError(f"it would hold {wanted / 2**30:.1f} GB beside {held / 2**30:.1f} GB "
+                             f"of the others, of {most / 2**30:.1f} GB")  # fmt: skip
+
+    def _frame(self, name: str, size: tuple[int, int], samples: int) -> float:
+        """Seconds of a frame, in proportion to pixels and samples; 0 where nothing is known."""
+        known = [f for f in self.figures if f.method == name]
+        return min(
+            (f.gpu / 1e3 * math.prod(size) / math.prod(f.size) * max(1, samples / f.samples)
+             for f in known), default=0.0,
+        )  # fmt: skip
+
+
+class _Timed:
+    """One method in the parts that are timed; has drawn one frame when it is made."""
+
+    parts: tuple[str, ...] = ("work", "passes")
+    bytes = 0
+
+    def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
+        self.blur, self.clock, self._held = blur, clock, _held()
+        self.images = Images(blur.device)
+        self.output = self.images.texture("output", size, blur.output)
+        self.memory, self.runs, self.counts = 0, [], {}
+
+    def draw(self, encoder, clock: timing.Clock | None) -> None:
+        """One frame, as the method draws it."""
+        raise NotImplementedError
+
+    def work(self) -> None:
+        """All passes at once."""
+        timing.work(self.blur.device, lambda encoder: self.draw(encoder, None))
+        self.memory = self.memory or _held() - self._held
+
+    def passes(self) -> None:
+        """All passes, each timed by itself."""
+        timing.work(self.blur.device, lambda encoder: self.draw(encoder, self.clock))
+        self.runs.append(self.clock.read())
+        self.counts = self.clock.counts
+
+
+class _Traced(_Timed):
+    """A method of scenes, on the first of two that it can draw: bodies, or volumes."""
+
+    def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
+        super().__init__(blur, clock, size)
+        for name in ("crossing", "torusphere"):
+            self._render = Staged(scenes.make(name), size=size).render(blur)
+            with contextlib.suppress(InputError):
+                self.work()
+                return
+        raise InputError(f"method {blur.method.name!r} draws none of the scenes it is timed on")
+
+    def draw(self, encoder, clock):
+        self._render.draw(self.output.create_view(), 0.0, timing=clock)
+
+
+class _Filter(_Timed):
+    """A method of pictures, on one frame."""
+
+    parts = ("work", "passes", "call", "upload", "readback")
+
+    def __init__(self, blur: Blur, clock: timing.Clock, frame: Frame):
+        super().__init__(blur, clock, frame.size)
+        self.frame = frame
         if "neighbours" in blur.method.uses:
             near = {"prev": replace(frame, number=-1), "next": replace(frame, number=1)}
             self.frame = replace(frame, **near)
-        self.views, self.images = blur.upload(self.frame), Images(blur.device)
-        self.output = self.images.texture("output", frame.size, blur.output)
-        self.passes: dict[str, list[float]] = {}
+        self.views = blur.upload(self.frame)
+        self.bytes = _bytes(self.views, self.output)
+        self.work()
 
-    def work(self) -> None:
-        """All passes, and the time of each where the adapter tells it."""
-        blur, output = self.blur, self.output.create_view()
-        clock = Timing(blur.device) if Timing.usable(blur.device) else None
-
-        def record(encoder) -> None:
-            blur.encode(encoder, output=output, timing=clock, **self.views)
-
-        timing.work(blur.device, record)
-        for label, seconds in clock.read().items() if clock else ():
-            self.passes.setdefault(label, []).append(seconds)
+    def draw(self, encoder, clock):
+        output = self.output.create_view()
+        self.blur.encode(encoder, output=output, timing=clock, **self.views)
 
     def call(self) -> None:
         """Arrays in, array out."""
@@ -205,6 +334,20 @@ class _Filter:
     def readback(self) -> None:
         """The result as an array."""
         self.images.download(self.blur.device.create_command_encoder(), self.output)
+
+
+def _held() -> int:
+    """What all textures and buffers of the process hold [bytes]."""
+    counts = wgpu.diagnostics.object_counts  # pyright: ignore[reportAttributeAccessIssue]
+    return counts.get_dict()["total"]["resource_mem"]
+
+
+def _memory() -> int:
+    """The machine's memory [bytes]; infinite where the system does not tell."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return sys.maxsize
 
 
 def _peak() -> int:
@@ -242,23 +385,40 @@ def copy_bandwidth(device: wgpu.GPUDevice, rounds: int = 7) -> float:
 
 def text(run: Bench) -> str:
     """A run's figures for people."""
-    lines = [f"{run.machine['adapter']}; a copy moves {run.copy:.1f} GB/s"]
+    lines = [f"{run.machine['adapter']}; a copy moves {run.copy:.1f} GB/s", _clocked(run)]
     for f in run.figures:
         pixels = f.width * f.height
         lines.append(f"{f.width} x {f.height}, {f.method}, {f.samples} samples")
-        rows = [("gpu", f.gpu), *((f"  {k}", v) for k, v in f.passes.items()),
+        rows = [("gpu", f.gpu), *((f"  {_times(f, k)}", v) for k, v in f.passes.items()),
                 ("upload", f.upload), ("readback", f.readback), ("call", f.call),
                 ("numba tap", f.numba)]  # fmt: skip
         for name, milliseconds in rows:
             if milliseconds is not None:
                 each = 1e6 * milliseconds / pixels
-                lines.append(f"  {name:34}{milliseconds:9.2f} ms {each:8.1f} ns a pixel")
+                lines.append(f"  {name:42}{milliseconds:9.2f} ms {each:8.1f} ns a pixel")
         if f.numba:
-            lines.append(f"  gpu / numba tap{f.gpu / f.numba:31.2f}")
+            lines.append(f"  gpu / numba tap{f.gpu / f.numba:36.2f}")
         if f.bytes:
             share = f.bandwidth / run.copy
-            lines.append(f"  at least{f.bandwidth:38.2f} GB/s {share:6.0%} of a copy")
+            lines.append(f"  at least{f.bandwidth:43.2f} GB/s {share:6.0%} of a copy")
+        lines.append(f"  holds{f.memory / 2**20:46.2f} MB {f.memory / pixels:8.1f} B a pixel")
+    lines += run.notes
     return "\n".join(lines) + "\n"
+
+
+def _times(f: Figure, label: str) -> str:
+    """A pass and how often it ran."""
+    return label if f.counts.get(label, 1) == 1 else f"{label} x {f.counts[label]}"
+
+
+def _clocked(run: Bench) -> str:
+    """How the passes were timed."""
+    if run.clock == Timing.name:
+        return "Passes by the GPU's timestamps"
+    return (
+        "Passes by wall clock, each submitted by itself, less the "
+        f"{run.empty:.2f} ms of an empty submission"
+    )
 
 
 def against(run: Bench, before: Bench) -> Table:
@@ -289,18 +449,22 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
         each, moved = 1e6 * f.gpu / (f.width * f.height), f.bandwidth if f.bytes else None
         values = (f.gpu, each, f.numba and f.gpu / f.numba, f.upload, f.readback, f.call, moved,
                   moved and moved / run.copy)  # fmt: skip
-        rows.append([*_first(f), *map(_round, values), f.peak >> 20])
-    columns.append("peak memory [MB]")
+        rows.append([*_first(f), *map(_round, values), f.memory >> 20, f.peak >> 20])
+    columns += ["holds [MB]", "peak of the process [MB]"]
     note = (
         f"A copy moves {run.copy:.1f} GB/s. Bytes are those of inputs and output, each once. "
-        "Memory is the process's largest so far, sizes in this order."
+        "A method holds textures and buffers, inputs and output too; the process's memory is its "
+        "largest so far, with all methods in it, sizes in this order."
     )
     made.tables.append(Table("Every method", columns, rows, note))
-    if passes := [[*_first(f), k, round(v, 3)] for f in run.figures for k, v in f.passes.items()]:
-        columns = ["method", "size", "samples", "pass", "GPU [ms]"]
-        made.tables.append(Table("Every pass", columns, passes, "By timestamp queries."))
-    else:
-        made.notes.append("Passes are not timed apart: this adapter's clock cannot be believed.")
+    passes = [
+        [*_first(f), k, f.counts.get(k, 1), round(v, 3), round(v / sum(f.passes.values()), 3)]
+        for f in run.figures
+        for k, v in f.passes.items()
+    ]
+    columns = ["method", "size", "samples", "pass", "times", "all of them [ms]", "share"]
+    made.tables.append(Table("Every pass", columns, passes, f"{_clocked(run)}."))
+    made.notes += run.notes
     if before:
         made.tables.append(against(run, before))
     made.plots += _curves(run.figures)
@@ -308,7 +472,7 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
 
 
 def _curves(figures: Sequence[Figure]) -> list[Plot]:
-    """Time a pixel against size, and time against samples, where there are several."""
+    """Time a pixel against size, time and passes against samples, where there are several."""
     sizes = sorted({(f.width * f.height, f.width, f.height) for f in figures})
     counts = sorted({f.samples for f in figures})
     plots = []
@@ -327,7 +491,20 @@ def _curves(figures: Sequence[Figure]) -> list[Plot]:
             if (f.width, f.height) == (width, height):
                 curves.setdefault(f.method, []).append((f.samples, f.gpu))
         plots.append(Plot(f"Time against samples, {width} x {height}", "samples", "ms", curves))
+        plots += _pass_curves([f for f in figures if f.size == (width, height)])
     return plots
+
+
+def _pass_curves(figures: Sequence[Figure]) -> list[Plot]:
+    """Every pass against samples, of each method that has several."""
+    plots: dict[str, Plot] = {}
+    for f in figures:
+        title = f"{f.method}: its passes, {f.width} x {f.height}"
+        plot = plots.setdefault(f.method, Plot(title, "samples", "ms", {}))
+        for label, milliseconds in f.passes.items():
+            plot.curves.setdefault(label, []).append((f.samples, milliseconds))
+    several = (p for p in plots.values() if len(p.curves) > 1)
+    return [p for p in several if any(len(curve) > 1 for curve in p.curves.values())]
 
 
 def _first(f: Figure) -> list:
@@ -370,17 +547,26 @@ def bench_torusphere(
     }
 
 
-def alternate(jobs: dict[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """Seconds of every job in every round; all jobs take turns after one round for warmth."""
+def alternate(
+    jobs: dict[str, Callable[[], object]], rounds: int, limit: float = math.inf
+) -> dict[str, list[float]]:
+    """Seconds of every job in every round; all jobs take turns after one round for warmth.
+
+    A job that has taken `limit` seconds is not repeated; at worst the round for warmth counts.
+    """
+    warm = {name: _seconds(job) for name, job in jobs.items()}
     seconds: dict[str, list[float]] = {name: [] for name in jobs}
-    for job in jobs.values():
-        job()
     for _ in range(rounds):
         for name, job in jobs.items():
-            started = time.perf_counter()
-            job()
-            seconds[name].append(time.perf_counter() - started)
-    return seconds
+            if warm[name] + sum(seconds[name]) < limit:
+                seconds[name].append(_seconds(job))
+    return {name: seconds[name] or [warm[name]] for name in jobs}
+
+
+def _seconds(job: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    job()
+    return time.perf_counter() - started
 
 
 def _motion(frame: Frame) -> np.ndarray:

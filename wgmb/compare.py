@@ -9,10 +9,12 @@ written as a page, JSON and CSV by report.py.
 from __future__ import annotations
 
 import ast
+import inspect
 import platform
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -130,33 +132,73 @@ class Case:
     staged: Staged | None = None
     peers: dict[str, np.ndarray] = field(default_factory=dict)
     """Pictures of other programs, by name."""
+    floor: dict[str, float] | None = None
+    """What every judge says of a perfect picture, if the truth's noise is known."""
 
 
 def scene_case(
     name: str, shutter: Shutter, reference: Contender, staged: Staged, device, tell: Tell
 ) -> Case:
-    """A case whose truth is rendered by `reference`, such as distributed:1024."""
+    """A case whose truth is rendered by `reference`, such as distributed:1024.
+
+    One that takes a seed renders it as two halves with seeds of their own.
+    """
     if not reference.needs_scene:
         wanted = ", ".join(m for m in METHODS if "scene" in METHODS[m].needs)
         raise InputError(f"the reference must be one of {wanted}, got {reference.method!r}")
     samples = reference.samples or 1024
     tell(f"{name}: reference, {reference.label} {samples}")
     started = time.perf_counter()
-    truth = staged.render(reference.blur(samples, shutter, device))(staged.time)
+    pictures = [
+        staged.render(part.blur(part.samples or samples, shutter, device))(staged.time)
+        for part in _halves(reference, samples) or [reference]
+    ]
     took = time.perf_counter() - started
     about = f"{reference.label}, {samples} samples a pixel, {took:.1f} s"
-    return Case(name, staged.frame(device), shutter, truth, about, staged)
+    case = Case(name, staged.frame(device), shutter, pictures[0], about, staged)
+    return case if len(pictures) == 1 else _of_halves(case, pictures)
+
+
+def _halves(reference: Contender, samples: int) -> list[Contender]:
+    """The reference as two with half the samples; none where it has no noise, or one sample."""
+    known = inspect.signature(METHODS[reference.method]).parameters
+    if "seed" not in known or samples < 2:
+        return []
+    options = dict(reference.options)
+    seed = options.get("seed", known["seed"].default)
+    # Neither has the seed of a contender that nobody gave one, which would share its rays.
+    return [
+        replace(reference, options=tuple((options | {"seed": s}).items()), samples=n)
+        for s, n in ((2 * seed + 1, samples - samples // 2), (2 * seed + 2, samples // 2))
+    ]
+
+
+def _of_halves(case: Case, halves: Sequence[np.ndarray]) -> Case:
+    """The case with the mean of two independent halves as its truth, and with its noise floor.
+
+    The mean has half the variance of one half, and so has the difference between them: a half
+    is as far from the mean as a perfect picture is, in the root of the mean square.
+    """
+    if halves[0].shape != halves[1].shape:
+        sizes = " and ".join(f"{h.shape[1]} x {h.shape[0]}" for h in halves)
+        raise InputError(f"two halves of the truth must be of one size, got {sizes}")
+    truth = np.mean(halves, axis=0)
+    found = [measure(half, truth) for half in halves]
+    floor = {name: float(np.mean([f[name] for f in found])) for name in found[0]}
+    return replace(case, truth=truth, floor=floor)
 
 
 def clip_case(
-    name: str, shutter: Shutter, inputs: Sequence[str], number: int | None, truth: Path,
-    peers: dict[str, Path], open_clip: Callable[[str], Clip] = Clip,
+    name: str, shutter: Shutter, inputs: Sequence[str], number: int | None,
+    truth: Sequence[Path], peers: dict[str, Path], open_clip: Callable[[str], Clip] = Clip,
 ) -> Case:  # fmt: skip
     """A case of rendered frames on disk.
 
     `inputs`: a pattern, with the `number` of its frame, or the file of one frame, or the files
-    of the frames before, here and after.
+    of the frames before, here and after. `truth`: one file, or two independent halves of it.
     """
+    if len(truth) not in (1, 2):
+        raise InputError(f"truth must be one file or two halves of it, got {len(truth)}")
     if len(inputs) == 3:
         before, here, after = (
             clip.frame(clip.source(clip.numbers[0])) for clip in map(open_clip, inputs)
@@ -173,7 +215,12 @@ def clip_case(
     else:
         raise InputError(f"inputs must be a pattern, one file or three, got {len(inputs)}")
     pictures = {k: _read(path) for k, path in peers.items()}
-    return Case(name, frame, shutter, _read(truth), truth.name, peers=pictures)
+    truths = [_read(path) for path in truth]
+    if len(truths) == 1:
+        about = f"{truth[0].name}; one picture, so that its noise is not known"
+        return Case(name, frame, shutter, truths[0], about, peers=pictures)
+    about = f"mean of {truth[0].name} and {truth[1].name}"
+    return _of_halves(Case(name, frame, shutter, truths[0], about, peers=pictures), truths)
 
 
 def _read(path: Path) -> np.ndarray:
@@ -200,7 +247,8 @@ class Entry:
     case: str
     label: str
     kind: str
-    """"sharp", "peer", "samples" (one step of the ladder) or "time" (all that fits a budget)."""
+    """"sharp", "peer", "floor" (of the truth's noise), "samples" (one step of the ladder) or
+    "time" (all that fits a budget)."""
     measures: dict[str, float]
     samples: int | None = None
     seconds: float | None = None
@@ -236,6 +284,8 @@ class Plot:
     curves: dict[str, list[tuple[float, float]]]
     log: bool = True
     """Whether x is logarithmic."""
+    floor: float | None = None
+    """What y is for a perfect picture, if the truth has noise."""
 
 
 @dataclass
@@ -281,7 +331,7 @@ class Laboratory:
         if rounds < 1:
             raise InputError(f"rounds must be 1 or more, got {rounds}")
         self.device, self.rounds, self.tell = device, rounds, tell or (lambda text: None)
-        self._images = Images(device)
+        self._images, self.clock = Images(device), timing.clock(device)
 
     def compare(
         self,
@@ -303,6 +353,11 @@ class Laboratory:
                 report.entries.append(
                     Entry(case.name, label, kind, found, shown=True, picture=picture)
                 )
+        if case.floor is not None:
+            found = ", ".join(f"{MEASURES[m].title} {case.floor[m]:.{MEASURES[m].digits}f}"
+                              for m in ("flip", "psnr"))  # fmt: skip
+            self.tell(f"{case.name}: noise floor of the truth: {found}")
+            report.entries.append(Entry(case.name, "noise floor", "floor", case.floor))
         able = self._able(report, case, contenders)
         frame_seconds = self.frame_seconds(case)
         known: dict[Contender, list[tuple[int, float]]] = {c: [] for c in able}
@@ -396,11 +451,33 @@ class Laboratory:
                 return time.perf_counter() - started
 
             return draw
+        record = self._recorder(case, blur, contender)
+        return lambda: timing.work(blur.device, record)
+
+    def _recorder(self, case: Case, blur: Blur, contender: Contender) -> Callable[..., None]:
+        """A function that records the blur of the case's frame, which is uploaded now."""
         views = blur.upload(contender.given(case.frame))
         output = self._images.view("timed", case.frame.size, blur.output)
-        return lambda: timing.work(
-            blur.device, lambda encoder: blur.encode(encoder, output=output, **views)
-        )
+        return partial(blur.encode, output=output, **views)
+
+    def passes(
+        self, case: Case, jobs: dict[Contender, Blur]
+    ) -> dict[Contender, dict[str, tuple[int, float]]]:
+        """How often every pass of methods of pictures runs, and the median seconds of all of them.
+
+        All take turns in `rounds` rounds, after one for warmth.
+        """
+        records = {c: self._recorder(case, blur, c) for c, blur in jobs.items()}
+        runs, counts = {c: [] for c in jobs}, {}
+        for _ in range(1 + self.rounds):
+            for c, record in records.items():
+                timing.work(self.device, partial(record, timing=self.clock))
+                runs[c].append(self.clock.read())
+                counts[c] = self.clock.counts
+        return {
+            c: {label: (counts[c][label], s) for label, s in timing.medians(found[1:]).items()}
+            for c, found in runs.items()
+        }
 
     def least(self, jobs: Sequence[Callable[[], float]]) -> list[float]:
         """The least seconds of every job in `rounds` rounds; all take turns."""

@@ -11,15 +11,11 @@ import re
 import tempfile
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING
 
 import wgpu
 
 from . import shader
 from .errors import DeviceError, InputError, ShaderError
-
-if TYPE_CHECKING:
-    from .timing import Timing
 
 SOFTWARE = "CPU"  # adapter_type of lavapipe, SwiftShader, WARP
 _PREFERENCE = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", SOFTWARE)
@@ -134,7 +130,6 @@ class Given:
 
     size: tuple[int, int]  # width, height [px]
     resources: dict[str, wgpu.GPUBuffer]  # by binding name
-    timing: Timing | None = None
 
 
 class Kernel:
@@ -183,10 +178,7 @@ class Kernel:
         if own.keys() != wanted:
             raise ShaderError(f"{self.source.name} binds {sorted(wanted)}, got {sorted(own)}")
         resources = given.resources | own
-        timing = given.timing
-        label = f"{self.source.name}:{entry}"
-        stamps = timing.of(label) if timing else {}
-        compute = encoder.begin_compute_pass(label=label, **stamps)
+        compute = encoder.begin_compute_pass(label=f"{self.source.name}:{entry}")
         compute.set_pipeline(self.pipelines[entry])
         for group, layout in zip(self.groups, self.layouts, strict=True):
             entries = [

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 from . import compare as laboratory
-from . import gpu
+from . import gpu, terminal
 from .blur import METHODS
 from .errors import InputError
 from .experiments import EXPERIMENTS
@@ -32,7 +32,7 @@ def compare(
     size: str = "480x270",
     time: float = 0.0,
     rays: int = 3,
-    truth: Path | None = None,
+    truth: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
     inputs: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     frame: int | None = None,
     peer: tuple[str, ...] = (),
@@ -60,7 +60,8 @@ def compare(
     rays
         Antialiasing of scenes' sharp frames: rays a pixel's side.
     truth
-        What the blurred frame should look like.
+        What the blurred frame should look like: a file, or two that were rendered with half the
+        samples and other seeds, whose mean it is: their difference tells how noisy it is.
     inputs
         Rendered frames: a pattern, or the files of the frame before, this one and the next.
     frame
@@ -86,12 +87,7 @@ def compare(
     if (truth is None) != (not inputs) or bool(scene) + bool(inputs) + bool(experiment) != 1:
         raise InputError("give scenes, or --truth with --inputs, or --experiment")
     device = gpu.open_device(adapter)
-    say = Console(stderr=True, highlight=False, soft_wrap=True)
-
-    def tell(text: str) -> None:
-        if not quiet:
-            say.print(text, markup=False)
-
+    tell = _teller(quiet)
     lab = laboratory.Laboratory(device, rounds=who.rounds, tell=tell)
     report = laboratory.Report("", _command_line(), laboratory.machine(device), who.samples)
     wanted, contenders = size_of(size), who.contenders()
@@ -114,7 +110,7 @@ def compare(
             cases.append(partial(laboratory.scene_case, f"{name}, {degrees}", shutter, reference,
                                  staged, device, tell))  # fmt: skip
     if truth is not None and inputs:
-        name = truth.parent.name or truth.stem
+        name = truth[0].parent.name or truth[0].stem
         for degrees, shutter in who.exposures(when).items():
             cases.append(partial(laboratory.clip_case, f"{name}, {degrees}", shutter, inputs, frame,
                                  truth, peers, given.open))  # fmt: skip
@@ -136,26 +132,36 @@ def bench(
     samples: str = "16",
     size: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     rounds: int = 9,
+    seconds: float = 60.0,
     output: Annotated[Path | None, Parameter(alias="-o")] = None,
     save: Path | None = None,
     against: Path | None = None,
     article: bool = False,
     adapter: str | None = None,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
     """Time methods on this machine: median milliseconds a frame, transfers apart.
 
     Example: wgmb bench --methods tap,reproject --size 960x540 1920x1080 --samples 4,16,64
 
+    Example: wgmb bench --methods all --size 960x540 1920x1080 3840x2160 --samples 4,16,64
+
+    Ctrl-C ends it with what was measured until then.
+
     Parameters
     ----------
     methods
-        NAME[:OPTION=VALUE]..., separated by commas; all that blur rendered frames by default.
+        NAME[:OPTION=VALUE]..., separated by commas, or all; by default those that blur rendered
+        frames. The others are timed on a built-in scene.
     samples
         Numbers of samples, separated by commas.
     size
         Pictures to time it on; 1920x1080 by default.
     rounds
         How often everything is done.
+    seconds
+        For a method at one size with one number of samples: where it would take longer it gets
+        fewer rounds, or is left out.
     output
         A page with tables and plots, .html; JSON and CSV beside it.
     save
@@ -166,6 +172,8 @@ def bench(
         Instead, the torusphere (640x360: beside the article's own shader on two cores).
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
+    quiet
+        Do not say how far it is.
     """
     from . import bench as measure
 
@@ -175,15 +183,14 @@ def bench(
         for width, height in sizes:
             _tell_article(measure.bench_torusphere(blur, width, height, rounds), width, height)
         return 0
-    every = map(laboratory.Contender, METHODS)
-    contenders = (
-        [laboratory.Contender.parse(text) for text in methods.split(",")]
-        if methods
-        else [c for c in every if not c.needs_scene]
-    )
+    contenders = [laboratory.Contender(name) for name in METHODS]
+    if methods is None:
+        contenders = [c for c in contenders if not c.needs_scene]
+    elif methods != "all":
+        contenders = [laboratory.Contender.parse(text) for text in methods.split(",")]
     counts = whole_numbers("samples", samples)
     before = measure.Bench.load(against) if against else None
-    run = measure.bench(device, contenders, sizes, counts, rounds)
+    run = measure.bench(device, contenders, sizes, counts, rounds, seconds, _teller(quiet))
     sys.stdout.write(measure.text(run))
     if before:
         table = measure.against(run, before)
@@ -193,6 +200,7 @@ def bench(
         write(measure.report(run, _command_line(), before), output)
     if save:
         run.save(save)
+    terminal.check()
     return 0
 
 
@@ -209,6 +217,18 @@ def _tell_article(found: dict, width: int, height: int) -> None:
                 *ratios
             )
         sys.stdout.write(line + "\n")
+
+
+def _teller(quiet: bool) -> laboratory.Tell:
+    """What says on stderr how far the work is, and hears Ctrl-C."""
+    say = Console(stderr=True, highlight=False, soft_wrap=True)
+
+    def tell(text: str) -> None:
+        terminal.check()
+        if not quiet:
+            say.print(text, markup=False)
+
+    return tell
 
 
 def _command_line() -> str:

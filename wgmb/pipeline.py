@@ -18,7 +18,7 @@ from .gbuffer import SceneOnGpu
 from .images import Images
 from .keep import KeepPass
 from .shutter import Shutter
-from .timing import Timing
+from .timing import Clock
 from .velocity import Moving, VelocityPass
 
 MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
@@ -182,7 +182,7 @@ class Blur:
         confidence: View | None = None,
         check: bool = False,
         number: int = 0,
-        timing: Timing | None = None,
+        timing: Clock | None = None,
         **moving,
     ) -> None:
         """Record the passes into `encoder`; nothing is submitted or waited for.
@@ -200,6 +200,9 @@ class Blur:
 
         `scene` instead of `color`, for the methods that need one, which may be recorded
         bit by bit: `progress` is how many samples were done before, and are to be done now.
+
+        `timing` takes the time of every pass: `timing.clock(device)`, whose WallClock runs the
+        passes at once instead of recording them.
         """
         gpu.check_size(self.device, *size)
         motions = _moving(moving)
@@ -209,7 +212,8 @@ class Blur:
         given_inputs = {"color": color, "motion": motions.known or None, "depth": motions.depth}
         given_inputs["scene"] = scene
         self._require({name for name, input_ in given_inputs.items() if input_ is not None})
-        given = self.given(size, number, timing)
+        given = self.given(size, number)
+        encoder = timing.watch(encoder) if timing else encoder
         motion, limited = motions.motion, self.max_blur is not None
         if motions.known and (not motions.ready or limited or check):
             motion = self._images.view("motion", size, "rgba32float")
@@ -392,9 +396,7 @@ class Blur:
         if missing := self.method.needs - there:
             raise InputError(f"method {self.method.name!r} needs {', '.join(sorted(missing))}")
 
-    def given(
-        self, size: tuple[int, int], number: int = 0, timing: Timing | None = None
-    ) -> gpu.Given:
+    def given(self, size: tuple[int, int], number: int = 0) -> gpu.Given:
         """What every pass of a frame is given: frame, shutter, times of the samples."""
         data = np.zeros((), shader.load("common/frame.wgsl").dtype("Frame"))
         data["size"], data["samples"], data["jitter"] = size, self.samples, self.jitter
@@ -403,7 +405,7 @@ class Blur:
         frame = self.device.create_buffer_with_data(
             label="frame", data=data, usage=wgpu.BufferUsage.UNIFORM
         )
-        return gpu.Given(size, {"frame": frame, **self._group0}, timing)
+        return gpu.Given(size, {"frame": frame, **self._group0})
 
 
 def _moving(given: dict) -> Moving:

@@ -19,7 +19,7 @@ from .output import Output
 from .pipeline import Blur
 from .scene import Scene
 from .source import Source
-from .timing import Timing
+from .timing import Clock
 
 _BUSY = 0.1  # seconds of GPU work handed over at once, so that Ctrl-C is heard
 Progress = Callable[[int, int], None]
@@ -86,17 +86,17 @@ class Render:
         blur: Blur | None = None,
         confidence: wgpu.GPUTextureView | None = None,
         progress: Progress | None = None,
-        timing: Timing | None = None,
+        timing: Clock | None = None,
     ) -> None:
         """Draw that frame into a texture of yours, of `size` and the blur's `output` format.
 
         `blur`: another one than the Render's own, of the same device. What several draw of
         one moment starts from the same pictures. `confidence`: another such texture, for
-        methods of pictures that have one. `timing`: of the passes, not of rays.
+        methods of pictures that have one. `timing`: of the passes.
         """
         blur = blur or self.blur
         if "progress" in blur.method.uses:
-            self.refine(output, time, number, blur=blur, progress=progress)
+            self.refine(output, time, number, blur=blur, progress=progress, timing=timing)
             return
         if "scene" in blur.method.needs:
             encoder = blur.device.create_command_encoder(label="scene")
@@ -129,6 +129,7 @@ class Render:
         seconds: float = math.inf,
         blur: Blur | None = None,
         progress: Progress | None = None,
+        timing: Clock | None = None,
     ) -> int:
         """Add samples to the `done` so far, for about `seconds`; how many there are now.
 
@@ -143,7 +144,7 @@ class Render:
             started = clock.perf_counter()
             encoder = blur.device.create_command_encoder(label=f"samples {done}")
             blur.encode(encoder, size=self.size, output=output, scene=on_gpu,
-                        progress=(done, count), number=number)  # fmt: skip
+                        progress=(done, count), number=number, timing=timing)  # fmt: skip
             gpu.submit(blur.device, encoder)
             blur.device.queue.read_buffer(self._token)  # waits
             now = clock.perf_counter()
@@ -157,7 +158,7 @@ class Render:
         return done
 
     def passes(
-        self, time: float, number: int = 0, timing: Timing | None = None
+        self, time: float, number: int = 0, timing: Clock | None = None
     ) -> dict[str, wgpu.GPUTexture]:
         """The sharp picture at `time` [s] and what lies under it, kept until the next moment.
 
@@ -199,14 +200,15 @@ class Render:
         return Render(self.scene, still, size=self.size, fps=self.fps)(time)
 
     def _see(
-        self, time: float, number: int, offset: int, blur: Blur, timing: Timing | None = None
+        self, time: float, number: int, offset: int, blur: Blur, timing: Clock | None = None
     ) -> dict:
         """The picture `offset` frames from the moment; what Blur.encode takes of it."""
         on_gpu = self.on_gpu(time, blur)
         if offset not in self._pictures:
             encoder = blur.device.create_command_encoder(label="render")
-            given, name = blur.given(self.size, number, timing), f"frame {offset}"
-            drawn = on_gpu.encode(encoder, given, self._images, name, float(offset))
+            given, name = blur.given(self.size, number), f"frame {offset}"
+            watched = timing.watch(encoder) if timing else encoder
+            drawn = on_gpu.encode(watched, given, self._images, name, float(offset))
             gpu.submit(blur.device, encoder)
             self._pictures[offset] = {**drawn, "camera": on_gpu.reprojections(offset)}
         seen = self._pictures[offset]

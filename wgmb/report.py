@@ -40,7 +40,14 @@ def as_json(report: Report) -> dict:
         "title": report.title,
         "command": report.command,
         "machine": report.machine,
-        "cases": [{"name": c.name, "truth": c.about} for c in report.cases],
+        "cases": [
+            {
+                "name": c.name,
+                "truth": c.about,
+                "floor": c.floor and {k: _plain(v) for k, v in c.floor.items()},
+            }
+            for c in report.cases
+        ],
         "entries": [_row(e) for e in report.entries],
         "tables": [
             {
@@ -51,19 +58,25 @@ def as_json(report: Report) -> dict:
             }
             for t in report.tables
         ],
-        "plots": [{"title": p.title, "x": p.x, "y": p.y, "curves": p.curves} for p in report.plots],
+        "plots": [
+            {"title": p.title, "x": p.x, "y": p.y, "floor": p.floor, "curves": p.curves}
+            for p in report.plots
+        ],
         "notes": report.notes,
     }
 
 
 def as_csv(report: Report) -> str:
-    """One line an entry."""
+    """One line an entry; where there are none, the tables one below the other."""
     text = io.StringIO()
     rows = [_row(e) for e in report.entries]
     if rows:
         writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
+    for i, table in enumerate([] if rows else report.tables):
+        lines = csv.writer(text, lineterminator="\n")
+        lines.writerows([*([[]] if i else []), table.columns, *table.rows])
     return text.getvalue()
 
 
@@ -143,7 +156,7 @@ def _case(report: Report, index: int, case: Case, colors) -> str:
             "<p class=soft>Times of methods that take rendered frames include rendering one.</p>"
         )
     parts.append("<h3>Error against time and samples</h3>")
-    parts.append(_plots(_curves(report.of(case.name, kind="samples")), colors))
+    parts.append(_plots(_curves(report.of(case.name, kind="samples"), case.floor or {}), colors))
     return "\n".join(parts)
 
 
@@ -209,13 +222,14 @@ def _figures(entries: list[Entry], colors) -> str:
     framed = any(e.frame_seconds for e in entries)
     columns = ["method", "samples", "time [ms]", *["without frame [ms]"][: int(framed)]]
     columns += [m.title for m in MEASURES.values()]
-    rows = []
+    rows, floor = [], None
     for e in entries:
         times: list[float | None] = [None, None]
         if e.seconds is not None:
             times = [round(1e3 * s, 2) for s in (e.seconds, e.seconds - e.frame_seconds)]
         rows.append([e.label, e.samples, *times[: 1 + framed], *e.measures.values()])
-    return _grid(columns, rows, colors, judged=3 + framed)
+        floor = rows[-1] if e.kind == "floor" else floor
+    return _grid(columns, rows, colors, judged=3 + framed, floor=floor)
 
 
 def _table(table: Table, colors) -> str:
@@ -223,15 +237,19 @@ def _table(table: Table, colors) -> str:
     return f"<h3>{escape(table.title)}</h3>{note}{_grid(table.columns, table.rows, colors)}"
 
 
-def _grid(columns, rows, colors, judged: int | None = None) -> str:
-    """A sortable table; from column `judged` on stand the MEASURES, the best of each marked."""
+def _grid(columns, rows, colors, judged: int | None = None, floor=None) -> str:
+    """A sortable table; from column `judged` on stand the MEASURES, the best of each marked.
+
+    The row `floor` takes no part in that.
+    """
     heads = "".join(
         f'<th scope="col"><button type="button">{escape(str(c))}</button></th>' for c in columns
     )
     best: dict[int, float] = {}
-    if judged is not None and len(rows) > 1:
+    ranked = [row for row in rows if row is not floor]
+    if judged is not None and len(ranked) > 1:
         for i, m in enumerate(MEASURES.values(), judged):
-            best[i] = (max if m.more_is_better else min)(row[i] for row in rows)
+            best[i] = (max if m.more_is_better else min)(row[i] for row in ranked)
     digits = {i: _digits(row[i] for row in rows) for i in range(len(columns))}
     if judged is not None:
         digits |= {i: m.digits for i, m in enumerate(MEASURES.values(), judged)}
@@ -239,7 +257,8 @@ def _grid(columns, rows, colors, judged: int | None = None) -> str:
     for row in rows:
         cells = []
         for i, value in enumerate(row):
-            mark = " class=best" if i in best and value == best[i] else ""
+            wins = i in best and value == best[i] and row is not floor
+            mark = " class=best" if wins else ""
             key = f' data-value="{value}"' if isinstance(value, int | float) else ""
             key = ' data-value=""' if value is None else key
             text = escape(_text(value, digits[i]))
@@ -278,7 +297,9 @@ def _foot(report: Report) -> str:
         f"<h2>How to read this</h2>{notes}<dl>{judges}<dt>error maps</dt>"
         f"<dd>{FLIP_GAIN:g} times FLIP of every pixel: black is alike, white very different</dd>"
         "<dt>time</dt><dd>wall clock from recording to the end of the GPU's work, the least of "
-        "several rounds in turns; compare times of one page only</dd></dl>"
+        "several rounds in turns; compare times of one page only</dd>"
+        "<dt>noise floor</dt><dd>what a perfect picture would get, as the truth has noise: each "
+        "of two independent halves of the truth against their mean</dd></dl>"
         "<p class=soft>Figures were taken from floating point pictures; those on this page are "
         "compressed. JSON and CSV lie beside it.</p>"
     )
@@ -287,7 +308,7 @@ def _foot(report: Report) -> str:
 # ---- plots ----------------------------------------------------------------------------------
 
 
-def _curves(entries: list[Entry]) -> list[Plot]:
+def _curves(entries: list[Entry], floor: dict[str, float]) -> list[Plot]:
     plots = []
     for judge in ("flip", "psnr"):
         m = MEASURES[judge]
@@ -299,8 +320,9 @@ def _curves(entries: list[Entry]) -> list[Plot]:
                 curves.setdefault(e.label, []).append((key(e), e.measures[judge]))
             better = "higher is better" if m.more_is_better else "lower is better"
             plots.append(
-                Plot(f"{m.title} against {title}", x, f"{m.title}{unit}, {better}", curves)
-            )
+                Plot(f"{m.title} against {title}", x, f"{m.title}{unit}, {better}", curves,
+                     floor=floor.get(judge))
+            )  # fmt: skip
     return plots
 
 
@@ -328,7 +350,8 @@ def svg(plot: Plot, colors: dict[str, str]) -> str:
         return ""
     xs, ys = ([p[i] for p in points] for i in (0, 1))
     x_ticks = _log_ticks(min(xs), max(xs)) if plot.log else _ticks(min(xs), max(xs))
-    y_ticks = _ticks(min(ys), max(ys))
+    floor = [plot.floor] if plot.floor is not None and math.isfinite(plot.floor) else []
+    y_ticks = _ticks(min(ys + floor), max(ys + floor))
     along = math.log if plot.log else float
     low_x = along(min(*x_ticks, *xs))
     high_x = along(max(*x_ticks, *xs))
@@ -357,6 +380,13 @@ def svg(plot: Plot, colors: dict[str, str]) -> str:
         f'<text x="{_WIDTH - _RIGHT}" y="{_HEIGHT - 4}" text-anchor="end">{escape(plot.x)}</text>'
         f'<text x="{_LEFT}" y="{_HEIGHT - 4}">{escape(plot.y)}</text>'
     )
+    for level in floor:
+        above = y(level) > _TOP + 16
+        parts.append(
+            f'<line class="floor" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{y(level)}" '
+            f'y2="{y(level)}"><title>noise floor of the truth: {level:.4g}</title></line>'
+            f'<text x="{_LEFT + 4}" y="{y(level) + (-4 if above else 13)}">noise floor</text>'
+        )
     for name, curve in plot.curves.items():
         at = [(x(a), y(b), a, b) for a, b in sorted(curve) if math.isfinite(b)]
         line = "M" + "L".join(f"{a},{b}" for a, b, *_ in at)
