@@ -18,14 +18,17 @@ from wgmb import (
     display,
     exr,
     gpu,
+    perceive,
     scenes,
     stills,
 )
 from wgmb.blur import METHODS
+from wgmb.perceive import Cone
 from wgmb.timing import Timing
 from wgmb.viewer import State, controls, offscreen
 from wgmb.viewer.pace import Pace
 from wgmb.viewer.stage import shutter_of
+from wgmb.viewer.subject import SceneSubject
 from wgmb.viewer.window import frame
 
 SIZE = 640, 1010  # tall enough for the whole panel; the picture is 320 x 180
@@ -57,7 +60,7 @@ class Hand:
         for _ in range(400):
             self.look(0.4)
             if not self.viewer.stage.report.busy:
-                return self.viewer.stage.picture()
+                return self.viewer.screen.picture()
         raise AssertionError("never done")
 
     def drag(self, start, end, button=1, modifiers=()):
@@ -133,7 +136,7 @@ def test_the_window_shows_the_picture_in_its_place(hand):
 
 
 def test_every_method_and_scene_can_be_chosen(hand):
-    methods = hand.viewer.stage.methods(PLAIN)
+    methods = hand.viewer.stage.choices.methods(PLAIN)
     assert set(METHODS) - set(methods) == {"volume"}  # there is none in the scene
     for method in methods:
         hand.choose("method", method)
@@ -181,17 +184,118 @@ def test_depth_is_grey_and_nearer_is_brighter(hand):
 def test_what_a_method_shows_of_itself_can_be_looked_at(hand):
     hand.viewer.state = replace(PLAIN, method="reproject")
     result = hand.picture()
-    assert "count" in hand.viewer.stage.looks(hand.state)
+    assert "count" in hand.viewer.stage.choices.looks(hand.state)
     hand.choose("look at", "count")
     assert np.abs(hand.picture() - result).max() > 0.1
 
 
 def test_all_that_can_be_looked_at_can_be_drawn(hand):
-    for method in hand.viewer.stage.methods(PLAIN):
-        for look in hand.viewer.stage.looks(replace(PLAIN, method=method)):
+    for method in hand.viewer.stage.choices.methods(PLAIN):
+        for look in hand.viewer.stage.choices.looks(replace(PLAIN, method=method)):
             if look != "error":
                 hand.viewer.state = replace(PLAIN, method=method, look=look)
                 assert np.isfinite(hand.picture()).all()
+
+
+def seen(frames, fps, after=0.0):
+    """What wgmb/perceive.py makes of the frames, the first of which was always there."""
+    eye = perceive.Viewer(fps)
+    for picture in frames:
+        eye.look(picture)
+    return stills.srgb(np.clip(eye.sees(after)[..., :3], 0, 1))
+
+
+def rendered(numbers, fps=24.0, rays=1, **blur):
+    how = Blur(**{"samples": 4, **blur})
+    render = Render(scenes.make("crossing"), how, size=(320, 180), rays=rays, fps=fps)
+    return [render(n / fps, n) for n in numbers]
+
+
+@pytest.mark.parametrize("frame, newest, after", [(3.0, 3, 0.0), (3.4, 3, 0.4), (2.5, 3, -0.5)])
+def test_what_is_perceived_is_what_the_library_says(hand, frame, newest, after):
+    hand.viewer.state = replace(PLAIN, look="perceived", frame=frame)
+    got = hand.picture()
+    want = seen(rendered(range(newest - 12, newest + 1)), 24.0, after / 24)
+    assert np.abs(got - want).max() < 4e-3  # the library keeps pictures as f16
+    hand.viewer.state = replace(hand.state, look="result")
+    assert np.abs(hand.picture() - want).mean() > 0.005
+
+
+@pytest.mark.parametrize("method", ["distributed", "gather"])
+def test_what_stands_still_is_perceived_as_it_is(hand, method):
+    state = replace(PLAIN, settings=(("speed", 0.0),), samples=64, method=method, frame=2.0)
+    hand.viewer.state = state
+    result = hand.picture()
+    hand.viewer.state = replace(state, look="perceived")
+    got = hand.picture()
+    apart = np.abs(got - result)  # distributed has other noise in every frame
+    assert apart.max() < 2e-3 if method == "gather" else apart.mean() < 0.02
+
+
+def test_only_new_frames_are_drawn_while_it_plays(hand, monkeypatch):
+    drawn = []
+
+    def draw(self, blur, *given):
+        drawn.append(self._number)
+        return plain(self, blur, *given)
+
+    plain = SceneSubject.draw
+    monkeypatch.setattr(SceneSubject, "draw", draw)
+    hand.viewer.state = replace(PLAIN, look="perceived", frame=4.0)
+    hand.picture()
+    held = Cone().held(24)
+    assert sorted(drawn) == list(range(5 - held, 5))
+    drawn.clear()
+    for key, number in (("ArrowRight", [5]), ("ArrowUp", []), ("ArrowRight", [6]), ("h", []),
+                        ("ArrowLeft", [6 - held]), ("ArrowLeft", [5 - held])):  # fmt: skip
+        hand.press(key)
+        hand.picture()
+        assert drawn == number, key
+        drawn.clear()
+    hand.viewer.state = replace(hand.state, cone_peak=0.051, exposure=1.0)
+    hand.picture()
+    assert drawn == []
+    hand.viewer.state = replace(hand.state, shutter=90.0)
+    hand.picture()
+    assert len(drawn) == held
+
+
+def test_who_perceives_is_set_in_the_panel(hand):
+    hand.viewer.state = replace(PLAIN, look="perceived", frame=4.0)
+    before = hand.picture()
+    hand.touch("cone_rate", 0.9)
+    hand.touch("cone_peak", 0.05)
+    assert hand.state.cone_rate > 100 and hand.state.cone_peak < 0.02
+    quick = hand.picture()
+    assert np.abs(quick - before).mean() > 0.005
+    hand.viewer.state = State.of_toml(hand.state.toml())
+    assert np.array_equal(hand.picture(), quick)
+
+
+def test_the_reference_of_what_is_perceived_is_perceived_nature(hand):
+    """Nature is a video of very many frames."""
+    state = replace(PLAIN, look="perceived", compare="wipe", against="reference", wipe=0.0,
+                    frame=4.0)  # fmt: skip
+    hand.viewer.state = state
+    nature = hand.picture()
+    assert hand.viewer.stage.report.labels == ("tap, perceived", "nature, perceived")
+    assert hand.viewer.stage.report.measured.samples == 1024
+    sharp = {"rays": 3, "shutter": 0}
+    want = seen(rendered(range(40 - 115, 41), 240.0, **sharp), 240.0)
+    video = seen(rendered(range(-8, 5), 24.0, **sharp), 24.0)
+    apart = [np.abs(a - want)[:, 3:].mean() for a in (nature, video)]
+    assert apart[0] < 0.004 and apart[0] < 0.7 * apart[1], apart
+
+
+def test_nature_is_exact_where_volumes_are(hand):
+    hand.viewer.state = replace(
+        PLAIN.opened("disk"), frame=8.0, look="perceived", compare="difference",
+        against="reference", gain=1.0,
+    )  # fmt: skip
+    boxes = hand.picture().mean()
+    assert hand.viewer.stage.report.labels[1] == "nature, perceived"
+    hand.viewer.state = replace(hand.state, shutter=0.0)
+    assert hand.picture().mean() > 1.2 * boxes > 0
 
 
 # ---- mouse and keys -------------------------------------------------------------------------
@@ -373,13 +477,13 @@ def test_a_parameter_of_the_scene(hand):
 @pytest.mark.parametrize("name", list(scenes.SCENES))
 def test_the_panel_changes_nothing_by_itself(hand, name):
     opened = PLAIN.opened(name)
-    for method in hand.viewer.stage.methods(opened):
+    for method in hand.viewer.stage.choices.methods(opened):
         odd = {"fastest": 0.0431, "max_blur": 33.3, "phase": "0.123", "shutter": 123.4}
-        state = hand.viewer.stage.possible(replace(opened, method=method, **odd))
+        state = hand.viewer.stage.choices.possible(replace(opened, method=method, **odd))
         hand.viewer.state = state
         hand.look()
         assert hand.state == state
-        if "velocity" in hand.viewer.stage.looks(state):
+        if "velocity" in hand.viewer.stage.choices.looks(state):
             hand.viewer.state = replace(state, look="velocity")
             hand.look()
             assert hand.state == replace(state, look="velocity")
@@ -390,7 +494,7 @@ def test_a_value_that_is_refused_is_said_and_undone(hand):
     hand.viewer.state = replace(PLAIN, source="fence", settings=(("posts", 900),))
     hand.look()
     assert hand.state == before
-    assert "posts" in hand.viewer._message[0]
+    assert "posts" in hand.viewer.message[0]
 
 
 def test_nothing_is_drawn_when_nothing_changes(hand):
@@ -449,7 +553,7 @@ def test_flicker_changes_with_the_clock(hand):
     seen = []
     for _ in range(4):
         hand.look(0.5)
-        seen.append(hand.viewer.stage.picture())
+        seen.append(hand.viewer.screen.picture())
     assert np.array_equal(seen[0], seen[2]) and np.array_equal(seen[1], seen[3])
     assert {a.tobytes() for a in seen} == {first.tobytes(), second.tobytes()}
 
@@ -459,13 +563,13 @@ def test_the_reference_converges_and_is_measured(hand):
     rays = []
     for _ in range(600):
         hand.look(0.4)
-        rays.append(hand.viewer.stage.report.reference)
-        if (found := hand.viewer.stage.report.measured) and found.rays >= 128:
+        rays.append(hand.viewer.stage.report.reference[0])
+        if (found := hand.viewer.stage.report.measured) and found.samples >= 128:
             break
     assert rays == sorted(rays) and len(set(rays)) > 3
     render = Render(scenes.make("crossing"), Blur(samples=4), size=(320, 180), rays=1)
     truth = Render(
-        render.scene, Blur("distributed", samples=found.rays), size=(320, 180), rays=1
+        render.scene, Blur("distributed", samples=found.samples), size=(320, 180), rays=1
     )(0.0)  # fmt: skip
     apart = stills.srgb(render(0.0)[..., :3]) - stills.srgb(truth[..., :3])
     assert found.psnr == pytest.approx(-10 * np.log10(np.mean(apart.astype("f8") ** 2)), abs=0.01)
@@ -474,7 +578,7 @@ def test_the_reference_converges_and_is_measured(hand):
     hand.submit("pointer_move", x=10, y=10, button=0, buttons=())
     hand.viewer.state = replace(hand.state, frame=1.0)
     hand.look()
-    assert hand.viewer.stage.report.reference < rays[-1]  # begun anew
+    assert hand.viewer.stage.report.reference[0] < rays[-1]  # begun anew
 
 
 # ---- the window -----------------------------------------------------------------------------
@@ -506,7 +610,7 @@ def test_an_error_while_drawing_is_not_swallowed(monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("broken")
 
-    monkeypatch.setattr(hand.viewer.stage, "compose", broken)
+    monkeypatch.setattr(hand.viewer.screen, "compose", broken)
     with pytest.raises(ZeroDivisionError):
         hand.look()
     assert hand.viewer.canvas.get_closed()
@@ -644,7 +748,7 @@ def test_render_takes_the_saved_settings(hand, tmp_path, monkeypatch):
     hand.viewer.do("load", "wgmb.toml")
     assert hand.state.source == "fence"
     hand.viewer.do("load", "nowhere.toml")
-    assert "nowhere" in hand.viewer._message[0]
+    assert "nowhere" in hand.viewer.message[0]
 
 
 @pytest.mark.parametrize("state", [MANY, replace(PLAIN.opened(SAMPLE), shutter=90.0)])
@@ -677,10 +781,10 @@ def test_export_runs_the_command_line(hand, tmp_path, monkeypatch):
     hand.viewer.state = replace(PLAIN, size="64x36", frames="0-1")
     hand.look()
     hand.viewer.do("export", str(tmp_path / "out.####.png"))
-    child = hand.viewer._export[0]
+    child = hand.viewer.actions.export[0]
     assert child.wait(60) == 0
     hand.look()
-    assert "made" in hand.viewer._export_said
+    assert "made" in hand.viewer.actions.export_said
     assert len(list(tmp_path.glob("*.png"))) == 2
 
 
@@ -719,11 +823,11 @@ def test_scrubbing_shutter_zoom_and_pan(reel):
 
 
 def test_frames_on_disk_have_no_reference(reel):
-    stage, state = reel.viewer.stage, reel.state
-    assert "error" not in stage.looks(state)
-    assert set(stage.methods(state)) == {n for n, m in METHODS.items() if "scene" not in m.needs}
-    assert "reference" not in stage.rivals(state)
-    for look in stage.looks(state):
+    choices, state = reel.viewer.stage.choices, reel.state
+    assert "error" not in choices.looks(state)
+    assert set(choices.methods(state)) == {n for n, m in METHODS.items() if "scene" not in m.needs}
+    assert "reference" not in choices.rivals(state)
+    for look in choices.looks(state):
         reel.viewer.state = replace(state, look=look)
         assert np.isfinite(reel.picture()).all()
 
@@ -734,7 +838,7 @@ def test_a_picture_without_passes_is_shown_as_it_is(tmp_path, hand):
     hand.viewer.state = PLAIN.opened(str(tmp_path / "plain.png"))
     hand.look()
     assert hand.state.look == "sharp"
-    assert hand.viewer.stage.looks(hand.state) == ["sharp"]
+    assert hand.viewer.stage.choices.looks(hand.state) == ["sharp"]
     assert np.abs(stills.srgb(hand.viewer.stage.download()[..., :3]) - image / 255).max() < 0.01
 
 
@@ -742,7 +846,7 @@ def test_a_method_that_needs_a_scene_gives_way_to_one_that_does_not(reel):
     reel.viewer.state = replace(PLAIN.opened(SAMPLE), method="distributed", look="error")
     reel.look()
     assert (reel.state.method, reel.state.look) == (next(iter(METHODS)), "result")
-    assert "distributed" in reel.viewer._message[0]
+    assert "distributed" in reel.viewer.message[0]
 
 
 def test_what_cannot_be_opened_is_told(tmp_path):

@@ -19,9 +19,9 @@ SIZE = 800, 720  # of the window; its picture is 480 wide
 PATIENCE = 90  # seconds: a busy machine without a GPU is slow
 BROKEN = """
 from wgmb.viewer import State, view
-from wgmb.viewer.stage import Stage
+from wgmb.viewer.screen import Screen
 def compose(*_): raise ZeroDivisionError("broken")
-Stage.compose = compose
+Screen.compose = compose
 view(State())
 """
 CLOSE = """

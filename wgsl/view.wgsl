@@ -13,6 +13,7 @@ struct View {
     key: vec4f,         // of the bar that explains the colours [px]; no width: none
     wheel: vec4f,       // of the wheel that explains the colours of motion [px]
     line: f32,          // of the wipe, from the left [px]
+    thick: f32,         // half of a line [px]
     exposure: f32,      // times
     gain: f32,          // times a difference
     middle: f32,        // depth of middle grey [scene units]
@@ -63,7 +64,7 @@ fn composed(at: vec2f) -> vec3f {
     if !inside(at, view.place) { return BACKGROUND; }
     let uv = (at - view.place.xy) / view.place.zw;
     if COMPARE == WIPE {
-        if abs(at.x - view.line) < 1.0 { return vec3f(0.95); }
+        if abs(at.x - view.line) < view.thick { return vec3f(0.95); }
         if at.x > view.line { return seen(second, SECOND, uv); }
     }
     let here = seen(first, FIRST, uv);
@@ -80,7 +81,7 @@ fn composed(at: vec2f) -> vec3f {
 fn side_by_side(at: vec2f) -> vec3f {
     let half = vec2f(0.5 * view.area.z, view.area.w);
     let right = at.x >= view.area.x + half.x;
-    if abs(at.x - view.area.x - half.x) < 1.0 { return vec3f(0.35); }
+    if abs(at.x - view.area.x - half.x) < view.thick { return vec3f(0.35); }
     let middle = view.area.xy + half * vec2f(select(0.5, 1.5, right), 0.5);
     let size = view.place.zw * 0.5;
     let pan = (view.place.xy + size - view.area.xy - view.area.zw * 0.5) * 0.5;

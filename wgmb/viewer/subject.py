@@ -52,6 +52,11 @@ class SceneSubject:
             return ["volume"]
         return can if scene.has_volumes else [name for name in can if name != "volume"]
 
+    def is_exact(self, state: State) -> bool:
+        """Whether `volume` shows it under any shutter; some figures have one of their own."""
+        scene = self._scene(state)
+        return scene.has_volumes and (scene.figure is None or scene.figure.shutter is None)
+
     def size(self, state: State) -> tuple[int, int]:
         """Width and height that give the picture its shape [px]."""
         return size_of(state.size)
@@ -111,6 +116,10 @@ class ClipSubject:
     def methods(self, state: State) -> list[str]:
         """Names of the methods that can be fed."""
         return methods_for(self.has(state))
+
+    def is_exact(self, state: State) -> bool:
+        """Whether `volume` shows it: these are no volumes."""
+        return False
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height of the frames [px]."""
