@@ -223,13 +223,13 @@ def test_what_is_perceived_is_what_the_library_says(hand, frame, newest, after):
 
 @pytest.mark.parametrize("method", ["distributed", "gather"])
 def test_what_stands_still_is_perceived_as_it_is(hand, method):
-    state = replace(PLAIN, settings=(("speed", 0.0),), samples=64, method=method, frame=2.0)
+    state = replace(PLAIN, settings=(("speed", 0.0),), samples=16, method=method, frame=2.0)
     hand.viewer.state = state
     result = hand.picture()
     hand.viewer.state = replace(state, look="perceived")
     got = hand.picture()
     apart = np.abs(got - result)  # distributed has other noise in every frame
-    assert apart.max() < 2e-3 if method == "gather" else apart.mean() < 0.02
+    assert apart.max() < 2e-3 if method == "gather" else apart.mean() < 0.03
 
 
 def test_only_new_frames_are_drawn_while_it_plays(hand, monkeypatch):
@@ -277,11 +277,13 @@ def test_the_reference_of_what_is_perceived_is_perceived_nature(hand):
     state = replace(PLAIN, look="perceived", compare="wipe", against="reference", wipe=0.0,
                     frame=4.0)  # fmt: skip
     hand.viewer.state = state
-    nature = hand.picture()
+    while hand.viewer.stage.report.reference[0] < 200:
+        hand.look(0.4)
+    nature = hand.viewer.screen.picture()
     assert hand.viewer.stage.report.labels == ("tap, perceived", "nature, perceived")
-    assert hand.viewer.stage.report.measured.samples == 1024
+    assert hand.viewer.stage.report.measured.psnr > 20
     sharp = {"rays": 3, "shutter": 0}
-    want = seen(rendered(range(40 - 115, 41), 240.0, **sharp), 240.0)
+    want = seen(rendered(range(20 - 60, 21), 120.0, **sharp), 120.0)
     video = seen(rendered(range(-8, 5), 24.0, **sharp), 24.0)
     apart = [np.abs(a - want)[:, 3:].mean() for a in (nature, video)]
     assert apart[0] < 0.004 and apart[0] < 0.7 * apart[1], apart
@@ -296,6 +298,9 @@ def test_nature_is_exact_where_volumes_are(hand):
     assert hand.viewer.stage.report.labels[1] == "nature, perceived"
     hand.viewer.state = replace(hand.state, shutter=0.0)
     assert hand.picture().mean() > 1.2 * boxes > 0
+    for name, choice in (("crossing", True), ("torusphere", False), ("cone", False)):
+        state = replace(PLAIN.opened(name), look="perceived")
+        assert ("reference" in hand.viewer.stage.choices.rivals(state)) is choice
 
 
 # ---- mouse and keys -------------------------------------------------------------------------

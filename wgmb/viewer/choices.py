@@ -61,10 +61,10 @@ class Choices:
     def reference(self, state: State) -> str | None:
         """The method that draws what the picture should be, if there is one.
 
-        The method's own result where it is exact and a world without frames is wanted.
+        Where it is looked at what is perceived, that is nature: a world without frames.
         """
-        if state.eye and state.method == "volume" and self.subject(state).is_exact(state):
-            return "volume"
+        if state.eye:
+            return self.subject(state).nature(state)
         return "distributed" if "distributed" in self.methods(state) else None
 
     def rivals(self, state: State) -> list[str]:

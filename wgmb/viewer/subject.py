@@ -52,10 +52,15 @@ class SceneSubject:
             return ["volume"]
         return can if scene.has_volumes else [name for name in can if name != "volume"]
 
-    def is_exact(self, state: State) -> bool:
-        """Whether `volume` shows it under any shutter; some figures have one of their own."""
+    def nature(self, state: State) -> str | None:
+        """The method that shows it under a shutter of any length, if there is one."""
         scene = self._scene(state)
-        return scene.has_volumes and (scene.figure is None or scene.figure.shutter is None)
+        if scene.figure is not None:
+            perceived = scene.figure.kind in ("NATURAL", "SCREEN")  # already
+            return None if perceived else "volume"
+        if callable(scene.volumes):  # their speeds are those of a moment
+            return None
+        return "volume" if scene.volumes and state.method == "volume" else "distributed"
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height that give the picture its shape [px]."""
@@ -117,9 +122,9 @@ class ClipSubject:
         """Names of the methods that can be fed."""
         return methods_for(self.has(state))
 
-    def is_exact(self, state: State) -> bool:
-        """Whether `volume` shows it: these are no volumes."""
-        return False
+    def nature(self, state: State) -> str | None:
+        """The method that shows it under a shutter of any length: nobody knows more than frames."""
+        return None
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height of the frames [px]."""
