@@ -15,7 +15,7 @@ from .subject import Option
 from .widgets import Widgets
 
 WIDTH = 320.0  # of the panel [logical px]
-_TALL = 1000.0  # a window so high shows everything opened [logical px]
+_HIGH, _TALL = 830.0, 1000.0  # windows so high show more opened, and all [logical px]
 
 
 @dataclass
@@ -78,12 +78,12 @@ class Panel:
             flags = imgui.WindowFlags_
             fixed = flags.no_title_bar | flags.no_resize | flags.no_move | flags.no_collapse
             imgui.begin("panel", None, fixed | flags.no_nav | flags.no_bring_to_front_on_focus)
-            state = self._sections(state, info, window[1] >= _TALL)
+            state = self._sections(state, info, window[1])
             imgui.end()
         self.active = imgui.is_any_item_active()
         return state
 
-    def _sections(self, state: State, info: Info, tall: bool) -> State:
+    def _sections(self, state: State, info: Info, height: float) -> State:
         self._header(info)
         state = self._transport(state)
         for title, section, opened in (
@@ -91,9 +91,9 @@ class Panel:
             ("Blur", sections.blur, True),
             ("Shutter", sections.shutter, True),
             ("View", sections.view, True),
-            ("Animation", sections.animation, tall),
-            ("Time", sections.times, tall),
-            ("Files", self._files_section, tall),
+            ("Animation", sections.animation, height >= _HIGH),
+            ("Time", sections.times, height >= _TALL),
+            ("Files", self._files_section, height >= _TALL),
         ):
             imgui.set_next_item_open(opened, imgui.Cond_.once)
             imgui.spacing()
@@ -106,6 +106,8 @@ class Panel:
     def _header(self, info: Info) -> None:
         size, full = info.report.size, info.report.full
         imgui.text("wgmb")
+        imgui.same_line()
+        imgui.text_disabled("h: help")
         share = size[0] / max(full[0], 1)
         times = info.frame_times
         text = f"{size[0]} x {size[1]}" + (f" ({share:.0%})" if share < 0.995 else "")

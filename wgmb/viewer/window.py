@@ -29,6 +29,7 @@ TITLE = "wgmb"
 _AFTER_WHEEL = 0.3  # seconds for which turning the wheel counts as moving
 _REPEAT = 0.4, 0.05  # seconds until a held arrow key repeats, and from one time to the next
 _FLICKER = 0.5  # seconds an image is shown
+_AFTER_EVENT = 3  # frames: ImGui hides what appears for its first one
 _MESSAGE = 4.0  # seconds a message stays
 _TIMES = 90  # frames in the plots
 _HANDLED = ("pointer_down", "pointer_up", "pointer_move", "wheel", "key_down", "key_up")
@@ -71,6 +72,7 @@ class Viewer:
         self._key: tuple[str, float] | None = None  # an arrow that is down, and when it is due
         self._repeating = False
         self._wheel_until = 0.0
+        self._due = 0  # frames still to be drawn because of an event
         self._now = self._last = clock()
         self._frame_times: deque[float] = deque(maxlen=_TIMES)
         self._draw_times: deque[float] = deque(maxlen=_TIMES)
@@ -99,6 +101,7 @@ class Viewer:
         return guarded
 
     def _on_any(self, event: dict) -> None:
+        self._due = _AFTER_EVENT
         self.canvas.request_draw()
 
     def _on_event(self, event: dict) -> None:
@@ -254,9 +257,11 @@ class Viewer:
 
     def _ask_for_more(self, busy: bool) -> None:
         waiting = self._now < self.message[1] or self.actions.export is not None
+        self._due -= 1
         if (
             busy
             or waiting
+            or self._due > 0
             or self.state != self._good
             or self.state.playing
             or self.actions.recording
