@@ -25,7 +25,7 @@ from wgmb import (
 from wgmb.blur import METHODS
 from wgmb.perceive import Cone
 from wgmb.timing import Timing
-from wgmb.viewer import State, controls, offscreen
+from wgmb.viewer import State, controls, offscreen, stage
 from wgmb.viewer.pace import Pace
 from wgmb.viewer.stage import shutter_of
 from wgmb.viewer.subject import SceneSubject
@@ -400,6 +400,20 @@ def test_keys(hand):
         assert getattr(hand.state, name) == pytest.approx(value), key
 
 
+def test_an_arrow_that_is_held_down_repeats(hand):
+    hand.submit("key_down", key="ArrowRight")
+    hand.look(0.11)
+    hand.look(0.11)
+    assert hand.state.frame == 1
+    for _ in range(6):
+        hand.look(0.11)
+    assert hand.state.frame == 5  # 0.4 s after it went down the first time, then at every look
+    hand.submit("key_up", key="ArrowRight")
+    hand.look(0.11)
+    hand.look(1.0)
+    assert hand.state.frame == 5
+
+
 def test_every_key_of_the_help_does_something():
     layout = controls.Layout((0, 0, 9, 9), (0, 0, 9, 9), tuple(METHODS), ("result", "sharp"),
                              ("off", "wipe"))  # fmt: skip
@@ -586,6 +600,25 @@ def test_the_reference_converges_and_is_measured(hand):
     assert hand.viewer.stage.report.reference[0] < rays[-1]  # begun anew
 
 
+def test_what_is_shown_never_has_less_in_it_than_before(hand, monkeypatch):
+    monkeypatch.setattr(stage, "_STEP", 0.0)  # a few samples at a time
+    hand.viewer.state = replace(PLAIN, method="accumulate", samples=32)
+    want, shown = hand.picture(), hand.viewer.stage._shown
+    hand.submit("pointer_down", x=100, y=500, button=1, buttons=(1,))
+    for _ in range(3):
+        hand.look()
+        assert np.array_equal(hand.viewer.screen.picture(), want)  # nothing has moved yet
+    hand.submit("pointer_move", x=110, y=500, button=0, buttons=(1,))
+    hand.look()
+    assert shown["first"].done == 4
+    hand.submit("pointer_up", x=110, y=500, button=1, buttons=())
+    done = []
+    while hand.viewer.stage.report.busy:
+        hand.look(0.4)
+        done.append(shown["first"].done)
+    assert done == sorted(done) and done[0] == 4 and done[-1] == 32 and len(set(done)) > 3
+
+
 # ---- the window -----------------------------------------------------------------------------
 
 
@@ -599,6 +632,49 @@ def test_sizes_and_hidpi(size, ratio):
     assert shown.shape[:2] == (height, width) and abs(width / height - 16 / 9) < 0.02
     x, y, wide, high = hand.viewer.panel.places["method"]
     assert x + wide <= size[0] and y + high <= size[1]
+
+
+def test_twice_the_pixels_show_the_same_twice_as_fine():
+    state = replace(PLAIN, look="velocity", compare="wipe", against="sharp", wipe=0.25)
+    coarse, fine = Hand(state, (640, 400), 1.0), Hand(state, (640, 400), 2.0)
+    for hand in (coarse, fine):
+        hand.picture()
+    a, b = coarse.look(), fine.look()
+    assert b.shape == (800, 1280, 3)
+    halved = b.reshape(400, 2, 640, 2, 3).mean(axis=(1, 3))
+    assert np.abs(a - halved).mean() < 3  # the panel's letters are finer
+    places = [[*hand.viewer.panel.places.values()] for hand in (coarse, fine)]
+    np.testing.assert_allclose(*places, atol=2)  # letters have parts of pixels
+    x = 80 * 2
+    line = (b[250, x - 2 : x + 2] > 230).all(axis=1)
+    assert line.all() and not (b[250, [x - 3, x + 2]] > 230).all(axis=1).any()  # as thick
+
+
+def test_the_mouse_is_where_it_is_seen_at_any_ratio():
+    state = replace(PLAIN, compare="wipe", against="sharp")
+    for ratio in (1.0, 1.5, 2.0):
+        hand = Hand(state, (640, 400), ratio)
+        hand.drag((160, 200), (80, 200))
+        assert hand.state.wipe == pytest.approx(0.25, abs=0.01)
+        hand.drag((200, 200), (220, 200))
+        assert hand.state.orbit[0] == pytest.approx(-20 / 320 * np.degrees(4.0))
+        hand.touch("shutter", 0.5)
+        assert hand.state.shutter == pytest.approx(360, abs=15)
+
+
+def test_moving_to_a_screen_of_another_ratio_and_back():
+    hand = Hand(PLAIN, (640, 400), 1.0)
+    before, canvas = hand.picture(), hand.viewer.canvas
+    whole, places = hand.look(), [*hand.viewer.panel.places.values()]
+    canvas.set_pixel_ratio(2.0)  # and what a window does then:
+    canvas.set_logical_size(640, 400)
+    fine = hand.picture()
+    assert hand.look().shape == (800, 1280, 3) and fine.shape[0] == 2 * before.shape[0]
+    np.testing.assert_allclose([*hand.viewer.panel.places.values()], places, atol=2)
+    canvas.set_pixel_ratio(1.0)
+    canvas.set_logical_size(640, 400)
+    assert np.array_equal(hand.picture(), before)
+    assert np.abs(hand.look() - whole).max() <= 1
 
 
 def test_resizing(hand):

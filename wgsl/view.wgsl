@@ -1,6 +1,6 @@
 // What the viewer shows: one or two images, as colour, depth or motion, side by side or compared.
 //#include common/frame.wgsl
-//#include common/finite.wgsl
+//#include common/wheel.wgsl
 
 @group(1) @binding(0) var<uniform> view: View;
 @group(1) @binding(1) var first: texture_2d<f32>;
@@ -144,13 +144,9 @@ fn grey_of(depth: f32) -> f32 {
     return view.middle / (view.middle + depth);
 }
 
-/// As wgmb/display.py: hue is the direction, brightness the speed [image heights per frame].
 fn motion_color(motion: vec2f) -> vec3f {
     if !is_finite(motion.x) || !is_finite(motion.y) { return vec3f(0.2); }
-    let value = clamp(length(motion) / view.fastest, 0.0, 1.0);
-    let hue = select(atan2(motion.y, motion.x), 0.0, value == 0.0);
-    let phase = vec3f(hue) - vec3f(0.0, TURN / 3.0, 2.0 * TURN / 3.0);
-    return srgb((0.5 + 0.5 * cos(phase)) * value);
+    return srgb(wheel_color(motion, view.fastest));    // image heights per frame
 }
 
 /// Black, violet, red, yellow, white for 0 to 1.
