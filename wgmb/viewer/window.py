@@ -77,6 +77,7 @@ class Viewer:
         self._frame_times: deque[float] = deque(maxlen=_TIMES)
         self._draw_times: deque[float] = deque(maxlen=_TIMES)
         self._passes: dict[str, float] = {}
+        self._timed = ("", "")
         self._info: Info | None = None
         self._sliding = False
         # Before ImGui's handlers, which keep to themselves what they take.
@@ -190,6 +191,8 @@ class Viewer:
             ratio,
         )
         self.screen.paint(self._context.get_current_texture())
+        if report.labels != self._timed:  # what is not drawn any more is forgotten
+            self._timed, self._passes = report.labels, {}
         self._passes |= report.seconds | report.passes | {"view": self.screen.seconds}
         self._imgui.render()
         self.actions.add_frame()
