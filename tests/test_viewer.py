@@ -25,7 +25,7 @@ from wgmb import (
 from wgmb.blur import METHODS
 from wgmb.perceive import Cone
 from wgmb.timing import Timing
-from wgmb.viewer import State, controls, offscreen, stage
+from wgmb.viewer import State, actions, controls, offscreen, stage
 from wgmb.viewer.pace import Pace
 from wgmb.viewer.stage import shutter_of
 from wgmb.viewer.subject import SceneSubject
@@ -516,6 +516,15 @@ def test_a_value_that_is_refused_is_said_and_undone(hand):
     assert "posts" in hand.viewer.message[0]
 
 
+def test_the_full_screen_is_that_of_the_monitor_the_window_is_on(monkeypatch):
+    areas = {"left": (0, 0, 1920, 1080), "right": (1920, 0, 2560, 1440)}
+    monkeypatch.setattr(actions.glfw, "get_monitors", lambda: list(areas))
+    monkeypatch.setattr(actions.glfw, "get_monitor_workarea", areas.get)
+    assert actions._monitor_of((1500, 100, 800, 600)) == "left"  # most of it
+    assert actions._monitor_of((1600, 100, 800, 600)) == "right"
+    assert actions._monitor_of((-5000, 0, 10, 10)) == "left"  # nowhere to be seen
+
+
 def test_nothing_is_drawn_when_nothing_changes(hand):
     hand.picture()
     hand.look()
@@ -782,6 +791,8 @@ MANY = State(
     against="tap",
     exposure=-0.5,
     tone="soft",
+    cone_rate=80.0,
+    cone_peak=0.02,
     playing=True,
     speed=0.5,
 )
@@ -807,6 +818,7 @@ def test_settings_come_back_as_they_were_saved(state):
         ('[render]\nscene = "crossing"\ncolour = 1', "colour"),
         ('[render]\nscene = "crossing"\n[view]\ncompare = "both"', "both"),
         ('[render]\nscene = "crossing"\n[view]\nzoo = 1', "zoo"),
+        ('[render]\nscene = "crossing"\n[view]\ncone_rate = 0', "rate"),
         ('[render]\nscene = "crossing"\n[view]\nframes = "x-y"', "x-y"),
     ],
 )

@@ -320,6 +320,7 @@ def _of_tables(render: dict | None, blur: dict | None, view: dict) -> State:
         values[name] = _typed(name, value, kinds[name].default)
     values |= {name: tuple(found) for name, found in pairs.items()}
     state = State(**values)  # pyright: ignore[reportArgumentType]
+    Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
     if state.method not in METHODS:
         raise InputError(f"unknown method {state.method!r}, one of {', '.join(METHODS)}")
     return state.settled()
