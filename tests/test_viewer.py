@@ -897,6 +897,16 @@ def test_frames_on_disk_are_blurred_as_the_library_does(reel):
     assert np.abs(got - want[..., :3]).max() < 1e-5
 
 
+def test_frames_on_disk_are_perceived_too(reel):
+    state = reel.state
+    reel.viewer.state = replace(state, look="perceived", frame=11.0)
+    reel.picture()
+    got = stills.srgb(np.clip(reel.viewer.stage.download()[..., :3], 0, 1))
+    blur = Blur(samples=4)
+    assert np.abs(got - seen([blur(frame)[..., :3] for frame in Clip(SAMPLE)], 24.0)).max() < 4e-3
+    reel.viewer.state = state
+
+
 def test_scrubbing_shutter_zoom_and_pan(reel):
     first = reel.picture()
     reel.press("ArrowRight")
