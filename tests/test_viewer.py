@@ -27,6 +27,7 @@ from wgmb.perceive import Cone
 from wgmb.timing import Timing
 from wgmb.viewer import State, actions, controls, offscreen, stage
 from wgmb.viewer.pace import Pace
+from wgmb.viewer.screen import key_box
 from wgmb.viewer.stage import shutter_of
 from wgmb.viewer.subject import SceneSubject
 from wgmb.viewer.window import frame
@@ -584,6 +585,20 @@ def test_flicker_changes_with_the_clock(hand):
         seen.append(hand.viewer.screen.picture())
     assert np.array_equal(seen[0], seen[2]) and np.array_equal(seen[1], seen[3])
     assert {a.tobytes() for a in seen} == {first.tobytes(), second.tobytes()}
+
+
+def test_the_error_is_shown_however_others_are_compared(hand):
+    shown = []
+    for compare in ("off", "wipe", "split", "difference", "flicker"):
+        hand.viewer.state = replace(PLAIN, look="error", compare=compare)
+        hand.look(1.0)
+        for _ in range(2):
+            hand.look(0.5)
+            shown.append(hand.viewer.screen.picture())
+        assert key_box(hand.state, "COLOR", (0, 0, 9, 9), (0, 0, 9, 9), 1.0)
+        layout = controls.Layout((0, 0, 320, 1010), (0, 400, 320, 180))
+        assert controls.grip(hand.state, layout, 160, 500, 1, ()) == "orbit"
+    assert all(picture.max() > 0.3 for picture in shown)  # flicker would show black in between
 
 
 def test_the_reference_converges_and_is_measured(hand):

@@ -146,14 +146,14 @@ def fit(shape: tuple[int, int], area: Box, state: State) -> Box:
 
 def key_box(state: State, kind: str, place: Box, area: Box, ratio: float) -> Box | None:
     """Where the colours of the first image are explained [px]; None where they need no words."""
-    if state.compare in ("split", "difference"):
+    if state.mode in ("split", "difference"):
         return None
     x, y, width, height = overlap(place, area)
     margin = _MARGIN * ratio
     if kind == "MOTION":
         edge = min(_WHEEL * ratio, 0.3 * min(width, height))
         return x + width - edge - margin, y + height - edge - margin, edge, edge
-    if kind == "DEPTH" or state.look == "error":
+    if kind == "DEPTH" or state.mode == "error":
         long, high = min(_KEY_WIDTH * ratio, 0.4 * width), _KEY_HEIGHT * ratio
         return x + margin, y + height - high - margin, long, high
     return None
@@ -172,9 +172,7 @@ def overlap(a: Box, b: Box) -> Box:
 
 
 def _mode(state: State) -> str:
-    if state.look == "error":
-        return "ERROR"
-    return {"off": "ONE", "flicker": "ONE"}.get(state.compare, state.compare.upper())
+    return {"off": "ONE", "flicker": "ONE"}.get(state.mode, state.mode.upper())
 
 
 def _taps(images: tuple[Image, Image], place: tuple[int, int], mode: str) -> int:

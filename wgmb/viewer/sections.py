@@ -219,7 +219,7 @@ def _eye(ui: Widgets, state: State) -> State:
 
 
 def _compare(ui: Widgets, state: State, info: Info) -> State:
-    if state.look == "error":
+    if state.mode == "error":
         state = _gain(ui, state)
         _reference(info)
         return state

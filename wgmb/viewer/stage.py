@@ -173,11 +173,9 @@ class Stage:
 
     def _wanted(self, state: State) -> list[str]:
         """One or two names: of a look, a method or the reference."""
-        if state.look == "error":
+        if state.mode == "error":
             return ["result", REFERENCE]
-        if state.compare == "off":
-            return [state.look]
-        return [state.look, state.against]
+        return [state.look] if state.mode == "off" else [state.look, state.against]
 
     def _advance(
         self, slot, name, state, subject, size, rays, quick: bool, full: bool, report: Report

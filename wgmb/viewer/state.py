@@ -90,6 +90,11 @@ class State:
         return Cone(self.cone_rate, self.cone_peak) if self.look == "perceived" else None
 
     @property
+    def mode(self) -> str:
+        """How two images are compared: one of COMPARE, or "error", which has its own two."""
+        return "error" if self.look == "error" else self.compare
+
+    @property
     def picture(self) -> State:
         """The same without what only changes how the picture is shown."""
         plain = State()

@@ -245,7 +245,7 @@ class Viewer:
         self._good = state
 
     def _flicked(self) -> bool:
-        return self.state.compare == "flicker" and int(self._now / _FLICKER) % 2 == 1
+        return self.state.mode == "flicker" and int(self._now / _FLICKER) % 2 == 1
 
     def _gui(self) -> None:
         assert self._info is not None
@@ -271,7 +271,7 @@ class Viewer:
             or self.panel.active
             or self._key is not None
             or self._now < self._wheel_until
-            or self.state.compare == "flicker"
+            or self.state.mode == "flicker"
         ):
             self.canvas.request_draw()
 

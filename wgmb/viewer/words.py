@@ -18,17 +18,17 @@ def name_images(
     """What is on either side, over an area `width` wide from `x`, `y` [logical px]."""
     first, second = labels
     left, right = x + 12, x + width - 12
-    if state.look == "error":
+    if state.mode == "error":
         tag(f"error of {first}, x {state.gain:.0f}", left, y)
-    elif state.compare == "flicker":
+    elif state.mode == "flicker":
         tag(second if flicked else first, left, y)
-    elif state.compare == "wipe":
+    elif state.mode == "wipe":
         tag(first, left, y)
         tag(second, right, y, right=True)
-    elif state.compare == "split":
+    elif state.mode == "split":
         tag(first, left, y)
         tag(second, x + width / 2 + 12, y)
-    elif state.compare == "difference":
+    elif state.mode == "difference":
         tag(f"{first} - {second}, x {state.gain:.0f}", left, y)
     elif state.look != "result" or not state.panel:
         tag(first, left, y)
