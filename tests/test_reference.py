@@ -12,6 +12,7 @@ import pytest
 
 import wgmb
 from wgmb import Body, InputError, Scene, Shot, Shutter, scenes
+from wgmb.blur.accumulate import spread
 from wgmb.render import Render
 from wgmb.scene import rotation, translation
 
@@ -250,6 +251,15 @@ def test_accumulate_is_the_mean_of_its_pictures():
             for t in times]  # fmt: skip
     got = rendered(scenes.make("crossing"), (32, 18), shutter, 5, "accumulate")
     np.testing.assert_allclose(got, np.mean(each, axis=0), atol=2e-4)
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 64, 100])
+def test_accumulate_begins_with_pictures_from_all_over_the_exposure(count):
+    order = spread(count)
+    assert sorted(order) == list(range(count))
+    for few in range(1, count + 1):
+        gaps = np.diff([-1, *sorted(order[:few]), count])
+        assert gaps.max() <= 2 * (count / few) + 1
 
 
 def test_accumulate_cannot_roll():

@@ -13,7 +13,7 @@ from twins import reproject as reproject_twin
 from twins import tap as tap_twin
 from twins import tiles as tiles_twin
 from twins import velocity as velocity_twin
-from wgmb import Camera, Reprojections, Shutter
+from wgmb import Camera, InputError, Reprojections, Shutter, display
 
 SIZES = [(48, 64), (37, 53), (1, 1), (3, 130)]
 TOLERANCE = 1e-4
@@ -265,6 +265,18 @@ def test_tiles_is_its_twin(form, depths, speed):
     )
     wrong = (np.abs(got - want) > 1e-3).any(axis=2)
     assert wrong.mean() < 0.01
+
+
+def test_tiles_shows_what_it_follows():
+    size = (44, 84)
+    color, motion = pictures(size, 20.0)
+    shutter = Shutter(300, "start")
+    got = wgmb.blur(color, motion=motion, method="tiles", shutter=shutter, show="tiles")
+    ways = tiles_twin.followed(motion, shutter.span, 40)
+    y, x = np.mgrid[: size[0], : size[1]] // 40
+    np.testing.assert_allclose(got[..., :3], display.motion_colors(ways[y, x], 40), atol=1e-3)
+    with pytest.raises(InputError, match="tiles"):
+        wgmb.Blur("tiles", show="depth")
 
 
 def noise_of(size, number):

@@ -18,14 +18,18 @@ from wgmb import (
     display,
     exr,
     gpu,
+    perceive,
     scenes,
     stills,
 )
 from wgmb.blur import METHODS
+from wgmb.perceive import Cone
 from wgmb.timing import Timing
-from wgmb.viewer import State, controls, offscreen
+from wgmb.viewer import State, actions, controls, offscreen, stage
 from wgmb.viewer.pace import Pace
+from wgmb.viewer.screen import key_box
 from wgmb.viewer.stage import shutter_of
+from wgmb.viewer.subject import SceneSubject
 from wgmb.viewer.window import frame
 
 SIZE = 640, 1010  # tall enough for the whole panel; the picture is 320 x 180
@@ -57,7 +61,7 @@ class Hand:
         for _ in range(400):
             self.look(0.4)
             if not self.viewer.stage.report.busy:
-                return self.viewer.stage.picture()
+                return self.viewer.screen.picture()
         raise AssertionError("never done")
 
     def drag(self, start, end, button=1, modifiers=()):
@@ -133,7 +137,7 @@ def test_the_window_shows_the_picture_in_its_place(hand):
 
 
 def test_every_method_and_scene_can_be_chosen(hand):
-    methods = hand.viewer.stage.methods(PLAIN)
+    methods = hand.viewer.stage.choices.methods(PLAIN)
     assert set(METHODS) - set(methods) == {"volume"}  # there is none in the scene
     for method in methods:
         hand.choose("method", method)
@@ -181,17 +185,123 @@ def test_depth_is_grey_and_nearer_is_brighter(hand):
 def test_what_a_method_shows_of_itself_can_be_looked_at(hand):
     hand.viewer.state = replace(PLAIN, method="reproject")
     result = hand.picture()
-    assert "count" in hand.viewer.stage.looks(hand.state)
+    assert "count" in hand.viewer.stage.choices.looks(hand.state)
     hand.choose("look at", "count")
     assert np.abs(hand.picture() - result).max() > 0.1
 
 
 def test_all_that_can_be_looked_at_can_be_drawn(hand):
-    for method in hand.viewer.stage.methods(PLAIN):
-        for look in hand.viewer.stage.looks(replace(PLAIN, method=method)):
+    for method in hand.viewer.stage.choices.methods(PLAIN):
+        for look in hand.viewer.stage.choices.looks(replace(PLAIN, method=method)):
             if look != "error":
                 hand.viewer.state = replace(PLAIN, method=method, look=look)
                 assert np.isfinite(hand.picture()).all()
+
+
+def seen(frames, fps, after=0.0):
+    """What wgmb/perceive.py makes of the frames, the first of which was always there."""
+    eye = perceive.Viewer(fps)
+    for picture in frames:
+        eye.look(picture)
+    return stills.srgb(np.clip(eye.sees(after)[..., :3], 0, 1))
+
+
+def rendered(numbers, fps=24.0, rays=1, **blur):
+    how = Blur(**{"samples": 4, **blur})
+    render = Render(scenes.make("crossing"), how, size=(320, 180), rays=rays, fps=fps)
+    return [render(n / fps, n) for n in numbers]
+
+
+@pytest.mark.parametrize("frame, newest, after", [(3.0, 3, 0.0), (3.4, 3, 0.4), (2.5, 3, -0.5)])
+def test_what_is_perceived_is_what_the_library_says(hand, frame, newest, after):
+    hand.viewer.state = replace(PLAIN, look="perceived", frame=frame)
+    got = hand.picture()
+    want = seen(rendered(range(newest - 12, newest + 1)), 24.0, after / 24)
+    assert np.abs(got - want).max() < 4e-3  # the library keeps pictures as f16
+    hand.viewer.state = replace(hand.state, look="result")
+    assert np.abs(hand.picture() - want).mean() > 0.005
+
+
+@pytest.mark.parametrize("method", ["distributed", "gather"])
+def test_what_stands_still_is_perceived_as_it_is(hand, method):
+    state = replace(PLAIN, settings=(("speed", 0.0),), samples=16, method=method, frame=2.0)
+    hand.viewer.state = state
+    result = hand.picture()
+    hand.viewer.state = replace(state, look="perceived")
+    got = hand.picture()
+    apart = np.abs(got - result)  # distributed has other noise in every frame
+    assert apart.max() < 2e-3 if method == "gather" else apart.mean() < 0.03
+
+
+def test_only_new_frames_are_drawn_while_it_plays(hand, monkeypatch):
+    drawn = []
+
+    def draw(self, blur, *given):
+        drawn.append(self._number)
+        return plain(self, blur, *given)
+
+    plain = SceneSubject.draw
+    monkeypatch.setattr(SceneSubject, "draw", draw)
+    hand.viewer.state = replace(PLAIN, look="perceived", frame=4.0)
+    hand.picture()
+    held = Cone().held(24)
+    assert sorted(drawn) == list(range(5 - held, 5))
+    drawn.clear()
+    for key, number in (("ArrowRight", [5]), ("ArrowUp", []), ("ArrowRight", [6]), ("h", []),
+                        ("ArrowLeft", [6 - held]), ("ArrowLeft", [5 - held])):  # fmt: skip
+        hand.press(key)
+        hand.picture()
+        assert drawn == number, key
+        drawn.clear()
+    hand.viewer.state = replace(hand.state, cone_peak=0.051, exposure=1.0)
+    hand.picture()
+    assert drawn == []
+    hand.viewer.state = replace(hand.state, shutter=90.0)
+    hand.picture()
+    assert len(drawn) == held
+
+
+def test_who_perceives_is_set_in_the_panel(hand):
+    hand.viewer.state = replace(PLAIN, look="perceived", frame=4.0)
+    before = hand.picture()
+    hand.touch("cone_rate", 0.9)
+    hand.touch("cone_peak", 0.05)
+    assert hand.state.cone_rate > 100 and hand.state.cone_peak < 0.02
+    quick = hand.picture()
+    assert np.abs(quick - before).mean() > 0.005
+    hand.viewer.state = State.of_toml(hand.state.toml())
+    assert np.array_equal(hand.picture(), quick)
+
+
+def test_the_reference_of_what_is_perceived_is_perceived_nature(hand):
+    """Nature is a video of very many frames."""
+    state = replace(PLAIN, look="perceived", compare="wipe", against="reference", wipe=0.0,
+                    frame=4.0)  # fmt: skip
+    hand.viewer.state = state
+    while hand.viewer.stage.report.reference[0] < 200:
+        hand.look(0.4)
+    nature = hand.viewer.screen.picture()
+    assert hand.viewer.stage.report.labels == ("tap, perceived", "nature, perceived")
+    assert hand.viewer.stage.report.measured.psnr > 20
+    sharp = {"rays": 3, "shutter": 0}
+    want = seen(rendered(range(20 - 60, 21), 120.0, **sharp), 120.0)
+    video = seen(rendered(range(-8, 5), 24.0, **sharp), 24.0)
+    apart = [np.abs(a - want)[:, 3:].mean() for a in (nature, video)]
+    assert apart[0] < 0.004 and apart[0] < 0.7 * apart[1], apart
+
+
+def test_nature_is_exact_where_volumes_are(hand):
+    hand.viewer.state = replace(
+        PLAIN.opened("disk"), frame=8.0, look="perceived", compare="difference",
+        against="reference", gain=1.0,
+    )  # fmt: skip
+    boxes = hand.picture().mean()
+    assert hand.viewer.stage.report.labels[1] == "nature, perceived"
+    hand.viewer.state = replace(hand.state, shutter=0.0)
+    assert hand.picture().mean() > 1.2 * boxes > 0
+    for name, choice in (("crossing", True), ("torusphere", False), ("cone", False)):
+        state = replace(PLAIN.opened(name), look="perceived")
+        assert ("reference" in hand.viewer.stage.choices.rivals(state)) is choice
 
 
 # ---- mouse and keys -------------------------------------------------------------------------
@@ -291,6 +401,20 @@ def test_keys(hand):
         assert getattr(hand.state, name) == pytest.approx(value), key
 
 
+def test_an_arrow_that_is_held_down_repeats(hand):
+    hand.submit("key_down", key="ArrowRight")
+    hand.look(0.11)
+    hand.look(0.11)
+    assert hand.state.frame == 1
+    for _ in range(6):
+        hand.look(0.11)
+    assert hand.state.frame == 5  # 0.4 s after it went down the first time, then at every look
+    hand.submit("key_up", key="ArrowRight")
+    hand.look(0.11)
+    hand.look(1.0)
+    assert hand.state.frame == 5
+
+
 def test_every_key_of_the_help_does_something():
     layout = controls.Layout((0, 0, 9, 9), (0, 0, 9, 9), tuple(METHODS), ("result", "sharp"),
                              ("off", "wipe"))  # fmt: skip
@@ -373,13 +497,13 @@ def test_a_parameter_of_the_scene(hand):
 @pytest.mark.parametrize("name", list(scenes.SCENES))
 def test_the_panel_changes_nothing_by_itself(hand, name):
     opened = PLAIN.opened(name)
-    for method in hand.viewer.stage.methods(opened):
+    for method in hand.viewer.stage.choices.methods(opened):
         odd = {"fastest": 0.0431, "max_blur": 33.3, "phase": "0.123", "shutter": 123.4}
-        state = hand.viewer.stage.possible(replace(opened, method=method, **odd))
+        state = hand.viewer.stage.choices.possible(replace(opened, method=method, **odd))
         hand.viewer.state = state
         hand.look()
         assert hand.state == state
-        if "velocity" in hand.viewer.stage.looks(state):
+        if "velocity" in hand.viewer.stage.choices.looks(state):
             hand.viewer.state = replace(state, look="velocity")
             hand.look()
             assert hand.state == replace(state, look="velocity")
@@ -390,7 +514,16 @@ def test_a_value_that_is_refused_is_said_and_undone(hand):
     hand.viewer.state = replace(PLAIN, source="fence", settings=(("posts", 900),))
     hand.look()
     assert hand.state == before
-    assert "posts" in hand.viewer._message[0]
+    assert "posts" in hand.viewer.message[0]
+
+
+def test_the_full_screen_is_that_of_the_monitor_the_window_is_on(monkeypatch):
+    areas = {"left": (0, 0, 1920, 1080), "right": (1920, 0, 2560, 1440)}
+    monkeypatch.setattr(actions.glfw, "get_monitors", lambda: list(areas))
+    monkeypatch.setattr(actions.glfw, "get_monitor_workarea", areas.get)
+    assert actions._monitor_of((1500, 100, 800, 600)) == "left"  # most of it
+    assert actions._monitor_of((1600, 100, 800, 600)) == "right"
+    assert actions._monitor_of((-5000, 0, 10, 10)) == "left"  # nowhere to be seen
 
 
 def test_nothing_is_drawn_when_nothing_changes(hand):
@@ -449,9 +582,23 @@ def test_flicker_changes_with_the_clock(hand):
     seen = []
     for _ in range(4):
         hand.look(0.5)
-        seen.append(hand.viewer.stage.picture())
+        seen.append(hand.viewer.screen.picture())
     assert np.array_equal(seen[0], seen[2]) and np.array_equal(seen[1], seen[3])
     assert {a.tobytes() for a in seen} == {first.tobytes(), second.tobytes()}
+
+
+def test_the_error_is_shown_however_others_are_compared(hand):
+    shown = []
+    for compare in ("off", "wipe", "split", "difference", "flicker"):
+        hand.viewer.state = replace(PLAIN, look="error", compare=compare)
+        hand.look(1.0)
+        for _ in range(2):
+            hand.look(0.5)
+            shown.append(hand.viewer.screen.picture())
+        assert key_box(hand.state, "COLOR", (0, 0, 9, 9), (0, 0, 9, 9), 1.0)
+        layout = controls.Layout((0, 0, 320, 1010), (0, 400, 320, 180))
+        assert controls.grip(hand.state, layout, 160, 500, 1, ()) == "orbit"
+    assert all(picture.max() > 0.3 for picture in shown)  # flicker would show black in between
 
 
 def test_the_reference_converges_and_is_measured(hand):
@@ -459,13 +606,13 @@ def test_the_reference_converges_and_is_measured(hand):
     rays = []
     for _ in range(600):
         hand.look(0.4)
-        rays.append(hand.viewer.stage.report.reference)
-        if (found := hand.viewer.stage.report.measured) and found.rays >= 128:
+        rays.append(hand.viewer.stage.report.reference[0])
+        if (found := hand.viewer.stage.report.measured) and found.samples >= 128:
             break
     assert rays == sorted(rays) and len(set(rays)) > 3
     render = Render(scenes.make("crossing"), Blur(samples=4), size=(320, 180), rays=1)
     truth = Render(
-        render.scene, Blur("distributed", samples=found.rays), size=(320, 180), rays=1
+        render.scene, Blur("distributed", samples=found.samples), size=(320, 180), rays=1
     )(0.0)  # fmt: skip
     apart = stills.srgb(render(0.0)[..., :3]) - stills.srgb(truth[..., :3])
     assert found.psnr == pytest.approx(-10 * np.log10(np.mean(apart.astype("f8") ** 2)), abs=0.01)
@@ -474,7 +621,26 @@ def test_the_reference_converges_and_is_measured(hand):
     hand.submit("pointer_move", x=10, y=10, button=0, buttons=())
     hand.viewer.state = replace(hand.state, frame=1.0)
     hand.look()
-    assert hand.viewer.stage.report.reference < rays[-1]  # begun anew
+    assert hand.viewer.stage.report.reference[0] < rays[-1]  # begun anew
+
+
+def test_what_is_shown_never_has_less_in_it_than_before(hand, monkeypatch):
+    monkeypatch.setattr(stage, "_STEP", 0.0)  # a few samples at a time
+    hand.viewer.state = replace(PLAIN, method="accumulate", samples=32)
+    want, shown = hand.picture(), hand.viewer.stage._shown
+    hand.submit("pointer_down", x=100, y=500, button=1, buttons=(1,))
+    for _ in range(3):
+        hand.look()
+        assert np.array_equal(hand.viewer.screen.picture(), want)  # nothing has moved yet
+    hand.submit("pointer_move", x=110, y=500, button=0, buttons=(1,))
+    hand.look()
+    assert shown["first"].done == 4
+    hand.submit("pointer_up", x=110, y=500, button=1, buttons=())
+    done = []
+    while hand.viewer.stage.report.busy:
+        hand.look(0.4)
+        done.append(shown["first"].done)
+    assert done == sorted(done) and done[0] == 4 and done[-1] == 32 and len(set(done)) > 3
 
 
 # ---- the window -----------------------------------------------------------------------------
@@ -492,6 +658,49 @@ def test_sizes_and_hidpi(size, ratio):
     assert x + wide <= size[0] and y + high <= size[1]
 
 
+def test_twice_the_pixels_show_the_same_twice_as_fine():
+    state = replace(PLAIN, look="velocity", compare="wipe", against="sharp", wipe=0.25)
+    coarse, fine = Hand(state, (640, 400), 1.0), Hand(state, (640, 400), 2.0)
+    for hand in (coarse, fine):
+        hand.picture()
+    a, b = coarse.look(), fine.look()
+    assert b.shape == (800, 1280, 3)
+    halved = b.reshape(400, 2, 640, 2, 3).mean(axis=(1, 3))
+    assert np.abs(a - halved).mean() < 3  # the panel's letters are finer
+    places = [[*hand.viewer.panel.places.values()] for hand in (coarse, fine)]
+    np.testing.assert_allclose(*places, atol=2)  # letters have parts of pixels
+    x = 80 * 2
+    line = (b[250, x - 2 : x + 2] > 230).all(axis=1)
+    assert line.all() and not (b[250, [x - 3, x + 2]] > 230).all(axis=1).any()  # as thick
+
+
+def test_the_mouse_is_where_it_is_seen_at_any_ratio():
+    state = replace(PLAIN, compare="wipe", against="sharp")
+    for ratio in (1.0, 1.5, 2.0):
+        hand = Hand(state, (640, 400), ratio)
+        hand.drag((160, 200), (80, 200))
+        assert hand.state.wipe == pytest.approx(0.25, abs=0.01)
+        hand.drag((200, 200), (220, 200))
+        assert hand.state.orbit[0] == pytest.approx(-20 / 320 * np.degrees(4.0))
+        hand.touch("shutter", 0.5)
+        assert hand.state.shutter == pytest.approx(360, abs=15)
+
+
+def test_moving_to_a_screen_of_another_ratio_and_back():
+    hand = Hand(PLAIN, (640, 400), 1.0)
+    before, canvas = hand.picture(), hand.viewer.canvas
+    whole, places = hand.look(), [*hand.viewer.panel.places.values()]
+    canvas.set_pixel_ratio(2.0)  # and what a window does then:
+    canvas.set_logical_size(640, 400)
+    fine = hand.picture()
+    assert hand.look().shape == (800, 1280, 3) and fine.shape[0] == 2 * before.shape[0]
+    np.testing.assert_allclose([*hand.viewer.panel.places.values()], places, atol=2)
+    canvas.set_pixel_ratio(1.0)
+    canvas.set_logical_size(640, 400)
+    assert np.array_equal(hand.picture(), before)
+    assert np.abs(hand.look() - whole).max() <= 1
+
+
 def test_resizing(hand):
     before = hand.picture()
     for size in ((900, 600), (60, 40), (3, 2), (1, 1), SIZE):
@@ -506,7 +715,7 @@ def test_an_error_while_drawing_is_not_swallowed(monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("broken")
 
-    monkeypatch.setattr(hand.viewer.stage, "compose", broken)
+    monkeypatch.setattr(hand.viewer.screen, "compose", broken)
     with pytest.raises(ZeroDivisionError):
         hand.look()
     assert hand.viewer.canvas.get_closed()
@@ -597,6 +806,8 @@ MANY = State(
     against="tap",
     exposure=-0.5,
     tone="soft",
+    cone_rate=80.0,
+    cone_peak=0.02,
     playing=True,
     speed=0.5,
 )
@@ -622,6 +833,7 @@ def test_settings_come_back_as_they_were_saved(state):
         ('[render]\nscene = "crossing"\ncolour = 1', "colour"),
         ('[render]\nscene = "crossing"\n[view]\ncompare = "both"', "both"),
         ('[render]\nscene = "crossing"\n[view]\nzoo = 1', "zoo"),
+        ('[render]\nscene = "crossing"\n[view]\ncone_rate = 0', "rate"),
         ('[render]\nscene = "crossing"\n[view]\nframes = "x-y"', "x-y"),
     ],
 )
@@ -644,7 +856,7 @@ def test_render_takes_the_saved_settings(hand, tmp_path, monkeypatch):
     hand.viewer.do("load", "wgmb.toml")
     assert hand.state.source == "fence"
     hand.viewer.do("load", "nowhere.toml")
-    assert "nowhere" in hand.viewer._message[0]
+    assert "nowhere" in hand.viewer.message[0]
 
 
 @pytest.mark.parametrize("state", [MANY, replace(PLAIN.opened(SAMPLE), shutter=90.0)])
@@ -677,10 +889,10 @@ def test_export_runs_the_command_line(hand, tmp_path, monkeypatch):
     hand.viewer.state = replace(PLAIN, size="64x36", frames="0-1")
     hand.look()
     hand.viewer.do("export", str(tmp_path / "out.####.png"))
-    child = hand.viewer._export[0]
+    child = hand.viewer.actions.export[0]
     assert child.wait(60) == 0
     hand.look()
-    assert "made" in hand.viewer._export_said
+    assert "made" in hand.viewer.actions.export_said
     assert len(list(tmp_path.glob("*.png"))) == 2
 
 
@@ -698,6 +910,16 @@ def test_frames_on_disk_are_blurred_as_the_library_does(reel):
     reel.picture()
     got = reel.viewer.stage.download()[..., :3]
     assert np.abs(got - want[..., :3]).max() < 1e-5
+
+
+def test_frames_on_disk_are_perceived_too(reel):
+    state = reel.state
+    reel.viewer.state = replace(state, look="perceived", frame=11.0)
+    reel.picture()
+    got = stills.srgb(np.clip(reel.viewer.stage.download()[..., :3], 0, 1))
+    blur = Blur(samples=4)
+    assert np.abs(got - seen([blur(frame)[..., :3] for frame in Clip(SAMPLE)], 24.0)).max() < 4e-3
+    reel.viewer.state = state
 
 
 def test_scrubbing_shutter_zoom_and_pan(reel):
@@ -719,11 +941,11 @@ def test_scrubbing_shutter_zoom_and_pan(reel):
 
 
 def test_frames_on_disk_have_no_reference(reel):
-    stage, state = reel.viewer.stage, reel.state
-    assert "error" not in stage.looks(state)
-    assert set(stage.methods(state)) == {n for n, m in METHODS.items() if "scene" not in m.needs}
-    assert "reference" not in stage.rivals(state)
-    for look in stage.looks(state):
+    choices, state = reel.viewer.stage.choices, reel.state
+    assert "error" not in choices.looks(state)
+    assert set(choices.methods(state)) == {n for n, m in METHODS.items() if "scene" not in m.needs}
+    assert "reference" not in choices.rivals(state)
+    for look in choices.looks(state):
         reel.viewer.state = replace(state, look=look)
         assert np.isfinite(reel.picture()).all()
 
@@ -734,7 +956,7 @@ def test_a_picture_without_passes_is_shown_as_it_is(tmp_path, hand):
     hand.viewer.state = PLAIN.opened(str(tmp_path / "plain.png"))
     hand.look()
     assert hand.state.look == "sharp"
-    assert hand.viewer.stage.looks(hand.state) == ["sharp"]
+    assert hand.viewer.stage.choices.looks(hand.state) == ["sharp"]
     assert np.abs(stills.srgb(hand.viewer.stage.download()[..., :3]) - image / 255).max() < 0.01
 
 
@@ -742,7 +964,7 @@ def test_a_method_that_needs_a_scene_gives_way_to_one_that_does_not(reel):
     reel.viewer.state = replace(PLAIN.opened(SAMPLE), method="distributed", look="error")
     reel.look()
     assert (reel.state.method, reel.state.look) == (next(iter(METHODS)), "result")
-    assert "distributed" in reel.viewer._message[0]
+    assert "distributed" in reel.viewer.message[0]
 
 
 def test_what_cannot_be_opened_is_told(tmp_path):

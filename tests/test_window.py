@@ -19,9 +19,9 @@ SIZE = 800, 720  # of the window; its picture is 480 wide
 PATIENCE = 90  # seconds: a busy machine without a GPU is slow
 BROKEN = """
 from wgmb.viewer import State, view
-from wgmb.viewer.stage import Stage
+from wgmb.viewer.screen import Screen
 def compose(*_): raise ZeroDivisionError("broken")
-Stage.compose = compose
+Screen.compose = compose
 view(State())
 """
 CLOSE = """
@@ -172,8 +172,24 @@ def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     time.sleep(1)
     assert np.array_equal(picture_of(it.settled()), picture_of(longer))
 
+    it.do("key", "h")
+    helped = it.settled(unlike=longer)
+    it.do("key", "h")
+    assert np.array_equal(picture_of(it.settled(unlike=helped)), picture_of(longer))
+
+    it.do("keydown", "Right")
+    time.sleep(0.1)
+    steps = [it.grab()]
+    until = time.monotonic() + PATIENCE
+    while len(steps) < 5 and time.monotonic() < until:
+        if np.abs((now := it.grab())[:, :460] - steps[-1][:, :460]).max() > 60:
+            steps.append(now)
+    it.do("keyup", "Right")
+    assert len(steps) == 5  # it goes on and on
+    later = it.settled()
+
     it.do("key", "2")
-    it.settled(unlike=longer)
+    it.settled(unlike=later)
     it.do("key", "s")
     until = time.monotonic() + PATIENCE
     while not (tmp_path / "wgmb-001.exr").exists() and time.monotonic() < until:

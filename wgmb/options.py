@@ -165,8 +165,8 @@ class BlurOptions:
     "tap: through the previous and the next place (curved), or along the mean velocity."
     form: Literal["shutter", "even", "slices", "published"] | None = None
     "tap, fusion (shutter), tiles (even), reproject (slices): published is the paper's."
-    show: Literal["color", "count", "confidence"] | None = None
-    "reproject: count shows how often a pixel was reached. gather: confidence shows how sure it is."
+    show: Literal["color", "tiles", "count", "confidence"] | None = None
+    "tiles: what each tile follows. reproject: count of samples. gather: confidence."
     facing: bool = False
     "reproject, published: leave out what faces away from the interpolated camera."
     depth_test: bool = False

@@ -7,6 +7,7 @@ integral is F(x) = exp(-exp(shift - rate x)) (Cusa 2022, after Howlett et al. 20
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,14 +52,81 @@ class Cone:
         """Seconds after which less than 1e-4 of a flash is still to come."""
         return (self.shift + math.log(1e4)) / self.rate
 
+    def held(self, rate: float) -> int:
+        """How many pictures of `rate` a second one has to know, to tell what is seen."""
+        if not (math.isfinite(rate) and rate > 0):
+            raise InputError(f"rate must be over 0 pictures a second, got {rate}")
+        count = math.ceil(self.memory * rate) + 2
+        if count > MOST_HELD:
+            raise InputError(f"{rate:g} pictures a second are too many: {MOST_HELD} are kept")
+        return count
+
+    def answer(self, x: np.ndarray | float) -> np.ndarray:
+        """W(x): the answer to a flash `x` seconds later, 1/s."""
+        late = np.minimum(self.shift - self.rate * np.asarray(x, float), 80)
+        return self.rate * np.exp(late - np.exp(late))
+
     def seen(self, x: np.ndarray | float) -> np.ndarray:
-        """Share of the answer to a flash that has come `x` seconds later."""
+        """F(x): share of the answer to a flash that has come `x` seconds later."""
         return np.exp(-np.exp(np.minimum(self.shift - self.rate * np.asarray(x, float), 80)))
 
     def weights(self, ages: np.ndarray, held: float) -> np.ndarray:
         """What pictures add that were shown for `held` [s], in the mean `ages` [s] ago."""
         ages = np.asarray(ages, float)
         return self.seen(ages + held / 2) - self.seen(ages - held / 2)
+
+    def shares(self, count: int, rate: float, after: float = 0.0) -> np.ndarray:
+        """(count,) of the last pictures, the newest first; the oldest stands for all before it.
+
+        `rate`: pictures a second, each held until the next. `after` [s] the newest one's middle.
+        """
+        weights = self.weights(after + np.arange(count) / rate, 1 / rate)
+        weights[-1] += 1 - weights.sum()
+        return weights
+
+    def shutter(self, fps: float) -> Shutter:
+        """Sees a world without frames as this cell does at the frame's instant."""
+        return Shutter(360 * self.memory * fps, "end", lambda x: self.answer((1 - x) * self.memory))
+
+
+class WeightedSum:
+    """The sum of pictures on the GPU, each times a weight; a pixel that is not finite is 0."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device, self._sums = device, Scratch(device)
+
+    def encode(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        pictures: Sequence[wgpu.GPUTexture],
+        weights: np.ndarray,
+        output: wgpu.GPUTexture,
+    ) -> None:
+        """Record it into `encoder`: float textures of one size, one weight each.
+
+        `output`: rgba32float, of that size.
+        """
+        width, height, _ = output.size
+        kernel = gpu.kernel(self._device, "perceive.wgsl")
+        data = np.zeros((), shader.load("common/frame.wgsl").dtype("Frame"))
+        data["size"] = width, height
+        uniform = wgpu.BufferUsage.UNIFORM
+        create = self._device.create_buffer_with_data
+        given = gpu.Given((width, height), {"frame": create(data=data, usage=uniform)})
+        views = [picture.create_view() for picture in pictures]
+        for first in range(0, len(views), EIGHT):
+            share = np.zeros((), kernel.source.dtype("Share"))
+            share["weights"].flat[: len(views) - first] = weights[first : first + EIGHT]
+            share["first"] = first == 0
+            kernel.run(
+                encoder,
+                "main",
+                given,
+                share=create(data=share, usage=uniform),
+                sums=self._sums.at_least(16 * width * height),
+                output=output.create_view(),
+                **{f"picture{i}": views[min(first + i, len(views) - 1)] for i in range(EIGHT)},
+            )
 
 
 class Viewer:
@@ -76,13 +144,9 @@ class Viewer:
         device: wgpu.GPUDevice | str | None = None,
     ):
         self.rate, self.cone = rate, cone or Cone()
-        if not (math.isfinite(rate) and rate > 0):
-            raise InputError(f"rate must be over 0 pictures a second, got {rate}")
-        self.held = math.ceil(self.cone.memory * rate) + 2  # pictures in the ring
-        if self.held > MOST_HELD:
-            raise InputError(f"{rate:g} pictures a second are too many: {MOST_HELD} are kept")
+        self.held = self.cone.held(rate)  # pictures in the ring
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
-        self._images, self._sums = Images(self.device), Scratch(self.device)
+        self._images, self._sum = Images(self.device), WeightedSum(self.device)
         self._size, self._shown = (0, 0), 0
 
     def look(self, picture: np.ndarray) -> None:
@@ -105,37 +169,13 @@ class Viewer:
         if not self._shown:
             raise InputError("nothing was shown yet")
         count = min(self._shown, self.held)
-        weights = self.cone.weights(after + np.arange(count) / self.rate, 1 / self.rate)
-        weights[-1] += 1 - weights.sum()  # the oldest stands for all before it
-        encoder = self.device.create_command_encoder(label="perceive")
+        pictures = [
+            self._images.texture(f"ring {number % self.held}", self._size, "rgba16float")
+            for number in range(self._shown - 1, self._shown - 1 - count, -1)
+        ]
         output = self._images.texture("output", self._size, "rgba32float")
-        kernel = gpu.kernel(self.device, "perceive.wgsl")
-        data = np.zeros((), shader.load("common/frame.wgsl").dtype("Frame"))
-        data["size"] = self._size
-        uniform = wgpu.BufferUsage.UNIFORM
-        create = self.device.create_buffer_with_data
-        given = gpu.Given(self._size, {"frame": create(data=data, usage=uniform)})
-        sums = self._sums.at_least(16 * self._size[0] * self._size[1])
-        for first in range(0, count, EIGHT):
-            share = np.zeros((), kernel.source.dtype("Share"))
-            ages = np.minimum(np.arange(first, first + EIGHT), count - 1)
-            share["weights"].flat[: count - first] = weights[first : first + EIGHT]
-            share["first"] = first == 0
-            pictures = {
-                f"picture{i}": self._images.view(
-                    f"ring {(self._shown - 1 - age) % self.held}", self._size, "rgba16float"
-                )
-                for i, age in enumerate(ages)
-            }
-            kernel.run(
-                encoder,
-                "main",
-                given,
-                share=create(data=share, usage=uniform),
-                sums=sums,
-                output=output.create_view(),
-                **pictures,
-            )
+        encoder = self.device.create_command_encoder(label="perceive")
+        self._sum.encode(encoder, pictures, self.cone.shares(count, self.rate, after), output)
         return self._images.download(encoder, output)
 
 

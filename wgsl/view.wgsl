@@ -1,6 +1,6 @@
 // What the viewer shows: one or two images, as colour, depth or motion, side by side or compared.
 //#include common/frame.wgsl
-//#include common/finite.wgsl
+//#include common/wheel.wgsl
 
 @group(1) @binding(0) var<uniform> view: View;
 @group(1) @binding(1) var first: texture_2d<f32>;
@@ -13,6 +13,7 @@ struct View {
     key: vec4f,         // of the bar that explains the colours [px]; no width: none
     wheel: vec4f,       // of the wheel that explains the colours of motion [px]
     line: f32,          // of the wipe, from the left [px]
+    thick: f32,         // half of a line [px]
     exposure: f32,      // times
     gain: f32,          // times a difference
     middle: f32,        // depth of middle grey [scene units]
@@ -63,7 +64,7 @@ fn composed(at: vec2f) -> vec3f {
     if !inside(at, view.place) { return BACKGROUND; }
     let uv = (at - view.place.xy) / view.place.zw;
     if COMPARE == WIPE {
-        if abs(at.x - view.line) < 1.0 { return vec3f(0.95); }
+        if abs(at.x - view.line) < view.thick { return vec3f(0.95); }
         if at.x > view.line { return seen(second, SECOND, uv); }
     }
     let here = seen(first, FIRST, uv);
@@ -80,7 +81,7 @@ fn composed(at: vec2f) -> vec3f {
 fn side_by_side(at: vec2f) -> vec3f {
     let half = vec2f(0.5 * view.area.z, view.area.w);
     let right = at.x >= view.area.x + half.x;
-    if abs(at.x - view.area.x - half.x) < 1.0 { return vec3f(0.35); }
+    if abs(at.x - view.area.x - half.x) < view.thick { return vec3f(0.35); }
     let middle = view.area.xy + half * vec2f(select(0.5, 1.5, right), 0.5);
     let size = view.place.zw * 0.5;
     let pan = (view.place.xy + size - view.area.xy - view.area.zw * 0.5) * 0.5;
@@ -143,13 +144,9 @@ fn grey_of(depth: f32) -> f32 {
     return view.middle / (view.middle + depth);
 }
 
-/// As wgmb/display.py: hue is the direction, brightness the speed [image heights per frame].
 fn motion_color(motion: vec2f) -> vec3f {
     if !is_finite(motion.x) || !is_finite(motion.y) { return vec3f(0.2); }
-    let value = clamp(length(motion) / view.fastest, 0.0, 1.0);
-    let hue = select(atan2(motion.y, motion.x), 0.0, value == 0.0);
-    let phase = vec3f(hue) - vec3f(0.0, TURN / 3.0, 2.0 * TURN / 3.0);
-    return srgb((0.5 + 0.5 * cos(phase)) * value);
+    return srgb(wheel_color(motion, view.fastest));    // image heights per frame
 }
 
 /// Black, violet, red, yellow, white for 0 to 1.

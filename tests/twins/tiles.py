@@ -48,6 +48,15 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
     return out
 
 
+def followed(motion, span, edge):
+    """(rows, columns, 2) what each tile follows [px], as it goes on after time 0."""
+    dominant = _dominant(_fastest(motion.astype(float), span, edge), span)
+    ways = np.zeros((*dominant.shape[:2], 2))
+    for at in np.ndindex(ways.shape[:2]):
+        ways[at] = _streak(dominant[at], span) * _direction(dominant[at], span)
+    return ways
+
+
 def _weight(far, offset, here, there, own_way, way, z, z_there):
     front = np.clip(1 - (z_there - z) / min(z, z_there), 0, 1)
     behind = np.clip(1 - (z - z_there) / min(z, z_there), 0, 1)

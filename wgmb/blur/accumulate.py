@@ -32,7 +32,7 @@ class Accumulate:
         if inputs.shutter.rolling:
             raise InputError("accumulate exposes whole pictures: it cannot roll the shutter")
         kernel = gpu.kernel(self._device, "blur/accumulate.wgsl", {"Output": self._output})
-        times = inputs.shutter.sample_times(inputs.samples)
+        times = inputs.shutter.sample_times(inputs.samples)[spread(inputs.samples)]
         width, height = inputs.given.size
         first, count = inputs.progress
         for i in range(first, first + count):
@@ -52,3 +52,8 @@ class Accumulate:
                 ),
                 output=output,
             )
+
+
+def spread(count: int) -> list[int]:
+    """0 to count - 1, so that the first few are spread over all (van der Corput's order)."""
+    return sorted(range(count), key=lambda i: f"{i:016b}"[::-1])

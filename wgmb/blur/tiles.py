@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..images import Images, Scratch
 
 FORMS = ("even", "published")
+SHOWN = ("color", "tiles")
 LONGEST = (40, 9)  # streak to either side: so many pixels, or the height over this
 
 
@@ -24,7 +25,8 @@ class Tiles:
     holds; a streak reaches at most a tile to either side: 40 px, or a ninth of the height.
     `form`: "even" divides every weight by what it is under uniform motion, so that there a
     streak is as even as the exposure; "published" takes them as printed, which makes streaks
-    brightest in their middle. Without depth, everything is equally near.
+    brightest in their middle. Without depth, everything is equally near. `show`: "tiles" gives
+    the motion that each tile follows: hue is its direction, full brightness a whole tile.
 
     Strong: one frame is enough, fast, soft at silhouettes. Artefacts: where two motions meet
     only one of them is followed, what was hidden is guessed from beside it.
@@ -35,10 +37,12 @@ class Tiles:
     uses = frozenset({"depth"})
     adaptive = True
 
-    def __init__(self, device, *, output="rgba32float", form="even"):
+    def __init__(self, device, *, output="rgba32float", form="even", show="color"):
         if form not in FORMS:
             raise InputError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
-        self._device, self._output, self._form = device, output, form
+        if show not in SHOWN:
+            raise InputError(f"show must be one of {', '.join(SHOWN)}, got {show!r}")
+        self._device, self._output, self._form, self._show = device, output, form, show
         self._images = Images(device)
         self._rows, self._fastest, self._dominant = (Scratch(device) for _ in range(3))
 
@@ -52,6 +56,7 @@ class Tiles:
             AUTO=inputs.auto,
             WEIGHTED=inputs.weight is not None,
             PUBLISHED=self._form == "published",
+            TILES=self._show == "tiles",
         )
         look = gpu.kernel(self._device, "blur/tiles_moves.wgsl", DEEP=inputs.depth is not None)
         width, height = inputs.given.size

@@ -62,7 +62,7 @@ def grip(state: State, layout: Layout, x: float, y: float, button: int, modifier
     if not _inside(layout.area, x, y):
         return None
     left, _, width, _ = layout.place
-    if state.compare == "wipe" and abs(x - left - state.wipe * width) <= _GRIP:
+    if state.mode == "wipe" and abs(x - left - state.wipe * width) <= _GRIP:
         return "wipe"
     if button == 2 or button == 3 or (button == 1 and "Shift" in modifiers):
         return "pan"

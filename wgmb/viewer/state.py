@@ -18,9 +18,10 @@ from .. import numbering, scenes
 from ..blur import METHODS
 from ..errors import InputError
 from ..options import OWN, BlurOptions, InputOptions, OutputOptions, SceneOptions, ShutterOptions
+from ..perceive import Cone
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
-LOOKS = ("result", "sharp", "depth", "velocity", "error")
+LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")
 TONES = ("clip", "soft")
 REFERENCE = "reference"
 _GROUPS = (BlurOptions, ShutterOptions, SceneOptions, OutputOptions, InputOptions)
@@ -69,6 +70,8 @@ class State:
     middle: float = 5.0  # depth shown as middle grey [scene units]
     exposure: float = 0.0  # stops
     tone: str = "clip"
+    cone_rate: float = 50.0  # of the eye that perceives: how fast its answer fades [1/s]
+    cone_peak: float = 0.05  # when it is strongest [s]
     zoom: float = 1.0  # of the picture on the screen, frames on disk only
     center: tuple[float, float] = (0.5, 0.5)
     playing: bool = False
@@ -80,6 +83,23 @@ class State:
     def is_scene(self) -> bool:
         """Whether `source` is a built-in scene."""
         return self.source in scenes.SCENES
+
+    @property
+    def eye(self) -> Cone | None:
+        """Who perceives, if that is looked at."""
+        return Cone(self.cone_rate, self.cone_peak) if self.look == "perceived" else None
+
+    @property
+    def mode(self) -> str:
+        """How two images are compared: one of COMPARE, or "error", which has its own two."""
+        return "error" if self.look == "error" else self.compare
+
+    @property
+    def picture(self) -> State:
+        """The same without what only changes how the picture is shown."""
+        plain = State()
+        same = replace(self, **{name: getattr(plain, name) for name in _SHOWING})
+        return same if self.is_scene else replace(same, frame=float(self.frame // 1))
 
     @property
     def span(self) -> tuple[int, int]:
@@ -251,8 +271,9 @@ class State:
 
 _VIEW = (
     "frames", "frame", "look", "compare", "against", "wipe", "gain", "fastest", "middle",
-    "exposure", "tone", "zoom", "center", "playing", "speed", "panel",
+    "exposure", "tone", "cone_rate", "cone_peak", "zoom", "center", "playing", "speed", "panel",
 )  # fmt: skip
+_SHOWING = (*(name for name in _VIEW if name != "frame"), "help")
 _MASKS = ("keep", "scale")
 _CHOICES = {"look": None, "compare": COMPARE, "against": None, "tone": TONES}
 
@@ -304,6 +325,7 @@ def _of_tables(render: dict | None, blur: dict | None, view: dict) -> State:
         values[name] = _typed(name, value, kinds[name].default)
     values |= {name: tuple(found) for name, found in pairs.items()}
     state = State(**values)  # pyright: ignore[reportArgumentType]
+    Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
     if state.method not in METHODS:
         raise InputError(f"unknown method {state.method!r}, one of {', '.join(METHODS)}")
     return state.settled()

@@ -52,6 +52,16 @@ class SceneSubject:
             return ["volume"]
         return can if scene.has_volumes else [name for name in can if name != "volume"]
 
+    def nature(self, state: State) -> str | None:
+        """The method that shows it under a shutter of any length, if there is one."""
+        scene = self._scene(state)
+        if scene.figure is not None:
+            perceived = scene.figure.kind in ("NATURAL", "SCREEN")  # already
+            return None if perceived else "volume"
+        if callable(scene.volumes):  # their speeds are those of a moment
+            return None
+        return "volume" if scene.volumes and state.method == "volume" else "distributed"
+
     def size(self, state: State) -> tuple[int, int]:
         """Width and height that give the picture its shape [px]."""
         return size_of(state.size)
@@ -111,6 +121,10 @@ class ClipSubject:
     def methods(self, state: State) -> list[str]:
         """Names of the methods that can be fed."""
         return methods_for(self.has(state))
+
+    def nature(self, state: State) -> str | None:
+        """The method that shows it under a shutter of any length: nobody knows more than frames."""
+        return None
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height of the frames [px]."""

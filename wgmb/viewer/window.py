@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 import warnings
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from fractions import Fraction
-from pathlib import Path
 
 import glfw
 import numpy as np
@@ -19,23 +15,25 @@ from imgui_bundle import imgui
 from rendercanvas.offscreen import OffscreenRenderCanvas
 from wgpu.utils.imgui import ImguiRenderer
 
-from .. import exr, gpu, shader, stills
-from ..errors import DeviceError, Error, InputError
-from ..output import SETTINGS, replace_file, temporary_name
-from ..video import Video
+from .. import gpu
+from ..errors import DeviceError, InputError
 from . import controls
+from .actions import Actions
 from .panel import Info, Panel
-from .stage import Stage, picture_key
+from .screen import Screen, key_box
+from .stage import Stage
 from .state import COMPARE, State
 from .theme import style
 
 TITLE = "wgmb"
 _AFTER_WHEEL = 0.3  # seconds for which turning the wheel counts as moving
+_REPEAT = 0.4, 0.05  # seconds until a held arrow key repeats, and from one time to the next
 _FLICKER = 0.5  # seconds an image is shown
+_AFTER_EVENT = 3  # frames: ImGui hides what appears for its first one
 _MESSAGE = 4.0  # seconds a message stays
 _TIMES = 90  # frames in the plots
-_HANDLED = ("pointer_down", "pointer_up", "pointer_move", "wheel", "key_down")
-_SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "key_up", "char", "resize")
+_HANDLED = ("pointer_down", "pointer_up", "pointer_move", "wheel", "key_down", "key_up")
+_SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "char", "resize")
 
 
 class Viewer:
@@ -54,28 +52,32 @@ class Viewer:
     ):
         self.canvas, self.state, self.clock = canvas, state, clock
         self.device = device or gpu.open_device()
-        self.stage, self.panel = Stage(self.device), Panel()
-        self.failed: BaseException | None = None
-        self._good = state
         self._context = canvas.get_wgpu_context()
         # Plain formats: the picture and ImGui's colours are display values already.
         format = self._context.get_preferred_format(self.device.adapter).removesuffix("-srgb")
         self._context.configure(device=self.device, format=format)
-        self._blit = self._blitter(format)
+        self.stage, self.screen, self.panel = (
+            Stage(self.device),
+            Screen(self.device, format),
+            Panel(),
+        )
+        self.actions = Actions(canvas, self.stage, self.screen, self.say)
+        self.failed: BaseException | None = None
+        self.message = ("", 0.0)  # and until when it is shown
+        self._good = state
         self._imgui = ImguiRenderer(self.device, canvas)
         style()
         self._imgui.set_gui(self._gui)
-        self._held: tuple[str, float, float] | None = None
+        self._held: tuple[str, float, float] | None = None  # by the mouse, and where
+        self._key: tuple[str, float] | None = None  # an arrow that is down, and when it is due
+        self._repeating = False
         self._wheel_until = 0.0
+        self._due = 0  # frames still to be drawn because of an event
         self._now = self._last = clock()
         self._frame_times: deque[float] = deque(maxlen=_TIMES)
         self._draw_times: deque[float] = deque(maxlen=_TIMES)
         self._passes: dict[str, float] = {}
-        self._message = ("", 0.0)
-        self._video: Video | None = None
-        self._export: tuple[subprocess.Popen, str] | None = None
-        self._export_said = ""
-        self._windowed: tuple[int, int, int, int] | None = None
+        self._timed = ("", "")
         self._info: Info | None = None
         self._sliding = False
         # Before ImGui's handlers, which keep to themselves what they take.
@@ -100,28 +102,33 @@ class Viewer:
         return guarded
 
     def _on_any(self, event: dict) -> None:
+        self._due = _AFTER_EVENT
         self.canvas.request_draw()
 
     def _on_event(self, event: dict) -> None:
         kind = event["event_type"]
-        io = self._imgui.backend.io
         if kind == "key_down":
-            if not io.want_text_input:
+            if not self._imgui.backend.io.want_text_input:
                 self._on_key(event["key"])
-            return
-        if kind == "pointer_up":
+        elif kind == "key_up":
+            if self._key and event["key"] == self._key[0]:
+                self._key, self._repeating = None, False
+        elif kind == "pointer_up":
             self._held = None
-            return
+        else:
+            self._on_pointer(kind, event)
+
+    def _on_pointer(self, kind: str, event: dict) -> None:
         x, y, layout = event["x"], event["y"], self._layout()
+        free = not (self._imgui.backend.io.want_capture_mouse and self._over_popup())
         if kind == "pointer_down":
-            free = not (io.want_capture_mouse and self._over_popup())
             name = controls.grip(self.state, layout, x, y, event["button"], event["modifiers"])
             self._held = (name, x, y) if name and free else None
         elif kind == "pointer_move" and self._held:
             name, from_x, from_y = self._held
             self.state = controls.drag(self.state, layout, name, x - from_x, y - from_y)
             self._held = name, x, y
-        elif kind == "wheel" and not (io.want_capture_mouse and self._over_popup()):
+        elif kind == "wheel" and free:
             moved = controls.wheel(self.state, layout, x, y, event["dx"], event["dy"])
             if moved != self.state:
                 self.state, self._wheel_until = moved, self.clock() + _AFTER_WHEEL
@@ -132,62 +139,66 @@ class Viewer:
         return imgui.is_popup_open("", any_popup)
 
     def _on_key(self, name: str) -> None:
+        arrow = name.startswith("Arrow")
+        self._key, self._repeating = (name, self.clock() + _REPEAT[0]) if arrow else None, False
         self.state, action = controls.key(self.state, self._layout(), name)
         if action:
             self.do(action)
+
+    def _repeat_key(self) -> None:
+        """GLFW's canvas tells of a key only once, however long it is down."""
+        if self._key and self._now >= self._key[1]:
+            self.state, _ = controls.key(self.state, self._layout(), self._key[0])
+            self._key, self._repeating = (self._key[0], self._now + _REPEAT[1]), True
 
     def _area(self) -> controls.Box:
         width, height = self.canvas.get_logical_size()
         return 0.0, 0.0, max(width - self.panel.width(self.state, (width, height)), 1.0), height
 
     def _layout(self) -> controls.Layout:
-        ratio = self.canvas.get_pixel_ratio()
-        x, y, width, height = self.stage.report.place
-        place = (x / ratio, y / ratio, width / ratio, height / ratio)
-        info = self._info
-        return controls.Layout(
-            self._area(),
-            place,
-            tuple(info.methods) if info else (),
-            tuple(info.looks) if info else (),
-            COMPARE,
-        )
+        ratio, info = self.canvas.get_pixel_ratio(), self._info
+        x, y, width, height = (v / ratio for v in self.stage.report.place)
+        methods, looks = (info.methods, info.looks) if info else ((), ())
+        place = x, y, width, height
+        return controls.Layout(self._area(), place, tuple(methods), tuple(looks), COMPARE)
 
     # ---- drawing -------------------------------------------------------------------------
 
     def _draw(self) -> None:
         started = time.perf_counter()
         self._now, before = self.clock(), self._last
-        self._last = self._now
+        self._last, recording = self._now, self.actions.recording
+        self._repeat_key()
         state = self.state
-        if state.playing or self._video:
-            step = 1 / state.fps if self._video else min(self._now - before, 0.5)
+        if state.playing or recording:
+            step = 1 / state.fps if recording else min(self._now - before, 0.5)
             state = controls.played(state, step)
         try:
-            possible = self.stage.possible(state)
-            if possible.method != state.method:
-                self.say(f"method {state.method!r} cannot be used here")
-            self.state = state = possible
             self._prepare(state)
-            self._good = state
         except (InputError, OSError) as error:
             self.say(str(error))
             if self.state == self._good:
                 raise
-            self.state = state = replace(self._good, playing=False)
-            self._prepare(state)
-        report = self.stage.report
-        ratio = self.canvas.get_pixel_ratio()
-        flicked = self._flicked()
-        picture = self.stage.compose(state, self._canvas_size(), ratio, flicked)
-        self._paint(picture)
-        self._passes |= report.seconds | report.passes
+            self._prepare(replace(self._good, playing=False))
+        report, state, ratio = self.stage.report, self.state, self.canvas.get_pixel_ratio()
+        width, height = self.canvas.get_physical_size()
+        self.screen.compose(
+            state,
+            self.stage.images(self._flicked()),
+            report.place,
+            report.area,
+            (max(width, 1), max(height, 1)),
+            ratio,
+        )
+        self.screen.paint(self._context.get_current_texture())
+        if report.labels != self._timed:  # what is not drawn any more is forgotten
+            self._timed, self._passes = report.labels, {}
+        self._passes |= report.seconds | report.passes | {"view": self.screen.seconds}
         self._imgui.render()
-        if self._video:
-            self._video.add(self._shown())
+        self.actions.add_frame()
         for action, what in self.panel.actions:
             self.do(action, what)
-        self._poll_export()
+        self.actions.poll_export()
         seconds = time.perf_counter() - started
         self.stage.finished(seconds, state.rays)
         if report.changed or state.playing:
@@ -196,186 +207,81 @@ class Viewer:
         self._ask_for_more(report.busy)
 
     def _prepare(self, state: State) -> None:
-        changes = picture_key(state) != picture_key(self._good)
+        """Draw what goes on the screen; the state, as far as it is possible, is what is there."""
+        choices, full = self.stage.choices, self.actions.recording
+        possible = choices.possible(state)
+        if possible.method != state.method:
+            self.say(f"method {state.method!r} cannot be used here")
+        self.state = state = possible
+        changes = state.picture != self._good.picture
         self._sliding = self.panel.active and (self._sliding or changes)
-        ratio = self.canvas.get_pixel_ratio()
-        area = tuple(round(v * ratio) for v in self._area())
         moving = (
             state.playing
+            or self._repeating
             or (self._held is not None and self._held[0] != "wipe")
             or self._now < self._wheel_until
             or self._sliding
         )
-        full = self._video is not None
+        ratio = self.canvas.get_pixel_ratio()
+        x, y, width, height = (round(v * ratio) for v in self._area())
+        area = x, y, width, height
         report = self.stage.update(state, area, self._now, moving and not full, full)
-        subject = self.stage.subject(state)
         self._info = Info(
             report=report,
             adapter=self.device.adapter.summary,
-            methods=self.stage.methods(state),
-            looks=self.stage.looks(state),
-            rivals=self.stage.rivals(state),
-            options=self.stage.options(state.method),
+            methods=choices.methods(state),
+            looks=choices.looks(state),
+            rivals=choices.rivals(state),
+            options=choices.options(state.method),
             frame_times=np.array(self._frame_times),
             draw_times=np.array(self._draw_times),
             passes={k: v for k, v in self._passes.items() if k != "draw"},
-            recording="recording" if self._video else "",
-            export=self._export_said,
-            message=self._message[0] if self._now < self._message[1] else "",
-            finding=getattr(subject, "finding", ""),
+            recording="recording" if full else "",
+            export=self.actions.export_said,
+            message=self.message[0] if self._now < self.message[1] else "",
+            finding=getattr(choices.subject(state), "finding", ""),
             flicked=self._flicked(),
         )
-
-    def _canvas_size(self) -> tuple[int, int]:
-        width, height = self.canvas.get_physical_size()
-        return max(width, 1), max(height, 1)
+        self._good = state
 
     def _flicked(self) -> bool:
-        return self.state.compare == "flicker" and int(self._now / _FLICKER) % 2 == 1
+        return self.state.mode == "flicker" and int(self._now / _FLICKER) % 2 == 1
 
     def _gui(self) -> None:
         assert self._info is not None
-        size, ratio = self.canvas.get_logical_size(), self.canvas.get_pixel_ratio()
-        key = self.stage.key_box(self.state, ratio)
+        size, ratio, report = (
+            self.canvas.get_logical_size(),
+            self.canvas.get_pixel_ratio(),
+            self.stage.report,
+        )
+        key = key_box(self.state, report.kind, report.place, report.area, ratio)
         logical = None if key is None else tuple(v / ratio for v in key)
-        self.panel.explain(self.state, logical, self._info)
-        self.state = self.panel.draw(self.state, self._info, size, self._area())
+        self.state = self.panel.draw(self.state, self._info, size, self._area(), logical)
 
     def _ask_for_more(self, busy: bool) -> None:
-        waiting = self._now < self._message[1] or self._export is not None
-        changed = self.state != self._good
+        waiting = self._now < self.message[1] or self.actions.export is not None
+        self._due -= 1
         if (
             busy
-            or changed
+            or waiting
+            or self._due > 0
+            or self.state != self._good
             or self.state.playing
-            or self._video
+            or self.actions.recording
             or self.panel.active
-            or (self._now < self._wheel_until or self.state.compare == "flicker" or waiting)
+            or self._key is not None
+            or self._now < self._wheel_until
+            or self.state.mode == "flicker"
         ):
             self.canvas.request_draw()
 
-    def _blitter(self, format: str):
-        module = self.device.create_shader_module(code=shader.load("blit.wgsl").text)
-        return self.device.create_render_pipeline(
-            label="blit.wgsl",
-            layout="auto",
-            vertex={"module": module, "entry_point": "corner"},
-            primitive={"topology": "triangle-list"},
-            fragment={"module": module, "entry_point": "texel", "targets": [{"format": format}]},
-        )
-
-    def _paint(self, picture: wgpu.GPUTexture) -> None:
-        encoder = self.device.create_command_encoder(label="blit")
-        target = self._context.get_current_texture().create_view()
-        attachment = {"view": target, "load_op": "clear", "store_op": "store"}
-        pass_ = encoder.begin_render_pass(color_attachments=[attachment])
-        pass_.set_pipeline(self._blit)
-        bound = self.device.create_bind_group(
-            layout=self._blit.get_bind_group_layout(0),
-            entries=[{"binding": 0, "resource": picture.create_view()}],
-        )
-        pass_.set_bind_group(0, bound)
-        pass_.draw(3)
-        pass_.end()
-        gpu.submit(self.device, encoder)
-
-    # ---- what is asked for ---------------------------------------------------------------
-
     def say(self, text: str) -> None:
         """Show a message for a while."""
-        self._message = text, self.clock() + _MESSAGE
+        self.message = text, self.clock() + _MESSAGE
 
     def do(self, action: str, what: str = "") -> None:
-        """What a key or a button asks for; what cannot be done is said."""
-        actions = {
-            "quit": lambda: self.canvas.close(),
-            "save": lambda: self._save(Path(what)),
-            "load": lambda: self._load(Path(what)),
-            "screenshot": self._screenshot,
-            "record": self._record,
-            "copy": lambda: self._copy(what),
-            "export": lambda: self._start_export(what),
-            "fullscreen": self._fullscreen,
-        }
-        try:
-            actions[action]()
-        except (Error, OSError, UnicodeDecodeError) as error:
-            self.say(str(error))
-
-    def _save(self, path: Path) -> None:
-        replace_file(path, self.state.toml().encode())
-        self.say(f"saved {path}")
-
-    def _load(self, path: Path) -> None:
-        self.state = State.of_toml(path.read_text(encoding="utf-8"))
-        self.say(f"loaded {path}")
-
-    def _shown(self) -> np.ndarray:
-        """The picture as it is on the screen, but in linear light, as files are written."""
-        return stills.linear(np.clip(self.stage.picture(), 0, 1))
-
-    def _screenshot(self) -> None:
-        path, settings = _free(".png", ".exr"), self.state.toml()
-        replace_file(path, stills.encode(self._shown(), ".png", 8, settings))
-        linear = self.stage.download()
-        rgba = np.ones((*linear.shape[:2], 4), np.float32)
-        rgba[..., : linear.shape[2]] = linear
-        whole = path.with_suffix(".exr")
-        replace_file(whole, exr.encode(exr.new(rgba, {SETTINGS: settings})))
-        self.say(f"saved {path.name} and {whole.name}")
-
-    def _record(self) -> None:
-        if self._video is None:
-            path, rate = _free(".mp4"), Fraction(self.state.fps).limit_denominator(1001)
-            self._video = Video(path, temporary_name(path), rate, self.state.toml())
-            return
-        video, self._video = self._video, None
-        video.close()
-        self.say(f"saved {video.path.name}")
-
-    def _copy(self, text: str) -> None:
-        imgui.set_clipboard_text(text)
-        if (window := getattr(self.canvas, "_window", None)) is not None:
-            glfw.set_clipboard_string(window, text)
-        self.say("copied")
-
-    def _start_export(self, output: str) -> None:
-        words = self.state.command(output)
-        child = subprocess.Popen(
-            [sys.executable, "-m", "wgmb", *words, "--quiet"],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        self._export, self._export_said = (child, output), f"making {output} ..."
-
-    def _poll_export(self) -> None:
-        if self._export is None or self._export[0].poll() is None:
-            return
-        (child, output), self._export = self._export, None
-        said = (child.communicate()[1] or "").strip().splitlines()
-        self._export_said = f"made {output}" if child.returncode == 0 else " ".join(said[-1:])
-
-    def _fullscreen(self) -> None:
-        window = getattr(self.canvas, "_window", None)
-        if window is None:
-            return
-        if self._windowed:
-            glfw.set_window_monitor(window, None, *self._windowed, glfw.DONT_CARE)  # pyright: ignore
-            self._windowed = None
-            return
-        self._windowed = (*glfw.get_window_pos(window), *glfw.get_window_size(window))
-        monitor = _monitor_of(self._windowed)
-        if monitor is not None:
-            mode = glfw.get_video_mode(monitor)
-            glfw.set_window_monitor(window, monitor, 0, 0, *mode.size, mode.refresh_rate)
-
-    def close(self) -> None:
-        """Let go of what is under way: a video is finished, an export goes on by itself."""
-        if self._video is not None:
-            video, self._video = self._video, None
-            video.close()
+        """What a key or a button asks for."""
+        self.state = self.actions.do(action, what, self.state)
 
 
 def offscreen(
@@ -410,29 +316,9 @@ def view(state: State, *, adapter: str | None = None, size: tuple[int, int] = (1
     canvas = RenderCanvas(title=TITLE, size=size, update_mode="ondemand", max_fps=60)
     viewer = Viewer(canvas, state, device=device)
     loop.run()
-    viewer.close()
+    viewer.actions.close()
     if viewer.failed is not None:
         raise viewer.failed
-
-
-def _free(*suffixes: str) -> Path:
-    """The first of wgmb-001, wgmb-002, ... that is not there yet, here, with any of these."""
-    for number in range(1, 10_000):
-        path = Path(f"wgmb-{number:03d}{suffixes[0]}")
-        if not any(path.with_suffix(suffix).exists() for suffix in suffixes):
-            return path
-    raise InputError("wgmb-001 to wgmb-9999 are all there")
-
-
-def _monitor_of(window: tuple[int, int, int, int]):
-    """The monitor on which the window's middle is, or the first."""
-    x, y = window[0] + window[2] // 2, window[1] + window[3] // 2
-    monitors = glfw.get_monitors()
-    for monitor in monitors:
-        left, top, width, height = glfw.get_monitor_workarea(monitor)
-        if left <= x < left + width and top <= y < top + height:
-            return monitor
-    return monitors[0] if monitors else None
 
 
 def _told(error: Exception) -> Exception:

@@ -3,6 +3,7 @@
 //#include common/frame.wgsl
 //#include common/noise.wgsl
 //#include common/shutter.wgsl
+//#include common/wheel.wgsl
 //#include blur/tiles_streak.wgsl
 
 struct Tiles {
@@ -24,6 +25,7 @@ struct Tiles {
 
 override WEIGHTED: bool = false;    // read `weight`
 override PUBLISHED: bool = false;   // weights as printed, not divided by those of uniform motion
+override TILES: bool = false;       // show what every tile follows instead of the colour
 
 // The paper's constants.
 const KAPPA: f32 = 40.0;            // the more, the less the pixel's own colour counts
@@ -93,6 +95,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let x = vec2f(id.xy) + 0.5;
     let noise = pixel_noise(id.xy);
+    if TILES {
+        let tile = id.xy / tiles.edge;
+        let way = dominant[tile.y * tiles.count.x + tile.x];
+        let shown = wheel_color(streak(path_of(way), delay_at(middle_of(tile))), f32(tiles.edge));
+        textureStore(output, id.xy, vec4f(shown, 1.0));
+        return;
+    }
     let most_times = shutter_times(x, frame.jitter * (noise - 0.5));
     let limit = f32(tiles.edge);
     let fast = held(path_of(dominant[tile_at(x, noise)]), most_times.delay, limit);

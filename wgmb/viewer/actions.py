@@ -1,0 +1,157 @@
+"""What a key or a button asks for beyond the picture: files, videos, exports, the whole screen."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import glfw
+import numpy as np
+from imgui_bundle import imgui
+
+from .. import exr, stills
+from ..errors import Error, InputError
+from ..output import SETTINGS, replace_file, temporary_name
+from ..video import Video
+from .screen import Screen
+from .stage import Stage
+from .state import State
+
+
+class Actions:
+    """Does them, and knows what is still under way; what cannot be done is said."""
+
+    def __init__(self, canvas, stage: Stage, screen: Screen, say: Callable[[str], None]):
+        self._window = getattr(canvas, "_window", None)  # of glfw, where there is one
+        self._canvas, self._stage, self._screen, self._say = canvas, stage, screen, say
+        self._video: Video | None = None
+        self._windowed: tuple[int, int, int, int] | None = None
+        self.export: tuple[subprocess.Popen, str] | None = None
+        self.export_said = ""
+
+    @property
+    def recording(self) -> bool:
+        """Whether frames go into a video."""
+        return self._video is not None
+
+    def do(self, action: str, what: str, state: State) -> State:
+        """Do it; the state afterwards, which only "load" changes."""
+        actions = {
+            "quit": lambda: self._canvas.close(),
+            "save": lambda: self._save(Path(what), state),
+            "load": lambda: self._load(Path(what)),
+            "screenshot": lambda: self._screenshot(state),
+            "record": lambda: self._record(state),
+            "copy": lambda: self._copy(what),
+            "export": lambda: self._start_export(what, state),
+            "fullscreen": self._fullscreen,
+        }
+        try:
+            return actions[action]() or state
+        except (Error, OSError, UnicodeDecodeError) as error:
+            self._say(str(error))
+            return state
+
+    def _save(self, path: Path, state: State) -> None:
+        replace_file(path, state.toml().encode())
+        self._say(f"saved {path}")
+
+    def _load(self, path: Path) -> State:
+        state = State.of_toml(path.read_text(encoding="utf-8"))
+        self._say(f"loaded {path}")
+        return state
+
+    def _shown(self) -> np.ndarray:
+        """The picture as it is on the screen, but in linear light, as files are written."""
+        return stills.linear(np.clip(self._screen.picture(), 0, 1))
+
+    def _screenshot(self, state: State) -> None:
+        path, settings = _free(".png", ".exr"), state.toml()
+        replace_file(path, stills.encode(self._shown(), ".png", 8, settings))
+        linear = self._stage.download()
+        rgba = np.ones((*linear.shape[:2], 4), np.float32)
+        rgba[..., : linear.shape[2]] = linear
+        whole = path.with_suffix(".exr")
+        replace_file(whole, exr.encode(exr.new(rgba, {SETTINGS: settings})))
+        self._say(f"saved {path.name} and {whole.name}")
+
+    def _record(self, state: State) -> None:
+        if self._video is None:
+            path, rate = _free(".mp4"), Fraction(state.fps).limit_denominator(1001)
+            self._video = Video(path, temporary_name(path), rate, state.toml())
+            return
+        self.close()
+
+    def add_frame(self) -> None:
+        """What is shown goes into the video, if one is recorded."""
+        if self._video is not None:
+            self._video.add(self._shown())
+
+    def close(self) -> None:
+        """Let go of what is under way: a video is finished, an export goes on by itself."""
+        if self._video is not None:
+            video, self._video = self._video, None
+            video.close()
+            self._say(f"saved {video.path.name}")
+
+    def _copy(self, text: str) -> None:
+        imgui.set_clipboard_text(text)
+        if self._window is not None:
+            glfw.set_clipboard_string(self._window, text)
+        self._say("copied")
+
+    def _start_export(self, output: str, state: State) -> None:
+        words = state.command(output)
+        child = subprocess.Popen(
+            [sys.executable, "-m", "wgmb", *words, "--quiet"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.export, self.export_said = (child, output), f"making {output} ..."
+
+    def poll_export(self) -> None:
+        """Notice that an export has ended, and how."""
+        if self.export is None or self.export[0].poll() is None:
+            return
+        (child, output), self.export = self.export, None
+        said = (child.communicate()[1] or "").strip().splitlines()
+        self.export_said = f"made {output}" if child.returncode == 0 else " ".join(said[-1:])
+
+    def _fullscreen(self) -> None:
+        window = self._window
+        if window is None:
+            return
+        if self._windowed:
+            glfw.set_window_monitor(window, None, *self._windowed, glfw.DONT_CARE)  # pyright: ignore
+            self._windowed = None
+            return
+        self._windowed = (*glfw.get_window_pos(window), *glfw.get_window_size(window))
+        monitor = _monitor_of(self._windowed)
+        if monitor is not None:
+            mode = glfw.get_video_mode(monitor)
+            glfw.set_window_monitor(window, monitor, 0, 0, *mode.size, mode.refresh_rate)
+
+
+def _free(*suffixes: str) -> Path:
+    """The first of wgmb-001, wgmb-002, ... that is not there yet, here, with any of these."""
+    for number in range(1, 10_000):
+        path = Path(f"wgmb-{number:03d}{suffixes[0]}")
+        if not any(path.with_suffix(suffix).exists() for suffix in suffixes):
+            return path
+    raise InputError("wgmb-001 to wgmb-9999 are all there")
+
+
+def _monitor_of(window: tuple[int, int, int, int]):
+    """The monitor on which the window's middle is, or the first."""
+    x, y = window[0] + window[2] // 2, window[1] + window[3] // 2
+    monitors = glfw.get_monitors()
+    for monitor in monitors:
+        left, top, width, height = glfw.get_monitor_workarea(monitor)
+        if left <= x < left + width and top <= y < top + height:
+            return monitor
+    return monitors[0] if monitors else None
