@@ -65,6 +65,7 @@ class Gather:
             "blur/gather.wgsl",
             {"Output": self._output},
             EVEN=inputs.even,
+            AUTO=inputs.auto,
             WEIGHTED=weighted,
             CONFIDENCE=self._show == "confidence",
         )

@@ -109,26 +109,37 @@ fn split(@builtin(global_invocation_id) id: vec3u) {
     let mixed = is_mixed(px);
     var nearest = FAR;
     var farthest = 0.0;
-    let around = select(0, 9, mixed);
-    for (var i = 0; i < around; i++) {
+    var i = 0;
+    loop {          // short loops are left from their end, see gather.wgsl
         let other = depth_at(px + vec2i(i % 3, i / 3) - 1);
         nearest = min(nearest, other);
         farthest = max(farthest, other);
+        i++;
+        if i >= 9 || !mixed { break; }
     }
     let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= FAR);
     var front = Side();
     var back = Side();
-    let wide = select(0, 25, mixed);
-    for (var i = 0; i < wide; i++) { collect(px, i, between, true, true, true, &front, &back); }
+    i = 0;
+    loop {
+        if mixed { collect(px, i, between, true, true, true, &front, &back); }
+        i++;
+        if i >= 25 || !mixed { break; }
+    }
     let thin = front.total == 0.0;      // a wire: nothing near is unmixed
-    let rest = select(0, 25, mixed && (thin || back.total == 0.0));
     let no_back = back.total == 0.0;
-    for (var i = 0; i < rest; i++) { collect(px, i, between, false, thin, no_back, &front, &back); }
+    let more = mixed && (thin || no_back);
+    i = 0;
+    loop {
+        if more { collect(px, i, between, false, thin, no_back, &front, &back); }
+        i++;
+        if i >= 25 || !more { break; }
+    }
 
     if mixed && front.total > 0.0 && back.total > 0.0 && back.counted > 0.0 {
         let behind = back.motion / back.total;
         var before = front.motion / front.total;
-        if thin { before = most_different(px, between, behind); }
+        if thin { before = most_different(px, between, behind, thin); }
         let way = before - behind;
         if dot(way, way) >= DIFFERENT * DIFFERENT {
             let part = clamp(dot(own_motion - behind, way) / dot(way, way), 0.0, 1.0);
@@ -184,11 +195,12 @@ fn collect(px: vec2i, i: i32, between: f32, pure_only: bool, to_front: bool, to_
     }
 }
 
-/// Of the near motions in the 3 x 3, the one most unlike that of the background.
-fn most_different(px: vec2i, between: f32, behind: vec4f) -> vec4f {
+/// Of the near motions in the 3 x 3, the one most unlike that of the background; of a `thin` thing.
+fn most_different(px: vec2i, between: f32, behind: vec4f, thin: bool) -> vec4f {
     var found = behind;
     var most = 0.0;
-    for (var i = 0; i < 9; i++) {
+    var i = 0;
+    loop {
         let at = held(px + vec2i(i % 3, i / 3) - 1);
         let way = textureLoad(motion, at, 0);
         let apart = dot(way - behind, way - behind);
@@ -196,6 +208,8 @@ fn most_different(px: vec2i, between: f32, behind: vec4f) -> vec4f {
             most = apart;
             found = way;
         }
+        i++;
+        if i >= 9 || !thin { break; }
     }
     return found;
 }
