@@ -83,7 +83,9 @@ struct Side {       // the mean of what lies on one side of a silhouette
 
 /// The two layers of every pixel.
 @compute @workgroup_size(WG_X, WG_Y)
-fn split(@builtin(global_invocation_id) id: vec3u) {
+fn split(@builtin(global_invocation_id) call: vec3u,
+        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let id = spread(call, group, groups);
     if any(id.xy >= frame.size) { return; }
     let px = vec2i(id.xy);
     let counts = weight_at(px);
