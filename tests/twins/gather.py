@@ -248,8 +248,7 @@ def instant(layers, tiles, x, y, t, color):
     shown = []
     if edge.depth < solid.depth / 1.05:
         shown.append(edge)
-        apart = 1.05 * (1.0 if second.frame == edge.frame else 1.1)
-        if apart * edge.depth <= second.depth < solid.depth / 1.05:
+        if is_behind(second, edge) and second.depth < solid.depth / 1.05:
             shown.append(second)
     if np.isfinite(solid.depth):
         shown.append(solid)
@@ -332,9 +331,14 @@ def note(seen, new, opaque):
                 seen[i] = new
             return
     if new.depth < edge.depth:
-        seen[1:] = [new, edge]
-    elif new.depth < second.depth:
+        seen[1:] = [new, edge if is_behind(edge, new) else second]
+    elif new.depth < second.depth and is_behind(new, edge):
         seen[2] = new
+
+
+def is_behind(new, old):
+    """Whether it is another surface; neighbouring frames show the same one again."""
+    return new.depth >= old.depth * 1.05 * (1.0 if new.frame == old.frame else 1.1)
 
 
 def fetch(frame, s):

@@ -92,9 +92,7 @@ fn main(@builtin(global_invocation_id) call: vec3u,
 
         // Front to back: silhouettes by the texels of their own surface, then what is opaque.
         let edge = seen.edge.depth < seen.solid.depth / BEHIND;
-        let room = BEHIND * select(NEIGHBOUR, 1.0, seen.second.layer == seen.edge.layer);
-        let second = edge && seen.second.depth < seen.solid.depth / BEHIND
-            && seen.second.depth >= seen.edge.depth * room;
+        let second = edge && seen.second.depth < seen.solid.depth / BEHIND && is_behind(seen.second, seen.edge);
         let solid = seen.solid.depth < NONE;
         let whole = solid && seen.solid.layer % 2u == 0u && (seen.solid.calm || !WEIGHTED);
         let texels = 4u * (u32(edge) + u32(second) + u32(solid && !whole));
@@ -250,9 +248,9 @@ fn search(x: vec2f, tile: vec2u, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
             let is_edge = is_same(found, edge);
             let is_second = is_same(found, second);
             let in_front = !is_edge && !is_second && found.depth < edge.depth;
-            let behind = !is_edge && !in_front
-                && select(found.depth < second.depth, found.miss < second.miss, is_second);
-            if in_front { second = edge; }
+            let behind = !is_edge && !in_front && select(
+                found.depth < second.depth && is_behind(found, edge), found.miss < second.miss, is_second);
+            if in_front && is_behind(edge, found) { second = edge; }
             if in_front || (is_edge && found.miss < edge.miss) { edge = found; }
             if behind { second = found; }
         }
@@ -284,6 +282,11 @@ fn search(x: vec2f, tile: vec2u, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
 
 fn is_same(a: Sample, b: Sample) -> bool {
     return a.layer == b.layer && alike(a.at, b.at);
+}
+
+/// Whether `b` is another surface behind that of `a`: neighbouring frames show the same one again.
+fn is_behind(b: Sample, a: Sample) -> bool {
+    return b.depth >= a.depth * BEHIND * select(NEIGHBOUR, 1.0, a.layer == b.layer);
 }
 
 struct Part {
