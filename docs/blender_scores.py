@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from wgmb import Blur, Clip, Frame, compare, exr, gpu, measure
+from wgmb import Blur, Clip, Frame, exr, gpu, measure
+from wgmb.findings import machine
 
 HERE = Path(__file__).parent
 SHUTTERS = {"050": 180, "100": 360}
@@ -78,7 +79,7 @@ def section(folder: Path, truth: np.ndarray, made: dict[str, np.ndarray]) -> str
 
 def page(device, table: str, sections: list[str]) -> str:
     """The text of docs/blender.md."""
-    about = ", ".join(f"{k} {v}" for k, v in compare.machine(device).items())
+    about = ", ".join(f"{k} {v}" for k, v in machine(device).items())
     return (
         "# Against a path tracer's own motion blur\n\n"
         "Made by hand: `python docs/blender_scenes.py FOLDER` renders the scenes with Cycles "

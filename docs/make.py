@@ -16,8 +16,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from wgmb import METHODS, compare, gpu
-from wgmb.compare import Contender, Entry, Report, Staged
+from wgmb import METHODS, gpu
+from wgmb.cases import Contender, Staged, make_scene, scene_case
+from wgmb.compare import Laboratory
+from wgmb.findings import Entry, Report, machine
 from wgmb.measure import FLIP_GAIN, MEASURES, display, flip_colors
 from wgmb.options import ShutterOptions
 
@@ -31,18 +33,16 @@ REFERENCE, SAMPLES, RAYS = "distributed:512", 16, 4
 def main() -> None:
     """Render, judge, and write gallery.md with its pictures."""
     device = gpu.open_device()
-    lab = compare.Laboratory(device, tell=lambda text: print(text, file=sys.stderr))
-    found = Report("Gallery", "python docs/make.py", compare.machine(device), SAMPLES)
+    lab = Laboratory(device, tell=lambda text: print(text, file=sys.stderr))
+    found = Report("Gallery", "python docs/make.py", machine(device), SAMPLES)
     contenders = [Contender(name) for name in METHODS]
     for text, time in SCENES.items():
-        name, scene = compare.make_scene(text)
+        name, scene = make_scene(text)
         exposure, staged = (
             ShutterOptions().settled(scene).make(),
             Staged(scene, time, SIZE, rays=RAYS),
         )
-        case = compare.scene_case(
-            name, exposure, Contender.parse(REFERENCE), staged, device, lab.tell
-        )
+        case = scene_case(name, exposure, Contender.parse(REFERENCE), staged, device, lab.tell)
         # Image methods have nothing to start from where there are volumes alone.
         able = contenders if scene.bodies else [c for c in contenders if c.needs_scene]
         lab.compare(found, case, able, (SAMPLES,), budgets=lambda *_: [])

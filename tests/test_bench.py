@@ -2,13 +2,14 @@
 
 import json
 import signal
+from dataclasses import replace
 
 import pytest
 
 import make_frames as make
-from wgmb import bench, report
+from wgmb import bench, bench_page, report, timing
 from wgmb.blur import METHODS
-from wgmb.compare import Contender
+from wgmb.cases import Contender
 from wgmb.errors import InputError
 
 SIZES = ((64, 36), (96, 54))
@@ -47,7 +48,7 @@ def test_figures_are_kept_and_compared(run, tmp_path):
     run.save(tmp_path / "kept.json")
     kept = bench.Bench.load(tmp_path / "kept.json")
     assert kept == run
-    table = bench.against(run, kept)
+    table = bench_page.against(run, kept)
     assert len(table.rows) == len(run.figures)
     assert all(row[-2] == 1.0 for row in table.rows)
 
@@ -57,18 +58,18 @@ def test_what_was_not_kept_is_refused(run, tmp_path):
     with pytest.raises(InputError, match=r"x\.json"):
         bench.Bench.load(tmp_path / "x.json")
     with pytest.raises(InputError, match="in common"):
-        bench.against(run, bench.Bench({}, 1.0, []))
+        bench_page.against(run, bench.Bench({}, 1.0, []))
 
 
 def test_slower_is_over_one(run):
-    slow = [bench.replace(f, gpu=2 * f.gpu) for f in run.figures]
-    table = bench.against(bench.Bench(run.machine, run.copy, slow), run)
+    slow = [replace(f, gpu=2 * f.gpu) for f in run.figures]
+    table = bench_page.against(bench.Bench(run.machine, run.copy, slow), run)
     assert all(row[-2] == 2.0 for row in table.rows)
 
 
 def test_text_and_page_tell_every_method(run):
-    said = bench.text(run)
-    page = report.page(bench.report(run, "wgmb bench", run))
+    said = bench_page.text(run)
+    page = report.page(bench_page.report(run, "wgmb bench", run))
     for method in METHODS:
         assert f", {method}, 4 samples" in said
         assert page.count(f"{method}</td>") >= 4
@@ -79,7 +80,7 @@ def test_text_and_page_tell_every_method(run):
 
 
 def test_without_entries_the_tables_are_the_csv(run):
-    every, passes = report.as_csv(bench.report(run, "")).split("\n\n")
+    every, passes = report.as_csv(bench_page.report(run, "")).split("\n\n")
     assert len(every.splitlines()) == 1 + len(run.figures)
     assert len(passes.splitlines()) == 1 + sum(len(f.passes) for f in run.figures)
     assert passes.startswith("method,size,samples,pass,times")
@@ -88,15 +89,15 @@ def test_without_entries_the_tables_are_the_csv(run):
 def test_all_jobs_take_turns():
     order = []
     jobs = {name: lambda n=name: order.append(n) for name in "ab"}
-    seconds = bench.alternate(jobs, 3)
+    seconds = timing.alternate(jobs, 3)
     assert order == list("ab" * 4)  # one round for warmth
     assert {k: len(v) for k, v in seconds.items()} == {"a": 3, "b": 3}
 
 
 def test_a_job_that_has_used_up_its_limit_is_not_repeated(monkeypatch):
-    monkeypatch.setattr(bench, "_seconds", lambda job: job())
+    monkeypatch.setattr(timing, "_seconds", lambda job: job())
     jobs = {"quick": lambda: 1, "slow": lambda: 5, "slowest": lambda: 20}
-    seconds = bench.alternate(jobs, 3, limit=12)  # the round for warmth is spent too
+    seconds = timing.alternate(jobs, 3, limit=12)  # the round for warmth is spent too
     assert seconds == {"quick": [1, 1, 1], "slow": [5, 5], "slowest": [20]}
 
 
@@ -125,10 +126,10 @@ def test_every_method_has_its_passes(run):
     for figure in run.figures:
         assert figure.passes.keys() == figure.counts.keys()
         assert any(label.startswith(f"blur/{figure.method}") for label in figure.passes)
-    every = bench.report(run, "").tables[1]
+    every = bench_page.report(run, "").tables[1]
     assert len(every.rows) == sum(len(f.passes) for f in run.figures)
     for f in run.figures:
-        shares = [row[-1] for row in every.rows if row[:3] == bench._first(f)]
+        shares = [row[-1] for row in every.rows if row[:3] == bench_page._first(f)]
         assert sum(shares) == pytest.approx(1, abs=0.01)
 
 
@@ -138,7 +139,7 @@ def test_both_clocks_tell_the_same_passes(device, monkeypatch, usable):
     several = [Contender(m) for m in ("tap", "tiles", "gather", "accumulate")]
     run = bench.bench(device, several, SIZES[:1], (3,), 1)
     assert run.clock == ("timestamps" if usable else "wall clock")
-    assert run.clock.split()[-1] in bench.report(run, "").tables[1].note
+    assert run.clock.split()[-1] in bench_page.report(run, "").tables[1].note
     assert (run.empty > 0) != usable
     counts = {f.method: f.counts for f in run.figures}
     assert counts["tap"] == {"blur/tap.wgsl:main": 1}
@@ -168,7 +169,7 @@ def test_what_takes_too_long_is_left_out_and_said(device):
         "96 x 54, 2 samples: tap", "96 x 54, 2 samples: gather"
     ]  # fmt: skip
     assert set(run.notes) <= set(said)
-    assert all(note in bench.text(run) and note in bench.report(run, "").notes
+    assert all(note in bench_page.text(run) and note in bench_page.report(run, "").notes
                for note in run.notes)  # fmt: skip
 
 

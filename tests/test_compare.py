@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import make_frames as make
-from wgmb import METHODS, Frame, Shutter, compare, report
-from wgmb.compare import Case, Contender, Entry, Report, Table
+from wgmb import METHODS, Frame, Shutter, cases, compare, findings, report
+from wgmb.cases import Case, Contender
 from wgmb.errors import InputError
+from wgmb.findings import Entry, Report, Table
 from wgmb.measure import MEASURES, measure
 
 SIZE = (48, 32)
@@ -40,7 +41,7 @@ def case(device):
 @pytest.fixture(scope="module")
 def found(device, case):
     lab = compare.Laboratory(device, rounds=1)
-    got = Report("Bars & <boxes>", "wgmb compare bar", compare.machine(device), 8)
+    got = Report("Bars & <boxes>", "wgmb compare bar", findings.machine(device), 8)
     lab.compare(got, case, [Contender("tap"), Contender("reproject")], (2, 4))
     got.tables.append(Table("More", ["what", "figure"], [["a < b", 1.5], ["c", None]]))
     return got
@@ -48,7 +49,7 @@ def found(device, case):
 
 @pytest.fixture(scope="module")
 def staged(device):
-    return compare.Staged(compare.make_scene("crossing:speed=3")[1], size=SIZE, rays=1)
+    return cases.Staged(cases.make_scene("crossing:speed=3")[1], size=SIZE, rays=1)
 
 
 @pytest.mark.parametrize(
@@ -76,12 +77,12 @@ def test_options_reach_the_method(device):
 
 
 def test_a_scene_is_read_with_its_settings():
-    name, scene = compare.make_scene("fence:speed=5:posts=3")
+    name, scene = cases.make_scene("fence:speed=5:posts=3")
     assert name == "fence, speed 5, posts 3"
     assert scene.name == "fence"
     for wrong in ("nowhere", "fence:fast", "fence:height=3"):
         with pytest.raises(InputError):
-            compare.make_scene(wrong)
+            cases.make_scene(wrong)
 
 
 def test_every_entry_has_every_measure_and_its_time(found, case):
@@ -147,7 +148,7 @@ def test_what_cannot_take_part_is_left_out_and_said(device, case):
 
 def test_a_scene_is_compared_with_every_method(device, staged):
     lab, got = compare.Laboratory(device, rounds=1), Report("", "", {}, 4)
-    made = compare.scene_case("x", Shutter(360), Contender.parse("distributed:64"), staged,
+    made = cases.scene_case("x", Shutter(360), Contender.parse("distributed:64"), staged,
                               device, lambda text: None)  # fmt: skip
     lab.compare(got, made, [Contender(m) for m in METHODS], (2,))
     left_out = {m for m in METHODS if any(f" {m} left out" in n for n in got.notes)}
@@ -164,10 +165,10 @@ def test_a_scene_is_compared_with_every_method(device, staged):
 def test_the_floor_is_what_a_perfect_picture_gets(device, staged):
     """A picture with far less noise and rays of its own stands where the floor says."""
     shutter, tell = Shutter(180), lambda text: None
-    few, more = (compare.scene_case("x", shutter, Contender.parse(f"distributed:{n}"), staged,
+    few, more = (cases.scene_case("x", shutter, Contender.parse(f"distributed:{n}"), staged,
                                     device, tell) for n in (32, 64))  # fmt: skip
     much = Contender.parse("distributed:1024:seed=9")
-    clean = compare.scene_case("x", shutter, much, staged, device, tell).truth
+    clean = cases.scene_case("x", shutter, much, staged, device, tell).truth
     assert list(few.floor) == list(MEASURES)
     for case in (few, more):
         perfect = measure(clean, case.truth)
@@ -180,17 +181,17 @@ def test_the_floor_is_what_a_perfect_picture_gets(device, staged):
 
 def test_halves_share_no_rays_with_each_other_or_with_who_is_judged():
     for text, seeds in (("distributed:64", {1, 2}), ("distributed:64:seed=1", {3, 4})):
-        halves = compare._halves(Contender.parse(text), 64)
+        halves = cases._halves(Contender.parse(text), 64)
         assert {dict(h.options)["seed"] for h in halves} == seeds
         assert [h.samples for h in halves] == [32, 32]
-    assert [h.samples for h in compare._halves(Contender("distributed"), 3)] == [2, 1]
-    assert compare._halves(Contender("distributed"), 1) == []
-    assert compare._halves(Contender("accumulate"), 64) == []  # has no noise
+    assert [h.samples for h in cases._halves(Contender("distributed"), 3)] == [2, 1]
+    assert cases._halves(Contender("distributed"), 1) == []
+    assert cases._halves(Contender("accumulate"), 64) == []  # has no noise
 
 
 def test_the_floor_stands_in_table_files_and_plots(device, staged, tmp_path):
     lab, got = compare.Laboratory(device, rounds=1), Report("", "", {}, 4)
-    case = compare.scene_case("x", Shutter(180), Contender.parse("distributed:32"), staged, device,
+    case = cases.scene_case("x", Shutter(180), Contender.parse("distributed:32"), staged, device,
                               lab.tell)  # fmt: skip
     lab.compare(got, case, [Contender("tap")], (2,), budgets=lambda *_: [])
     page, figures, table = report.write(got, tmp_path / "r.html")
@@ -205,7 +206,7 @@ def test_the_floor_stands_in_table_files_and_plots(device, staged, tmp_path):
 
 
 def test_the_line_of_the_floor_lies_where_it_belongs():
-    plot = compare.Plot("p", "x", "y", {"a": [(1, 0.2), (10, 1.0)]}, floor=0.2)
+    plot = findings.Plot("p", "x", "y", {"a": [(1, 0.2), (10, 1.0)]}, floor=0.2)
     drawn = report.svg(plot, {"a": "red"})
     (at,) = re.findall(r'class="floor" [^>]*y1="([\d.]+)" y2="\1"', drawn)
     assert at == re.findall(r'cy="([\d.]+)"', drawn)[0]
@@ -214,7 +215,7 @@ def test_the_line_of_the_floor_lies_where_it_belongs():
 
 def test_a_reference_must_trace_the_scene(device, staged):
     with pytest.raises(InputError, match="reference must be"):
-        compare.scene_case("x", Shutter(180), Contender("tap"), staged, device, print)
+        cases.scene_case("x", Shutter(180), Contender("tap"), staged, device, print)
 
 
 def test_crossings_are_read_off_the_curves():
@@ -292,7 +293,7 @@ def test_the_page_tells_command_machine_and_figures(found):
 
 
 def test_a_plot_has_every_point_where_it_belongs():
-    plot = compare.Plot("p", "x", "y", {"a": [(1, 0.0), (10, 0.5), (100, 1.0)]})
+    plot = findings.Plot("p", "x", "y", {"a": [(1, 0.0), (10, 0.5), (100, 1.0)]})
     at = re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', report.svg(plot, {"a": "red"}))
     (x0, y0), (x1, y1), (x2, y2) = [(float(x), float(y)) for x, y in at]
     assert x1 - x0 == pytest.approx(x2 - x1, abs=0.2)
@@ -302,7 +303,7 @@ def test_a_plot_has_every_point_where_it_belongs():
 
 @pytest.mark.parametrize("points", [[(4, 0.2)], [(4, 0.2), (4, 0.2)], [(1, -3.0), (1e4, 1e-9)]])
 def test_a_plot_of_little_is_drawn(points):
-    text = report.svg(compare.Plot("p", "x", "y", {"a": points}), {"a": "red"})
+    text = report.svg(findings.Plot("p", "x", "y", {"a": points}), {"a": "red"})
     assert text.count("<circle") == len(points)
     assert "nan" not in text
 
@@ -329,17 +330,17 @@ def test_three_files_are_before_here_and_after(tmp_path):
     shot = make.write_sequence(tmp_path, range(1, 4))
     files = [shot.replace("####", f"{n:04d}") for n in (1, 2, 3)]
     truth = [Path(files[1])]
-    three = compare.clip_case("x", Shutter(180), files, None, truth, {})
-    one = compare.clip_case("x", Shutter(180), [shot], 2, truth, {})
+    three = cases.clip_case("x", Shutter(180), files, None, truth, {})
+    one = cases.clip_case("x", Shutter(180), [shot], 2, truth, {})
     for made in (three.frame, three.frame.prev, three.frame.next):
         assert made is not None
     for a, b in ((three.frame.prev, one.frame.prev), (three.frame.next, one.frame.next)):
         assert a is not None and b is not None
         np.testing.assert_array_equal(a.color, b.color)
     with pytest.raises(InputError, match="no frame 7"):
-        compare.clip_case("x", Shutter(180), [shot], 7, truth, {})
+        cases.clip_case("x", Shutter(180), [shot], 7, truth, {})
     with pytest.raises(InputError, match="one file or three, got 2"):
-        compare.clip_case("x", Shutter(180), files[:2], None, truth, {})
+        cases.clip_case("x", Shutter(180), files[:2], None, truth, {})
 
 
 def test_two_halves_of_a_true_picture_tell_its_noise(tmp_path, capsys):
@@ -347,7 +348,7 @@ def test_two_halves_of_a_true_picture_tell_its_noise(tmp_path, capsys):
     files = [Path(shot.replace("####", f"{n:04d}")) for n in (1, 2, 3)]
 
     def case(*truth):
-        return compare.clip_case("x", Shutter(180), [shot], 2, truth, {})
+        return cases.clip_case("x", Shutter(180), [shot], 2, truth, {})
 
     one, two = case(files[1]), case(files[0], files[2])
     assert one.floor is None and "noise is not known" in one.about

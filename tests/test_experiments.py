@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wgmb import compare, experiments, report
-from wgmb.compare import Case, Entry, Report
+from wgmb import compare, experiments, findings, report
+from wgmb.cases import Case
 from wgmb.errors import InputError
+from wgmb.findings import Entry, Report
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -20,7 +21,7 @@ def lab(device):
 
 
 def made(lab, name, size=(48, 32), **options):
-    found = Report(name, "", compare.machine(lab.device), 16)
+    found = Report(name, "", findings.machine(lab.device), 16)
     experiments.EXPERIMENTS[name](lab, found, size, **options)
     assert "<svg" in report.page(found)
     for table in found.tables:

@@ -15,27 +15,25 @@ import os
 import statistics
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import wgpu
 
 from . import gpu, scenes, timing
-from .compare import Contender, Plot, Report, Staged, Table, Tell, machine
+from .cases import Contender, Staged, Tell
 from .errors import InputError
+from .findings import machine
 from .frame import Frame
 from .images import Images, numpy_of
+from .peers import numba_tap
 from .pipeline import Blur
-from .render import Render
 from .shutter import Shutter
 from .timing import Timing
 
-# Milliseconds by iTime [s] of the article's own fragment shader of the torusphere, 640 x 360,
-# software OpenGL (Mesa 22.3) on two cores; another machine's figures are another matter.
-ARTICLE = {31.0: 13.7, 20.5: 20.2, 16.0: 22.7, 12.0: 24.9, 7.5: 27.7, 0.0: 35.0}
 MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
 _COPY = 64 << 20  # bytes, of the copy that tells the machine's bandwidth
 _HEAVY = 3  # parts of a figure that draw a whole frame: work, passes, call
@@ -214,9 +212,9 @@ class _Matrix:
                 continue
             for part in one.parts:
                 jobs[f"{name} {part}"] = getattr(one, part)
-        if peer := _numba_peer(frame, samples):
+        if peer := numba_tap(frame, samples):
             jobs["numba"] = peer
-        every = alternate(jobs, self.rounds, self.limit / _HEAVY)
+        every = timing.alternate(jobs, self.rounds, self.limit / _HEAVY)
         median = {k: 1e3 * statistics.median(v) for k, v in every.items()}
         for name, one in timed.items():
             parts = {part: median.get(f"{name} {part}") for part in ("call", "upload", "readback")}
@@ -381,246 +379,3 @@ def copy_bandwidth(device: wgpu.GPUDevice, rounds: int = 7) -> float:
 
     seconds = [timing.work(device, copy) for _ in range(rounds + 1)][1:]
     return 2 * _COPY / statistics.median(seconds) / 1e9
-
-
-def text(run: Bench) -> str:
-    """A run's figures for people."""
-    lines = [f"{run.machine['adapter']}; a copy moves {run.copy:.1f} GB/s", _clocked(run)]
-    for f in run.figures:
-        pixels = f.width * f.height
-        lines.append(f"{f.width} x {f.height}, {f.method}, {f.samples} samples")
-        rows = [("gpu", f.gpu), *((f"  {_times(f, k)}", v) for k, v in f.passes.items()),
-                ("upload", f.upload), ("readback", f.readback), ("call", f.call),
-                ("numba tap", f.numba)]  # fmt: skip
-        for name, milliseconds in rows:
-            if milliseconds is not None:
-                each = 1e6 * milliseconds / pixels
-                lines.append(f"  {name:42}{milliseconds:9.2f} ms {each:8.1f} ns a pixel")
-        if f.numba:
-            lines.append(f"  gpu / numba tap{f.gpu / f.numba:36.2f}")
-        if f.bytes:
-            share = f.bandwidth / run.copy
-            lines.append(f"  at least{f.bandwidth:43.2f} GB/s {share:6.0%} of a copy")
-        lines.append(f"  holds{f.memory / 2**20:46.2f} MB {f.memory / pixels:8.1f} B a pixel")
-    lines += run.notes
-    return "\n".join(lines) + "\n"
-
-
-def _times(f: Figure, label: str) -> str:
-    """A pass and how often it ran."""
-    return label if f.counts.get(label, 1) == 1 else f"{label} x {f.counts[label]}"
-
-
-def _clocked(run: Bench) -> str:
-    """How the passes were timed."""
-    if run.clock == Timing.name:
-        return "Passes by the GPU's timestamps"
-    return (
-        "Passes by wall clock, each submitted by itself, less the "
-        f"{run.empty:.2f} ms of an empty submission"
-    )
-
-
-def against(run: Bench, before: Bench) -> Table:
-    """This run over an earlier one: under 1 is faster now."""
-    old = {f.key: f for f in before.figures}
-    rows = []
-    for f in run.figures:
-        if (was := old.get(f.key)) is None:
-            continue
-        peers = f.gpu / f.numba / (was.gpu / was.numba) if f.numba and was.numba else None
-        rows.append([*_first(f), round(was.gpu, 2), round(f.gpu, 2), round(f.gpu / was.gpu, 2),
-                     None if peers is None else round(peers, 2)])  # fmt: skip
-    if not rows:
-        raise InputError("the two runs have no method, size and samples in common")
-    columns = ["method", "size", "samples", "before [ms]", "now [ms]", "now / before",
-               "the same, by numba"]  # fmt: skip
-    note = f"Before: {before.machine.get('adapter')}, {before.machine.get('made')}."
-    return Table("Against an earlier run", columns, rows, note)
-
-
-def report(run: Bench, command: str, before: Bench | None = None) -> Report:
-    """The figures as tables and plots, for report.py."""
-    made = Report("Speed of the methods", command, run.machine, 0)
-    columns = ["method", "size", "samples", "GPU [ms]", "ns a pixel", "/ numba tap"]
-    columns += ["upload [ms]", "readback [ms]", "call [ms]", "at least [GB/s]", "of a copy"]
-    rows = []
-    for f in run.figures:
-        each, moved = 1e6 * f.gpu / (f.width * f.height), f.bandwidth if f.bytes else None
-        values = (f.gpu, each, f.numba and f.gpu / f.numba, f.upload, f.readback, f.call, moved,
-                  moved and moved / run.copy)  # fmt: skip
-        rows.append([*_first(f), *map(_round, values), f.memory >> 20, f.peak >> 20])
-    columns += ["holds [MB]", "peak of the process [MB]"]
-    note = (
-        f"A copy moves {run.copy:.1f} GB/s. Bytes are those of inputs and output, each once. "
-        "A method holds textures and buffers, inputs and output too; the process's memory is its "
-        "largest so far, with all methods in it, sizes in this order."
-    )
-    made.tables.append(Table("Every method", columns, rows, note))
-    passes = [
-        [*_first(f), k, f.counts.get(k, 1), round(v, 3), round(v / sum(f.passes.values()), 3)]
-        for f in run.figures
-        for k, v in f.passes.items()
-    ]
-    columns = ["method", "size", "samples", "pass", "times", "all of them [ms]", "share"]
-    made.tables.append(Table("Every pass", columns, passes, f"{_clocked(run)}."))
-    made.notes += run.notes
-    if before:
-        made.tables.append(against(run, before))
-    made.plots += _curves(run.figures)
-    return made
-
-
-def _curves(figures: Sequence[Figure]) -> list[Plot]:
-    """Time a pixel against size, time and passes against samples, where there are several."""
-    sizes = sorted({(f.width * f.height, f.width, f.height) for f in figures})
-    counts = sorted({f.samples for f in figures})
-    plots = []
-    if len(sizes) > 1:
-        curves: dict[str, list[tuple[float, float]]] = {}
-        for f in figures:
-            if f.samples == counts[len(counts) // 2]:
-                pixels = f.width * f.height
-                curves.setdefault(f.method, []).append((pixels / 1e6, 1e6 * f.gpu / pixels))
-        title = f"Time a pixel, {counts[len(counts) // 2]} samples"
-        plots.append(Plot(title, "megapixels", "ns a pixel", curves))
-    if len(counts) > 1:
-        _, width, height = sizes[len(sizes) // 2]
-        curves = {}
-        for f in figures:
-            if (f.width, f.height) == (width, height):
-                curves.setdefault(f.method, []).append((f.samples, f.gpu))
-        plots.append(Plot(f"Time against samples, {width} x {height}", "samples", "ms", curves))
-        plots += _pass_curves([f for f in figures if f.size == (width, height)])
-    return plots
-
-
-def _pass_curves(figures: Sequence[Figure]) -> list[Plot]:
-    """Every pass against samples, of each method that has several."""
-    plots: dict[str, Plot] = {}
-    for f in figures:
-        title = f"{f.method}: its passes, {f.width} x {f.height}"
-        plot = plots.setdefault(f.method, Plot(title, "samples", "ms", {}))
-        for label, milliseconds in f.passes.items():
-            plot.curves.setdefault(label, []).append((f.samples, milliseconds))
-    several = (p for p in plots.values() if len(p.curves) > 1)
-    return [p for p in several if any(len(curve) > 1 for curve in p.curves.values())]
-
-
-def _first(f: Figure) -> list:
-    return [f.method, f"{f.width} x {f.height}", f.samples]
-
-
-def _round(value: float | None) -> float | None:
-    return None if value is None else round(value, 2)
-
-
-def bench_torusphere(
-    blur: Blur, width: int, height: int, rounds: int = 9
-) -> dict[float, tuple[float, ...]]:
-    """By iTime [s]: milliseconds a frame, of those recording it, and of all cores' work.
-
-    Published density, the shutter that the scene is made for. Medians; all times take turns.
-    """
-    device = blur.device
-    token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
-    scene = scenes.make("torusphere", density="published")
-    render = Render(scene, blur, size=(width, height), fps=60)
-    output = Images(device).texture("output", (width, height), blur.output)
-    work: dict[float, list[float]] = {t: [] for t in ARTICLE}
-    recording: dict[float, list[float]] = {t: [] for t in ARTICLE}
-
-    def frame(t: float) -> None:
-        cores, started = time.process_time(), time.perf_counter()
-        on_gpu = render.on_gpu(t)
-        encoder = device.create_command_encoder()
-        blur.encode(encoder, size=render.size, output=output.create_view(), scene=on_gpu)
-        recording[t].append(time.perf_counter() - started)
-        gpu.submit(device, encoder)
-        device.queue.read_buffer(token)
-        work[t].append(time.process_time() - cores)
-
-    seconds = alternate({str(t): partial(frame, t) for t in ARTICLE}, rounds)
-    return {
-        t: tuple(1e3 * statistics.median(s) for s in (seconds[str(t)], recording[t], work[t]))
-        for t in ARTICLE
-    }
-
-
-def alternate(
-    jobs: dict[str, Callable[[], object]], rounds: int, limit: float = math.inf
-) -> dict[str, list[float]]:
-    """Seconds of every job in every round; all jobs take turns after one round for warmth.
-
-    A job that has taken `limit` seconds is not repeated; at worst the round for warmth counts.
-    """
-    warm = {name: _seconds(job) for name, job in jobs.items()}
-    seconds: dict[str, list[float]] = {name: [] for name in jobs}
-    for _ in range(rounds):
-        for name, job in jobs.items():
-            if warm[name] + sum(seconds[name]) < limit:
-                seconds[name].append(_seconds(job))
-    return {name: seconds[name] or [warm[name]] for name in jobs}
-
-
-def _seconds(job: Callable[[], object]) -> float:
-    started = time.perf_counter()
-    job()
-    return time.perf_counter() - started
-
-
-def _motion(frame: Frame) -> np.ndarray:
-    assert frame.motion is not None
-    return frame.motion
-
-
-def _numba_peer(frame: Frame, samples: int) -> Callable[[], object] | None:
-    """The tap blur as one would write it for the CPU: curved paths, bilinear, all cores."""
-    if (tap := _numba_tap()) is None:
-        return None
-    times = -(((np.arange(samples) + 0.5) / samples - 0.5) * 0.5).astype(np.float32)
-    out = np.empty_like(frame.color)
-    return lambda: tap(frame.color, _motion(frame), times, out)
-
-
-@cache
-def _numba_tap():
-    """It, compiled; None without numba."""
-    try:
-        from numba import njit, prange  # pyright: ignore[reportMissingImports]
-    except ImportError:
-        return None
-
-    @njit(parallel=True, fastmath=True)
-    def tap(color, motion, times, out):  # pragma: no cover - compiled
-        height, width = color.shape[:2]
-        zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
-        right, bottom = np.float32(width - 1), np.float32(height - 1)
-        share = one / np.float32(times.size)
-        for y in prange(height):
-            for x in range(width):
-                ax = (motion[y, x, 2] - motion[y, x, 0]) * half
-                bx = (motion[y, x, 2] + motion[y, x, 0]) * half
-                ay = (motion[y, x, 3] - motion[y, x, 1]) * half
-                by = (motion[y, x, 3] + motion[y, x, 1]) * half
-                r, g, b, a = zero, zero, zero, zero
-                for k in range(times.size):
-                    t = times[k]
-                    u = min(max(np.float32(x) + (ax + bx * t) * t, zero), right)
-                    v = min(max(np.float32(y) + (ay + by * t) * t, zero), bottom)
-                    i, j = int(u), int(v)
-                    i1, j1 = min(i + 1, width - 1), min(j + 1, height - 1)
-                    u -= np.float32(i)
-                    v -= np.float32(j)
-                    w00, w10, w01, w11 = (one - u) * (one - v), u * (one - v), (one - u) * v, u * v
-                    p, q, s, t1 = color[j, i], color[j, i1], color[j1, i], color[j1, i1]
-                    r += p[0] * w00 + q[0] * w10 + s[0] * w01 + t1[0] * w11
-                    g += p[1] * w00 + q[1] * w10 + s[1] * w01 + t1[1] * w11
-                    b += p[2] * w00 + q[2] * w10 + s[2] * w01 + t1[2] * w11
-                    a += p[3] * w00 + q[3] * w10 + s[3] * w01 + t1[3] * w11
-                out[y, x, 0] = r * share
-                out[y, x, 1] = g * share
-                out[y, x, 2] = b * share
-                out[y, x, 3] = a * share
-
-    return tap

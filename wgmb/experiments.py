@@ -12,8 +12,10 @@ import numpy as np
 
 from . import scenes
 from .blur import METHODS
-from .compare import Case, Contender, Laboratory, Plot, Report, Staged, Table, scene_case
+from .cases import Case, Contender, Staged, scene_case
+from .compare import Laboratory
 from .errors import InputError
+from .findings import Plot, Report, Table
 from .frame import Frame
 from .measure import MEASURES, display
 from .scene import Body, Scene, Shot, moving

@@ -12,11 +12,13 @@ from typing import Annotated
 from cyclopts import Parameter
 from rich.console import Console
 
-from . import compare as laboratory
 from . import gpu, terminal
 from .blur import METHODS
+from .cases import Case, Contender, Staged, Tell, clip_case, make_scene, scene_case
+from .compare import Laboratory, crossings
 from .errors import InputError
 from .experiments import EXPERIMENTS
+from .findings import Report, machine
 from .options import CompareOptions, InputOptions, ShutterOptions, size_of, whole_numbers
 from .pipeline import Blur
 from .report import write
@@ -88,8 +90,8 @@ def compare(
         raise InputError("give scenes, or --truth with --inputs, or --experiment")
     device = gpu.open_device(adapter)
     tell = _teller(quiet)
-    lab = laboratory.Laboratory(device, rounds=who.rounds, tell=tell)
-    report = laboratory.Report("", _command_line(), laboratory.machine(device), who.samples)
+    lab = Laboratory(device, rounds=who.rounds, tell=tell)
+    report = Report("", _command_line(), machine(device), who.samples)
     wanted, contenders = size_of(size), who.contenders()
     steps, budgets = who.steps(), who.budgets()
     if experiment:
@@ -101,24 +103,24 @@ def compare(
         write(report, output)
         tell(f"-> {output}")
         return 0
-    reference = laboratory.Contender.parse(who.reference)
+    reference = Contender.parse(who.reference)
     peers = {name: Path(file) for name, _, file in (p.partition("=") for p in peer)}
-    cases: list[Callable[[], laboratory.Case]] = []
-    for name, made in map(laboratory.make_scene, scene):
-        staged = laboratory.Staged(made, time, wanted, rays=rays)
+    cases: list[Callable[[], Case]] = []
+    for name, made in map(make_scene, scene):
+        staged = Staged(made, time, wanted, rays=rays)
         for degrees, shutter in who.exposures(when, made).items():
-            cases.append(partial(laboratory.scene_case, f"{name}, {degrees}", shutter, reference,
+            cases.append(partial(scene_case, f"{name}, {degrees}", shutter, reference,
                                  staged, device, tell))  # fmt: skip
     if truth is not None and inputs:
         name = truth[0].parent.name or truth[0].stem
         for degrees, shutter in who.exposures(when).items():
-            cases.append(partial(laboratory.clip_case, f"{name}, {degrees}", shutter, inputs, frame,
+            cases.append(partial(clip_case, f"{name}, {degrees}", shutter, inputs, frame,
                                  truth, peers, given.open))  # fmt: skip
     able = contenders if who.methods or scene else [c for c in contenders if not c.needs_scene]
     for make in cases:
         case = make()
         lab.compare(report, case, able, steps, budgets)
-        if found := laboratory.crossings(report, case):
+        if found := crossings(report, case):
             report.tables.append(found)
     report.title = "Motion blur compared: " + ", ".join(c.name for c in report.cases)
     write(report, output)
@@ -175,29 +177,31 @@ def bench(
     quiet
         Do not say how far it is.
     """
-    from . import bench as measure
+    from . import bench_page, peers
+    from .bench import Bench
+    from .bench import bench as measure
 
     device, sizes = gpu.open_device(adapter), [size_of(text) for text in size or ["1920x1080"]]
     if article:
         blur = Blur("volume", device=device, shutter=Shutter(720, curve="cosine"))
         for width, height in sizes:
-            _tell_article(measure.bench_torusphere(blur, width, height, rounds), width, height)
+            _tell_article(peers.bench_torusphere(blur, width, height, rounds), width, height)
         return 0
-    contenders = [laboratory.Contender(name) for name in METHODS]
+    contenders = [Contender(name) for name in METHODS]
     if methods is None:
         contenders = [c for c in contenders if not c.needs_scene]
     elif methods != "all":
-        contenders = [laboratory.Contender.parse(text) for text in methods.split(",")]
+        contenders = [Contender.parse(text) for text in methods.split(",")]
     counts = whole_numbers("samples", samples)
-    before = measure.Bench.load(against) if against else None
-    run = measure.bench(device, contenders, sizes, counts, rounds, seconds, _teller(quiet))
-    sys.stdout.write(measure.text(run))
+    before = Bench.load(against) if against else None
+    run = measure(device, contenders, sizes, counts, rounds, seconds, _teller(quiet))
+    sys.stdout.write(bench_page.text(run))
     if before:
-        table = measure.against(run, before)
+        table = bench_page.against(run, before)
         for row in (table.columns, *table.rows):
             sys.stdout.write("".join(f"{cell!s:>20}" for cell in row) + "\n")
     if output:
-        write(measure.report(run, _command_line(), before), output)
+        write(bench_page.report(run, _command_line(), before), output)
     if save:
         run.save(save)
     terminal.check()
@@ -205,7 +209,7 @@ def bench(
 
 
 def _tell_article(found: dict, width: int, height: int) -> None:
-    from .bench import ARTICLE
+    from .peers import ARTICLE
 
     sys.stdout.write(f"{width} x {height}, torusphere, published density\n")
     for time_, (frame, recording, work) in found.items():
@@ -219,7 +223,7 @@ def _tell_article(found: dict, width: int, height: int) -> None:
         sys.stdout.write(line + "\n")
 
 
-def _teller(quiet: bool) -> laboratory.Tell:
+def _teller(quiet: bool) -> Tell:
     """What says on stderr how far the work is, and hears Ctrl-C."""
     say = Console(stderr=True, highlight=False, soft_wrap=True)
 

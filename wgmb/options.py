@@ -13,8 +13,9 @@ from cyclopts import Group, Parameter
 
 from . import scenes, sequence, shutter, vectors
 from .blur import METHODS
-from .compare import Case, Contender, Report
+from .cases import Case, Contender
 from .errors import InputError
+from .findings import Report
 from .numbering import frame_numbers
 from .perceive import Cone
 from .pipeline import Blur

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from .compare import Case, Entry, Plot, Report, Table
+from .cases import Case
+from .findings import Entry, Plot, Report, Table
 from .measure import FLIP_GAIN, MEASURES, display, flip_colors
 
 _COLORS = 10  # in report.html

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -191,4 +192,26 @@ def work(device: wgpu.GPUDevice, record: Callable[[wgpu.GPUCommandEncoder], None
     record(encoder)
     submit(device, encoder)
     device.queue.read_buffer(token)  # waits
+    return time.perf_counter() - started
+
+
+def alternate(
+    jobs: dict[str, Callable[[], object]], rounds: int, limit: float = math.inf
+) -> dict[str, list[float]]:
+    """Seconds of every job in every round; all jobs take turns after one round for warmth.
+
+    A job that has taken `limit` seconds is not repeated; at worst the round for warmth counts.
+    """
+    warm = {name: _seconds(job) for name, job in jobs.items()}
+    seconds: dict[str, list[float]] = {name: [] for name in jobs}
+    for _ in range(rounds):
+        for name, job in jobs.items():
+            if warm[name] + sum(seconds[name]) < limit:
+                seconds[name].append(_seconds(job))
+    return {name: seconds[name] or [warm[name]] for name in jobs}
+
+
+def _seconds(job: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    job()
     return time.perf_counter() - started
