@@ -321,15 +321,16 @@ def follow(paths, centre, seed, u, known):
 def note(seen, new, opaque):
     """Keep what is nearest; of one place at a silhouette, the sample that fits best."""
     solid, edge, second = seen
+    for i, old in enumerate(seen):
+        is_same = (old.frame, old.far) == (new.frame, new.far)
+        if opaque == (i == 0) and is_same and (np.abs(old.at - new.at) < 0.75).all():
+            if new.miss < old.miss:
+                seen[i] = new
+            return
     if opaque:
         if new.depth < solid.depth:
             seen[0] = new
         return
-    for i, old in ((1, edge), (2, second)):
-        if old.frame == new.frame and (np.abs(old.at - new.at) < 0.75).all():
-            if new.miss < old.miss:
-                seen[i] = new
-            return
     if new.depth < edge.depth:
         seen[1:] = [new, edge if is_behind(edge, new) else second]
     elif new.depth < second.depth and is_behind(new, edge):

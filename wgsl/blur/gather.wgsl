@@ -243,7 +243,9 @@ fn search(x: vec2f, tile: vec2u, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
         let guess = select(1.0, GUESSED, round >= 3u && !calm);
         let found = Sample(abs(z) * handicap * guess, abs(z), miss, x - d, layer, calm && round < 3u);
         let hit = miss <= MISS && !known;
-        if hit && z > 0.0 && found.depth < solid.depth { solid = found; }
+        let is_solid = is_same(found, solid);
+        let better = select(found.depth < solid.depth, found.miss < solid.miss, is_solid);
+        if hit && z > 0.0 && better { solid = found; }
         if hit && z < 0.0 {
             let is_edge = is_same(found, edge);
             let is_second = is_same(found, second);
