@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import make_frames as make
-from wgmb import bench, bench_page, report, timing
+from wgmb import bench, bench_page, cli, report, timing
 from wgmb.blur import METHODS
 from wgmb.cases import Contender
 from wgmb.errors import InputError
@@ -57,8 +57,27 @@ def test_what_was_not_kept_is_refused(run, tmp_path):
     (tmp_path / "x.json").write_text('{"figures": 3}')
     with pytest.raises(InputError, match=r"x\.json"):
         bench.Bench.load(tmp_path / "x.json")
-    with pytest.raises(InputError, match="in common"):
-        bench_page.against(run, bench.Bench({}, 1.0, []))
+
+
+def test_another_run_with_nothing_in_common_says_so(run):
+    table = bench_page.against(run, bench.Bench({}, 1.0, []))
+    assert not table.rows and "in common" in table.note
+
+
+@pytest.mark.parametrize("arguments, named", [
+    (["--methods", "tap:32"], "tap:32"),
+    (["--methods", "tap,tap"], "twice"),
+    (["-o", "x.txt"], "x.txt"),
+    (["-o", "missing/x.html"], "missing"),
+    (["--save", "missing/x.json"], "missing"),
+    (["-o", "x.html", "--save", "x.json"], "x.json"),
+])  # fmt: skip
+def test_wrong_usage_is_said_before_the_work(tmp_path, monkeypatch, capsys, arguments, named):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(bench, "bench", lambda *a: pytest.fail("measured"))
+    assert cli.main(["bench", "--size", "64x36", *arguments]) == 2
+    assert named in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_slower_is_over_one(run):

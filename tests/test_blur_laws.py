@@ -137,6 +137,25 @@ def test_what_is_kept_stays_sharp_and_out_of_its_neighbours(method, noise):
     assert out[keep == 0].max() < 0.11
 
 
+@pytest.mark.parametrize("zoom", [0.0, 0.3, -0.3])
+@pytest.mark.parametrize("kept", ["checker", "ring", "block"])
+def test_white_stays_white_whatever_is_kept(method, kept, zoom):
+    """A nearer bar moves over a moving background: nothing darkens, nothing brightens."""
+    y, x = np.mgrid[:48, :80].astype("f4") + 0.5
+    to_next = np.stack([6 + (x - 40) * zoom, 3 + (y - 24) * zoom], axis=2)
+    bar = (abs(x - 40) < 10) & (abs(y - 24) < 12)
+    to_next[bar] = (20, 0)
+    keep = {
+        "checker": (x // 3 + y // 3) % 2,
+        "ring": (x > 27) & (x < 31),
+        "block": (abs(x - 32) < 2) & (abs(y - 22) < 2),
+    }[kept].astype("f4")
+    white = np.ones((48, 80, 3), "f4")
+    depth = np.where(bar, 3.0, 10.0).astype("f4")
+    out = wgmb.blur(white, to_next, keep=keep, depth=depth, method=method)
+    np.testing.assert_allclose(out, 1, atol=ZERO)
+
+
 def test_half_kept_is_half_way(method, noise):
     keep = np.full(noise.shape[:2], 0.5, "f4")
     out = blurred(noise, moving(noise), keep=keep, method=method)

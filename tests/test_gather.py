@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import wgpu
 from test_twins import crossing
 
 import wgmb
 from wgmb import Shutter
+from wgmb.images import Images
 
 SIZE = (54, 96)
 SHUTTER = Shutter(180)
@@ -92,3 +94,27 @@ def test_confidence_tells_where_the_neighbours_were_needed(sources):
 def test_what_can_be_shown_is_told():
     with pytest.raises(wgmb.InputError, match="color, confidence"):
         wgmb.Blur("gather", show="depth")
+
+
+def test_the_order_of_neighbours_does_not_matter(sources):
+    """Where the public encode is given them the other way round."""
+    frame = frame_of(sources)
+    blur = wgmb.Blur("gather", shutter=360)
+    want = blur(frame)
+    inputs = blur.upload(frame)
+    inputs["neighbours"] = dict(reversed(inputs["neighbours"].items()))
+    textures = Images(blur.device)
+    output = textures.texture("picture", frame.size, blur.output)
+    encoder = blur.device.create_command_encoder()
+    blur.encode(encoder, output=output.create_view(), **inputs)
+    assert np.array_equal(textures.download(encoder, output), want)
+    inputs["neighbours"][2] = inputs["neighbours"].pop(1)
+    with pytest.raises(wgmb.InputError, match=r"neighbours.*2"):
+        blur.encode(encoder, output=output.create_view(), **inputs)
+
+
+def test_a_device_that_allows_too_little_is_told_what_to_ask_for():
+    limits = {"max-storage-textures-per-shader-stage": 4}
+    device = wgpu.gpu.request_adapter_sync().request_device_sync(required_limits=limits)
+    with pytest.raises(wgmb.InputError, match="required_limits"):
+        wgmb.Blur("gather", device=device)

@@ -985,3 +985,15 @@ def test_a_scene_that_loops_is_there_for_its_whole_loop():
     state = PLAIN.opened("torusphere")
     assert (state.frames, state.speed) == ("0-1199", 1.0)
     assert state.opened("fence").frames == PLAIN.frames
+
+
+@pytest.mark.parametrize("look", ["result", "perceived"])
+def test_between_frames_on_disk_no_stale_picture_is_seen(reel, look):
+    first = float(reel.state.span[0])
+    pictures = []
+    for frames in ([first, first + 0.7], [first + 1.0, first + 0.7]):
+        for frame in frames:
+            reel.viewer.state = replace(reel.state, look=look, frame=frame)
+            picture = reel.picture()
+        pictures.append(picture)
+    assert np.array_equal(*pictures)

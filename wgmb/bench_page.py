@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .bench import Bench, Figure
-from .errors import InputError
 from .findings import Plot, Report, Table
 from .timing import Timing
 
@@ -58,11 +57,11 @@ def against(run: Bench, before: Bench) -> Table:
         peers = f.gpu / f.numba / (was.gpu / was.numba) if f.numba and was.numba else None
         rows.append([*_first(f), round(was.gpu, 2), round(f.gpu, 2), round(f.gpu / was.gpu, 2),
                      None if peers is None else round(peers, 2)])  # fmt: skip
-    if not rows:
-        raise InputError("the two runs have no method, size and samples in common")
     columns = ["method", "size", "samples", "before [ms]", "now [ms]", "now / before",
                "the same, by numba"]  # fmt: skip
     note = f"Before: {before.machine.get('adapter')}, {before.machine.get('made')}."
+    if not rows:
+        note += " The two runs have no method, size and samples in common."
     return Table("Against an earlier run", columns, rows, note)
 
 
@@ -85,8 +84,9 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
     )
     made.tables.append(Table("Every method", columns, rows, note))
     passes = [
-        [*_first(f), k, f.counts.get(k, 1), round(v, 3), round(v / sum(f.passes.values()), 3)]
+        [*_first(f), k, f.counts.get(k, 1), round(v, 3), round(v / total, 3) if total else None]
         for f in run.figures
+        for total in [sum(f.passes.values())]
         for k, v in f.passes.items()
     ]
     columns = ["method", "size", "samples", "pass", "times", "all of them [ms]", "share"]

@@ -80,9 +80,7 @@ def compare(
         Print errors only.
     """
     who, when, given = who or CompareOptions(), when or ShutterOptions(), given or InputOptions()
-    pages = [output.with_suffix(suffix) for suffix in (".html", ".json", ".csv")]
-    if output.suffix != ".html":
-        raise InputError(f"output must be a page such as report.html, got {output}")
+    pages = _pages(output)
     for file in pages:
         if file.exists() and not overwrite:
             raise InputError(f"{file} exists; --overwrite replaces it")
@@ -192,20 +190,42 @@ def bench(
         contenders = [c for c in contenders if not c.needs_scene]
     elif methods != "all":
         contenders = [Contender.parse(text) for text in methods.split(",")]
+    if wrong := [c for c in contenders if c.samples]:
+        raise InputError(
+            f"bench takes samples from --samples, got {wrong[0].label}:{wrong[0].samples}"
+        )
+    labels = [c.label for c in contenders]
+    if twice := [label for label in labels if labels.count(label) > 1]:
+        raise InputError(f"methods must differ, got {twice[0]} twice")
+    pages = _pages(output) if output else []
+    if save and save.resolve() in [page.resolve() for page in pages]:
+        raise InputError(f"{save} is written beside {output} already; save the figures elsewhere")
+    if save and not save.parent.is_dir():
+        raise InputError(f"there is no folder {save.parent}")
     counts = whole_numbers("samples", samples)
     before = Bench.load(against) if against else None
     run = measure(device, contenders, sizes, counts, rounds, seconds, _teller(quiet))
+    if save:
+        run.save(save)
     sys.stdout.write(bench_page.text(run))
     if before:
         table = bench_page.against(run, before)
+        sys.stdout.write(f"{table.note}\n")
         for row in (table.columns, *table.rows):
             sys.stdout.write("".join(f"{cell!s:>20}" for cell in row) + "\n")
     if output:
         write(bench_page.report(run, _command_line(), before), output)
-    if save:
-        run.save(save)
     terminal.check()
     return 0
+
+
+def _pages(output: Path) -> list[Path]:
+    """The page and what is written beside it; that it can be, before the work."""
+    if output.suffix != ".html":
+        raise InputError(f"output must be a page such as report.html, got {output}")
+    if not output.parent.is_dir():
+        raise InputError(f"there is no folder {output.parent}")
+    return [output.with_suffix(suffix) for suffix in (".html", ".json", ".csv")]
 
 
 def _tell_article(found: dict, width: int, height: int) -> None:

@@ -61,6 +61,8 @@ def numba_tap(frame: Frame, samples: int) -> Callable[[], object] | None:
     times = -(((np.arange(samples) + 0.5) / samples - 0.5) * 0.5).astype(np.float32)
     out = np.empty_like(frame.color)
     motion = frame.motion
+    assert motion is not None
+    tap(frame.color[:1], motion[:1], times, out[:1])  # compiles
     return lambda: tap(frame.color, motion, times, out)
 
 

@@ -219,11 +219,13 @@ class Blur:
             motion = self._images.view("motion", size, "rgba32float")
             self._velocity.encode(encoder, given, motions, limited, motion)
         around = (neighbours or {}) if "neighbours" in self.method.uses else {}
+        if wrong := around.keys() - {-1, 1}:
+            raise InputError(f"neighbours must be frames -1 and 1, got {min(wrong)}")
         masked = keep is not None or check
         masked |= any(n.get("keep") is not None or n.get("check") for n in around.values())
         near = tuple(
             self._neighbour(encoder, given, offset, dict(inputs), masked)
-            for offset, inputs in around.items()
+            for offset, inputs in sorted(around.items())
         )
         weight, result, own = None, output, color
         if color is not None and masked:

@@ -10,8 +10,11 @@ from typing import Any
 
 import numpy as np
 import wgpu
+from wgpu.backends.wgpu_native import _api
 
 from .gpu import SOFTWARE, submit
+
+_PERIOD = "wgpuQueueGetTimestampPeriod"  # [ns] a tick
 
 
 class _Clock:
@@ -52,6 +55,8 @@ class Timing(_Clock):
     def __init__(self, device: wgpu.GPUDevice):
         super().__init__(device)
         self._queries = device.create_query_set(type="timestamp", count=2 * self.MOST)
+        # wgpu-py has no public name for it, and resolves queries to raw ticks.
+        self._tick = 1e-9 * getattr(_api.lib, _PERIOD)(device.queue._internal)  # [s]
 
     @staticmethod
     def usable(device: wgpu.GPUDevice) -> bool:
@@ -86,7 +91,7 @@ class Timing(_Clock):
         encoder.resolve_query_set(self._queries, 0, 2 * len(self.labels), buffer, 0)
         submit(self.device, encoder)
         stamps = np.asarray(self.device.queue.read_buffer(buffer)).view("<u8").reshape(-1, 2)
-        return [(int(end) - int(begin)) * 1e-9 for begin, end in stamps]
+        return [(int(end) - int(begin)) * self._tick for begin, end in stamps]
 
 
 class _Stamped:
@@ -137,7 +142,7 @@ class WallClock(_Clock):
 
     def _seconds(self) -> list[float]:
         took, self._took = self._took, []
-        return [seconds - self.empty for seconds in took]
+        return [max(seconds - self.empty, 0.0) for seconds in took]
 
 
 class _OneByOne:

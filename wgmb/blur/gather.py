@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..images import Images, Scratch
 
 SHOWN = ("color", "confidence")
+_STORED = 6  # storage textures of one pass, marks and both layers
 
 
 class Gather:
@@ -41,6 +42,12 @@ class Gather:
     def __init__(self, device, *, output="rgba32float", show="color"):
         if show not in SHOWN:
             raise InputError(f"show must be one of {', '.join(SHOWN)}, got {show!r}")
+        limit = "max-storage-textures-per-shader-stage"
+        if device.limits[limit] < _STORED:
+            raise InputError(
+                f"gather writes {_STORED} textures in a pass, this device allows "
+                f"{device.limits[limit]}: request it with required_limits={{{limit!r}: {_STORED}}}"
+            )
         self._device, self._output, self._show = device, output, show
         self._images = Images(device)
         self._contents, self._farthest = Scratch(device), Scratch(device)

@@ -78,6 +78,7 @@ class Perceived:
             self._device.queue.read_buffer(self._token)  # waits
             if held.done < blur.samples:
                 break
+        subject.look_at(state, (width, height), rays)
         drawn = {n: held.texture for n in numbers if (held := self._frames.get(n)) and held.done}
         weights = dict.fromkeys(drawn, 0.0)
         after = (state.frame - newest) / state.fps
@@ -88,6 +89,10 @@ class Perceived:
         self._sum.encode(encoder, [*drawn.values()], np.array([*weights.values()]), output)
         gpu.submit(self._device, encoder)
         return sum(self._frames[n].done == blur.samples for n in drawn)
+
+    def forget(self) -> None:
+        """Let go of all frames."""
+        self._frames = {}
 
     def _texture(self, blur: Blur, width: int, height: int) -> wgpu.GPUTexture:
         usage = wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.TEXTURE_BINDING

@@ -112,6 +112,8 @@ class Stage:
         report = Report(shape if not state.is_scene else whole(place), place, area, moving)
         quick = moving and not full
         names = self._wanted(state)
+        if "perceived" not in names:
+            self._perceived.forget()
         for slot, name in zip(("first", "second"), names, strict=False):
             self._advance(slot, name, state, subject, size, rays, quick, full, report)
         slots = ("first", "second")[: len(names)]
@@ -182,7 +184,8 @@ class Stage:
     ) -> None:
         """Draw some of `name`; it is shown once it is no coarser than what it replaces."""
         shown, coming = self._shown[slot], self._coming[slot]
-        key = (name, state.picture, state.eye if name in ("perceived", REFERENCE) else None)
+        eye = state.eye if name in ("perceived", REFERENCE) else None
+        key = (name, state.picture, eye, state.frame if name == "perceived" else None)
         fine = (size, rays, self._level if quick else None)
         if (coming.key, coming.fine) != (key, fine):
             if self._level and shown.key == key and not _coarser(shown.fine, fine):

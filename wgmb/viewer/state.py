@@ -99,7 +99,7 @@ class State:
         """The same without what only changes how the picture is shown."""
         plain = State()
         same = replace(self, **{name: getattr(plain, name) for name in _SHOWING})
-        return same if self.is_scene else replace(same, frame=float(self.frame // 1))
+        return same if self.is_scene else replace(same, frame=float(math.ceil(self.frame - 0.5)))
 
     @property
     def span(self) -> tuple[int, int]:

@@ -33,7 +33,6 @@ const BEHIND: f32 = 1.05;       // ratio of depths that makes two surfaces
 const NEIGHBOUR: f32 = 1.1;     // a neighbouring frame's sample counts as this much farther
 const GUESSED: f32 = 1.2;       // and a background that was only inferred as this much
 const TRUSTED: f32 = 0.25;      // times up to which the frame itself needs no second opinion [frame intervals]
-const NONE: f32 = 3e38;         // depth of no sample
 const ROUNDS: u32 = 6u;         // near layers of three frames, then their far layers
 
 struct Sample {
@@ -72,7 +71,7 @@ fn main(@builtin(global_invocation_id) call: vec3u,
     let reach1 = reach(tile, 1u);
     let reach2 = reach(tile, 2u);
     let path = path_in(textureLoad(paths, id.xy, 0u, 0));
-    let longest = max(reach0.about.w, max(reach1.about.w, reach2.about.w));
+    let longest = max(reach0.about.z, max(reach1.about.z, reach2.about.z));
     let streak = max(streak_of(reach0, 0u), max(streak_of(reach1, 1u), streak_of(reach2, 2u)));
     let times = enough_times(shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5)), streak);
     let share = 1.0 / f32(times.count);     // before adding, so that no sum of finite colours overflows
@@ -127,7 +126,10 @@ fn main(@builtin(global_invocation_id) call: vec3u,
         if whole {
             color += clear * resampled(seen.solid.at, seen.solid.layer, seen.solid.calm);
             var counts = 1.0;
-            if WEIGHTED { counts = textureLoad(surfaces, vec2u(seen.solid.at), seen.solid.layer / 2u, 0).w; }
+            if WEIGHTED {
+                let at = vec2u(clamp(seen.solid.at, vec2f(0.0), vec2f(frame.size) - 1.0));
+                counts = textureLoad(surfaces, at, seen.solid.layer / 2u, 0).w;
+            }
             weight += clear * counts;
             if CONFIDENCE {
                 missed += clear * seen.solid.miss;
@@ -181,8 +183,8 @@ fn reach(tile: vec2u, f: u32) -> Reach {
 
 /// How long a streak the longest motion of a frame leaves in the exposure [px].
 fn streak_of(here: Reach, f: u32) -> f32 {
-    let since = shutter.span - sources.offsets[f];
-    return here.about.w * (shutter.span.y - shutter.span.x) / max(abs(since.x), abs(since.y));
+    let since = abs(shown(sources.offsets[f]));
+    return here.about.z * (shutter.span.y - shutter.span.x) / max(max(since.x, since.y), 1e-9);
 }
 
 fn of_frame(f: u32, a: vec4f, b: vec4f, c: vec4f) -> vec4f {
@@ -199,13 +201,13 @@ fn alike(a: vec2f, b: vec2f) -> bool {
 }
 
 /// Samples that are at `x` by the time `t`, searched for in the near layer of the frame itself; then of
-/// the neighbour on the side of `t`, if that is far from the frame's instant or nothing opaque was found;
+/// the neighbour on the side of `t`, or the only one, if that is far from the frame's instant or nothing opaque was found;
 /// then of the other one, if still nothing was. What the frame itself does not show is also searched for
 /// behind silhouettes.
 fn search(x: vec2f, tile: vec2u, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
     let count = sources.count;
     let offsets = sources.offsets;
-    let parted = max(a.about.z, max(b.about.z, c.about.z)) > 0.0;
+    let parted = max(a.about.y, max(b.about.y, c.about.y)) > 0.0;
     var solid = nothing();
     var edge = nothing();
     var second = nothing();

@@ -149,7 +149,7 @@ fn split(@builtin(global_invocation_id) call: vec3u,
             if part < 1.0 - WHOLE {     // all background, whatever the depth's one sample says
                 seen = true;
                 coverage = 0.0;
-                far = own / max(counts, 1e-6);
+                far = select(back.color / back.counted, own / counts, counts > 0.0);
                 near = vec4f(0.0);
                 near_motion = before;
                 if z >= between { far_z = z; }

@@ -5,6 +5,7 @@ const TILE: u32 = 16u;          // side [px]
 const PATHS: u32 = 4u;          // motions kept a tile
 const LAYERS: u32 = 8u;         // of the texture that holds them: about, depths, from when, till when, then the paths
 
+const NONE: f32 = 3e38;         // depth of nothing
 const HALF_MAX: f32 = 65504.0;  // largest finite f16
 
 struct Tile {
@@ -14,8 +15,8 @@ struct Tile {
     about: vec4f,               // see below
 }
 
-// `about`: how many paths there are, fewer where the rest is like these or like standing still; the
-// least depth; 1 if there are silhouettes; the longest displacement [px].
+// `about`: how many paths there are, fewer where the rest is like these or like standing still; 1 if
+// there are silhouettes; the longest displacement [px].
 
 fn tiles_of(size: vec2u) -> vec2u {
     return (size + TILE - 1u) / TILE;

@@ -12,24 +12,17 @@ struct Source {
 @group(1) @binding(0) var<uniform> source: Source;
 @group(1) @binding(1) var near: texture_2d<u32>;        // see packed()
 @group(1) @binding(2) var<storage, read_write> contents: array<Tile>;     // of every tile's own pixels
-@group(1) @binding(4) var<storage, read_write> farthest: atomic<u32>;   // bits of the longest displacement of all
 @group(1) @binding(3) var reaching: Reaching;            // of all that reaches it, LAYERS a frame
+@group(1) @binding(4) var<storage, read_write> farthest: atomic<u32>;   // bits of the longest displacement of all
 
 alias Reaching = texture_storage_2d_array<rgba32float, write>;
 
 const ALIKE: f32 = 0.5;         // displacements closer than this [px] stand for each other
-const NOWHERE: f32 = 3e38;    // depth of nothing
 const WILD: f32 = 1e5;          // motions beyond this [px] are errors
 const FARTHEST: i32 = 16;       // tiles that a motion is followed over
 
-/// From when to when, after its own instant, a frame's samples are shown [frame intervals].
-fn shown() -> vec2f {
-    let late = 0.5 * (abs(shutter.rolling.x) + abs(shutter.rolling.y));
-    return shutter.span + vec2f(-late, late) - source.offset;
-}
-
 fn longest_time() -> f32 {
-    let span = abs(shown());
+    let span = abs(shown(source.offset));
     return max(span.x, span.y);
 }
 
@@ -74,7 +67,7 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
     let corner = id.xy * TILE;
     let size = min(corner + TILE, frame.size) - corner;
     let pixels = size.x * size.y;
-    let span = shown();
+    let span = shown(source.offset);
     let u = longest_time();
     var tile = Tile();
     var count = 0.0;
@@ -102,17 +95,15 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
             tile.box = vec4f(min(tile.box.xy, min(a, b)), max(tile.box.zw, max(a, b)));
         }
     }
-    var nearest = NOWHERE;
     var split = 0.0;
-    tile.depths = vec4f(NOWHERE);
+    tile.depths = vec4f(NONE);
     for (var i = 0u; i < pixels; i++) {
         let texel = textureLoad(near, corner + vec2u(i % size.x, i / size.x), 0);
         let z = abs(depth_in(texel));
-        nearest = min(nearest, z);
         if depth_in(texel) < 0.0 { split = 1.0; }
-        tile.depths = min(tile.depths, select(vec4f(NOWHERE), vec4f(z), most_alike(as_vec4(path_in(texel)), tile.paths, u)));
+        tile.depths = min(tile.depths, select(vec4f(NONE), vec4f(z), most_alike(as_vec4(path_in(texel)), tile.paths, u)));
     }
-    tile.about = vec4f(count, nearest, split, longest);
+    tile.about = vec4f(count, split, longest, 0.0);
     contents[id.y * tiles.x + id.x] = tile;
     atomicMax(&farthest, bitcast<u32>(longest));
 }
@@ -122,7 +113,7 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
 fn reach(@builtin(global_invocation_id) id: vec3u) {
     let tiles = tiles_of(frame.size);
     if any(id.xy >= tiles) { return; }
-    let span = shown();
+    let span = shown(source.offset);
     let u = longest_time();
     let around = min(i32(ceil(bitcast<f32>(atomicLoad(&farthest)) / f32(TILE))) + 1, FARTHEST);
     let here = vec2i(id.xy);
@@ -131,7 +122,6 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
     var count = size.x * size.y;
     var least = here;       // of the tiles that move here
     var most = here;
-    var nearest = NOWHERE;
     var split = 0.0;
     var longest = 0.0;
     for (var i = 0; i < count; i++) {
@@ -139,9 +129,8 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
         let at = u32(there.y) * tiles.x + u32(there.x);
         if meets(contents[at].box, vec2f((here - there) * i32(TILE))) {
             let about = contents[at].about;
-            nearest = min(nearest, about.y);
-            split = max(split, about.z);
-            longest = max(longest, about.w);
+            split = max(split, about.y);
+            longest = max(longest, about.z);
             if about.x > 0.0 {
                 least = min(least, there);
                 most = max(most, there);
@@ -178,7 +167,7 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
             chosen_count = k + 1u;
         }
     }
-    var depths = vec4f(NOWHERE);
+    var depths = vec4f(NONE);
     var comes = vec4f(1.0);
     var goes = vec4f(0.0);
     for (var i = 0; i < count; i++) {
@@ -191,7 +180,7 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
             let when = lands(path, span, off);
             if when.x <= when.y {
                 let alike = most_alike(path, chosen, u);
-                depths = min(depths, select(vec4f(NOWHERE), vec4f(contents[at].depths[n]), alike));
+                depths = min(depths, select(vec4f(NONE), vec4f(contents[at].depths[n]), alike));
                 comes = min(comes, select(vec4f(1.0), vec4f(when.x), alike));
                 goes = max(goes, select(vec4f(0.0), vec4f(when.y), alike));
             }
@@ -216,12 +205,12 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
             }
         }
     }
-    let about = vec4f(f32(chosen_count), nearest, split, longest);
+    let about = vec4f(f32(chosen_count), split, longest, 0.0);
     textureStore(reaching, id.xy, source.first, about);
     textureStore(reaching, id.xy, source.first + 1u, depths);
-    let none = depths >= vec4f(NOWHERE);
-    textureStore(reaching, id.xy, source.first + 2u, select(span.x + (span.y - span.x) * comes, vec4f(NOWHERE), none));
-    textureStore(reaching, id.xy, source.first + 3u, select(span.x + (span.y - span.x) * goes, vec4f(-NOWHERE), none));
+    let none = depths >= vec4f(NONE);
+    textureStore(reaching, id.xy, source.first + 2u, select(span.x + (span.y - span.x) * comes, vec4f(NONE), none));
+    textureStore(reaching, id.xy, source.first + 3u, select(span.x + (span.y - span.x) * goes, vec4f(-NONE), none));
     for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id.xy, source.first + 4u + k, chosen[k]); }
 }
 

@@ -22,6 +22,12 @@ override AUTO: bool = false;    // as many samples as a streak has pixels, up to
 
 const FEWEST: u32 = 2u;         // samples of what moves
 
+/// From when to when, after its own instant, a frame `offset` intervals away is shown [frame intervals].
+fn shown(offset: f32) -> vec2f {
+    let late = 0.5 * (abs(shutter.rolling.x) + abs(shutter.rolling.y));
+    return shutter.span + vec2f(-late, late) - offset;
+}
+
 struct Times {      // what a pixel's sample times have in common, fetched once before its loop
     count: u32,     // samples of this pixel
     first: f32,     // of a box [frame intervals]
