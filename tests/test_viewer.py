@@ -992,8 +992,8 @@ def test_between_frames_on_disk_no_stale_picture_is_seen(reel, look):
     first = float(reel.state.span[0])
     pictures = []
     for frames in ([first, first + 0.7], [first + 1.0, first + 0.7]):
-        for frame in frames:
-            reel.viewer.state = replace(reel.state, look=look, frame=frame)
+        for at in frames:
+            reel.viewer.state = replace(reel.state, look=look, frame=at)
             picture = reel.picture()
         pictures.append(picture)
     assert np.array_equal(*pictures)
