@@ -63,7 +63,7 @@ def test_every_pass_that_runs_is_told(method, clock, device, monkeypatch):
         assert watch.counts == wanted
     assert list(seconds) == list(wanted)
     if clock is WallClock:
-        assert all(s > 0 for s in seconds.values())
+        assert all(s >= 0 for s in seconds.values())
     np.testing.assert_allclose(picture, drawn(blur, None), rtol=0, atol=1e-5)
 
 

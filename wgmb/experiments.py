@@ -220,7 +220,13 @@ def _by_pass(
         parts = [(label, passes[method, label][0][0], s)
                  for (m, label), s in median.items() if m == method]  # fmt: skip
         rows += [
-            [method, label, times, round(1e3 * s, 2), round(s / whole[tap], 2)]
+            [
+                method,
+                label,
+                times,
+                round(1e3 * s, 2),
+                round(s / whole[tap], 2) if whole[tap] else None,
+            ]
             for label, times, s in [*parts, ("all", sum(t for _, t, _ in parts), total)]
         ]
     columns = ["method", "pass", "times", "median [ms]", "to the tap blur's"]
