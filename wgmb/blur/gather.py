@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..images import Images, Scratch
 
 SHOWN = ("color", "confidence")
-_STORED = 6  # storage textures of one pass, marks and both layers
+_STORED = 7  # storage textures of one pass, marks and both layers
 
 
 class Gather:
@@ -65,6 +65,7 @@ class Gather:
                 "near_path": _layer(layers["paths"], 2 * i),
                 "far_path": _layer(layers["paths"], 2 * i + 1),
                 "surface": _layer(layers["surfaces"], i),
+                "bend": _layer(layers["bends"], i),
             }
             self._silhouettes(encoder, inputs, frame, views)
             self._tiles(encoder, inputs, frame[0], i, len(frames), views)
@@ -101,6 +102,7 @@ class Gather:
             "colors": self._images.texture("colors", size, color, 2 * count),
             "paths": self._images.texture("paths", size, "rgba32uint", 2 * count),
             "surfaces": self._images.texture("surfaces", size, "rgba32float", count),
+            "bends": self._images.texture("bends", size, "rgba32uint", count),
         }
 
     def _reaching(self, size, count: int) -> wgpu.GPUTextureView:

@@ -19,7 +19,8 @@ struct Sources {
 @group(1) @binding(5) var own: texture_2d<f32>;             // the frame as it came
 @group(1) @binding(6) var own_weight: texture_2d<f32>;
 @group(1) @binding(7) var linear: sampler;
-@group(1) @binding(8) var output: Output;
+@group(1) @binding(8) var bends: texture_2d_array<u32>;     // second differences of the near colours
+@group(1) @binding(9) var output: Output;
 
 override WEIGHTED: bool = false;
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
@@ -38,7 +39,7 @@ const ROUNDS: u32 = 6u;         // near layers of three frames, then their far l
 struct Sample {
     depth: f32,         // that it competes with
     true_depth: f32,
-    miss: f32,          // distance of its place from the pixel [px]
+    miss: f32,          // squared distance of its place from the pixel [px^2]
     at: vec2f,          // where in its frame [px]
     layer: u32,         // near, far, of the frames one after the other
     calm: bool,         // one surface and weight, nothing brighter than white, all around
@@ -114,7 +115,7 @@ fn main(@builtin(global_invocation_id) call: vec3u,
                 color += clear * part.color;
                 weight += clear * part.weight;
                 if CONFIDENCE {
-                    missed += clear * part.cover * now.miss;
+                    missed += clear * part.cover * sqrt(now.miss);
                     if now.layer > 1u { others += clear * part.cover; }
                 }
                 clear *= 1.0 - part.cover;
@@ -124,7 +125,7 @@ fn main(@builtin(global_invocation_id) call: vec3u,
             if n >= texels { break; }
         }
         if whole {
-            color += clear * resampled(seen.solid.at, seen.solid.layer, seen.solid.calm);
+            color += clear * resampled(seen.solid.at, seen.solid.layer);
             var counts = 1.0;
             if WEIGHTED {
                 let at = vec2u(clamp(seen.solid.at, vec2f(0.0), vec2f(frame.size) - 1.0));
@@ -132,7 +133,7 @@ fn main(@builtin(global_invocation_id) call: vec3u,
             }
             weight += clear * counts;
             if CONFIDENCE {
-                missed += clear * seen.solid.miss;
+                missed += clear * sqrt(seen.solid.miss);
                 if seen.solid.layer > 1u { others += clear; }
             }
             clear = 0.0;
@@ -233,10 +234,11 @@ fn search(x: vec2f, tile: vec2u, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
             let q = x - d;
             texel = textureLoad(paths, vec2i(floor(q)), layer, 0);
             let next = displacement(path_in(texel), u);
-            miss = select(NONE, distance(next, d), inside(q));
+            let step = next - d;
+            miss = select(NONE, dot(step, step), inside(q));
             d = next;
             n++;
-            if miss < FOUND || miss >= NONE || n >= steps || alike(d, first) { break; }
+            if miss < FOUND * FOUND || miss >= NONE || n >= steps || alike(d, first) { break; }
         }
         if k == 0u { first = d; }
 
@@ -244,7 +246,7 @@ fn search(x: vec2f, tile: vec2u, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
         let calm = is_calm(texel);
         let guess = select(1.0, GUESSED, round >= 3u && !calm);
         let found = Sample(abs(z) * handicap * guess, abs(z), miss, x - d, layer, calm && round < 3u);
-        let hit = miss <= MISS && !known;
+        let hit = miss <= MISS * MISS && !known;
         let is_solid = is_same(found, solid);
         let better = select(found.depth < solid.depth, found.miss < solid.miss, is_solid);
         if hit && z > 0.0 && better { solid = found; }
@@ -322,24 +324,13 @@ fn add(part: ptr<function, Part>, now: Sample, i: u32) {
     (*part).cover += amount * select(there.z, 1.0, is_far);
 }
 
-/// Catmull-Rom interpolation where that is `safe`, linear elsewhere, by five bilinear samples; the corners
-/// of the 4 x 4, which weigh next to nothing, are left out.
-fn resampled(at: vec2f, layer: u32, safe: bool) -> vec4f {
-    let one = floor(at - 0.5) + 0.5;
-    let f = at - one;
-    let w0 = select(vec2f(0.0), f * (-0.5 + f * (1.0 - 0.5 * f)), safe);
-    let w2 = select(f, f * (0.5 + f * (2.0 - 1.5 * f)), safe);
-    let w3 = select(vec2f(0.0), f * f * (-0.5 + 0.5 * f), safe);
-    let middle = 1.0 - w0 - w3;         // of the two inner texels together
-    let texel = 1.0 / vec2f(frame.size);
-    let inner = (one + w2 / middle) * texel;
-    let first = (one - 1.0) * texel;
-    let last = (one + 2.0) * texel;
-    let both = middle.x * middle.y;
-    let sum = both * textureSampleLevel(colors, linear, inner, layer, 0.0)
-        + w0.x * middle.y * textureSampleLevel(colors, linear, vec2f(first.x, inner.y), layer, 0.0)
-        + w3.x * middle.y * textureSampleLevel(colors, linear, vec2f(last.x, inner.y), layer, 0.0)
-        + w0.y * middle.x * textureSampleLevel(colors, linear, vec2f(inner.x, first.y), layer, 0.0)
-        + w3.y * middle.x * textureSampleLevel(colors, linear, vec2f(inner.x, last.y), layer, 0.0);
-    return sum / (both + (w0.x + w3.x) * middle.y + (w0.y + w3.y) * middle.x);
+/// Catmull-Rom interpolation where the texel is calm, linear elsewhere: what is between two texels differs
+/// from the line by their second differences, of which the nearest texel's stand for both.
+fn resampled(at: vec2f, layer: u32) -> vec4f {
+    let f = fract(at - 0.5);
+    let bend = textureLoad(bends, vec2u(clamp(at, vec2f(0.0), vec2f(frame.size) - 1.0)), layer / 2u, 0);
+    let across = vec4f(unpack2x16float(bend.x), unpack2x16float(bend.y));
+    let down = vec4f(unpack2x16float(bend.z), unpack2x16float(bend.w));
+    let share = 0.5 * f * (1.0 - f);
+    return textureSampleLevel(colors, linear, at / vec2f(frame.size), layer, 0.0) - share.x * across - share.y * down;
 }

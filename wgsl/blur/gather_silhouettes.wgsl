@@ -16,6 +16,7 @@
 @group(1) @binding(8) var far_color: Color;
 @group(1) @binding(9) var far_path: Packed;
 @group(1) @binding(10) var surface: Exact;              // near depth; far depth, 0 where there is none; coverage; weight
+@group(1) @binding(11) var bend: Packed;                // second differences of the colour, across, down, where calm
 
 alias Marks = texture_storage_2d<r32uint, write>;
 alias Color = texture_storage_2d<rgba32float, write>;
@@ -39,6 +40,10 @@ fn held(px: vec2i) -> vec2i {
 fn depth_at(px: vec2i) -> f32 {
     let z = textureLoad(depth, held(px), 0).x;
     return select(FAR, min(z, FAR), is_finite(z) && z > 0.0);
+}
+
+fn color_at(px: vec2i) -> vec4f {
+    return textureLoad(color, held(px), 0);
 }
 
 fn is_mixed(px: vec2i) -> bool {
@@ -90,14 +95,16 @@ fn split(@builtin(global_invocation_id) call: vec3u,
     let px = vec2i(id.xy);
     let counts = weight_at(px);
     var beside = false;
-    var calm = true;        // one surface and weight, nothing brighter than white, in the 5 x 5
-    for (var i = 0; i < 25; i++) {
-        let off = vec2i(i % 5, i / 5) - 2;
-        let mark = textureLoad(marked, held(px + off), 0).x;
-        calm = calm && mark == 0u && weight_at(px + off) == counts;
-        beside = beside || ((mark & MIXED) != 0u && all(abs(off) < vec2i(2)));
+    var calm = true;        // one surface and weight, nothing brighter than white, in the 3 x 3
+    for (var i = 0; i < 9; i++) {
+        let at = px + vec2i(i % 3, i / 3) - 1;
+        let mark = textureLoad(marked, held(at), 0).x;
+        calm = calm && mark == 0u && weight_at(at) == counts;
+        beside = beside || (mark & MIXED) != 0u;
     }
     let own = textureLoad(color, px, 0);
+    let across = select(vec4f(0.0), color_at(px - vec2i(1, 0)) - 2.0 * own + color_at(px + vec2i(1, 0)), calm);
+    let down = select(vec4f(0.0), color_at(px - vec2i(0, 1)) - 2.0 * own + color_at(px + vec2i(0, 1)), calm);
     let own_motion = textureLoad(motion, px, 0);
     var z = depth_at(px);
     var near = own;
@@ -168,6 +175,8 @@ fn split(@builtin(global_invocation_id) call: vec3u,
     textureStore(near_path, px, packed(path_of(near_motion), select(z, -z, beside), calm));
     textureStore(far_color, px, far);
     textureStore(far_path, px, packed(path_of(far_motion), max(far_z, 0.0), seen));
+    textureStore(bend, px, vec4u(
+        pack2x16float(across.xy), pack2x16float(across.zw), pack2x16float(down.xy), pack2x16float(down.zw)));
     textureStore(surface, px, vec4f(z, far_z, coverage, coverage * counts));
 }
 
