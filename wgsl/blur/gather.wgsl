@@ -62,9 +62,9 @@ struct Reach {          // what a tile may show of a frame, see gather_tile.wgsl
 // than it has turns. So all searches of a time share one loop, and short loops are left from their end.
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn main(@builtin(global_invocation_id) call: vec3u,
+fn main(@builtin(local_invocation_index) local: u32,
         @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let id = spread(call, group, groups);
+    let id = spread(local, group, groups);
     if any(id.xy >= frame.size) { return; }
     let x = vec2f(id.xy) + 0.5;
     let tile = id.xy / TILE;

@@ -9,7 +9,7 @@
 @group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
 @group(1) @binding(2) var depth: texture_2d<f32>;
 @group(1) @binding(3) var weight: texture_2d<f32>;
-@group(1) @binding(4) var marked: texture_2d<u32>;      // what `mark` wrote: MIXED, BRIGHT
+@group(1) @binding(4) var marked: texture_2d<u32>;      // what `mark` wrote: a Mark each
 @group(1) @binding(5) var marks: Marks;
 @group(1) @binding(6) var near_color: Color;            // premultiplied by coverage too
 @group(1) @binding(7) var near_path: Packed;            // see packed()
@@ -25,9 +25,11 @@ alias Exact = texture_storage_2d<rgba32float, write>;
 
 override WEIGHTED: bool = false;
 
+// A mark: the bits of the depth, the last two of them flags.
+const FLAGS: u32 = 3u;
 const MIXED: u32 = 1u;          // two surfaces may show
 const BRIGHT: u32 = 2u;         // some channel is over WHITE
-const FAR: f32 = 1e10;          // depth of what has none
+const FAR: f32 = 0x1p33f;       // depth of what has none; its last bits are 0
 const APART: f32 = 1.1;         // ratio of depths that makes two surfaces
 const DIFFERENT: f32 = 0.5;     // of their motions [px]
 const WHITE: f32 = 1.0;
@@ -46,8 +48,16 @@ fn color_at(px: vec2i) -> vec4f {
     return textureLoad(color, held(px), 0);
 }
 
-fn is_mixed(px: vec2i) -> bool {
-    return (textureLoad(marked, px, 0).x & MIXED) != 0u;
+fn mark_at(px: vec2i) -> u32 {
+    return textureLoad(marked, held(px), 0).x;
+}
+
+fn is_mixed(mark: u32) -> bool {
+    return (mark & MIXED) != 0u;
+}
+
+fn marked_depth(mark: u32) -> f32 {
+    return bitcast<f32>(mark & ~FLAGS);
 }
 
 fn weight_at(px: vec2i) -> f32 {
@@ -75,7 +85,8 @@ fn mark(@builtin(global_invocation_id) id: vec3u) {
         most = max(most, dot(other, other));
     }
     let bright = any(textureLoad(color, px, 0) > vec4f(WHITE));
-    textureStore(marks, px, vec4u(select(0u, MIXED, most > DIFFERENT * DIFFERENT) | select(0u, BRIGHT, bright)));
+    let flags = select(0u, MIXED, most > DIFFERENT * DIFFERENT) | select(0u, BRIGHT, bright);
+    textureStore(marks, px, vec4u((bitcast<u32>(depth_at(px)) & ~FLAGS) | flags));
 }
 
 struct Side {       // the mean of what lies on one side of a silhouette
@@ -86,21 +97,31 @@ struct Side {       // the mean of what lies on one side of a silhouette
     counted: f32,   // weight of the colour
 }
 
+// What is looked for in the 5 x 5 around a pixel that shows two surfaces.
+const PURE: u32 = 0u;           // what is unmixed, on both sides
+const ANY: u32 = 1u;            // the rest, on a side where nothing is
+const UNLIKE: u32 = 2u;         // of a wire, in the 3 x 3: the motion most unlike that of the background
+const DONE: u32 = 3u;
+
 /// The two layers of every pixel.
 @compute @workgroup_size(WG_X, WG_Y)
-fn split(@builtin(global_invocation_id) call: vec3u,
+fn split(@builtin(local_invocation_index) local: u32,
         @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let id = spread(call, group, groups);
+    let id = spread(local, group, groups);
     if any(id.xy >= frame.size) { return; }
     let px = vec2i(id.xy);
     let counts = weight_at(px);
     var beside = false;
     var calm = true;        // one surface and weight, nothing brighter than white, in the 3 x 3
+    var nearest = FAR;
+    var farthest = 0.0;
     for (var i = 0; i < 9; i++) {
         let at = px + vec2i(i % 3, i / 3) - 1;
-        let mark = textureLoad(marked, held(at), 0).x;
-        calm = calm && mark == 0u && weight_at(at) == counts;
-        beside = beside || (mark & MIXED) != 0u;
+        let mark = mark_at(at);
+        calm = calm && (mark & FLAGS) == 0u && weight_at(at) == counts;
+        beside = beside || is_mixed(mark);
+        nearest = min(nearest, marked_depth(mark));
+        farthest = max(farthest, marked_depth(mark));
     }
     let own = textureLoad(color, px, 0);
     let across = select(vec4f(0.0), color_at(px - vec2i(1, 0)) - 2.0 * own + color_at(px + vec2i(1, 0)), calm);
@@ -115,40 +136,63 @@ fn split(@builtin(global_invocation_id) call: vec3u,
     var coverage = 1.0;
     var seen = false;       // the far layer is no guess
 
-    let mixed = is_mixed(px);
-    var nearest = FAR;
-    var farthest = 0.0;
-    var i = 0;
-    loop {          // short loops are left from their end, see gather.wgsl
-        let other = depth_at(px + vec2i(i % 3, i / 3) - 1);
-        nearest = min(nearest, other);
-        farthest = max(farthest, other);
-        i++;
-        if i >= 9 || !mixed { break; }
-    }
+    let mixed = is_mixed(mark_at(px));
     let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= FAR);
     var front = Side();
     var back = Side();
-    i = 0;
-    loop {
-        if mixed { collect(px, i, between, true, true, true, &front, &back); }
+    var before = vec4f(0.0);
+    var behind = vec4f(0.0);
+    var most = 0.0;
+    var thin = false;       // a wire: nothing near is unmixed
+    var no_back = false;
+    var stage = select(DONE, PURE, mixed);
+    var i = 0;
+    loop {          // left from its end, and one for all stages, see gather.wgsl
+        let off = vec2i(i % 5, i / 5) - 2;
+        let at = px + off;
+        let mark = mark_at(at);
+        let is_front = marked_depth(mark) < between;
+        let way = textureLoad(motion, held(at), 0);
+        let there = stage < DONE && all(at >= vec2i(0)) && all(at < vec2i(frame.size));
+        let wanted = select(select(no_back, thin, is_front), !is_mixed(mark), stage == PURE);
+        if there && wanted && stage != UNLIKE {
+            // The less the farther it is.
+            let distance2 = f32(off.x * off.x + off.y * off.y);
+            let share = 1.0 / (1.0 + distance2 * distance2);
+            if is_front {
+                front.total += share;
+                front.motion += share * way;
+                front.depth += share * marked_depth(mark);
+            } else {
+                back.total += share;
+                back.motion += share * way;
+                back.depth += share * marked_depth(mark);
+                back.color += share * textureLoad(color, at, 0);
+                back.counted += share * weight_at(at);
+            }
+        }
+        let apart = dot(way - behind, way - behind);
+        if there && stage == UNLIKE && is_front && all(abs(off) < vec2i(2)) && apart > most {
+            most = apart;
+            before = way;
+        }
         i++;
-        if i >= 25 || !mixed { break; }
-    }
-    let thin = front.total == 0.0;      // a wire: nothing near is unmixed
-    let no_back = back.total == 0.0;
-    let more = mixed && (thin || no_back);
-    i = 0;
-    loop {
-        if more { collect(px, i, between, false, thin, no_back, &front, &back); }
-        i++;
-        if i >= 25 || !more { break; }
+        if i >= 25 {
+            i = 0;
+            if stage == PURE {
+                thin = front.total == 0.0;
+                no_back = back.total == 0.0;
+            }
+            if stage != UNLIKE {
+                behind = back.motion / back.total;
+                before = select(front.motion / front.total, behind, thin);
+            }
+            stage = select(select(DONE, UNLIKE, thin && stage == ANY), ANY, stage == PURE && (thin || no_back));
+        }
+        if stage == DONE { break; }
     }
 
     if mixed && front.total > 0.0 && back.total > 0.0 && back.counted > 0.0 {
-        let behind = back.motion / back.total;
-        var before = front.motion / front.total;
-        if thin { before = most_different(px, between, behind, thin); }
         let way = before - behind;
         if dot(way, way) >= DIFFERENT * DIFFERENT {
             let part = clamp(dot(own_motion - behind, way) / dot(way, way), 0.0, 1.0);
@@ -178,49 +222,4 @@ fn split(@builtin(global_invocation_id) call: vec3u,
     textureStore(bend, px, vec4u(
         pack2x16float(across.xy), pack2x16float(across.zw), pack2x16float(down.xy), pack2x16float(down.zw)));
     textureStore(surface, px, vec4f(z, far_z, coverage, coverage * counts));
-}
-
-/// Add pixel `i` of the 5 x 5 around `px` to its side, the less the farther it is.
-fn collect(px: vec2i, i: i32, between: f32, pure_only: bool, to_front: bool, to_back: bool,
-           front: ptr<function, Side>, back: ptr<function, Side>) {
-    let off = vec2i(i % 5, i / 5) - 2;
-    let at = px + off;
-    if any(at < vec2i(0)) || any(at >= vec2i(frame.size)) { return; }
-    if pure_only && is_mixed(at) { return; }
-    let z = depth_at(at);
-    let is_front = z < between;
-    if !select(to_back, to_front, is_front) { return; }
-    let distance2 = f32(off.x * off.x + off.y * off.y);
-    let share = 1.0 / (1.0 + distance2 * distance2);
-    let way = share * textureLoad(motion, at, 0);
-    if is_front {
-        (*front).total += share;
-        (*front).motion += way;
-        (*front).depth += share * z;
-    } else {
-        (*back).total += share;
-        (*back).motion += way;
-        (*back).depth += share * z;
-        (*back).color += share * textureLoad(color, at, 0);
-        (*back).counted += share * weight_at(at);
-    }
-}
-
-/// Of the near motions in the 3 x 3, the one most unlike that of the background; of a `thin` thing.
-fn most_different(px: vec2i, between: f32, behind: vec4f, thin: bool) -> vec4f {
-    var found = behind;
-    var most = 0.0;
-    var i = 0;
-    loop {
-        let at = held(px + vec2i(i % 3, i / 3) - 1);
-        let way = textureLoad(motion, at, 0);
-        let apart = dot(way - behind, way - behind);
-        if apart > most && depth_at(at) < between {
-            most = apart;
-            found = way;
-        }
-        i++;
-        if i >= 9 || !thin { break; }
-    }
-    return found;
 }
