@@ -226,7 +226,7 @@ fn lands(path: vec4f, span: vec2f, off: vec2f) -> vec2f {
     let a = displaced(path, span.x) - off;
     let way = displaced(path, span.y) - off - a;
     let bend = length(path.zw) * (span.y - span.x) * (span.y - span.x) * 0.25;
-    let margin = f32(TILE) + 2.0 + bend;
+    let margin = f32(TILE) + bend;
     // The part of the way between two parallel sides, for both pairs of sides.
     let steps = select(way, vec2f(1e-6), abs(way) < vec2f(1e-6));
     let one = (-margin - a) / steps;
