@@ -6,7 +6,7 @@ import numpy as np
 
 from twins.tap import bilinear
 
-FAR, TILE, PATHS = 1e10, 16, 4
+FAR, TILE, PATHS = 2.0**33, 16, 4
 
 
 @dataclass
@@ -20,7 +20,7 @@ class Layers:
     coverage: np.ndarray
     guessed: np.ndarray  # the far layer was not seen
     plain: np.ndarray  # no silhouette in the 3 x 3
-    calm: np.ndarray  # none, and nothing brighter than white, in the 5 x 5
+    calm: np.ndarray  # none, and nothing brighter than white, in the 3 x 3
 
 
 @dataclass
@@ -92,7 +92,7 @@ def split(offset, color, motion, depth):
         for x in range(width):
             plain[y, x] = not any(mixed[p] for p in around(height, width, y, x, 1))
             calm[y, x] = not any(
-                mixed[p] or (color[p] > 1).any() for p in around(height, width, y, x, 2)
+                mixed[p] or (np.abs(color[p]) > 1).any() for p in around(height, width, y, x, 1)
             )
     paths = [stored(found[1]), stored(far[1])]
     depths = [found[2], far[2]]
@@ -200,7 +200,7 @@ def reaching(frame, span):
         bend = np.hypot(*path[2:]) * (u1 - u0) ** 2 / 4
         steps = np.linspace(0, 1, 2001)
         at = moved(path, u0) + steps[:, None] * (moved(path, u1) - moved(path, u0)) - off
-        touching = steps[(np.abs(at) <= TILE + 2 + bend).all(axis=1)]
+        touching = steps[(np.abs(at) <= TILE + bend).all(axis=1)]
         return u0 + (u1 - u0) * touching[[0, -1]] if len(touching) else None
 
     def meets(tile, off):
@@ -368,21 +368,11 @@ def fetch(frame, s):
 
 
 def cubic(image, x, y):
-    """Catmull-Rom over the 4 x 4 without its corners."""
+    """Catmull-Rom: the line between texels, bent by the second differences of the nearest one."""
     height, width = image.shape[:2]
-
-    def weights(f):
-        return (-f + 2 * f**2 - f**3) / 2, (2 - 5 * f**2 + 3 * f**3) / 2, \
-            (f + 4 * f**2 - 3 * f**3) / 2, (f**3 - f**2) / 2  # fmt: skip
-
-    i, j = int(np.floor(x - 0.5)), int(np.floor(y - 0.5))
-    across, down = weights(x - 0.5 - i), weights(y - 0.5 - j)
-    sum_, total = 0.0, 0.0
-    for n in range(4):
-        for m in range(4):
-            if n in (0, 3) and m in (0, 3):
-                continue
-            p = min(max(j + n - 1, 0), height - 1), min(max(i + m - 1, 0), width - 1)
-            sum_ = sum_ + across[m] * down[n] * image[p]
-            total += across[m] * down[n]
-    return sum_ / total
+    i, j = int(np.clip(x, 0, width - 1)), int(np.clip(y, 0, height - 1))
+    left, right = image[j, max(i - 1, 0)], image[j, min(i + 1, width - 1)]
+    above, below = image[max(j - 1, 0), i], image[min(j + 1, height - 1), i]
+    across, down = (left - 2 * image[j, i] + right), (above - 2 * image[j, i] + below)
+    f, g = (x - 0.5) % 1, (y - 0.5) % 1
+    return bilinear(image, x, y) - (f * (1 - f) * across + g * (1 - g) * down) / 2

@@ -42,7 +42,6 @@ struct Sample {
     miss: f32,          // squared distance of its place from the pixel [px^2]
     at: vec2f,          // where in its frame [px]
     layer: u32,         // near, far, of the frames one after the other
-    calm: bool,         // one surface and weight, nothing brighter than white, all around
 }
 
 struct Seen {           // the nearest ones
@@ -94,7 +93,8 @@ fn main(@builtin(local_invocation_index) local: u32,
         let edge = seen.edge.depth < seen.solid.depth / BEHIND;
         let second = edge && seen.second.depth < seen.solid.depth / BEHIND && is_behind(seen.second, seen.edge);
         let solid = seen.solid.depth < NONE;
-        let whole = solid && seen.solid.layer % 2u == 0u && (seen.solid.calm || !WEIGHTED);
+        var whole = solid && seen.solid.layer % 2u == 0u;
+        if WEIGHTED { whole = whole && is_calm(textureLoad(paths, nearest_to(seen.solid.at), seen.solid.layer, 0)); }
         let texels = 4u * (u32(edge) + u32(second) + u32(solid && !whole));
         var clear = 1.0;
         var color = vec4f(0.0);
@@ -127,10 +127,7 @@ fn main(@builtin(local_invocation_index) local: u32,
         if whole {
             color += clear * resampled(seen.solid.at, seen.solid.layer);
             var counts = 1.0;
-            if WEIGHTED {
-                let at = vec2u(clamp(seen.solid.at, vec2f(0.0), vec2f(frame.size) - 1.0));
-                counts = textureLoad(surfaces, at, seen.solid.layer / 2u, 0).w;
-            }
+            if WEIGHTED { counts = textureLoad(surfaces, nearest_to(seen.solid.at), seen.solid.layer / 2u, 0).w; }
             weight += clear * counts;
             if CONFIDENCE {
                 missed += clear * sqrt(seen.solid.miss);
@@ -168,7 +165,7 @@ fn main(@builtin(local_invocation_index) local: u32,
 }
 
 fn nothing() -> Sample {
-    return Sample(NONE, NONE, NONE, vec2f(-9.0), 99u, false);
+    return Sample(NONE, NONE, NONE, vec2f(-9.0), 99u);
 }
 
 fn reach(tile: vec2u, f: u32) -> Reach {
@@ -194,6 +191,11 @@ fn of_frame(f: u32, a: vec4f, b: vec4f, c: vec4f) -> vec4f {
 
 fn inside(q: vec2f) -> bool {
     return all(q >= vec2f(0.0)) && all(q < vec2f(frame.size));
+}
+
+/// The pixel in the picture nearest to a place.
+fn nearest_to(q: vec2f) -> vec2u {
+    return vec2u(clamp(q, vec2f(0.0), vec2f(frame.size) - 1.0));
 }
 
 /// Whether two displacements, or two places, are the same.
@@ -243,9 +245,8 @@ fn search(x: vec2f, tile: vec2u, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
         if k == 0u { first = d; }
 
         let z = depth_in(texel);
-        let calm = is_calm(texel);
-        let guess = select(1.0, GUESSED, round >= 3u && !calm);
-        let found = Sample(abs(z) * handicap * guess, abs(z), miss, x - d, layer, calm && round < 3u);
+        let guess = select(1.0, GUESSED, round >= 3u && !is_calm(texel));
+        let found = Sample(abs(z) * handicap * guess, abs(z), miss, x - d, layer);
         let hit = miss <= MISS * MISS && !known;
         let is_solid = is_same(found, solid);
         let better = select(found.depth < solid.depth, found.miss < solid.miss, is_solid);
@@ -308,7 +309,7 @@ fn add(part: ptr<function, Part>, now: Sample, i: u32) {
     let corner = floor(now.at - 0.5);
     let share = now.at - 0.5 - corner;
     let step = vec2f(vec2u(i & 1u, i >> 1u));
-    let px = vec2u(clamp(corner + step, vec2f(0.0), vec2f(frame.size) - 1.0));
+    let px = nearest_to(corner + step);
     let both = mix(1.0 - share, share, step);
     let there = textureLoad(surfaces, px, source, 0);
     let is_split = there.y > 0.0;
@@ -328,7 +329,7 @@ fn add(part: ptr<function, Part>, now: Sample, i: u32) {
 /// from the line by their second differences, of which the nearest texel's stand for both.
 fn resampled(at: vec2f, layer: u32) -> vec4f {
     let f = fract(at - 0.5);
-    let bend = textureLoad(bends, vec2u(clamp(at, vec2f(0.0), vec2f(frame.size) - 1.0)), layer / 2u, 0);
+    let bend = textureLoad(bends, nearest_to(at), layer / 2u, 0);
     let across = vec4f(unpack2x16float(bend.x), unpack2x16float(bend.y));
     let down = vec4f(unpack2x16float(bend.z), unpack2x16float(bend.w));
     let share = 0.5 * f * (1.0 - f);

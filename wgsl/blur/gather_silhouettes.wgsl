@@ -28,7 +28,7 @@ override WEIGHTED: bool = false;
 // A mark: the bits of the depth, the last two of them flags.
 const FLAGS: u32 = 3u;
 const MIXED: u32 = 1u;          // two surfaces may show
-const BRIGHT: u32 = 2u;         // some channel is over WHITE
+const BRIGHT: u32 = 2u;         // some channel is beyond WHITE
 const FAR: f32 = 0x1p33f;       // depth of what has none; its last bits are 0
 const APART: f32 = 1.1;         // ratio of depths that makes two surfaces
 const DIFFERENT: f32 = 0.5;     // of their motions [px]
@@ -84,7 +84,7 @@ fn mark(@builtin(global_invocation_id) id: vec3u) {
         let other = textureLoad(motion, held(px + vec2i(i % 3, i / 3) - 1), 0) - here;
         most = max(most, dot(other, other));
     }
-    let bright = any(textureLoad(color, px, 0) > vec4f(WHITE));
+    let bright = any(abs(textureLoad(color, px, 0)) > vec4f(WHITE));
     let flags = select(0u, MIXED, most > DIFFERENT * DIFFERENT) | select(0u, BRIGHT, bright);
     textureStore(marks, px, vec4u((bitcast<u32>(depth_at(px)) & ~FLAGS) | flags));
 }
@@ -112,7 +112,7 @@ fn split(@builtin(local_invocation_index) local: u32,
     let px = vec2i(id.xy);
     let counts = weight_at(px);
     var beside = false;
-    var calm = true;        // one surface and weight, nothing brighter than white, in the 3 x 3
+    var calm = true;        // one surface and weight, nothing beyond white, in the 3 x 3
     var nearest = FAR;
     var farthest = 0.0;
     for (var i = 0; i < 9; i++) {
