@@ -125,15 +125,15 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
     var split = 0.0;
     var longest = 0.0;
     for (var i = 0; i < count; i++) {
-        let there = low + vec2i(i % size.x, i / size.x);
-        let at = u32(there.y) * tiles.x + u32(there.x);
-        if meets(contents[at].box, vec2f((here - there) * i32(TILE))) {
-            let about = contents[at].about;
+        let tile = low + vec2i(i % size.x, i / size.x);
+        let there = other(tile, here, tiles);
+        if there.leads {
+            let about = contents[there.at].about;
             split = max(split, about.y);
             longest = max(longest, about.z);
-            if about.x > 0.0 {
-                least = min(least, there);
-                most = max(most, there);
+            if there.count > 0u {
+                least = min(least, tile);
+                most = max(most, tile);
             }
         }
     }
@@ -147,14 +147,11 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
         var best = 0.0;
         var found = vec4f(0.0);
         for (var i = 0; i < count; i++) {
-            let there = low + vec2i(i % size.x, i / size.x);
-            let at = u32(there.y) * tiles.x + u32(there.x);
-            let off = vec2f((here - there) * i32(TILE));
-            let paths_there = select(0u, u32(contents[at].about.x), meets(contents[at].box, off));
-            for (var n = 0u; n < paths_there; n++) {
-                let path = contents[at].paths[n];
+            let there = other(low + vec2i(i % size.x, i / size.x), here, tiles);
+            for (var n = 0u; n < there.count; n++) {
+                let path = contents[there.at].paths[n];
                 let least = unlike(path, chosen, u);
-                let when = lands(path, span, off);
+                let when = lands(path, span, there.off);
                 if least > best && when.x <= when.y {
                     best = least;
                     found = path;
@@ -171,16 +168,13 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
     var comes = vec4f(1.0);
     var goes = vec4f(0.0);
     for (var i = 0; i < count; i++) {
-        let there = low + vec2i(i % size.x, i / size.x);
-        let at = u32(there.y) * tiles.x + u32(there.x);
-        let off = vec2f((here - there) * i32(TILE));
-        let paths_there = select(0u, u32(contents[at].about.x), meets(contents[at].box, off));
-        for (var n = 0u; n < paths_there; n++) {
-            let path = contents[at].paths[n];
-            let when = lands(path, span, off);
+        let there = other(low + vec2i(i % size.x, i / size.x), here, tiles);
+        for (var n = 0u; n < there.count; n++) {
+            let path = contents[there.at].paths[n];
+            let when = lands(path, span, there.off);
             if when.x <= when.y {
                 let alike = most_alike(path, chosen, u);
-                depths = min(depths, select(vec4f(NONE), vec4f(contents[at].depths[n]), alike));
+                depths = min(depths, select(vec4f(NONE), vec4f(contents[there.at].depths[n]), alike));
                 comes = min(comes, select(vec4f(1.0), vec4f(when.x), alike));
                 goes = max(goes, select(vec4f(0.0), vec4f(when.y), alike));
             }
@@ -212,6 +206,20 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
     textureStore(reaching, id.xy, source.first + 2u, select(span.x + (span.y - span.x) * comes, vec4f(NONE), none));
     textureStore(reaching, id.xy, source.first + 3u, select(span.x + (span.y - span.x) * goes, vec4f(-NONE), none));
     for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id.xy, source.first + 4u + k, chosen[k]); }
+}
+
+struct Other {
+    at: u32,            // in `contents`
+    off: vec2f,         // from there to here [px]
+    leads: bool,        // some of its motions may lead here
+    count: u32,         // of its paths, if so
+}
+
+fn other(there: vec2i, here: vec2i, tiles: vec2u) -> Other {
+    let at = u32(there.y) * tiles.x + u32(there.x);
+    let off = vec2f((here - there) * i32(TILE));
+    let leads = meets(contents[at].box, off);
+    return Other(at, off, leads, select(0u, u32(contents[at].about.x), leads));
 }
 
 /// Whether any motion of a tile, by its box, leads to the one that lies `off` [px] away.
