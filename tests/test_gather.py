@@ -80,6 +80,26 @@ def test_energy_of_a_moving_spark_is_kept():
     assert out.sum() == pytest.approx(sources[0][0].sum(), rel=0.01)
 
 
+@pytest.mark.parametrize("length", [40, 200, 480])
+def test_a_long_flight_leaves_a_whole_streak(length):
+    """A block over still ground; at the ends of the exposure it is half of `length` px away."""
+    y, x = np.mgrid[:24, :800] + 0.5
+
+    def at(t):
+        block = (abs(x - 400 - length * t) < 20) & (abs(y - 12) < 8)
+        motion = np.zeros((24, 800, 4), "f4")
+        motion[block] = (-length, 0, length, 0)
+        color = np.where(block[..., None], 1.0, 0.25).repeat(3, axis=2).astype("f4")
+        return color, motion, np.where(block, 2.0, 9.0).astype("f4")
+
+    frame = frame_of([at(0), at(-1), at(1)])
+    got = wgmb.Blur("gather", shutter=360, samples=64)(frame)
+    times = (np.arange(64) + 0.5) / 64 - 0.5
+    want = np.mean([at(t)[0] for t in times], axis=0)
+    assert got.sum() - 0.25 * got.size == pytest.approx(want.sum() - 0.25 * want.size, rel=1e-3)
+    np.testing.assert_allclose(got, want, atol=0.75 * 3 / 64)
+
+
 def test_confidence_tells_where_the_neighbours_were_needed(sources):
     frame = frame_of(sources)
     shown = wgmb.Blur("gather", show="confidence")(frame)
