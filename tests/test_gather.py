@@ -80,6 +80,37 @@ def test_energy_of_a_moving_spark_is_kept():
     assert out.sum() == pytest.approx(sources[0][0].sum(), rel=0.01)
 
 
+def shapes(offset, mixed):
+    """A disc flies over a box, over nothing: colour with alpha, vectors mixed or not, depth."""
+    fine, (height, width) = 8, (90, 160)
+    y, x = (np.mgrid[: height * fine, : width * fine] + 0.5) / fine
+    velocity = np.array([[0, 0], [3, 1], [-36, 4]])
+    fx, fy = x - 3 * offset - 80, y - offset - 45
+    which = ((abs(fx) < 35) & (abs(fy) < 27)).astype(int)
+    which[(x + 36 * offset - 121) ** 2 + (y - 4 * offset - 45) ** 2 < 24**2] = 2
+    color = np.array([[0, 0, 0, 0], [0.8, 0.5, 0.1, 1], [0.1, 0.4, 0.9, 1]])[which]
+    motion = np.concatenate([-velocity, velocity], axis=1)[which]
+    middle = np.s_[fine // 2 :: fine, fine // 2 :: fine]
+
+    def mean(a):
+        return a.reshape(height, fine, width, fine, -1).mean(axis=(1, 3)).astype("f4")
+
+    motion = mean(motion) if mixed else motion[middle].astype("f4")
+    return mean(color), motion, np.array([np.inf, 9, 4], "f4")[which[middle]]
+
+
+def test_alpha_tells_the_coverage_that_vectors_do_not():
+    """Many renderers give the vector of one of the surfaces that a pixel shows."""
+    times = Shutter(360).sample_times(24)
+    truth = np.mean([shapes(t, True)[0] for t in times], axis=0)
+    errors = []
+    for mixed in (True, False):
+        frame = frame_of([shapes(offset, mixed) for offset in (0, -1, 1)])
+        errors.append(error(wgmb.Blur("gather", shutter=360, samples=24)(frame), truth))
+    assert errors[1] < 1.5 * errors[0]
+    assert errors[0] < 0.1 * error(shapes(0, True)[0], truth)
+
+
 @pytest.mark.parametrize("length", [40, 200, 480])
 def test_a_long_flight_leaves_a_whole_streak(length):
     """A block over still ground; at the ends of the exposure it is half of `length` px away."""

@@ -198,8 +198,11 @@ def test_reproject_is_its_twin(size, neighbours):
     assert wrong.mean() < 0.01
 
 
-def crossing(size, offset, seed=0):
-    """A box over a wall, both moving and textured, as a renderer with antialiasing sees it."""
+def crossing(size, offset, seed=0, wall=True):
+    """A box over a wall, both moving and textured, as a renderer with antialiasing sees it.
+
+    Without the `wall`, over nothing, with the vectors of the middles of pixels.
+    """
     rng = np.random.default_rng(seed)
     height, width = size
     fine = 4
@@ -228,15 +231,20 @@ def crossing(size, offset, seed=0):
     def mean(a):
         return a.reshape(height, fine, width, fine, -1).mean(axis=(1, 3)).astype("f4")
 
-    return mean(color), mean(vectors[which]), depths[which][::fine, ::fine].astype("f4")
+    depth, motion = depths[which][::fine, ::fine].astype("f4"), mean(vectors[which])
+    if not wall:
+        color[which == 0], depth[depth == depths[0]] = 0, np.inf
+        motion = vectors[which][::fine, ::fine].astype("f4")
+    return mean(color), motion, depth
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3])
 @pytest.mark.parametrize("size", [(36, 52), (1, 1)])
 @pytest.mark.parametrize("degrees", [180, 400])
-def test_gather_is_its_twin(size, frames, degrees):
+@pytest.mark.parametrize("wall", [True, False])
+def test_gather_is_its_twin(size, frames, degrees, wall):
     """Samples on a texel's edge may read the next one; nearly all pixels agree."""
-    sources = [(offset, *crossing(size, offset)) for offset in (0, -1, 1)[:frames]]
+    sources = [(offset, *crossing(size, offset, wall=wall)) for offset in (0, -1, 1)[:frames]]
     own, *near = [wgmb.Frame(c, motion=m, depth=d) for _, c, m, d in sources]
     near = dict(zip(("prev", "next"), near, strict=False))
     frame = wgmb.Frame(own.color, motion=own.motion, depth=own.depth, **near)

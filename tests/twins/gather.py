@@ -132,7 +132,13 @@ def part(color, motion, z, mixed, y, x):
     way = before - behind
     if way @ way < 0.25:
         return None
-    coverage = np.clip((motion[y, x] - behind) @ way / (way @ way), 0, 1)
+    coverage = (motion[y, x] - behind) @ way / (way @ way)
+    if color.shape[2] == 4:
+        opaque = 1.0 if thin else mean(color, front)[3]
+        clear = mean(color, back)[3]
+        if opaque - clear > 0.5:
+            coverage = (color[y, x, 3] - clear) / (opaque - clear)
+    coverage = np.clip(coverage, 0, 1)
     far_z = mean(z, back)
     if coverage < 1 - 0.98:
         far_z = z[y, x] if z[y, x] >= between else far_z

@@ -20,7 +20,8 @@ class Gather:
 
     A fixed-point search along curved paths starts from the pixel's own motion and from the
     few motions that reach its tile. Silhouettes are parted into two layers before, so that
-    mixed pixels move as what they are made of. The nearest sample wins, the frame's own
+    mixed pixels move as what they are made of; their shares are those of alpha before what is
+    transparent, else those of mixed vectors. The nearest sample wins, the frame's own
     unless a neighbouring frame's is clearly nearer; where no frame saw what is there, the
     pixel's own path is followed.
     `show`: "confidence" gives, instead of colour, the share of times at which a sample was

@@ -34,6 +34,7 @@ const APART: f32 = 1.1;         // ratio of depths that makes two surfaces
 const DIFFERENT: f32 = 0.5;     // of their motions [px]
 const WHITE: f32 = 1.0;
 const WHOLE: f32 = 0.98;        // coverage from here on is all
+const HALF: f32 = 0.5;          // alphas farther apart than this tell coverage
 
 fn held(px: vec2i) -> vec2i {
     return clamp(px, vec2i(0), vec2i(frame.size) - 1);
@@ -103,6 +104,10 @@ const ANY: u32 = 1u;            // the rest, on a side where nothing is
 const UNLIKE: u32 = 2u;         // of a wire, in the 3 x 3: the motion most unlike that of the background
 const DONE: u32 = 3u;
 
+fn both(a: Side, b: Side) -> Side {
+    return Side(a.total + b.total, a.motion + b.motion, a.depth + b.depth, a.color + b.color, a.counted + b.counted);
+}
+
 /// The two layers of every pixel.
 @compute @workgroup_size(WG_X, WG_Y)
 fn split(@builtin(local_invocation_index) local: u32,
@@ -159,17 +164,8 @@ fn split(@builtin(local_invocation_index) local: u32,
             // The less the farther it is.
             let distance2 = f32(off.x * off.x + off.y * off.y);
             let share = 1.0 / (1.0 + distance2 * distance2);
-            if is_front {
-                front.total += share;
-                front.motion += share * way;
-                front.depth += share * marked_depth(mark);
-            } else {
-                back.total += share;
-                back.motion += share * way;
-                back.depth += share * marked_depth(mark);
-                back.color += share * textureLoad(color, at, 0);
-                back.counted += share * weight_at(at);
-            }
+            let here = Side(share, share * way, share * marked_depth(mark), share * textureLoad(color, at, 0), share * weight_at(at));
+            if is_front { front = both(front, here); } else { back = both(back, here); }
         }
         let apart = dot(way - behind, way - behind);
         if there && stage == UNLIKE && is_front && all(abs(off) < vec2i(2)) && apart > most {
@@ -195,7 +191,12 @@ fn split(@builtin(local_invocation_index) local: u32,
     if mixed && front.total > 0.0 && back.total > 0.0 && back.counted > 0.0 {
         let way = before - behind;
         if dot(way, way) >= DIFFERENT * DIFFERENT {
-            let part = clamp(dot(own_motion - behind, way) / dot(way, way), 0.0, 1.0);
+            // What is opaque before what is not tells its share better than vectors, which some renderers do not mix.
+            let opaque = select(front.color.a / max(front.counted, 1e-9), 1.0, thin);
+            let clear = back.color.a / back.counted;
+            let by_alpha = opaque - clear > HALF && counts > 0.0;
+            let part = clamp(select(dot(own_motion - behind, way) / dot(way, way),
+                (own.a / counts - clear) / (opaque - clear), by_alpha), 0.0, 1.0);
             far_z = back.depth / back.total;
             if part < 1.0 - WHOLE {     // all background, whatever the depth's one sample says
                 seen = true;
