@@ -9,7 +9,7 @@
 @group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
 @group(1) @binding(2) var depth: texture_2d<f32>;
 @group(1) @binding(3) var weight: texture_2d<f32>;
-@group(1) @binding(4) var marked: texture_2d<u32>;      // what `mark` wrote: a Mark each
+@group(1) @binding(4) var marked: texture_2d<u32>;      // what `mark` wrote: depth and flags
 @group(1) @binding(5) var marks: Marks;
 @group(1) @binding(6) var near_color: Color;            // premultiplied by coverage too
 @group(1) @binding(7) var near_path: Packed;            // see packed()
@@ -25,7 +25,7 @@ alias Exact = texture_storage_2d<rgba32float, write>;
 
 override WEIGHTED: bool = false;
 
-// A mark: the bits of the depth, the last two of them flags.
+// The last two bits of a marked depth.
 const FLAGS: u32 = 3u;
 const MIXED: u32 = 1u;          // two surfaces may show
 const BRIGHT: u32 = 2u;         // some channel is beyond WHITE
@@ -34,7 +34,7 @@ const APART: f32 = 1.1;         // ratio of depths that makes two surfaces
 const DIFFERENT: f32 = 0.5;     // of their motions [px]
 const WHITE: f32 = 1.0;
 const WHOLE: f32 = 0.98;        // coverage from here on is all
-const HALF: f32 = 0.5;          // alphas farther apart than this tell coverage
+const TELLING: f32 = 0.5;       // alphas farther apart than this tell coverage
 
 fn held(px: vec2i) -> vec2i {
     return clamp(px, vec2i(0), vec2i(frame.size) - 1);
@@ -194,7 +194,7 @@ fn split(@builtin(local_invocation_index) local: u32,
             // What is opaque before what is not tells its share better than vectors, which some renderers do not mix.
             let opaque = select(front.color.a / max(front.counted, 1e-9), 1.0, thin);
             let clear = back.color.a / back.counted;
-            let by_alpha = opaque - clear > HALF && counts > 0.0;
+            let by_alpha = opaque - clear > TELLING && counts > 0.0;
             let part = clamp(select(dot(own_motion - behind, way) / dot(way, way),
                 (own.a / counts - clear) / (opaque - clear), by_alpha), 0.0, 1.0);
             far_z = back.depth / back.total;
