@@ -333,6 +333,8 @@ SCENES = {s.__name__: s for s in (rotozoom, propeller, flag, runner)}
 def gltf(text: str) -> str:
     """The file's model on a ground before a wall, or as its own camera sees it; says so."""
     path, _, name = (text, "", "") if Path(text).is_file() else text.rpartition(":")
+    if not Path(path).is_file():
+        sys.exit(f"expected a glTF file or a scene of {', '.join(SCENES)}, got {text!r}")
     bpy.ops.import_scene.gltf(filepath=str(Path(path).resolve()), disable_bone_shape=True)
     things = list(bpy.data.objects)
     about = f"{Path(path).name}: {play(things, name)}, at {SPEED:g} times its speed"
