@@ -1,5 +1,9 @@
 """Scenes with a path tracer's own motion blur: python docs/blender_scenes.py FOLDER [SCENE ...]
 
+A scene is one of this file's, or an animated glTF file, FILE.glb or FILE.glb:ANIMATION (else
+its first): its cycle is played SPEED times as fast as the file says, so that a walk blurs like
+a run, with the cycle's middle on frame 10.
+
 Runs in an environment of its own (Python 3.11, `pip install bpy==4.5.15 OpenEXR`, 1 GB), on
 the CPU, three to five minutes a scene on two cores. Into FOLDER/SCENE it writes
 prev.exr, curr.exr, next.exr    frames 9, 10, 11 without motion blur, with depth and vectors
@@ -28,6 +32,7 @@ SHUTTERS = {"050": 0.5, "100": 1.0}
 SPAN = 2.25  # frames from the middle one to the last key: vectors of 9 and 11 lead to 8 and 12
 STEP = 0.125  # frames between keys
 AMBIENT = 0.3
+SPEED = 2.0  # of a glTF file's animation
 
 
 # ---- what scenes are made of ------------------------------------------------------------------
@@ -322,6 +327,84 @@ def runner():
 SCENES = {s.__name__: s for s in (rotozoom, propeller, flag, runner)}
 
 
+# ---- a scene of a glTF file -------------------------------------------------------------------
+
+
+def gltf(text: str) -> str:
+    """The file's model on a ground before a wall, or as its own camera sees it; says so."""
+    path, _, name = (text, "", "") if Path(text).is_file() else text.rpartition(":")
+    if not Path(path).is_file():
+        sys.exit(f"expected a glTF file or a scene of {', '.join(SCENES)}, got {text!r}")
+    bpy.ops.import_scene.gltf(filepath=str(Path(path).resolve()), disable_bone_shape=True)
+    things = list(bpy.data.objects)
+    about = f"{Path(path).name}: {play(things, name)}, at {SPEED:g} times its speed"
+    glow()
+    if not any(thing.type == "LIGHT" for thing in things):
+        sun((-0.45, 0.7, -0.8), 2.2)
+    eyes = [thing for thing in things if thing.type == "CAMERA"]
+    if eyes:
+        bpy.context.scene.camera = eyes[0]
+        return f"{about}, seen by its own camera."
+    middle = Vector((0, 0, stand(things) / 2))
+    add("plane", material("noise", (0.1, 0.14, 0.05), (0.42, 0.36, 0.24), 5), size=60)
+    wall = add("plane", material("brick", (0.5, 0.2, 0.12), (0.62, 0.32, 0.2), 2.2), size=60)
+    wall.location, wall.rotation_euler[0] = (0, 3.4, 2.2 - 30), math.radians(90)
+    bpy.ops.object.empty_add(location=middle)
+    pivot = bpy.context.object
+    head, _ = camera((2.3, -3.5, 0.9), (0, 0, 0), 35)
+    head.parent = pivot
+    animate(pivot, "rotation_euler", lambda t: math.radians(-2.5 * t), 2)
+    return f"{about}; the camera goes round it."
+
+
+def play(things, name: str) -> str:
+    """Play one animation alone, three times, the second's middle on FRAME; returns its name."""
+    moved = [of.animation_data for of in (*things, *bpy.data.shape_keys) if of.animation_data]
+    names = sorted({track.name for of in moved for track in of.nla_tracks})
+    name = name or next((of.action.name for of in moved if of.action), "")
+    if name not in names:
+        sys.exit(f"expected one of the file's animations {names}, got {name!r}")
+    for of in moved:
+        of.action = None
+        for track in of.nla_tracks:
+            track.mute = track.name != name
+            strip = track.strips[0]
+            half = 1.5 * (strip.frame_end - strip.frame_start) / SPEED
+            strip.scale, strip.repeat = 1 / SPEED, 3
+            strip.frame_start, strip.frame_end = FRAME - half, FRAME + half
+    return name
+
+
+def glow():
+    """Give what was imported the ambient light that `material` gives."""
+    for made in bpy.data.materials:
+        for node in made.node_tree.nodes:
+            if node.type == "BSDF_PRINCIPLED" and not node.inputs["Emission Color"].is_linked:
+                color, emission = node.inputs["Base Color"], node.inputs["Emission Color"]
+                emission.default_value = color.default_value
+                for given in color.links:
+                    made.node_tree.links.new(given.from_socket, emission)
+                node.inputs["Emission Strength"].default_value = AMBIENT
+
+
+def stand(things) -> float:
+    """Put things on the ground, 2 long, wide or high over frames 8 to 12; returns how high."""
+    corners = []
+    for offset in range(-2, 3):
+        bpy.context.scene.frame_set(FRAME + offset)
+        graph = bpy.context.evaluated_depsgraph_get()
+        for mesh in (thing.evaluated_get(graph) for thing in things if thing.type == "MESH"):
+            corners += [mesh.matrix_world @ Vector(corner) for corner in mesh.bound_box]
+    low, high = np.min(corners, 0), np.max(corners, 0)
+    scale = 2 / (high - low).max()
+    bpy.ops.object.empty_add(location=-scale * np.array([*(low + high)[:2] / 2, low[2]]))
+    under = bpy.context.object
+    under.scale = [scale] * 3
+    for thing in things:
+        thing.parent = thing.parent or under
+    return scale * (high - low)[2]
+
+
 # ---- rendering --------------------------------------------------------------------------------
 
 
@@ -362,13 +445,13 @@ def shoot(scene, path: Path, layers: bool):
 def render(folder: Path, name: str):
     """Everything of one scene but the vector blur."""
     scene = begin()
-    SCENES[name]()
+    about = SCENES[name]() or SCENES[name].__doc__ if name in SCENES else gltf(name)
     for i, thing in enumerate(bpy.data.objects):
         thing.pass_index = i + 1
         thing.cycles.use_motion_blur = thing.cycles.use_deform_motion = True
         thing.cycles.motion_steps = 3
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "camera.json").write_text(json.dumps(cameras(scene, name), indent=1))
+    (folder / "camera.json").write_text(json.dumps(cameras(scene, about), indent=1))
     for offset, file in ((-1, "prev"), (0, "curr"), (1, "next")):
         scene.frame_set(FRAME + offset)
         shoot(scene, folder / f"{file}.exr", True)
@@ -398,7 +481,7 @@ def save_mean(files, onto: Path):
     OpenEXR.File(header, half).write(str(onto))
 
 
-def cameras(scene, name: str) -> dict:
+def cameras(scene, about: str) -> dict:
     """camera.json: matrices in Blender's and OpenGL's sense."""
     found = {}
     for time in (9, 9.5, 10, 10.5, 11):
@@ -412,7 +495,7 @@ def cameras(scene, name: str) -> dict:
             "projection": [list(row) for row in projection],
         }
     return {
-        "doc": " ".join((SCENES[name].__doc__ or "").split()),
+        "doc": about,
         "frame": FRAME,
         "fps": FPS,
         "resolution": SIZE,
@@ -451,10 +534,10 @@ def vector_blur(folder: Path):
 
 
 def main():
-    """Render the scenes named, or all."""
+    """Render the scenes named, or all of this file's."""
     into, *names = sys.argv[1:]
     for name in names or SCENES:
-        folder = Path(into).resolve() / name
+        folder = Path(into).resolve() / Path(name).stem
         render(folder, name)
         vector_blur(folder)
 
