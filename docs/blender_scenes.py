@@ -495,7 +495,7 @@ def cameras(scene, about: str) -> dict:
             "projection": [list(row) for row in projection],
         }
     return {
-        "doc": about,
+        "doc": " ".join(about.split()),
         "frame": FRAME,
         "fps": FPS,
         "resolution": SIZE,
