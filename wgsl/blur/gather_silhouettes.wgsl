@@ -218,7 +218,7 @@ fn split(@builtin(local_invocation_index) local: u32,
     }
     textureStore(near_color, px, near);
     textureStore(near_path, px, packed(path_of(near_motion), select(z, -z, beside), calm));
-    textureStore(far_color, px, far);
+    if far_z > 0.0 { textureStore(far_color, px, far); }        // else nobody reads it
     textureStore(far_path, px, packed(path_of(far_motion), max(far_z, 0.0), seen));
     textureStore(bend, px, vec4u(
         pack2x16float(across.xy), pack2x16float(across.zw), pack2x16float(down.xy), pack2x16float(down.zw)));
