@@ -17,7 +17,7 @@ GOLDEN = (5**0.5 - 1) / 2
 FORMS = ("slices", "published")
 SHOWN = ("color", "count")
 SPLATS = ("point", "line")
-LINKS = 64 << 20  # bytes of links between samples: how many steps are done together
+LINKS = 64 << 20  # bytes of links, or depths: how many steps, or slices, are done together
 
 
 class Reproject:
@@ -72,12 +72,13 @@ class Reproject:
             raise InputError("a line is at many depths: depth_test goes with splat 'point'")
         self._facing, self._depth_test, self._splat = facing, depth_test, splat
         self._device, self._output, self._show, self._form = device, output, show, form
-        self._nearest, self._winner, self._hits = (Scratch(device) for _ in range(3))
+        self._nearest, self._winner = Scratch(device), Scratch(device)
+        self._hits, self._open = Scratch(device), Scratch(device)
         self._means, self._counts = Scratch(device), Scratch(device)
         self._carries, self._links, self._heads = (Scratch(device) for _ in range(3))
 
     def encode(self, encoder, inputs, output):
-        """Record four passes a slice and source, or two for several steps."""
+        """Record three passes a source for several slices, or two for several steps."""
         record = self._published if self._form == "published" else self._slices
         record(encoder, inputs, output)
 
@@ -90,7 +91,10 @@ class Reproject:
             WEIGHTED=inputs.weight is not None,
             COUNTS=self._show == "count",
         )
-        pixels = inputs.given.size[0] * inputs.given.size[1]
+        width, height = inputs.given.size
+        pixels = width * height
+        bits = int(kernel.source.constant("BLOCK_BITS"))
+        blocks = ((width >> bits) + 1) * ((height >> bits) + 1)
         sources = [(0, inputs.color, inputs.motion, inputs.depth, inputs.weight)]
         sources += [(n.offset, n.color, n.motion, n.depth, n.weight) for n in inputs.neighbours]
         most = max(1, min(int(kernel.source.constant("SLICES")), LINKS // (4 * pixels)))
@@ -101,6 +105,7 @@ class Reproject:
             "nearest": self._nearest.at_least(4 * most * pixels),
             "winner": self._winner.at_least(4 * most * pixels),
             "hits": self._hits.at_least(4 * len(sources) * pixels),
+            "open": self._open.at_least(4 * blocks),
             "means": self._means.at_least(16 * pixels),
             "counts": self._counts.at_least(4 * pixels),
             "output": output,
@@ -130,12 +135,13 @@ class Reproject:
         encoder.clear_buffer(shared["means"])
         encoder.clear_buffer(shared["counts"])
         for first in range(0, inputs.samples, most):
-            encoder.clear_buffer(shared["nearest"])
-            encoder.clear_buffer(shared["winner"])
+            for name in ("nearest", "winner", "open"):
+                encoder.clear_buffer(shared[name])
             count = min(most, inputs.samples - first)
-            for entry in ("depths", "winners", "gather"):
-                for source in range(len(sources)):
-                    run(entry, source, first, count)
+            for together in ([0], range(1, len(sources))):
+                for entry in ("depths", "winners", "gather"):
+                    for source in together:
+                        run(entry, source, first, count)
         run("finish", 0, 0, 0)
 
     def _published(self, encoder, inputs, output):

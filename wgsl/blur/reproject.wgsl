@@ -20,44 +20,51 @@ struct Chunk {                  // slices of one source that are done together
 @group(1) @binding(4) var weight: texture_2d<f32>;      // of the source, 0: counts for nothing
 @group(1) @binding(5) var own: texture_2d<f32>;         // the frame itself, for pixels that nothing reached
 @group(1) @binding(6) var linear: sampler;
-@group(1) @binding(7) var<storage, read_write> nearest: array<atomic<u32>>;     // per slice and pixel; 0: nothing
-@group(1) @binding(8) var<storage, read_write> winner: array<atomic<u32>>;      // sample seen there; 0: none
-@group(1) @binding(9) var<storage, read_write> hits: array<u32>;                // per source and sample: bits of where it may be seen
-@group(1) @binding(10) var<storage, read_write> means: array<vec4f>;            // of what was seen, over the slices
-@group(1) @binding(11) var<storage, read_write> counts: array<f32>;             // its weight
-@group(1) @binding(12) var output: Output;
+@group(1) @binding(7) var<storage, read_write> nearest: array<atomic<u32>>;     // key of what is seen, per slice and pixel
+@group(1) @binding(8) var<storage, read_write> winner: array<atomic<u32>>;      // complement of that sample's number
+@group(1) @binding(9) var<storage, read_write> hits: array<u32>;                // where a sample may be seen, bits; per source
+@group(1) @binding(10) var<storage, read_write> open: array<atomic<u32>>;       // slices in which the frame itself leaves a block holes, bits
+@group(1) @binding(11) var<storage, read_write> means: array<vec4f>;            // of what was seen, over the slices
+@group(1) @binding(12) var<storage, read_write> counts: array<f32>;             // its weight
+@group(1) @binding(13) var output: Output;
 
 override WEIGHTED: bool = false;
 override COUNTS: bool = false;      // show how many slices reached a pixel instead of its colour
 
 const SLICES: u32 = 8u;             // of a chunk: four pixels in each are the bits of a word
+const BLOCK_BITS: u32 = 3u;         // a block is 8 x 8 pixels
 const FAR: f32 = 1e10;              // depth of what has none
 const OFF_CENTRE: f32 = 0.004;      // share of depth by which a sample stands back per pixel off its place
 const NEIGHBOUR: u32 = 0x80000000u;
 const ROW_BIT: u32 = 15u;           // in a sample's number its column comes first, then its row,
 const SOURCE_BITS: u32 = 30u;       // then the source
 
-/// The nearest of all samples at every pixel.
+/// The nearest of all samples at every pixel; a neighbouring frame's only where there are holes.
 @compute @workgroup_size(WG_X, WG_Y)
 fn depths(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let sample = sample_at(id.xy);
+    var slices = sample.slices;
+    if chunk.source > 0u {
+        for (var k = 0u; k < chunk.count; k++) {
+            let to = clamp(floor(place(sample, k)) + 1.0, vec2f(0.0), vec2f(frame.size));
+            slices &= atomicLoad(&open[block_of(vec2u(to))]) | ~(1u << k);
+        }
+    }
     var bits = 0u;
-    for (var k = 0u; k < sample.slices; k++) {
+    loop {      // short loops that end below save the turn in which nothing happens
+        let k = firstTrailingBit(slices);
         let x = place(sample, k);
         for (var i = 0u; i < 4u; i++) {
             let on = landing(sample, k, x, i);
-            bits |= select(0u, 1u, on.key > 0u && on.key >= atomicLoad(&nearest[on.at])) << (4u * k + i);
+            if slices != 0u && on.key > 0u {
+                bits |= select(0u, 1u, on.key >= atomicMax(&nearest[on.at], on.key)) << (4u * k + i);
+            }
         }
+        slices &= slices - 1u;
+        if slices == 0u { break; }
     }
     hits[chunk.source * frame.size.x * frame.size.y + index_of(id.xy)] = bits;
-    loop {      // short loops that end below save the turn in which nothing happens
-        let k = firstTrailingBit(bits) >> 2u;
-        let on = landing(sample, k, place(sample, k), firstTrailingBit(bits) & 3u);
-        if bits != 0u { atomicMax(&nearest[on.at], on.key); }
-        bits &= bits - 1u;
-        if bits == 0u { break; }
-    }
 }
 
 /// Of the samples that are as near, the one with the least number: the same one every time.
@@ -82,32 +89,36 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let at = index_of(id.xy);
     let pixels = frame.size.x * frame.size.y;
-    var slices = 0u;                            // bits of those that show a sample of this source
-    for (var k = 0u; k < chunk.count; k++) {
-        let ours = ~atomicLoad(&winner[k * pixels + at]) >> SOURCE_BITS == chunk.source;
-        slices |= select(0u, 1u << k, ours);
-    }
+    var slices = (1u << chunk.count) - 1u;
+    if chunk.source > 0u { slices = atomicLoad(&open[block_of(id.xy)]); }
+    var unseen = slices;
     let still_color = textureLoad(color, id.xy, 0);
     var mean = means[at];
     var count = counts[at];
     loop {
-        if slices == 0u { break; }
         let k = firstTrailingBit(slices);
         let seen = ~atomicLoad(&winner[k * pixels + at]);
-        let px = vec2u(seen & ((1u << ROW_BIT) - 1u), (seen & ((1u << SOURCE_BITS) - 1u)) >> ROW_BIT);
-        let moved = way(path_of(textureLoad(motion, px, 0)), times_at(px), k);
-        let uv = (vec2f(id.xy) + 0.5 - moved) / vec2f(frame.size);
-        let still = all(moved == vec2f(0.0));       // to the bit
-        let seen_color = select(textureSampleLevel(color, linear, uv, 0.0), still_color, still);
-        var counted = 1.0;
-        if WEIGHTED { counted = textureSampleLevel(weight, linear, uv, 0.0).x; }
-        count += counted;
-        // A running mean: equal colours stay equal to the bit, and no sum of finite ones overflows.
-        if count > 0.0 { mean += (seen_color - counted * mean) / count; }
+        if slices != 0u && seen >> SOURCE_BITS == chunk.source {
+            unseen &= ~(1u << k);
+            let px = vec2u(seen & ((1u << ROW_BIT) - 1u), (seen & ((1u << SOURCE_BITS) - 1u)) >> ROW_BIT);
+            let moved = way(path_of(textureLoad(motion, px, 0)), times_at(px), k);
+            let uv = (vec2f(id.xy) + 0.5 - moved) / vec2f(frame.size);
+            let still = all(moved == vec2f(0.0));       // to the bit
+            let seen_color = select(textureSampleLevel(color, linear, uv, 0.0), still_color, still);
+            var counted = 1.0;
+            if WEIGHTED { counted = textureSampleLevel(weight, linear, uv, 0.0).x; }
+            count += counted;
+            // A running mean: equal colours stay equal to the bit, and no sum of finite ones overflows.
+            if count > 0.0 { mean += (seen_color - counted * mean) / count; }
+        }
         slices &= slices - 1u;
+        if slices == 0u { break; }
     }
     means[at] = mean;
     counts[at] = count;
+    for (var i = 0u; i < 4u; i++) {     // a place's four pixels are those before it
+        if chunk.source == 0u && unseen != 0u { atomicOr(&open[block_of(id.xy + vec2u(i & 1u, i >> 1u))], unseen); }
+    }
 }
 
 /// After the last slice.
@@ -125,18 +136,24 @@ fn index_of(px: vec2u) -> u32 {
     return px.y * frame.size.x + px.x;
 }
 
+/// Index of the block of a pixel, or of one beyond the last.
+fn block_of(px: vec2u) -> u32 {
+    let at = px >> vec2u(BLOCK_BITS);
+    return at.y * ((frame.size.x >> BLOCK_BITS) + 1u) + at.x;
+}
+
 struct Sample {
     x: vec2f,           // [px], centres of pixels are integers
     path: Path,
     depth: f32,
     times: Times,
-    slices: u32,        // in which it may be seen
+    slices: u32,        // bits of those in which it may be seen
 }
 
 fn sample_at(px: vec2u) -> Sample {
     var z = textureLoad(depth, px, 0).x;
     if !is_finite(z) || z <= 0.0 { z = FAR; }
-    var slices = chunk.count;
+    var slices = (1u << chunk.count) - 1u;
     if WEIGHTED { slices = select(0u, slices, textureLoad(weight, px, 0).x > 0.0); }
     return Sample(vec2f(px), path_of(textureLoad(motion, px, 0)), z, times_at(px), slices);
 }
