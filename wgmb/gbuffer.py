@@ -48,8 +48,8 @@ class SceneOnGpu:
         self.constants = {"RINGS": rings > 0, "STAGED": scene.stage is not None}
 
     @cached_property
-    def resources(self) -> dict[str, wgpu.GPUBuffer]:
-        """The buffers, made when the first kernel binds them."""
+    def resources(self) -> dict[str, wgpu.GPUBuffer | wgpu.GPUTextureView]:
+        """What it binds, made when the first kernel binds them."""
         if self.scene.figure is not None:
             raise InputError(f"scene {self.scene.name!r} is flat: only method 'volume' draws it")
         scene, size, time, source = (
@@ -86,11 +86,7 @@ class SceneOnGpu:
             "bodies": buffer(
                 label="bodies", data=_bodies(scene, source), usage=wgpu.BufferUsage.STORAGE
             ),
-            "poses": buffer(
-                label="poses",
-                data=_poses(source, camera, places),
-                usage=wgpu.BufferUsage.STORAGE,
-            ),
+            "poses": Images(self.device).upload("poses", _poses(camera, places), "rgba32float"),
         }
 
     def encode(self, encoder, given: gpu.Given, images: Images, name: str, time: float) -> dict:
@@ -166,13 +162,7 @@ def _check_finite(camera: np.ndarray, places: list[np.ndarray]) -> None:
             raise InputError(f"{name} must stay within {MOST:g} of the middle, all finite")
 
 
-def _poses(source: shader.Source, camera: np.ndarray, places: list[np.ndarray]) -> np.ndarray:
-    """(rows, 1 + bodies) matrices: of the picture into the world, then of the world into bodies."""
-    dtype = source.dtype("Pose")
-    if len(camera) * (1 + len(places)) * dtype.itemsize > 128 << 20:
-        raise InputError(f"a scene of {len(places)} bodies is too large")
-    table = np.zeros((len(camera), 1 + len(places)), dtype)
-    for i, matrix in enumerate([camera, *map(np.linalg.inv, places)]):
-        for row, name in enumerate("xyz"):
-            table[name][:, i] = matrix[:, row]
-    return table
+def _poses(camera: np.ndarray, places: list[np.ndarray]) -> np.ndarray:
+    """(rows, 3 + 3 bodies, 4): rows of the picture into the world, of the world into bodies."""
+    matrices = np.stack([camera, *map(np.linalg.inv, places)], axis=1)
+    return matrices[:, :, :3].reshape(len(camera), -1, 4)

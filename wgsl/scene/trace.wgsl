@@ -42,7 +42,7 @@ struct Scene {
 
 @group(1) @binding(0) var<uniform> scene: Scene;
 @group(1) @binding(1) var<storage, read> bodies: array<Body>;
-@group(1) @binding(2) var<storage, read> poses: array<Pose>;    // by row, the camera first, then the bodies
+@group(1) @binding(2) var poses: texture_2d<f32>;   // three texels each, the camera first, then the bodies
 
 const FAR: f32 = 1e10;      // depth where nothing is, as Blender writes it
 const CLOSE: f32 = 1e-3;    // hits nearer than this to a ray's start are the surface it left [scene units]
@@ -67,20 +67,23 @@ struct Hit {
 }
 
 struct Instant {            // where among the rows of poses
-    row: u32,               // index of the row's first pose
+    row: u32,
     after: f32,             // 0..1 towards the next row
 }
 
 fn instant(t: f32) -> Instant {
     let x = clamp((t - scene.first) / scene.step, 0.0, f32(scene.rows - 1u));
     let row = min(u32(x), scene.rows - 2u);
-    return Instant(row * (scene.bodies + 1u), x - f32(row));
+    return Instant(row, x - f32(row));
 }
 
 fn pose(index: u32, now: Instant) -> Pose {
-    let a = poses[now.row + index];
-    let b = poses[now.row + scene.bodies + 1u + index];
-    return Pose(mix(a.x, b.x, now.after), mix(a.y, b.y, now.after), mix(a.z, b.z, now.after));
+    return Pose(pose_row(3u * index, now), pose_row(3u * index + 1u, now), pose_row(3u * index + 2u, now));
+}
+
+fn pose_row(column: u32, now: Instant) -> vec4f {
+    let before = textureLoad(poses, vec2u(column, now.row), 0);
+    return mix(before, textureLoad(poses, vec2u(column, now.row + 1u), 0), now.after);
 }
 
 fn moved(p: Pose, v: vec4f) -> vec3f {
