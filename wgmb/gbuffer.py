@@ -79,7 +79,7 @@ class SceneOnGpu:
         data["pixel"] = 2 / (zoom * size[1])
         data["rays"] = self.rays
         for bounds, place in zip(data["bounds"], places, strict=False):
-            bounds["low"][:3], bounds["high"][:3] = _bounds(place)
+            bounds[:3] = _halves(*_bounds(place))
         buffer = self.device.create_buffer_with_data
         return {
             "scene": buffer(label="scene", data=data, usage=wgpu.BufferUsage.UNIFORM),
@@ -142,6 +142,15 @@ def _bounds(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     # Between two rows a body strays from both by less than they differ; the rest is rounding.
     margin = np.abs(np.diff(place, axis=0)).max() + 1e-4 + 1e-6 * np.abs(place).max()
     return (middle - reach).min(axis=0) - margin, (middle + reach).max(axis=0) + margin
+
+
+def _halves(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(3,) uint32: both numbers as float16 in a word, the low one first, rounded outwards."""
+    with np.errstate(over="ignore"):  # what is beyond a half's range is infinite
+        halves = np.stack([low, high], axis=1).astype(np.float16)
+    inward = np.stack([halves[:, 0] > low, halves[:, 1] < high], axis=1)
+    outward = np.nextafter(halves, np.array([-np.inf, np.inf], np.float16))
+    return np.where(inward, outward, halves).view(np.uint32)[:, 0]
 
 
 def _world_from_picture(scene: Scene, times: np.ndarray, size: tuple[int, int]) -> np.ndarray:

@@ -18,11 +18,6 @@ struct Pose {               // rows of an affine matrix: of a body body_from_wor
     z: vec4f,
 }
 
-struct Bounds {             // corners of a box along the world's axes; w unused
-    low: vec4f,
-    high: vec4f,
-}
-
 struct Scene {
     sun: vec4f,             // direction towards it; w: strength
     sky: vec4f,             // straight up; w: strength of the light from all round
@@ -37,7 +32,7 @@ struct Scene {
     rays: u32,              // a pixel's rays for antialiasing: this number squared
     cylinders: u32,
     stage: Stage,           // where STAGED
-    bounds: array<Bounds, MOST_BODIES>,     // around each body wherever it is at any of the rows
+    bounds: array<vec4u, MOST_BODIES>,  // x, y, z: two halves, from where to where each body is at any of the rows
 }
 
 @group(1) @binding(0) var<uniform> scene: Scene;
@@ -133,12 +128,12 @@ fn sift(first: u32, count: u32, ray: Ray) -> u32 {
     var near = 0u;
     var i = 0u;
     loop {
-        let a = (scene.bounds[first + i].low.xyz - ray.origin) * inverse;
-        let b = (scene.bounds[first + i].high.xyz - ray.origin) * inverse;
-        let enters = min(a, b);
-        let leaves = max(a, b);
-        let enter = max(max(enters.x, enters.y), max(enters.z, 0.0));
-        let leave = min(leaves.x, min(leaves.y, leaves.z));
+        let bounds = scene.bounds[first + i].xyz;
+        let x = (unpack2x16float(bounds.x) - ray.origin.x) * inverse.x;
+        let y = (unpack2x16float(bounds.y) - ray.origin.y) * inverse.y;
+        let z = (unpack2x16float(bounds.z) - ray.origin.z) * inverse.z;
+        let enter = max(max(min(x.x, x.y), min(y.x, y.y)), max(min(z.x, z.y), 0.0));
+        let leave = min(max(x.x, x.y), min(max(y.x, y.y), max(z.x, z.y)));
         near |= select(0u, 1u << i, enter <= leave && i < count);
         i++;
         if i >= count { break; }
