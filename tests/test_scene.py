@@ -10,7 +10,7 @@ import make_frames as make
 import wgmb
 from twins import gbuffer as twin
 from wgmb import Body, InputError, Scene, Shot, gpu, scenes
-from wgmb.gbuffer import SceneOnGpu, _bounds
+from wgmb.gbuffer import SceneOnGpu, _bounds, _halves
 from wgmb.images import Images
 from wgmb.scene import SHAPES, at, rotation, translation
 
@@ -160,6 +160,29 @@ def test_bounds_hold_every_corner_between_any_two_rows(seed):
             at = corners @ between[:3, :3].T + between[:3, 3]
             assert (at >= low).all()
             assert (at <= high).all()
+
+
+def test_halves_hold_what_they_were_made_of():
+    rng = np.random.default_rng(1)
+    low = rng.normal(size=1000) * 10 ** rng.uniform(-7, 7, 1000)
+    high = low + rng.random(1000) * np.abs(low)
+    halves = _halves(low, high).view(np.float16).reshape(-1, 2).astype(float)
+    assert (halves[:, 0] <= low).all()
+    assert (high <= halves[:, 1]).all()
+    size = np.abs([low, high])
+    normal = (size.min(axis=0) > 1e-4) & (size.max(axis=0) < 6e4)
+    np.testing.assert_allclose(halves[normal], np.stack([low, high], 1)[normal], rtol=2e-3)
+
+
+def test_a_body_beyond_the_range_of_halves_is_seen():
+    def path(t):
+        return translation(0, 0, -2e5, t)
+
+    scene = Scene("far", (Body("box", (1e5, 1e5, 1.0), path, light=1.0),), STILL)
+    got = at_instant(scene, 0.0, 0.0, (-0.25, 0.25))
+    want = twin.see(scene, SIZE, 0.0)
+    assert (want["object_id"] > 0).mean() > 0.2
+    np.testing.assert_array_equal(got["object"][..., 0], want["object_id"])
 
 
 def test_every_scene_is_finite_and_something_is_to_be_seen():

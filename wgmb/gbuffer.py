@@ -48,8 +48,8 @@ class SceneOnGpu:
         self.constants = {"RINGS": rings > 0, "STAGED": scene.stage is not None}
 
     @cached_property
-    def resources(self) -> dict[str, wgpu.GPUBuffer]:
-        """The buffers, made when the first kernel binds them."""
+    def resources(self) -> dict[str, wgpu.GPUBuffer | wgpu.GPUTextureView]:
+        """What it binds, made when the first kernel binds them."""
         if self.scene.figure is not None:
             raise InputError(f"scene {self.scene.name!r} is flat: only method 'volume' draws it")
         scene, size, time, source = (
@@ -79,18 +79,14 @@ class SceneOnGpu:
         data["pixel"] = 2 / (zoom * size[1])
         data["rays"] = self.rays
         for bounds, place in zip(data["bounds"], places, strict=False):
-            bounds["low"][:3], bounds["high"][:3] = _bounds(place)
+            bounds[:3] = _halves(*_bounds(place))
         buffer = self.device.create_buffer_with_data
         return {
             "scene": buffer(label="scene", data=data, usage=wgpu.BufferUsage.UNIFORM),
             "bodies": buffer(
                 label="bodies", data=_bodies(scene, source), usage=wgpu.BufferUsage.STORAGE
             ),
-            "poses": buffer(
-                label="poses",
-                data=_poses(source, camera, places),
-                usage=wgpu.BufferUsage.STORAGE,
-            ),
+            "poses": Images(self.device).upload("poses", _poses(camera, places), "rgba32float"),
         }
 
     def encode(self, encoder, given: gpu.Given, images: Images, name: str, time: float) -> dict:
@@ -148,6 +144,15 @@ def _bounds(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (middle - reach).min(axis=0) - margin, (middle + reach).max(axis=0) + margin
 
 
+def _halves(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(3,) uint32: both numbers as float16 in a word, the low one first, rounded outwards."""
+    with np.errstate(over="ignore"):  # what is beyond a half's range is infinite
+        halves = np.stack([low, high], axis=1).astype(np.float16)
+    inward = np.stack([halves[:, 0] > low, halves[:, 1] < high], axis=1)
+    outward = np.nextafter(halves, np.array([-np.inf, np.inf], np.float16))
+    return np.where(inward, outward, halves).view(np.uint32)[:, 0]
+
+
 def _world_from_picture(scene: Scene, times: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """(rows, 4, 4) from -1..1, y up, and 1: the ray's direction; from the origin: its start."""
     zoom = np.broadcast_to(scene.shot.zoom(times), times.shape)
@@ -166,13 +171,7 @@ def _check_finite(camera: np.ndarray, places: list[np.ndarray]) -> None:
             raise InputError(f"{name} must stay within {MOST:g} of the middle, all finite")
 
 
-def _poses(source: shader.Source, camera: np.ndarray, places: list[np.ndarray]) -> np.ndarray:
-    """(rows, 1 + bodies) matrices: of the picture into the world, then of the world into bodies."""
-    dtype = source.dtype("Pose")
-    if len(camera) * (1 + len(places)) * dtype.itemsize > 128 << 20:
-        raise InputError(f"a scene of {len(places)} bodies is too large")
-    table = np.zeros((len(camera), 1 + len(places)), dtype)
-    for i, matrix in enumerate([camera, *map(np.linalg.inv, places)]):
-        for row, name in enumerate("xyz"):
-            table[name][:, i] = matrix[:, row]
-    return table
+def _poses(camera: np.ndarray, places: list[np.ndarray]) -> np.ndarray:
+    """(rows, 3 + 3 bodies, 4): rows of the picture into the world, of the world into bodies."""
+    matrices = np.stack([camera, *map(np.linalg.inv, places)], axis=1)
+    return matrices[:, :, :3].reshape(len(camera), -1, 4)

@@ -17,7 +17,7 @@ GOLDEN = (5**0.5 - 1) / 2
 FORMS = ("slices", "published")
 SHOWN = ("color", "count")
 SPLATS = ("point", "line")
-LINKS = 64 << 20  # bytes of links between samples: how many steps are done together
+LINKS = 64 << 20  # bytes of links, or depths: how many steps, or slices, are done together
 
 
 class Reproject:
@@ -73,50 +73,57 @@ class Reproject:
         self._facing, self._depth_test, self._splat = facing, depth_test, splat
         self._device, self._output, self._show, self._form = device, output, show, form
         self._nearest, self._winner = Scratch(device), Scratch(device)
+        self._hits, self._open = Scratch(device), Scratch(device)
         self._means, self._counts = Scratch(device), Scratch(device)
         self._carries, self._links, self._heads = (Scratch(device) for _ in range(3))
 
     def encode(self, encoder, inputs, output):
-        """Record four passes a slice and source, or two for several steps."""
+        """Record three passes a source for several slices, or two for several steps."""
         record = self._published if self._form == "published" else self._slices
         record(encoder, inputs, output)
 
     def _slices(self, encoder, inputs, output):
-        weighted = inputs.weight is not None
         kernel = gpu.kernel(
             self._device,
             "blur/reproject.wgsl",
             {"Output": self._output},
-            WEIGHTED=weighted,
+            EVEN=inputs.even,
+            WEIGHTED=inputs.weight is not None,
             COUNTS=self._show == "count",
         )
-        pixels = inputs.given.size[0] * inputs.given.size[1]
+        width, height = inputs.given.size
+        pixels = width * height
+        bits = int(kernel.source.constant("BLOCK_BITS"))
+        blocks = ((width >> bits) + 1) * ((height >> bits) + 1)
+        sources = [(0, inputs.color, inputs.motion, inputs.depth, inputs.weight)]
+        sources += [(n.offset, n.color, n.motion, n.depth, n.weight) for n in inputs.neighbours]
+        most = max(1, min(int(kernel.source.constant("SLICES")), LINKS // (4 * pixels)))
+        most = min(most, inputs.samples)
         shared = {
             "own": inputs.color,
             "linear": inputs.linear,
-            "nearest": self._nearest.at_least(4 * pixels),
-            "winner": self._winner.at_least(4 * pixels),
+            "nearest": self._nearest.at_least(4 * most * pixels),
+            "winner": self._winner.at_least(4 * most * pixels),
+            "hits": self._hits.at_least(4 * len(sources) * pixels),
+            "open": self._open.at_least(4 * blocks),
             "means": self._means.at_least(16 * pixels),
             "counts": self._counts.at_least(4 * pixels),
             "output": output,
         }
-        sources = [(0, inputs.color, inputs.motion, inputs.depth, inputs.weight)]
-        sources += [(n.offset, n.color, n.motion, n.depth, n.weight) for n in inputs.neighbours]
-        # All pixels share a slice's time, so jitter is the frame's: its next golden section.
-        shift = inputs.jitter * (inputs.number * GOLDEN % 1 - 0.5)
-        times = inputs.shutter.sample_times(inputs.samples, shift)
 
-        def run(entry: str, source: int, time: float) -> None:
+        def run(entry: str, source: int, first: int, count: int) -> None:
             offset, color, motion, depth, weight = sources[source]
-            data = np.zeros((), kernel.source.dtype("Slice"))
-            data["time"], data["offset"], data["source"] = time, offset, source
-            data["last"] = source == len(sources) - 1
+            data = np.zeros((), kernel.source.dtype("Chunk"))
+            data["first"], data["count"], data["source"] = first, count, source
+            data["offset"] = offset
+            # All pixels share a slice's time, so jitter is the frame's: its next golden section.
+            data["shift"] = inputs.jitter * (inputs.number * GOLDEN % 1 - 0.5)
             kernel.run(
                 encoder,
                 entry,
                 inputs.given,
-                slice=self._device.create_buffer_with_data(
-                    label="slice", data=data, usage=wgpu.BufferUsage.UNIFORM
+                chunk=self._device.create_buffer_with_data(
+                    label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM
                 ),
                 color=color,
                 motion=motion,
@@ -125,12 +132,17 @@ class Reproject:
                 **shared,
             )
 
-        run("clear", 0, 0.0)
-        for time in times:
-            for entry in ("depths", "winners", "gather"):
-                for source in range(len(sources)):
-                    run(entry, source, time)
-        run("finish", 0, 0.0)
+        encoder.clear_buffer(shared["means"])
+        encoder.clear_buffer(shared["counts"])
+        for first in range(0, inputs.samples, most):
+            for name in ("nearest", "winner", "open"):
+                encoder.clear_buffer(shared[name])
+            count = min(most, inputs.samples - first)
+            for together in ([0], range(1, len(sources))):
+                for entry in ("depths", "winners", "gather"):
+                    for source in together:
+                        run(entry, source, first, count)
+        run("finish", 0, 0, 0)
 
     def _published(self, encoder, inputs, output):
         camera: Reprojections | None = inputs.camera if inputs.by_camera else None

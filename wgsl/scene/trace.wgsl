@@ -18,11 +18,6 @@ struct Pose {               // rows of an affine matrix: of a body body_from_wor
     z: vec4f,
 }
 
-struct Bounds {             // corners of a box along the world's axes; w unused
-    low: vec4f,
-    high: vec4f,
-}
-
 struct Scene {
     sun: vec4f,             // direction towards it; w: strength
     sky: vec4f,             // straight up; w: strength of the light from all round
@@ -37,12 +32,12 @@ struct Scene {
     rays: u32,              // a pixel's rays for antialiasing: this number squared
     cylinders: u32,
     stage: Stage,           // where STAGED
-    bounds: array<Bounds, MOST_BODIES>,     // around each body wherever it is at any of the rows
+    bounds: array<vec4u, MOST_BODIES>,  // x, y, z: two halves, from where to where each body is at any of the rows
 }
 
 @group(1) @binding(0) var<uniform> scene: Scene;
 @group(1) @binding(1) var<storage, read> bodies: array<Body>;
-@group(1) @binding(2) var<storage, read> poses: array<Pose>;    // by row, the camera first, then the bodies
+@group(1) @binding(2) var poses: texture_2d<f32>;   // three texels each, the camera first, then the bodies
 
 const FAR: f32 = 1e10;      // depth where nothing is, as Blender writes it
 const CLOSE: f32 = 1e-3;    // hits nearer than this to a ray's start are the surface it left [scene units]
@@ -67,20 +62,23 @@ struct Hit {
 }
 
 struct Instant {            // where among the rows of poses
-    row: u32,               // index of the row's first pose
+    row: u32,
     after: f32,             // 0..1 towards the next row
 }
 
 fn instant(t: f32) -> Instant {
     let x = clamp((t - scene.first) / scene.step, 0.0, f32(scene.rows - 1u));
     let row = min(u32(x), scene.rows - 2u);
-    return Instant(row * (scene.bodies + 1u), x - f32(row));
+    return Instant(row, x - f32(row));
 }
 
 fn pose(index: u32, now: Instant) -> Pose {
-    let a = poses[now.row + index];
-    let b = poses[now.row + scene.bodies + 1u + index];
-    return Pose(mix(a.x, b.x, now.after), mix(a.y, b.y, now.after), mix(a.z, b.z, now.after));
+    return Pose(pose_row(3u * index, now), pose_row(3u * index + 1u, now), pose_row(3u * index + 2u, now));
+}
+
+fn pose_row(column: u32, now: Instant) -> vec4f {
+    let before = textureLoad(poses, vec2u(column, now.row), 0);
+    return mix(before, textureLoad(poses, vec2u(column, now.row + 1u), 0), now.after);
 }
 
 fn moved(p: Pose, v: vec4f) -> vec3f {
@@ -130,12 +128,12 @@ fn sift(first: u32, count: u32, ray: Ray) -> u32 {
     var near = 0u;
     var i = 0u;
     loop {
-        let a = (scene.bounds[first + i].low.xyz - ray.origin) * inverse;
-        let b = (scene.bounds[first + i].high.xyz - ray.origin) * inverse;
-        let enters = min(a, b);
-        let leaves = max(a, b);
-        let enter = max(max(enters.x, enters.y), max(enters.z, 0.0));
-        let leave = min(leaves.x, min(leaves.y, leaves.z));
+        let bounds = scene.bounds[first + i].xyz;
+        let x = (unpack2x16float(bounds.x) - ray.origin.x) * inverse.x;
+        let y = (unpack2x16float(bounds.y) - ray.origin.y) * inverse.y;
+        let z = (unpack2x16float(bounds.z) - ray.origin.z) * inverse.z;
+        let enter = max(max(min(x.x, x.y), min(y.x, y.y)), max(min(z.x, z.y), 0.0));
+        let leave = min(max(x.x, x.y), min(max(y.x, y.y), max(z.x, z.y)));
         near |= select(0u, 1u << i, enter <= leave && i < count);
         i++;
         if i >= count { break; }
