@@ -55,7 +55,7 @@ def test_many_steps_are_done_in_several_chunks(monkeypatch):
     rng = np.random.default_rng(2)
     given = frame(rng.random((48, 64, 3), "f4"), 9 * rng.normal(size=(48, 64, 2)))
     whole = published(given, samples=10)
-    monkeypatch.setattr(sys.modules["wgmb.blur.reproject"], "LINKS", 3 * 4 * 48 * 64)
+    monkeypatch.setattr(sys.modules["wgmb.blur.reproject"], "AT_ONCE", 3 * 4 * 48 * 64)
     assert np.array_equal(published(given, samples=10), whole)
 
 

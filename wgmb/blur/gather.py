@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..images import Images, Scratch
 
 SHOWN = ("color", "confidence")
-_STORED = 7  # storage textures of one pass, marks and both layers
+_STORED = 7  # storage textures of one pass: marks, both layers, their surfaces and bends
 
 
 class Gather:

@@ -17,7 +17,7 @@ GOLDEN = (5**0.5 - 1) / 2
 FORMS = ("slices", "published")
 SHOWN = ("color", "count")
 SPLATS = ("point", "line")
-LINKS = 64 << 20  # bytes of links, or depths: how many steps, or slices, are done together
+AT_ONCE = 64 << 20  # bytes of depths, or links: how many slices, or steps, are done together
 
 
 class Reproject:
@@ -97,7 +97,7 @@ class Reproject:
         blocks = ((width >> bits) + 1) * ((height >> bits) + 1)
         sources = [(0, inputs.color, inputs.motion, inputs.depth, inputs.weight)]
         sources += [(n.offset, n.color, n.motion, n.depth, n.weight) for n in inputs.neighbours]
-        most = max(1, min(int(kernel.source.constant("SLICES")), LINKS // (4 * pixels)))
+        most = max(1, min(int(kernel.source.constant("SLICES")), AT_ONCE // (4 * pixels)))
         most = min(most, inputs.samples)
         shared = {
             "own": inputs.color,
@@ -172,7 +172,8 @@ class Reproject:
         bits = (width - 1).bit_length(), (width - 1).bit_length() + (height - 1).bit_length()
         rows = int(kernel.source.constant("ROWS"))
         most = max(
-            1, min(rows - 1, 2 ** (32 - bits[1]) - 2, LINKS // (4 * width * height), inputs.samples)
+            1,
+            min(rows - 1, 2 ** (32 - bits[1]) - 2, AT_ONCE // (4 * width * height), inputs.samples),
         )
         most = 1 if self._depth_test else most
         shared = {

@@ -164,7 +164,7 @@ fn split(@builtin(local_invocation_index) local: u32,
             // The less the farther it is.
             let distance2 = f32(off.x * off.x + off.y * off.y);
             let share = 1.0 / (1.0 + distance2 * distance2);
-            let here = Side(share, share * way, share * marked_depth(mark), share * textureLoad(color, at, 0), share * weight_at(at));
+            let here = Side(share, share * way, share * marked_depth(mark), share * color_at(at), share * weight_at(at));
             if is_front { front = both(front, here); } else { back = both(back, here); }
         }
         let apart = dot(way - behind, way - behind);

@@ -20,10 +20,10 @@ struct Chunk {                  // slices of one source that are done together
 @group(1) @binding(4) var weight: texture_2d<f32>;      // of the source, 0: counts for nothing
 @group(1) @binding(5) var own: texture_2d<f32>;         // the frame itself, for pixels that nothing reached
 @group(1) @binding(6) var linear: sampler;
-@group(1) @binding(7) var<storage, read_write> nearest: array<atomic<u32>>;     // key of what is seen, per slice and pixel
+@group(1) @binding(7) var<storage, read_write> nearest: array<atomic<u32>>;     // key of what is seen; slice, pixel
 @group(1) @binding(8) var<storage, read_write> winner: array<atomic<u32>>;      // complement of that sample's number
-@group(1) @binding(9) var<storage, read_write> hits: array<u32>;                // where a sample may be seen, bits; per source
-@group(1) @binding(10) var<storage, read_write> open: array<atomic<u32>>;       // slices in which the frame itself leaves a block holes, bits
+@group(1) @binding(9) var<storage, read_write> hits: array<u32>;                // bits: where a sample may be seen; source, pixel
+@group(1) @binding(10) var<storage, read_write> open: array<atomic<u32>>;       // bits: slices whose holes the frame leaves; block
 @group(1) @binding(11) var<storage, read_write> means: array<vec4f>;            // of what was seen, over the slices
 @group(1) @binding(12) var<storage, read_write> counts: array<f32>;             // its weight
 @group(1) @binding(13) var output: Output;
@@ -64,7 +64,7 @@ fn depths(@builtin(global_invocation_id) id: vec3u) {
         slices &= slices - 1u;
         if slices == 0u { break; }
     }
-    hits[chunk.source * frame.size.x * frame.size.y + index_of(id.xy)] = bits;
+    hits[hits_of(id.xy)] = bits;
 }
 
 /// Of the samples that are as near, the one with the least number: the same one every time.
@@ -73,7 +73,7 @@ fn winners(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let sample = sample_at(id.xy);
     let number = ~((chunk.source << SOURCE_BITS) | (id.y << ROW_BIT) | id.x);
-    var bits = hits[chunk.source * frame.size.x * frame.size.y + index_of(id.xy)];
+    var bits = hits[hits_of(id.xy)];
     loop {
         let k = firstTrailingBit(bits) >> 2u;
         let on = landing(sample, k, place(sample, k), firstTrailingBit(bits) & 3u);
@@ -134,6 +134,11 @@ fn finish(@builtin(global_invocation_id) id: vec3u) {
 
 fn index_of(px: vec2u) -> u32 {
     return px.y * frame.size.x + px.x;
+}
+
+/// Where the source's sample at `px` keeps its hits.
+fn hits_of(px: vec2u) -> u32 {
+    return chunk.source * frame.size.x * frame.size.y + index_of(px);
 }
 
 /// Index of the block of a pixel, or of one beyond the last.

@@ -41,7 +41,7 @@ struct Scene {
 
 const FAR: f32 = 1e10;      // depth where nothing is, as Blender writes it
 const CLOSE: f32 = 1e-3;    // hits nearer than this to a ray's start are the surface it left [scene units]
-const MOST_BODIES: u32 = 1024u;    // bounds are uniforms, which are 64 KiB at most: storage is a third slower on lavapipe
+const MOST_BODIES: u32 = 1024u;    // bounds are uniforms, poses rows of a texture: storage is a third slower on lavapipe
 const RING_STEPS: u32 = 64u;        // towards a ring's surface at most
 const RING_CLOSE: f32 = 1e-4;       // distance from it that counts as there [scene units]
 
