@@ -123,6 +123,7 @@ def test_samples_for_a_budget_stay_in_bounds_when_times_say_nothing():
     assert compare._guess([(4, 0.5), (16, 0.5)], 1e-6) == 1
     assert compare._guess([(4, 0.5), (16, 0.4)], 1e6) == 8 * 16
     assert compare._guess([(1000, 0.4)], 1e6) == 4096
+    assert compare._guess([(100, 0.4)], 1e6, most=512) == 512
 
 
 def test_one_time_that_was_disturbed_does_not_mislead():

@@ -6,7 +6,7 @@ import wgpu
 from test_twins import crossing
 
 import wgmb
-from wgmb import Shutter
+from wgmb import Shutter, gpu
 from wgmb.images import Images
 
 SIZE = (54, 96)
@@ -169,3 +169,26 @@ def test_a_device_that_allows_too_little_is_told_what_to_ask_for():
     device = wgpu.gpu.request_adapter_sync().request_device_sync(required_limits=limits)
     with pytest.raises(wgmb.InputError, match="required_limits"):
         wgmb.Blur("gather", device=device)
+
+
+@pytest.mark.parametrize("degrees", [180, 360])
+@pytest.mark.parametrize("alone", [True, False])
+def test_the_short_cut_of_plain_times_shows_the_same(degrees, alone):
+    """Times so little jittered that they are the same, but that blocks do not share them."""
+    frame = frame_of([crossing((96, 160), offset) for offset in (0, -1, 1)])
+    if alone:
+        frame = frame.between(None, None)
+    short = wgmb.Blur("gather", shutter=degrees)(frame)
+    long = wgmb.Blur("gather", shutter=degrees, jitter=1e-6)(frame)
+    apart = np.abs(short - long).max(axis=2)
+    assert (apart > 2e-3).mean() < 0.005
+    assert apart.max() < 0.05
+
+
+def test_a_software_adapter_takes_no_more_samples_than_its_loops_have_turns(sources):
+    frame = frame_of(sources)
+    some, most = (wgmb.Blur("gather", samples=n)(frame) for n in (128, 512))
+    np.testing.assert_allclose(most, some, atol=2e-3)
+    if gpu.open_device().adapter_info["adapter_type"] == gpu.SOFTWARE:
+        with pytest.raises(wgmb.InputError, match="1 to 512 samples without a GPU, got 513"):
+            wgmb.Blur("gather", samples=513)

@@ -22,7 +22,12 @@ def test_contract(name):
     assert shader.load(f"blur/{name}.wgsl").text.startswith("// ")
     public = {n for n in vars(method) if not n.startswith("_")}
     assert len(set(getattr(method, "confidence", "rgba"))) == 4
-    assert public - {"samples", "adaptive", "confidence"} == {"name", "needs", "uses", "encode"}
+    assert public - {"samples", "adaptive", "confidence", "most_in_software"} == {
+        "name",
+        "needs",
+        "uses",
+        "encode",
+    }
     assert "Artefacts:" in (method.__doc__ or "")
 
 

@@ -16,7 +16,7 @@ BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.S)
 def test_python_blocks_run_in_their_order(tmp_path, monkeypatch):
     monkeypatch.chdir(HERE)
     names: dict = {}
-    assert len(BLOCKS) == 4
+    assert len(BLOCKS) == 5
     for block in BLOCKS:
         exec(compile(block.replace('"out/', f'"{tmp_path}/'), "README.md", "exec"), names)
     assert names["out"].shape == (270, 480, 3)

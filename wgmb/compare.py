@@ -21,7 +21,7 @@ from .errors import InputError
 from .findings import Entry, Report, Table
 from .images import Images
 from .measure import MEASURES, measure
-from .pipeline import MOST_SAMPLES, Blur
+from .pipeline import MOST_SAMPLES, Blur, most_samples
 from .shutter import Shutter
 
 LADDER = (4, 8, 16, 32, 64)
@@ -127,13 +127,13 @@ class Laboratory:
 
     def _fitting(self, case: Case, c: Contender, known, budget: float, frame_seconds: float) -> int:
         """The samples that take about `budget` seconds: guessed, tried, and corrected twice."""
-        known = list(known)
+        known, most = list(known), most_samples(c.method, self.device)
         for _ in range(3):
-            samples = _guess(known, budget)
+            samples = _guess(known, budget, most)
             timer = self.timer(case, c.blur(samples, case.shutter, self.device), c)
             timer()  # compiles
             seconds = self.least([timer])[0] + (0.0 if c.needs_scene else frame_seconds)
-            if abs(seconds / budget - 1) < _NEAR or samples in (1, MOST_SAMPLES):
+            if abs(seconds / budget - 1) < _NEAR or samples in (1, most):
                 break
             known.append((samples, seconds))
         return samples
@@ -211,7 +211,7 @@ def _slowest_of_pictures(report: Report, case: Case) -> list[float]:
     return [max(e.seconds or 0.0 for e in pictures)]
 
 
-def _guess(known: list[tuple[int, float]], budget: float) -> int:
+def _guess(known: list[tuple[int, float]], budget: float, most: int = MOST_SAMPLES) -> int:
     """Samples for `budget` seconds between the times that are known, or in line with them.
 
     Other work makes times too long, never too short: a time that is longer than that of more
@@ -228,7 +228,7 @@ def _guess(known: list[tuple[int, float]], budget: float) -> int:
         slope = (times[-1] - times[0]) / max(counts[-1] - counts[0], 1)
         slope = max(slope, times[-1] / counts[-1] / 100)
         wanted = min(counts[-1] + (budget - times[-1]) / slope, _FARTHER * counts[-1])
-    return int(np.clip(round(wanted), 1, MOST_SAMPLES))
+    return int(np.clip(round(wanted), 1, most))
 
 
 def crossings(report: Report, case: Case, judge: str = "flip") -> Table | None:

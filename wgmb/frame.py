@@ -12,6 +12,7 @@ Foreign conventions are translated in vectors.py and cameras.py, nowhere else.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -94,9 +95,7 @@ class Frame:
             raise InputError("object_id needs the camera file that says how objects move")
         if self.motion is not None and not (self.to_next is None and self.to_prev is None):
             raise InputError("motion stands instead of to_next and to_prev: give one or the other")
-        for name, neighbour in (("prev", self.prev), ("next", self.next)):
-            if neighbour is not None and neighbour.size != self.size:
-                raise InputError(f"{name} must be {self.size} like the frame, got {neighbour.size}")
+        self._check_neighbours()
         for name in ("color", "to_next", "to_prev", "motion", "scale", "keep"):
             if given := _count_bad(getattr(self, name)):
                 self.bad[name] = given
@@ -106,6 +105,39 @@ class Frame:
                 good = np.isfinite(self.depth) if clip else self.depth > 0
             if given := int(np.count_nonzero(~good)):
                 self.bad["depth"] = given
+
+    def _check_neighbours(self) -> None:
+        for name, neighbour in (("prev", self.prev), ("next", self.next)):
+            if neighbour is not None and neighbour.size != self.size:
+                raise InputError(f"{name} must be {self.size} like the frame, got {neighbour.size}")
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Those that there are, by name."""
+        given = {name: getattr(self, name) for name in ("color", *_CHANNELS, "object_id")}
+        return {name: array for name, array in given.items() if array is not None}
+
+    @property
+    def is_locked(self) -> bool:
+        """Whether no array can be written to: it will look the same when it comes again."""
+        return not any(array.flags.writeable for array in self.arrays.values())
+
+    def locked(self) -> Frame:
+        """The same pixels in arrays that cannot be written to."""
+        locked = copy(self)
+        for name, array in self.arrays.items():
+            view = array.view()
+            view.flags.writeable = False
+            object.__setattr__(locked, name, view)
+        return locked
+
+    def between(self, prev: Frame | None, next: Frame | None) -> Frame:
+        """The same arrays, with these neighbours."""
+        frame = copy(self)
+        object.__setattr__(frame, "prev", prev)
+        object.__setattr__(frame, "next", next)
+        frame._check_neighbours()
+        return frame
 
     @property
     def size(self) -> tuple[int, int]:

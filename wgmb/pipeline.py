@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import weakref
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -26,6 +28,7 @@ SAMPLES = 16
 AUTO_SAMPLES = 64  # the most that "auto" takes a pixel
 AUTO_STRATA = 256  # equal shares of the exposure that times are interpolated in
 OUTPUTS = ("rgba32float", "rgba16float")
+_PLACES = ("", " 1", " 2")  # frames that are on the GPU, by the end of their textures' names
 View = wgpu.GPUTextureView
 
 
@@ -39,6 +42,7 @@ class Neighbour:
     depth: View
     normal: View | None
     weight: View | None  # there if the frame itself has one
+    token: object | None  # the same as before: the same pixels
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,7 @@ class Inputs:
     normal: View | None  # unit vectors in the world
     weight: View | None  # None: every pixel counts
     neighbours: tuple[Neighbour, ...]
+    token: object | None  # of the frame itself, see Neighbour
     none: View  # bound where an input is not there
     linear: wgpu.GPUSampler
     even: bool  # the shutter is a box
@@ -65,14 +70,41 @@ class Inputs:
     scene: SceneOnGpu | None
     progress: tuple[int, int]  # samples done before, samples to do now
 
+    @property
+    def frames(self) -> tuple[Neighbour, ...]:
+        """The frame itself, as the neighbour 0 intervals away; then the others."""
+        own = self.color, self.motion, self.depth, self.normal, self.weight, self.token
+        return Neighbour(0, *own), *self.neighbours
+
+
+class _Held:
+    """A frame that was uploaded, and the inputs of `encode` that it became."""
+
+    def __init__(self, frame: Frame, inputs: dict):
+        self.inputs = inputs
+        self._arrays = {name: weakref.ref(array) for name, array in frame.arrays.items()}
+        self._rest = frame.camera, frame.object_motion
+
+    def is_of(self, frame: Frame) -> bool:
+        """Whether these are the arrays of `frame`, and cannot have changed."""
+        given = frame.arrays
+        return (
+            frame.is_locked
+            and given.keys() == self._arrays.keys()
+            and all(self._arrays[name]() is array for name, array in given.items())
+            and frame.camera is self._rest[0]
+            and frame.object_motion == self._rest[1]
+        )
+
 
 class Blur:
     """A compiled method. Call it with arrays, or `encode` it into your own frame.
 
     `method`: a name in METHODS; its own options follow as keywords.
     `shutter`: degrees (180 is open for half a frame interval), or a Shutter.
-    `samples`: taps a pixel, 1 to 4096; 16, or what the method's source says, by default; "auto"
-    takes one a pixel of a streak, 64 at most (methods that cannot tell pixels apart take 64).
+    `samples`: taps a pixel, 1 to 4096 (gather without a GPU: 512); 16, or what the method's
+    source says, by default; "auto" takes one a pixel of a streak, 64 at most (methods that
+    cannot tell pixels apart take 64).
     `jitter`: 0 to 1, trades bands for noise: how far a tap may move within its share of time.
     `max_blur`: longest streak [px]; None leaves it free.
     `device`: a wgpu device of yours, the name of an adapter, or None for the best.
@@ -112,10 +144,13 @@ class Blur:
                 f"it has {', '.join(sorted(known)) or 'none'}"
             )
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
+        if samples > (most := most_samples(method, self.device)):
+            raise InputError(f"{method} takes 1 to {most} samples without a GPU, got {samples}")
         self.method = METHODS[method](self.device, output=output, **options)
         self._options = options
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._images = Images(self.device)
+        self._held: dict[str, _Held] = {}
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
         self._none = self._images.view("none", (1, 1), gpu.texel(self.device, 4))
         no_object = self._images.view("no object", (1, 1), "r32uint")
@@ -181,6 +216,7 @@ class Blur:
         normal: View | None = None,
         confidence: View | None = None,
         check: bool = False,
+        token: object | None = None,
         number: int = 0,
         timing: Clock | None = None,
         **moving,
@@ -196,7 +232,11 @@ class Blur:
         price of three small passes.
 
         `neighbours`: -1 and 1, each with `color`, its own `moving` inputs and depth, and
-        `keep`, `normal` and `check` as above, for methods that use them.
+        `keep`, `normal`, `check` and `token` as above, for methods that use them.
+
+        `token`: any object that stands for what is in the views of one frame. While the same
+        one is given again, as the frame's or a neighbour's, what a method made of these views
+        alone is not made again; the commands that made it must have been submitted.
 
         `scene` instead of `color`, for the methods that need one, which may be recorded
         bit by bit: `progress` is how many samples were done before, and are to be done now.
@@ -245,6 +285,7 @@ class Blur:
             normal=normal,
             weight=weight,
             neighbours=near,
+            token=token,
             none=self._none,
             linear=self._linear,
             even=self._shutter.curve == "box",
@@ -262,15 +303,17 @@ class Blur:
         """Blur one frame: a Frame, or a colour array and its passes (see Frame).
 
         Returns float32 of color's shape. `InputError` says what is missing or does not fit.
+        Frames whose arrays cannot be written to (Frame.locked) are uploaded once, even if they
+        come again as neighbours.
         """
         frame = color if isinstance(color, Frame) else Frame(color, to_next, **passes)
         self._require(frame.has)
         output = self._images.texture("output", frame.size, self.output)
         encoder = self.device.create_command_encoder(label="wgmb")
-        self.encode(encoder, output=output.create_view(), **self.upload(frame))
-        return self._images.download(encoder, output)[..., : frame.color.shape[2]].astype(
-            "f4", copy=False
-        )
+        with self._forgetting():
+            self.encode(encoder, output=output.create_view(), **self._upload(frame))
+            picture = self._images.download(encoder, output)
+        return picture[..., : frame.color.shape[2]].astype("f4", copy=False)
 
     def with_confidence(self, frame: Frame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """The blurred frame, and how sure the method is of every pixel, at twice the cost.
@@ -285,8 +328,9 @@ class Blur:
         sure = self._images.texture("confidence", size, self.output)
         encoder = self.device.create_command_encoder(label="wgmb")
         views = {"output": output.create_view(), "confidence": sure.create_view()}
-        self.encode(encoder, **views, **self.upload(frame))
-        picture = self._images.download(encoder, output)[..., :channels]
+        with self._forgetting():
+            self.encode(encoder, **views, **self._upload(frame))
+            picture = self._images.download(encoder, output)[..., :channels]
         told = self._images.download(self.device.create_command_encoder(), sure)
         planes = np.moveaxis(told.astype("f4", copy=False), 2, 0)
         return picture.astype("f4", copy=False), dict(zip(names, planes, strict=True))
@@ -297,6 +341,7 @@ class Blur:
             raise InputError("there is no motion: give to_next, to_prev, or depth and a camera")
         encoder = self.device.create_command_encoder(label="wgmb motion")
         motion = self._images.texture("motion", frame.size, "rgba32float")
+        self._held.clear()
         moving = self._upload_moving(frame)
         self.encode_motion(encoder, frame.size, motion.create_view(), frame.number, **moving)
         return self._images.download(encoder, motion)
@@ -319,12 +364,48 @@ class Blur:
 
         They are kept: the next frame's go into the same textures.
         """
-        return {
-            "size": frame.size,
-            "number": frame.number,
-            "neighbours": self._upload_neighbours(frame),
-            **self._upload_one(frame),
-        }
+        self._held.clear()
+        inputs = self._upload(frame)
+        for one in (inputs, *inputs["neighbours"].values()):
+            one["token"] = None  # these views may be encoded again, and all is to be done again
+        self._held.clear()
+        return inputs
+
+    @contextmanager
+    def _forgetting(self):
+        """What was uploaded is uploaded again, if what was recorded may not have been done."""
+        try:
+            yield
+        except BaseException:
+            self._held.clear()
+            raise
+
+    def _upload(self, frame: Frame) -> dict:
+        """What `encode` takes, with tokens; only frames that are not there yet are uploaded."""
+        around = {0: frame}
+        if "neighbours" in self.method.uses:
+            near = {-1: frame.prev, 1: frame.next}
+            needs = self.method.needs
+            around |= {o: f for o, f in near.items() if f is not None and f.has >= needs}
+        wanted = [self._place_of(one) for one in around.values()]
+        free = [place for place in _PLACES if place not in wanted]
+        inputs = {}
+        for offset, one in around.items():
+            place = self._place_of(one)
+            if place is None:
+                place = free.pop(0)
+                self._held.pop(place, None)
+                inputs[offset] = self._upload_one(one, place)
+                if one.is_locked:
+                    self._held[place] = _Held(one, inputs[offset] | {"token": object()})
+            if place in self._held:
+                inputs[offset] = self._held[place].inputs
+        own = inputs.pop(0)
+        return {"size": frame.size, "number": frame.number, "neighbours": inputs, **own}
+
+    def _place_of(self, frame: Frame) -> str | None:
+        """Where a frame has been uploaded to."""
+        return next((place for place, held in self._held.items() if held.is_of(frame)), None)
 
     def _upload_one(self, frame: Frame, which: str = "") -> dict:
         """What there is of one frame, the frame itself or a neighbour."""
@@ -344,16 +425,6 @@ class Blur:
             rgba = np.ones((*rgba.shape[:2], 4), rgba.dtype)
             rgba[..., :3] = frame.color
         return rgba, "rgba16float" if rgba.dtype == np.float16 else gpu.texel(self.device, 4)
-
-    def _upload_neighbours(self, frame: Frame) -> dict[int, dict]:
-        """Those neighbours that the method uses and that have what it needs."""
-        if "neighbours" not in self.method.uses:
-            return {}
-        found = {}
-        for offset, near in ((-1, frame.prev), (1, frame.next)):
-            if near is not None and near.has >= self.method.needs:
-                found[offset] = self._upload_one(near, f" {offset}")
-        return found
 
     def _upload_moving(self, frame: Frame, which: str = "") -> dict:
         deep = frame.camera is not None or "depth" in self.method.needs | self.method.uses
@@ -381,6 +452,7 @@ class Blur:
     def _neighbour(self, encoder, given, offset: int, inputs: dict, masked: bool) -> Neighbour:
         color, normal = inputs.pop("color"), inputs.pop("normal", None)
         keep, check = inputs.pop("keep", None), inputs.pop("check", False)
+        token = inputs.pop("token", None)
         _check_views(given.size, {"color": color, "normal": normal, "keep": keep, **inputs})
         moving = _moving(inputs)
         motion, limited = moving.motion, self.max_blur is not None
@@ -392,7 +464,7 @@ class Blur:
         weight = None
         if masked:
             color, weight = self._keep.before(encoder, given, color, keep, f" {offset}")
-        return Neighbour(offset, color, motion, moving.depth, normal, weight)
+        return Neighbour(offset, color, motion, moving.depth, normal, weight, token)
 
     def _require(self, there) -> None:
         if missing := self.method.needs - there:
@@ -408,6 +480,13 @@ class Blur:
             label="frame", data=data, usage=wgpu.BufferUsage.UNIFORM
         )
         return gpu.Given(size, {"frame": frame, **self._group0})
+
+
+def most_samples(method: str, device: wgpu.GPUDevice) -> int:
+    """The most samples that a pixel may take on the device."""
+    if device.adapter_info["adapter_type"] != gpu.SOFTWARE:
+        return MOST_SAMPLES
+    return getattr(METHODS[method], "most_in_software", MOST_SAMPLES)
 
 
 def _moving(given: dict) -> Moving:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +85,7 @@ class Clip:
         self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
         self.cuts: set[int] = set()
         self._kept: OrderedDict[int, Source] = OrderedDict()
+        self._ready: OrderedDict[int, tuple[Source, bool, Frame]] = OrderedDict()
         self._found: vectors.Finding | None = None
 
     def _numbers(self, frames: str | None, skip_missing: bool) -> list[int]:
@@ -139,6 +140,7 @@ class Clip:
     def forget(self, number: int) -> None:
         """Let go of a frame that nobody will ask for again."""
         self._kept.pop(number, None)
+        self._ready.pop(number, None)
 
     @property
     def finding(self) -> str:
@@ -189,7 +191,11 @@ class Clip:
                 self.forget(number)
 
     def with_neighbours(self, source: Source, normal: bool = True) -> Frame:
-        """`frame`, and the frames before and after as far as they can be read."""
+        """`frame`, and the frames before and after as far as they can be read.
+
+        Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
+        Blur, once, though it is shown in three.
+        """
         near = {}
         for side, number in (("prev", source.number - 1), ("next", source.number + 1)):
             path = frame_path(self.pattern, number)
@@ -197,13 +203,24 @@ class Clip:
                 with contextlib.suppress(InputError, OSError):  # its turn to fail comes
                     other = self.source(number)
                     if other.size == source.size:
-                        near[side] = self.frame(other, normal=normal)
-        frame = self.frame(source, normal=normal)
+                        near[side] = self._locked(other, normal)
+        frame = self._locked(source, normal)
         for side in list(near):
             if is_cut(frame, near[side], -1 if side == "prev" else 1):
                 del near[side]
                 self.cuts.add(source.number if side == "prev" else source.number + 1)
-        return replace(frame, **near)
+        return frame.between(near.get("prev"), near.get("next"))
+
+    def _locked(self, source: Source, normal: bool) -> Frame:
+        """`frame`, made once for the three frames that it is shown in."""
+        made, with_normal, frame = self._ready.get(source.number, (None, None, None))
+        if frame is None or made is not source or with_normal != normal:
+            self._ready.pop(source.number, None)
+            while len(self._ready) > 2:
+                self._ready.popitem(last=False)
+            frame = self.frame(source, normal=normal).locked()
+            self._ready[source.number] = source, normal, frame
+        return frame
 
     def frame(self, source: Source, picture: bool = True, normal: bool = True) -> Frame:
         """What a method is given of `source`; without `picture`, all but the colour (0); without

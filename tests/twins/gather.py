@@ -156,8 +156,8 @@ def part(color, motion, z, mixed, y, x):
 
 
 def apart(a, b, u):
-    """How far two paths come apart by the time `u` [px]."""
-    return (np.hypot(*(a - b)[:2]) + np.hypot(*(a - b)[2:]) * u) * u
+    """How far two paths come apart by the time `u`, before or after [px]."""
+    return max(np.hypot(*moved(a - b, t)) for t in (-u, u))
 
 
 def choose(paths, u):
@@ -276,15 +276,17 @@ def search(layers, tiles, x, y, t):
     seen = [Sample(), Sample(), Sample()]
 
     def look(f, far, seed, known):
-        """One search; where it led."""
+        """One search; where it led, and whether something is there."""
         frame, u = layers[f], t - layers[f].offset
         d, miss, pixel = follow(frame.path[int(far)], centre, seed, u, known)
-        if pixel is not None and miss <= 1.0 and frame.depth[int(far)][pixel] > 0:
+        is_there = pixel is not None and miss <= 1.0
+        again = known is not None and known[1] and (np.abs(d - known[0]) < 0.75).all()
+        if is_there and not again and frame.depth[int(far)][pixel] > 0:
             z = frame.depth[int(far)][pixel]
             weight = (1.1 if f else 1.0) * (1.2 if far and frame.guessed[pixel] else 1.0)
             found = Sample(z * weight, z, miss, centre - d, f, far, pixel)
             note(seen, found, opaque=far or frame.plain[pixel])
-        return d
+        return d, is_there
 
     def near(f):
         tile, u = tiles[f], t - layers[f].offset
@@ -293,24 +295,30 @@ def search(layers, tiles, x, y, t):
             if z * (1.1 if f else 1.0) < seen[0].depth and when[0] <= u <= when[1]:
                 look(f, False, moved(path, u), own)
 
+    def inferred():
+        return np.isinf(seen[0].depth) or (seen[0].frame, seen[0].far) == (0, True)
+
     near(0)
     hidden = np.isinf(seen[0].depth)
+    behind = hidden and any(tile["edges"] for tile in tiles)
+    if behind:
+        look(0, True, None, None)
     if len(order) > 1 and (hidden or abs(t) > 0.25):
         near(order[1])
-    if len(order) > 2 and np.isinf(seen[0].depth):
-        near(order[2])
-    if hidden and any(tile["edges"] for tile in tiles):
-        for f in order:
-            look(f, True, None, None)
+        if len(order) > 2 and inferred():
+            near(order[2])
+        for f in order[1:]:
+            if behind and inferred() and (np.isinf(seen[0].depth) or np.isinf(seen[1].depth)):
+                look(f, True, None, None)
     return seen
 
 
 def follow(paths, centre, seed, u, known):
     """Fixed point of d = displacement(centre - d): d, the last step, pixel; None: from 0."""
     height, width = paths.shape[:2]
-    d, steps = (np.zeros(2), 5) if seed is None else (seed, 4)
+    d, steps = (np.zeros(2), 5) if seed is None else (seed, 3)
     miss, pixel = np.inf, None
-    if known is not None and (np.abs(d - known) < 0.75).all():
+    if known is not None and (np.abs(d - known[0]) < 0.75).all():
         return d, miss, pixel
     for _ in range(steps):
         q = centre - d
@@ -319,20 +327,14 @@ def follow(paths, centre, seed, u, known):
         pixel = int(q[1]), int(q[0])
         step = moved(paths[pixel], u)
         miss, d = np.hypot(*(step - d)), step
-        if miss < 0.25 or (known is not None and (np.abs(d - known) < 0.75).all()):
+        if miss < 0.25 or (known is not None and (np.abs(d - known[0]) < 0.75).all()):
             break
     return d, miss, pixel
 
 
 def note(seen, new, opaque):
-    """Keep what is nearest; of one place at a silhouette, the sample that fits best."""
+    """Keep what is nearest."""
     solid, edge, second = seen
-    for i, old in enumerate(seen):
-        is_same = (old.frame, old.far) == (new.frame, new.far)
-        if opaque == (i == 0) and is_same and (np.abs(old.at - new.at) < 0.75).all():
-            if new.miss < old.miss:
-                seen[i] = new
-            return
     if opaque:
         if new.depth < solid.depth:
             seen[0] = new

@@ -31,13 +31,14 @@ class Gather:
     Strong: the closest to the truth. What is hidden appears, blur goes over silhouettes.
     Artefacts: shading is that of one frame; what all three frames hide is guessed from its
     surroundings; what comes from more than 256 px away by a sample's time may be missed; costs
-    10 to 35 times as much as taps.
+    8 to 26 times as much as taps.
     """
 
     name = "gather"
     needs = frozenset({"color", "motion", "depth"})
     uses = frozenset({"neighbours"})
     adaptive = True
+    most_in_software = 512  # loops end there after 65,535 turns, all of a pixel together
     confidence = ("accepted", "disocclusion", "residual", "left")
 
     def __init__(self, device, *, output="rgba32float", show="color"):
@@ -51,53 +52,86 @@ class Gather:
             )
         self._device, self._output, self._show = device, output, show
         self._images = Images(device)
-        self._contents, self._farthest = Scratch(device), Scratch(device)
+        self._farthest = Scratch(device)
+        self._colors: wgpu.GPUTexture | None = None
+        self._made: dict[int, tuple] = {}  # what the layers at a place were made of
 
     def encode(self, encoder, inputs, output):
         """Record silhouettes and tiles of every frame, then the search."""
-        weighted = inputs.weight is not None
-        frames = [(0, inputs.color, inputs.motion, inputs.depth, inputs.weight)]
-        frames += [(n.offset, n.color, n.motion, n.depth, n.weight) for n in inputs.neighbours]
-        layers = self._layers(inputs.given.size, len(frames))
-        for i, frame in enumerate(frames):
+        size, frames = inputs.given.size, inputs.frames
+        layers = self._layers(size, len(frames))
+        places = self._places(frames, layers)
+        for i, (frame, place) in enumerate(zip(frames, places, strict=True)):
             views = {
-                "near_color": _layer(layers["colors"], 2 * i),
-                "far_color": _layer(layers["colors"], 2 * i + 1),
-                "near_path": _layer(layers["paths"], 2 * i),
-                "far_path": _layer(layers["paths"], 2 * i + 1),
-                "surface": _layer(layers["surfaces"], i),
-                "bend": _layer(layers["bends"], i),
+                "near_color": _layer(layers["colors"], 2 * place),
+                "far_color": _layer(layers["colors"], 2 * place + 1),
+                "near_path": _layer(layers["paths"], 2 * place),
+                "far_path": _layer(layers["paths"], 2 * place + 1),
+                "surface": _layer(layers["surfaces"], place),
+                "bend": _layer(layers["bends"], place),
             }
-            self._silhouettes(encoder, inputs, frame, views)
-            self._tiles(encoder, inputs, frame[0], i, len(frames), views)
+            if self._made.get(place) != _contents(frame):
+                self._silhouettes(encoder, inputs, frame, views)
+                self._made.pop(place, None)
+            if frame.token is not None:
+                self._made[place] = _contents(frame)
+            self._tiles(encoder, inputs, frame.offset, i, len(frames), views)
+        self._search(encoder, inputs, [frame.offset for frame in frames], places, layers, output)
+
+    def _places(self, frames, layers) -> list[int]:
+        """Where the layers of the frames are, or are to be: what is there already stays."""
+        if layers["colors"] is not self._colors:
+            self._colors, self._made = layers["colors"], {}
+        made = {contents: place for place, contents in self._made.items()}
+        places = [made.get(_contents(frame)) for frame in frames]
+        free = (place for place in range(self._colors.size[2] // 2) if place not in places)
+        return [next(free) if place is None else place for place in places]
+
+    def _search(self, encoder, inputs, offsets, places, layers, output):
+        """Record which times of which blocks are plain, then all pixels."""
+        count = len(offsets)
+        timed = {"EVEN": inputs.even, "AUTO": inputs.auto}
+        plain = gpu.kernel(self._device, "blur/gather_plain.wgsl", **timed)
+        data = np.zeros((), plain.source.dtype("Sources"))
+        data["offsets"][:count] = offsets
+        data["places"][:count] = places
+        data["count"] = count
+        arrays = {k: t.create_view(dimension="2d-array") for k, t in layers.items()}
+        searched = {
+            "sources": self._uniform("sources", data),
+            "paths": arrays.pop("paths"),
+            "tiles": self._reaching(inputs.given.size, count),
+        }
+        side, times = (int(plain.source.constant(n)) for n in ("BLOCK", "AT_ONCE"))
+        blocks = tuple(-(-n // side) for n in inputs.given.size)
+        words = self._images.texture("plain", blocks, "r32uint", -(-inputs.samples // times))
+        bits = words.create_view(dimension="2d-array")
+        plain.run(encoder, "main", replace(inputs.given, size=blocks), plain=bits, **searched)
         kernel = gpu.kernel(
             self._device,
             "blur/gather.wgsl",
             {"Output": self._output},
-            EVEN=inputs.even,
-            AUTO=inputs.auto,
-            WEIGHTED=weighted,
+            WEIGHTED=inputs.weight is not None,
             CONFIDENCE=self._show == "confidence",
+            **timed,
         )
-        data = np.zeros((), kernel.source.dtype("Sources"))
-        data["offsets"][: len(frames)] = [frame[0] for frame in frames]
-        data["count"] = len(frames)
-        arrays = {k: t.create_view(dimension="2d-array") for k, t in layers.items()}
-        arrays["tiles"] = self._reaching(inputs.given.size, len(frames))
         kernel.run(
             encoder,
             "main",
             inputs.given,
-            sources=self._uniform("sources", data),
+            plain=bits,
             own=inputs.color,
             own_weight=inputs.weight or inputs.none,
             linear=inputs.linear,
             output=output,
+            **searched,
             **arrays,
         )
 
     def _layers(self, size, count: int) -> dict[str, wgpu.GPUTexture]:
         """Two layers a frame, near and far, and what there is to know of both."""
+        if self._colors is not None and self._colors.size[:2] == size:
+            count = max(count, self._colors.size[2] // 2)
         color = gpu.texel(self._device, 4)
         return {
             "colors": self._images.texture("colors", size, color, 2 * count),
@@ -114,12 +148,11 @@ class Gather:
         return texture.create_view(dimension="2d-array")
 
     def _silhouettes(self, encoder, inputs, frame, views):
-        _, color, motion, depth, weight = frame
         kernel = gpu.kernel(
             self._device,
             "blur/gather_silhouettes.wgsl",
             {"Color": gpu.texel(self._device, 4)},
-            WEIGHTED=weight is not None,
+            WEIGHTED=frame.weight is not None,
         )
         marks = self._images.view("marks", inputs.given.size, "r32uint")
         idle = self._images.view("no marks", inputs.given.size, "r32uint")
@@ -129,10 +162,10 @@ class Gather:
                 encoder,
                 entry,
                 inputs.given,
-                color=color,
-                motion=motion,
-                depth=depth,
-                weight=weight or inputs.none,
+                color=frame.color,
+                motion=frame.motion,
+                depth=frame.depth,
+                weight=frame.weight or inputs.none,
                 marked=idle if marking else marks,
                 marks=marks if marking else idle,
                 **views,
@@ -142,21 +175,26 @@ class Gather:
         kernel = gpu.kernel(self._device, "blur/gather_tiles.wgsl")
         side = int(kernel.source.constant("TILE"))
         across, down = (-(-n // side) for n in inputs.given.size)
-        tiles = kernel.source.dtype("Tile").itemsize * across * down
         data = np.zeros((), kernel.source.dtype("Source"))
         data["offset"] = offset
         data["first"] = index * int(kernel.source.constant("LAYERS"))
         source = self._uniform("source", data)
-        contents = self._contents.at_least(tiles)
+        grid, held = (across, down), int(kernel.source.constant("HELD"))
+        contents = self._images.texture("contents", grid, "rgba32float", held)
+        contents = contents.create_view(dimension="2d-array")
+        idle = self._images.texture("no contents", (1, 1), "rgba32float")
+        idle = idle.create_view(dimension="2d-array")
         reaching = self._reaching(inputs.given.size, count)
         for entry in ("clear", "local", "reach"):
+            reads = entry == "reach"
             kernel.run(
                 encoder,
                 entry,
-                replace(inputs.given, size=(across, down)),
+                replace(inputs.given, size=grid),
                 source=source,
                 near=views["near_path"],
-                contents=contents,
+                content=contents if reads else idle,
+                contents=idle if reads else contents,
                 reaching=reaching,
                 farthest=self._farthest.at_least(4),
             )
@@ -165,6 +203,11 @@ class Gather:
         return self._device.create_buffer_with_data(
             label=name, data=data, usage=wgpu.BufferUsage.UNIFORM
         )
+
+
+def _contents(frame) -> tuple[object, bool]:
+    """What the layers of a frame are made of: its pixels, with weights or without."""
+    return frame.token, frame.weight is not None
 
 
 def _layer(texture: wgpu.GPUTexture, index: int) -> wgpu.GPUTextureView:

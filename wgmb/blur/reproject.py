@@ -95,8 +95,7 @@ class Reproject:
         pixels = width * height
         bits = int(kernel.source.constant("BLOCK_BITS"))
         blocks = ((width >> bits) + 1) * ((height >> bits) + 1)
-        sources = [(0, inputs.color, inputs.motion, inputs.depth, inputs.weight)]
-        sources += [(n.offset, n.color, n.motion, n.depth, n.weight) for n in inputs.neighbours]
+        sources = inputs.frames
         most = max(1, min(int(kernel.source.constant("SLICES")), AT_ONCE // (4 * pixels)))
         most = min(most, inputs.samples)
         shared = {
@@ -112,10 +111,10 @@ class Reproject:
         }
 
         def run(entry: str, source: int, first: int, count: int) -> None:
-            offset, color, motion, depth, weight = sources[source]
+            frame = sources[source]
             data = np.zeros((), kernel.source.dtype("Chunk"))
             data["first"], data["count"], data["source"] = first, count, source
-            data["offset"] = offset
+            data["offset"] = frame.offset
             # All pixels share a slice's time, so jitter is the frame's: its next golden section.
             data["shift"] = inputs.jitter * (inputs.number * GOLDEN % 1 - 0.5)
             kernel.run(
@@ -125,10 +124,10 @@ class Reproject:
                 chunk=self._device.create_buffer_with_data(
                     label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM
                 ),
-                color=color,
-                motion=motion,
-                depth=depth,
-                weight=weight or inputs.none,
+                color=frame.color,
+                motion=frame.motion,
+                depth=frame.depth,
+                weight=frame.weight or inputs.none,
                 **shared,
             )
 

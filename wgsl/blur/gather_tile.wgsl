@@ -8,13 +8,6 @@ const LAYERS: u32 = 8u;         // of the texture that holds them: about, depths
 const NONE: f32 = 3e38;         // depth of nothing
 const HALF_MAX: f32 = 65504.0;  // largest finite f16
 
-struct Tile {
-    paths: array<vec4f, 4>,     // velocity, curvature: the longest, then always the most different
-    box: vec4f,                 // least, greatest displacement of any while the frame is shown [px]
-    depths: vec4f,              // the least depth of what moves like each path
-    about: vec4f,               // see below
-}
-
 // `about`: how many paths there are, fewer where the rest is like these or like standing still; 1 if
 // there are silhouettes; the longest displacement [px].
 

@@ -11,11 +11,18 @@ struct Source {
 
 @group(1) @binding(0) var<uniform> source: Source;
 @group(1) @binding(1) var near: texture_2d<u32>;        // see packed()
-@group(1) @binding(2) var<storage, read_write> contents: array<Tile>;     // of every tile's own pixels
-@group(1) @binding(3) var reaching: Reaching;            // of all that reaches it, LAYERS a frame
-@group(1) @binding(4) var<storage, read_write> farthest: atomic<u32>;   // bits of the longest displacement of all
+@group(1) @binding(2) var content: texture_2d_array<f32>;   // what `local` wrote
+@group(1) @binding(3) var contents: Vectors;            // of every tile's own pixels, HELD layers
+@group(1) @binding(4) var reaching: Vectors;            // of all that reaches it, LAYERS a frame
+@group(1) @binding(5) var<storage, read_write> farthest: atomic<u32>;   // bits of the longest displacement of all
 
-alias Reaching = texture_storage_2d_array<rgba32float, write>;
+alias Vectors = texture_storage_2d_array<rgba32float, write>;
+
+// Layers of `contents`, after the paths.
+const BOX: u32 = 4u;            // least, greatest displacement of any while the frame is shown [px]
+const DEPTHS: u32 = 5u;         // the least depth of what moves like each path
+const ABOUT: u32 = 6u;          // see gather_tile.wgsl
+const HELD: u32 = 7u;
 
 const ALIKE: f32 = 0.5;         // displacements closer than this [px] stand for each other
 const WILD: f32 = 1e5;          // motions beyond this [px] are errors
@@ -26,10 +33,10 @@ fn longest_time() -> f32 {
     return max(span.x, span.y);
 }
 
-/// How far apart two motions come by the time `u`, at most, squared.
+/// How far apart two motions come by the time `u`, before or after, squared.
 fn apart(a: vec4f, b: vec4f, u: f32) -> f32 {
-    let d = length(a.xy - b.xy) + length(a.zw - b.zw) * u;
-    return d * d * u * u;
+    let d = (a - b) * vec4f(u, u, u * u, u * u);
+    return dot(d, d) + 2.0 * abs(dot(d.xy, d.zw));
 }
 
 /// The same to the most similar one of `chosen`; those not chosen yet are 0, which stands still.
@@ -61,7 +68,9 @@ fn clear(@builtin(global_invocation_id) id: vec3u) {
 
 /// The few motions of a tile's own pixels.
 @compute @workgroup_size(WG_X, WG_Y)
-fn local(@builtin(global_invocation_id) id: vec3u) {
+fn local(@builtin(local_invocation_index) local: u32,
+        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let id = spread(local, group, groups);
     let tiles = tiles_of(frame.size);
     if any(id.xy >= tiles) { return; }
     let corner = id.xy * TILE;
@@ -69,12 +78,13 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
     let pixels = size.x * size.y;
     let span = shown(source.offset);
     let u = longest_time();
-    var tile = Tile();
+    var paths = array<vec4f, 4>();      // the longest, then always the most different
+    var box = vec4f(0.0);
     var count = 0.0;
     var longest = 0.0;
     var more = true;
     for (var k = 0u; k < PATHS && more; k++) {
-        let chosen = tile.paths;
+        let chosen = paths;
         var most = 0.0;
         var found = vec4f(0.0);
         for (var i = 0u; i < pixels; i++) {
@@ -89,28 +99,32 @@ fn local(@builtin(global_invocation_id) id: vec3u) {
         more = most > ALIKE * ALIKE;
         if more {
             count += 1.0;
-            tile.paths[k] = found;
+            paths[k] = found;
             let a = displaced(found, span.x);
             let b = displaced(found, span.y);
-            tile.box = vec4f(min(tile.box.xy, min(a, b)), max(tile.box.zw, max(a, b)));
+            box = vec4f(min(box.xy, min(a, b)), max(box.zw, max(a, b)));
         }
     }
     var split = 0.0;
-    tile.depths = vec4f(NONE);
+    var depths = vec4f(NONE);
     for (var i = 0u; i < pixels; i++) {
         let texel = textureLoad(near, corner + vec2u(i % size.x, i / size.x), 0);
         let z = abs(depth_in(texel));
         if depth_in(texel) < 0.0 { split = 1.0; }
-        tile.depths = min(tile.depths, select(vec4f(NONE), vec4f(z), most_alike(as_vec4(path_in(texel)), tile.paths, u)));
+        depths = min(depths, select(vec4f(NONE), vec4f(z), most_alike(as_vec4(path_in(texel)), paths, u)));
     }
-    tile.about = vec4f(count, split, longest, 0.0);
-    contents[id.y * tiles.x + id.x] = tile;
+    for (var k = 0u; k < PATHS; k++) { textureStore(contents, id.xy, k, paths[k]); }
+    textureStore(contents, id.xy, BOX, box);
+    textureStore(contents, id.xy, DEPTHS, depths);
+    textureStore(contents, id.xy, ABOUT, vec4f(count, split, longest, 0.0));
     atomicMax(&farthest, bitcast<u32>(longest));
 }
 
 /// The few motions that lead to a tile, from wherever they come.
 @compute @workgroup_size(WG_X, WG_Y)
-fn reach(@builtin(global_invocation_id) id: vec3u) {
+fn reach(@builtin(local_invocation_index) local: u32,
+        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let id = spread(local, group, groups);
     let tiles = tiles_of(frame.size);
     if any(id.xy >= tiles) { return; }
     let span = shown(source.offset);
@@ -126,9 +140,9 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
     var longest = 0.0;
     for (var i = 0; i < count; i++) {
         let tile = low + vec2i(i % size.x, i / size.x);
-        let there = other(tile, here, tiles);
+        let there = other(tile, here);
         if there.leads {
-            let about = contents[there.at].about;
+            let about = textureLoad(content, there.at, ABOUT, 0);
             split = max(split, about.y);
             longest = max(longest, about.z);
             if there.count > 0u {
@@ -147,9 +161,9 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
         var best = 0.0;
         var found = vec4f(0.0);
         for (var i = 0; i < count; i++) {
-            let there = other(low + vec2i(i % size.x, i / size.x), here, tiles);
+            let there = other(low + vec2i(i % size.x, i / size.x), here);
             for (var n = 0u; n < there.count; n++) {
-                let path = contents[there.at].paths[n];
+                let path = textureLoad(content, there.at, n, 0);
                 let least = unlike(path, chosen, u);
                 let when = lands(path, span, there.off);
                 if least > best && when.x <= when.y {
@@ -168,13 +182,13 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
     var comes = vec4f(1.0);
     var goes = vec4f(0.0);
     for (var i = 0; i < count; i++) {
-        let there = other(low + vec2i(i % size.x, i / size.x), here, tiles);
+        let there = other(low + vec2i(i % size.x, i / size.x), here);
         for (var n = 0u; n < there.count; n++) {
-            let path = contents[there.at].paths[n];
+            let path = textureLoad(content, there.at, n, 0);
             let when = lands(path, span, there.off);
             if when.x <= when.y {
                 let alike = most_alike(path, chosen, u);
-                depths = min(depths, select(vec4f(NONE), vec4f(contents[there.at].depths[n]), alike));
+                depths = min(depths, select(vec4f(NONE), vec4f(textureLoad(content, there.at, DEPTHS, 0)[n]), alike));
                 comes = min(comes, select(vec4f(1.0), vec4f(when.x), alike));
                 goes = max(goes, select(vec4f(0.0), vec4f(when.y), alike));
             }
@@ -209,17 +223,16 @@ fn reach(@builtin(global_invocation_id) id: vec3u) {
 }
 
 struct Other {
-    at: u32,            // in `contents`
+    at: vec2i,
     off: vec2f,         // from there to here [px]
     leads: bool,        // some of its motions may lead here
     count: u32,         // of its paths, if so
 }
 
-fn other(there: vec2i, here: vec2i, tiles: vec2u) -> Other {
-    let at = u32(there.y) * tiles.x + u32(there.x);
+fn other(there: vec2i, here: vec2i) -> Other {
     let off = vec2f((here - there) * i32(TILE));
-    let leads = meets(contents[at].box, off);
-    return Other(at, off, leads, select(0u, u32(contents[at].about.x), leads));
+    let leads = meets(textureLoad(content, there, BOX, 0), off);
+    return Other(there, off, leads, select(0u, u32(textureLoad(content, there, ABOUT, 0).x), leads));
 }
 
 /// Whether any motion of a tile, by its box, leads to the one that lies `off` [px] away.
