@@ -34,12 +34,12 @@ View = wgpu.GPUTextureView
 
 @dataclass(frozen=True)
 class Neighbour:
-    """The frame before or after, as far as a method needs it."""
+    """The frame before or after, or the frame itself, as far as a method needs it."""
 
-    offset: int  # -1, 1 [frame intervals]
+    offset: int  # -1, 1; 0 is the frame itself [frame intervals]
     color: View  # premultiplied by alpha and by weight
     motion: View
-    depth: View
+    depth: View | None  # neighbours have one
     normal: View | None
     weight: View | None  # there if the frame itself has one
     token: object | None  # the same as before: the same pixels

@@ -84,7 +84,7 @@ class Gather:
             self._colors, self._made = layers["colors"], {}
         made = {contents: place for place, contents in self._made.items()}
         places = [made.get(_contents(frame)) for frame in frames]
-        free = (place for place in range(self._colors.size[2] // 2) if place not in places)
+        free = (place for place in range(layers["colors"].size[2] // 2) if place not in places)
         return [next(free) if place is None else place for place in places]
 
     def _search(self, encoder, inputs, offsets, places, layers, output):
