@@ -113,11 +113,13 @@ def part(color, motion, z, mixed, y, x):
     nearest, farthest = min(z[p] for p in inner), max(z[p] for p in inner)
     between = 1.5 * nearest if farthest >= FAR else np.sqrt(nearest * farthest)
     outer = list(around(height, width, y, x, 2))
-    front = [p for p in outer if z[p] < between and not mixed[p]]
-    back = [p for p in outer if z[p] >= between and not mixed[p]]
+    nearer = [p for p in outer if z[p] < between]
+    # The corners are too far away for a background.
+    farther = [(j, i) for j, i in outer if z[j, i] >= between and abs((j - y) * (i - x)) < 4]
+    front = [p for p in nearer if not mixed[p]]
     thin = not front
-    front = front or [p for p in outer if z[p] < between]
-    back = back or [p for p in outer if z[p] >= between]
+    front = front or nearer
+    back = [p for p in farther if not mixed[p]] or farther
     if not front or not back:
         return None
 

@@ -158,11 +158,13 @@ fn split(@builtin(local_invocation_index) local: u32,
         let mark = mark_at(at);
         let is_front = marked_depth(mark) < between;
         let way = textureLoad(motion, held(at), 0);
-        let there = stage < DONE && all(at >= vec2i(0)) && all(at < vec2i(frame.size));
+        let distance2 = f32(off.x * off.x + off.y * off.y);
+        // The corners are too far away for a background: it may be another one.
+        let near_enough = is_front || distance2 < 8.0;
+        let there = stage < DONE && near_enough && all(at >= vec2i(0)) && all(at < vec2i(frame.size));
         let wanted = select(select(no_back, thin, is_front), !is_mixed(mark), stage == PURE);
         if there && wanted && stage != UNLIKE {
             // The less the farther it is.
-            let distance2 = f32(off.x * off.x + off.y * off.y);
             let share = 1.0 / (1.0 + distance2 * distance2);
             let here = Side(share, share * way, share * marked_depth(mark), share * color_at(at), share * weight_at(at));
             if is_front { front = both(front, here); } else { back = both(back, here); }
