@@ -237,8 +237,9 @@ fn search(x: vec2f, path: Path, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
                 place = step_from(x, place.d, u, stored(layer));
                 n++;
                 let again = alike(place.d, first);
-                let ended = has_ended(place) || n > STEPS || again;
-                hit = place.miss <= MISS * MISS && !(again && is_first);
+                let farther = !own && depth_in(place.texel) * handicap >= solid.depth;     // it leads to what is seen
+                let ended = has_ended(place) || n > STEPS || again || farther;
+                hit = place.miss <= MISS * MISS && !(again && is_first) && !farther;
                 if ended && (own || hit || !any(todo.left)) { break; }
                 if ended {
                     place.d = next_of(&todo);
