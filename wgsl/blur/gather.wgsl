@@ -20,6 +20,7 @@ override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 
 const BEHIND: f32 = 1.05;       // ratio of depths that makes two surfaces
 const GUESSED: f32 = 1.2;       // and a background that was only inferred as this much
+const SPARED: u32 = 2u;         // steps by which a search from a tile's motion is shorter than one from nowhere
 const ROUNDS: u32 = 6u;         // near, far of the frame itself; near of the neighbours; far of these
 
 struct Sample {
@@ -229,7 +230,7 @@ fn search(x: vec2f, path: Path, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
             var n = u32(f == 0u);
             if !own {
                 place.d = next_of(&todo);
-                n = 2u;
+                n = SPARED;
             }
             // A turn is a step: from one start until something is there, then from the next.
             var hit = false;
@@ -243,7 +244,7 @@ fn search(x: vec2f, path: Path, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
                 if ended && (own || hit || !any(todo.left)) { break; }
                 if ended {
                     place.d = next_of(&todo);
-                    n = 2u;
+                    n = SPARED;
                 }
             }
             if own {
