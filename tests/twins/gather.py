@@ -328,8 +328,11 @@ def follow(paths, centre, seed, u, known):
             return d, np.inf, None
         pixel = int(q[1]), int(q[0])
         step = moved(paths[pixel], u)
+        back = np.inf if known is None else np.hypot(*(d - known[0])) / 2
         miss, d = np.hypot(*(step - d)), step
-        if miss < 0.25 or (known is not None and (np.abs(d - known[0]) < 0.75).all()):
+        if miss < 0.25 or miss > back:  # there, or astray
+            break
+        if known is not None and (np.abs(d - known[0]) < 0.75).all():
             break
     return d, miss, pixel
 

@@ -21,6 +21,7 @@ override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 const BEHIND: f32 = 1.05;       // ratio of depths that makes two surfaces
 const GUESSED: f32 = 1.2;       // and a background that was only inferred as this much
 const SPARED: u32 = 2u;         // steps by which a search from a tile's motion is shorter than one from nowhere
+const ASTRAY: f32 = 0.5;        // of the way back to where the first one led: a longer step ends such a search
 const ROUNDS: u32 = 6u;         // near, far of the frame itself; near of the neighbours; far of these
 
 struct Sample {
@@ -235,11 +236,13 @@ fn search(x: vec2f, path: Path, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
             // A turn is a step: from one start until something is there, then from the next.
             var hit = false;
             loop {
+                let back = place.d - first;
                 place = step_from(x, place.d, u, stored(layer));
                 n++;
                 let again = alike(place.d, first);
                 let farther = !own && depth_in(place.texel) * handicap >= solid.depth;     // it leads to what is seen
-                let ended = has_ended(place) || n > STEPS || again || farther;
+                let astray = !own && place.miss > ASTRAY * ASTRAY * dot(back, back);
+                let ended = has_ended(place) || n > STEPS || again || farther || astray;
                 hit = place.miss <= MISS * MISS && !(again && is_first) && !farther;
                 if ended && (own || hit || !any(todo.left)) { break; }
                 if ended {
