@@ -172,8 +172,11 @@ class Kernel:
             for name in source.entry_points()
         }
 
-    def run(self, encoder, entry: str, given: Given, **own) -> None:
-        """Record one dispatch over the image: group 0 from `given`, group 1 from `own`."""
+    def run(self, encoder, entry: str, given: Given, groups: dict | None = None, **own) -> None:
+        """Record one dispatch over the image: group 0 from `given`, group 1 from `own`.
+
+        `groups`: the part of a buffer, as in `own`, that tells how many workgroups instead.
+        """
         wanted = {name for name, b in self.bindings.items() if b.group > 0}
         if own.keys() != wanted:
             raise ShaderError(f"{self.source.name} binds {sorted(wanted)}, got {sorted(own)}")
@@ -188,9 +191,12 @@ class Kernel:
             ]
             bound = self.device.create_bind_group(layout=layout, entries=entries)
             compute.set_bind_group(group, bound)
-        compute.dispatch_workgroups(
-            *(-(-n // edge) for n, edge in zip(given.size, self.workgroup, strict=True))
-        )
+        if groups:
+            compute.dispatch_workgroups_indirect(groups["buffer"], groups["offset"])
+        else:
+            compute.dispatch_workgroups(
+                *(-(-n // edge) for n, edge in zip(given.size, self.workgroup, strict=True))
+            )
         compute.end()
 
 

@@ -38,7 +38,9 @@ class Scratch:
             self._buffer = self._device.create_buffer(
                 label="scratch",
                 size=size,
-                usage=wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_DST,
+                usage=wgpu.BufferUsage.STORAGE
+                | wgpu.BufferUsage.COPY_DST
+                | wgpu.BufferUsage.INDIRECT,
             )
         return self._buffer
 

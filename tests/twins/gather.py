@@ -358,7 +358,7 @@ def is_behind(new, old):
 def fetch(frame, s):
     """Colour and coverage of a sample, from the texels of its own surface."""
     if not s.far and frame.plain[s.pixel]:
-        if frame.calm[s.pixel]:
+        if frame.calm[s.pixel] and frame.offset == 0:
             return cubic(frame.color[0], *s.at), 1.0
         return bilinear(frame.color[0], *s.at), 1.0
     height, width = frame.plain.shape

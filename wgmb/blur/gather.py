@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..images import Images, Scratch
 
 SHOWN = ("color", "confidence")
-_STORED = 7  # storage textures of one pass: marks, both layers, their surfaces and bends
+_STORED = 6  # storage textures of one pass: marks, both layers, their surfaces
 
 
 class Gather:
@@ -52,7 +52,8 @@ class Gather:
             )
         self._device, self._output, self._show = device, output, show
         self._images = Images(device)
-        self._farthest = Scratch(device)
+        self._farthest, self._lists = Scratch(device), Scratch(device)
+        self._everywhere: tuple[tuple[int, int], dict] | None = None
         self._colors: wgpu.GPUTexture | None = None
         self._made: dict[int, tuple] = {}  # what the layers at a place were made of
 
@@ -61,6 +62,7 @@ class Gather:
         size, frames = inputs.given.size, inputs.frames
         layers = self._layers(size, len(frames))
         places = self._places(frames, layers)
+        lists = self._listed(encoder, inputs)
         for i, (frame, place) in enumerate(zip(frames, places, strict=True)):
             views = {
                 "near_color": _layer(layers["colors"], 2 * place),
@@ -68,15 +70,15 @@ class Gather:
                 "near_path": _layer(layers["paths"], 2 * place),
                 "far_path": _layer(layers["paths"], 2 * place + 1),
                 "surface": _layer(layers["surfaces"], place),
-                "bend": _layer(layers["bends"], place),
             }
             if self._made.get(place) != _contents(frame):
-                self._silhouettes(encoder, inputs, frame, views)
+                self._silhouettes(encoder, inputs, frame, views, lists)
                 self._made.pop(place, None)
             if frame.token is not None:
                 self._made[place] = _contents(frame)
-            self._tiles(encoder, inputs, frame.offset, i, len(frames), views)
-        self._search(encoder, inputs, [frame.offset for frame in frames], places, layers, output)
+            self._tiles(encoder, inputs, frame.offset, i, len(frames), views, lists)
+        offsets = [frame.offset for frame in frames]
+        self._search(encoder, inputs, offsets, places, layers, lists, output)
 
     def _places(self, frames, layers) -> list[int]:
         """Where the layers of the frames are, or are to be: what is there already stays."""
@@ -87,7 +89,53 @@ class Gather:
         free = (place for place in range(layers["colors"].size[2] // 2) if place not in places)
         return [next(free) if place is None else place for place in places]
 
-    def _search(self, encoder, inputs, offsets, places, layers, output):
+    def _listed(self, encoder, inputs) -> dict[str, dict]:
+        """What needs work: the lists of gather_live.wgsl, by name."""
+        kernel = gpu.kernel(self._device, "blur/gather_live.wgsl")
+        grid = self._grid(inputs.given.size)
+        words = -(-(grid[0] * grid[1] + int(kernel.source.constant("CELLS"))) // 64) * 64
+        size = 4 * words * int(kernel.source.constant("LISTS"))
+        lists = self._lists.at_least(size)
+        encoder.clear_buffer(lists)
+        data = np.zeros((), kernel.source.dtype("Survey"))
+        data["words"] = words
+        tiles = replace(inputs.given, size=grid)
+        for frame in inputs.frames:
+            data["offset"] = frame.offset
+            source = self._uniform("survey", data)
+            kernel.run(encoder, "survey", tiles, source=source, motion=frame.motion, lists=lists)
+        for entry, grid in (("near", grid), ("list", (grid[1], 1))):
+            rows = replace(inputs.given, size=grid)
+            kernel.run(encoder, entry, rows, source=source, motion=inputs.motion, lists=lists)
+        return {
+            name: {
+                "buffer": lists,
+                "offset": 4 * words * int(kernel.source.constant(name.upper())),
+                "size": 4 * words,
+            }
+            for name in ("moving", "resting", "parted", "whole", "marked")
+        }
+
+    def _all(self, size) -> dict:
+        """A list of all cells, in an order that spreads every stretch of it over the picture."""
+        if self._everywhere is None or self._everywhere[0] != size:
+            source = shader.load("blur/gather_tile.wgsl")
+            strands, row, wide, side, strip = (
+                int(source.constant(n)) for n in ("STRANDS", "IN_A_ROW", "CELL", "TILE", "STRIP")
+            )
+            across, down = self._grid(size)
+            across = -(-across // wide)
+            rows = np.concatenate([np.arange(i, down, strands) for i in range(strands)])
+            cells = (np.arange(across) + 65536 * rows[:, None]).ravel()
+            head = min(cells.size, row), side // strip, -(-cells.size // row), cells.size
+            spare = [0] * (-cells.size % 4)  # a struct's size is a multiple of 16 bytes
+            data = np.array([*head, *cells, *spare], np.uint32)
+            usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDIRECT
+            buffer = self._device.create_buffer_with_data(label="all", data=data, usage=usage)
+            self._everywhere = size, {"buffer": buffer, "offset": 0, "size": buffer.size}
+        return self._everywhere[1]
+
+    def _search(self, encoder, inputs, offsets, places, layers, lists, output):
         """Record which times of which blocks are plain, then all pixels."""
         count = len(offsets)
         timed = {"EVEN": inputs.even, "AUTO": inputs.auto}
@@ -102,11 +150,15 @@ class Gather:
             "paths": arrays.pop("paths"),
             "tiles": self._reaching(inputs.given.size, count),
         }
-        side, times = (int(plain.source.constant(n)) for n in ("BLOCK", "AT_ONCE"))
-        blocks = tuple(-(-n // side) for n in inputs.given.size)
+        wide, side, block, times = (
+            int(plain.source.constant(n)) for n in ("CELL", "TILE", "BLOCK", "AT_ONCE")
+        )
+        across, down = self._grid(inputs.given.size)
+        blocks = -(-across // wide) * wide * side // block, down * side // block
         words = self._images.texture("plain", blocks, "r32uint", -(-inputs.samples // times))
         bits = words.create_view(dimension="2d-array")
-        plain.run(encoder, "main", replace(inputs.given, size=blocks), plain=bits, **searched)
+        given = replace(inputs.given, size=blocks)
+        plain.run(encoder, "main", given, plain=bits, moving=lists["moving"], **searched)
         kernel = gpu.kernel(
             self._device,
             "blur/gather.wgsl",
@@ -115,18 +167,39 @@ class Gather:
             CONFIDENCE=self._show == "confidence",
             **timed,
         )
+        bends = self._bends(encoder, inputs, layers["paths"], places[0], lists["parted"])
+        for entry, tiles in (("main", lists["moving"]), ("rest", lists["resting"])):
+            kernel.run(
+                encoder,
+                entry,
+                inputs.given,
+                groups=tiles,
+                listed=tiles,
+                plain=bits,
+                bends=bends,
+                own=inputs.color,
+                own_weight=inputs.weight or inputs.none,
+                linear=inputs.linear,
+                output=output,
+                **searched,
+                **arrays,
+            )
+
+    def _bends(self, encoder, inputs, paths, place: int, parted) -> wgpu.GPUTextureView:
+        """Record how the frame's own colours bend between pixels."""
+        bends = self._images.view("bends", inputs.given.size, "rgba32uint")
+        kernel = gpu.kernel(self._device, "blur/gather_bends.wgsl")
         kernel.run(
             encoder,
             "main",
             inputs.given,
-            plain=bits,
-            own=inputs.color,
-            own_weight=inputs.weight or inputs.none,
-            linear=inputs.linear,
-            output=output,
-            **searched,
-            **arrays,
+            groups=parted,
+            color=inputs.color,
+            near=_layer(paths, 2 * place),
+            bends=bends,
+            listed=parted,
         )
+        return bends
 
     def _layers(self, size, count: int) -> dict[str, wgpu.GPUTexture]:
         """Two layers a frame, near and far, and what there is to know of both."""
@@ -137,17 +210,24 @@ class Gather:
             "colors": self._images.texture("colors", size, color, 2 * count),
             "paths": self._images.texture("paths", size, "rgba32uint", 2 * count),
             "surfaces": self._images.texture("surfaces", size, "rgba32float", count),
-            "bends": self._images.texture("bends", size, "rgba32uint", count),
         }
 
+    def _grid(self, size) -> tuple[int, int]:
+        """Tiles across and down a picture."""
+        side = int(shader.load("blur/gather_tile.wgsl").constant("TILE"))
+        return -(-size[0] // side), -(-size[1] // side)
+
     def _reaching(self, size, count: int) -> wgpu.GPUTextureView:
-        source = shader.load("blur/gather_tile.wgsl")
-        side, layers = (int(source.constant(n)) for n in ("TILE", "LAYERS"))
-        grid = -(-size[0] // side), -(-size[1] // side)
-        texture = self._images.texture("reaching", grid, "rgba32float", layers * count)
+        layers = int(shader.load("blur/gather_tile.wgsl").constant("LAYERS"))
+        texture = self._images.texture("reaching", self._grid(size), "rgba32float", layers * count)
         return texture.create_view(dimension="2d-array")
 
-    def _silhouettes(self, encoder, inputs, frame, views):
+    def _silhouettes(self, encoder, inputs, frame, views, lists):
+        """Record them for all that something moves near; for the whole frame if it is kept."""
+        if frame.token is None:
+            passes = {"whole": lists["whole"], "mark": lists["marked"], "split": lists["parted"]}
+        else:
+            passes = dict.fromkeys(("mark", "split"), self._all(inputs.given.size))
         kernel = gpu.kernel(
             self._device,
             "blur/gather_silhouettes.wgsl",
@@ -156,12 +236,14 @@ class Gather:
         )
         marks = self._images.view("marks", inputs.given.size, "r32uint")
         idle = self._images.view("no marks", inputs.given.size, "r32uint")
-        for entry in ("mark", "split"):
+        for entry, tiles in passes.items():
             marking = entry == "mark"
             kernel.run(
                 encoder,
                 entry,
                 inputs.given,
+                groups=tiles,
+                listed=tiles,
                 color=frame.color,
                 motion=frame.motion,
                 depth=frame.depth,
@@ -171,32 +253,38 @@ class Gather:
                 **views,
             )
 
-    def _tiles(self, encoder, inputs, offset: int, index: int, count: int, views):
+    def _tiles(self, encoder, inputs, offset: int, index: int, count: int, views, lists):
         kernel = gpu.kernel(self._device, "blur/gather_tiles.wgsl")
-        side = int(kernel.source.constant("TILE"))
-        across, down = (-(-n // side) for n in inputs.given.size)
         data = np.zeros((), kernel.source.dtype("Source"))
         data["offset"] = offset
         data["first"] = index * int(kernel.source.constant("LAYERS"))
         source = self._uniform("source", data)
-        grid, held = (across, down), int(kernel.source.constant("HELD"))
+        grid, held = self._grid(inputs.given.size), int(kernel.source.constant("HELD"))
         contents = self._images.texture("contents", grid, "rgba32float", held)
         contents = contents.create_view(dimension="2d-array")
         idle = self._images.texture("no contents", (1, 1), "rgba32float")
         idle = idle.create_view(dimension="2d-array")
         reaching = self._reaching(inputs.given.size, count)
-        for entry in ("clear", "local", "reach"):
-            reads = entry == "reach"
+        wide = int(kernel.source.constant("WIDE"))
+        coarse = -(-grid[0] // wide), -(-grid[1] // wide)
+        boxes = self._images.view("wide boxes", coarse, "rgba32float")
+        no_boxes = self._images.view("no boxes", (1, 1), "rgba32float")
+        for entry in ("clear", "local", "widen", "reach"):
+            reads, last = entry in ("widen", "reach"), entry == "reach"
             kernel.run(
                 encoder,
                 entry,
-                replace(inputs.given, size=grid),
+                replace(inputs.given, size=coarse if entry == "widen" else grid),
                 source=source,
                 near=views["near_path"],
                 content=contents if reads else idle,
                 contents=idle if reads else contents,
                 reaching=reaching,
                 farthest=self._farthest.at_least(4),
+                wide_box=boxes if last else inputs.none,
+                wide_boxes=no_boxes if last else boxes,
+                moving=lists["moving"],
+                resting=lists["resting"],
             )
 
     def _uniform(self, name: str, data: np.ndarray) -> wgpu.GPUBuffer:

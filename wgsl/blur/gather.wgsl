@@ -9,11 +9,12 @@
 @group(1) @binding(3) var plain: texture_2d_array<u32>;     // bits of times, see gather_plain.wgsl
 @group(1) @binding(4) var colors: texture_2d_array<f32>;    // premultiplied by alpha, coverage, weight; near, far, a frame
 @group(1) @binding(5) var surfaces: texture_2d_array<f32>;  // near depth, far depth, coverage, weight
-@group(1) @binding(6) var bends: texture_2d_array<u32>;     // second differences of the near colours
+@group(1) @binding(6) var bends: texture_2d<u32>;           // second differences of the frame's own near colours
 @group(1) @binding(7) var own: texture_2d<f32>;             // the frame as it came
 @group(1) @binding(8) var own_weight: texture_2d<f32>;
 @group(1) @binding(9) var linear: sampler;
 @group(1) @binding(10) var output: Output;
+@group(1) @binding(11) var<storage, read> listed: Listed;   // the cells to work on
 
 override WEIGHTED: bool = false;
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
@@ -41,20 +42,20 @@ struct Seen {           // the nearest ones
 // lavapipe executes the body of every `if` and of every loop at least once, and that of a `for` once more
 // than it has turns. So loops are left from their end, and what is rare has a loop of its own over bits of times.
 
-@compute @workgroup_size(WG_X, WG_Y)
-fn main(@builtin(local_invocation_index) local: u32,
-        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let id = spread(local, group, groups);
-    if any(id.xy >= frame.size) { return; }
-    let x = vec2f(id.xy) + 0.5;
-    let tile = id.xy / TILE;
+@compute @workgroup_size(CELL * TILE, STRIP)
+fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = place_of(group);
+    let id = pixel_in(listed.cells[k], group, local);
+    if k >= listed.count || any(id >= frame.size) { return; }
+    let x = vec2f(id) + 0.5;
+    let tile = id / TILE;
     let reach0 = reach(tile, 0u);
     let reach1 = reach(tile, 1u);
     let reach2 = reach(tile, 2u);
     let here = stored(0u);
-    let path = path_in(textureLoad(paths, id.xy, here, 0));
-    let start = path_in(textureLoad(paths, id.xy / BLOCK * BLOCK, here, 0));    // see gather_plain.wgsl
-    let times = times_of(x, frame.jitter * (pixel_noise(id.xy) - 0.5), reach0, reach1, reach2);
+    let path = path_in(textureLoad(paths, id, here, 0));
+    let start = path_in(textureLoad(paths, id / BLOCK * BLOCK, here, 0));    // see gather_plain.wgsl
+    let times = times_of(x, frame.jitter * (pixel_noise(id) - 0.5), reach0, reach1, reach2);
     let share = 1.0 / f32(times.count);     // before adding, so that no sum of finite colours overflows
 
     let still = is_still(reach0, reach1, reach2);
@@ -66,7 +67,7 @@ fn main(@builtin(local_invocation_index) local: u32,
     var first = 0u;         // time of this turn's words of bits
     loop {
         let valid = select(select(0u, (1u << (samples - first)) - 1u, samples > first), ~0u, samples >= first + AT_ONCE);
-        var bits = textureLoad(plain, id.xy / BLOCK, first / AT_ONCE, 0).x & valid;
+        var bits = textureLoad(plain, id / BLOCK, first / AT_ONCE, 0).x & valid;
         var todo = bits;
         loop {              // times at which one search is enough
             let t = time_in(times, first, todo);
@@ -79,7 +80,7 @@ fn main(@builtin(local_invocation_index) local: u32,
                 counts = textureLoad(surfaces, px, here / 2u, 0).w;
             }
             if todo != 0u && is_even {
-                add(&sum, Shown(resampled(x - found.d, here), counts, 1.0, sqrt(found.miss), 0.0), share);
+                add(&sum, Shown(resampled(x - found.d, here, true), counts, 1.0, sqrt(found.miss), 0.0), share);
                 accepted += 1.0;
             }
             if !is_even { bits &= ~(1u << firstTrailingBit(todo)); }
@@ -115,18 +116,31 @@ fn main(@builtin(local_invocation_index) local: u32,
         if first >= samples { break; }
     }
     var result = max(sum.color, vec4f(0.0)) / sum.weight;
-    if still || sum.weight <= 0.0 {     // to the bit
-        result = textureLoad(own, id.xy, 0);
-        if WEIGHTED {
-            let counted = textureLoad(own_weight, id.xy, 0).x;
-            result = select(vec4f(0.0), result / counted, counted > 0.0);
-        }
-    }
+    if still || sum.weight <= 0.0 { result = unmoved(id); }
     if CONFIDENCE {
         let times_seen = max(accepted * share, 1e-9);
         result = vec4f(accepted * share, sum.others, sum.missed / times_seen, left * share);
     }
-    textureStore(output, id.xy, result);
+    textureStore(output, id, result);
+}
+
+/// Where nothing moves.
+@compute @workgroup_size(CELL * TILE, STRIP)
+fn rest(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = place_of(group);
+    let id = pixel_in(listed.cells[k], group, local);
+    if k >= listed.count || any(id >= frame.size) { return; }
+    var result = unmoved(id);
+    if CONFIDENCE { result = vec4f(1.0, 0.0, 0.0, 0.0); }
+    textureStore(output, id, result);
+}
+
+/// The frame's own pixel, to the bit.
+fn unmoved(px: vec2u) -> vec4f {
+    let color = textureLoad(own, px, 0);
+    if !WEIGHTED { return color; }
+    let counted = textureLoad(own_weight, px, 0).x;
+    return select(vec4f(0.0), color / counted, counted > 0.0);
 }
 
 /// The time of the lowest of 32 bits, of which `first` is the time of the first.
@@ -188,7 +202,7 @@ fn composed(seen: Seen) -> Shown {
         var counts = 1.0;
         if WEIGHTED { counts = textureLoad(surfaces, nearest_to(at), layer / 2u, 0).w; }
         let others = select(0.0, 1.0, seen.solid.layer > 1u);
-        add(&sum, Shown(resampled(at, layer), counts, 1.0, sqrt(seen.solid.miss), others), 1.0 - sum.cover);
+        add(&sum, Shown(resampled(at, layer, seen.solid.layer == 0u), counts, 1.0, sqrt(seen.solid.miss), others), 1.0 - sum.cover);
     }
     return sum;
 }
@@ -330,13 +344,13 @@ fn add_texel(part: ptr<function, Shown>, now: Sample, i: u32) {
     (*part).cover += amount * select(there.z, 1.0, is_far);
 }
 
-/// Catmull-Rom interpolation where the texel is calm, linear elsewhere: what is between two texels differs
-/// from the line by their second differences, of which the nearest texel's stand for both.
-fn resampled(at: vec2f, layer: u32) -> vec4f {
+/// Catmull-Rom interpolation where the frame's own texel is calm, linear elsewhere: what is between two texels
+/// differs from the line by their second differences, of which the nearest texel's stand for both.
+fn resampled(at: vec2f, layer: u32, is_own: bool) -> vec4f {
     let f = fract(at - 0.5);
-    let bend = textureLoad(bends, nearest_to(at), layer / 2u, 0);
+    let bend = textureLoad(bends, nearest_to(at), 0);
     let across = vec4f(unpack2x16float(bend.x), unpack2x16float(bend.y));
     let down = vec4f(unpack2x16float(bend.z), unpack2x16float(bend.w));
-    let share = 0.5 * f * (1.0 - f);
+    let share = select(vec2f(0.0), 0.5 * f * (1.0 - f), is_own);
     return textureSampleLevel(colors, linear, at / vec2f(frame.size), layer, 0.0) - share.x * across - share.y * down;
 }

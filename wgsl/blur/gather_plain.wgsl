@@ -5,6 +5,7 @@
 //#include blur/gather_search.wgsl
 
 @group(1) @binding(3) var plain: Plain;     // bits of times, AT_ONCE a layer; a texel a block
+@group(1) @binding(4) var<storage, read> moving: Listed;    // cells, see gather_live.wgsl
 
 alias Plain = texture_storage_2d_array<r32uint, write>;
 
@@ -13,11 +14,15 @@ alias Plain = texture_storage_2d_array<r32uint, write>;
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(local_invocation_index) local: u32,
         @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let id = spread(local, group, groups);
-    if any(id.xy >= (frame.size + BLOCK - 1u) / BLOCK) { return; }
-    let low = id.xy * BLOCK;
-    let high = min(low + BLOCK, frame.size) - 1u;
+    let k = place_in_list(local, group, groups);
+    let down = TILE / BLOCK;        // blocks of a cell
+    let across = CELL * down;
+    let n = k / (across * down);
+    let id = cell_in(moving.cells[n]) * vec2u(across, down) + vec2u(k % across, k / across % down);
+    let low = id * BLOCK;
     let tile = low / TILE;
+    if n >= moving.count || any(low >= frame.size) { return; }
+    let high = min(low + BLOCK, frame.size) - 1u;
     let reach0 = reach(tile, 0u);
     let reach1 = reach(tile, 1u);
     let reach2 = reach(tile, 2u);
@@ -62,7 +67,7 @@ fn main(@builtin(local_invocation_index) local: u32,
         bits |= u32(is_plain) << (i % AT_ONCE);
         i++;
         if i % AT_ONCE == 0u || i >= frame.samples {
-            textureStore(plain, id.xy, (i - 1u) / AT_ONCE, vec4u(bits));
+            textureStore(plain, id, (i - 1u) / AT_ONCE, vec4u(bits));
             bits = 0u;
         }
         if i >= frame.samples { break; }

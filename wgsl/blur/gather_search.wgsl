@@ -14,7 +14,6 @@ struct Sources {
 @group(1) @binding(1) var paths: texture_2d_array<u32>;     // see packed(), stored()
 @group(1) @binding(2) var tiles: texture_2d_array<f32>;     // LAYERS a frame
 
-const STILL: f32 = 0.01;        // paths shorter than this [px] need no search
 const STEPS: u32 = 4u;          // of a search from the pixel's own path, at most
 const FOUND: f32 = 0.25;        // a step shorter than this [px] ends the search
 const MISS: f32 = 1.0;          // a sample farther than this [px] from the pixel is none of it

@@ -16,7 +16,7 @@
 @group(1) @binding(8) var far_color: Color;
 @group(1) @binding(9) var far_path: Packed;
 @group(1) @binding(10) var surface: Exact;              // near depth; far depth, 0 where there is none; coverage; weight
-@group(1) @binding(11) var bend: Packed;                // second differences of the colour, across, down, where calm
+@group(1) @binding(11) var<storage, read> listed: Listed;   // the cells to work on
 
 alias Marks = texture_storage_2d<r32uint, write>;
 alias Color = texture_storage_2d<rgba32float, write>;
@@ -67,10 +67,11 @@ fn weight_at(px: vec2i) -> f32 {
 }
 
 /// Around one pixel: depths lie apart, and so do motions.
-@compute @workgroup_size(WG_X, WG_Y)
-fn mark(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
+@compute @workgroup_size(CELL * TILE, STRIP)
+fn mark(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = place_of(group);
+    let px = vec2i(pixel_in(listed.cells[k], group, local));
+    if k >= listed.count || any(px >= vec2i(frame.size)) { return; }
     var nearest = FAR;
     var farthest = 0.0;
     for (var i = 0; i < 9; i++) {
@@ -109,17 +110,17 @@ fn both(a: Side, b: Side) -> Side {
 }
 
 /// The two layers of every pixel.
-@compute @workgroup_size(WG_X, WG_Y)
-fn split(@builtin(local_invocation_index) local: u32,
-        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let id = spread(local, group, groups);
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
+@compute @workgroup_size(CELL * TILE, STRIP)
+fn split(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = place_of(group);
+    let px = vec2i(pixel_in(listed.cells[k], group, local));
+    if k >= listed.count || any(px >= vec2i(frame.size)) { return; }
     let counts = weight_at(px);
     var beside = false;
     var calm = true;        // one surface and weight, nothing beyond white, in the 3 x 3
     var nearest = FAR;
     var farthest = 0.0;
+    let here = mark_at(px);
     for (var i = 0; i < 9; i++) {
         let at = px + vec2i(i % 3, i / 3) - 1;
         let mark = mark_at(at);
@@ -129,10 +130,8 @@ fn split(@builtin(local_invocation_index) local: u32,
         farthest = max(farthest, marked_depth(mark));
     }
     let own = textureLoad(color, px, 0);
-    let across = select(vec4f(0.0), color_at(px - vec2i(1, 0)) - 2.0 * own + color_at(px + vec2i(1, 0)), calm);
-    let down = select(vec4f(0.0), color_at(px - vec2i(0, 1)) - 2.0 * own + color_at(px + vec2i(0, 1)), calm);
     let own_motion = textureLoad(motion, px, 0);
-    var z = depth_at(px);
+    var z = marked_depth(here);
     var near = own;
     var near_motion = own_motion;
     var far = vec4f(0.0);
@@ -141,7 +140,7 @@ fn split(@builtin(local_invocation_index) local: u32,
     var coverage = 1.0;
     var seen = false;       // the far layer is no guess
 
-    let mixed = is_mixed(mark_at(px));
+    let mixed = is_mixed(here);
     let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= FAR);
     var front = Side();
     var back = Side();
@@ -222,7 +221,16 @@ fn split(@builtin(local_invocation_index) local: u32,
     textureStore(near_path, px, packed(path_of(near_motion), select(z, -z, beside), calm));
     if far_z > 0.0 { textureStore(far_color, px, far); }        // else nobody reads it
     textureStore(far_path, px, packed(path_of(far_motion), max(far_z, 0.0), seen));
-    textureStore(bend, px, vec4u(
-        pack2x16float(across.xy), pack2x16float(across.zw), pack2x16float(down.xy), pack2x16float(down.zw)));
     textureStore(surface, px, vec4f(z, far_z, coverage, coverage * counts));
+}
+
+/// Pixels far from all that moves, whose colours nobody reads: searches pass over them.
+@compute @workgroup_size(CELL * TILE, STRIP)
+fn whole(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = place_of(group);
+    let px = vec2i(pixel_in(listed.cells[k], group, local));
+    if k >= listed.count || any(px >= vec2i(frame.size)) { return; }
+    let path = path_of(textureLoad(motion, px, 0));
+    textureStore(near_path, px, packed(path, marked_depth(bitcast<u32>(depth_at(px))), false));
+    textureStore(far_path, px, packed(path, 0.0, false));
 }

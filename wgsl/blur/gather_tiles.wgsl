@@ -2,6 +2,7 @@
 //#include common/frame.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
+//#include blur/gather_moving.wgsl
 //#include blur/gather_tile.wgsl
 
 struct Source {
@@ -15,8 +16,13 @@ struct Source {
 @group(1) @binding(3) var contents: Vectors;            // of every tile's own pixels, HELD layers
 @group(1) @binding(4) var reaching: Vectors;            // of all that reaches it, LAYERS a frame
 @group(1) @binding(5) var<storage, read_write> farthest: atomic<u32>;   // bits of the longest displacement of all
+@group(1) @binding(6) var<storage, read> moving: Listed;    // cells, see gather_live.wgsl
+@group(1) @binding(7) var<storage, read> resting: Listed;
+@group(1) @binding(8) var wide_box: texture_2d<f32>;    // what `widen` wrote
+@group(1) @binding(9) var wide_boxes: Boxes;            // around the boxes of WIDE x WIDE tiles
 
 alias Vectors = texture_storage_2d_array<rgba32float, write>;
+alias Boxes = texture_storage_2d<rgba32float, write>;
 
 // Layers of `contents`, after the paths.
 const BOX: u32 = 4u;            // least, greatest displacement of any while the frame is shown [px]
@@ -24,20 +30,8 @@ const DEPTHS: u32 = 5u;         // the least depth of what moves like each path
 const ABOUT: u32 = 6u;          // see gather_tile.wgsl
 const HELD: u32 = 7u;
 
+const WIDE: i32 = 4;
 const ALIKE: f32 = 0.5;         // displacements closer than this [px] stand for each other
-const WILD: f32 = 1e5;          // motions beyond this [px] are errors
-const FARTHEST: i32 = 16;       // tiles that a motion is followed over
-
-fn longest_time() -> f32 {
-    let span = abs(shown(source.offset));
-    return max(span.x, span.y);
-}
-
-/// How far apart two motions come by the time `u`, before or after, squared.
-fn apart(a: vec4f, b: vec4f, u: f32) -> f32 {
-    let d = (a - b) * vec4f(u, u, u * u, u * u);
-    return dot(d, d) + 2.0 * abs(dot(d.xy, d.zw));
-}
 
 /// The same to the most similar one of `chosen`; those not chosen yet are 0, which stands still.
 fn unlike(path: vec4f, chosen: array<vec4f, 4>, u: f32) -> f32 {
@@ -53,14 +47,6 @@ fn most_alike(path: vec4f, chosen: array<vec4f, 4>, u: f32) -> vec4<bool> {
     return d == vec4f(least);
 }
 
-fn as_vec4(path: Path) -> vec4f {
-    return vec4f(path.velocity, path.curvature);
-}
-
-fn displaced(path: vec4f, u: f32) -> vec2f {
-    return displacement(Path(path.xy, path.zw), u);
-}
-
 @compute @workgroup_size(WG_X, WG_Y)
 fn clear(@builtin(global_invocation_id) id: vec3u) {
     if all(id.xy == vec2u(0u)) { atomicStore(&farthest, 0u); }
@@ -70,14 +56,17 @@ fn clear(@builtin(global_invocation_id) id: vec3u) {
 @compute @workgroup_size(WG_X, WG_Y)
 fn local(@builtin(local_invocation_index) local: u32,
         @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let id = spread(local, group, groups);
-    let tiles = tiles_of(frame.size);
-    if any(id.xy >= tiles) { return; }
-    let corner = id.xy * TILE;
-    let size = min(corner + TILE, frame.size) - corner;
-    let pixels = size.x * size.y;
+    let k = place_in_list(local, group, groups);
+    let n = k / CELL;
+    let moves = n < moving.count;
+    let cell = cell_in(select(resting.cells[n - moving.count], moving.cells[n], moves));
+    let id = cell * vec2u(CELL, 1u) + vec2u(k % CELL, 0u);
+    if n >= moving.count + resting.count || id.x >= tiles_of(frame.size).x { return; }
+    let corner = id * TILE;
+    let end = min(corner + TILE, frame.size) - 1u;
+    let pixels = select(0u, TILE * TILE, moves);        // some twice in tiles that are cut off
     let span = shown(source.offset);
-    let u = longest_time();
+    let u = longest_time(source.offset);
     var paths = array<vec4f, 4>();      // the longest, then always the most different
     var box = vec4f(0.0);
     var count = 0.0;
@@ -88,7 +77,7 @@ fn local(@builtin(local_invocation_index) local: u32,
         var most = 0.0;
         var found = vec4f(0.0);
         for (var i = 0u; i < pixels; i++) {
-            let path = as_vec4(path_in(textureLoad(near, corner + vec2u(i % size.x, i / size.x), 0)));
+            let path = as_vec4(path_in(textureLoad(near, min(corner + vec2u(i % TILE, i / TILE), end), 0)));
             let least = unlike(path, chosen, u);
             if least > most && least < WILD * WILD {
                 most = least;
@@ -108,60 +97,85 @@ fn local(@builtin(local_invocation_index) local: u32,
     var split = 0.0;
     var depths = vec4f(NONE);
     for (var i = 0u; i < pixels; i++) {
-        let texel = textureLoad(near, corner + vec2u(i % size.x, i / size.x), 0);
+        let texel = textureLoad(near, min(corner + vec2u(i % TILE, i / TILE), end), 0);
         let z = abs(depth_in(texel));
         if depth_in(texel) < 0.0 { split = 1.0; }
         depths = min(depths, select(vec4f(NONE), vec4f(z), most_alike(as_vec4(path_in(texel)), paths, u)));
     }
-    for (var k = 0u; k < PATHS; k++) { textureStore(contents, id.xy, k, paths[k]); }
-    textureStore(contents, id.xy, BOX, box);
-    textureStore(contents, id.xy, DEPTHS, depths);
-    textureStore(contents, id.xy, ABOUT, vec4f(count, split, longest, 0.0));
+    for (var k = 0u; k < PATHS; k++) { textureStore(contents, id, k, paths[k]); }
+    textureStore(contents, id, BOX, box);
+    textureStore(contents, id, DEPTHS, depths);
+    textureStore(contents, id, ABOUT, vec4f(count, split, longest, 0.0));
     atomicMax(&farthest, bitcast<u32>(longest));
+}
+
+/// The boxes of many tiles as one, so that `reach` need not look at each.
+@compute @workgroup_size(WG_X, WG_Y)
+fn widen(@builtin(global_invocation_id) id: vec3u) {
+    let first = vec2i(id.xy) * WIDE;
+    let tiles = vec2i(tiles_of(frame.size));
+    if any(first >= tiles) { return; }
+    var box = vec4f(0.0);
+    for (var i = 0; i < WIDE * WIDE; i++) {
+        let one = textureLoad(content, min(first + vec2i(i % WIDE, i / WIDE), tiles - 1), BOX, 0);
+        box = vec4f(min(box.xy, one.xy), max(box.zw, one.zw));
+    }
+    textureStore(wide_boxes, id.xy, box);
 }
 
 /// The few motions that lead to a tile, from wherever they come.
 @compute @workgroup_size(WG_X, WG_Y)
 fn reach(@builtin(local_invocation_index) local: u32,
         @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let id = spread(local, group, groups);
+    let k = place_in_list(local, group, groups);
     let tiles = tiles_of(frame.size);
-    if any(id.xy >= tiles) { return; }
+    let id = cell_in(moving.cells[k / CELL]) * vec2u(CELL, 1u) + vec2u(k % CELL, 0u);
+    if k / CELL >= moving.count || id.x >= tiles.x { return; }
     let span = shown(source.offset);
-    let u = longest_time();
+    let u = longest_time(source.offset);
     let around = min(i32(ceil(bitcast<f32>(atomicLoad(&farthest)) / f32(TILE))) + 1, FARTHEST);
-    let here = vec2i(id.xy);
-    var low = max(here - around, vec2i(0));
-    var size = min(here + around, vec2i(tiles) - 1) - low + 1;
-    var count = size.x * size.y;
-    var least = here;       // of the tiles that move here
-    var most = here;
+    let here = vec2i(id);
+    let low = max(here - around, vec2i(0));
+    let high = min(here + around, vec2i(tiles) - 1);
+    let lowest = low / WIDE;
+    let highest = high / WIDE;
+    var first = here;       // of the tiles that may lead here
+    var last = here;
+    for (var wide = lowest; wide.y <= highest.y; wide = after(wide, lowest, highest)) {
+        let box = textureLoad(wide_box, wide, 0);
+        let side = f32((WIDE - 1) * i32(TILE));
+        let off = vec2f((here - wide * WIDE) * i32(TILE));
+        if meets(vec4f(box.xy, box.zw + side), off) {
+            first = min(first, wide * WIDE);
+            last = max(last, wide * WIDE + WIDE - 1);
+        }
+    }
+    let least = max(first, low);
+    let most = min(last, high);
+    first = here;           // of those that do, and move
+    last = here;
     var split = 0.0;
     var longest = 0.0;
-    for (var i = 0; i < count; i++) {
-        let tile = low + vec2i(i % size.x, i / size.x);
+    for (var tile = least; tile.y <= most.y; tile = after(tile, least, most)) {
         let there = other(tile, here);
         if there.leads {
             let about = textureLoad(content, there.at, ABOUT, 0);
             split = max(split, about.y);
             longest = max(longest, about.z);
             if there.count > 0u {
-                least = min(least, tile);
-                most = max(most, tile);
+                first = min(first, tile);
+                last = max(last, tile);
             }
         }
     }
-    low = least;
-    size = most - least + 1;
-    count = size.x * size.y;
     var chosen = array<vec4f, 4>();
     var chosen_count = 0u;
     var more = true;
     for (var k = 0u; k < PATHS && more; k++) {
         var best = 0.0;
         var found = vec4f(0.0);
-        for (var i = 0; i < count; i++) {
-            let there = other(low + vec2i(i % size.x, i / size.x), here);
+        for (var tile = first; tile.y <= last.y; tile = after(tile, first, last)) {
+            let there = other(tile, here);
             for (var n = 0u; n < there.count; n++) {
                 let path = textureLoad(content, there.at, n, 0);
                 let least = unlike(path, chosen, u);
@@ -181,8 +195,8 @@ fn reach(@builtin(local_invocation_index) local: u32,
     var depths = vec4f(NONE);
     var comes = vec4f(1.0);
     var goes = vec4f(0.0);
-    for (var i = 0; i < count; i++) {
-        let there = other(low + vec2i(i % size.x, i / size.x), here);
+    for (var tile = first; tile.y <= last.y; tile = after(tile, first, last)) {
+        let there = other(tile, here);
         for (var n = 0u; n < there.count; n++) {
             let path = textureLoad(content, there.at, n, 0);
             let when = lands(path, span, there.off);
@@ -214,12 +228,17 @@ fn reach(@builtin(local_invocation_index) local: u32,
         }
     }
     let about = vec4f(f32(chosen_count), split, longest, 0.0);
-    textureStore(reaching, id.xy, source.first, about);
-    textureStore(reaching, id.xy, source.first + 1u, depths);
+    textureStore(reaching, id, source.first, about);
+    textureStore(reaching, id, source.first + 1u, depths);
     let none = depths >= vec4f(NONE);
-    textureStore(reaching, id.xy, source.first + 2u, select(span.x + (span.y - span.x) * comes, vec4f(NONE), none));
-    textureStore(reaching, id.xy, source.first + 3u, select(span.x + (span.y - span.x) * goes, vec4f(-NONE), none));
-    for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id.xy, source.first + 4u + k, chosen[k]); }
+    textureStore(reaching, id, source.first + 2u, select(span.x + (span.y - span.x) * comes, vec4f(NONE), none));
+    textureStore(reaching, id, source.first + 3u, select(span.x + (span.y - span.x) * goes, vec4f(-NONE), none));
+    for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id, source.first + 4u + k, chosen[k]); }
+}
+
+/// The tile that comes after another one, row by row of those from `first` to `last`.
+fn after(tile: vec2i, first: vec2i, last: vec2i) -> vec2i {
+    return select(vec2i(tile.x + 1, tile.y), vec2i(first.x, tile.y + 1), tile.x >= last.x);
 }
 
 struct Other {

@@ -22,12 +22,15 @@ const STRANDS: u32 = 16u;
 /// the workgroups; this order spreads each such stretch over the whole picture. They work on eight pixels at
 /// once, as long as the dearest takes; these are blocks of 4 x 2, which meet fewer edges than rows.
 fn spread(local: u32, group: vec3u, groups: vec3u) -> vec2u {
-    let rows = groups.y / STRANDS;              // of most strands; the first few have one more
-    let first = groups.y % STRANDS * (rows + 1u);
-    var row = group.y % (rows + 1u) * STRANDS + group.y / (rows + 1u);
-    if group.y >= first {
-        let rest = group.y - first;
-        row = rest % rows * STRANDS + groups.y % STRANDS + rest / rows;
+    return vec2u(group.x * WG_X + local / 8u * 4u + local % 4u, strand(group.y, groups.y) * WG_Y + local / 4u % 2u);
+}
+
+/// The row that comes at a place in such an order of rows.
+fn strand(place: u32, rows: u32) -> u32 {
+    let length = rows / STRANDS;                // of most strands; the first few have one more
+    let rest = place - min(rows % STRANDS * (length + 1u), place);
+    if place < rows % STRANDS * (length + 1u) {
+        return place % (length + 1u) * STRANDS + place / (length + 1u);
     }
-    return vec2u(group.x * WG_X + local / 8u * 4u + local % 4u, row * WG_Y + local / 4u % 2u);
+    return rest % length * STRANDS + rows % STRANDS + rest / length;
 }
