@@ -154,9 +154,9 @@ class _OneByOne:
     def begin_compute_pass(self, *, label: str):
         return _Alone(self._clock, label)
 
-    def clear_buffer(self, buffer) -> None:
+    def clear_buffer(self, buffer, offset: int = 0, size: int | None = None) -> None:
         encoder = self._clock.device.create_command_encoder()
-        encoder.clear_buffer(buffer)
+        encoder.clear_buffer(buffer, offset, size)
         submit(self._clock.device, encoder)
 
 

@@ -53,6 +53,7 @@ class Gather:
         self._device, self._output, self._show = device, output, show
         self._images = Images(device)
         self._farthest, self._lists = Scratch(device), Scratch(device)
+        self._mixed, self._needed, self._spare = (Scratch(device) for _ in range(3))
         self._everywhere: tuple[tuple[int, int], dict] | None = None
         self._colors: wgpu.GPUTexture | None = None
         self._made: dict[int, tuple] = {}  # what the layers at a place were made of
@@ -224,32 +225,40 @@ class Gather:
 
     def _silhouettes(self, encoder, inputs, frame, views, lists):
         """Record them for all that something moves near; for the whole frame if it is kept."""
+        size = inputs.given.size
+        needed = {"buffer": self._needed.at_least(16), "offset": 0, "size": 16}
         if frame.token is None:
             passes = {"whole": lists["whole"], "mark": lists["marked"], "split": lists["parted"]}
         else:
-            passes = dict.fromkeys(("mark", "split"), self._all(inputs.given.size))
+            passes = dict.fromkeys(("mark", "split"), self._all(size))
+        cells = passes | dict.fromkeys(("count", "part"), passes["split"])
+        passes |= {"count": None, "part": needed}
         kernel = gpu.kernel(
             self._device,
             "blur/gather_silhouettes.wgsl",
             {"Color": gpu.texel(self._device, 4)},
             WEIGHTED=frame.weight is not None,
         )
-        marks = self._images.view("marks", inputs.given.size, "r32uint")
-        idle = self._images.view("no marks", inputs.given.size, "r32uint")
-        for entry, tiles in passes.items():
+        marks = self._images.view("marks", size, "r32uint")
+        idle = self._images.view("no marks", size, "r32uint")
+        mixed = self._mixed.at_least(4 + 4 * size[0] * size[1])
+        encoder.clear_buffer(mixed, 0, 4)
+        for entry, groups in passes.items():
             marking = entry == "mark"
             kernel.run(
                 encoder,
                 entry,
-                inputs.given,
-                groups=tiles,
-                listed=tiles,
+                inputs.given if groups else replace(inputs.given, size=(1, 1)),
+                groups=groups,
+                listed=cells[entry],
                 color=frame.color,
                 motion=frame.motion,
                 depth=frame.depth,
                 weight=frame.weight or inputs.none,
                 marked=idle if marking else marks,
                 marks=marks if marking else idle,
+                mixed=mixed,
+                needed=needed if entry == "count" else self._spare.at_least(16),
                 **views,
             )
 

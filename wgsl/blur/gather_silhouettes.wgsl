@@ -17,6 +17,13 @@
 @group(1) @binding(9) var far_path: Packed;
 @group(1) @binding(10) var surface: Exact;              // near depth; far depth, 0 where there is none; coverage; weight
 @group(1) @binding(11) var<storage, read> listed: Listed;   // the cells to work on
+@group(1) @binding(12) var<storage, read_write> mixed: Mixed;
+@group(1) @binding(13) var<storage, read_write> needed: array<u32>;     // workgroups of `part`, to dispatch it indirectly
+
+struct Mixed {          // pixels that may show two surfaces
+    count: atomic<u32>,
+    pixels: array<u32>, // x, y as 16 bits each
+}
 
 alias Marks = texture_storage_2d<r32uint, write>;
 alias Color = texture_storage_2d<rgba32float, write>;
@@ -91,25 +98,7 @@ fn mark(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     textureStore(marks, px, vec4u((bitcast<u32>(depth_at(px)) & ~FLAGS) | flags));
 }
 
-struct Side {       // the mean of what lies on one side of a silhouette
-    total: f32,
-    motion: vec4f,
-    depth: f32,
-    color: vec4f,
-    counted: f32,   // weight of the colour
-}
-
-// What is looked for in the 5 x 5 around a pixel that shows two surfaces.
-const PURE: u32 = 0u;           // what is unmixed, on both sides
-const ANY: u32 = 1u;            // the rest, on a side where nothing is
-const UNLIKE: u32 = 2u;         // of a wire, in the 3 x 3: the motion most unlike that of the background
-const DONE: u32 = 3u;
-
-fn both(a: Side, b: Side) -> Side {
-    return Side(a.total + b.total, a.motion + b.motion, a.depth + b.depth, a.color + b.color, a.counted + b.counted);
-}
-
-/// The two layers of every pixel.
+/// The two layers of every pixel that shows one surface, and a list of all others.
 @compute @workgroup_size(CELL * TILE, STRIP)
 fn split(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let k = place_of(group);
@@ -118,20 +107,83 @@ fn split(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
     let counts = weight_at(px);
     var beside = false;
     var calm = true;        // one surface and weight, nothing beyond white, in the 3 x 3
-    var nearest = FAR;
-    var farthest = 0.0;
     let here = mark_at(px);
     for (var i = 0; i < 9; i++) {
         let at = px + vec2i(i % 3, i / 3) - 1;
         let mark = mark_at(at);
         calm = calm && (mark & FLAGS) == 0u && weight_at(at) == counts;
         beside = beside || is_mixed(mark);
-        nearest = min(nearest, marked_depth(mark));
-        farthest = max(farthest, marked_depth(mark));
+    }
+    let path = path_of(textureLoad(motion, px, 0));
+    let z = marked_depth(here);
+    textureStore(near_color, px, textureLoad(color, px, 0));
+    textureStore(near_path, px, packed(path, select(z, -z, beside), calm));
+    textureStore(far_path, px, packed(path, 0.0, false));
+    textureStore(surface, px, vec4f(z, 0.0, 1.0, counts));
+    if is_mixed(here) { mixed.pixels[atomicAdd(&mixed.count, 1u)] = listed_as(vec2u(px)); }
+}
+
+@compute @workgroup_size(1)
+fn count() {
+    let wanted = (atomicLoad(&mixed.count) + WG_X * WG_Y - 1u) / (WG_X * WG_Y);
+    needed[0] = min(wanted, IN_A_ROW);
+    needed[1] = (wanted + IN_A_ROW - 1u) / IN_A_ROW;
+    needed[2] = 1u;
+}
+
+struct Side {       // the mean of what lies on one side of a silhouette
+    total: f32,
+    motion: vec4f,
+    depth: f32,
+    color: vec4f,
+    counted: f32,   // weight of the colour
+}
+
+fn add(side: ptr<function, Side>, share: f32, way: vec4f, z: f32, shown: vec4f, weight: f32) {
+    (*side).total += share;
+    (*side).motion += share * way;
+    (*side).depth += share * z;
+    (*side).color += share * shown;
+    (*side).counted += share * weight;
+}
+
+struct Around {         // one of the 5 x 5 around a pixel that shows two surfaces
+    at: vec2i,
+    distance2: f32,
+    z: f32,
+    counts: bool,
+    is_front: bool,
+    is_pure: bool,      // it shows one
+}
+
+fn around(px: vec2i, i: i32, between: f32) -> Around {
+    let off = vec2i(i % 5, i / 5) - 2;
+    let at = px + off;
+    let mark = mark_at(at);
+    let z = marked_depth(mark);
+    let distance2 = f32(off.x * off.x + off.y * off.y);
+    let inside = all(at >= vec2i(0)) && all(at < vec2i(frame.size));
+    // The corners are too far away for a background: it may be another one.
+    return Around(at, distance2, z, inside && (z < between || distance2 < 8.0), z < between, !is_mixed(mark));
+}
+
+/// The two layers of the pixels that show two surfaces: all others have them already.
+@compute @workgroup_size(WG_X, WG_Y)
+fn part(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = (group.y * IN_A_ROW + group.x) * WG_X * WG_Y + local;
+    if k >= atomicLoad(&mixed.count) { return; }
+    let px = vec2i(cell_in(mixed.pixels[k]));
+    let counts = weight_at(px);
+    var nearest = FAR;
+    var farthest = 0.0;
+    for (var i = 0; i < 9; i++) {
+        let z = marked_depth(mark_at(px + vec2i(i % 3, i / 3) - 1));
+        nearest = min(nearest, z);
+        farthest = max(farthest, z);
     }
     let own = textureLoad(color, px, 0);
     let own_motion = textureLoad(motion, px, 0);
-    var z = marked_depth(here);
+    var z = marked_depth(mark_at(px));
     var near = own;
     var near_motion = own_motion;
     var far = vec4f(0.0);
@@ -140,56 +192,41 @@ fn split(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
     var coverage = 1.0;
     var seen = false;       // the far layer is no guess
 
-    let mixed = is_mixed(here);
     let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= FAR);
+    var thin = true;        // a wire: nothing near is unmixed
+    var no_back = true;     // nothing behind is
+    for (var i = 0; i < 25; i++) {
+        let there = around(px, i, between);
+        thin = thin && !(there.counts && there.is_front && there.is_pure);
+        no_back = no_back && !(there.counts && !there.is_front && there.is_pure);
+    }
     var front = Side();
     var back = Side();
-    var before = vec4f(0.0);
-    var behind = vec4f(0.0);
+    for (var i = 0; i < 25; i++) {
+        let there = around(px, i, between);
+        let wanted = there.counts && (there.is_pure || select(no_back, thin, there.is_front));
+        let way = select(vec4f(0.0), textureLoad(motion, held(there.at), 0), wanted);
+        let shown = select(vec4f(0.0), color_at(there.at), wanted);
+        // The less the farther it is.
+        let share = select(0.0, 1.0 / (1.0 + there.distance2 * there.distance2), wanted);
+        let weight = weight_at(there.at);
+        add(&front, select(0.0, share, there.is_front), way, there.z, shown, weight);
+        add(&back, select(share, 0.0, there.is_front), way, there.z, shown, weight);
+    }
+    let behind = back.motion / back.total;
+    var before = select(front.motion / front.total, behind, thin);
     var most = 0.0;
-    var thin = false;       // a wire: nothing near is unmixed
-    var no_back = false;
-    var stage = select(DONE, PURE, mixed);
-    var i = 0;
-    loop {          // left from its end, and one for all stages, see gather.wgsl
-        let off = vec2i(i % 5, i / 5) - 2;
-        let at = px + off;
-        let mark = mark_at(at);
-        let is_front = marked_depth(mark) < between;
-        let way = textureLoad(motion, held(at), 0);
-        let distance2 = f32(off.x * off.x + off.y * off.y);
-        // The corners are too far away for a background: it may be another one.
-        let near_enough = is_front || distance2 < 8.0;
-        let there = stage < DONE && near_enough && all(at >= vec2i(0)) && all(at < vec2i(frame.size));
-        let wanted = select(select(no_back, thin, is_front), !is_mixed(mark), stage == PURE);
-        if there && wanted && stage != UNLIKE {
-            // The less the farther it is.
-            let share = 1.0 / (1.0 + distance2 * distance2);
-            let here = Side(share, share * way, share * marked_depth(mark), share * color_at(at), share * weight_at(at));
-            if is_front { front = both(front, here); } else { back = both(back, here); }
-        }
+    for (var i = 0; i < select(0, 9, thin); i++) {     // of a wire, the motion most unlike the background's
+        let there = around(px, i % 3 + i / 3 * 5 + 6, between);
+        let way = textureLoad(motion, held(there.at), 0);
         let apart = dot(way - behind, way - behind);
-        if there && stage == UNLIKE && is_front && all(abs(off) < vec2i(2)) && apart > most {
+        if there.counts && there.is_front && apart > most {
             most = apart;
             before = way;
         }
-        i++;
-        if i >= 25 {
-            i = 0;
-            if stage == PURE {
-                thin = front.total == 0.0;
-                no_back = back.total == 0.0;
-            }
-            if stage != UNLIKE {
-                behind = back.motion / back.total;
-                before = select(front.motion / front.total, behind, thin);
-            }
-            stage = select(select(DONE, UNLIKE, thin && stage == ANY), ANY, stage == PURE && (thin || no_back));
-        }
-        if stage == DONE { break; }
     }
 
-    if mixed && front.total > 0.0 && back.total > 0.0 && back.counted > 0.0 {
+    if front.total > 0.0 && back.total > 0.0 && back.counted > 0.0 {
         let way = before - behind;
         if dot(way, way) >= DIFFERENT * DIFFERENT {
             // What is opaque before what is not tells its share better than vectors, which some renderers do not mix.
@@ -218,7 +255,7 @@ fn split(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
         }
     }
     textureStore(near_color, px, near);
-    textureStore(near_path, px, packed(path_of(near_motion), select(z, -z, beside), calm));
+    textureStore(near_path, px, packed(path_of(near_motion), -z, false));
     if far_z > 0.0 { textureStore(far_color, px, far); }        // else nobody reads it
     textureStore(far_path, px, packed(path_of(far_motion), max(far_z, 0.0), seen));
     textureStore(surface, px, vec4f(z, far_z, coverage, coverage * counts));
