@@ -303,19 +303,6 @@ fn search(x: vec2f, path: Path, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
     return Seen(solid, edge, second);
 }
 
-struct Starts {         // displacements to search from
-    left: vec4<bool>,
-    x: vec4f,
-    y: vec4f,
-}
-
-fn next_of(starts: ptr<function, Starts>) -> vec2f {
-    let s = *starts;
-    (*starts).left = s.left & vec4<bool>(false, s.left.x, any(s.left.xy), any(s.left.xyz));
-    let later = select(vec2f(s.x.w, s.y.w), vec2f(s.x.z, s.y.z), s.left.z);
-    return select(select(later, vec2f(s.x.y, s.y.y), s.left.y), vec2f(s.x.x, s.y.x), s.left.x);
-}
-
 /// Whether `b` is another surface behind that of `a`: neighbouring frames show the same one again.
 fn is_behind(b: Sample, a: Sample) -> bool {
     return b.depth >= a.depth * BEHIND * select(NEIGHBOUR, 1.0, a.layer == b.layer);

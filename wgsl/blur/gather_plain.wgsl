@@ -52,11 +52,15 @@ fn main(@builtin(local_invocation_index) local: u32,
                 let z = depth_in(found.texel) * handicap;
                 deepest = max(deepest, z);
                 let wanted = worth(here, u, select(seen, z, f == 0u) / handicap);
-                is_plain = is_plain && z > 0.0 && found.miss <= MISS * MISS && z >= seen
-                    && (!wanted.x || leads(x, vec2f(dx.x, dy.x), found.d, u, layer))
-                    && (!wanted.y || leads(x, vec2f(dx.y, dy.y), found.d, u, layer))
-                    && (!wanted.z || leads(x, vec2f(dx.z, dy.z), found.d, u, layer))
-                    && (!wanted.w || leads(x, vec2f(dx.w, dy.w), found.d, u, layer));
+                is_plain = is_plain && z > 0.0 && found.miss <= MISS * MISS && z >= seen;
+                let known = (abs(dx - found.d.x) < vec4f(SAME)) & (abs(dy - found.d.y) < vec4f(SAME));
+                var todo = Starts(wanted & !known, dx, dy);
+                loop {
+                    let any_left = any(todo.left);
+                    let ends = leads(x, next_of(&todo), found.d, u, layer);
+                    is_plain = is_plain && (!any_left || ends);
+                    if !is_plain || !any(todo.left) { break; }
+                }
                 n++;
                 if !is_plain || n >= 4u { break; }
             }
@@ -78,5 +82,5 @@ fn main(@builtin(local_invocation_index) local: u32,
 /// leaves the picture.
 fn leads(x: vec2f, start: vec2f, first: vec2f, u: f32, layer: u32) -> bool {
     let place = step_from(x, start, u, layer);
-    return alike(start, first) || place.miss >= NONE || (depth_in(place.texel) > 0.0 && alike(place.d, first));
+    return place.miss >= NONE || (depth_in(place.texel) > 0.0 && alike(place.d, first));
 }

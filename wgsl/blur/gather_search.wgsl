@@ -77,6 +77,19 @@ fn displaced_y(here: Reach, u: f32) -> vec4f {
     return (here.vy + here.cy * u) * u;
 }
 
+struct Starts {         // displacements to search from
+    left: vec4<bool>,
+    x: vec4f,
+    y: vec4f,
+}
+
+fn next_of(starts: ptr<function, Starts>) -> vec2f {
+    let s = *starts;
+    (*starts).left = s.left & vec4<bool>(false, s.left.x, any(s.left.xy), any(s.left.xyz));
+    let later = select(vec2f(s.x.w, s.y.w), vec2f(s.x.z, s.y.z), s.left.z);
+    return select(select(later, vec2f(s.x.y, s.y.y), s.left.y), vec2f(s.x.x, s.y.x), s.left.x);
+}
+
 /// The neighbour on the side of `t`, or the only one; the `second`, the other one.
 fn neighbour_of(t: f32, second: bool) -> u32 {
     return select(1u, 2u, (sources.count == 3u && t > 0.0) != second);
