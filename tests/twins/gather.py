@@ -330,7 +330,7 @@ def follow(paths, centre, seed, u, known):
         step = moved(paths[pixel], u)
         back = np.inf if known is None else np.hypot(*(d - known[0])) / 2
         miss, d = np.hypot(*(step - d)), step
-        if miss < 0.25 or miss > back:  # there, or astray
+        if miss < 0.5 or miss > back:  # there, or astray
             break
         if known is not None and (np.abs(d - known[0]) < 0.75).all():
             break

@@ -15,7 +15,7 @@ struct Sources {
 @group(1) @binding(2) var tiles: texture_2d_array<f32>;     // LAYERS a frame
 
 const STEPS: u32 = 4u;          // of a search from the pixel's own path, at most
-const FOUND: f32 = 0.25;        // a step shorter than this [px] ends the search
+const FOUND: f32 = 0.5;         // a step shorter than this [px] ends the search
 const MISS: f32 = 1.0;          // a sample farther than this [px] from the pixel is none of it
 const SAME: f32 = 0.75;         // searches, and samples of one layer, closer than this [px] are one
 const NEIGHBOUR: f32 = 1.1;     // a neighbouring frame's sample counts as this much farther
