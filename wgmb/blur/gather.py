@@ -103,11 +103,10 @@ class Gather:
         tiles = replace(inputs.given, size=grid)
         for frame in inputs.frames:
             data["offset"] = frame.offset
-            source = self._uniform("survey", data)
-            kernel.run(encoder, "survey", tiles, source=source, motion=frame.motion, lists=lists)
-        for entry, grid in (("near", grid), ("list", (grid[1], 1))):
-            rows = replace(inputs.given, size=grid)
-            kernel.run(encoder, entry, rows, source=source, motion=inputs.motion, lists=lists)
+            own = {"source": self._uniform("survey", data), "motion": frame.motion, "lists": lists}
+            kernel.run(encoder, "survey", tiles, **own)
+        kernel.run(encoder, "near", tiles, **own)
+        kernel.run(encoder, "list", replace(inputs.given, size=(grid[1], 1)), **own)
         return {
             name: {
                 "buffer": lists,
