@@ -172,10 +172,10 @@ class Kernel:
             for name in source.entry_points()
         }
 
-    def run(self, encoder, entry: str, given: Given, groups: dict | None = None, **own) -> None:
+    def run(self, encoder, entry: str, given: Given, groups: dict | None = None, /, **own) -> None:
         """Record one dispatch over the image: group 0 from `given`, group 1 from `own`.
 
-        `groups`: the part of a buffer, as in `own`, that tells how many workgroups instead.
+        `groups`: the part of a buffer that holds how many workgroups it takes instead.
         """
         wanted = {name for name, b in self.bindings.items() if b.group > 0}
         if own.keys() != wanted:

@@ -173,7 +173,7 @@ class Gather:
                 encoder,
                 entry,
                 inputs.given,
-                groups=tiles,
+                tiles,
                 listed=tiles,
                 plain=bits,
                 bends=bends,
@@ -193,7 +193,7 @@ class Gather:
             encoder,
             "main",
             inputs.given,
-            groups=parted,
+            parted,
             color=inputs.color,
             near=_layer(paths, 2 * place),
             bends=bends,
@@ -227,11 +227,11 @@ class Gather:
         size = inputs.given.size
         needed = {"buffer": self._needed.at_least(16), "offset": 0, "size": 16}
         if frame.token is None:
-            passes = {"whole": lists["whole"], "mark": lists["marked"], "split": lists["parted"]}
+            cells = {"whole": lists["whole"], "mark": lists["marked"], "split": lists["parted"]}
         else:
-            passes = dict.fromkeys(("mark", "split"), self._all(size))
-        cells = passes | dict.fromkeys(("count", "part"), passes["split"])
-        passes |= {"count": None, "part": needed}
+            cells = dict.fromkeys(("mark", "split"), self._all(size))
+        passes: dict[str, tuple[dict | None, dict]] = {k: (c, c) for k, c in cells.items()}
+        passes |= {"count": (None, cells["split"]), "part": (needed, cells["split"])}
         kernel = gpu.kernel(
             self._device,
             "blur/gather_silhouettes.wgsl",
@@ -242,14 +242,14 @@ class Gather:
         idle = self._images.view("no marks", size, "r32uint")
         mixed = self._mixed.at_least(4 + 4 * size[0] * size[1])
         encoder.clear_buffer(mixed, 0, 4)
-        for entry, groups in passes.items():
+        for entry, (groups, listed) in passes.items():
             marking = entry == "mark"
             kernel.run(
                 encoder,
                 entry,
                 inputs.given if groups else replace(inputs.given, size=(1, 1)),
-                groups=groups,
-                listed=cells[entry],
+                groups,
+                listed=listed,
                 color=frame.color,
                 motion=frame.motion,
                 depth=frame.depth,

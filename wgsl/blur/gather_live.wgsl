@@ -41,7 +41,7 @@ fn survey(@builtin(local_invocation_index) local: u32,
     var most = vec4f(-WILD);
     for (var i = 0; i < side * side; i++) {
         let px = clamp(corner + vec2i(i % side, i / side), vec2i(0), vec2i(frame.size) - 1);
-        let way = textureLoad(motion, px, 0);
+        let way = clamp(textureLoad(motion, px, 0), vec4f(-WILD), vec4f(WILD));
         least = min(least, way);
         most = max(most, way);
     }
@@ -50,8 +50,9 @@ fn survey(@builtin(local_invocation_index) local: u32,
     let first = max(here + max(vec2i(floor(box.xy / f32(TILE) - margin)), vec2i(-FARTHEST)), vec2i(0));
     let last = min(here + min(vec2i(ceil(box.zw / f32(TILE) + margin)), vec2i(FARTHEST)), tiles - 1);
     let across = last.x - first.x + 1;
-    let u = longest_time(source.offset);    // by the ends of the exposure it may be back
-    let is_still = all(abs(both(between(least, most, u), between(least, most, -u))) < vec4f(0.5 * STILL));
+    // By the ends of the exposure it may be back. Both components together stay under STILL.
+    let u = longest_time(source.offset);
+    let is_still = all(abs(both(between(least, most, u), between(least, most, -u))) < vec4f(0.7 * STILL));
     let count = select(across * (last.y - first.y + 1), 0, is_still);
     for (var i = 0; i < count; i++) {
         atomicStore(&lists[live_at(first + vec2i(i % across, i / across))], 1u);
