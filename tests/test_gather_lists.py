@@ -10,7 +10,7 @@ from wgmb import Shutter, gpu, shader
 
 SIZE = (150, 340)
 ALL_LIVE = "blur/gather_live.wgsl", "var nearest = BESIDE + 1;", "var nearest = 0;"
-SHORT_ROWS = "blur/gather_tile.wgsl", "const IN_A_ROW: u32 = 32768u;", "const IN_A_ROW: u32 = 5u;"
+SHORT_ROWS = "blur/gather_listed.wgsl", "const IN_A_ROW: u32 = 32768u;", "const IN_A_ROW: u32 = 5u;"
 
 
 def ball(number, speed, bend=0.0, start=60):

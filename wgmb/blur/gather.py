@@ -119,7 +119,7 @@ class Gather:
     def _all(self, size) -> dict:
         """A list of all cells, in an order that spreads every stretch of it over the picture."""
         if self._everywhere is None or self._everywhere[0] != size:
-            source = shader.load("blur/gather_tile.wgsl")
+            source = shader.load("blur/gather_listed.wgsl")
             strands, row, wide, side, strip = (
                 int(source.constant(n)) for n in ("STRANDS", "IN_A_ROW", "CELL", "TILE", "STRIP")
             )

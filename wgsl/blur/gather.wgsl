@@ -4,6 +4,7 @@
 //#include common/noise.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
+//#include blur/gather_listed.wgsl
 //#include blur/gather_search.wgsl
 
 @group(1) @binding(3) var plain: texture_2d_array<u32>;     // bits of times, see gather_plain.wgsl

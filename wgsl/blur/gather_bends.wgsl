@@ -1,6 +1,7 @@
 // How colours bend between pixels, for finer interpolation than linear: see resampled() of gather.wgsl.
 //#include common/frame.wgsl
 //#include common/path.wgsl
+//#include blur/gather_listed.wgsl
 //#include blur/gather_tile.wgsl
 
 @group(1) @binding(0) var color: texture_2d<f32>;       // premultiplied by alpha and weight

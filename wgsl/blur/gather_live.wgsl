@@ -3,6 +3,7 @@
 //#include common/frame.wgsl
 //#include common/shutter.wgsl
 //#include blur/gather_moving.wgsl
+//#include blur/gather_listed.wgsl
 //#include blur/gather_tile.wgsl
 
 struct Survey {

@@ -2,6 +2,7 @@
 // frame itself; most times of most pixels are such.
 //#include common/frame.wgsl
 //#include common/shutter.wgsl
+//#include blur/gather_listed.wgsl
 //#include blur/gather_search.wgsl
 
 @group(1) @binding(3) var plain: Plain;     // bits of times, AT_ONCE a layer; a texel a block

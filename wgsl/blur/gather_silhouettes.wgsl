@@ -3,6 +3,7 @@
 //#include common/finite.wgsl
 //#include common/frame.wgsl
 //#include common/path.wgsl
+//#include blur/gather_listed.wgsl
 //#include blur/gather_tile.wgsl
 
 @group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
@@ -22,7 +23,7 @@
 
 struct Mixed {          // pixels that may show two surfaces
     count: atomic<u32>,
-    pixels: array<u32>, // x, y as 16 bits each
+    pixels: array<u32>, // as cells are in a Listed
 }
 
 alias Marks = texture_storage_2d<r32uint, write>;

@@ -1,5 +1,4 @@
 // What a tile of a frame may show over the exposure: the few motions that stand for all in it.
-//#include common/frame.wgsl
 //#include common/path.wgsl
 
 const TILE: u32 = 16u;          // side [px]
@@ -36,50 +35,4 @@ fn depth_in(texel: vec4u) -> f32 {
 
 fn is_calm(texel: vec4u) -> bool {
     return (texel.w & 1u) == 1u;
-}
-
-/// Parts of the picture that a pass is for: cells, tiles side by side. Workgroups are strips of them, the
-/// same one of all cells after the other: so they go along rows, which caches like.
-struct Listed {
-    groups: vec3u,      // of workgroups, to dispatch it indirectly
-    count: u32,
-    cells: array<u32>,  // see listed_as()
-}
-
-const CELL: u32 = 2u;           // tiles
-const STRIP: u32 = 2u;          // height of a strip [px]
-const IN_A_ROW: u32 = 32768u;   // cells; devices take 65,535 workgroups
-// Where in it, in words.
-const COUNT: u32 = 3u;
-const CELLS: u32 = 4u;
-
-fn cells_of(size: vec2u) -> vec2u {
-    return (size + vec2u(CELL * TILE, TILE) - 1u) / vec2u(CELL * TILE, TILE);
-}
-
-fn listed_as(cell: vec2u) -> u32 {
-    return cell.x | cell.y << 16u;
-}
-
-fn cell_in(word: u32) -> vec2u {
-    return vec2u(word & 0xffffu, word >> 16u);
-}
-
-/// Where in the list the cell of a workgroup stands.
-fn place_of(group: vec3u) -> u32 {
-    return group.z * IN_A_ROW + group.x;
-}
-
-/// The pixel of an invocation of a strip: eight at once are blocks of 4 x 2, see spread().
-fn pixel_in(word: u32, group: vec3u, local: u32) -> vec2u {
-    let across = CELL * TILE;
-    let row = local / (2u * across);
-    let off = vec2u(local / 8u * 4u % across + local % 4u, row * 2u + local / 4u % 2u);
-    return cell_in(word) * vec2u(across, TILE) + vec2u(0u, group.y * STRIP) + off;
-}
-
-/// Where in a list, or in parts of its cells, an invocation of a pass over the picture stands: the work is
-/// in the first ones.
-fn place_in_list(local: u32, group: vec3u, groups: vec3u) -> u32 {
-    return (strand(group.y, groups.y) * groups.x + group.x) * WG_X * WG_Y + local;
 }
