@@ -81,9 +81,9 @@ def work(blur, frames, monkeypatch):
         counts[-1]["uploads"] += 1
         return upload(self, name, image, format)
 
-    def ran(self, encoder, entry, given, **own):
+    def ran(self, encoder, entry, *given, **own):
         counts[-1]["splits"] += entry == "split"
-        return run(self, encoder, entry, given, **own)
+        return run(self, encoder, entry, *given, **own)
 
     monkeypatch.setattr(Images, "upload", uploaded)
     monkeypatch.setattr(gpu.Kernel, "run", ran)
@@ -112,9 +112,9 @@ def test_uploaded_views_are_worked_on_every_time(monkeypatch):
     output = Images(blur.device).view("out", SIZE[::-1], "rgba32float")
     run = gpu.Kernel.run
 
-    def ran(self, encoder, entry, given, **own):
+    def ran(self, encoder, entry, *given, **own):
         splits.append(entry == "split")
-        return run(self, encoder, entry, given, **own)
+        return run(self, encoder, entry, *given, **own)
 
     monkeypatch.setattr(gpu.Kernel, "run", ran)
     for _ in range(2):

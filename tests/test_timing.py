@@ -39,8 +39,8 @@ def dispatched(monkeypatch, blur):
     """What really runs: every pass by name, and how often."""
     names, run = [], gpu.Kernel.run
 
-    def noted(kernel, encoder, entry, given, **own):
-        run(kernel, encoder, entry, given, **own)
+    def noted(kernel, encoder, entry, *given, **own):
+        run(kernel, encoder, entry, *given, **own)
         names.append(f"{kernel.source.name}:{entry}")
 
     with monkeypatch.context() as patch:
