@@ -155,7 +155,7 @@ class Gather:
         )
         across, down = self._grid(inputs.given.size)
         blocks = -(-across // wide) * wide * side // block, down * side // block
-        words = self._images.texture("plain", blocks, "r32uint", -(-inputs.samples // times))
+        words = self._images.texture("plain", blocks, "r32uint", -(-inputs.samples // times) + 1)
         bits = words.create_view(dimension="2d-array")
         given = replace(inputs.given, size=blocks)
         plain.run(encoder, "main", given, plain=bits, moving=lists["moving"], **searched)

@@ -59,7 +59,11 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let times = times_of(x, frame.jitter * (pixel_noise(id) - 0.5), reach0, reach1, reach2);
     let share = 1.0 / f32(times.count);     // before adding, so that no sum of finite colours overflows
 
-    let still = is_still(reach0, reach1, reach2);
+    // Nothing moves, nor does anything come here.
+    let longest = max(abs(shown(0.0).x), abs(shown(0.0).y));
+    let rests = all((abs(path.velocity) + abs(path.curvature) * longest) * longest < vec2f(STILL));
+    let all_plain = textureLoad(plain, id / BLOCK, (frame.samples - 1u) / AT_ONCE + 1u, 0).x == 1u;
+    let still = is_still(reach0, reach1, reach2) || (rests && all_plain);
     let samples = select(times.count, 0u, still);
 
     var sum = Shown();

@@ -5,7 +5,7 @@
 //#include blur/gather_listed.wgsl
 //#include blur/gather_search.wgsl
 
-@group(1) @binding(3) var plain: Plain;     // bits of times, AT_ONCE a layer; a texel a block
+@group(1) @binding(3) var plain: Plain;     // bits of times, AT_ONCE a layer, then whether all are set; a texel a block
 @group(1) @binding(4) var<storage, read> moving: Listed;    // cells, see gather_live.wgsl
 
 alias Plain = texture_storage_2d_array<r32uint, write>;
@@ -31,6 +31,7 @@ fn main(@builtin(local_invocation_index) local: u32,
     // Jittered pixels have times of their own.
     let count = select(times.count, 0u, frame.jitter > 0.0 || is_still(reach0, reach1, reach2));
     var bits = 0u;
+    var all_plain = true;
     var i = 0u;
     loop {
         let t = shutter_time(times, min(i, times.count - 1u));
@@ -70,6 +71,7 @@ fn main(@builtin(local_invocation_index) local: u32,
             if !again { break; }
         }
         bits |= u32(is_plain) << (i % AT_ONCE);
+        all_plain = all_plain && (is_plain || i >= times.count);
         i++;
         if i % AT_ONCE == 0u || i >= frame.samples {
             textureStore(plain, id, (i - 1u) / AT_ONCE, vec4u(bits));
@@ -77,6 +79,7 @@ fn main(@builtin(local_invocation_index) local: u32,
         }
         if i >= frame.samples { break; }
     }
+    textureStore(plain, id, (frame.samples - 1u) / AT_ONCE + 1u, vec4u(u32(all_plain)));
 }
 
 /// Whether a search from `start` goes where another one went, `first`, not by way of a silhouette; or
