@@ -118,6 +118,18 @@ def write_sequence(
     return str(folder / "shot.####.exr")
 
 
+def write_depth_sequence(
+    folder: Path, numbers=(1, 2, 3), depth: float = 10.0, index: np.ndarray | None = None, **options
+) -> Path:
+    """Frames c.0001.exr, ... with depth and without vectors; the pattern that stands for them."""
+    for n in numbers:
+        channels = frame(n, None) | {"Z": np.full((HEIGHT, WIDTH), depth, "f4")}
+        if index is not None:
+            channels["IndexOB.X"] = index.astype("f4")
+        write_exr(folder / f"c.{n:04d}.exr", channels, **options)
+    return folder / "c.####.exr"
+
+
 def plain_read(path: Path) -> dict[str, np.ndarray]:
     """Every channel of a one-part EXR file, read without wgmb."""
     with OpenEXR.File(str(path), separate_channels=True) as file:

@@ -1,14 +1,12 @@
 """Sequences: which frames are read, which are done again, what is written, and that only."""
 
-import os
-
 import numpy as np
 import pytest
 from PIL import Image
 
 import make_frames as make
 from wgmb import Blur, Frame, InputError, sequence
-from wgmb.output import Output, temporary_name
+from wgmb.output import Output
 from wgmb.sequence import Clip, Passes
 from wgmb.vectors import Vectors
 
@@ -21,12 +19,6 @@ def shot(tmp_path_factory):
 
 def contents(folder) -> dict[str, bytes]:
     return {p.name: p.read_bytes() for p in folder.iterdir()}
-
-
-def newer(path) -> None:
-    """Make a file a minute younger than it is, and what is written now still younger."""
-    later = path.stat().st_mtime + 60
-    os.utime(path, (later, later))
 
 
 # ---- names ----------------------------------------------------------------------------------
@@ -221,15 +213,6 @@ def test_a_missing_layer_is_refused_with_the_files_name_once(shot, passes):
 # ---- cameras --------------------------------------------------------------------------------
 
 
-def camera_shot(folder, numbers=(1, 2, 3), depth=10.0, index=None, **options):
-    for n in numbers:
-        channels = make.frame(n, None) | {"Z": np.full((48, 64), depth, "f4")}
-        if index is not None:
-            channels["IndexOB.X"] = index.astype("f4")
-        make.write_exr(folder / f"c.{n:04d}.exr", channels, **options)
-    return folder / "c.####.exr"
-
-
 def camera_motion(pattern, camera, number=2, **more):
     clip = Clip(pattern, frames=str(number), passes=Passes(camera=camera, **more))
     (frame,) = clip
@@ -243,7 +226,7 @@ def per_unit(depth: float) -> float:
 
 @pytest.mark.parametrize("number", [2, 5])
 def test_a_camera_that_goes_right_moves_the_picture_left(tmp_path, number):
-    pattern = camera_shot(tmp_path, (number,))
+    pattern = make.write_depth_sequence(tmp_path, (number,))
     camera = make.write_cameras(tmp_path / "cam.json", range(1, 8), step=0.5)
     motion = camera_motion(pattern, camera, number)
     want = 0.5 * per_unit(10) * np.array([1, 0, -1, 0])
@@ -252,7 +235,7 @@ def test_a_camera_that_goes_right_moves_the_picture_left(tmp_path, number):
 
 def test_inverse_depth_says_the_same(tmp_path):
     camera = make.write_cameras(tmp_path / "cam.json", range(1, 4))
-    pattern = camera_shot(tmp_path, depth=0.25)
+    pattern = make.write_depth_sequence(tmp_path, depth=0.25)
     motion = camera_motion(pattern, camera, depth_kind="inverse")
     np.testing.assert_allclose(motion[..., 2], -0.5 * per_unit(4), atol=2e-3)
 
@@ -270,7 +253,7 @@ def test_the_cameras_picture_is_the_display_window(tmp_path):
                                 camera_matrix_world=lambda n: frames[n],
                                 projection=lambda n: make.projection(128, 96).tolist())  # fmt: skip
     data, display = (40, -10, 103, 37), (-5, -20, 122, 75)  # 128 x 96 shown
-    pattern = camera_shot(tmp_path, data=data, display=display)
+    pattern = make.write_depth_sequence(tmp_path, data=data, display=display)
     motion = camera_motion(pattern, camera)
     y, x = np.mgrid[:48, :64] + 0.5
     from_centre = np.stack([x + 40 + 5 - 64, y - 10 + 20 - 48], 2)
@@ -289,14 +272,14 @@ def test_objects_are_told_apart_by_their_index(tmp_path):
         return {"a": {"index": 3, "matrix_world": world.tolist()}}
 
     camera = make.write_cameras(tmp_path / "cam.json", (1, 2, 3), step=0.0, objects=body)
-    motion = camera_motion(camera_shot(tmp_path, index=index), camera)
+    motion = camera_motion(make.write_depth_sequence(tmp_path, index=index), camera)
     np.testing.assert_allclose(motion[:, :32], 0, atol=1e-3)
     np.testing.assert_allclose(motion[:, 32:, 2], 0.25 * per_unit(10), atol=2e-3)
 
 
 def test_the_first_and_last_frame_use_the_neighbour_that_there_is(tmp_path):
     camera = make.write_cameras(tmp_path / "cam.json", (1, 2, 3))
-    pattern = camera_shot(tmp_path)
+    pattern = make.write_depth_sequence(tmp_path)
     whole = camera_motion(pattern, camera, 2)
     for n in (1, 3):
         np.testing.assert_allclose(camera_motion(pattern, camera, n), whole, atol=2e-3)
@@ -306,7 +289,7 @@ def test_the_first_and_last_frame_use_the_neighbour_that_there_is(tmp_path):
 def test_a_frame_that_the_camera_file_cannot_serve_is_refused_by_its_name(tmp_path, numbers):
     camera = make.write_cameras(tmp_path / "cam.json", numbers)
     with pytest.raises(InputError, match=r"cam\.json"):
-        camera_motion(camera_shot(tmp_path), camera)
+        camera_motion(make.write_depth_sequence(tmp_path), camera)
 
 
 def test_a_camera_without_depth_is_refused_with_a_list_of_layers(tmp_path):
@@ -352,85 +335,6 @@ def test_what_exists_is_not_overwritten_unless_told(tmp_path, capsys, shot):
     assert contents(tmp_path) == {"b.0003.exr": b"precious"}
     assert run(capsys, shot, tmp_path, "--overwrite")[0] == 0
     assert kept.read_bytes() != b"precious"
-
-
-def test_resume_redoes_what_is_gone_or_damaged_and_nothing_else(tmp_path, capsys, shot):
-    run(capsys, shot, tmp_path)
-    whole = contents(tmp_path)
-    times = {p.name: p.stat().st_mtime_ns for p in tmp_path.iterdir()}
-    (tmp_path / "b.0002.exr").unlink()
-    (tmp_path / "b.0004.exr").write_bytes(b"rubbish")
-    (tmp_path / "b.0005.exr").write_bytes(whole["b.0005.exr"][:200])
-    temporary_name(tmp_path / "b.0006.exr").write_bytes(b"left over from a crash")
-    code, _, err = run(capsys, shot, tmp_path, "--resume")
-    assert code == 0
-    assert "3 frames" in err
-    assert "3 were there" in err
-    assert contents(tmp_path) == whole
-    for name in ("b.0001.exr", "b.0003.exr", "b.0006.exr"):
-        assert (tmp_path / name).stat().st_mtime_ns == times[name]
-
-
-@pytest.mark.parametrize("suffix", ["exr", "png", "tif", "jpg"])
-def test_resume_redoes_frames_of_other_settings(tmp_path, capsys, shot, suffix):
-    frames = ("--frames", "1-3")
-    run(capsys, shot, tmp_path / "want", *frames, "--shutter", 90, suffix=suffix)
-    run(capsys, shot, tmp_path / "got", *frames, suffix=suffix)
-    code, _, err = run(
-        capsys, shot, tmp_path / "got", *frames, "--shutter", 90, "--resume", suffix=suffix
-    )
-    assert code == 0
-    assert err.startswith("3 frames")
-    assert contents(tmp_path / "got") == contents(tmp_path / "want")
-    _, _, err = run(
-        capsys, shot, tmp_path / "got", *frames, "--shutter", 90, "--resume", suffix=suffix
-    )
-    assert err.startswith("0 frames")
-
-
-def test_resume_redoes_stills_of_other_bits(tmp_path, capsys, shot):
-    run(capsys, shot, tmp_path, "--frames", "1", suffix="png")
-    run(capsys, shot, tmp_path, "--frames", "1", "--bits", 16, "--resume", suffix="png")
-    assert (tmp_path / "b.0001.png").read_bytes()[24] == 16
-
-
-def test_resume_redoes_frames_whose_input_is_newer(tmp_path, capsys):
-    pattern = make.write_sequence(tmp_path, (1, 2, 3))
-    run(capsys, pattern, tmp_path / "out")
-    newer(tmp_path / "shot.0002.exr")
-    _, _, err = run(capsys, pattern, tmp_path / "out", "--resume")
-    assert "1 frames" in err
-
-
-@pytest.mark.parametrize("option", ["--also", "--camera", "--keep", "--scale"])
-def test_resume_redoes_frames_whose_other_files_are_newer(tmp_path, capsys, option):
-    pattern = camera_shot(tmp_path, (1, 2))
-    camera = make.write_cameras(tmp_path / "cam.json", (1, 2, 3))
-    Image.new("L", (64, 48), 255).save(tmp_path / "m.png")
-    also = make.write_exr(tmp_path / "also.exr", {"extra.X": np.ones((48, 64), "f4")})
-    given = {"--camera": camera, "--also": also}.get(option, tmp_path / "m.png")
-    options = [option, given] + ([] if option == "--camera" else ["--camera", camera])
-    assert run(capsys, pattern, tmp_path / "out", *options)[0] == 0
-    newer(given)
-    _, _, err = run(capsys, pattern, tmp_path / "out", *options, "--resume")
-    assert "2 frames" in err
-
-
-def test_resume_gives_what_an_unbroken_run_gives_even_where_the_first_frame_says_nothing(
-    tmp_path, capsys
-):
-    """Frames 1 and 2 stand still, so their vectors cannot be tested; later ones are wrong."""
-    for n in range(1, 6):
-        channels = make.frame(n, "nuke", (0.0, 0.0) if n < 3 else make.VELOCITY)
-        for name in ("forward.v", "backward.v"):
-            channels[name] = -channels[name]
-        make.write_exr(tmp_path / f"s.{n:04d}.exr", channels)
-    pattern, out = tmp_path / "s.####.exr", tmp_path / "out"
-    run(capsys, pattern, out)
-    whole = contents(out)
-    (out / "b.0004.exr").unlink()
-    run(capsys, pattern, out, "--resume")
-    assert contents(out) == whole
 
 
 def test_the_same_run_twice_gives_the_same_bytes(tmp_path, capsys, shot):

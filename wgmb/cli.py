@@ -92,6 +92,7 @@ def blur(
     look = look.settled(clip=clip)
     made = look.make(when.make(), adapter)
     settings = _settings(look, when, given) | {"samples": _samples(made), "bits": output.bits}
+    settings["curve"] = when.curve_read()
     if confidence:
         _check_confidence(made, output)
         settings["confidence"] = True
@@ -101,6 +102,7 @@ def blur(
         numbers=clip.numbers,
         bits=output.bits,
         fps=output.rate,
+        inputs=clip.inputs,
         overwrite=output.overwrite,
         resume=output.resume,
     )
@@ -142,6 +144,9 @@ def _conclude(say, clip, files, report: Report, took: str, quiet: bool, verbose:
 
     for number, why in sorted(report.failed.items()):
         line(f"wgmb: frame {number} failed: {why}")
+    if report.stopped:
+        rest = len(clip.numbers) - len(report.done) - len(report.skipped) - len(report.failed)
+        line(f"wgmb: stopped: {report.stopped}; {rest} other frames were not written")
     if not quiet:
         for number, bad in sorted(report.bad.items()):
             what = ", ".join(f"{n} in {name}" for name, n in bad.items())
@@ -154,8 +159,7 @@ def _conclude(say, clip, files, report: Report, took: str, quiet: bool, verbose:
         line(done + (f", {len(report.skipped)} were there" if report.skipped else ""))
     if report.failed:
         line(f"wgmb: {len(report.failed)} of {len(clip.numbers)} frames failed")
-        return SOME_FAILED
-    return DONE
+    return SOME_FAILED if report.failed or report.stopped else DONE
 
 
 @app.command
@@ -214,7 +218,7 @@ def render(
     renderer = Render(picture, made, size=size_of(what.size), fps=fps, rays=what.rays)
     settings = {"scene": scene, "sharp": sharp, "passes": passes, "bits": output.bits}
     settings |= plain(look) | plain(when) | plain(what) | {"wgmb": __version__, "fps": fps}
-    settings["samples"] = _samples(made)
+    settings["samples"], settings["curve"] = _samples(made), when.curve_read()
     if confidence:
         _check_confidence(made, output)
         settings["confidence"] = True

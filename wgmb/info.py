@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from . import layers, stills
+from .atomic import write_file
 from .display import motion_picture
 from .errors import InputError
 from .numbering import frame_range
-from .output import replace_file
+from .output import refuse_inputs
 from .pipeline import Blur
 from .sequence import Clip
 from .source import Source
@@ -22,6 +23,8 @@ def describe(clip: Clip, output: Path | None = None) -> list[tuple[str, str]]:
     """Name and text of every line about the clip's first frame; `output`: draw its motion."""
     if output is not None and output.suffix.lower() not in stills.SUFFIXES:
         raise InputError(f"output {output}: a picture, {', '.join(stills.SUFFIXES)}")
+    if output is not None:
+        refuse_inputs(output.parent, [output.name], [output], clip.inputs)
     source = clip.source(clip.numbers[0])
     lines = [("file", str(source.path))]
     if len(clip.numbers) > 1:
@@ -68,6 +71,6 @@ def _about_motion(clip: Clip, source: Source, output: Path | None) -> list[tuple
     if output is not None:
         full = max(float(nearly), 1.0)
         picture = motion_picture(motion, full)
-        replace_file(output, stills.encode(picture, output.suffix, 8, "motion"))
+        write_file(output, stills.encode(picture, output.suffix, 8, "motion"))
         lines.append(("motion", f"{output} (full brightness: {full:.1f} px per frame)"))
     return lines

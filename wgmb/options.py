@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -56,6 +57,12 @@ class ShutterOptions:
             shutter=degrees if self.shutter is None else self.shutter,
             curve=curve if self.curve is None else self.curve,
         )
+
+    def curve_read(self) -> str | None:
+        """The curve's name; of a file also its checksum, as a file may change."""
+        if self.curve is None or self.curve in shutter.CURVES:
+            return self.curve
+        return f"{self.curve} (CRC-32 {zlib.crc32(Path(self.curve).read_bytes()):08x})"
 
     def make(self) -> shutter.Shutter:
         """The Shutter these options describe, once they are settled."""

@@ -267,7 +267,7 @@ def render_frames(
     """
     tell, skipped = progress or (lambda number, what: None), 0
     for number, time in moments.items():
-        if resume and output.done(number, []):
+        if resume and output.done(number):
             skipped += 1
             tell(number, "skipped")
             continue

@@ -11,6 +11,8 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from .errors import Error, InputError
 from .frame import Frame
 from .output import Output
@@ -26,10 +28,23 @@ class Report:
     done: list[int] = field(default_factory=list)
     skipped: list[int] = field(default_factory=list)  # already there (resume)
     failed: dict[int, str] = field(default_factory=dict)
+    stopped: str = ""  # why the rest was not tried, or there is no video
     bad: dict[int, dict[str, int]] = field(default_factory=dict)  # pixels not finite, by input
 
 
+@dataclass
+class _Job:
+    """One frame on its way through the three threads."""
+
+    source: Source
+    frame: Frame
+    made_of: dict
+    result: np.ndarray = field(init=False)
+    told: dict[str, np.ndarray] = field(default_factory=dict)
+
+
 IN_FLIGHT = 3  # frames: one being read, one on the GPU, one being written
+HOPELESS = 3  # frames one after the other that cannot be written for the same reason
 
 Progress = Callable[[int, str], None]
 """Called with a frame's number and "done", "skipped" or "failed"."""
@@ -68,10 +83,12 @@ def blur_sequence(
     """Blur every frame of `clip` into `output`; with `confidence`, as layers beside the picture.
 
     Frames that cannot be read, blurred or written are in the report's `failed`, with the
-    reason; the others are done. Interrupted, nothing half written is left and the
-    interruption goes on.
+    reason; the others are done. Where frame after frame cannot be written for the same reason (a
+    full disk, a folder that is gone), or a video cannot go on, the run stops and `stopped`
+    says why. Interrupted, nothing half written is left and the interruption goes on.
     """
     report, stop, tell = Report(), threading.Event(), progress or (lambda number, what: None)
+    hopeless = threading.Event()
     to_blur, to_write = _Handover(stop), _Handover(stop)
     neighbours = "neighbours" in blur.method.uses
     prepare = clip.with_neighbours if neighbours else clip.frame
@@ -88,15 +105,22 @@ def blur_sequence(
 
     def read() -> None:
         for number in clip.numbers:
-            if resume and output.done(number, clip.files(number)):
-                report.skipped.append(number)
-                tell(number, "skipped")
-                continue
+            if hopeless.is_set():
+                break
             places.get()
             try:
+                made_of = clip.made_of(number, neighbours)
+                if resume and output.done(number, made_of):
+                    places.put(None)
+                    report.skipped.append(number)
+                    tell(number, "skipped")
+                    continue
                 source = clip.source(number)
-                to_blur.put((source, prepare(source, normal=normal)))
-                del source
+                frame = prepare(source, normal=normal)
+                if unread := sorted({number - 1, number + 1} & clip.unread):
+                    made_of["unread"] = unread  # so that --resume asks for them again
+                to_blur.put(_Job(source, frame, made_of))
+                del source, frame
             except (Error, OSError, MemoryError) as error:
                 fail(number, error)
             finally:
@@ -104,17 +128,27 @@ def blur_sequence(
         to_blur.put(None)
 
     def write() -> None:
-        while (item := to_write.get()) is not None:
-            source, result, told = item
-            try:
-                output.write(result, source, told)
-            except (Error, OSError, MemoryError, RuntimeError) as error:
-                fail(source.number, error)
-            else:
+        reasons: list[str] = []
+        while (job := to_write.get()) is not None:
+            if hopeless.is_set():
                 places.put(None)
-                report.done.append(source.number)
-                tell(source.number, "done")
-            del item, source, result, told
+                continue
+            try:
+                output.write(job.result, job.source, job.told, job.made_of)
+            except (Error, OSError, MemoryError, RuntimeError) as error:
+                fail(job.source.number, error)
+                reasons.append(output.why_hopeless(error))
+                if reasons[-1] and (
+                    output.is_video or reasons[-HOPELESS:] == HOPELESS * reasons[-1:]
+                ):
+                    report.stopped = reasons[-1]
+                    hopeless.set()
+            else:
+                reasons.clear()
+                places.put(None)
+                report.done.append(job.source.number)
+                tell(job.source.number, "done")
+            del job
 
     def guarded(work: Callable[[], None]) -> None:
         try:
@@ -132,10 +166,9 @@ def blur_sequence(
     for thread in threads:
         thread.start()
     try:
-        while (item := to_blur.get()) is not None:
-            source, frame = item
-            _blur_one(blur, source, frame, confidence, report, to_write, fail)
-            del item, source, frame
+        while (job := to_blur.get()) is not None:
+            _blur_one(blur, job, confidence, report, to_write, fail)
+            del job
         to_write.put(None)
         for thread in threads:
             while thread.is_alive():  # a join without limit would hold back Ctrl-C
@@ -144,6 +177,7 @@ def blur_sequence(
         pass
     finally:
         broken = any(thread.is_alive() for thread in threads) or crash or not report.done
+        broken = broken or (output.is_video and report.stopped)
         stop.set()
         for thread in threads:
             thread.join(0.5)
@@ -154,25 +188,22 @@ def blur_sequence(
     if not broken:
         try:
             output.close()
-        except OSError as error:  # a video that cannot be finished is not there at all
-            for number in report.done:
-                fail(number, error)
-            report.done.clear()
+        except OSError as error:
+            report.stopped = str(error)
+    if output.is_video and report.stopped:  # it is not there at all
+        report.done.clear()
     return report
 
 
-def _blur_one(
-    blur: Blur, source: Source, frame: Frame, confidence: bool, report: Report, to_write, fail
-) -> None:
-    told = {}
+def _blur_one(blur: Blur, job: _Job, confidence: bool, report: Report, to_write, fail) -> None:
     try:
         if confidence:
-            result, told = blur.with_confidence(frame)
+            job.result, job.told = blur.with_confidence(job.frame)
         else:
-            result = blur(frame)
+            job.result = blur(job.frame)
     except InputError as error:
-        fail(source.number, InputError(f"{source.path}: {error}"))
+        fail(job.source.number, InputError(f"{job.source.path}: {error}"))
         return
-    if frame.bad:
-        report.bad[source.number] = frame.bad
-    to_write.put((source, result, told))
+    if job.frame.bad:
+        report.bad[job.source.number] = job.frame.bad
+    to_write.put(job)

@@ -14,6 +14,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 from . import __version__, plot, scenes
+from .atomic import write_file
 from .errors import InputError
 from .numbering import frame_numbers
 from .options import (
@@ -25,7 +26,7 @@ from .options import (
     settings_of,
     size_of,
 )
-from .output import Output, replace_file
+from .output import Output
 from .perceive import VIDEOS, Viewer, best_shutter, compare
 from .pipeline import Blur
 from .render import Render
@@ -80,10 +81,12 @@ def perceive(
         raise InputError("--resume cannot be: every perceived frame depends on those before it")
     if pattern in scenes.SCENES:
         numbers, pictures, rate = _nature(pattern, given, who, float(output.rate), adapter)
+        inputs = ()
     else:
         clip = given.open(pattern)
         numbers, rate = clip.numbers, float(output.rate)
         pictures = ((n, clip.source(n), [clip.source(n).rgba]) for n in numbers)
+        inputs = clip.inputs
     viewer = Viewer(rate, who.cone, device=adapter)
     files = Output(
         output.output,
@@ -91,6 +94,7 @@ def perceive(
         numbers=numbers,
         bits=output.bits,
         fps=output.rate,
+        inputs=inputs,
         overwrite=output.overwrite,
     )
     say = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -147,7 +151,7 @@ def _report(output: OutputOptions, who: PerceptionOptions, speed: float | None, 
     best = best_shutter(speed, fps, who.cone) if speed is not None else None
     speeds = np.linspace(fps / 12, fps * 5 / 3, 20)
     found = compare(fps, speeds, who.cone)
-    replace_file(path, plot.svg(*plot.perception_charts(found, speeds, fps)).encode())
+    write_file(path, plot.svg(*plot.perception_charts(found, speeds, fps)).encode())
     if not quiet:
         sys.stdout.write("rad/s    " + "".join(f"{name:>11}" for name in found) + "\n")
         for i in range(3, len(speeds), 4):
@@ -190,7 +194,7 @@ def shutter(
     if when.shutter is None:
         when = replace(when, shutter=OVERLAPS.get(when.curve or "box", 360.0))
     made, name = when.settled().make(), when.curve or "box"
-    replace_file(output, plot.svg(*plot.shutter_charts(made, Path(name).name)).encode())
+    write_file(output, plot.svg(*plot.shutter_charts(made, Path(name).name)).encode())
     total = made.overlap(np.linspace(0, 1, 2001))
     low, high = round(float(total.min()), 3), round(float(total.max()), 3)
     even = high - low < 0.01

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -65,8 +66,9 @@ class Passes:
 class Clip:
     """A frame sequence, or one picture, being read.
 
-    Iterating gives Frames. `finding` says what the vectors were found to mean; `cuts` has the
-    frames read so far that come after a camera cut.
+    Iterating gives Frames. `numbers` are the frames asked for, `on_disk` all that there are.
+    `finding` says what the vectors were found to mean; `cuts` has the frames read so far that
+    come after a camera cut, `unread` the neighbours that could not be read.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class Clip:
         self.numbers = self._numbers(frames, skip_missing)
         self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
         self.cuts: set[int] = set()
+        self.unread: set[int] = set()
         self._kept: OrderedDict[int, Source] = OrderedDict()
         self._ready: OrderedDict[int, tuple[Source, bool, Frame]] = OrderedDict()
         self._found: vectors.Finding | None = None
@@ -95,8 +98,9 @@ class Clip:
                 raise InputError(f"{path}: no such file")
             if frames is not None:
                 raise InputError(f"--frames needs a pattern such as shot.####.exr, got {path.name}")
-            return [number_in(path)]
-        there = numbers_on_disk(self.pattern)
+            self.on_disk = [number_in(path)]
+            return self.on_disk
+        self.on_disk = there = numbers_on_disk(self.pattern)
         wanted = frame_numbers(frames) if frames else list(range(there[0], there[-1] + 1))
         missing = sorted(set(wanted) - set(there))
         if missing and not skip_missing:
@@ -114,8 +118,11 @@ class Clip:
 
     @property
     def has(self) -> frozenset[str]:
-        """What the first frame that can be read has for methods (see Frame.has)."""
-        for number in self.numbers:
+        """What the first frame that can be read has for methods (see Frame.has).
+
+        Of all frames on disk, so that it does not depend on which of them are asked for.
+        """
+        for number in self.on_disk:
             with contextlib.suppress(InputError, OSError):  # its turn to fail comes
                 return self.frame(self.source(number), picture=False, normal=False).has
         return frozenset()
@@ -127,6 +134,29 @@ class Clip:
         patterns = (self.pattern, *passes.also, *masks)
         camera = [passes.camera] if passes.camera else []
         return [*(frame_path(p, number) for p in patterns), *camera]
+
+    @property
+    def inputs(self) -> Iterator[Path]:
+        """Every file that may be read, whichever frames are asked for."""
+        for number in self.on_disk:
+            yield from self.files(number)
+
+    def made_of(self, number: int, neighbours: bool) -> dict:
+        """What the result of frame `number` depends on beside the settings, as JSON has it.
+
+        Name, size [bytes] and time of change [ns] of every file, those of the frames before and
+        after too if the method uses `neighbours`; and what the vectors were found to mean.
+        """
+        around = [number]
+        if neighbours and is_pattern(self.pattern):
+            near = (number - 1, number + 1)
+            around += [n for n in near if frame_path(self.pattern, n).is_file()]
+        files = dict.fromkeys(path for n in around for path in self.files(n))
+        meaning = self._decide().vectors
+        return {
+            "files": [[path.name, *_size_and_time(path)] for path in files],
+            "vectors_mean": str(meaning) if meaning else None,
+        }
 
     def source(self, number: int) -> Source:
         """Frame `number` as stored; the last three are kept for their neighbours."""
@@ -150,14 +180,15 @@ class Clip:
     def _decide(self) -> vectors.Finding:
         """Settle, once for all frames, what the vectors mean.
 
-        By name, and tested on the clip's first frame, or its middle or last one where nothing
-        moves; so every run over the same frames settles it alike.
+        By name, and tested on the first frame on disk, or the middle or last one where nothing
+        moves; so every run settles it alike, whichever frames it is asked for.
         """
         if self._found is None:
             wanted = self.passes.vectors
             self._found = vectors.Finding(None, False, "none asked for")
             if wanted.convention != "none":
-                tested = dict.fromkeys(self.numbers[i] for i in (0, len(self.numbers) // 2, -1))
+                there = self.on_disk
+                tested = dict.fromkeys(there[i] for i in (0, len(there) // 2, -1))
                 for number in tested:
                     with contextlib.suppress(InputError, OSError):  # its turn to fail comes
                         self._found = self._test(number, wanted)
@@ -200,10 +231,12 @@ class Clip:
         for side, number in (("prev", source.number - 1), ("next", source.number + 1)):
             path = frame_path(self.pattern, number)
             if is_pattern(self.pattern) and path.is_file():
-                with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                try:
                     other = self.source(number)
                     if other.size == source.size:
                         near[side] = self._locked(other, normal)
+                except (InputError, OSError):  # its turn to fail comes
+                    self.unread.add(number)
         frame = self._locked(source, normal)
         for side in list(near):
             if is_cut(frame, near[side], -1 if side == "prev" else 1):
@@ -310,6 +343,15 @@ class Clip:
                 f"{file} must be {size_text(source.size)} like the picture, is {size_text(plane)}"
             )
         return plane
+
+
+def _size_and_time(path: Path) -> tuple[int, int]:
+    """Of a file; -1 where there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return -1, -1
+    return found.st_size, found.st_mtime_ns
 
 
 def _is_file(mask: str, number: int) -> bool:

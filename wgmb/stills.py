@@ -21,9 +21,9 @@ from av.container import InputContainer
 from PIL import Image
 
 from .errors import InputError
+from .record import KEY
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
-KEYWORD = "wgmb"  # of the text that holds the settings
 _MOST_PIXELS = 1 << 28
 _AFTER_HEADER = 33  # bytes of a PNG's signature and IHDR
 
@@ -119,8 +119,8 @@ def _to_linear(samples: np.ndarray) -> np.ndarray:
     return np.concatenate([light * alpha, alpha], axis=2)
 
 
-def encode(rgba: np.ndarray, suffix: str, bits: int, settings: str) -> bytes:
-    """The bytes of a still of (height, width, 3 or 4) linear light, `settings` within."""
+def encode(rgba: np.ndarray, suffix: str, bits: int, text: str) -> bytes:
+    """The bytes of a still of (height, width, 3 or 4) linear light, with the record's text."""
     suffix = suffix.lower()
     if suffix in (".jpg", ".jpeg"):
         samples = to_display(rgba[..., :3], 8)
@@ -130,11 +130,11 @@ def encode(rgba: np.ndarray, suffix: str, bits: int, settings: str) -> bytes:
             extension=".jpg",
             quality=95,
             subsampling=0,
-            comment=settings.encode(),
+            comment=text.encode(),
         )
     samples = to_display(rgba, bits)
     if suffix == ".png":
-        return _with_text(_png(samples), settings)
+        return _with_text(_png(samples), text)
     stream = io.BytesIO()
     extra = ["unassalpha"] if samples.shape[2] == 4 else None
     tifffile.imwrite(
@@ -143,26 +143,10 @@ def encode(rgba: np.ndarray, suffix: str, bits: int, settings: str) -> bytes:
         photometric="rgb",
         extrasamples=extra,
         compression="zlib",
-        description=f"{KEYWORD} {settings}",
+        description=f"{KEY} {text}",
         metadata=None,
     )
     return stream.getvalue()
-
-
-def settings_of(path: Path) -> str | None:
-    """The settings that `encode` put into a still; None if there are none."""
-    try:
-        data = path.read_bytes()
-        if path.suffix.lower() == ".png":
-            return _text_of(data)
-        if path.suffix.lower() in (".tif", ".tiff"):
-            with tifffile.TiffFile(io.BytesIO(data)) as file:
-                found = str(file.pages.first.description)
-            return found.removeprefix(f"{KEYWORD} ") if found.startswith(KEYWORD) else None
-        with Image.open(io.BytesIO(data), formats=["JPEG"]) as image:
-            return image.info.get("comment", b"").decode()
-    except Exception:  # a damaged file holds no settings
-        return None
 
 
 def _png(samples: np.ndarray) -> bytes:
@@ -184,20 +168,9 @@ def _png(samples: np.ndarray) -> bytes:
 
 def _with_text(png: bytes, text: str) -> bytes:
     """The PNG with a tEXt chunk after its header (PNG specification, 11.3.3)."""
-    body = b"tEXt" + KEYWORD.encode() + b"\0" + text.encode("latin-1", "replace")
+    body = b"tEXt" + KEY.encode() + b"\0" + text.encode("latin-1", "replace")
     chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
     return png[:_AFTER_HEADER] + chunk + png[_AFTER_HEADER:]
-
-
-def _text_of(png: bytes) -> str | None:
-    at = _AFTER_HEADER
-    while at + 8 <= len(png):
-        length, kind = struct.unpack(">I4s", png[at : at + 8])
-        body = png[at + 8 : at + 8 + length]
-        if kind == b"tEXt" and body.startswith(KEYWORD.encode() + b"\0"):
-            return body[len(KEYWORD) + 1 :].decode("latin-1")
-        at += 12 + length
-    return None
 
 
 # ---- light and display values ---------------------------------------------------------------

@@ -13,8 +13,9 @@ import numpy as np
 from imgui_bundle import imgui
 
 from .. import exr, stills
+from ..atomic import temporary_name, write_file
 from ..errors import Error, InputError
-from ..output import SETTINGS, replace_file, temporary_name
+from ..record import KEY
 from ..video import Video
 from .screen import Screen
 from .stage import Stage
@@ -56,7 +57,7 @@ class Actions:
             return state
 
     def _save(self, path: Path, state: State) -> None:
-        replace_file(path, state.toml().encode())
+        write_file(path, state.toml().encode())
         self._say(f"saved {path}")
 
     def _load(self, path: Path) -> State:
@@ -70,12 +71,12 @@ class Actions:
 
     def _screenshot(self, state: State) -> None:
         path, settings = _free(".png", ".exr"), state.toml()
-        replace_file(path, stills.encode(self._shown(), ".png", 8, settings))
+        write_file(path, stills.encode(self._shown(), ".png", 8, settings))
         linear = self._stage.download()
         rgba = np.ones((*linear.shape[:2], 4), np.float32)
         rgba[..., : linear.shape[2]] = linear
         whole = path.with_suffix(".exr")
-        replace_file(whole, exr.encode(exr.new(rgba, {SETTINGS: settings})))
+        write_file(whole, exr.encode(exr.new(rgba, {KEY: settings})))
         self._say(f"saved {path.name} and {whole.name}")
 
     def _record(self, state: State) -> None:

@@ -1,0 +1,129 @@
+"""Files that are whole under their names, or not there.
+
+A file is written beside its name under a temporary one, which tells the host and the process
+that write it, and is then renamed. Several processes, on several hosts, may therefore write
+into one folder: whoever opens a finished name reads a whole file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import secrets
+import socket
+from collections.abc import Collection
+from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # Windows, where a file that is open cannot be removed
+    fcntl = None
+
+_MOST_OF_A_NAME = 190  # bytes of it in the temporary one: file systems take 255 in all
+_HOST = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())[:32] or "host"
+_TEMPORARY = re.compile(r"\.(?P<name>.+)\.(?P<host>\w+)-(?P<process>\d+)-[0-9a-f]{8}\.part", re.S)
+
+
+def write_file(path: Path, data: bytes, temporary: Path | None = None) -> None:
+    """Put `data` at `path`: all of it under a temporary name, then renamed.
+
+    Raises OSError, whose text names `path`, and then nothing has changed.
+    """
+    temporary = temporary or temporary_name(path)
+    try:
+        with os.fdopen(create(temporary), "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        rename(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise about(path, error) from None
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def temporary_name(path: Path) -> Path:
+    """A name beside `path` that no other process, and no other call, uses."""
+    end = f".{_HOST}-{os.getpid()}-{secrets.token_hex(4)}.part"
+    return path.with_name(f".{_begin(path.name)}{end}")
+
+
+def _begin(name: str) -> str:
+    """As much of a name as a temporary one can hold."""
+    encoded = os.fsencode(name)
+    if len(encoded) <= _MOST_OF_A_NAME:
+        return name
+    return encoded[:_MOST_OF_A_NAME].decode(errors="ignore")
+
+
+def create(temporary: Path) -> int:
+    """Create the file and open it for writing; returns its descriptor.
+
+    Raises FileExistsError where there is anything under that name, a link too. While the
+    descriptor is open the file is locked, so that other processes see that it is in use.
+    """
+    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL
+    flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    descriptor = os.open(temporary, flags, 0o666)
+    if fcntl is not None:
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    return descriptor
+
+
+def rename(temporary: Path, path: Path) -> None:
+    """Give a finished file its name, and wait until the folder is on disk."""
+    os.replace(temporary, path)
+    if os.name == "nt":  # folders cannot be opened there
+        return
+    with contextlib.suppress(OSError):  # a folder that may be written but not read
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+def about(path: Path, error: OSError) -> OSError:
+    """The error with a text that names the file it is about; its number stays."""
+    told = OSError(f"{path}: {error.strerror or error}")
+    told.errno = error.errno
+    return told
+
+
+def sweep(folder: Path, names: Collection[str]) -> None:
+    """Remove what dead processes of this host left of files with these names."""
+    left = [m for m in map(_TEMPORARY.fullmatch, os.listdir(folder)) if m and m["host"] == _HOST]
+    begins = {_begin(name) for name in names} if left else set()
+    for m in left:
+        path = folder / m[0]
+        if m["name"] in begins and _is_left(path, int(m["process"])):
+            with contextlib.suppress(OSError):  # of somebody else
+                path.unlink()
+
+
+def _is_left(path: Path, process: int) -> bool:
+    """Whether the process that wrote `path` has ended."""
+    if process == os.getpid() or fcntl is None:
+        return process != os.getpid()
+    with contextlib.suppress(ProcessLookupError):
+        with contextlib.suppress(PermissionError):  # somebody else's process
+            os.kill(process, 0)
+        return False
+    # A process of another container may have that number: it holds a lock.
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    finally:
+        os.close(descriptor)
+    return True
