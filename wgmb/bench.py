@@ -24,6 +24,7 @@ import numpy as np
 import wgpu
 
 from . import gpu, scenes, timing
+from .atomic import write_file
 from .cases import Contender, Staged, Tell
 from .errors import InputError
 from .findings import machine
@@ -99,7 +100,7 @@ class Bench:
 
     def save(self, path: Path) -> None:
         """As JSON, for `load`."""
-        path.write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8")
+        write_file(path, (json.dumps(asdict(self), indent=1) + "\n").encode())
 
     @classmethod
     def load(cls, path: Path) -> Bench:

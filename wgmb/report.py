@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from .atomic import write_file
 from .cases import Case
 from .findings import Entry, Plot, Report, Table
 from .measure import FLIP_GAIN, MEASURES, display, flip_colors
@@ -31,7 +32,7 @@ def write(report: Report, path: Path) -> list[Path]:
         path.with_suffix(".csv"): as_csv(report),
     }
     for file, text in written.items():
-        file.write_text(text, encoding="utf-8")
+        write_file(file, text.encode())
     return list(written)
 
 
