@@ -6,7 +6,8 @@ import pytest
 import make_frames as make
 import wgmb
 from twins import figure as twin
-from wgmb import InputError, Shutter, figures, scenes, stills
+from wgmb import InputError, Shutter, scenes, stills
+from wgmb.cone import VIDEOS
 
 SIZE = (96, 54)
 WIDE = (96, 48)
@@ -81,7 +82,7 @@ def cone(video, speed, time):
 def test_screen_cone_is_the_sum_of_ten_frames(video):
     """Each frame counts from its own instant on, as in the article."""
     speed, now = 20.0, 0.07
-    times = figures.VIDEOS[video].time((np.arange(1000) + 0.5) / 1000) / 60
+    times = VIDEOS[video].time((np.arange(1000) + 0.5) / 1000) / 60
     x, y = twin.positions(*WIDE)
     x, total = x - 0.5, np.zeros(x.shape)
     for k in range(4, -6, -1):

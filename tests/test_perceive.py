@@ -7,7 +7,9 @@ from PIL import Image
 import make_frames as make
 from twins import perceive as twin
 from wgmb import InputError, Shutter, stills
-from wgmb.perceive import VIDEOS, Cone, Viewer, best_shutter, compare, difference
+from wgmb.cone import VIDEOS, Cone
+from wgmb.perceive import Viewer
+from wgmb.shutter_study import best_shutter, compare, difference
 
 # Mean differences to perceived nature at 20, 40, 60, 80 rad/s and 60 frames a second.
 TABLE = {

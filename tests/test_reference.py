@@ -13,8 +13,8 @@ import pytest
 import wgmb
 from wgmb import Body, InputError, Scene, Shot, Shutter, scenes
 from wgmb.blur.accumulate import spread
+from wgmb.bodies import rotation, translation
 from wgmb.render import Render
-from wgmb.scene import rotation, translation
 
 STILL = Shot(lambda t: (0 * t, 0 * t, 0 * t))
 AWAY, THIN = 8.0, 1e-4  # distance to the flat bodies, half their thickness [m]

@@ -10,9 +10,9 @@ import make_frames as make
 import wgmb
 from twins import gbuffer as twin
 from wgmb import Body, InputError, Scene, Shot, gpu, scenes
+from wgmb.bodies import SHAPES, at, rotation, translation
 from wgmb.gbuffer import SceneOnGpu, _bounds, _halves
 from wgmb.images import Images
-from wgmb.scene import SHAPES, at, rotation, translation
 
 SIZE = (96, 54)
 STILL = Shot(lambda t: (0 * t, 0 * t, 0 * t))

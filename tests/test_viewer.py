@@ -23,7 +23,7 @@ from wgmb import (
     stills,
 )
 from wgmb.blur import METHODS
-from wgmb.perceive import Cone
+from wgmb.cone import Cone
 from wgmb.timing import Timing
 from wgmb.viewer import State, actions, controls, offscreen, stage
 from wgmb.viewer.pace import Pace

@@ -13,7 +13,7 @@ from twins import volume as twin
 from wgmb import InputError, Scene, Shutter, gpu, scenes, shader, stills
 from wgmb.blur import volume as method_file
 from wgmb.density import overrides, tables
-from wgmb.scene import Orbit, Stage, Torus
+from wgmb.volumes import Orbit, Stage, Torus
 
 CURVES = ["box", "trapezoid", "triangle", "cosine", "gaussian"]
 SPEEDS = [0.0, 1.0, 30.0, 160.0, 400.0, 1e4]

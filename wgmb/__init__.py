@@ -12,15 +12,18 @@ Shutter ── times of the samples ──────────────�
 __version__ = "0.1.0"
 
 from .blur import METHODS
-from .cameras import Camera, CameraFile, Reprojections
+from .bodies import Body
+from .camera_file import CameraFile
+from .cameras import Camera, Reprojections
+from .cone import Cone
 from .errors import DeviceError, Error, InputError, ShaderError
 from .frame import Frame
 from .output import Output
-from .perceive import Cone, Viewer
+from .perceive import Viewer
 from .pipeline import Blur, blur
 from .render import Render
 from .run import Report, blur_sequence
-from .scene import Body, Scene, Shot
+from .scene import Scene, Shot
 from .sequence import Clip, Passes
 from .shutter import Shutter
 from .vectors import Vectors

@@ -12,13 +12,14 @@ import numpy as np
 
 from . import scenes
 from .blur import METHODS
+from .bodies import Body, moving
 from .cases import Case, Contender, Staged, scene_case
 from .compare import Laboratory
 from .errors import InputError
 from .findings import Plot, Report, Table
 from .frame import Frame
 from .measure import MEASURES, display
-from .scene import Body, Scene, Shot, moving
+from .scene import Scene, Shot
 from .shutter import Shutter
 
 UNIT_RAYS = 8  # taylor: rays a pixel that distributed makes in the small budget

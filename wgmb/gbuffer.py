@@ -8,10 +8,11 @@ import numpy as np
 import wgpu
 
 from . import gpu, shader
+from .bodies import SHAPES
 from .cameras import Camera, Reprojections
 from .errors import InputError
 from .images import Images
-from .scene import SHAPES, Scene
+from .scene import Scene
 
 ROWS = 257  # poses between which the GPU interpolates
 MOST_RAYS = 8  # a side, for antialiasing

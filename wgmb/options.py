@@ -15,10 +15,10 @@ from cyclopts import Group, Parameter
 from . import scenes, sequence, shutter, vectors
 from .blur import METHODS
 from .cases import Case, Contender
+from .cone import Cone
 from .errors import InputError
 from .findings import Report
 from .numbering import frame_numbers
-from .perceive import Cone
 from .pipeline import Blur
 from .scene import Scene
 

@@ -102,15 +102,6 @@ def _text(x, y, text: str, anchor: str = "start", weight: str = "normal") -> str
     )
 
 
-def perception_charts(found, speeds: np.ndarray, fps: float) -> tuple[Chart, Chart]:
-    """Differences by shutter (`perceive.compare`) against speed [rad/s], and the small ones."""
-    lines = {name: (speeds, np.asarray(values)) for name, values in found.items()}
-    title = f"perceived video and perceived nature, {fps:g} frames a second"
-    axes = "speed [rad/s]", "difference"
-    blurred = {name: line for name, line in lines.items() if name != "none"}
-    return Chart(title, *axes, lines), Chart("with blur only", *axes, blurred)
-
-
 def shutter_charts(shutter, name: str) -> tuple[Chart, Chart, Chart]:
     """A shutter's curve, its integral, and the sum of neighbouring frames' windows."""
     opens, closes = shutter.span

@@ -11,9 +11,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from .bodies import Body, at, moving, rotation, translation
 from .errors import InputError
-from .figures import cone, disk, spiric
-from .scene import Body, Scene, Shot, at, moving, rotation, translation
+from .figure_scenes import cone, disk, spiric
+from .scene import Scene, Shot
 from .torusphere import torusphere
 
 RED, ORANGE, YELLOW = (0.72, 0.10, 0.07), (0.85, 0.36, 0.08), (0.90, 0.72, 0.18)

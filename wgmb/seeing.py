@@ -15,6 +15,7 @@ from rich.console import Console
 
 from . import __version__, plot, scenes
 from .atomic import write_file
+from .cone import VIDEOS
 from .errors import InputError
 from .numbering import frame_numbers
 from .options import (
@@ -27,10 +28,11 @@ from .options import (
     size_of,
 )
 from .output import Output
-from .perceive import VIDEOS, Viewer, best_shutter, compare
+from .perceive import Viewer
 from .pipeline import Blur
 from .render import Render
 from .shutter import OVERLAPS
+from .shutter_study import best_shutter, compare, perception_charts
 from .source import Source
 from .terminal import progress
 
@@ -151,7 +153,7 @@ def _report(output: OutputOptions, who: PerceptionOptions, speed: float | None, 
     best = best_shutter(speed, fps, who.cone) if speed is not None else None
     speeds = np.linspace(fps / 12, fps * 5 / 3, 20)
     found = compare(fps, speeds, who.cone)
-    write_file(path, plot.svg(*plot.perception_charts(found, speeds, fps)).encode())
+    write_file(path, plot.svg(*perception_charts(found, speeds, fps)).encode())
     if not quiet:
         sys.stdout.write("rad/s    " + "".join(f"{name:>11}" for name in found) + "\n")
         for i in range(3, len(speeds), 4):

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from . import layers, stills, vectors
-from .cameras import CameraFile
+from .camera_file import CameraFile
 from .cuts import is_cut, jumps, straightened
 from .errors import InputError
 from .frame import Frame

@@ -10,7 +10,8 @@ import math
 import numpy as np
 
 from .errors import InputError
-from .scene import Instant, Orbit, Scene, Shot, Stage, Torus
+from .scene import Scene, Shot
+from .volumes import Instant, Orbit, Stage, Torus
 
 TURN = 2 * math.pi
 BEGIN = 25.0  # seconds of the animation that have passed at iTime 0

@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import wgpu
 
-from .. import gpu, scene, shader
+from .. import gpu, shader
 from ..density import TURN, Way, overrides, tables
 from ..errors import InputError
 from ..figures import RATE
 from ..shutter import Shutter
+from ..volumes import Orbit, Stage, Torus
 
 CLOUD, SHADOW = 1, 2  # what can be in a tile
 
@@ -55,14 +56,14 @@ class Volume:
         on_gpu, shutter = inputs.scene, inputs.shutter
         volumes, stage = on_gpu.shown.instant(on_gpu.time)
         volumes = [v for v in volumes if v.opacity or v.facing]
-        volumes.sort(key=lambda v: isinstance(v, scene.Torus))
+        volumes.sort(key=lambda v: isinstance(v, Torus))
         exact = on_gpu.shown.density == "exact"
         ways = [way_of(v, shutter, on_gpu.fps, exact) for v in volumes]
         constants = {
             **overrides(shutter, ways),
             "EXACT": exact,
-            "ORBITS": sum(isinstance(v, scene.Orbit) for v in volumes),
-            "TORI": sum(isinstance(v, scene.Torus) for v in volumes),
+            "ORBITS": sum(isinstance(v, Orbit) for v in volumes),
+            "TORI": sum(isinstance(v, Torus) for v in volumes),
             "ROLLING": shutter.rolling is not None,
             "BLENDED": all(v.facing is not None for v in volumes),
         }
@@ -136,7 +137,7 @@ class Volume:
 
 
 def volume_row(
-    row: np.ndarray, v: scene.Volume, way: Way, middle_of: float, delay: tuple[float, float]
+    row: np.ndarray, v: Orbit | Torus, way: Way, middle_of: float, delay: tuple[float, float]
 ) -> None:
     """Fill a `Volume` of the shader, all but `turning`.
 
@@ -151,7 +152,7 @@ def volume_row(
     row["drift"] = [abs(v.speed) * d for d in delay]
     half = min((swept + np.abs(row["drift"]).sum()) / 2, math.pi / 2)
     middle, reach = np.array(v.centre), v.reach
-    if isinstance(v, scene.Orbit):
+    if isinstance(v, Orbit):
         row["turn"] = c, -s, -side * s, -side * c
         row["small"], row["large"] = v.radius, v.orbit
         quick = 2 * speed * _smoothstep(30, 40, speed)
@@ -174,15 +175,15 @@ def _smoothstep(a: float, b: float, x: float) -> float:
     return u * u * (3 - 2 * u)
 
 
-def way_of(volume: scene.Volume, shutter: Shutter, fps: float, exact: bool) -> Way:
+def way_of(volume: Orbit | Torus, shutter: Shutter, fps: float, exact: bool) -> Way:
     """How far it turns; a torus is itself again after half a turn, which "published" ignores."""
     opens, closes = shutter.span
-    often = 2 if exact and isinstance(volume, scene.Torus) else 1
+    often = 2 if exact and isinstance(volume, Torus) else 1
     return Way(abs(volume.speed) * (closes - opens) / fps, often)
 
 
 def _uniforms(
-    on_gpu, shutter: Shutter, stage: scene.Stage, volumes: list[scene.Volume], ways: list[Way]
+    on_gpu, shutter: Shutter, stage: Stage, volumes: list[Orbit | Torus], ways: list[Way]
 ) -> np.ndarray:
     source = shader.load("blur/volume.wgsl")
     data = np.zeros((), source.dtype("Volumes"))

@@ -15,7 +15,8 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..perceive import Cone, WeightedSum
+from ..cone import Cone
+from ..perceive import WeightedSum
 from ..pipeline import Blur
 from ..timing import Timing
 from .state import State

@@ -16,9 +16,9 @@ from typing import Any
 
 from .. import numbering, scenes
 from ..blur import METHODS
+from ..cone import Cone
 from ..errors import InputError
 from ..options import OWN, BlurOptions, InputOptions, OutputOptions, SceneOptions, ShutterOptions
-from ..perceive import Cone
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
 LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")

@@ -1,0 +1,83 @@
+"""Rigid bodies as data, and 4 x 4 matrices over time.
+
+World: right-handed, y up, metres; time in seconds. A body is a unit sphere, cube (-1..1),
+cylinder (along z) or ring (about y) that `place(t)` puts into the world; patterns are listed in
+wgsl/scene/pattern.wgsl. Every function of time takes an array of times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+Color = tuple[float, float, float]
+Place = Callable[[np.ndarray], np.ndarray]  # times (n,) -> world_from_body (n, 4, 4)
+SHAPES = ("sphere", "box", "cylinder", "ring")
+PATTERNS = ("PLAIN", "CHECKER", "STRIPES", "BRICKS", "DOTS", "GROUND")
+
+
+def times_of(t) -> np.ndarray:
+    """(n,) float64 of a number or an array."""
+    return np.atleast_1d(np.asarray(t, np.float64))
+
+
+def translation(x, y, z, like) -> np.ndarray:
+    """(n, 4, 4) for numbers or arrays over the times `like`."""
+    m = np.tile(np.eye(4), (len(times_of(like)), 1, 1))
+    for row, value in enumerate((x, y, z)):
+        m[:, row, 3] = value
+    return m
+
+
+def scaling(size, like) -> np.ndarray:
+    """(n, 4, 4) of constant half extents."""
+    return np.tile(np.diag([*size, 1.0]), (len(times_of(like)), 1, 1))
+
+
+def rotation(axis: str, angle, like) -> np.ndarray:
+    """(n, 4, 4) about "x", "y" or "z" by radians, right-handed."""
+    angle = np.broadcast_to(np.asarray(angle, np.float64), times_of(like).shape)
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    m = translation(0, 0, 0, like)
+    m[:, i, i] = m[:, j, j] = np.cos(angle)
+    m[:, j, i] = np.sin(angle)
+    m[:, i, j] = -m[:, j, i]
+    return m
+
+
+@dataclass(frozen=True)
+class Body:
+    """One rigid thing; `path` gives its place without its size.
+
+    `size`: half extents; a ring's tube is as thick as it is high, 2 size[1].
+    """
+
+    shape: str
+    size: tuple[float, float, float]
+    path: Place
+    color: Color = (0.7, 0.7, 0.7)
+    other: Color = (0.2, 0.2, 0.2)
+    pattern: str = "PLAIN"
+    repeats: tuple[float, float] = (1.0, 1.0)
+    light: float = 0.0
+    gloss: float = 0.0
+
+    def world_from_body(self, t) -> np.ndarray:
+        """(n, 4, 4) at the times `t` [s]."""
+        return self.path(times_of(t)) @ scaling(self.size, t)
+
+
+def at(x: float, y: float, z: float, yaw: float = 0.0, pitch: float = 0.0) -> Place:
+    """A place that does not move; yaw about y, then pitch about x [radians]."""
+    return lambda t: translation(x, y, z, t) @ rotation("y", yaw, t) @ rotation("x", pitch, t)
+
+
+def moving(start, velocity, *, spin: float = 0.0, axis: str = "z", fall: float = 0.0) -> Place:
+    """Along a line or, with `fall` [m/s^2], a parabola; spinning about `axis` [rad/s]."""
+    (x, y, z), (u, v, w) = start, velocity
+    return lambda t: (
+        translation(x + u * t, y + v * t - 0.5 * fall * t * t, z + w * t, t)
+        @ rotation(axis, spin * t, t)
+    )
