@@ -1,5 +1,7 @@
 """What gather alone promises: the neighbouring frames show what the frame itself hides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import wgpu
@@ -147,21 +149,14 @@ def test_what_can_be_shown_is_told():
         wgmb.Blur("gather", show="depth")
 
 
-def test_the_order_of_neighbours_does_not_matter(sources):
-    """Where the public encode is given them the other way round."""
-    frame = frame_of(sources)
+def test_a_neighbour_that_lacks_what_the_method_needs_is_named(sources):
     blur = wgmb.Blur("gather", shutter=360)
-    want = blur(frame)
+    frame = frame_of(sources)
     inputs = blur.upload(frame)
-    inputs["neighbours"] = dict(reversed(inputs["neighbours"].items()))
-    textures = Images(blur.device)
-    output = textures.texture("picture", frame.size, blur.output)
-    encoder = blur.device.create_command_encoder()
-    blur.encode(encoder, output=output.create_view(), **inputs)
-    assert np.array_equal(textures.download(encoder, output), want)
-    inputs["neighbours"][2] = inputs["neighbours"].pop(1)
-    with pytest.raises(wgmb.InputError, match=r"neighbours.*2"):
-        blur.encode(encoder, output=output.create_view(), **inputs)
+    output = Images(blur.device).view("picture", frame.size, blur.output)
+    inputs["next"] = replace(inputs["next"], depth=None)
+    with pytest.raises(wgmb.InputError, match=r"needs next\.depth"):
+        blur.encode(blur.device.create_command_encoder(), output=output, **inputs)
 
 
 def test_a_device_that_allows_too_little_is_told_what_to_ask_for():

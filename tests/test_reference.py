@@ -201,8 +201,7 @@ def test_bit_by_bit_is_the_same_as_at_once(method):
         output = render._images.texture("output", render.size, blur.output)
         for progress in bits:
             encoder = blur.device.create_command_encoder()
-            blur.encode(encoder, size=render.size, output=output.create_view(), scene=on_gpu,
-                        progress=progress)  # fmt: skip
+            blur.encode_scene(encoder, on_gpu, output.create_view(), progress=progress)
             wgmb.gpu.submit(blur.device, encoder)
         pictures.append(render._images.download(blur.device.create_command_encoder(), output))
     assert np.array_equal(*pictures)

@@ -18,6 +18,7 @@ from .cameras import Camera, Reprojections
 from .cone import Cone
 from .errors import DeviceError, Error, InputError, ShaderError
 from .frame import Frame
+from .frame_views import FrameViews
 from .output import Output
 from .perceive import Viewer
 from .pipeline import Blur, blur
@@ -39,6 +40,7 @@ __all__ = [
     "DeviceError",
     "Error",
     "Frame",
+    "FrameViews",
     "InputError",
     "Output",
     "Passes",

@@ -29,6 +29,7 @@ from .cases import Contender, Staged, Tell
 from .errors import InputError
 from .findings import machine
 from .frame import Frame
+from .frame_views import FrameViews
 from .images import Images, numpy_of
 from .peers import numba_tap
 from .pipeline import Blur
@@ -361,8 +362,8 @@ def _peak() -> int:
 
 def _bytes(views: dict, output: wgpu.GPUTexture) -> int:
     """What all textures of `encode`'s inputs and the output hold."""
-    near = [view for inputs in views["neighbours"].values() for view in inputs.values()]
-    read = [v.texture for v in (*views.values(), *near) if isinstance(v, wgpu.GPUTextureView)]
+    every = [v for one in views.values() if isinstance(one, FrameViews) for v in vars(one).values()]
+    read = [v.texture for v in every if isinstance(v, wgpu.GPUTextureView)]
     total = 0
     for texture in (*read, output):
         kind, channels = numpy_of(texture.format)

@@ -41,7 +41,7 @@ def bench_torusphere(
         cores, started = time.process_time(), time.perf_counter()
         on_gpu = render.on_gpu(t)
         encoder = device.create_command_encoder()
-        blur.encode(encoder, size=render.size, output=output.create_view(), scene=on_gpu)
+        blur.encode_scene(encoder, on_gpu, output.create_view())
         recording[t].append(time.perf_counter() - started)
         gpu.submit(device, encoder)
         device.queue.read_buffer(token)

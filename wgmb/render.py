@@ -13,6 +13,7 @@ import wgpu
 from . import exr, gpu
 from .errors import InputError
 from .frame import Frame
+from .frame_views import FrameViews
 from .gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
 from .images import Images
 from .output import Output
@@ -100,22 +101,22 @@ class Render:
             return
         if "scene" in blur.method.needs:
             encoder = blur.device.create_command_encoder(label="scene")
-            blur.encode(encoder, size=self.size, output=output, scene=self.on_gpu(time, blur),
-                        number=number, timing=timing)  # fmt: skip
+            blur.encode_scene(
+                encoder, self.on_gpu(time, blur), output, number=number, timing=timing
+            )
             gpu.submit(blur.device, encoder)
             return
         seen = {k: self._see(time, number, k, blur, timing) for k in _offsets(blur)}
         encoder = blur.device.create_command_encoder(label="blur")
-        here = seen.pop(0)
         blur.encode(
             encoder,
-            size=self.size,
-            output=output,
+            seen[0],
+            output,
+            prev=seen.get(-1),
+            next=seen.get(1),
             number=number,
-            neighbours=seen,
             confidence=confidence,
             timing=timing,
-            **here,
         )
         gpu.submit(blur.device, encoder)
 
@@ -143,8 +144,9 @@ class Render:
             count = min(count, most, blur.samples - done)
             started = clock.perf_counter()
             encoder = blur.device.create_command_encoder(label=f"samples {done}")
-            blur.encode(encoder, size=self.size, output=output, scene=on_gpu,
-                        progress=(done, count), number=number, timing=timing)  # fmt: skip
+            blur.encode_scene(
+                encoder, on_gpu, output, progress=(done, count), number=number, timing=timing
+            )
             gpu.submit(blur.device, encoder)
             blur.device.queue.read_buffer(self._token)  # waits
             now = clock.perf_counter()
@@ -170,15 +172,14 @@ class Render:
         if "motion" not in textures:
             motion = self._images.texture("motion", self.size, "rgba32float")
             encoder = self.blur.device.create_command_encoder(label="motion")
-            moving = {k: v for k, v in here.items() if k not in ("color", "normal")}
-            self.blur.encode_motion(encoder, self.size, motion.create_view(), number, **moving)
+            self.blur.encode_motion(encoder, here, motion.create_view(), number)
             gpu.submit(self.blur.device, encoder)
             textures["motion"] = motion
         return {name: texture for name, texture in textures.items() if name != "camera"}
 
     def frame(self, time: float, number: int = 0) -> Frame:
         """The sharp picture at `time` [s] with its depth, normals, object indices and motion."""
-        camera = self._see(time, number, 0, self.blur)["camera"]
+        camera = self._see(time, number, 0, self.blur).camera
         arrays = {}
         for name in ("color", "depth", "normal", "object"):
             encoder = self.blur.device.create_command_encoder(label="download")
@@ -201,8 +202,8 @@ class Render:
 
     def _see(
         self, time: float, number: int, offset: int, blur: Blur, timing: Clock | None = None
-    ) -> dict:
-        """The picture `offset` frames from the moment; what Blur.encode takes of it."""
+    ) -> FrameViews:
+        """The picture `offset` frames from the moment."""
         on_gpu = self.on_gpu(time, blur)
         if offset not in self._pictures:
             encoder = blur.device.create_command_encoder(label="render")
@@ -212,13 +213,13 @@ class Render:
             gpu.submit(blur.device, encoder)
             self._pictures[offset] = {**drawn, "camera": on_gpu.reprojections(offset)}
         seen = self._pictures[offset]
-        return {
-            "color": seen["color"].create_view(),
-            "depth": seen["depth"].create_view(),
-            "normal": seen["normal"].create_view(),
-            "object_id": seen["object"].create_view(),
-            "camera": seen["camera"],
-        }
+        return FrameViews(
+            color=seen["color"].create_view(),
+            depth=seen["depth"].create_view(),
+            normal=seen["normal"].create_view(),
+            object_id=seen["object"].create_view(),
+            camera=seen["camera"],
+        )
 
     def on_gpu(self, time: float, blur: Blur | None = None) -> SceneOnGpu:
         """The scene around `time` [s], as far as the blur looks."""

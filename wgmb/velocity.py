@@ -2,45 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import wgpu
 
 from . import gpu, shader
 from .cameras import Reprojections
+from .frame_views import FrameViews, View
 
 FILE = "velocity.wgsl"
-View = wgpu.GPUTextureView
-
-
-@dataclass(frozen=True)
-class Moving:
-    """What is known of the motion: textures, and the matrices around the frame."""
-
-    to_prev: View | None = None  # displacement [px] in x, y
-    to_next: View | None = None
-    motion: View | None = None  # both in one texture, instead of the two
-    camera: Reprojections | None = None
-    depth: View | None = None  # needed with camera
-    object_id: View | None = None  # r32uint: rows of the camera's bodies
-    scale: View | None = None  # multiplies the result
-    object_motion: bool = False  # vectors leave the camera's motion out
-
-    @property
-    def has_vectors(self) -> bool:
-        """Whether there are vectors, with a camera or without."""
-        return any(v is not None for v in (self.to_prev, self.to_next, self.motion))
-
-    @property
-    def known(self) -> bool:
-        """Whether anything says what moves."""
-        return self.has_vectors or self.camera is not None
-
-    @property
-    def ready(self) -> bool:
-        """Whether `motion` is already all there is to know."""
-        return self.motion is not None and self.camera is None and self.scale is None
 
 
 class VelocityPass:
@@ -49,34 +18,34 @@ class VelocityPass:
     def __init__(self, device: wgpu.GPUDevice, none: View, no_object: View):
         self._device, self._none, self._no_object = device, none, no_object
 
-    def encode(self, encoder, given: gpu.Given, moving: Moving, limited: bool, output: View):
+    def encode(self, encoder, given: gpu.Given, frame: FrameViews, limited: bool, output: View):
         """Record `output` = to_prev, to_next [px] of every pixel."""
-        paired = moving.motion is not None
-        to_prev = moving.motion if paired else moving.to_prev
-        with_camera = moving.camera is not None
+        paired = frame.motion is not None
+        to_prev = frame.motion if paired else frame.to_prev
+        with_camera = frame.camera is not None
         kernel = gpu.kernel(
             self._device,
             FILE,
             PREV=to_prev is not None,
-            NEXT=moving.to_next is not None or paired,
+            NEXT=frame.to_next is not None or paired,
             PAIRED=paired,
             CAMERA=with_camera,
-            OBJECTS=with_camera and moving.object_id is not None,
-            SCALED=moving.scale is not None,
+            OBJECTS=with_camera and frame.object_id is not None,
+            SCALED=frame.scale is not None,
             LIMITED=limited,
-            ADDED=moving.object_motion,
+            ADDED=frame.object_motion,
         )
-        uniform, table = self._matrices(given.size, moving.camera)
+        uniform, table = self._matrices(given.size, frame.camera)
         kernel.run(
             encoder,
             "main",
             given,
             velocity=uniform,
             to_prev=to_prev or self._none,
-            to_next=moving.to_next or self._none,
-            depth=moving.depth or self._none,
-            object=moving.object_id or self._no_object,
-            scale=moving.scale or self._none,
+            to_next=frame.to_next or self._none,
+            depth=frame.depth or self._none,
+            object=frame.object_id or self._no_object,
+            scale=frame.scale or self._none,
             reprojections=table,
             motion=output,
         )

@@ -82,15 +82,15 @@ class Fusion:
 
     def encode(self, encoder, inputs, output):
         """Record the Gaussian's two passes, for weights too, and the fusion."""
-        camera: Reprojections | None = inputs.camera
+        camera: Reprojections | None = inputs.frame.camera
         turned = camera is not None and camera.here.view_from_world is not None
-        weighted = inputs.weight is not None
+        weighted = inputs.frame.weight is not None
         kernel = gpu.kernel(
             self._device,
             "blur/fusion.wgsl",
             {"Output": self._output},
             EVEN=inputs.even,
-            NORMALS=turned and inputs.normal is not None,
+            NORMALS=turned and inputs.frame.normal is not None,
             WEIGHTED=weighted,
             PUBLISHED=self._published,
         )
@@ -107,13 +107,13 @@ class Fusion:
             fusion=self._device.create_buffer_with_data(
                 label="fusion", data=data, usage=wgpu.BufferUsage.UNIFORM
             ),
-            color=inputs.color,
-            soft=self._filtered(encoder, inputs, inputs.color, "color"),
-            motion=inputs.motion,
-            depth=inputs.depth,
-            normal=inputs.normal or inputs.none,
-            weight=inputs.weight or inputs.none,
-            soft_weight=self._filtered(encoder, inputs, inputs.weight, "weight")
+            color=inputs.frame.color,
+            soft=self._filtered(encoder, inputs, inputs.frame.color, "color"),
+            motion=inputs.frame.motion,
+            depth=inputs.frame.depth,
+            normal=inputs.frame.normal or inputs.none,
+            weight=inputs.frame.weight or inputs.none,
+            soft_weight=self._filtered(encoder, inputs, inputs.frame.weight, "weight")
             if weighted
             else inputs.none,
             linear=inputs.linear,

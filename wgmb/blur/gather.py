@@ -75,7 +75,7 @@ class Gather:
             if self._made.get(place) != _contents(frame):
                 self._silhouettes(encoder, inputs, frame, views, lists)
                 self._made.pop(place, None)
-            if frame.token is not None:
+            if frame.key is not None:
                 self._made[place] = _contents(frame)
             self._tiles(encoder, inputs, frame.offset, i, len(frames), views, lists)
         offsets = [frame.offset for frame in frames]
@@ -163,7 +163,7 @@ class Gather:
             self._device,
             "blur/gather.wgsl",
             {"Output": self._output},
-            WEIGHTED=inputs.weight is not None,
+            WEIGHTED=inputs.frame.weight is not None,
             CONFIDENCE=self._show == "confidence",
             **timed,
         )
@@ -177,8 +177,8 @@ class Gather:
                 listed=tiles,
                 plain=bits,
                 bends=bends,
-                own=inputs.color,
-                own_weight=inputs.weight or inputs.none,
+                own=inputs.frame.color,
+                own_weight=inputs.frame.weight or inputs.none,
                 linear=inputs.linear,
                 output=output,
                 **searched,
@@ -194,7 +194,7 @@ class Gather:
             "main",
             inputs.given,
             parted,
-            color=inputs.color,
+            color=inputs.frame.color,
             near=_layer(paths, 2 * place),
             bends=bends,
             listed=parted,
@@ -226,7 +226,7 @@ class Gather:
         """Record them for all that something moves near; for the whole frame if it is kept."""
         size = inputs.given.size
         needed = {"buffer": self._needed.at_least(16), "offset": 0, "size": 16}
-        if frame.token is None:
+        if frame.key is None:
             cells = {"whole": lists["whole"], "mark": lists["marked"], "split": lists["parted"]}
         else:
             cells = dict.fromkeys(("mark", "split"), self._all(size))
@@ -303,7 +303,7 @@ class Gather:
 
 def _contents(frame) -> tuple[object, bool]:
     """What the layers of a frame are made of: its pixels, with weights or without."""
-    return frame.token, frame.weight is not None
+    return frame.key, frame.weight is not None
 
 
 def _layer(texture: wgpu.GPUTexture, index: int) -> wgpu.GPUTextureView:

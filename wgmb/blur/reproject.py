@@ -88,7 +88,7 @@ class Reproject:
             "blur/reproject.wgsl",
             {"Output": self._output},
             EVEN=inputs.even,
-            WEIGHTED=inputs.weight is not None,
+            WEIGHTED=inputs.frame.weight is not None,
             COUNTS=self._show == "count",
         )
         width, height = inputs.given.size
@@ -99,7 +99,7 @@ class Reproject:
         most = max(1, min(int(kernel.source.constant("SLICES")), AT_ONCE // (4 * pixels)))
         most = min(most, inputs.samples)
         shared = {
-            "own": inputs.color,
+            "own": inputs.frame.color,
             "linear": inputs.linear,
             "nearest": self._nearest.at_least(4 * most * pixels),
             "winner": self._winner.at_least(4 * most * pixels),
@@ -144,7 +144,7 @@ class Reproject:
         run("finish", 0, 0, 0)
 
     def _published(self, encoder, inputs, output):
-        camera: Reprojections | None = inputs.camera if inputs.by_camera else None
+        camera: Reprojections | None = inputs.frame.camera if inputs.frame.by_camera else None
         ways: list[tuple[Camera, Camera]] = []
         if camera and camera.prev and camera.here.view_from_world is not None:
             ways = [(camera.here, camera.prev), (camera.prev, camera.here)]
@@ -153,14 +153,14 @@ class Reproject:
                 "facing needs the cameras of this and the previous frame with view_from_world, "
                 "and no vectors"
             )
-        prev = [n for n in inputs.neighbours if n.offset == -1]
-        normals = inputs.normal is not None and all(n.normal is not None for n in prev)
+        prev = [n for n in inputs.frames[1:] if n.offset == -1]
+        normals = inputs.frame.normal is not None and all(n.normal is not None for n in prev)
         kernel = gpu.kernel(
             self._device,
             "blur/reproject_published.wgsl",
             {"Output": self._output},
             CAMERA=bool(ways),
-            WEIGHTED=inputs.weight is not None,
+            WEIGHTED=inputs.frame.weight is not None,
             COUNTS=self._show == "count",
             LINES=self._splat == "line",
             FACING=self._facing,
@@ -176,7 +176,7 @@ class Reproject:
         )
         most = 1 if self._depth_test else most
         shared = {
-            "own": inputs.color,
+            "own": inputs.frame.color,
             "heads": self._heads.at_least(4 * width * height),
             "links": self._links.at_least(4 * most * width * height),
             "sums": self._means.at_least(16 * width * height),
@@ -188,7 +188,6 @@ class Reproject:
         create = self._device.create_buffer_with_data
 
         def run(entry: str, source, steps: np.ndarray, way, first: bool, last: bool) -> None:
-            color, motion, depth, normal, weight = source
             data = np.zeros((), kernel.source.dtype("Chunk"))
             data["bits"], data["steps"] = bits, max(len(steps) - 1, 0)
             data["first"], data["last"] = first, last
@@ -209,16 +208,15 @@ class Reproject:
                 inputs.given,
                 chunk=create(label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM),
                 steps=create(label="steps", data=table, usage=wgpu.BufferUsage.UNIFORM),
-                color=color,
-                motion=motion,
-                depth=depth,
-                normal=normal if self._facing and normals else inputs.none,
-                weight=weight or inputs.none,
+                color=source.color,
+                motion=source.motion,
+                depth=source.depth,
+                normal=source.normal if self._facing and normals else inputs.none,
+                weight=source.weight or inputs.none,
                 **shared,
             )
 
-        sources = [(inputs.color, inputs.motion, inputs.depth, inputs.normal, inputs.weight)]
-        sources += [(n.color, n.motion, n.depth, n.normal, n.weight) for n in prev]
+        sources = [inputs.frame, *prev]
         shares = np.linspace(0, 1, inputs.samples) if inputs.samples > 1 else np.zeros(1)
         jobs = []
         for k, source in enumerate(sources):

@@ -43,16 +43,16 @@ class Tap:
             {"Output": self._output},
             EVEN=inputs.even,
             AUTO=inputs.auto,
-            WEIGHTED=inputs.weight is not None,
+            WEIGHTED=inputs.frame.weight is not None,
             **self._constants,
         )
         kernel.run(
             encoder,
             "main",
             inputs.given,
-            color=inputs.color,
-            motion=inputs.motion,
-            weight=inputs.weight or inputs.none,
+            color=inputs.frame.color,
+            motion=inputs.frame.motion,
+            weight=inputs.frame.weight or inputs.none,
             linear=inputs.linear,
             output=output,
         )

@@ -54,11 +54,13 @@ class Tiles:
             {"Output": self._output},
             EVEN=inputs.even,
             AUTO=inputs.auto,
-            WEIGHTED=inputs.weight is not None,
+            WEIGHTED=inputs.frame.weight is not None,
             PUBLISHED=self._form == "published",
             TILES=self._show == "tiles",
         )
-        look = gpu.kernel(self._device, "blur/tiles_moves.wgsl", DEEP=inputs.depth is not None)
+        look = gpu.kernel(
+            self._device, "blur/tiles_moves.wgsl", DEEP=inputs.frame.depth is not None
+        )
         width, height = inputs.given.size
         edge = max(LONGEST[0], height // LONGEST[1])
         count = -(-width // edge), -(-height // edge)
@@ -72,16 +74,16 @@ class Tiles:
             encoder,
             "main",
             inputs.given,
-            motion=inputs.motion,
-            depth=inputs.depth or inputs.none,
+            motion=inputs.frame.motion,
+            depth=inputs.frame.depth or inputs.none,
             moves=moves,
         )
         own = {
             "tiles": tiles,
-            "color": inputs.color,
-            "motion": inputs.motion,
+            "color": inputs.frame.color,
+            "motion": inputs.frame.motion,
             "moves": moves,
-            "weight": inputs.weight or inputs.none,
+            "weight": inputs.frame.weight or inputs.none,
             "linear": inputs.linear,
             "rows": self._rows.at_least(16 * count[0] * height),
             "fastest": self._fastest.at_least(16 * count[0] * count[1]),

@@ -22,7 +22,6 @@ from ..pipeline import Blur
 from ..render import Render
 from ..scene import Scene
 from ..timing import Timing
-from ..velocity import Moving
 from .state import State
 
 _MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
@@ -167,9 +166,8 @@ class ClipSubject:
             found["depth"] = images.texture("depth", frame.size, "r32float")
         if "motion" in frame.has:
             motion = images.texture("motion", frame.size, "rgba32float")
-            moving = {k: v for k, v in inputs.items() if k in _MOVING}
             encoder = self._device.create_command_encoder(label="motion")
-            self._sharp.encode_motion(encoder, frame.size, motion.create_view(), **moving)
+            self._sharp.encode_motion(encoder, inputs["frame"], motion.create_view())
             gpu.submit(self._device, encoder)
             found["motion"] = motion
         return found
@@ -193,7 +191,6 @@ def _bytes(frame: Frame) -> int:
     return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
 
 
-_MOVING = {f.name for f in fields(Moving)}
 Subject = SceneSubject | ClipSubject
 
 

@@ -1,0 +1,108 @@
+"""Residency: which frames' arrays are on the GPU, in which textures.
+
+Four caches keep what the frames of a sequence share. They rest on one another, and a frame is
+the same for all of them only while its arrays are the same and cannot be written to:
+
+- `Clip` keeps the last three files read, and the frames made of them, by number;
+- `Residency` uploads the arrays of a locked frame once, and knows them again by identity;
+- a method may keep what it derived from a frame's views, by their `key` (see FrameViews);
+- `Images` keeps textures by name, so that the next frame's go into the same ones.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from . import gpu
+from .frame import Frame
+from .frame_views import TEXTURES, FrameViews, View
+from .images import Images
+
+_PLACES = (" a", " b", " c")  # for a frame and its neighbours, by the end of their textures' names
+
+
+class _ResidentFrame:
+    """A locked frame that was uploaded, and its views."""
+
+    def __init__(self, frame: Frame, views: FrameViews):
+        self.views = views
+        self._arrays = {name: weakref.ref(array) for name, array in frame.arrays.items()}
+        self._rest = frame.camera, frame.object_motion
+
+    def is_of(self, frame: Frame) -> bool:
+        """Whether these are the arrays of `frame`, and cannot have changed."""
+        given = frame.arrays
+        return (
+            frame.is_locked
+            and given.keys() == self._arrays.keys()
+            and all(self._arrays[name]() is array for name, array in given.items())
+            and frame.camera is self._rest[0]
+            and frame.object_motion == self._rest[1]
+        )
+
+
+class Residency:
+    """Uploads frames, those that are locked once. `wanted`: what the method needs and uses."""
+
+    def __init__(self, images: Images, wanted: frozenset[str]):
+        self._images, self._wanted = images, wanted
+        self._resident: dict[str, _ResidentFrame] = {}
+
+    def views_of(self, frames: Mapping[int, Frame]) -> dict[int, FrameViews]:
+        """The views of up to three frames, by the same keys; uploads those not yet resident."""
+        places = {key: self._place_of(frame) for key, frame in frames.items()}
+        free = [place for place in _PLACES if place not in places.values()]
+        views: dict[int, FrameViews] = {}
+        for key, frame in frames.items():
+            # Looked up again, as the same frame may stand at two offsets.
+            place = self._place_of(frame)
+            if place is not None:
+                views[key] = self._resident[place].views
+                continue
+            place = free.pop(0)
+            self._resident.pop(place, None)
+            views[key] = self._upload(frame, place)
+            if frame.is_locked:
+                views[key] = replace(views[key], key=object())
+                self._resident[place] = _ResidentFrame(frame, views[key])
+        return views
+
+    def forget(self) -> None:
+        """Upload everything again; for when what was recorded may not have been done."""
+        self._resident.clear()
+
+    def _place_of(self, frame: Frame) -> str | None:
+        return next((place for place, held in self._resident.items() if held.is_of(frame)), None)
+
+    def _upload(self, frame: Frame, place: str) -> FrameViews:
+        color = _padded(frame.color, 4, 1)
+        half = color.dtype == np.float16
+        four = "rgba16float" if half else gpu.texel(self._images.device, 4)
+        views: dict[str, View] = {}
+        for name, texture in TEXTURES.items():
+            array = getattr(frame, name)
+            used = not texture["if_used"] or name in self._wanted
+            used |= name == "depth" and frame.camera is not None
+            if array is not None and used:
+                array = _padded(array, 4, 0) if texture["format"].startswith("rgba") else array
+                views[name] = self._images.upload(name + place, array, texture["format"])
+        return FrameViews(
+            color=self._images.upload("color" + place, color, four),
+            camera=frame.camera,
+            object_motion=frame.object_motion,
+            check=bool(frame.bad.keys() - {"depth"}),
+            **views,
+        )
+
+
+def _padded(array: np.ndarray, channels: int, value: float) -> np.ndarray:
+    """The array with as many channels, the new ones of one value."""
+    if array.shape[2] == channels:
+        return array
+    padded = np.full((*array.shape[:2], channels), value, array.dtype)
+    padded[..., : array.shape[2]] = array
+    return padded
