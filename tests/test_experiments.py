@@ -47,7 +47,7 @@ def test_chen_compares_rates_faces_and_alphas(lab):
     assert titles[:3] == ["Table 1: frames per second of the blur over a dive",
                           "Table 1, pass by pass", "Quality at 8 samples"]  # fmt: skip
     by_pass, quality = found.tables[1:3]
-    for method in ("tap, form published", "fusion, form published"):
+    for method in ("tap, variant published", "fusion, variant published"):
         rows = [row for row in by_pass.rows if row[0] == method]
         *parts, (_, name, times, whole, ratio) = rows
         assert (name, times) == ("all", sum(row[2] for row in parts))
@@ -56,7 +56,7 @@ def test_chen_compares_rates_faces_and_alphas(lab):
     assert {"gaussian.wgsl:main", "blur/fusion.wgsl:main"} <= {row[1] for row in by_pass.rows}
     for scene in ("scaling", "crossing"):
         rows = {row[1]: row[2:] for row in quality.rows if row[0] == scene}
-        assert {"sharp", "noise floor", "tap, form published", "fusion"} <= rows.keys()
+        assert {"sharp", "noise floor", "tap, variant published", "fusion"} <= rows.keys()
         assert min(rows, key=lambda name: rows[name][0]) == "noise floor"
     for scene in ("scaling", "crossing"):
         (figure,) = (t for t in found.tables if t.title == f"Figure 5, {scene}: alpha")
@@ -106,7 +106,7 @@ def test_worth_in_rays_is_read_off_the_curve(limit, rays):
     case = Case("x", None, None, None, "")  # pyright: ignore[reportArgumentType]
     entries = [Entry("x", "distributed", "samples", {"flip": 0.4 / np.sqrt(n)}, n, 0.01 * n)
                for n in (1, 2, 8, 16)]  # fmt: skip
-    entries += [Entry("x", "reproject, form published", "samples", {"flip": error}, n, 0.001 * n)
+    entries += [Entry("x", "reproject, variant published", "samples", {"flip": error}, n, 0.001 * n)
                 for n, error in ((1, 2 * limit), (8, 1.01 * limit), (16, limit))]  # fmt: skip
     ((_, _, best, after, enough, _),) = experiments._worth(
         Report("", "", {}, 1, entries=entries), case, "flip"

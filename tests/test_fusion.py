@@ -69,7 +69,7 @@ def test_printed_weights_brighten_as_they_sum(tau):
     np.testing.assert_allclose(out, 0.5 * (1 + 0.04 * (1 - tau**8)), atol=1e-5)
 
 
-@pytest.mark.parametrize("options", [{"weights": "old"}, {"form": "slices"}, {"alpha_front": 0},
+@pytest.mark.parametrize("options", [{"weights": "old"}, {"variant": "slices"}, {"alpha_front": 0},
                                      {"alpha_back": 1.5}, {"tau": float("nan")}])  # fmt: skip
 def test_senseless_options_are_named(options):
     with pytest.raises(wgmb.InputError, match=next(iter(options))):

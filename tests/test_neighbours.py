@@ -9,7 +9,7 @@ from test_twins import crossing
 
 import wgmb
 
-METHODS = [("gather", {}), ("reproject", {}), ("reproject", {"form": "published"})]
+METHODS = [("gather", {}), ("reproject", {}), ("reproject", {"variant": "published"})]
 PLACES = {-1: np.s_[16:32, 40:56], 1: np.s_[16:32, 56:72]}
 
 

@@ -107,7 +107,7 @@ def test_nothing_moves_before_a_camera_that_stands_still(method):
 def test_nor_in_the_published_form():
     """But for its sums of fixed point numbers."""
     scene = scenes.make("translation", speed=0)
-    render = wgmb.Render(scene, wgmb.Blur("reproject", form="published"), size=SIZE)
+    render = wgmb.Render(scene, wgmb.Blur("reproject", variant="published"), size=SIZE)
     np.testing.assert_allclose(render(0.2), render.frame(0.2).color, atol=1e-4)
 
 

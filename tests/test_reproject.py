@@ -19,7 +19,7 @@ def frame(color, to_prev, depth=5.0):
 
 
 def published(given, samples=8, **options):
-    return wgmb.Blur("reproject", form="published", samples=samples, **options)(given)
+    return wgmb.Blur("reproject", variant="published", samples=samples, **options)(given)
 
 
 def converging(size=(48, 64)):
@@ -88,10 +88,10 @@ def test_the_nearest_of_a_step_is_seen():
 
 
 @pytest.mark.parametrize("options, words", [
-    ({"facing": True}, "form 'published'"),
-    ({"splat": "line"}, "form 'published'"),
-    ({"form": "published", "splat": "square"}, "splat must be one of point, line"),
-    ({"form": "published", "splat": "line", "depth_test": True}, "depth_test goes with"),
+    ({"facing": True}, "variant 'published'"),
+    ({"splat": "line"}, "variant 'published'"),
+    ({"variant": "published", "splat": "square"}, "splat must be one of point, line"),
+    ({"variant": "published", "splat": "line", "depth_test": True}, "depth_test goes with"),
 ])  # fmt: skip
 def test_options_that_do_not_fit_are_named(options, words):
     with pytest.raises(InputError, match=words):
@@ -109,7 +109,7 @@ def test_options_reach_the_command_line(tmp_path):
     for i, more in enumerate([[], ["--depth-test"], ["--splat", "line"]]):
         out = tmp_path / f"out{i}.exr"
         words = ["blur", str(path), "-o", str(out), "--method", "reproject", "-q"]
-        assert cli.main([*words, "--form", "published", "--samples", "3", *more]) == 0
+        assert cli.main([*words, "--variant", "published", "--samples", "3", *more]) == 0
         seen.append(next(iter(Clip(out))).color)
     assert not np.array_equal(seen[0], seen[1])
     assert not np.array_equal(seen[0], seen[2])

@@ -77,7 +77,7 @@ def test_a_clock_begins_anew(clock, device):
 
 def test_what_is_cleared_between_passes_is_cleared(device):
     """The published form of reproject clears its lists for every frame."""
-    blur = Blur("reproject", form="published", samples=3, device=device)
+    blur = Blur("reproject", variant="published", samples=3, device=device)
     want = drawn(blur, None)
     for _ in range(2):
         np.testing.assert_array_equal(drawn(blur, WallClock(device)), want)

@@ -68,7 +68,7 @@ def test_auto_taps_are_their_twin(close, curve):
 @pytest.mark.parametrize("size", SIZES)
 def test_the_published_form_is_its_twin(close, size):
     color, motion = pictures(size)
-    got = wgmb.blur(color, motion=motion, samples=7, form="published")
+    got = wgmb.blur(color, motion=motion, samples=7, variant="published")
     close(got, tap_twin.published(color, motion[..., :2].astype(float), 7), TOLERANCE)
 
 
@@ -118,17 +118,18 @@ def test_fusion_is_its_twin(close, size, shutter):
     close(got, want, TOLERANCE)
 
 
-@pytest.mark.parametrize("form", ["shutter", "published"])
+@pytest.mark.parametrize("variant", ["shutter", "published"])
 @pytest.mark.parametrize("weights, tau", [("published", 0.5), ("normalised", 1.0),
                                           ("published", 0.9), ("normalised", 0.7)])  # fmt: skip
-def test_every_form_of_fusion_is_its_twin(close, form, weights, tau):
+def test_every_form_of_fusion_is_its_twin(close, variant, weights, tau):
     color, motion = pictures((24, 33))
     motion[::4, ::3] = 0
     depth = depths((24, 33))
-    got = wgmb.blur(color, motion=motion, depth=depth, method="fusion", form=form, weights=weights,
-                    tau=tau, alpha_front=0.1, alpha_back=0.02)  # fmt: skip
+    options = {"variant": variant, "weights": weights, "tau": tau}
+    options |= {"alpha_front": 0.1, "alpha_back": 0.02}
+    got = wgmb.blur(color, motion=motion, depth=depth, method="fusion", **options)
     times, span = Shutter(180).sample_times(8).astype(float), (-0.25, 0.25)
-    if form == "published":
+    if variant == "published":
         times, span = (np.arange(8) - 7) / 16, None
     want = fusion_twin.fusion(color, motion, depth, times, 0.0, (0.1, 0.02), span=span,
                               printed=weights == "published", tau=tau)  # fmt: skip
@@ -255,10 +256,10 @@ def test_gather_is_its_twin(size, frames, degrees, wall):
 
 
 @pytest.mark.parametrize(
-    "form, depths, speed",
+    "variant, depths, speed",
     [("even", True, 6.0), ("even", False, 60.0), ("published", True, 60.0)],
 )
-def test_tiles_is_its_twin(form, depths, speed):
+def test_tiles_is_its_twin(variant, depths, speed):
     """Taps that land on a texel's edge may read the next one; all other pixels agree."""
     size = (44, 84)  # tiles of 40 px: two rows, three columns
     color, motion = pictures(size, speed)
@@ -266,10 +267,10 @@ def test_tiles_is_its_twin(form, depths, speed):
     depth = np.random.default_rng(4).uniform(1, 9, size).astype("f4") if depths else None
     shutter = Shutter(300, "start", "triangle")
     got = wgmb.blur(color, motion=motion, depth=depth, method="tiles", shutter=shutter, samples=5,
-                    number=2, form=form)  # fmt: skip
+                    number=2, variant=variant)  # fmt: skip
     times = shutter.sample_times(5).astype(float)
     want = tiles_twin.tiles(
-        color, motion, depth, times, shutter.span, noise_of(size, 2), 40, form == "published"
+        color, motion, depth, times, shutter.span, noise_of(size, 2), 40, variant == "published"
     )
     wrong = (np.abs(got - want) > 1e-3).any(axis=2)
     assert wrong.mean() < 0.01
@@ -319,7 +320,7 @@ def test_published_reprojection_along_vectors_is_its_twin(size, options):
     flags = {"nearest": "depth_test" in options, "line": "splat" in options}
     want, count = reproject_twin.published(frame.color, 4, movers, **flags)
     blur = [
-        wgmb.Blur("reproject", form="published", samples=4, show=show, **options)
+        wgmb.Blur("reproject", variant="published", samples=4, show=show, **options)
         for show in ("color", "count")
     ]
     agree(blur[0](frame), want)
@@ -351,11 +352,11 @@ def test_published_reprojection_by_cameras_is_its_twin(options, normals):
     want, count = reproject_twin.published(frames[0].color, 3, movers, **flags)
     frame = replace(frames[0], prev=frames[1])
     for show, twin in (("color", want), ("count", count[..., None])):
-        got = wgmb.Blur("reproject", form="published", samples=3, show=show, **options)(frame)
+        got = wgmb.Blur("reproject", variant="published", samples=3, show=show, **options)(frame)
         agree(got if show == "color" else got[..., :1], twin, 0.02)
     if "facing" in options:
         plain = {k: v for k, v in options.items() if k != "facing"}
-        free = wgmb.Blur("reproject", form="published", samples=3, show="count", **plain)(frame)
+        free = wgmb.Blur("reproject", variant="published", samples=3, show="count", **plain)(frame)
         assert free[..., 0].mean() > count.mean() + 0.005
 
 

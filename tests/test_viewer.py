@@ -800,7 +800,7 @@ MANY = State(
     samples=5,
     jitter=0.5,
     max_blur=33.0,
-    options=(("form", "slices"),),
+    options=(("variant", "slices"),),
     shutter=270.0,
     phase="0.1",
     curve="cosine",
@@ -977,10 +977,10 @@ def test_what_cannot_be_opened_is_told(tmp_path):
 
 def test_options_of_the_command_line_reach_the_state():
     state = State().told(
-        {"method": "reproject", "samples": 8, "form": "published", "shutter": 90.0}
+        {"method": "reproject", "samples": 8, "variant": "published", "shutter": 90.0}
     )
     assert (state.method, state.samples, state.shutter) == ("reproject", 8, 90)
-    assert dict(state.options) == {"form": "published"}
+    assert dict(state.options) == {"variant": "published"}
 
 
 def test_a_scene_that_loops_is_there_for_its_whole_loop():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import inspect
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,6 +13,7 @@ import numpy as np
 
 from . import scenes
 from .blur import METHODS
+from .blur.options import options_of
 from .errors import InputError
 from .frame import Frame
 from .measure import measure
@@ -29,7 +29,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Contender:
-    """A method with its options, as the command line writes it: `tap`, `reproject:form=published`.
+    """A method with options as the command line writes it: `tap`, `reproject:variant=published`.
 
     `samples`: its own number at equal samples, `tap:32`; None takes everyone's. `name`: what
     tables call it, if not by method and options. `given`: what it is given of a case's frame.
@@ -146,7 +146,7 @@ def scene_case(
 
 def _halves(reference: Contender, samples: int) -> list[Contender]:
     """The reference as two with half the samples; none where it has no noise, or one sample."""
-    known = inspect.signature(METHODS[reference.method]).parameters
+    known = options_of(METHODS[reference.method].Options)
     if "seed" not in known or samples < 2:
         return []
     options = dict(reference.options)

@@ -44,7 +44,7 @@ def taylor(
     not have been; so the rays a pixel that are as good as reprojection at its best say more
     than the crossing points in time.
     """
-    names = ("distributed", "accumulate", "reproject:form=published", "reproject", "tap")
+    names = ("distributed", "accumulate", "reproject:variant=published", "reproject", "tap")
     contenders = [Contender.parse(name) for name in names]
     claims, fixed, worth = [], [], []
     for name in moves:
@@ -123,7 +123,7 @@ def _worth(report: Report, case: Case, judge: str) -> list[list]:
     rays, times, errors = np.array(
         [(e.samples or 0, e.seconds or 0.0, _error(judge, e.measures[judge])) for e in traced]
     ).T
-    published = report.of(case.name, label="reproject, form published")
+    published = report.of(case.name, label="reproject, variant published")
     least = min(_error(judge, e.measures[judge]) for e in published)
     near = [e for e in published if _error(judge, e.measures[judge]) < 1.02 * least]
     best = min(near, key=lambda e: e.seconds or 0.0)
@@ -154,8 +154,8 @@ def chen(lab: Laboratory, report: Report, size: tuple[int, int], moments: int = 
     if "fusion" not in METHODS:
         raise InputError(f"this experiment needs the method fusion; there is {', '.join(METHODS)}")
     report.samples = 8
-    tap, fusion = (Contender(m, (("form", "published"),)) for m in ("tap", "fusion"))
-    printed = Contender("fusion", (("form", "published"), ("weights", "published")))
+    tap, fusion = (Contender(m, (("variant", "published"),)) for m in ("tap", "fusion"))
+    printed = Contender("fusion", (("variant", "published"), ("weights", "published")))
     both = [tap, fusion, printed, Contender("tap"), Contender("fusion")]
     dive, shutter = scenes.make("scaling"), Shutter(180)
     seconds: dict[str, list[float]] = {c.label: [] for c in both}

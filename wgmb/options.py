@@ -148,7 +148,7 @@ class InputOptions:
         )
 
 
-OWN = ("path", "form", "show", "facing", "depth_test", "splat", "weights", "alpha_front",
+OWN = ("path", "variant", "show", "facing", "depth_test", "splat", "weights", "alpha_front",
        "alpha_back", "tau", "seed")  # fmt: skip
 
 
@@ -171,7 +171,7 @@ class BlurOptions:
     "Longest streak in pixels."
     path: Literal["curved", "straight"] | None = None
     "tap: through the previous and the next place (curved), or along the mean velocity."
-    form: Literal["shutter", "even", "slices", "published"] | None = None
+    variant: Literal["shutter", "even", "slices", "published"] | None = None
     "tap, fusion (shutter), tiles (even), reproject (slices): published is the paper's."
     show: Literal["color", "tiles", "count", "confidence"] | None = None
     "tiles: what each tile follows. reproject: count of samples. gather: confidence."

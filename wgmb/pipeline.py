@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
@@ -13,6 +12,7 @@ import wgpu
 from . import gpu, shader
 from .blur import METHODS
 from .blur.contract import Inputs, PreparedFrame
+from .blur.options import options_of
 from .errors import InputError
 from .frame import PASSES, Frame
 from .frame_views import FrameViews, View, check_view
@@ -71,17 +71,17 @@ class Blur:
             raise InputError(f"max_blur must be 0 or more pixels, got {max_blur}")
         if output not in OUTPUTS:
             raise InputError(f"output must be one of {', '.join(OUTPUTS)}, got {output!r}")
-        known = set(inspect.signature(METHODS[method]).parameters) - {"device", "output"}
-        if unknown := options.keys() - known:
+        known = options_of(METHODS[method].Options)
+        if unknown := options.keys() - known.keys():
             raise InputError(
                 f"method {method!r} has no option {', '.join(sorted(unknown))}; "
-                f"it has {', '.join(sorted(known)) or 'none'}"
+                f"it has {', '.join(known) or 'none'}"
             )
+        self._options = METHODS[method].Options(**options)
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         if samples > (most := most_samples(method, self.device)):
             raise InputError(f"{method} takes 1 to {most} samples without a GPU, got {samples}")
-        self.method = METHODS[method](self.device, output=output, **options)
-        self._options = options
+        self.method = METHODS[method](self.device, self._options, output=output)
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._images = Images(self.device)
         wanted = self.method.needs | self.method.uses
@@ -104,8 +104,8 @@ class Blur:
     @cached_property
     def _judge(self):
         """The method once more, telling how sure it is."""
-        options = self._options | {"show": "confidence"}
-        return METHODS[self.method.name](self.device, output=self.output, **options)
+        options = replace(self._options, show="confidence")
+        return METHODS[self.method.name](self.device, options, output=self.output)
 
     @property
     def shutter(self) -> Shutter:

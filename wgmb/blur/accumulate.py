@@ -8,6 +8,7 @@ import wgpu
 from .. import gpu
 from ..errors import InputError
 from ..images import Images, Scratch
+from .options import MethodOptions
 
 
 class Accumulate:
@@ -23,7 +24,9 @@ class Accumulate:
     needs = frozenset({"scene"})
     uses = frozenset({"progress"})
 
-    def __init__(self, device, *, output="rgba32float"):
+    Options = MethodOptions
+
+    def __init__(self, device, options: MethodOptions, *, output="rgba32float"):
         self._device, self._output = device, output
         self._sums, self._images = Scratch(device), Images(device)
 

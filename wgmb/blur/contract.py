@@ -11,6 +11,7 @@ from .. import gpu
 from ..frame_views import FrameViews, View
 from ..gbuffer import SceneOnGpu
 from ..shutter import Shutter
+from .options import MethodOptions
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,6 +70,11 @@ class Method(Protocol):
     uses: frozenset[str]
     """What it takes if it is there: "neighbours", "depth", "normal"; "progress": its samples may
     be recorded bit by bit."""
+
+    Options: type[MethodOptions]
+    """Its own options; see options.py."""
+
+    def __init__(self, device: wgpu.GPUDevice, options: MethodOptions, *, output: str): ...
 
     def encode(
         self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 import wgpu
 
 from .. import gpu
 from ..images import Scratch
+from .options import MethodOptions, Range
 
 TIMES = 4096  # equal shares of the exposure between which times are interpolated
 
@@ -28,8 +30,14 @@ class Distributed:
     needs = frozenset({"scene"})
     uses = frozenset({"progress"})
 
-    def __init__(self, device, *, output="rgba32float", seed=0):
-        self._device, self._output, self._seed = device, output, seed
+    @dataclass(frozen=True, kw_only=True)
+    class Options(MethodOptions):
+        """Which noise."""
+
+        seed: Annotated[int, Range(0, 2**32 - 1), "another seed is other noise"] = 0
+
+    def __init__(self, device, options: Options, *, output="rgba32float"):
+        self._device, self._output, self._seed = device, output, options.seed
         self._sums = Scratch(device)
         self._times: tuple[object, wgpu.GPUBuffer] | None = None
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
 import numpy as np
 import wgpu
 
 from .. import gpu
 from ..cameras import Camera, Reprojections
-from ..errors import InputError
 from ..images import Images
-
-FORMS = ("shutter", "published")
-WEIGHTS = ("normalised", "published")
+from .options import MethodOptions, Range
 
 
 class Fusion:
@@ -40,10 +40,10 @@ class Fusion:
     "normalised" sum to 1 and follow the text: the trail has the smaller of the two alphas over
     the surface's own as its share (0.04 / 0.08 in front, all of it behind), R(0) the rest; tau
     is 1 unless given, the limit in which all samples weigh alike.
-    `form`: "shutter" spreads the samples over the exposure, at equal shares of it; R(0) is
+    `variant`: "shutter" spreads the samples over the exposure, at equal shares of it; R(0) is
     seen at its middle, and within a streak of 1 px the trail turns into R(0). "published"
     steps over half the way from the previous place, whatever the shutter.
-    A pixel that stands still has no samples (N = 0): it stays as it is, in every form.
+    A pixel that stands still has no samples (N = 0): it stays as it is, in every variant.
     `alpha_front`, `alpha_back`: over 0 and at most 1; the paper tries 0.02 to 0.10.
 
     Strong: as cheap as taps; fast things keep a recognisable leading side. Artefacts: those
@@ -56,28 +56,33 @@ class Fusion:
     uses = frozenset({"normal"})
     samples = 8
 
-    def __init__(
-        self,
-        device,
-        *,
-        output="rgba32float",
-        form="shutter",
-        weights="normalised",
-        alpha_front=0.08,
-        alpha_back=0.04,
-        tau=None,
-    ):
-        if form not in FORMS:
-            raise InputError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
-        if weights not in WEIGHTS:
-            raise InputError(f"weights must be one of {', '.join(WEIGHTS)}, got {weights!r}")
-        tau = tau if tau is not None else 0.5 if weights == "published" else 1.0
-        for name, value in (("alpha_front", alpha_front), ("alpha_back", alpha_back), ("tau", tau)):
-            if not 0 < value <= 1:
-                raise InputError(f"{name} must be over 0 and at most 1, got {value}")
-        self._device, self._output, self._published = device, output, form == "published"
-        self._printed, self._tau = weights == "published", tau
-        self._alphas = alpha_front, alpha_back
+    @dataclass(frozen=True, kw_only=True)
+    class Options(MethodOptions):
+        """Where the samples stand, and what they weigh."""
+
+        variant: Annotated[
+            Literal["shutter", "published"],
+            "samples over the exposure, or from the previous position, whatever the shutter",
+        ] = "shutter"
+        weights: Annotated[Literal["normalised", "published"], "with the sum 1, or as printed"] = (
+            "normalised"
+        )
+        alpha_front: Annotated[
+            float, Range(0, 1, above=True), "factor of faces that lead; more blurs them less"
+        ] = 0.08
+        alpha_back: Annotated[float, Range(0, 1, above=True), "factor of all other faces"] = 0.04
+        tau: Annotated[
+            float | None,
+            Range(0, 1, above=True),
+            "ratio of a sample's weight to that of the next newer one; 1, published: 0.5",
+        ] = None
+
+    def __init__(self, device, options: Options, *, output="rgba32float"):
+        self._device, self._output = device, output
+        self._published = options.variant == "published"
+        self._printed = options.weights == "published"
+        self._tau = options.tau if options.tau is not None else 0.5 if self._printed else 1.0
+        self._alphas = options.alpha_front, options.alpha_back
         self._images = Images(device)
 
     def encode(self, encoder, inputs, output):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
 
 import numpy as np
 import wgpu
@@ -10,8 +11,8 @@ import wgpu
 from .. import gpu, shader
 from ..errors import InputError
 from ..images import Images, Scratch
+from .options import MethodOptions
 
-SHOWN = ("color", "confidence")
 _STORED = 6  # storage textures of one pass: marks, both layers, their surfaces
 
 
@@ -41,16 +42,22 @@ class Gather:
     most_in_software = 512  # loops end there after 65,535 turns, all of a pixel together
     confidence = ("accepted", "disocclusion", "residual", "left")
 
-    def __init__(self, device, *, output="rgba32float", show="color"):
-        if show not in SHOWN:
-            raise InputError(f"show must be one of {', '.join(SHOWN)}, got {show!r}")
+    @dataclass(frozen=True, kw_only=True)
+    class Options(MethodOptions):
+        """What is shown."""
+
+        show: Annotated[
+            Literal["color", "confidence"], "the blurred picture, or how sure it is"
+        ] = "color"
+
+    def __init__(self, device, options: Options, *, output="rgba32float"):
         limit = "max-storage-textures-per-shader-stage"
         if device.limits[limit] < _STORED:
             raise InputError(
                 f"gather writes {_STORED} textures in a pass, this device allows "
                 f"{device.limits[limit]}: request it with required_limits={{{limit!r}: {_STORED}}}"
             )
-        self._device, self._output, self._show = device, output, show
+        self._device, self._output, self._options = device, output, options
         self._images = Images(device)
         self._farthest, self._lists = Scratch(device), Scratch(device)
         self._mixed, self._needed, self._spare = (Scratch(device) for _ in range(3))
@@ -164,7 +171,7 @@ class Gather:
             "blur/gather.wgsl",
             {"Output": self._output},
             WEIGHTED=inputs.frame.weight is not None,
-            CONFIDENCE=self._show == "confidence",
+            CONFIDENCE=self._options.show == "confidence",
             **timed,
         )
         bends = self._bends(encoder, inputs, layers["paths"], places[0], lists["parted"])

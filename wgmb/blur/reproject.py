@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
 
 import numpy as np
 import wgpu
@@ -12,11 +13,9 @@ from ..cameras import Camera, Reprojections
 from ..errors import InputError
 from ..images import Scratch
 from ..velocity import view_of
+from .options import MethodOptions
 
 GOLDEN = (5**0.5 - 1) / 2
-FORMS = ("slices", "published")
-SHOWN = ("color", "count")
-SPLATS = ("point", "line")
 AT_ONCE = 64 << 20  # bytes of depths, or links: how many slices, or steps, are done together
 
 
@@ -27,7 +26,7 @@ class Reproject:
     a depth test in every time slice, moving objects, the GPU. `samples` are time slices.
     Samples come from the frame itself; what they leave open is filled from the neighbouring
     frames, where there are any. Integer atomics alone decide what is seen: the same bits every run.
-    `form`: "published" is the paper's: the previous frame's samples go towards this frame's
+    `variant`: "published" is the paper's: the previous frame's samples go towards this frame's
     camera and back in `samples` steps, are rounded to pixels and counted without a depth test,
     so the exposure is the interval between the two whatever the shutter. Cameras are
     interpolated; where there are vectors, samples follow those. Colour is summed in fixed
@@ -49,29 +48,36 @@ class Reproject:
     needs = frozenset({"color", "motion", "depth"})
     uses = frozenset({"neighbours", "normal"})
 
-    def __init__(
-        self,
-        device,
-        *,
-        output="rgba32float",
-        show="color",
-        form="slices",
-        facing=False,
-        depth_test=False,
-        splat="point",
-    ):
-        if form not in FORMS:
-            raise InputError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
-        if show not in SHOWN:
-            raise InputError(f"show must be one of {', '.join(SHOWN)}, got {show!r}")
-        if splat not in SPLATS:
-            raise InputError(f"splat must be one of {', '.join(SPLATS)}, got {splat!r}")
-        if form != "published" and (facing or depth_test or splat != "point"):
-            raise InputError("facing, depth_test and splat are options of the form 'published'")
-        if depth_test and splat == "line":
-            raise InputError("a line is at many depths: depth_test goes with splat 'point'")
-        self._facing, self._depth_test, self._splat = facing, depth_test, splat
-        self._device, self._output, self._show, self._form = device, output, show, form
+    @dataclass(frozen=True, kw_only=True)
+    class Options(MethodOptions):
+        """The variant, and what the paper names and leaves out."""
+
+        variant: Annotated[
+            Literal["slices", "published"],
+            "with a depth test in every time slice, or the paper's counting",
+        ] = "slices"
+        show: Annotated[
+            Literal["color", "count"],
+            "the blurred picture, or the share of slices that reached a pixel",
+        ] = "color"
+        facing: Annotated[
+            bool, "published: leave out what faces away from the interpolated camera"
+        ] = False
+        depth_test: Annotated[bool, "published: only the nearest of the samples on a pixel"] = False
+        splat: Annotated[
+            Literal["point", "line"], "published: points, or lines between the steps"
+        ] = "point"
+
+        def __post_init__(self):
+            super().__post_init__()
+            published = self.facing or self.depth_test or self.splat != "point"
+            if self.variant != "published" and published:
+                raise InputError("facing, depth_test and splat need the variant 'published'")
+            if self.depth_test and self.splat == "line":
+                raise InputError("a line is at many depths: depth_test needs splat 'point'")
+
+    def __init__(self, device, options: Options, *, output="rgba32float"):
+        self._device, self._output, self._options = device, output, options
         self._nearest, self._winner = Scratch(device), Scratch(device)
         self._hits, self._open = Scratch(device), Scratch(device)
         self._means, self._counts = Scratch(device), Scratch(device)
@@ -79,7 +85,7 @@ class Reproject:
 
     def encode(self, encoder, inputs, output):
         """Record three passes a source for several slices, or two for several steps."""
-        record = self._published if self._form == "published" else self._slices
+        record = self._published if self._options.variant == "published" else self._slices
         record(encoder, inputs, output)
 
     def _slices(self, encoder, inputs, output):
@@ -89,7 +95,7 @@ class Reproject:
             {"Output": self._output},
             EVEN=inputs.even,
             WEIGHTED=inputs.frame.weight is not None,
-            COUNTS=self._show == "count",
+            COUNTS=self._options.show == "count",
         )
         width, height = inputs.given.size
         pixels = width * height
@@ -148,7 +154,7 @@ class Reproject:
         ways: list[tuple[Camera, Camera]] = []
         if camera and camera.prev and camera.here.view_from_world is not None:
             ways = [(camera.here, camera.prev), (camera.prev, camera.here)]
-        if self._facing and not ways:
+        if self._options.facing and not ways:
             raise InputError(
                 "facing needs the cameras of this and the previous frame with view_from_world, "
                 "and no vectors"
@@ -161,11 +167,11 @@ class Reproject:
             {"Output": self._output},
             CAMERA=bool(ways),
             WEIGHTED=inputs.frame.weight is not None,
-            COUNTS=self._show == "count",
-            LINES=self._splat == "line",
-            FACING=self._facing,
+            COUNTS=self._options.show == "count",
+            LINES=self._options.splat == "line",
+            FACING=self._options.facing,
             NORMALS=normals,
-            NEAREST_ONLY=self._depth_test,
+            NEAREST_ONLY=self._options.depth_test,
         )
         width, height = inputs.given.size
         bits = (width - 1).bit_length(), (width - 1).bit_length() + (height - 1).bit_length()
@@ -174,7 +180,7 @@ class Reproject:
             1,
             min(rows - 1, 2 ** (32 - bits[1]) - 2, AT_ONCE // (4 * width * height), inputs.samples),
         )
-        most = 1 if self._depth_test else most
+        most = 1 if self._options.depth_test else most
         shared = {
             "own": inputs.frame.color,
             "heads": self._heads.at_least(4 * width * height),
@@ -211,7 +217,7 @@ class Reproject:
                 color=source.color,
                 motion=source.motion,
                 depth=source.depth,
-                normal=source.normal if self._facing and normals else inputs.none,
+                normal=source.normal if self._options.facing and normals else inputs.none,
                 weight=source.weight or inputs.none,
                 **shared,
             )
@@ -223,15 +229,15 @@ class Reproject:
             times = (-1, 1)[k] * np.append(shares, shares[-1])  # what is one too many ends a line
             for i in range(0, inputs.samples, most):
                 jobs.append((source, times[i : i + most + 1], ways[k] if ways else None))
-        if self._splat == "line":
+        if self._options.splat == "line":
             run("gather", sources[0], shares[:0], None, True, False)
         for i, (source, steps, way) in enumerate(jobs):
-            if self._splat == "line":
+            if self._options.splat == "line":
                 run("lines", source, steps, way, False, False)
             else:
                 run("link", source, steps, way, False, False)
                 run("gather", source, steps, way, i == 0, i == len(jobs) - 1)
-        if self._splat == "line":
+        if self._options.splat == "line":
             run("gather", sources[0], shares[:0], None, False, True)
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from .. import gpu
-from ..errors import InputError
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
-PATHS = ("curved", "straight")
-FORMS = ("shutter", "published")
+from .. import gpu
+from .options import MethodOptions
 
 
 class Tap:
@@ -15,7 +15,7 @@ class Tap:
     Taps stand where equal shares of the exposure have passed, on the path back in time.
     `path`: "curved" goes through the pixel's places in the previous, this and the next
     frame; "straight" takes their mean velocity.
-    `form`: "published" is the chapter's own: velocity is half the difference between this
+    `variant`: "published" is the chapter's own: velocity is half the difference between this
     and the previous position, equal taps go from the pixel along it, the shutter is ignored.
 
     Strong: the cheapest, smooth within a surface. Artefacts: blur stops at the silhouette of
@@ -27,13 +27,23 @@ class Tap:
     uses: frozenset[str] = frozenset()
     adaptive = True
 
-    def __init__(self, device, *, output="rgba32float", path="curved", form="shutter"):
-        if path not in PATHS:
-            raise InputError(f"path must be one of {', '.join(PATHS)}, got {path!r}")
-        if form not in FORMS:
-            raise InputError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
+    @dataclass(frozen=True, kw_only=True)
+    class Options(MethodOptions):
+        """Which path taps follow, and the chapter's own variant."""
+
+        path: Annotated[
+            Literal["curved", "straight"],
+            "through the positions in three frames, or along the mean velocity",
+        ] = "curved"
+        variant: Annotated[
+            Literal["shutter", "published"],
+            "taps over the exposure, or as in the chapter, whatever the shutter",
+        ] = "shutter"
+
+    def __init__(self, device, options: Options, *, output="rgba32float"):
         self._device, self._output = device, output
-        self._constants = {"CURVED": path == "curved", "PUBLISHED": form == "published"}
+        published = options.variant == "published"
+        self._constants = {"CURVED": options.path == "curved", "PUBLISHED": published}
 
     def encode(self, encoder, inputs, output):
         """Record the one pass."""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
 
 import numpy as np
 import wgpu
 
 from .. import gpu
-from ..errors import InputError
 from ..images import Images, Scratch
+from .options import MethodOptions
 
-FORMS = ("even", "published")
-SHOWN = ("color", "tiles")
 LONGEST = (40, 9)  # streak to either side: so many pixels, or the height over this
 
 
@@ -23,7 +22,7 @@ class Tiles:
     Blur Filter" (2014): tile maximum, neighbour maximum, and three weights a tap by motion and
     depth (after McGuire et al. 2012). Times are the shutter's, so that any curve and phase
     holds; a streak reaches at most a tile to either side: 40 px, or a ninth of the height.
-    `form`: "even" divides every weight by what it is under uniform motion, so that there a
+    `variant`: "even" divides every weight by what it is under uniform motion, so that there a
     streak is as even as the exposure; "published" takes them as printed, which makes streaks
     brightest in their middle. Without depth, everything is equally near. `show`: "tiles" gives
     the motion that each tile follows: hue is its direction, full brightness a whole tile.
@@ -37,12 +36,20 @@ class Tiles:
     uses = frozenset({"depth"})
     adaptive = True
 
-    def __init__(self, device, *, output="rgba32float", form="even", show="color"):
-        if form not in FORMS:
-            raise InputError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
-        if show not in SHOWN:
-            raise InputError(f"show must be one of {', '.join(SHOWN)}, got {show!r}")
-        self._device, self._output, self._form, self._show = device, output, form, show
+    @dataclass(frozen=True, kw_only=True)
+    class Options(MethodOptions):
+        """How taps are weighted, and what is shown."""
+
+        variant: Annotated[
+            Literal["even", "published"],
+            "weights divided by those under uniform motion, or as printed",
+        ] = "even"
+        show: Annotated[
+            Literal["color", "tiles"], "the blurred picture, or the motion that each tile follows"
+        ] = "color"
+
+    def __init__(self, device, options: Options, *, output="rgba32float"):
+        self._device, self._output, self._options = device, output, options
         self._images = Images(device)
         self._rows, self._fastest, self._dominant = (Scratch(device) for _ in range(3))
 
@@ -55,8 +62,8 @@ class Tiles:
             EVEN=inputs.even,
             AUTO=inputs.auto,
             WEIGHTED=inputs.frame.weight is not None,
-            PUBLISHED=self._form == "published",
-            TILES=self._show == "tiles",
+            PUBLISHED=self._options.variant == "published",
+            TILES=self._options.show == "tiles",
         )
         look = gpu.kernel(
             self._device, "blur/tiles_moves.wgsl", DEEP=inputs.frame.depth is not None

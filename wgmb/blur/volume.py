@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..figures import RATE
 from ..shutter import Shutter
 from ..volumes import Orbit, Stage, Torus
+from .options import MethodOptions
 
 CLOUD, SHADOW = 1, 2  # what can be in a tile
 
@@ -34,7 +35,9 @@ class Volume:
     needs = frozenset({"scene"})
     uses: frozenset[str] = frozenset()
 
-    def __init__(self, device, *, output="rgba32float"):
+    Options = MethodOptions
+
+    def __init__(self, device, options: MethodOptions, *, output="rgba32float"):
         self._device, self._output = device, output
 
     def encode(self, encoder, inputs, output):

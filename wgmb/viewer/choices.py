@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import wgpu
 
+from ..blur import METHODS
+from ..blur.options import Option, options_of
 from .state import LOOKS, REFERENCE, State
-from .subject import ClipSubject, Option, SceneSubject, Subject, options_of
+from .subject import ClipSubject, SceneSubject, Subject
 
 
 class Choices:
@@ -17,7 +19,6 @@ class Choices:
         self._device = device
         self._scene: SceneSubject | None = None
         self._clip: tuple[tuple, ClipSubject] | None = None
-        self._options: dict[str, dict[str, Option]] = {}
 
     def subject(self, state: State) -> Subject:
         """The scene or the frames that the state is about."""
@@ -34,10 +35,9 @@ class Choices:
         return self.subject(state).methods(state)
 
     def options(self, method: str) -> dict[str, Option]:
-        """The method's own options; see `options_of`."""
-        if method not in self._options:
-            self._options[method] = options_of(self._device, method)
-        return self._options[method]
+        """The method's own options that have a control: words, numbers and switches."""
+        every = options_of(METHODS[method].Options)
+        return {name: option for name, option in every.items() if option.default is not None}
 
     def shows(self, state: State) -> list[str]:
         """What the method can show of its inner life instead of its result."""

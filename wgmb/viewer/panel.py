@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from imgui_bundle import imgui
 
+from ..blur.options import Option
 from . import sections, words
 from .controls import Box
 from .stage import Report
 from .state import State, command_line
-from .subject import Option
 from .widgets import Widgets
 
 WIDTH = 320.0  # of the panel [logical px]

@@ -54,7 +54,7 @@ class State:
     jitter: float = 0.0
     max_blur: float | None = None
     options: tuple[tuple[str, object], ...] = ()
-    """Of the method: path, form, show, seed, ..."""
+    """Of the method: path, variant, show, seed, ..."""
     shutter: float = 180.0
     phase: str = "centre"
     curve: str = "box"

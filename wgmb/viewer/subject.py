@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import inspect
-import typing
 from collections import OrderedDict
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -14,10 +11,9 @@ import wgpu
 
 from .. import gpu, scenes
 from ..blur import METHODS
-from ..errors import InputError
 from ..frame import Frame
 from ..images import Images
-from ..options import OWN, BlurOptions, InputOptions, SceneOptions, size_of
+from ..options import InputOptions, SceneOptions, size_of
 from ..pipeline import Blur
 from ..render import Render
 from ..scene import Scene
@@ -197,40 +193,3 @@ Subject = SceneSubject | ClipSubject
 def methods_for(has: frozenset[str]) -> list[str]:
     """The methods that can be fed with what there is."""
     return [name for name, method in METHODS.items() if method.needs <= has]
-
-
-@dataclass(frozen=True)
-class Option:
-    """What one option of a method is by default, and the words one can choose from."""
-
-    default: Any
-    choices: tuple[str, ...] = ()
-
-
-def options_of(device: wgpu.GPUDevice, method: str) -> dict[str, Option]:
-    """The method's own options, those that the command line has."""
-    kinds = typing.get_type_hints(BlurOptions)
-    found: dict[str, Option] = {}
-    known = inspect.signature(METHODS[method]).parameters
-    for name, parameter in known.items():
-        if name not in OWN:
-            continue
-        forms = _words(kinds["form"]) if "form" in known else ()
-        taken = tuple(w for w in _words(kinds[name]) if _takes(device, method, name, w, forms))
-        if taken or isinstance(parameter.default, (bool, int, float)):
-            found[name] = Option(parameter.default, taken)
-    return found
-
-
-def _words(kind) -> tuple[str, ...]:
-    """Of `Literal[...] | None`."""
-    return tuple(word for part in typing.get_args(kind) for word in typing.get_args(part))
-
-
-def _takes(device, method: str, name: str, word: str, forms: tuple[str, ...]) -> bool:
-    """Whether the option can be `word`, in one of the method's forms at least."""
-    for form in ({}, *({"form": form} for form in forms if name != "form")):
-        with contextlib.suppress(InputError):
-            METHODS[method](device, **{**form, name: word})
-            return True
-    return False
