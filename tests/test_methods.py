@@ -26,6 +26,7 @@ def test_contract(name):
         "name",
         "needs",
         "uses",
+        "Options",
         "encode",
     }
     assert "Artefacts:" in (method.__doc__ or "")

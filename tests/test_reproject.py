@@ -91,7 +91,7 @@ def test_the_nearest_of_a_step_is_seen():
     ({"facing": True}, "variant 'published'"),
     ({"splat": "line"}, "variant 'published'"),
     ({"variant": "published", "splat": "square"}, "splat must be one of point, line"),
-    ({"variant": "published", "splat": "line", "depth_test": True}, "depth_test goes with"),
+    ({"variant": "published", "splat": "line", "depth_test": True}, "depth_test needs splat"),
 ])  # fmt: skip
 def test_options_that_do_not_fit_are_named(options, words):
     with pytest.raises(InputError, match=words):

@@ -16,7 +16,7 @@ from .bodies import Body
 from .camera_file import CameraFile
 from .cameras import Camera, Reprojections
 from .cone import Cone
-from .errors import DeviceError, Error, InputError, ShaderError
+from .errors import DeviceError, Error, GpuMemoryError, InputError, ShaderError
 from .frame import Frame
 from .frame_views import FrameViews
 from .output import Output
@@ -41,6 +41,7 @@ __all__ = [
     "Error",
     "Frame",
     "FrameViews",
+    "GpuMemoryError",
     "InputError",
     "Output",
     "Passes",

@@ -361,7 +361,8 @@ def main(arguments: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, terminal.interrupt)
     signal.signal(signal.SIGINT, terminal.interrupt)  # a shell may have set it to be ignored
     warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
-    logging.getLogger("tifffile").setLevel(logging.CRITICAL)
+    for name in ("tifffile", "wgpu"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         words = sys.argv[1:] if arguments is None else arguments
         app.config = _config(words)

@@ -3,7 +3,8 @@
 Error
 ├── InputError    your arrays, files or options do not fit (also a ValueError)
 ├── ShaderError   a WGSL file could not be read, compiled or bound; says file:line
-└── DeviceError   no adapter, or one that lacks a feature or a limit; says which
+├── DeviceError   no adapter, one that lacks a feature or a limit, or a device that was lost
+└── GpuMemoryError  too little memory on the GPU for one frame; the next one may do
 """
 
 
@@ -20,4 +21,8 @@ class ShaderError(Error):
 
 
 class DeviceError(Error):
-    """No usable GPU adapter, or one that lacks a feature or a limit."""
+    """No usable GPU adapter, or one that lacks a feature or a limit; or its device was lost."""
+
+
+class GpuMemoryError(Error):
+    """Too little memory on the GPU for one frame; smaller ones, and later ones, may do."""

@@ -9,13 +9,14 @@ from __future__ import annotations
 import os
 import re
 import tempfile
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import wgpu
 
 from . import shader
-from .errors import DeviceError, InputError, ShaderError
+from .errors import DeviceError, GpuMemoryError, InputError, ShaderError
 
 SOFTWARE = "CPU"  # adapter_type of lavapipe, SwiftShader, WARP
 _PREFERENCE = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", SOFTWARE)
@@ -70,8 +71,18 @@ def _is_opengl(adapter: wgpu.GPUAdapter) -> bool:
 
 
 def open_device(name: str | None = None) -> wgpu.GPUDevice:
-    """A device of the chosen adapter with all it can do; the same one every time."""
-    return _device(name or os.environ.get("WGMB_ADAPTER") or "")
+    """A device of the chosen adapter with all it can do; the same one every time.
+
+    A new one where the last one was lost.
+    """
+    claim()
+    name = name or os.environ.get("WGMB_ADAPTER") or ""
+    try:
+        _device(name).create_buffer(size=4, usage=wgpu.BufferUsage.COPY_DST)
+    except wgpu.GPUError:
+        _device.cache_clear()
+        _kernel.cache_clear()
+    return _device(name)
 
 
 @cache
@@ -102,22 +113,47 @@ def texel(device: wgpu.GPUDevice, channels: int) -> str:
     return {1: f"r{bits}float", 2: f"rg{bits}float", 4: f"rgba{bits}float"}[channels]
 
 
-_forks = 0
+_process: int | None = None  # the one that has a device
 
 
-def _forked() -> None:
-    global _forks
-    _forks += 1
+def claim() -> None:
+    """Note that this process has a device.
+
+    DeviceError where it was forked from one that has: GPU drivers do not survive a fork.
+    """
+    global _process
+    if _process not in (None, os.getpid()):
+        raise DeviceError(
+            "this process was forked from one that has a GPU device; GPU work needs a process "
+            'that is spawned, or forked before (multiprocessing.get_context("spawn"))'
+        )
+    _process = os.getpid()
 
 
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forked)
+@contextmanager
+def reported(size: tuple[int, int]):
+    """Turn what wgpu raises while it works on a picture of `size` into errors of ours.
+
+    GpuMemoryError names the size. DeviceError: the device was lost; the next `open_device`
+    makes a new one.
+    """
+    try:
+        yield
+    except wgpu.GPUError as error:
+        text = " ".join(str(error).split())
+        if "memory" in text.lower() or isinstance(error, wgpu.GPUOutOfMemoryError):
+            width, height = size
+            raise GpuMemoryError(f"too little GPU memory for {width} x {height} pixels") from None
+        if "lost" in text.lower():
+            _device.cache_clear()
+            _kernel.cache_clear()
+            raise DeviceError(f"the GPU device was lost: {text}") from None
+        raise
 
 
 def submit(device: wgpu.GPUDevice, *encoders: wgpu.GPUCommandEncoder) -> None:
     """Run what was recorded. The one place that submits."""
-    if _forks:
-        raise DeviceError("this process was forked; GPU work needs one that was spawned")
+    claim()
     device.queue.submit([encoder.finish() for encoder in encoders])
 
 

@@ -9,6 +9,7 @@ from .errors import InputError
 from .gpu import check_size, submit
 
 _BAND = 4 << 20  # bytes written at once: five times faster at 4K than all at once
+_READBACK = 256 << 20  # bytes read back at once: a buffer has a limit, and memory is not endless
 _HALF_MAX = 65504.0  # largest finite f16
 _USAGE = wgpu.TextureUsage
 _NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4"}
@@ -101,21 +102,28 @@ class Images:
         kind, channels = numpy_of(texture.format)
         row = width * channels * kind.itemsize
         pitch = -(-row // 256) * 256  # rows in a buffer start at multiples of 256 bytes
-        if self._staging is None or self._staging.size != pitch * height:
+        picture = np.empty((height, width, channels), kind)
+        band = max(1, min(height, _READBACK // pitch))
+        if self._staging is None or self._staging.size != pitch * band:
             usage = wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.MAP_READ
             self._staging = self.device.create_buffer(
-                label="readback", size=pitch * height, usage=usage
+                label="readback", size=pitch * band, usage=usage
             )
-        encoder.copy_texture_to_buffer(
-            {"texture": texture},
-            {"buffer": self._staging, "bytes_per_row": pitch, "rows_per_image": height},
-            (width, height, 1),
-        )
-        submit(self.device, encoder)
-        self._staging.map_sync(wgpu.MapMode.READ)
-        try:
-            data = np.asarray(self._staging.read_mapped(copy=False)).view(np.uint8)
-            rows = data.reshape(height, pitch)[:, :row]
-            return rows.copy().view(kind).reshape(height, width, channels)
-        finally:
-            self._staging.unmap()
+        for top in range(0, height, band):
+            rows = min(band, height - top)
+            if top:
+                encoder = self.device.create_command_encoder(label="readback")
+            encoder.copy_texture_to_buffer(
+                {"texture": texture, "origin": (0, top, 0)},
+                {"buffer": self._staging, "bytes_per_row": pitch, "rows_per_image": rows},
+                (width, rows, 1),
+            )
+            submit(self.device, encoder)
+            self._staging.map_sync(wgpu.MapMode.READ)
+            try:
+                data = np.asarray(self._staging.read_mapped(copy=False)).view(np.uint8)
+                data = data[: pitch * rows].reshape(rows, pitch)[:, :row]
+                picture[top : top + rows] = data.view(kind).reshape(rows, width, channels)
+            finally:
+                self._staging.unmap()
+        return picture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 
 import numpy as np
@@ -74,6 +75,7 @@ class Viewer:
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         self._images, self._sum = Images(self.device), WeightedSum(self.device)
         self._size, self._shown = (0, 0), 0
+        self._lock = threading.RLock()
 
     def look(self, picture: np.ndarray) -> None:
         """Show one more: (height, width, 3 or 4), linear light."""
@@ -86,20 +88,22 @@ class Viewer:
             )
         if channels == 3:
             picture = np.concatenate([picture, np.ones_like(picture[..., :1])], axis=2)
-        self._size = width, height
-        self._images.upload(f"ring {self._shown % self.held}", picture, "rgba16float")
-        self._shown += 1
+        with self._lock, gpu.reported((width, height)):
+            self._size = width, height
+            self._images.upload(f"ring {self._shown % self.held}", picture, "rgba16float")
+            self._shown += 1
 
     def sees(self, after: float = 0.0) -> np.ndarray:
         """(height, width, 4) float32: what is seen `after` [s] the middle of the last picture."""
         if not self._shown:
             raise InputError("nothing was shown yet")
-        count = min(self._shown, self.held)
-        pictures = [
-            self._images.texture(f"ring {number % self.held}", self._size, "rgba16float")
-            for number in range(self._shown - 1, self._shown - 1 - count, -1)
-        ]
-        output = self._images.texture("output", self._size, "rgba32float")
-        encoder = self.device.create_command_encoder(label="perceive")
-        self._sum.encode(encoder, pictures, self.cone.shares(count, self.rate, after), output)
-        return self._images.download(encoder, output)
+        with self._lock, gpu.reported(self._size):
+            count = min(self._shown, self.held)
+            pictures = [
+                self._images.texture(f"ring {number % self.held}", self._size, "rgba16float")
+                for number in range(self._shown - 1, self._shown - 1 - count, -1)
+            ]
+            output = self._images.texture("output", self._size, "rgba32float")
+            encoder = self.device.create_command_encoder(label="perceive")
+            self._sum.encode(encoder, pictures, self.cone.shares(count, self.rate, after), output)
+            return self._images.download(encoder, output)

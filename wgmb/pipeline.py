@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
@@ -43,6 +44,10 @@ class Blur:
     `max_blur`: longest streak [px]; None leaves it free.
     `device`: a wgpu device of yours, the name of an adapter, or None for the best.
     `output`: texel format of the result, rgba32float or rgba16float.
+
+    Several threads may call one Blur: they take turns, as its textures are shared. A Blur for each
+    thread lets them work at the same time. `encode` records and does not wait: whoever encodes
+    from several threads orders the submissions himself.
     """
 
     def __init__(
@@ -78,11 +83,13 @@ class Blur:
                 f"it has {', '.join(known) or 'none'}"
             )
         self._options = METHODS[method].Options(**options)
+        gpu.claim()
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         if samples > (most := most_samples(method, self.device)):
             raise InputError(f"{method} takes 1 to {most} samples without a GPU, got {samples}")
         self.method = METHODS[method](self.device, self._options, output=output)
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
+        self._lock = threading.RLock()
         self._images = Images(self.device)
         wanted = self.method.needs | self.method.uses
         self._residency = Residency(self._images, wanted)
@@ -259,9 +266,9 @@ class Blur:
         """
         frame = color if isinstance(color, Frame) else Frame(color, to_next, **passes)
         self._require(frame.has)
-        output = self._images.texture("output", frame.size, self.output)
-        encoder = self.device.create_command_encoder(label="wgmb")
-        with self._forgetting():
+        with self._working(frame.size):
+            output = self._images.texture("output", frame.size, self.output)
+            encoder = self.device.create_command_encoder(label="wgmb")
             self.encode(encoder, output=output.create_view(), **self._views(frame))
             picture = self._images.download(encoder, output)
         return picture[..., : frame.color.shape[2]].astype("f4", copy=False)
@@ -275,14 +282,14 @@ class Blur:
         names = self.confidence
         self._require(frame.has)
         size, channels = frame.size, frame.color.shape[2]
-        output = self._images.texture("output", size, self.output)
-        sure = self._images.texture("confidence", size, self.output)
-        encoder = self.device.create_command_encoder(label="wgmb")
-        views = {"output": output.create_view(), "confidence": sure.create_view()}
-        with self._forgetting():
+        with self._working(size):
+            output = self._images.texture("output", size, self.output)
+            sure = self._images.texture("confidence", size, self.output)
+            encoder = self.device.create_command_encoder(label="wgmb")
+            views = {"output": output.create_view(), "confidence": sure.create_view()}
             self.encode(encoder, **views, **self._views(frame))
             picture = self._images.download(encoder, output)[..., :channels]
-        told = self._images.download(self.device.create_command_encoder(), sure)
+            told = self._images.download(self.device.create_command_encoder(), sure)
         planes = np.moveaxis(told.astype("f4", copy=False), 2, 0)
         return picture.astype("f4", copy=False), dict(zip(names, planes, strict=True))
 
@@ -290,9 +297,9 @@ class Blur:
         """The motion that methods follow: (height, width, 4) to_prev, to_next [px]."""
         if "motion" not in frame.has:
             raise InputError("there is no motion: give to_next, to_prev, or depth and a camera")
-        encoder = self.device.create_command_encoder(label="wgmb motion")
-        motion = self._images.texture("motion", frame.size, "rgba32float")
-        with self._forgetting():
+        with self._working(frame.size):
+            encoder = self.device.create_command_encoder(label="wgmb motion")
+            motion = self._images.texture("motion", frame.size, "rgba32float")
             views = self._residency.views_of({0: frame})[0]
             self.encode_motion(encoder, views, motion.create_view(), frame.number)
             return self._images.download(encoder, motion)
@@ -310,9 +317,10 @@ class Blur:
 
         They are kept: the next frame's go into the same textures.
         """
-        self._residency.forget()
-        inputs = self._views(frame)
-        self._residency.forget()
+        with self._working(frame.size):
+            self._residency.forget()
+            inputs = self._views(frame)
+            self._residency.forget()
         # These views may be encoded again, and all is to be done again.
         return {
             name: replace(value, key=None) if isinstance(value, FrameViews) else value
@@ -320,13 +328,14 @@ class Blur:
         }
 
     @contextmanager
-    def _forgetting(self):
-        """What was uploaded is uploaded again, if what was recorded may not have been done."""
-        try:
-            yield
-        except BaseException:
-            self._residency.forget()
-            raise
+    def _working(self, size: tuple[int, int]):
+        """One thread at a time; wgpu's errors become ours, and then all is uploaded again."""
+        with self._lock, gpu.reported(size):
+            try:
+                yield
+            except BaseException:
+                self._residency.forget()
+                raise
 
     def _views(self, frame: Frame) -> dict:
         """The frame and the neighbours that the method takes, as keywords of `encode`."""

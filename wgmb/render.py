@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import threading
 import time as clock
 from collections.abc import Callable
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +34,7 @@ class Render:
 
     `size` (width, height) [px]; `fps`: frames per second, what the shutter's times refer to;
     `rays`: antialiasing of the pictures that image methods start from, rays a pixel's side.
+    Several threads may call one Render: they take turns.
     """
 
     def __init__(
@@ -49,6 +52,7 @@ class Render:
         if not 1 <= rays <= MOST_RAYS:
             raise InputError(f"rays must be 1 to {MOST_RAYS}, got {rays}")
         self.scene, self.blur, self.size, self.fps, self.rays = scene, blur, size, fps, rays
+        self._lock = threading.RLock()
         self._images = Images(blur.device)
         self._token = blur.device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._moment: tuple = ()
@@ -59,23 +63,31 @@ class Render:
         self, time: float, number: int = 0, progress: Progress | None = None
     ) -> np.ndarray:
         """(height, width, 4) float32, linear: the frame whose instant is `time` [s]."""
-        output = self._images.texture("output", self.size, self.blur.output)
-        self.draw(output.create_view(), time, number, progress=progress)
-        return self._images.download(self.blur.device.create_command_encoder(), output)
+        with self._working():
+            output = self._images.texture("output", self.size, self.blur.output)
+            self.draw(output.create_view(), time, number, progress=progress)
+            return self._images.download(self.blur.device.create_command_encoder(), output)
+
+    @contextmanager
+    def _working(self):
+        """One thread at a time; wgpu's errors become ours."""
+        with self._lock, gpu.reported(self.size):
+            yield
 
     def with_confidence(
         self, time: float, number: int = 0
     ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """That frame, and how sure the method is of it; see Blur.with_confidence."""
         names = self.blur.confidence
-        textures = [
-            self._images.texture(name, self.size, self.blur.output)
-            for name in ("output", "confidence")
-        ]
-        output, sure = (t.create_view() for t in textures)
-        self.draw(output, time, number, confidence=sure)
-        create = self.blur.device.create_command_encoder
-        picture, told = (self._images.download(create(), t) for t in textures)
+        with self._working():
+            textures = [
+                self._images.texture(name, self.size, self.blur.output)
+                for name in ("output", "confidence")
+            ]
+            output, sure = (t.create_view() for t in textures)
+            self.draw(output, time, number, confidence=sure)
+            create = self.blur.device.create_command_encoder
+            picture, told = (self._images.download(create(), t) for t in textures)
         return picture, dict(zip(names, np.moveaxis(told, 2, 0), strict=True))
 
     def draw(
@@ -179,11 +191,12 @@ class Render:
 
     def frame(self, time: float, number: int = 0) -> Frame:
         """The sharp picture at `time` [s] with its depth, normals, object indices and motion."""
-        camera = self._see(time, number, 0, self.blur).camera
         arrays = {}
-        for name in ("color", "depth", "normal", "object"):
-            encoder = self.blur.device.create_command_encoder(label="download")
-            arrays[name] = self._images.download(encoder, self._pictures[0][name])
+        with self._working():
+            camera = self._see(time, number, 0, self.blur).camera
+            for name in ("color", "depth", "normal", "object"):
+                encoder = self.blur.device.create_command_encoder(label="download")
+                arrays[name] = self._images.download(encoder, self._pictures[0][name])
         return Frame(
             arrays["color"],
             depth=arrays["depth"][..., 0],

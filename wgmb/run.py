@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .errors import Error, InputError
+from .errors import Error, GpuMemoryError, InputError
 from .frame import Frame
 from .output import Output
 from .pipeline import Blur
@@ -201,7 +201,7 @@ def _blur_one(blur: Blur, job: _Job, confidence: bool, report: Report, to_write,
             job.result, job.told = blur.with_confidence(job.frame)
         else:
             job.result = blur(job.frame)
-    except InputError as error:
+    except (InputError, GpuMemoryError) as error:
         fail(job.source.number, InputError(f"{job.source.path}: {error}"))
         return
     if job.frame.bad:
