@@ -1,6 +1,7 @@
 // The article's figures (Cusa 2022): an orbiting disk on a screen and as it is perceived; a turning torus in section.
 // Colours are display values. Positions: 1 is the picture's height, y up, 0 in the middle.
 //#include common/frame.wgsl
+//#include common/loops.wgsl
 //#include scene/density.wgsl
 //#include scene/stage.wgsl
 
@@ -86,14 +87,16 @@ fn panels(p: vec2f, size: vec2f, aspect: f32) -> vec3f {
         let h = disk_half_angle(length(q), figure.small, figure.large);
         let passed = wrapped(ahead_of(q, figure.rotation), 1.0);
         var since = 0.0;
-        for (var k = 0u; k < figure.passes; k++) {
+        let passes = turns_of(figure.passes, bitcast<u32>(p.x));
+        for (var k = 0u; k < passes; k++) {
             let beta = passed + TURN * f32(k);
             since += response((beta + h) / figure.speed) - response((beta - h) / figure.speed);
         }
         seen = select(response((passed + h) / SLOW) - response((passed - h) / SLOW), since, right);
     } else {
         var sum = 0.0;
-        for (var i = 0u; i < figure.ways; i++) {
+        let ways = turns_of(figure.ways, bitcast<u32>(p.x));
+        for (var i = 0u; i < ways; i++) {
             sum += figure.frames[i].y * image(q, figure.frames[i].x, size.y);
         }
         seen = select(image(q, figure.rotation, size.y), sum, right);

@@ -17,7 +17,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let now = instant(view.time);
     var sum = vec3f(0.0);
-    for (var i = 0u; i < scene.rays * scene.rays; i++) {
+    let rays = turns_of(scene.rays * scene.rays, id.x);
+    for (var i = 0u; i < rays; i++) {
         let within = (vec2f(vec2u(i % scene.rays, i / scene.rays)) + 0.5) / f32(scene.rays);
         let ray = camera_ray(vec2f(id.xy) + within, now);
         sum += radiance(nearest(ray, now), ray, now);

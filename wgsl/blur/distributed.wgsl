@@ -1,5 +1,6 @@
 // Distributed ray tracing in time (Cook, Porter, Carpenter 1984): every ray has its own instant.
 //#include common/frame.wgsl
+//#include common/loops.wgsl
 //#include common/shutter.wgsl
 //#include scene/trace.wgsl
 
@@ -24,7 +25,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let shift = random3(id.xy);
     var sum = vec4f(0.0);
     if progress.first > 0u { sum = sums[at]; }
-    for (var i = 0u; i < progress.count; i++) {
+    let count = turns_of(progress.count, id.x);
+    for (var i = 0u; i < count; i++) {
         let point = fract(shift + fract(f32(progress.first + i) * SPREAD));
         let x = vec2f(id.xy) + point.xy;
         let now = instant(time_of(point.z) + dot(shutter.rolling, x / vec2f(frame.size) - 0.5));

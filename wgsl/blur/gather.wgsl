@@ -40,8 +40,7 @@ struct Seen {           // the nearest ones
     second: Sample,     // the silhouette behind that
 }
 
-// lavapipe executes the body of every `if` and of every loop at least once, and that of a `for` once more
-// than it has turns. So loops are left from their end, and what is rare has a loop of its own over bits of times.
+// Loops are left from their end, and what is rare has a loop of its own over bits of times: see docs/lavapipe.md.
 
 @compute @workgroup_size(CELL * TILE, STRIP)
 fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {

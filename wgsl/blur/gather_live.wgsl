@@ -81,7 +81,7 @@ fn near(@builtin(global_invocation_id) id: vec3u) {
 fn list(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let place = group.x * WG_X * WG_Y + local;
     let cells = cells_of(frame.size);
-    // Nothing returns before these loops: where eight at once have returned, lavapipe goes on to 65,535 turns.
+    // Nothing returns before these loops: see docs/lavapipe.md.
     let width = select(0u, cells.x, place < cells.y);
     let row = strand(min(place, cells.y - 1u), cells.y);
     var within = vec2u(0u);         // how many are live, parted, marked

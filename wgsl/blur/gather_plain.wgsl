@@ -1,6 +1,7 @@
 // Where, and when, one opaque surface is all there is to see. Such a time of a pixel needs one search, in the
 // frame itself; most times of most pixels are such.
 //#include common/frame.wgsl
+//#include common/loops.wgsl
 //#include common/shutter.wgsl
 //#include blur/gather_listed.wgsl
 //#include blur/gather_search.wgsl
@@ -30,6 +31,7 @@ fn main(@builtin(local_invocation_index) local: u32,
     let times = times_of(0.5 * vec2f(low + high) + 0.5, 0.0, reach0, reach1, reach2);
     // Jittered pixels have times of their own.
     let count = select(times.count, 0u, frame.jitter > 0.0 || is_still(reach0, reach1, reach2));
+    let samples = turns_of(frame.samples, moving.count);
     var bits = 0u;
     var all_plain = true;
     var i = 0u;
@@ -73,11 +75,11 @@ fn main(@builtin(local_invocation_index) local: u32,
         bits |= u32(is_plain) << (i % AT_ONCE);
         all_plain = all_plain && (is_plain || i >= times.count);
         i++;
-        if i % AT_ONCE == 0u || i >= frame.samples {
+        if i % AT_ONCE == 0u || i >= samples {
             textureStore(plain, id, (i - 1u) / AT_ONCE, vec4u(bits));
             bits = 0u;
         }
-        if i >= frame.samples { break; }
+        if i >= samples { break; }
     }
     textureStore(plain, id, (frame.samples - 1u) / AT_ONCE + 1u, vec4u(u32(all_plain)));
 }

@@ -2,6 +2,7 @@
 // the nearest one is seen (Taylor, extended by the depth test and object motion he left to others).
 //#include common/finite.wgsl
 //#include common/frame.wgsl
+//#include common/loops.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
 
@@ -46,7 +47,8 @@ fn depths(@builtin(global_invocation_id) id: vec3u) {
     let sample = sample_at(id.xy);
     var slices = sample.slices;
     if chunk.source > 0u {
-        for (var k = 0u; k < chunk.count; k++) {
+        let count = turns_of(chunk.count, id.x);
+        for (var k = 0u; k < count; k++) {
             let to = clamp(floor(place(sample, k)) + 1.0, vec2f(0.0), vec2f(frame.size));
             slices &= atomicLoad(&open[block_of(vec2u(to))]) | ~(1u << k);
         }

@@ -3,6 +3,7 @@
 //#include common/camera.wgsl
 //#include common/finite.wgsl
 //#include common/frame.wgsl
+//#include common/loops.wgsl
 //#include common/path.wgsl
 
 struct Step {
@@ -48,7 +49,7 @@ override NEAREST_ONLY: bool = false;    // of the samples on a pixel, the neares
 const STEPS_PER_UNIT: f32 = 16384.0;
 const LARGEST: f32 = 262143.0;      // colour beyond this, and below 0, is held to the range [linear]
 const UNIT: u32 = 1024u;            // what a sample counts that lies on one pixel for a whole step
-const MOST: u32 = 60000u;           // samples in one pixel's list: lavapipe ends loops soon after
+const MOST: u32 = 60000u;           // samples in one pixel's list: loops end soon after, see docs/lavapipe.md
 const ROWS: u32 = 17u;             // steps of a chunk, and one more where a line ends
 const LONGEST: f32 = 4000.0;        // line in one step [px]; beyond it, points have gaps
 
@@ -62,7 +63,7 @@ fn link(@builtin(global_invocation_id) id: vec3u) {
     let shift = chunk.bits.y;
     let index = id.y * frame.size.x + id.x;
     let number = 1u + (id.y << chunk.bits.x) + id.x;
-    let count = select(0u, chunk.steps, sample.counts);
+    let count = select(0u, turns_of(chunk.steps, id.x), sample.counts);
     for (var k = 0u; k < count; k++) {
         let to = vec2i(floor(vec2f(id.xy) + 0.5 + way(sample, k)));
         if any(to < vec2i(0)) || any(to >= size) || turned_away(sample, k) { continue; }
@@ -82,7 +83,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
     var low = vec4u(0u);
     var high = vec4u(0u);
     var count = 0u;
-    let before_first = select(4u, 0u, chunk.first == 1u);   // only loops not entered save time everywhere
+    let before_first = turns_of(select(4u, 0u, chunk.first == 1u), id.x);   // a branch saves nothing, see docs/lavapipe.md
     for (var c = 0u; c < before_first; c++) {
         low[c] = atomicLoad(&sums[4u * at + c]);
         high[c] = atomicLoad(&carries[4u * at + c]);
@@ -111,7 +112,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
         count += UNIT;
     }
     atomicStore(&heads[at], 0u);
-    let after_last = select(4u, 0u, chunk.last == 1u);
+    let after_last = turns_of(select(4u, 0u, chunk.last == 1u), id.x);
     for (var c = 0u; c < after_last; c++) {
         atomicStore(&sums[4u * at + c], low[c]);
         atomicStore(&carries[4u * at + c], high[c]);
@@ -133,7 +134,7 @@ fn lines(@builtin(global_invocation_id) id: vec3u) {
     let sample = sample_at(id.xy);
     let value = fixed(id.xy);
     let x = vec2f(id.xy) + 0.5;
-    let count = select(0u, chunk.steps, sample.counts);
+    let count = select(0u, turns_of(chunk.steps, id.x), sample.counts);
     for (var k = 0u; k < count; k++) {
         let start = x + way(sample, k);
         let along = x + way(sample, k + 1u) - start;     // the last step of all ends where it begins

@@ -24,7 +24,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if !CURVED { path.curvature = vec2f(0.0); }
     if PUBLISHED { path = Path(-textureLoad(motion, id.xy, 0).xy, vec2f(0.0)); }
 
-    // A loop that ends early is the only branch that saves time on every driver.
+    // A branch saves nothing, a loop that ends early does: see docs/lavapipe.md.
     let shift = frame.jitter * (pixel_noise(id.xy) - 0.5);
     let all = shutter_times(x, shift);
     let opens = shutter.span.x + all.delay;

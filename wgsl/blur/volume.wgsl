@@ -7,8 +7,7 @@
 @group(1) @binding(2) var<storage, read> tiles: array<vec2u>;  // the workgroups' places in the picture
 @group(1) @binding(3) var output: Output;
 
-// A loop costs lavapipe one turn even where it has none, and branches save nothing: so it is told
-// beforehand which tiles a volume, or a shadow, can be in.
+// It is told beforehand which tiles a volume, or a shadow, can be in: branches save nothing, see docs/lavapipe.md.
 override CLOUD: bool = true;
 override SHADOW: bool = true;
 

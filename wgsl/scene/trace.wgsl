@@ -1,5 +1,6 @@
 // What a ray meets among rigid bodies at an instant, and the light that comes from there.
 //#include common/frame.wgsl
+//#include common/loops.wgsl
 //#include scene/pattern.wgsl
 //#include scene/stage.wgsl
 
@@ -93,14 +94,13 @@ fn camera_ray(x: vec2f, now: Instant) -> Ray {
 }
 
 /// Poses are dear to fetch and a ray passes near few bodies: so the bounds sift the bodies
-/// first, 32 at a time with a bit each. On lavapipe only fewer turns of a loop save time, not branches;
-/// left from their end, loops take no turn for nothing.
+/// first, 32 at a time with a bit each. For the form of the loops see docs/lavapipe.md.
 fn nearest(ray: Ray, now: Instant) -> Hit {
     var hit = Hit(FAR, 0u, Pose());
     let boxes = scene.spheres;
     let cylinders = boxes + scene.boxes;
     let rings = cylinders + scene.cylinders;
-    let end = scene.bodies;
+    let end = turns_of(scene.bodies, bitcast<u32>(ray.direction.x));
     var first = 0u;
     loop {
         var near = sift(first, min(end - first, 32u), ray);
