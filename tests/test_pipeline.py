@@ -62,14 +62,14 @@ def test_a_picture_too_large_for_the_adapter_is_refused(device):
 
 
 def test_a_blur_is_used_again_for_other_sizes(noise):
-    blur = wgmb.Blur()
+    blur = wgmb.Blur("tap")
     for picture in (noise, noise[:30, :41], noise[:30, :41, :3], noise):
         frame = wgmb.Frame(picture, motion(size=picture.shape[:2]))
         assert np.array_equal(blur(frame), wgmb.blur(picture, frame.to_next))
 
 
 def test_the_shutter_is_changed_between_frames(noise):
-    blur = wgmb.Blur(shutter=0)
+    blur = wgmb.Blur("tap", shutter=0)
     assert np.array_equal(blur(noise, motion()), noise)
     blur.shutter = wgmb.Shutter(360, curve="cosine")
     want = wgmb.blur(noise, motion(), shutter=wgmb.Shutter(360, curve="cosine"))
@@ -77,7 +77,7 @@ def test_the_shutter_is_changed_between_frames(noise):
 
 
 def test_two_blurs_do_not_disturb_each_other(noise):
-    a, b = wgmb.Blur(samples=3), wgmb.Blur(samples=40, shutter=360)
+    a, b = wgmb.Blur("tap", samples=3), wgmb.Blur("tap", samples=40, shutter=360)
     first = a(noise, motion()), b(noise, motion())
     second = b(noise, motion()), a(noise, motion())
     assert np.array_equal(first[0], second[1])
@@ -95,7 +95,7 @@ def test_encode_in_your_own_frame_is_the_same_as_arrays(noise, output):
     images = Images(device)
     rgba = np.concatenate([noise, np.ones_like(noise[..., :1])], axis=2).astype("f2")
     texture = images.texture("mine", (64, 48), output)
-    blur = wgmb.Blur(device=device, output=output)
+    blur = wgmb.Blur("tap", device=device, output=output)
     encoder = device.create_command_encoder()
     frame = FrameViews(
         color=images.upload("color", rgba, "rgba16float"),
@@ -117,7 +117,7 @@ def test_a_device_that_cannot_filter_f32_does_with_f16(noise):
 
 
 def test_work_is_recorded_but_not_submitted(noise, monkeypatch):
-    blur = wgmb.Blur()
+    blur = wgmb.Blur("tap")
     images = Images(blur.device)
     output = images.texture("o", (64, 48), "rgba32float").create_view()
     color = images.upload("c", np.ones((48, 64, 4), "f4"), "rgba32float")
@@ -170,7 +170,7 @@ def test_a_passes_time_is_told_by_its_name(noise):
     """Software adapters' clocks lie, so only the names are looked at here."""
     from wgmb.timing import Timing
 
-    blur = wgmb.Blur()
+    blur = wgmb.Blur("tap")
     timing = Timing(blur.device)
     images = Images(blur.device)
     encoder = blur.device.create_command_encoder()
@@ -231,7 +231,7 @@ def test_the_device_is_the_same_one_every_time():
     ],
 )
 def test_encode_refuses_what_does_not_fit_together(inputs, words):
-    blur = wgmb.Blur()
+    blur = wgmb.Blur("tap")
     images, encoder = Images(blur.device), blur.device.create_command_encoder()
     inputs = {"color": (64, 48), "output": (64, 48), **inputs}
     views = {
@@ -246,7 +246,7 @@ def test_encode_refuses_what_does_not_fit_together(inputs, words):
 @pytest.mark.parametrize("shutter", ["abc", None])
 def test_a_shutter_that_is_no_number_is_named(shutter):
     with pytest.raises(InputError, match="shutter"):
-        wgmb.Blur(shutter=shutter)
+        wgmb.Blur("tap", shutter=shutter)
 
 
 def test_a_picture_of_many_bands_comes_back_as_it_was(device):

@@ -216,7 +216,7 @@ def test_a_missing_layer_is_refused_with_the_files_name_once(shot, passes):
 def camera_motion(pattern, camera, number=2, **more):
     clip = Clip(pattern, frames=str(number), passes=Passes(camera=camera, **more))
     (frame,) = clip
-    return Blur().motion(frame)
+    return Blur("tap").motion(frame)
 
 
 def per_unit(depth: float) -> float:
@@ -310,7 +310,7 @@ def test_every_frame_is_what_the_library_makes_of_it(tmp_path, capsys, shot):
     code, out, _ = run(capsys, shot, tmp_path, "--method", "tap", "--samples", 8, "--frames", "2-4")
     assert (code, out) == (0, "")
     assert make.names_in(tmp_path) == [f"b.{n:04d}.exr" for n in (2, 3, 4)]
-    blur = Blur(samples=8)
+    blur = Blur("tap", samples=8)
     for n in (2, 3, 4):
         got = make.plain_read(tmp_path / f"b.{n:04d}.exr")
         color = make.picture(n).astype("f2")

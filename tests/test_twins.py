@@ -425,6 +425,8 @@ def test_velocity_is_its_twin(close, size, kind, orthographic, more):
     frame = wgmb.Frame(
         np.zeros((*size, 3), "f4"), depth=depth, camera=around, object_id=ids, **inputs
     )
-    blur = wgmb.Blur(shutter=Shutter(216, "start"), max_blur=3.0 if more == "limit" else None)
+    blur = wgmb.Blur(
+        "tap", shutter=Shutter(216, "start"), max_blur=3.0 if more == "limit" else None
+    )
     got = blur.motion(frame)
     close(got / (1 + np.abs(want)), want / (1 + np.abs(want)), TOLERANCE)

@@ -18,7 +18,7 @@ def motion(depth, here, prev=None, next_=None, ids=None, **options):
         object_id=ids,
         camera=Reprojections(here, prev, next_, **options),
     )
-    found = wgmb.Blur().motion(frame)
+    found = wgmb.Blur("tap").motion(frame)
     return found[..., :2], found[..., 2:]
 
 
@@ -125,7 +125,7 @@ def test_a_cut_out_window_moves_like_its_part_of_the_whole():
         depth=np.full((10, 12), 5, "f4"),
         camera=Reprojections(here, None, there, window=(30, 7, SIZE[1], SIZE[0])),
     )
-    part = wgmb.Blur().motion(frame)[..., 2:]
+    part = wgmb.Blur("tap").motion(frame)[..., 2:]
     np.testing.assert_allclose(part, whole[7:17, 30:42], atol=1e-4)
 
 
@@ -147,7 +147,7 @@ def test_vectors_come_before_the_camera_but_the_sky_follows_it():
     depth[:, :10] = 1e10
     around = Reprojections(STILL, None, camera((0, 0, 0), yaw=0.05))
     frame = wgmb.Frame(np.zeros((*SIZE, 3), "f4"), given_vectors(3.0), depth=depth, camera=around)
-    got = wgmb.Blur().motion(frame)[..., 2:]
+    got = wgmb.Blur("tap").motion(frame)[..., 2:]
     np.testing.assert_array_equal(got[:, 10:], 3)
     want = motion(np.inf, STILL, None, camera((0, 0, 0), yaw=0.05))[1]
     np.testing.assert_allclose(got[:, :10], want[:, :10], atol=1e-4)
@@ -158,7 +158,7 @@ def test_object_motion_is_added_to_the_cameras():
     depth = np.full(SIZE, 5, "f4")
     frame = wgmb.Frame(np.zeros((*SIZE, 3), "f4"), given_vectors(3.0), depth=depth, camera=around,
                        object_motion=True)  # fmt: skip
-    got = wgmb.Blur().motion(frame)[..., 2:]
+    got = wgmb.Blur("tap").motion(frame)[..., 2:]
     want = motion(5.0, STILL, None, camera((0.1, 0, 0)))[1] + 3
     np.testing.assert_allclose(got, want, atol=1e-4)
 
@@ -189,7 +189,7 @@ def test_a_matrix_must_be_finite_and_4_by_4(matrix):
 
 def test_the_longest_streak_is_limited_on_the_way_out_and_back():
     """6.25 px out and back within the exposure; its ends are in one place."""
-    blur = wgmb.Blur(max_blur=1.0)
+    blur = wgmb.Blur("tap", max_blur=1.0)
     got = blur.motion(
         wgmb.Frame(PICTURE, given_vectors((100, 0)), to_prev=given_vectors((100, 0)))
     )[0, 0]
@@ -200,7 +200,7 @@ def test_the_longest_streak_is_limited_on_the_way_out_and_back():
 def test_no_motion_is_too_large_to_be_limited(phase):
     forth = given_vectors((6, 2))
     forth[20, 30, 0] = 3e38
-    blur = wgmb.Blur(shutter=Shutter(180, phase), max_blur=5.0)
+    blur = wgmb.Blur("tap", shutter=Shutter(180, phase), max_blur=5.0)
     got = blur.motion(wgmb.Frame(PICTURE, forth, to_prev=-forth))[20, 30]
     assert np.abs(got).max() <= 10
 
@@ -212,8 +212,8 @@ def test_no_depth_makes_motion_bad(kind, value):
     frame = wgmb.Frame(
         PICTURE, depth=depth, camera=Reprojections(STILL, STILL, STILL, depth_kind=kind)
     )
-    assert np.isfinite(wgmb.Blur().motion(frame)).all()
-    assert np.array_equal(wgmb.Blur()(frame), PICTURE)
+    assert np.isfinite(wgmb.Blur("tap").motion(frame)).all()
+    assert np.array_equal(wgmb.Blur("tap")(frame), PICTURE)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -225,7 +225,7 @@ def test_bad_motion_stands_still(where, bad):
         "scale": np.ones(SIZE, "f4"),
     }
     inputs[where][20, 30] = bad
-    got = wgmb.Blur().motion(wgmb.Frame(PICTURE, **inputs))
+    got = wgmb.Blur("tap").motion(wgmb.Frame(PICTURE, **inputs))
     assert not got[20, 30].any()
     assert np.isfinite(got).all()
 
@@ -233,7 +233,7 @@ def test_bad_motion_stands_still(where, bad):
 @pytest.mark.parametrize("phase", ["start", "centre", "end"])
 @pytest.mark.parametrize("degrees", [90, 360])
 def test_the_limit_is_of_the_streak_while_the_shutter_is_open(degrees, phase):
-    blur = wgmb.Blur(shutter=Shutter(degrees, phase), max_blur=5.0)
+    blur = wgmb.Blur("tap", shutter=Shutter(degrees, phase), max_blur=5.0)
     got = blur.motion(wgmb.Frame(PICTURE, given_vectors((400, 300))))[..., 2:]
     length = np.hypot(*got[0, 0]) * degrees / 360
     assert length == pytest.approx(5, rel=1e-5)
@@ -241,6 +241,6 @@ def test_the_limit_is_of_the_streak_while_the_shutter_is_open(degrees, phase):
 
 def test_the_limit_follows_a_bent_path_as_the_shutter_sees_it():
     """From 0 to 1 of this path are (20, 0) px, whatever it did before."""
-    blur = wgmb.Blur(shutter=Shutter(360, "start"), max_blur=5.0)
+    blur = wgmb.Blur("tap", shutter=Shutter(360, "start"), max_blur=5.0)
     got = blur.motion(wgmb.Frame(PICTURE, given_vectors((20, 0)), to_prev=given_vectors(0)))
     np.testing.assert_allclose(got[0, 0], (0, 0, 5, 0), atol=1e-4)

@@ -153,7 +153,9 @@ def test_every_method_and_scene_can_be_chosen(hand):
 @pytest.mark.parametrize("tone", ["clip", "soft"])
 def test_exposure_and_tone(hand, tone):
     hand.viewer.state = replace(PLAIN, exposure=1.5, tone=tone, look="sharp")
-    light = Render(scenes.make("crossing"), Blur(samples=4), size=(320, 180), rays=1).frame(0.0)
+    light = Render(scenes.make("crossing"), Blur("tap", samples=4), size=(320, 180), rays=1).frame(
+        0.0
+    )
     want = light.color[..., :3] * 2**1.5
     want = want / (1 + want) if tone == "soft" else want
     assert np.abs(hand.picture() - stills.srgb(want)).max() < 2e-3
@@ -162,7 +164,7 @@ def test_exposure_and_tone(hand, tone):
 def test_velocity_has_the_colours_of_display(hand):
     hand.viewer.state = replace(PLAIN, look="velocity")
     shown = hand.picture()
-    render = Render(scenes.make("crossing"), Blur(), size=(320, 180), rays=1)
+    render = Render(scenes.make("crossing"), Blur("tap"), size=(320, 180), rays=1)
     motion = render.blur.motion(render.frame(0.0))[..., 2:]
     want = stills.srgb(display.motion_colors(motion, PLAIN.fastest * 180))
     apart = np.abs(shown - want).max(axis=2)
@@ -175,7 +177,7 @@ def test_velocity_has_the_colours_of_display(hand):
 def test_depth_is_grey_and_nearer_is_brighter(hand):
     hand.viewer.state = replace(PLAIN, look="depth")
     shown = hand.picture()
-    depth = Render(scenes.make("crossing"), Blur(), size=(320, 180), rays=1).frame(0.0).depth
+    depth = Render(scenes.make("crossing"), Blur("tap"), size=(320, 180), rays=1).frame(0.0).depth
     want = np.where(np.isfinite(depth), 5 / (5 + depth), 0)
     apart = np.abs(shown - want[..., None])
     apart[150:, :160] = 0  # the legend
@@ -612,7 +614,7 @@ def test_the_reference_converges_and_is_measured(hand, monkeypatch):
         if (found := hand.viewer.stage.report.measured) and found.samples >= 128:
             break
     assert rays == sorted(rays) and len(set(rays)) > 3
-    render = Render(scenes.make("crossing"), Blur(samples=4), size=(320, 180), rays=1)
+    render = Render(scenes.make("crossing"), Blur("tap", samples=4), size=(320, 180), rays=1)
     truth = Render(
         render.scene, Blur("distributed", samples=found.samples), size=(320, 180), rays=1
     )(at, 7)  # fmt: skip
@@ -875,7 +877,7 @@ def test_screenshot_and_recording(hand, tmp_path, monkeypatch):
     hand.press("s")
     assert np.abs(iio.imread("wgmb-001.png") / 255 - shown).max() < 0.01
     whole = exr.read(Path("wgmb-001.exr")).parts[0]
-    want = Render(scenes.make("crossing"), Blur(samples=4), size=(320, 180), rays=1)(0.0)
+    want = Render(scenes.make("crossing"), Blur("tap", samples=4), size=(320, 180), rays=1)(0.0)
     assert np.abs(whole.channels["R"].astype("f4") - want[..., 0]).max() < 2e-3
     hand.press("v")
     for _ in range(3):
@@ -907,7 +909,7 @@ def reel():
 
 
 def test_frames_on_disk_are_blurred_as_the_library_does(reel):
-    want = Blur(samples=4)(next(iter(Clip(SAMPLE))))
+    want = Blur("tap", samples=4)(next(iter(Clip(SAMPLE))))
     reel.viewer.state = replace(reel.state, frame=9.0)
     reel.picture()
     got = reel.viewer.stage.download()[..., :3]
@@ -919,7 +921,7 @@ def test_frames_on_disk_are_perceived_too(reel):
     reel.viewer.state = replace(state, look="perceived", frame=11.0)
     reel.picture()
     got = stills.srgb(np.clip(reel.viewer.stage.download()[..., :3], 0, 1))
-    blur = Blur(samples=4)
+    blur = Blur("tap", samples=4)
     assert np.abs(got - seen([blur(frame)[..., :3] for frame in Clip(SAMPLE)], 24.0)).max() < 4e-3
     reel.viewer.state = state
 

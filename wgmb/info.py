@@ -54,7 +54,7 @@ def _about_motion(clip: Clip, source: Source, output: Path | None) -> list[tuple
         if output:
             raise InputError(f"{source.path}: no motion to draw: no vectors, no camera")
         return lines
-    motion = Blur().motion(frame)[..., 2:]
+    motion = Blur("tap").motion(frame)[..., 2:]
     speed = np.hypot(motion[..., 0], motion[..., 1])
     half, most, nearly, fastest = np.percentile(speed, (50, 90, 99, 100))
     lines.append((

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from . import scenes, sequence, shutter, vectors
-from .blur import METHODS
+from .blur import METHODS, default_method
 from .cases import Case, Contender
 from .cone import Cone
 from .errors import InputError
@@ -194,7 +194,7 @@ class BlurOptions:
 
     def settled(self, scene: Scene | None = None, clip: sequence.Clip | None = None) -> BlurOptions:
         """With a method that suits the scene or what the files hold, if it was left open."""
-        suited = "tap" if clip is not None and not clip.has >= {"motion", "depth"} else "gather"
+        suited = "gather" if clip is None else default_method(clip.has)
         if scene is not None and scene.has_volumes:
             suited = "volume"
         return replace(self, method=self.method or suited)
@@ -206,7 +206,7 @@ class BlurOptions:
             name: value for name, value in own.items() if value is not None and value is not False
         }
         return Blur(
-            self.method or "tap",
+            self.method or default_method({"motion", "depth"}),
             shutter=shutter_,
             samples=self.samples,
             jitter=self.jitter,

@@ -11,7 +11,7 @@ import numpy as np
 import wgpu
 
 from . import gpu, shader
-from .blur import METHODS
+from .blur import METHODS, default_method
 from .blur.contract import Inputs, PreparedFrame
 from .blur.options import options_of
 from .errors import InputError
@@ -52,7 +52,7 @@ class Blur:
 
     def __init__(
         self,
-        method: str = "tap",
+        method: str,
         *,
         shutter: Shutter | float = 180,
         samples: int | str | None = None,
@@ -376,15 +376,19 @@ def blur(
     color: np.ndarray,
     to_next: np.ndarray | None = None,
     *,
-    method: str = "tap",
+    method: str | None = None,
     shutter: Shutter | float = 180,
     samples: int | str | None = None,
     **more,
 ) -> np.ndarray:
     """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.
 
-    `more` are the passes of Frame (to_prev, depth, camera, keep, ...) and the options of
-    Blur (jitter, max_blur, device, and those of the method).
+    `method`: a name in METHODS; None is gather where there is depth, else tap. `more` are the
+    passes of Frame (to_prev, depth, camera, keep, ...) and the options of Blur (jitter,
+    max_blur, device, and those of the method).
     """
     passes = {name: more.pop(name) for name in PASSES if name in more}
-    return Blur(method, shutter=shutter, samples=samples, **more)(color, to_next, **passes)
+    frame = Frame(color, to_next, **passes)
+    return Blur(method or default_method(frame.has), shutter=shutter, samples=samples, **more)(
+        frame
+    )

@@ -126,7 +126,7 @@ def _nature(name: str, given: InputOptions, who: PerceptionOptions, fps: float, 
     rate = fps * steps
     renderer = Render(
         scenes.make(name, **settings_of(who.set)),
-        Blur(device=adapter),
+        Blur("tap", device=adapter),
         size=size_of(who.size),
         fps=fps,
     )

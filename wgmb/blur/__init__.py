@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from .accumulate import Accumulate
 from .distributed import Distributed
 from .fusion import Fusion
@@ -13,3 +15,8 @@ from .volume import Volume
 
 _ALL = (Tap, Tiles, Gather, Fusion, Reproject, Volume, Accumulate, Distributed)
 METHODS: dict[str, type] = {m.name: m for m in _ALL}
+
+
+def default_method(has: Collection[str]) -> str:
+    """The method for frames that have colour and these inputs: gather where it can be, else tap."""
+    return Gather.name if Gather.needs <= {"color", *has} else Tap.name

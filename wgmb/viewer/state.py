@@ -48,7 +48,7 @@ class State:
     rays: int = 2
     fps: float = 24.0
 
-    method: str = "tap"
+    method: str = "gather"
     samples: int | str | None = None
     """A number, "auto", or None for what the method has by default."""
     jitter: float = 0.0
@@ -134,7 +134,7 @@ class State:
         scene = scenes.make(self.source) if self.is_scene else None
         when = ShutterOptions().settled(scene, self.fps)
         volumes = scene is not None and scene.has_volumes
-        method = "volume" if volumes else "tap"  # quick; `wgmb render` takes gather
+        method = "volume" if volumes else "gather"  # where frames have no depth: tap
         return {"method": method, "shutter": when.shutter, "curve": when.curve}
 
     def settled(self) -> State:

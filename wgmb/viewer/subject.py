@@ -31,7 +31,7 @@ class SceneSubject:
     """A built-in scene: any size, any moment, every method that it has what to show for."""
 
     def __init__(self, device: wgpu.GPUDevice):
-        self._render = Render(scenes.make(next(iter(scenes.SCENES))), Blur(device=device))
+        self._render = Render(scenes.make(next(iter(scenes.SCENES))), Blur("tap", device=device))
         self._seen: tuple = ()
         self._made = self._render.scene
 
@@ -103,7 +103,7 @@ class ClipSubject:
         masks = given.pop("keep", None), given.pop("scale", None)
         self._clip = InputOptions(**given).open(state.source, *masks)
         self._frames: OrderedDict[int, Frame] = OrderedDict()
-        self._sharp = Blur(device=device)
+        self._sharp = Blur("tap", device=device)
         self._number = self._clip.numbers[0]
         self._uploaders: dict[tuple, Blur] = {}
         self._uploaded: dict[tuple, tuple[int, dict]] = {}
