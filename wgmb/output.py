@@ -47,7 +47,9 @@ def temporary_name(path: Path) -> Path:
 class Output:
     """Where results go: a pattern of pictures, one picture, or a video.
 
-    `settings`: written into every file, and compared when a run is resumed.
+    `settings`: written into every file, and compared when a run is resumed. `layers`: "all" that
+    an EXR input holds go into the EXR output, or those of the "picture" only. `compression` of
+    EXR: a name in exr.COMPRESSIONS, or "same" as the input's.
     """
 
     def __init__(
@@ -60,7 +62,11 @@ class Output:
         fps: Fraction = Fraction(24),
         overwrite: bool = False,
         resume: bool = False,
+        layers: str = "all",
+        compression: str = "zip",
     ):
+        _check_exr_options(pattern, layers, compression)
+        self._layers, self._compression = layers, compression
         self.pattern, self.bits, self.numbers = Path(pattern), bits, numbers
         self.settings = json.dumps(settings or {}, sort_keys=True)
         suffix = self.pattern.suffix.lower()
@@ -143,7 +149,8 @@ class Output:
             return
         path = self.path(source.number)
         if path.suffix.lower() == ".exr":
-            data = exr.encode(_with_result(source, result, self.settings, layers))
+            content = _with_result(source, result, self.settings, layers, self._layers == "picture")
+            data = exr.encode(content, self._compression)
         else:
             data = stills.encode(result, path.suffix, self.bits, self.settings)
         replace_file(path, data)
@@ -168,10 +175,25 @@ class Output:
                 temporary_name(self.path(number)).unlink(missing_ok=True)
 
 
+def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> None:
+    if layers not in ("all", "picture"):
+        raise InputError(f"layers must be all or picture, got {layers!r}")
+    exr.check_compression(compression)
+    if compression != "zip" and Path(pattern).suffix.lower() != ".exr":
+        raise InputError(f"compression {compression} is for an .exr output, got {pattern}")
+
+
 def _with_result(
-    source: Source, result: np.ndarray, settings: str, layers: Mapping[str, np.ndarray]
+    source: Source,
+    result: np.ndarray,
+    settings: str,
+    layers: Mapping[str, np.ndarray],
+    only_picture: bool,
 ) -> exr.Exr:
-    """The source's file with the picture replaced, layers and the settings added."""
+    """The source's file with the picture replaced, layers and the settings added.
+
+    `only_picture`: without all other layers, and without what describes Cryptomattes.
+    """
     more = {name: exr.to_half(plane) for name, plane in layers.items()}
     if source.file is None:
         made = exr.new(result, {SETTINGS: settings})
@@ -182,8 +204,8 @@ def _with_result(
         replace(p, channels=dict(p.channels), attributes=dict(p.attributes))
         for p in source.file.parts
     ]
-    parts[0].attributes[SETTINGS] = settings
     twins = dict(zip(map(id, source.file.parts), parts, strict=True))
+    home = twins[id(source.part)]
     for full, part, name in source.file.places():
         if full in new:
             kind = part.channels[name].dtype
@@ -191,5 +213,12 @@ def _with_result(
             twins[id(part)].channels[name] = (
                 exr.to_half(new[full]) if half else new[full].astype(kind)
             )
-    twins[id(source.part)].channels |= more
+        elif only_picture:
+            del twins[id(part)].channels[name]
+    home.channels |= more
+    if only_picture:
+        for name in [n for n in home.attributes if n.startswith("cryptomatte/")]:
+            del home.attributes[name]
+        parts = [home]
+    parts[0].attributes[SETTINGS] = settings
     return exr.Exr(source.path, parts)

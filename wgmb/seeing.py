@@ -92,6 +92,8 @@ def perceive(
         bits=output.bits,
         fps=output.rate,
         overwrite=output.overwrite,
+        layers=output.layers,
+        compression=output.compression,
     )
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     started = time.perf_counter()

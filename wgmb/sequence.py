@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import layers, stills, vectors
+from . import layers, limits, stills, vectors
 from .cameras import CameraFile
 from .cuts import is_cut, jumps, straightened
 from .errors import InputError
@@ -66,7 +66,7 @@ class Clip:
     """A frame sequence, or one picture, being read.
 
     Iterating gives Frames. `finding` says what the vectors were found to mean; `cuts` has the
-    frames read so far that come after a camera cut.
+    frames read so far that come after a camera cut, `sizes` how large those read so far are.
     """
 
     def __init__(
@@ -76,10 +76,13 @@ class Clip:
         frames: str | None = None,
         passes: Passes | None = None,
         skip_missing: bool = False,
+        max_mb: float = limits.MAX_MB,
     ):
         """`frames`: "1-100x2", "1,3,5-8"; all that exist by default, and none may be missing
-        between them unless `skip_missing`.
+        between them unless `skip_missing`. `max_mb`: megabytes that a file may unpack to.
         """
+        self._max_mb = max_mb
+        self.sizes: dict[int, tuple[int, int]] = {}
         self.pattern, self.passes = str(pattern), passes or Passes()
         self.numbers = self._numbers(frames, skip_missing)
         self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
@@ -134,7 +137,8 @@ class Clip:
             while len(self._kept) > 2:
                 self._kept.popitem(last=False)
             paths = [frame_path(p, number) for p in (self.pattern, *self.passes.also)]
-            self._kept[number] = read(paths, number, self.passes.color)
+            self._kept[number] = source = read(paths, number, self.passes.color, self._max_mb)
+            self.sizes[number] = source.whole
         return self._kept[number]
 
     def forget(self, number: int) -> None:
@@ -301,10 +305,12 @@ class Clip:
             return layers.mask(source.channels, source.attributes, wanted)
         file = frame_path(wanted, source.number)
         if file.suffix.lower() == ".exr":
-            channels = read([file], source.number, None).channels
+            channels = read([file], source.number, None, self._max_mb).channels
             plane = layers.grey(channels).astype(np.float32)
         else:
-            plane = stills.srgb(stills.read(file)[..., 0])  # grey values as painted
+            plane = stills.srgb(
+                stills.read(file, max_mb=self._max_mb)[..., 0]
+            )  # grey values as painted
         if plane.shape[::-1] != source.size:
             raise InputError(
                 f"{file} must be {size_text(source.size)} like the picture, is {size_text(plane)}"
