@@ -37,6 +37,7 @@ from .output import Output
 from .pipeline import Blur
 from .render import Render, render_frames
 from .run import Report, blur_sequence
+from .source import odd_sizes
 from .terminal import progress
 
 DONE, SOME_FAILED, USAGE, NO_DEVICE, INTERRUPTED = 0, 1, 2, 3, 130
@@ -91,7 +92,7 @@ def blur(
     clip = given.open(pattern, look.keep, look.scale)
     look = look.settled(clip=clip)
     made = look.make(when.make(), adapter)
-    settings = _settings(look, when, given) | {"samples": _samples(made), "bits": output.bits}
+    settings = _settings(look, when, given) | {"samples": _samples(made)} | output.looks
     settings["curve"] = when.curve_read()
     if confidence:
         _check_confidence(made, output)
@@ -105,6 +106,8 @@ def blur(
         inputs=clip.inputs,
         overwrite=output.overwrite,
         resume=output.resume,
+        layers=output.layers,
+        compression=output.compression,
     )
     if verbose:
         say.print(f"adapter: {made.device.adapter.summary}", markup=False)
@@ -121,7 +124,7 @@ def blur(
 def _settings(look: BlurOptions, when: ShutterOptions, given: InputOptions) -> dict:
     """Everything that changes a result, as it is written into the files."""
     every = {"wgmb": __version__} | plain(look) | plain(when) | plain(given)
-    for not_a_look in ("frames", "skip_missing"):
+    for not_a_look in ("frames", "skip_missing", "max_mb"):
         del every[not_a_look]
     return every
 
@@ -155,6 +158,8 @@ def _conclude(say, clip, files, report: Report, took: str, quiet: bool, verbose:
             line(f"vectors: {clip.finding}")
         if clip.cuts:
             line(f"camera cut before frame {', '.join(map(str, sorted(clip.cuts)))}")
+        if odd := odd_sizes({n: clip.sizes[n] for n in report.done}):
+            line(odd)
         done = f"{len(report.done)} frames in {took} -> {files.pattern}"
         line(done + (f", {len(report.skipped)} were there" if report.skipped else ""))
     if report.failed:
@@ -211,12 +216,14 @@ def render(
         raise InputError("--keep and --scale are for files: wgmb render has no layers to name")
     if passes and not output.output.lower().endswith(".exr"):
         raise InputError(f"--passes need an .exr output, got {output.output}")
+    if passes and output.layers == "picture":
+        raise InputError("--passes writes layers, --layers picture leaves them out: say one")
     moments = what.moments(fps)
     if confidence and sharp:
         raise InputError("--sharp is without blur: there is no --confidence to tell")
     made = look.make(when.make(), adapter)
     renderer = Render(picture, made, size=size_of(what.size), fps=fps, rays=what.rays)
-    settings = {"scene": scene, "sharp": sharp, "passes": passes, "bits": output.bits}
+    settings = {"scene": scene, "sharp": sharp, "passes": passes} | output.looks
     settings |= plain(look) | plain(when) | plain(what) | {"wgmb": __version__, "fps": fps}
     settings["samples"], settings["curve"] = _samples(made), when.curve_read()
     if confidence:
@@ -230,6 +237,8 @@ def render(
         fps=output.rate,
         overwrite=output.overwrite,
         resume=output.resume,
+        layers=output.layers,
+        compression=output.compression,
     )
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     if verbose:

@@ -1,27 +1,39 @@
 """EXR files: every part, channel and attribute in, the same out, and no fault passed over.
 
 The OpenEXR library answers a damaged file with a line on the terminal and fewer parts; here
-that is an error that names the file. What it prints is held back while the program that
-runs us keeps its own output apart from the process's descriptors 1 and 2 (the command line
-does), because only then nothing else can get lost.
+that is an error that names the file.
 """
 
 from __future__ import annotations
 
-import contextlib
 import io
-import os
-import sys
-import threading
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import OpenEXR
 
+from . import limits
 from .errors import InputError
+from .limits import MOST_PIXELS_A_SIDE
+from .native import hushed, inside
 
-MOST_PIXELS_A_SIDE = 32768
+COMPRESSIONS = {
+    "none": OpenEXR.NO_COMPRESSION,
+    "rle": OpenEXR.RLE_COMPRESSION,
+    "zips": OpenEXR.ZIPS_COMPRESSION,
+    "zip": OpenEXR.ZIP_COMPRESSION,
+    "piz": OpenEXR.PIZ_COMPRESSION,
+    "pxr24": OpenEXR.PXR24_COMPRESSION,
+    "b44": OpenEXR.B44_COMPRESSION,
+    "b44a": OpenEXR.B44A_COMPRESSION,
+    "dwaa": OpenEXR.DWAA_COMPRESSION,
+    "dwab": OpenEXR.DWAB_COMPRESSION,
+}
+"""The library's names of what every program reads; see also `check_compression`."""
+_LOSSY = tuple(COMPRESSIONS[name] for name in ("pxr24", "b44", "b44a", "dwaa", "dwab"))
+_SAME = "same"
 _WRITTEN_ANEW = (
     "channels",
     "compression",
@@ -34,8 +46,6 @@ _WRITTEN_ANEW = (
     "version",
     "name",
 )
-_CHATTER = "Warning: Exception raised reading pixel data"
-_lock = threading.Lock()
 
 
 @dataclass
@@ -47,6 +57,7 @@ class Part:
     attributes: dict
     data_window: tuple[int, int, int, int]  # left, top, right, bottom; the last pixels belong to it
     display_window: tuple[int, int, int, int]
+    compression: OpenEXR.Compression = OpenEXR.ZIP_COMPRESSION  # as it was stored
 
     @property
     def size(self) -> tuple[int, int]:
@@ -76,23 +87,33 @@ class Exr:
         return found
 
 
-def read(path: str | Path, *, header_only: bool = False) -> Exr:
+def read(path: str | Path, *, header_only: bool = False, max_mb: float = limits.MAX_MB) -> Exr:
     """Read `path`; `header_only` leaves every channel an empty array.
 
-    `InputError` names the file where it is missing, damaged, cut off, deep or absurdly large.
+    `max_mb`: megabytes that its pixels may take. `InputError` names the file where it is missing,
+    damaged, cut off, deep, absurdly large or beyond that limit, and where memory is short.
     """
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    header = _open(path, header_only=True)
+    with inside():
+        header = _open(path, header_only=True)
     try:
         promised = [_promised(path, part) for part in header.parts]
     except (UnicodeDecodeError, KeyError, TypeError, IndexError) as error:
         raise InputError(f"{path}: not a readable EXR file: {_first_line(error)}") from None
+    if (count := sum(len(part.channels) for part in promised)) > limits.MOST_CHANNELS:
+        raise InputError(f"{path}: {count} channels; at most {limits.MOST_CHANNELS}")
     if header_only:
         return Exr(path, promised)
-    content = _open(path, header_only=False)
+    needed = sum(limits.unpacked(part.size, len(part.channels)) for part in promised)
+    what = "{} x {}, ".format(*promised[0].size) + f"{count} channels,"
+    limits.check(path, what, needed, path.stat().st_size, max_mb)
+    with inside(), hushed() as heard:
+        content = _open(path, header_only=False)
     if len(content.parts) != len(promised):
+        if _short_of_memory(heard, needed):
+            raise InputError(f"{path}: not enough memory for {needed >> 20} MB of pixels")
         raise InputError(
             f"{path}: damaged or cut off: pixels of {len(content.parts)} of "
             f"{len(promised)} parts could be read"
@@ -111,28 +132,55 @@ def read(path: str | Path, *, header_only: bool = False) -> Exr:
     return Exr(path, promised)
 
 
-def encode(exr: Exr) -> bytes:
-    """The file's bytes: every part, ZIP compressed scan lines."""
+def check_compression(name: str) -> None:
+    """InputError unless `name` is in COMPRESSIONS, or "same": as the file that was read."""
+    if name not in (*COMPRESSIONS, _SAME):
+        known = ", ".join((*COMPRESSIONS, _SAME))
+        raise InputError(f"compression must be one of {known}, got {name!r}")
+
+
+def encode(exr: Exr, compression: str = "zip") -> bytes:
+    """The file's bytes: every part in scan lines; the same parts give the same bytes.
+
+    InputError where a lossy compression would change the ids of a Cryptomatte.
+    """
+    check_compression(compression)
     parts = []
     for part in exr.parts:
+        kind = part.compression if compression == _SAME else COMPRESSIONS[compression]
+        if kind in _LOSSY and (crypto := _cryptomatte(part)):
+            raise InputError(
+                f"{exr.path}: {kind.name.partition('_')[0].lower()} compression is lossy and would "
+                f"change the ids of the Cryptomatte {crypto}; zip keeps them"
+            )
         # An empty list says nothing, and the library cannot write it.
         kept = {k: v for k, v in part.attributes.items() if not (isinstance(v, list) and not v)}
         header = {k: v for k, v in kept.items() if k not in _WRITTEN_ANEW} | {
-            "compression": OpenEXR.ZIP_COMPRESSION,
+            "compression": kind,
             "type": OpenEXR.scanlineimage,
             "dataWindow": _box(part.data_window),
             "displayWindow": _box(part.display_window),
         }
         # The library ignores strides and would write wrong pixels.
         channels = {k: np.ascontiguousarray(v) for k, v in part.channels.items()}
-        parts.append(OpenEXR.Part(header, channels, part.name))
+        parts.append((header, channels, part.name))
     stream = io.BytesIO()
     try:
-        with _quiet():
-            OpenEXR.File(parts, num_threads=2).write(stream)
+        with inside():
+            OpenEXR.File([OpenEXR.Part(*part) for part in parts]).write(stream)
     except (RuntimeError, TypeError, ValueError) as error:
         raise InputError(f"{exr.path}: cannot be written as EXR: {_first_line(error)}") from None
     return stream.getvalue()
+
+
+def _cryptomatte(part: Part) -> str | None:
+    """The name of a Cryptomatte that has channels in `part`."""
+    for key, name in part.attributes.items():
+        if re.fullmatch(r"cryptomatte/[^/]+/name", key):
+            for channel in part.channels:
+                if channel.startswith(str(name)) or part.name.startswith(str(name)):
+                    return str(name)
+    return None
 
 
 def new(rgba: np.ndarray, attributes: dict | None = None) -> Exr:
@@ -151,14 +199,24 @@ def to_half(values: np.ndarray) -> np.ndarray:
 
 def _open(path: Path, *, header_only: bool):
     try:
-        with _quiet():
-            OpenEXR.setMaxImageSize(MOST_PIXELS_A_SIDE, MOST_PIXELS_A_SIDE)
-            OpenEXR.setMaxTileSize(MOST_PIXELS_A_SIDE, MOST_PIXELS_A_SIDE)
-            return OpenEXR.File(
-                str(path), separate_channels=True, header_only=header_only, num_threads=2
-            )
-    except (RuntimeError, ValueError, TypeError, OSError, MemoryError) as error:
+        return OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
+    except MemoryError:
+        raise InputError(f"{path}: not enough memory to read it") from None
+    except (RuntimeError, ValueError, TypeError, OSError) as error:
         raise InputError(f"{path}: not a readable EXR file: {_first_line(error)}") from None
+
+
+def _short_of_memory(heard: list[str], needed: int) -> bool:
+    """Whether pixels could not be read for want of memory: the library says so of arrays, but not
+    of its own rooms, which are smaller.
+    """
+    if "MemoryError" in "".join(heard):
+        return True
+    try:
+        np.empty(needed + (needed >> 3), np.uint8)
+    except MemoryError:
+        return True
+    return False
 
 
 def _promised(path: Path, part) -> Part:
@@ -176,7 +234,8 @@ def _promised(path: Path, part) -> Part:
     if not channels:
         raise InputError(f"{path}: a part without channels")
     attributes = {k: v for k, v in header.items() if k not in _WRITTEN_ANEW}
-    return Part(header.get("name", "") or "", channels, attributes, data, display)
+    name, compression = header.get("name", "") or "", header["compression"]
+    return Part(name, channels, attributes, data, display, compression)
 
 
 def _corners(box) -> tuple[int, int, int, int]:
@@ -191,49 +250,3 @@ def _box(corners: tuple[int, int, int, int]):
 
 def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
-
-
-class _Sieve:
-    """A text stream without the lines that the OpenEXR module prints about damaged files."""
-
-    def __init__(self, stream):
-        self._stream, self._holding = stream, False
-
-    def write(self, text: str) -> int:
-        if text.startswith(_CHATTER):
-            self._holding = True  # until its line ends
-        elif not self._holding:
-            self._stream.write(text)
-        if text.endswith("\n"):
-            self._holding = False
-        return len(text)
-
-    def flush(self) -> None:
-        self._stream.flush()
-
-    def __getattr__(self, name: str):
-        return getattr(self._stream, name)
-
-
-@contextlib.contextmanager
-def _quiet():
-    """Hold back what native code prints, where Python's own streams live elsewhere."""
-    with _lock, contextlib.redirect_stdout(_Sieve(sys.stdout)):
-        try:
-            apart = sys.stdout.fileno() != 1 and sys.stderr.fileno() != 2
-        except (OSError, ValueError, AttributeError):
-            apart = False
-        if not apart:
-            yield
-            return
-        kept = os.dup(1), os.dup(2)
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        try:
-            os.dup2(nowhere, 1)
-            os.dup2(nowhere, 2)
-            yield
-        finally:
-            os.dup2(kept[0], 1)
-            os.dup2(kept[1], 2)
-            for fd in (*kept, nowhere):
-                os.close(fd)

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from . import scenes, sequence, shutter, vectors
+from . import limits, scenes, sequence, shutter, vectors
 from .blur import METHODS, default_method
 from .cases import Case, Contender
 from .cone import Cone
@@ -119,6 +119,8 @@ class InputOptions:
     "Pattern of files with further layers of the same frames; may be repeated."
     skip_missing: bool = False
     "Leave out frames that are not there instead of refusing."
+    max_mb: float = limits.MAX_MB
+    "Megabytes that a picture file may unpack to (as 32-bit floats); a larger one is refused."
 
     def open(
         self, pattern: str, keep: str | None = None, scale: str | None = None
@@ -144,7 +146,11 @@ class InputOptions:
             also=self.also,
         )
         return sequence.Clip(
-            pattern, frames=self.frames, passes=passes, skip_missing=self.skip_missing
+            pattern,
+            frames=self.frames,
+            passes=passes,
+            skip_missing=self.skip_missing,
+            max_mb=self.max_mb,
         )
 
 
@@ -367,6 +373,15 @@ class OutputOptions:
     "Replace files that exist."
     resume: bool = False
     "Keep frames that are done; redo those whose settings or inputs differ."
+    layers: Literal["all", "picture"] = "all"
+    "EXR to EXR: all layers of the input beside the picture, or the picture only (faster)."
+    compression: str = "zip"
+    "EXR: none, rle, zips, zip, piz; lossy: pxr24, b44, b44a, dwaa, dwab; same as the input's."
+
+    @property
+    def looks(self) -> dict:
+        """What of these changes the files' content."""
+        return {"bits": self.bits, "layers": self.layers, "compression": self.compression}
 
     @property
     def rate(self) -> Fraction:

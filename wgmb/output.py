@@ -23,6 +23,8 @@ class Output:
     `settings`: written into the record of every file (see record.py), and compared when a run is
     resumed. `inputs`: the files that are read; an output that is one of them is refused, always.
     `overwrite` replaces any file that exists, `resume` only what wgmb wrote and is not done.
+    `layers`: "all" that an EXR input holds go into the EXR output, or those of the "picture"
+    only. `compression` of EXR: a name in exr.COMPRESSIONS, or "same" as the input's.
     """
 
     def __init__(
@@ -36,7 +38,11 @@ class Output:
         inputs: Iterable[Path] = (),
         overwrite: bool = False,
         resume: bool = False,
+        layers: str = "all",
+        compression: str = "zip",
     ):
+        _check_exr_options(pattern, layers, compression)
+        self._layers, self._compression = layers, compression
         self.pattern, self.bits, self.numbers = Path(pattern), bits, numbers
         self.settings = json.dumps(settings or {}, sort_keys=True)
         suffix = self.pattern.suffix.lower()
@@ -146,7 +152,8 @@ class Output:
         path = self.path(source.number)
         text = record.blank(self._expected(made_of))
         if path.suffix.lower() == ".exr":
-            data = exr.encode(_with_result(source, result, text, layers))
+            content = _with_result(source, result, text, layers, self._layers == "picture")
+            data = exr.encode(content, self._compression)
         else:
             data = stills.encode(result, path.suffix, self.bits, text)
         if self._resume and self.done(source.number, made_of):
@@ -214,10 +221,25 @@ def _identity(path: Path) -> tuple[int, int] | None:
     return found.st_dev, found.st_ino
 
 
+def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> None:
+    if layers not in ("all", "picture"):
+        raise InputError(f"layers must be all or picture, got {layers!r}")
+    exr.check_compression(compression)
+    if compression != "zip" and Path(pattern).suffix.lower() != ".exr":
+        raise InputError(f"compression {compression} is for an .exr output, got {pattern}")
+
+
 def _with_result(
-    source: Source, result: np.ndarray, text: str, layers: Mapping[str, np.ndarray]
+    source: Source,
+    result: np.ndarray,
+    text: str,
+    layers: Mapping[str, np.ndarray],
+    only_picture: bool,
 ) -> exr.Exr:
-    """The source's file with the picture replaced, layers and the record's text added."""
+    """The source's file with the picture replaced, layers and the record's text added.
+
+    `only_picture`: without all other layers, and without what describes Cryptomattes.
+    """
     more = {name: exr.to_half(plane) for name, plane in layers.items()}
     if source.file is None:
         made = exr.new(result, {record.KEY: text})
@@ -228,8 +250,8 @@ def _with_result(
         replace(p, channels=dict(p.channels), attributes=dict(p.attributes))
         for p in source.file.parts
     ]
-    parts[0].attributes[record.KEY] = text
     twins = dict(zip(map(id, source.file.parts), parts, strict=True))
+    home = twins[id(source.part)]
     for full, part, name in source.file.places():
         if full in new:
             kind = part.channels[name].dtype
@@ -237,5 +259,12 @@ def _with_result(
             twins[id(part)].channels[name] = (
                 exr.to_half(new[full]) if half else new[full].astype(kind)
             )
-    twins[id(source.part)].channels |= more
+        elif only_picture:
+            del twins[id(part)].channels[name]
+    home.channels |= more
+    if only_picture:
+        for name in [n for n in home.attributes if n.startswith("cryptomatte/")]:
+            del home.attributes[name]
+        parts = [home]
+    parts[0].attributes[record.KEY] = text
     return exr.Exr(source.path, parts)

@@ -98,6 +98,8 @@ def perceive(
         fps=output.rate,
         inputs=inputs,
         overwrite=output.overwrite,
+        layers=output.layers,
+        compression=output.compression,
     )
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     started = time.perf_counter()

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import layers, stills, vectors
+from . import layers, limits, stills, vectors
 from .camera_file import CameraFile
 from .cuts import is_cut, jumps, straightened
 from .errors import InputError
@@ -68,7 +68,8 @@ class Clip:
 
     Iterating gives Frames. `numbers` are the frames asked for, `on_disk` all that there are.
     `finding` says what the vectors were found to mean; `cuts` has the frames read so far that
-    come after a camera cut, `unread` the neighbours that could not be read.
+    come after a camera cut, `unread` the neighbours that could not be read, `sizes` how large
+    those read so far are.
     """
 
     def __init__(
@@ -78,10 +79,13 @@ class Clip:
         frames: str | None = None,
         passes: Passes | None = None,
         skip_missing: bool = False,
+        max_mb: float = limits.MAX_MB,
     ):
         """`frames`: "1-100x2", "1,3,5-8"; all that exist by default, and none may be missing
-        between them unless `skip_missing`.
+        between them unless `skip_missing`. `max_mb`: megabytes that a file may unpack to.
         """
+        self._max_mb = max_mb
+        self.sizes: dict[int, tuple[int, int]] = {}
         self.pattern, self.passes = str(pattern), passes or Passes()
         self.numbers = self._numbers(frames, skip_missing)
         self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
@@ -164,7 +168,8 @@ class Clip:
             while len(self._kept) > 2:
                 self._kept.popitem(last=False)
             paths = [frame_path(p, number) for p in (self.pattern, *self.passes.also)]
-            self._kept[number] = read(paths, number, self.passes.color)
+            self._kept[number] = source = read(paths, number, self.passes.color, self._max_mb)
+            self.sizes[number] = source.whole
         return self._kept[number]
 
     def forget(self, number: int) -> None:
@@ -334,10 +339,12 @@ class Clip:
             return layers.mask(source.channels, source.attributes, wanted)
         file = frame_path(wanted, source.number)
         if file.suffix.lower() == ".exr":
-            channels = read([file], source.number, None).channels
+            channels = read([file], source.number, None, self._max_mb).channels
             plane = layers.grey(channels).astype(np.float32)
         else:
-            plane = stills.srgb(stills.read(file)[..., 0])  # grey values as painted
+            plane = stills.srgb(
+                stills.read(file, max_mb=self._max_mb)[..., 0]
+            )  # grey values as painted
         if plane.shape[::-1] != source.size:
             raise InputError(
                 f"{file} must be {size_text(source.size)} like the picture, is {size_text(plane)}"

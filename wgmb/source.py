@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from . import exr, layers, stills
+from . import exr, layers, limits, stills
 from .errors import InputError
+from .numbering import frame_range
 
 Window = tuple[int, int, int, int]  # left, top, right, bottom; the last pixels belong to it
 
@@ -26,7 +28,7 @@ class Source:
     wanted: str | None = None  # the picture's layer, if its name does not say so
     part: exr.Part | None = None  # of the file, that the picture is in
 
-    @property
+    @cached_property
     def color(self) -> list[str]:
         """Names of the picture's channels, 3 or 4."""
         with about(self.path):
@@ -44,6 +46,11 @@ class Source:
         """Width and height [px]."""
         height, width = next(iter(self.channels.values())).shape
         return width, height
+
+    @property
+    def whole(self) -> tuple[int, int]:
+        """Width and height [px] of the whole picture, of which an EXR may hold a window."""
+        return self.size if self.window is None else self.window[2:]
 
     @property
     def rgba(self) -> np.ndarray:
@@ -71,6 +78,18 @@ def size_text(of) -> str:
     return f"{width} x {height}"
 
 
+def odd_sizes(sizes: dict[int, tuple[int, int]]) -> str | None:
+    """Which frames are not as large as most, for people; None where all are alike."""
+    by_size: dict[tuple[int, int], list[int]] = {}
+    for number in sorted(sizes):
+        by_size.setdefault(sizes[number], []).append(number)
+    if len(by_size) < 2:
+        return None
+    usual = max(by_size, key=lambda size: len(by_size[size]))
+    odd = [f"{frame_range(n)}: {size_text(s)}" for s, n in by_size.items() if s != usual]
+    return f"frames of another size than most, {size_text(usual)}: {'; '.join(odd)}"
+
+
 @contextlib.contextmanager
 def about(path: Path):
     """Name the file in errors that do not."""
@@ -82,10 +101,13 @@ def about(path: Path):
         raise InputError(f"{path}: {error}") from None
 
 
-def read(paths: list[Path], number: int, wanted: str | None) -> Source:
+def read(
+    paths: list[Path], number: int, wanted: str | None, max_mb: float = limits.MAX_MB
+) -> Source:
     """One frame's files, their channels together; `wanted`: the picture's layer.
 
-    `InputError` names the file that is missing, damaged, or of another size.
+    `max_mb`: megabytes that each file may unpack to. `InputError` names the file that is missing,
+    damaged, too large, or of another size.
     """
     path, channels, attributes = paths[0], {}, {}
     file: exr.Exr | None = None
@@ -93,14 +115,14 @@ def read(paths: list[Path], number: int, wanted: str | None) -> Source:
     size: tuple[int, int] | None = None
     for p in paths:
         if p.suffix.lower() == ".exr":
-            content = exr.read(p)
+            content = exr.read(p, max_mb=max_mb)
             onto = onto or _picture_part(content, wanted)
             file = content if p == path else file
             more = _one_window(content, onto)
             for part in reversed(content.parts):
                 attributes = {**part.attributes, **attributes}
         elif p.suffix.lower() in stills.SUFFIXES:
-            rgba = stills.read(p)
+            rgba = stills.read(p, max_mb=max_mb)
             more = {c: rgba[..., i] for i, c in enumerate("RGBA"[: rgba.shape[2]])}
         else:
             known = ", ".join((".exr", *stills.SUFFIXES))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import struct
 import zlib
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import cast
@@ -18,37 +19,53 @@ import imageio.v3 as iio
 import numpy as np
 import tifffile
 from av.container import InputContainer
-from PIL import Image
+from PIL import JpegImagePlugin
 
+from . import limits
 from .errors import InputError
 from .record import KEY
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
-_MOST_PIXELS = 1 << 28
 _AFTER_HEADER = 33  # bytes of a PNG's signature and IHDR
 
 
-def read(path: str | Path) -> np.ndarray:
+def read(path: str | Path, *, max_mb: float = limits.MAX_MB) -> np.ndarray:
     """(height, width, 3 or 4) float32, linear, premultiplied.
 
-    `InputError` names the file where it is missing, damaged, cut off or no picture.
+    `max_mb`: megabytes that it may unpack to. `InputError` names the file where it is missing,
+    damaged, cut off, no picture or beyond that limit, and where memory is short.
     """
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such file")
+
+    def allow(width: int, height: int) -> None:
+        if width < 1 or height < 1:
+            raise ValueError(f"{width} x {height} pixels")
+        unpacked = limits.unpacked((width, height), 4)
+        limits.check(path, f"{width} x {height}", unpacked, path.stat().st_size, max_mb)
+
     try:
-        return _to_linear(_READERS[path.suffix.lower()](path.read_bytes()))
+        return _to_linear(_READERS[path.suffix.lower()](path.read_bytes(), allow))
+    except InputError:
+        raise
+    except MemoryError:
+        raise InputError(f"{path}: not enough memory for its pixels") from None
     except Exception as error:  # decoders raise whatever they like on damaged data
         lines = str(error).splitlines() or [type(error).__name__]
         raise InputError(f"{path}: not a readable picture: {lines[0]}") from None
 
 
-def _read_png(data: bytes) -> np.ndarray:
+Allow = Callable[[int, int], None]
+"""Told the width and height before any pixel is read; raises where they are too large."""
+
+
+def _read_png(data: bytes, allow: Allow) -> np.ndarray:
     if len(data) < _AFTER_HEADER or data[:8] != b"\x89PNG\r\n\x1a\n":
         raise ValueError("no PNG header")
     if b"IEND" not in data[-1024:]:
         raise ValueError("cut off before its end")
-    _check_pixels(*struct.unpack(">II", data[16:24]))
+    allow(*struct.unpack(">II", data[16:24]))
     with cast(InputContainer, av.open(io.BytesIO(data), format="png_pipe")) as container:
         frame = next(container.decode(video=0))
     name = frame.format.name
@@ -63,19 +80,20 @@ def _read_png(data: bytes) -> np.ndarray:
     return frame.to_ndarray(format=wanted)
 
 
-def _read_jpeg(data: bytes) -> np.ndarray:
-    with Image.open(io.BytesIO(data), formats=["JPEG"]) as image:
+def _read_jpeg(data: bytes, allow: Allow) -> np.ndarray:
+    with JpegImagePlugin.JpegImageFile(io.BytesIO(data)) as image:  # `open` has its own limit
+        allow(*image.size)
         if image.mode not in ("L", "RGB"):
             raise ValueError(f"must be grey or RGB, is {image.mode}")
         return np.asarray(image)
 
 
-def _read_tiff(data: bytes) -> np.ndarray:
+def _read_tiff(data: bytes, allow: Allow) -> np.ndarray:
     with tifffile.TiffFile(io.BytesIO(data)) as file:
         page = file.pages.first
         if len(file.pages) != 1:
             raise ValueError(f"must be one picture, has {len(file.pages)} pages")
-        _check_pixels(page.imagewidth, page.imagelength)
+        allow(page.imagewidth, page.imagelength)
         if page.photometric not in (tifffile.PHOTOMETRIC.RGB, tifffile.PHOTOMETRIC.MINISBLACK):
             raise ValueError(
                 f"must be grey or RGB, is {tifffile.PHOTOMETRIC(page.photometric).name}"
@@ -92,11 +110,6 @@ _READERS = {
     ".tif": _read_tiff,
     ".tiff": _read_tiff,
 }
-
-
-def _check_pixels(width: int, height: int) -> None:
-    if not 0 < width * height <= _MOST_PIXELS:
-        raise ValueError(f"{width} x {height} pixels; at most {_MOST_PIXELS}")
 
 
 def _to_linear(samples: np.ndarray) -> np.ndarray:
