@@ -17,7 +17,7 @@ from .blur import METHODS
 from .errors import InputError
 from .frame import Frame
 from .measure import measure
-from .numbering import frame_range
+from .numbering import frame_list
 from .pipeline import Blur
 from .render import Render
 from .scene import Scene
@@ -192,7 +192,7 @@ def clip_case(
     elif len(inputs) == 1:
         clip = open_clip(inputs[0])
         if number is None and len(clip.numbers) > 1:
-            raise InputError(f"{inputs[0]} has frames {frame_range(clip.numbers)}: choose --frame")
+            raise InputError(f"{inputs[0]} has frames {frame_list(clip.numbers)}: choose --frame")
         wanted = clip.numbers[0] if number is None else number
         if wanted not in clip.numbers:
             raise InputError(f"{inputs[0]} has no frame {wanted}")
