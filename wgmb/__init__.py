@@ -11,19 +11,25 @@ Shutter ── times of the samples ──────────────�
 
 __version__ = "0.1.0"
 
-from .blur import METHODS
-from .cameras import Camera, CameraFile, Reprojections
-from .errors import DeviceError, Error, InputError, ShaderError
-from .frame import Frame
-from .output import Output
-from .perceive import Cone, Viewer
-from .pipeline import Blur, blur
-from .render import Render
-from .run import Report, blur_sequence
-from .scene import Body, Scene, Shot
-from .sequence import Clip, Passes
-from .shutter import Shutter
-from .vectors import Vectors
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .blur import METHODS
+    from .cameras import Camera, CameraFile, Reprojections
+    from .errors import DeviceError, Error, InputError, ShaderError
+    from .frame import Frame
+    from .output import Output
+    from .perceive import Cone, Viewer
+    from .pipeline import Blur, blur
+    from .render import Render
+    from .run import Report, blur_sequence
+    from .scene import Body, Scene, Shot
+    from .sequence import Clip, Passes
+    from .shutter import Shutter
+    from .vectors import Vectors
 
 __all__ = [
     "METHODS",
@@ -51,3 +57,53 @@ __all__ = [
     "blur",
     "blur_sequence",
 ]
+
+_PLACES = {
+    "blur": ("METHODS",),
+    "cameras": ("Camera", "CameraFile", "Reprojections"),
+    "errors": ("DeviceError", "Error", "InputError", "ShaderError"),
+    "frame": ("Frame",),
+    "output": ("Output",),
+    "perceive": ("Cone", "Viewer"),
+    "pipeline": ("Blur", "blur"),
+    "render": ("Render",),
+    "run": ("Report", "blur_sequence"),
+    "scene": ("Body", "Scene", "Shot"),
+    "sequence": ("Clip", "Passes"),
+    "shutter": ("Shutter",),
+    "vectors": ("Vectors",),
+}
+_PLACE = {name: place for place, names in _PLACES.items() for name in names}
+
+
+class _Package(ModuleType):
+    """Importing the folder of methods leaves `wgmb.blur` the function of that name."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name == "blur" and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
+
+if not TYPE_CHECKING:  # a checker takes every name for known otherwise
+
+    def __getattr__(name: str) -> object:
+        """Load what is asked for: importing wgmb itself costs nothing."""
+        if name in _PLACE:
+            value = getattr(import_module(f"{__name__}.{_PLACE[name]}"), name)
+        elif name.startswith("_"):
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        else:
+            try:
+                value = import_module(f"{__name__}.{name}")
+            except ModuleNotFoundError as error:
+                if error.name != f"{__name__}.{name}":
+                    raise
+                raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

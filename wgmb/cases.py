@@ -51,8 +51,8 @@ class Contender:
         for part in more:
             key, equals, value = part.partition("=")
             if equals:
-                options.append((key, _value(value)))
-            elif part.isdigit():
+                options.append((key, _option(name, key, value)))
+            elif part.isdecimal() and len(part) < 10:
                 samples = int(part)
             else:
                 raise InputError(f"a method is NAME:SAMPLES:OPTION=VALUE, got {text!r}")
@@ -75,10 +75,24 @@ class Contender:
         )
 
 
-def _value(text: str):
+def _option(method: str, name: str, text: str) -> Any:
+    """The value of an option that a Blur of the method takes; the error says what it has."""
+    own, every = (inspect.signature(made).parameters for made in (METHODS[method], Blur))
+    known = {k: p.default for k, p in own.items() if k not in ("device", "output")}
+    known |= {k: every[k].default for k in ("jitter", "max_blur")}
+    if name not in known:
+        raise InputError(f"method {method!r} has no option {name}; it has {', '.join(known)}")
+    value, default = _value(text), known[name]
+    number = default is None or isinstance(default, float)
+    if type(value) not in ((int, float) if number else (type(default),)):
+        raise InputError(f"{method}: {name} cannot be {text!r}")
+    return value
+
+
+def _value(text: str) -> Any:
     try:
         return ast.literal_eval(text)
-    except (ValueError, SyntaxError):
+    except (ValueError, SyntaxError, MemoryError, RecursionError):  # the last two: much nested
         return text
 
 

@@ -189,7 +189,7 @@ def _crypto_id(crypto: Mapping[str, str], value: str) -> int:
         return int(value, 16)
     try:
         manifest = json.loads(crypto.get("manifest") or "{}")
-    except ValueError:
+    except (ValueError, RecursionError):
         manifest = {}
     if not isinstance(manifest, dict) or value not in manifest:
         known = (

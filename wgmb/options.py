@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -331,10 +332,10 @@ class PerceptionOptions:
 
 def size_of(text: str) -> tuple[int, int]:
     """`1920x1080` -> width, height."""
-    width, _, height = text.partition("x")
-    if not (width.isdigit() and height.isdigit() and int(width) and int(height)):
+    sides = re.fullmatch(r"0*([1-9][0-9]{0,8})x0*([1-9][0-9]{0,8})", text)
+    if sides is None:
         raise InputError(f"size must be like 1920x1080, got {text!r}")
-    return int(width), int(height)
+    return int(sides[1]), int(sides[2])
 
 
 def settings_of(texts: tuple[str, ...]) -> dict[str, str]:
@@ -364,13 +365,20 @@ class OutputOptions:
     @property
     def rate(self) -> Fraction:
         """Frames per second, exactly."""
-        try:
-            fps = Fraction(self.fps)
-        except (ValueError, ZeroDivisionError):
-            raise InputError(f"fps must be a number or a fraction, got {self.fps!r}") from None
-        if not 0 < fps <= 1000:
-            raise InputError(f"fps must be over 0 and at most 1000, got {self.fps}")
-        return fps
+        return rate_of(self.fps)
+
+
+def rate_of(text: str) -> Fraction:
+    """`24`, `23.976`, `30000/1001` -> frames per second, exactly; over 0, at most 1000."""
+    try:
+        if re.search(r"e[+-]?[0-9]{4}", text, re.IGNORECASE):  # would be worked out in full
+            raise ValueError
+        fps = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        raise InputError(f"fps must be a number or a fraction, got {text!r}") from None
+    if not 0 < fps <= 1000:
+        raise InputError(f"fps must be over 0 and at most 1000, got {text}")
+    return fps
 
 
 def plain(options) -> dict:
