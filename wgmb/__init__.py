@@ -12,10 +12,8 @@ Shutter ── times of the samples ──────────────�
 __version__ = "0.1.0"
 
 import sys
-from importlib import import_module
-from types import ModuleType
-from typing import TYPE_CHECKING
 
+TYPE_CHECKING = False  # typing's own, without the time that loading it takes
 if TYPE_CHECKING:
     from .blur import METHODS
     from .cameras import Camera, CameraFile, Reprojections
@@ -73,14 +71,15 @@ _PLACES = {
     "shutter": ("Shutter",),
     "vectors": ("Vectors",),
 }
+_Module = type(sys)
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}
 
 
-class _Package(ModuleType):
+class _Package(_Module):
     """Importing the folder of methods leaves `wgmb.blur` the function of that name."""
 
     def __setattr__(self, name: str, value: object) -> None:
-        if not (name == "blur" and isinstance(value, ModuleType)):
+        if not (name == "blur" and isinstance(value, _Module)):
             super().__setattr__(name, value)
 
 
@@ -90,6 +89,8 @@ if not TYPE_CHECKING:  # a checker takes every name for known otherwise
 
     def __getattr__(name: str) -> object:
         """Load what is asked for: importing wgmb itself costs nothing."""
+        from importlib import import_module
+
         if name in _PLACE:
             value = getattr(import_module(f"{__name__}.{_PLACE[name]}"), name)
         elif name.startswith("_"):

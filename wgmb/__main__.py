@@ -1,15 +1,15 @@
 """The `wgmb` command, also `python -m wgmb`: it hears Ctrl-C while the rest is being loaded."""
 
-import contextlib
 import os
 import signal
 
 
 def _leave(*_) -> None:
     """Nothing has begun yet, so nothing is to be tidied up."""
-    with contextlib.suppress(OSError):
+    try:
         os.write(2, b"wgmb: interrupted\n")
-    os._exit(130)
+    finally:
+        os._exit(130)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import signal
 import sys
 import time
@@ -17,7 +18,7 @@ from typing import Annotated
 
 import cyclopts
 from cyclopts import Parameter
-from cyclopts.config import Toml
+from cyclopts.config import Dict
 
 from . import __version__, gpu, lab, seeing, terminal
 from .errors import DeviceError, Error, InputError
@@ -35,7 +36,9 @@ from .output import Output
 from .pipeline import Blur
 from .render import Render, render_frames
 from .run import Report, blur_sequence
+from .source import about
 from .terminal import note, out, progress
+from .toml import parse, text_of
 
 DONE, SOME_FAILED, USAGE, NO_DEVICE, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -345,26 +348,29 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     terminal.own_streams()
     terminal.interrupted.clear()
+    words = sys.argv[1:] if arguments is None else arguments
     try:
         signal.signal(signal.SIGTERM, terminal.interrupt)
         signal.signal(signal.SIGINT, terminal.interrupt)  # a shell may have set it to be ignored
         warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
         logging.getLogger("tifffile").setLevel(logging.CRITICAL)
-        words = sys.argv[1:] if arguments is None else arguments
         _check_text(words)
         app.config = _config(words)
         result = app(words, exit_on_error=False, print_error=False)
         terminal.flush()
         return result if isinstance(result, int) else DONE
     except cyclopts.CycloptsError as error:
-        return _say_why(str(error), USAGE)
+        return _say_why(f"{error}{_hint(words)}", USAGE)
     except DeviceError as error:
         return _say_why(str(error), NO_DEVICE)
     except Error as error:
         return _say_why(str(error), USAGE)
     except OSError as error:
         if error.filename is None:  # not of opening what was named, but of writing
-            return _say_why(error.strerror or str(error), SOME_FAILED)
+            return _say_why(
+                (error.strerror or str(error)).lower() if error.strerror else str(error),
+                SOME_FAILED,
+            )
         return _say_why(f"{error.filename}: {(error.strerror or str(error)).lower()}", USAGE)
     except MemoryError:
         return _say_why("there is not enough memory", SOME_FAILED)
@@ -382,15 +388,22 @@ def _check_text(words: list[str]) -> None:
             raise InputError(f"{shown}: not UTF-8; please rename the file or folder") from None
 
 
-def _config(words: list[str]) -> tuple[Toml, ...]:
+def _hint(words: list[str]) -> str:
+    """What may be meant where a file's name was taken for an option."""
+    for word in words:
+        if re.fullmatch(r"-[^=]*\.[A-Za-z]\w*", word):
+            return f" For a file whose name begins with -, write ./{word}"
+    return ""
+
+
+def _config(words: list[str]) -> tuple[Dict, ...]:
     """The file named by --config; what stands on the command line wins over it."""
     for i, word in enumerate(words if words[:1] != ["view"] else []):
-        name, _, path = word.partition("=")
+        name, _, given = word.partition("=")
         if name == "--config":
-            path = path or "".join(words[i + 1 : i + 2])
-            if not Path(path).is_file():
-                raise InputError(f"--config {path}: no such file")
-            return (Toml(path, must_exist=True, search_parents=False),)
+            path = Path(given or "".join(words[i + 1 : i + 2]))
+            with about(path):
+                return (Dict(parse(text_of(path)), source=str(path)),)
     return ()
 
 

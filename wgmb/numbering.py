@@ -55,6 +55,17 @@ def frame_path(pattern: str | Path, number: int) -> Path:
     return Path(pattern) if parsed is None else parsed.folder / parsed.name(number)
 
 
+def readable(path: Path) -> bool:
+    """Whether the path is a file; InputError names one that must not be read."""
+    try:
+        if not path.is_file():
+            return False
+        with open(path, "rb"):
+            return True
+    except OSError as error:
+        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
 def numbers_on_disk(pattern: str | Path) -> list[int]:
     """The frames of a pattern that exist, padded as it says, in order; at least one."""
     parsed = _parsed(pattern)

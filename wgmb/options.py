@@ -17,7 +17,7 @@ from .blur import METHODS
 from .cases import Case, Contender
 from .errors import InputError
 from .findings import Report
-from .numbering import frame_numbers
+from .numbering import frame_numbers, is_pattern, readable
 from .perceive import Cone
 from .pipeline import Blur
 from .scene import Scene
@@ -71,7 +71,7 @@ class ShutterOptions:
         curve = self.curve
         assert self.shutter is not None and curve is not None
         if curve not in shutter.CURVES:
-            if not Path(curve).is_file():
+            if not readable(Path(curve)):
                 known = ", ".join(shutter.CURVES)
                 raise InputError(f"curve must be one of {known}, or a CSV file; got {curve!r}")
             curve = shutter.read_curve(curve)
@@ -117,7 +117,10 @@ class InputOptions:
     def open(
         self, pattern: str, keep: str | None = None, scale: str | None = None
     ) -> sequence.Clip:
-        """The clip these options describe."""
+        """The clip these options describe; InputError where one of its files must not be read."""
+        for name in (keep, scale, *self.also):
+            if name and Path(name).suffix and not is_pattern(name):
+                readable(Path(name))
         passes = sequence.Passes(
             color=self.layer,
             vectors=vectors.Vectors(

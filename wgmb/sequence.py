@@ -25,6 +25,7 @@ from .numbering import (
     is_pattern,
     number_in,
     numbers_on_disk,
+    readable,
 )
 from .source import Source, about, read, size_text
 
@@ -92,7 +93,7 @@ class Clip:
     def _numbers(self, frames: str | None, skip_missing: bool) -> list[int]:
         if not is_pattern(self.pattern):
             path = Path(self.pattern)
-            if not path.is_file():
+            if not readable(path):
                 raise InputError(f"{path}: no such file")
             if frames is not None:
                 raise InputError(f"--frames needs a pattern such as shot.####.exr, got {path.name}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 import types
 import typing
 from dataclasses import fields
@@ -21,6 +20,7 @@ from ..options import (
     ShutterOptions,
     rate_of,
 )
+from ..toml import parse
 
 GROUPS = (BlurOptions, ShutterOptions, SceneOptions, OutputOptions, InputOptions)
 INPUTS = frozenset({*(f.name for f in fields(InputOptions)), "keep", "scale"})
@@ -30,21 +30,6 @@ VIEW = (
     "exposure", "tone", "cone_rate", "cone_peak", "zoom", "center", "playing", "speed", "panel",
 )  # fmt: skip
 """What only the viewer knows, and the moment."""
-_MOST_BYTES = 1 << 20
-
-
-def text_of(path: Path) -> str:
-    """The text of a settings file; InputError names it and says why it cannot be read."""
-    try:
-        if not path.is_file():
-            raise InputError(f"{path}: no such file")
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, not read")
-        return path.read_bytes().decode()
-    except OSError as error:
-        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: settings must be UTF-8") from None
 
 
 def toml(tables: dict[str, dict[str, object]]) -> str:
@@ -65,14 +50,7 @@ def _line(name: str, value: object) -> str:
 
 def tables(text: str) -> dict[str, dict]:
     """The tables of the text: [render] or [blur], and [view]; InputError if there are others."""
-    try:
-        found = tomllib.loads(text)
-    except RecursionError:
-        raise InputError("settings: too many lists or tables in each other") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"settings: {error}") from None
-    except ValueError:
-        raise InputError("settings: a number has thousands of digits") from None
+    found = parse(text)
     if unknown := found.keys() - {"render", "blur", "view"}:
         raise InputError(f"settings have no table {', '.join(sorted(unknown))}")
     if ("render" in found) == ("blur" in found):
@@ -93,12 +71,10 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
         if name not in allowed:
             raise InputError(f"settings have no {name!r}")
         fit = typed(name, value, known[name])
-        if name == "fps":
-            fit = float(rate_of(str(fit)))
         if name == "set":
             pairs["settings"] = [_setting(text) for text in fit]
         elif name in own:
-            found[name] = fit
+            found[name] = float(rate_of(str(fit))) if name == "fps" else fit
         else:
             pairs["options" if name in OWN else "given"].append((name, fit))
     hints = _hints(state)
@@ -154,9 +130,11 @@ def _as(value: Any, hint: Any) -> Any:
     elif hint is float and type(value) in (int, float):
         if math.isfinite(number := float(value)):
             return number
-    elif hint in (bool, int, str) and type(value) is hint:
-        if hint is not int or abs(value) < 2**63:  # as TOML has them
+    elif hint is int and type(value) is int:
+        if abs(value) < 2**63:  # as TOML has them
             return value
+    elif hint in (bool, str) and type(value) is hint:
+        return value
     elif hint is Path and isinstance(value, str):
         return Path(value)
     raise TypeError

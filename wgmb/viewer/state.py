@@ -16,6 +16,8 @@ from ..blur import METHODS
 from ..errors import InputError
 from ..options import OWN, ShutterOptions
 from ..perceive import Cone
+from ..source import about
+from ..toml import text_of
 from . import saved
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
@@ -107,7 +109,7 @@ class State:
     def opened(self, source: str) -> State:
         """The same state with another scene or other frames, seen anew."""
         if source not in scenes.SCENES and not (
-            Path(source).is_file() or numbering.is_pattern(source)
+            numbering.readable(Path(source)) or numbering.is_pattern(source)
         ):
             known = ", ".join(scenes.SCENES)
             raise InputError(f"no file or scene {source!r}; scenes: {known}")
@@ -250,11 +252,8 @@ class State:
     @staticmethod
     def read(path: Path) -> State:
         """The state that was saved in a file; `InputError` names the file and what is wrong."""
-        text = saved.text_of(path)
-        try:
-            return State.of_toml(text)
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
+        with about(path):
+            return State.of_toml(text_of(path))
 
     @staticmethod
     def of_toml(text: str) -> State:
