@@ -366,12 +366,10 @@ def main(arguments: list[str] | None = None) -> int:
     except Error as error:
         return _say_why(str(error), USAGE)
     except OSError as error:
-        if error.filename is None:  # not of opening what was named, but of writing
-            return _say_why(
-                (error.strerror or str(error)).lower() if error.strerror else str(error),
-                SOME_FAILED,
-            )
-        return _say_why(f"{error.filename}: {(error.strerror or str(error)).lower()}", USAGE)
+        why = error.strerror.lower() if error.strerror else str(error)
+        if error.filename is not None:  # what was named cannot be opened
+            return _say_why(f"{error.filename}: {why}", USAGE)
+        return _say_why(why, SOME_FAILED)
     except MemoryError:
         return _say_why("there is not enough memory", SOME_FAILED)
     except KeyboardInterrupt:
@@ -400,7 +398,7 @@ def _config(words: list[str]) -> tuple[Dict, ...]:
     """The file named by --config; what stands on the command line wins over it."""
     for i, word in enumerate(words if words[:1] != ["view"] else []):
         name, _, given = word.partition("=")
-        if name == "--config":
+        if name == "--config" and (given or words[i + 1 :]):
             path = Path(given or "".join(words[i + 1 : i + 2]))
             with about(path):
                 return (Dict(parse(text_of(path)), source=str(path)),)

@@ -158,9 +158,8 @@ def _cryptomatte(attributes: Mapping, layer: str) -> dict[str, str] | None:
         if m := re.fullmatch(r"cryptomatte/([^/]+)/(\w+)", name):
             found.setdefault(m[1], {})[m[2]] = str(value)
     for crypto in found.values():
-        if layer in (crypto.get("name"), stem(crypto.get("name", ""))):
-            return crypto
-        if stem(crypto.get("name", "")) == layer.lower():
+        name = crypto.get("name")
+        if name and (layer in (name, stem(name)) or stem(name) == layer.lower()):
             return crypto
     return None
 

@@ -87,18 +87,18 @@ def frame_numbers(text: str) -> list[int]:
     """The numbers that `1-100x2` or `1,3,5-8` stands for, in that order; MOST_FRAMES of them
     at most.
     """
+    asked = f"frames {text if len(text) < 60 else f'{text[:60]}...'!r}"
     try:
         ranges = [(int(a), int(b), int(step or 1)) for a, b, step in _RANGE.findall(text)]
         count = sum(abs(b - a) // max(step, 1) + 1 for a, b, step in ranges)
-        if "." in text:
-            raise ValueError("must be whole numbers")
-        if count > MOST_FRAMES:
-            raise ValueError(f"{count} frames, but one run takes {MOST_FRAMES} at most")
-        numbers = [int(n) for n in FrameSet(text)]
-    except (FileSeqException, ValueError) as error:
-        raise InputError(f"frames {text!r}: {error}") from None
+        sensible = count <= MOST_FRAMES and "." not in text
+        numbers = [int(n) for n in FrameSet(text)] if sensible else []
+    except (FileSeqException, ValueError):
+        count, numbers = 0, []
+    if count > MOST_FRAMES:
+        raise InputError(f"{asked}: {count} frames, but one run takes {MOST_FRAMES} at most")
     if not numbers:
-        raise InputError(f"frames {text!r}: none")
+        raise InputError(f"{asked}: must be whole numbers such as 1-100, 1-100x2 or 1,3,5-8")
     return numbers
 
 
