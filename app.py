@@ -2,6 +2,6 @@
 
 import sys
 
-from wgmb.cli import main
+from wgmb.__main__ import main
 
-sys.exit(main(["view", *sys.argv[1:]]))
+main(["view", *sys.argv[1:]])

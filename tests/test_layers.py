@@ -156,12 +156,23 @@ def test_a_mask_that_cannot_be_made_is_refused_with_the_reason(wanted, says):
         layers.mask({**channels, "IndexOB.X": INDEX}, attributes, wanted)
 
 
-@pytest.mark.parametrize("manifest", ["not json", "[]", "3", '{"tree": 5}', '{"tree": "xyz"}'])
+@pytest.mark.parametrize(
+    "manifest",
+    ["not json", "[]", "3", '{"tree": 5}', '{"tree": "xyz"}', 100_000 * "[", 5000 * "9"],
+    ids=lambda text: text[:15],
+)
 def test_a_damaged_cryptomatte_manifest_is_refused(manifest):
     channels, attributes = cryptomatte()
     attributes["cryptomatte/abc1234/manifest"] = manifest
     with pytest.raises(InputError):
         layers.mask(channels, attributes, "CryptoObject=tree")
+
+
+def test_a_cryptomatte_without_a_name_is_none():
+    channels, attributes = cryptomatte()
+    del attributes["cryptomatte/abc1234/name"]
+    with pytest.raises(InputError, match="no layer"):
+        layers.mask(channels, attributes, "=tree")
 
 
 def test_a_cryptomatte_without_its_channels_is_refused():

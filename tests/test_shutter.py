@@ -150,7 +150,10 @@ def test_a_curve_file_is_the_curve_it_lists(tmp_path):
 @pytest.mark.parametrize(
     "text",
     ["", "time,weight\n", "1,1\n", "1,1\n1,2\n", "2,1\n1,1\n", "0,-1\n1,1\n", "0,0\n1,0\n",
-     "0,x\n1,1\n", "0\n1\n", "0,nan\n1,1\n", "0,1e999\n1,1\n"],
+     "0,x\n1,1\n", "0\n1\n", "0,nan\n1,1\n", "0,1e999\n1,1\n",
+     "0,1e308\n1,1e308\n", "-1e308,1\n1e308,1\n", "0,0\n1e-9,1\n2e-9,0\n1,0\n",
+     f"0,{200_000 * '1'}\n"],
+    ids=lambda text: repr(text[:30]),
 )  # fmt: skip
 def test_a_senseless_curve_file_is_named(tmp_path, text):
     (tmp_path / "bad.csv").write_text(text)

@@ -1,5 +1,6 @@
 """The viewer offscreen: events in, pictures out."""
 
+import random
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -839,11 +840,75 @@ def test_settings_come_back_as_they_were_saved(state):
         ('[render]\nscene = "crossing"\n[view]\nzoo = 1', "zoo"),
         ('[render]\nscene = "crossing"\n[view]\ncone_rate = 0', "rate"),
         ('[render]\nscene = "crossing"\n[view]\nframes = "x-y"', "x-y"),
+        ('[render]\nscene = "crossing"\nset = 3', "set"),
+        ('[render]\nscene = "crossing"\nset = [3]', "set"),
+        ('view = 3\n[render]\nscene = "crossing"', "view"),
+        ("render = 3", "render"),
+        ("a = " + 5000 * "[", "lists"),
+        ("a = " + 5000 * "9", "digits"),
+        (f'[render]\nscene = "crossing"\nrays = 0x{5000 * "f"}', "rays"),
+        ('[render]\nscene = "crossing"\nmax_blur = "far"', "max_blur"),
+        ('[render]\nscene = "crossing"\nrolling = 3', "rolling"),
+        ('[render]\nscene = "crossing"\npath = [1]', "path"),
+        ('[render]\nscene = "crossing"\nsource = "fence"', "source"),
+        ('[render]\nscene = "crossing"\nfps = 0', "fps"),
+        ('[render]\nscene = "crossing"\n[view]\nframes = "0-9999999"', "1000000"),
+        ('[blur]\npattern = "a.####.exr"\nalso = "b.####.exr"', "also"),
+        ('[blur]\npattern = "a.####.exr"\nvector_scale = "2"', "vector_scale"),
     ],
 )
 def test_settings_that_make_no_sense_are_told(text, said):
     with pytest.raises(InputError, match=said):
         State.of_toml(text)
+
+
+ON_DISK = State(
+    source="a.####.exr",
+    given=(("also", ("b.####.exr", "c\x7f.exr")), ("camera", Path("cam.json")), ("far", 50.0)),
+)
+
+
+def test_what_files_hold_comes_back_as_it_was_saved():
+    assert State.of_toml(ON_DISK.toml()) == ON_DISK
+
+
+def test_changed_settings_are_read_or_refused_and_nothing_else():
+    """A thousand small changes of sound files; the message is one line."""
+    rng = random.Random(1)
+    values = ["3", "-1", "[[1]]", "{a = 1}", "nan", "1e400", "true", '""', "[]", "1979-05-27",
+              "0x" + 5000 * "f", 5000 * "9", '"\\u0000"']  # fmt: skip
+    read = 0
+    for _ in range(1000):
+        lines = rng.choice((MANY, ON_DISK, State())).toml().splitlines()
+        at = rng.randrange(len(lines))
+        if rng.random() < 0.7:
+            lines[at] = lines[at].partition(" = ")[0] + f" = {rng.choice(values)}"
+        else:
+            place = rng.randrange(len(lines[at]) + 1)
+            lines[at] = lines[at][:place] + chr(rng.randrange(128)) + lines[at][place + 1 :]
+        try:
+            state = State.of_toml("\n".join(lines))
+        except InputError as error:
+            assert len(str(error)) < 400
+        else:
+            read += 1
+            assert State.of_toml(state.toml()) == state
+    assert 50 < read < 950
+
+
+@pytest.mark.parametrize(
+    "data, said",
+    [(b"\xff[render]", "UTF-8"), (b"[render", "settings"), (b"[render]\nscene = 3", "scene")],
+)
+def test_a_settings_file_that_makes_no_sense_is_named(hand, tmp_path, data, said):
+    (tmp_path / "bad.toml").write_bytes(data)
+    with pytest.raises(InputError, match=rf"bad\.toml: .*{said}") as error:
+        State.read(tmp_path / "bad.toml")
+    assert str(error.value).count("bad.toml") == 1
+    state = hand.state
+    hand.viewer.do("load", str(tmp_path / "bad.toml"))
+    assert said in hand.viewer.message[0]
+    assert hand.state == state
 
 
 def test_render_takes_the_saved_settings(hand, tmp_path, monkeypatch):

@@ -1,5 +1,25 @@
-"""`python -m wgmb` is the command line."""
+"""The `wgmb` command, also `python -m wgmb`: it hears Ctrl-C while the rest is being loaded."""
 
-from .cli import run
+import os
+import signal
 
-run()
+
+def _leave(*_) -> None:
+    """Nothing has begun yet, so nothing is to be tidied up."""
+    try:
+        os.write(2, b"wgmb: interrupted\n")
+    finally:
+        os._exit(130)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and end the process with its exit code."""
+    signal.signal(signal.SIGINT, _leave)
+    signal.signal(signal.SIGTERM, _leave)
+    from .cli import run
+
+    run(arguments)
+
+
+if __name__ == "__main__":
+    main()

@@ -110,7 +110,7 @@ class Bench:
             data = json.loads(path.read_text(encoding="utf-8"))
             figures = [Figure(**f) for f in data["figures"]]
             return cls(**data | {"copy": float(data["copy"]), "figures": figures})
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             raise InputError(f"{path}: not a saved bench: {error}") from None
 
 

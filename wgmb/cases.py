@@ -17,7 +17,7 @@ from .blur.options import options_of
 from .errors import InputError
 from .frame import Frame
 from .measure import measure
-from .numbering import frame_range
+from .numbering import frame_list
 from .pipeline import Blur
 from .render import Render
 from .scene import Scene
@@ -51,8 +51,8 @@ class Contender:
         for part in more:
             key, equals, value = part.partition("=")
             if equals:
-                options.append((key, _value(value)))
-            elif part.isdigit():
+                options.append((key, _option(name, key, value)))
+            elif part.isdecimal() and len(part) < 10:
                 samples = int(part)
             else:
                 raise InputError(f"a method is NAME:SAMPLES:OPTION=VALUE, got {text!r}")
@@ -75,10 +75,24 @@ class Contender:
         )
 
 
-def _value(text: str):
+def _option(method: str, name: str, text: str) -> Any:
+    """The value of an option that a Blur of the method takes; the error says what it has."""
+    known = options_of(METHODS[method].Options)
+    value = _value(text)
+    if name in known:
+        known[name].check(value)
+    elif name not in ("jitter", "max_blur"):
+        every = ", ".join((*known, "jitter", "max_blur"))
+        raise InputError(f"method {method!r} has no option {name}; it has {every}")
+    elif not isinstance(value, (int, float)) or isinstance(value, bool):
+        raise InputError(f"{name} must be a number, got {text!r}")
+    return value
+
+
+def _value(text: str) -> Any:
     try:
         return ast.literal_eval(text)
-    except (ValueError, SyntaxError):
+    except (ValueError, SyntaxError, MemoryError, RecursionError):  # the last two: much nested
         return text
 
 
@@ -192,7 +206,7 @@ def clip_case(
     elif len(inputs) == 1:
         clip = open_clip(inputs[0])
         if number is None and len(clip.numbers) > 1:
-            raise InputError(f"{inputs[0]} has frames {frame_range(clip.numbers)}: choose --frame")
+            raise InputError(f"{inputs[0]} has frames {frame_list(clip.numbers)}: choose --frame")
         wanted = clip.numbers[0] if number is None else number
         if wanted not in clip.numbers:
             raise InputError(f"{inputs[0]} has no frame {wanted}")

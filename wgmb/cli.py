@@ -1,14 +1,14 @@
 """The command line: options into the library's words, errors into one line and an exit code.
 
-Exit codes: 0 done, 1 some frames failed, 2 usage or input, 3 no adapter or display,
-130 interrupted.
+Exit codes: 0 done, 1 some frames failed or the output cannot be written, 2 usage or input,
+3 no adapter or display, 130 interrupted.
 """
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import os
+import re
 import signal
 import sys
 import time
@@ -18,8 +18,7 @@ from typing import Annotated
 
 import cyclopts
 from cyclopts import Parameter
-from cyclopts.config import Toml
-from rich.console import Console
+from cyclopts.config import Dict
 
 from . import __version__, gpu, lab, seeing, terminal
 from .errors import DeviceError, Error, InputError
@@ -37,8 +36,9 @@ from .output import Output
 from .pipeline import Blur
 from .render import Render, render_frames
 from .run import Report, blur_sequence
-from .source import odd_sizes
-from .terminal import progress
+from .source import about, odd_sizes
+from .terminal import note, out, progress
+from .toml import parse, text_of
 
 DONE, SOME_FAILED, USAGE, NO_DEVICE, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -88,7 +88,6 @@ def blur(
     """
     look, given = look or BlurOptions(), given or InputOptions()
     when = (when or ShutterOptions()).settled()
-    say = Console(stderr=True, highlight=False, soft_wrap=True)
     clip = given.open(pattern, look.keep, look.scale)
     look = look.settled(clip=clip)
     made = look.make(when.make(), adapter)
@@ -110,15 +109,15 @@ def blur(
         compression=output.compression,
     )
     if verbose:
-        say.print(f"adapter: {made.device.adapter.summary}", markup=False)
-        say.print(f"settings: {files.settings}", markup=False)
+        note(f"adapter: {made.device.adapter.summary}")
+        note(f"settings: {files.settings}")
     started = time.perf_counter()
-    with progress(say, len(clip.numbers), quiet) as tick:
+    with progress(len(clip.numbers), quiet) as tick:
         report = blur_sequence(
             clip, made, files, resume=output.resume, confidence=confidence, progress=tick
         )
     took = f"{time.perf_counter() - started:.1f} s with {made.method.name}"
-    return _conclude(say, clip, files, report, took, quiet, verbose)
+    return _conclude(clip, files, report, took, quiet, verbose)
 
 
 def _settings(look: BlurOptions, when: ShutterOptions, given: InputOptions) -> dict:
@@ -139,31 +138,27 @@ def _samples(blur: Blur) -> int | str:
     return "auto" if blur.auto else blur.samples
 
 
-def _conclude(say, clip, files, report: Report, took: str, quiet: bool, verbose: bool) -> int:
+def _conclude(clip, files, report: Report, took: str, quiet: bool, verbose: bool) -> int:
     """Say what became of the run; return the exit code."""
-
-    def line(text: str) -> None:
-        say.print(text, markup=False)
-
     for number, why in sorted(report.failed.items()):
-        line(f"wgmb: frame {number} failed: {why}")
+        note(f"wgmb: frame {number} failed: {why}")
     if report.stopped:
         rest = len(clip.numbers) - len(report.done) - len(report.skipped) - len(report.failed)
-        line(f"wgmb: stopped: {report.stopped}; {rest} other frames were not written")
+        note(f"wgmb: stopped: {report.stopped}; {rest} other frames were not written")
     if not quiet:
         for number, bad in sorted(report.bad.items()):
             what = ", ".join(f"{n} in {name}" for name, n in bad.items())
-            line(f"frame {number}: pixels that are not finite were given no weight: {what}")
+            note(f"frame {number}: pixels that are not finite were given no weight: {what}")
         if verbose or "because" in clip.finding or "check them" in clip.finding:
-            line(f"vectors: {clip.finding}")
+            note(f"vectors: {clip.finding}")
         if clip.cuts:
-            line(f"camera cut before frame {', '.join(map(str, sorted(clip.cuts)))}")
+            note(f"camera cut before frame {', '.join(map(str, sorted(clip.cuts)))}")
         if odd := odd_sizes({n: clip.sizes[n] for n in report.done}):
-            line(odd)
+            note(odd)
         done = f"{len(report.done)} frames in {took} -> {files.pattern}"
-        line(done + (f", {len(report.skipped)} were there" if report.skipped else ""))
+        note(done + (f", {len(report.skipped)} were there" if report.skipped else ""))
     if report.failed:
-        line(f"wgmb: {len(report.failed)} of {len(clip.numbers)} frames failed")
+        note(f"wgmb: {len(report.failed)} of {len(clip.numbers)} frames failed")
     return SOME_FAILED if report.failed or report.stopped else DONE
 
 
@@ -240,12 +235,11 @@ def render(
         layers=output.layers,
         compression=output.compression,
     )
-    say = Console(stderr=True, highlight=False, soft_wrap=True)
     if verbose:
-        say.print(f"adapter: {renderer.blur.device.adapter.summary}", markup=False)
-        say.print(f"settings: {files.settings}", markup=False)
+        note(f"adapter: {renderer.blur.device.adapter.summary}")
+        note(f"settings: {files.settings}")
     started = time.perf_counter()
-    with progress(say, len(moments), quiet, "rendering") as tick:
+    with progress(len(moments), quiet, "rendering") as tick:
         try:
             skipped = render_frames(
                 renderer, moments, files, sharp, passes, confidence, output.resume, tick
@@ -256,7 +250,7 @@ def render(
     if not quiet:
         seconds, made = time.perf_counter() - started, len(moments) - skipped
         done = f"{made} frames in {seconds:.1f} s -> {files.pattern}"
-        say.print(done + (f", {skipped} were there" if skipped else ""), markup=False)
+        note(done + (f", {skipped} were there" if skipped else ""))
     return DONE
 
 
@@ -296,7 +290,7 @@ def view(
         ) from None
     state = viewer.State()
     if config is not None:
-        state = viewer.State.of_toml(config.read_text(encoding="utf-8"))
+        state = viewer.State.read(config)
     if what is not None:
         state = state.opened(what)
     given, look, when = given or InputOptions(), look or BlurOptions(), when or ShutterOptions()
@@ -332,9 +326,8 @@ def info(
     if output is not None and output.exists() and not overwrite:
         raise InputError(f"{output} exists; --overwrite replaces it")
     lines = describe(clip, output)
-    say = Console(highlight=False, soft_wrap=True)
     for name, text in lines:
-        say.print(f"{name:10}{text}", markup=False)
+        out(f"{name:10}{text}")
     return DONE
 
 
@@ -351,7 +344,7 @@ def devices() -> int:
         chosen = None
     for i, adapter in enumerate(found):
         same = chosen is not None and adapter.summary == chosen.summary
-        sys.stdout.write(f"{'*' if same else ' '} {i}: {adapter.summary}\n")
+        out(f"{'*' if same else ' '} {i}: {adapter.summary}")
     if chosen is None:
         gpu.choose_adapter()  # says why
     return DONE
@@ -365,71 +358,76 @@ app.command(seeing.shutter)
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    _own_streams()
+    terminal.own_streams()
     terminal.interrupted.clear()
-    signal.signal(signal.SIGTERM, terminal.interrupt)
-    signal.signal(signal.SIGINT, terminal.interrupt)  # a shell may have set it to be ignored
-    warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
-    for name in ("tifffile", "wgpu"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    words = sys.argv[1:] if arguments is None else arguments
     try:
-        words = sys.argv[1:] if arguments is None else arguments
+        signal.signal(signal.SIGTERM, terminal.interrupt)
+        signal.signal(signal.SIGINT, terminal.interrupt)  # a shell may have set it to be ignored
+        warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
+        for name in ("tifffile", "wgpu"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        _check_text(words)
         app.config = _config(words)
         result = app(words, exit_on_error=False, print_error=False)
-        sys.stdout.flush()
+        terminal.flush()
         return result if isinstance(result, int) else DONE
     except cyclopts.CycloptsError as error:
-        return _say_why(str(error), USAGE)
+        return _say_why(f"{error}{_hint(words)}", USAGE)
     except DeviceError as error:
         return _say_why(str(error), NO_DEVICE)
     except Error as error:
         return _say_why(str(error), USAGE)
     except OSError as error:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - whoever read us may be gone
-        return _say_why(str(error), SOME_FAILED)
+        why = error.strerror.lower() if error.strerror else str(error)
+        if error.filename is not None:  # what was named cannot be opened
+            return _say_why(f"{error.filename}: {why}", USAGE)
+        return _say_why(why, SOME_FAILED)
+    except MemoryError:
+        return _say_why("there is not enough memory", SOME_FAILED)
     except KeyboardInterrupt:
         return _say_why("interrupted", INTERRUPTED)
 
 
-def _config(words: list[str]) -> tuple[Toml, ...]:
+def _check_text(words: list[str]) -> None:
+    """Names go into files and libraries that take text only."""
+    for word in words:
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            shown = os.fsencode(word).decode("utf-8", "backslashreplace")
+            raise InputError(f"{shown}: not UTF-8; please rename the file or folder") from None
+
+
+def _hint(words: list[str]) -> str:
+    """What may be meant where a file's name was taken for an option."""
+    for word in words:
+        if re.fullmatch(r"-[^=]*\.[A-Za-z]\w*", word):
+            return f" For a file whose name begins with -, write ./{word}"
+    return ""
+
+
+def _config(words: list[str]) -> tuple[Dict, ...]:
     """The file named by --config; what stands on the command line wins over it."""
     for i, word in enumerate(words if words[:1] != ["view"] else []):
-        name, _, path = word.partition("=")
-        if name == "--config":
-            path = path or "".join(words[i + 1 : i + 2])
-            if not Path(path).is_file():
-                raise InputError(f"--config {path}: no such file")
-            return (Toml(path, must_exist=True, search_parents=False),)
+        name, _, given = word.partition("=")
+        if name == "--config" and (given or words[i + 1 :]):
+            path = Path(given or "".join(words[i + 1 : i + 2]))
+            with about(path):
+                return (Dict(parse(text_of(path)), source=str(path)),)
     return ()
 
 
 def _say_why(text: str, code: int) -> int:
-    with contextlib.suppress(OSError):
-        sys.stderr.write(f"wgmb: {' '.join(text.split())}\n")
+    terminal.note(f"wgmb: {' '.join(text.split())}")
     return code
 
 
-def _own_streams() -> None:
-    """Move Python's output off descriptors 1 and 2, so that native chatter can be held back."""
-    for name in ("stdout", "stderr"):
-        stream = getattr(sys, name)
-        try:
-            if stream.fileno() > 2:
-                continue
-            stream.flush()
-            own = os.fdopen(
-                os.dup(stream.fileno()),
-                "w",
-                buffering=1,
-                encoding=stream.encoding,
-                errors="replace",
-            )
-        except (OSError, ValueError, AttributeError):
-            continue
-        setattr(sys, name, own)
-
-
-def run() -> None:
-    """The `wgmb` command."""
+def run(arguments: list[str] | None = None) -> None:
+    """Run the command line and end the process with its exit code."""
     sys.unraisablehook = terminal.hush
-    sys.exit(main())
+    code = main(arguments)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    terminal.drop_streams()
+    sys.exit(code)

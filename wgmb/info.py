@@ -10,7 +10,7 @@ from . import layers, stills
 from .atomic import write_file
 from .display import motion_picture
 from .errors import InputError
-from .numbering import frame_range
+from .numbering import frame_list
 from .output import refuse_inputs
 from .pipeline import Blur
 from .sequence import Clip
@@ -28,7 +28,7 @@ def describe(clip: Clip, output: Path | None = None) -> list[tuple[str, str]]:
     source = clip.source(clip.numbers[0])
     lines = [("file", str(source.path))]
     if len(clip.numbers) > 1:
-        lines.append(("frames", f"{frame_range(clip.numbers)} ({len(clip.numbers)})"))
+        lines.append(("frames", f"{frame_list(clip.numbers)} ({len(clip.numbers)})"))
     lines.append(("size", "{} x {}".format(*source.size)))
     for part in source.file.parts if source.file else ():
         if part.data_window != part.display_window:

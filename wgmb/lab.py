@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
 
 from . import gpu, terminal
 from .blur import METHODS
@@ -23,6 +22,7 @@ from .options import CompareOptions, InputOptions, ShutterOptions, size_of, whol
 from .pipeline import Blur
 from .report import write
 from .shutter import Shutter
+from .terminal import note, out
 
 
 def compare(
@@ -207,12 +207,13 @@ def bench(
     run = measure(device, contenders, sizes, counts, rounds, seconds, _teller(quiet))
     if save:
         run.save(save)
-    sys.stdout.write(bench_page.text(run))
+    for line in bench_page.text(run).splitlines():
+        out(line)
     if before:
         table = bench_page.against(run, before)
-        sys.stdout.write(f"{table.note}\n")
+        out(table.note)
         for row in (table.columns, *table.rows):
-            sys.stdout.write("".join(f"{cell!s:>20}" for cell in row) + "\n")
+            out("".join(f"{cell!s:>20}" for cell in row))
     if output:
         write(bench_page.report(run, _command_line(), before), output)
     terminal.check()
@@ -231,7 +232,7 @@ def _pages(output: Path) -> list[Path]:
 def _tell_article(found: dict, width: int, height: int) -> None:
     from .peers import ARTICLE
 
-    sys.stdout.write(f"{width} x {height}, torusphere, published density\n")
+    out(f"{width} x {height}, torusphere, published density")
     for time_, (frame, recording, work) in found.items():
         line = f"  iTime {time_:<6g}{frame:9.2f} ms a frame, {recording:.2f} of them recording, "
         line += f"{work:.2f} ms of all cores"
@@ -240,17 +241,16 @@ def _tell_article(found: dict, width: int, height: int) -> None:
             line += "; to the article's shader {:.2f}, as work of two free cores {:.2f}".format(
                 *ratios
             )
-        sys.stdout.write(line + "\n")
+        out(line)
 
 
 def _teller(quiet: bool) -> Tell:
     """What says on stderr how far the work is, and hears Ctrl-C."""
-    say = Console(stderr=True, highlight=False, soft_wrap=True)
 
     def tell(text: str) -> None:
         terminal.check()
         if not quiet:
-            say.print(text, markup=False)
+            note(text)
 
     return tell
 

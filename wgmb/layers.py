@@ -158,9 +158,8 @@ def _cryptomatte(attributes: Mapping, layer: str) -> dict[str, str] | None:
         if m := re.fullmatch(r"cryptomatte/([^/]+)/(\w+)", name):
             found.setdefault(m[1], {})[m[2]] = str(value)
     for crypto in found.values():
-        if layer in (crypto.get("name"), stem(crypto.get("name", ""))):
-            return crypto
-        if stem(crypto.get("name", "")) == layer.lower():
+        name = crypto.get("name")
+        if name and (layer in (name, stem(name)) or stem(name) == layer.lower()):
             return crypto
     return None
 
@@ -189,7 +188,7 @@ def _crypto_id(crypto: Mapping[str, str], value: str) -> int:
         return int(value, 16)
     try:
         manifest = json.loads(crypto.get("manifest") or "{}")
-    except ValueError:
+    except (ValueError, RecursionError):
         manifest = {}
     if not isinstance(manifest, dict) or value not in manifest:
         known = (

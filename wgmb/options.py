@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from .cases import Case, Contender
 from .cone import Cone
 from .errors import InputError
 from .findings import Report
-from .numbering import frame_numbers
+from .numbering import frame_numbers, is_pattern, readable
 from .pipeline import Blur
 from .scene import Scene
 
@@ -77,7 +78,7 @@ class ShutterOptions:
         curve = self.curve
         assert self.shutter is not None and curve is not None
         if curve not in shutter.CURVES:
-            if not Path(curve).is_file():
+            if not readable(Path(curve)):
                 known = ", ".join(shutter.CURVES)
                 raise InputError(f"curve must be one of {known}, or a CSV file; got {curve!r}")
             curve = shutter.read_curve(curve)
@@ -125,7 +126,10 @@ class InputOptions:
     def open(
         self, pattern: str, keep: str | None = None, scale: str | None = None
     ) -> sequence.Clip:
-        """The clip these options describe."""
+        """The clip these options describe; InputError where one of its files must not be read."""
+        for name in (keep, scale, *self.also):
+            if name and Path(name).suffix and not is_pattern(name):
+                readable(Path(name))
         passes = sequence.Passes(
             color=self.layer,
             vectors=vectors.Vectors(
@@ -344,10 +348,10 @@ class PerceptionOptions:
 
 def size_of(text: str) -> tuple[int, int]:
     """`1920x1080` -> width, height."""
-    width, _, height = text.partition("x")
-    if not (width.isdigit() and height.isdigit() and int(width) and int(height)):
+    sides = re.fullmatch(r"0*([1-9][0-9]{0,8})x0*([1-9][0-9]{0,8})", text)
+    if sides is None:
         raise InputError(f"size must be like 1920x1080, got {text!r}")
-    return int(width), int(height)
+    return int(sides[1]), int(sides[2])
 
 
 def settings_of(texts: tuple[str, ...]) -> dict[str, str]:
@@ -386,13 +390,20 @@ class OutputOptions:
     @property
     def rate(self) -> Fraction:
         """Frames per second, exactly."""
-        try:
-            fps = Fraction(self.fps)
-        except (ValueError, ZeroDivisionError):
-            raise InputError(f"fps must be a number or a fraction, got {self.fps!r}") from None
-        if not 0 < fps <= 1000:
-            raise InputError(f"fps must be over 0 and at most 1000, got {self.fps}")
-        return fps
+        return rate_of(self.fps)
+
+
+def rate_of(text: str) -> Fraction:
+    """`24`, `23.976`, `30000/1001` -> frames per second, exactly; over 0, at most 1000."""
+    try:
+        if re.search(r"e[+-]?[0-9]{4}", text, re.IGNORECASE):  # would be worked out in full
+            raise ValueError
+        fps = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        raise InputError(f"fps must be a number or a fraction, got {text!r}") from None
+    if not 0 < fps <= 1000:
+        raise InputError(f"fps must be over 0 and at most 1000, got {text}")
+    return fps
 
 
 def plain(options) -> dict:

@@ -291,7 +291,7 @@ SCENES: dict[str, Callable[..., Scene]] = {
 }
 
 
-def make(name: str, **settings: float | str) -> Scene:
+def make(name: str, /, **settings: float | str) -> Scene:
     """The built-in scene `name`; `InputError` names an unknown scene, setting or bad value."""
     if name not in SCENES:
         raise InputError(f"unknown scene {name!r}, one of {', '.join(SCENES)}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
-from rich.console import Console
 
 from . import __version__, plot, scenes
 from .atomic import write_file
@@ -34,7 +32,7 @@ from .render import Render
 from .shutter import OVERLAPS
 from .shutter_study import best_shutter, compare, perception_charts
 from .source import Source
-from .terminal import progress
+from .terminal import note, out, progress
 
 
 def perceive(
@@ -101,9 +99,8 @@ def perceive(
         layers=output.layers,
         compression=output.compression,
     )
-    say = Console(stderr=True, highlight=False, soft_wrap=True)
     started = time.perf_counter()
-    with progress(say, len(numbers), quiet, "perceiving") as tick:
+    with progress(len(numbers), quiet, "perceiving") as tick:
         try:
             for number, source, shown in pictures:
                 for picture in shown:
@@ -117,7 +114,7 @@ def perceive(
     if not quiet:
         seconds = time.perf_counter() - started
         done = f"{len(numbers)} frames in {seconds:.1f} s -> {files.pattern}"
-        say.print(done, markup=False)
+        note(done)
     return 0
 
 
@@ -157,16 +154,16 @@ def _report(output: OutputOptions, who: PerceptionOptions, speed: float | None, 
     found = compare(fps, speeds, who.cone)
     write_file(path, plot.svg(*perception_charts(found, speeds, fps)).encode())
     if not quiet:
-        sys.stdout.write("rad/s    " + "".join(f"{name:>11}" for name in found) + "\n")
+        out("rad/s    " + "".join(f"{name:>11}" for name in found))
         for i in range(3, len(speeds), 4):
             row = "".join(f"{values[i]:11.4f}" for values in found.values())
-            sys.stdout.write(f"{speeds[i]:<9.1f}{row}\n")
+            out(f"{speeds[i]:<9.1f}{row}")
     if best is not None and speed is not None:
         name, off = best
         degrees = VIDEOS[name].degrees
-        sys.stdout.write(
+        out(
             f"at {speed:g} rad/s and {fps:g} frames a second the disk moves {speed / fps:.2f} of "
-            f"its width a frame: --curve {name} --shutter {degrees:g} is nearest, {off:.4f}\n"
+            f"its width a frame: --curve {name} --shutter {degrees:g} is nearest, {off:.4f}"
         )
     return 0
 
@@ -203,5 +200,5 @@ def shutter(
     low, high = round(float(total.min()), 3), round(float(total.max()), 3)
     even = high - low < 0.01
     text = "add up to 1" if even else f"add up to {low:g} to {high:g}"
-    sys.stdout.write(f"{name}, {made.degrees:g} degrees: all frames' windows {text}\n")
+    out(f"{name}, {made.degrees:g} degrees: all frames' windows {text}")
     return 0

@@ -19,12 +19,14 @@ from .cuts import is_cut, jumps, straightened
 from .errors import InputError
 from .frame import Frame
 from .numbering import (
+    MOST_FRAMES,
+    frame_list,
     frame_numbers,
     frame_path,
-    frame_range,
     is_pattern,
     number_in,
     numbers_on_disk,
+    readable,
 )
 from .source import Source, about, read, size_text
 
@@ -98,23 +100,31 @@ class Clip:
     def _numbers(self, frames: str | None, skip_missing: bool) -> list[int]:
         if not is_pattern(self.pattern):
             path = Path(self.pattern)
-            if not path.is_file():
+            if not readable(path):
                 raise InputError(f"{path}: no such file")
             if frames is not None:
                 raise InputError(f"--frames needs a pattern such as shot.####.exr, got {path.name}")
             self.on_disk = [number_in(path)]
             return self.on_disk
         self.on_disk = there = numbers_on_disk(self.pattern)
+        if frames is None and skip_missing:
+            return there
+        if frames is None and there[-1] - there[0] - len(there) >= MOST_FRAMES:
+            raise InputError(
+                f"{self.pattern}: {len(there)} of the frames {there[0]} to {there[-1]} are there; "
+                "--skip-missing takes these, --frames chooses"
+            )
         wanted = frame_numbers(frames) if frames else list(range(there[0], there[-1] + 1))
-        missing = sorted(set(wanted) - set(there))
+        found = set(there)
+        missing = sorted(set(wanted) - found)
         if missing and not skip_missing:
             raise InputError(
-                f"{self.pattern}: missing frames {frame_range(missing)}; "
+                f"{self.pattern}: missing frames {frame_list(missing)}; "
                 "--skip-missing leaves them out"
             )
-        if len(missing) == len(set(wanted)):
+        if not found & set(wanted):
             raise InputError(f"{self.pattern}: none of the frames {frames} exist")
-        return [n for n in wanted if n not in set(missing)]
+        return [n for n in wanted if n in found]
 
     def __iter__(self):
         for number in self.numbers:

@@ -163,7 +163,9 @@ def read_curve(path: str | Path) -> Weight:
     try:
         with open(path, newline="", encoding="utf-8") as file:
             rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise InputError(f"curve {path}: {(error.strerror or str(error)).lower()}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"curve {path}: {error}") from None
     try:
         points = np.array([[float(cell) for cell in row[:2]] for row in rows[_is_header(rows) :]])
@@ -172,12 +174,23 @@ def read_curve(path: str | Path) -> Weight:
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
         raise InputError(f"curve {path}: needs at least two rows of time, weight")
     time, weight = points.T
-    if not np.isfinite(points).all() or (np.diff(time) <= 0).any() or (weight < 0).any():
+    if not np.isfinite(points).all() or (time[1:] <= time[:-1]).any() or (weight < 0).any():
         raise InputError(f"curve {path}: times must rise, weights be 0 or more, all finite")
     if not weight.any():
         raise InputError(f"curve {path}: all weights are 0")
-    time = (time - time[0]) / (time[-1] - time[0])
-    return lambda x: np.interp(x, time, weight)
+    with np.errstate(all="ignore"):
+        time = (time - time[0]) / (time[-1] - time[0])
+
+        def curve(x: np.ndarray) -> np.ndarray:
+            return np.interp(x, time, weight)
+
+        try:
+            share = Shutter(curve=curve).integral()[1]
+        except InputError as error:
+            raise InputError(f"curve {path}: {error}") from None
+    if not (np.isfinite(time).all() and np.isfinite(share).all()):
+        raise InputError(f"curve {path}: times or weights are too large")
+    return curve
 
 
 def _is_header(rows: list[list[str]]) -> bool:

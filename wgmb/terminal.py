@@ -1,8 +1,9 @@
-"""What the commands show while they work, and how they are interrupted."""
+"""What the commands say, what they show while they work, and how they are interrupted."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 import threading
 import time
@@ -32,9 +33,80 @@ def check(*_) -> None:
         raise KeyboardInterrupt
 
 
+def printable(text: str) -> str:
+    """`text` as one line that cannot steer a terminal.
+
+    Whatever is no visible character, nor a space (control and format characters, line ends, bytes
+    that are not UTF-8), becomes an escape such as \\x1b.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def out(text: str) -> None:
+    """Print a line of results; OSError if nobody can take it."""
+    with _taken():
+        sys.stdout.write(f"{printable(text)}\n")
+
+
+def note(text: str) -> None:
+    """Print a line for people on standard error; if nobody can take it, there is nobody to tell."""
+    with contextlib.suppress(OSError):
+        sys.stderr.write(f"{printable(text)}\n")
+
+
+def flush() -> None:
+    """Hand over what was printed; OSError if nobody can take it."""
+    with _taken():
+        sys.stdout.flush()
+
+
 @contextlib.contextmanager
-def progress(say: Console, frames: int, quiet: bool, doing: str = "blurring"):
+def _taken():
+    try:
+        yield
+    except OSError as error:
+        raise OSError(f"standard output: {(error.strerror or str(error)).lower()}") from None
+
+
+def own_streams() -> None:
+    """Move Python's output off descriptors 1 and 2, so that native chatter can be held back.
+
+    Descriptors that are closed are filled, as a file that is opened would get their numbers and
+    with them the chatter; nothing can be printed there all the same.
+    """
+    while (spare := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(spare)
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        try:
+            if stream is None:
+                own, encoding = os.open(os.devnull, os.O_RDONLY), "utf-8"
+            elif stream.fileno() > 2:
+                continue
+            else:
+                stream.flush()
+                own, encoding = os.dup(stream.fileno()), stream.encoding
+        except (OSError, ValueError, AttributeError):
+            continue
+        setattr(sys, name, os.fdopen(own, "w", buffering=1, encoding=encoding, errors="replace"))
+
+
+def drop_streams() -> None:
+    """Before the process ends: what cannot be handed over must not change its exit code."""
+    for name in ("stdout", "stderr"):
+        try:
+            getattr(sys, name).flush()
+        except (OSError, ValueError, AttributeError):
+            setattr(sys, name, None)
+
+
+@contextlib.contextmanager
+def progress(frames: int, quiet: bool, doing: str = "blurring"):
     """What to call after every frame: a bar with frames/s and time left where somebody watches."""
+    say = Console(stderr=True, highlight=False, soft_wrap=True)
     if quiet or not say.is_terminal:
         yield check
         return

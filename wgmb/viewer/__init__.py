@@ -1,6 +1,6 @@
 """The interactive viewer: `wgmb view`, `python app.py`.
 
-state      what the viewer is set to; as TOML and as a command line
+state      what the viewer is set to; as TOML (saved) and as a command line
 controls   mouse and keys: an event and a State make a State
 subject    a scene or frames on disk, drawn into textures; choices: what they allow
 stage      a State becomes one or two images, a bit at a time

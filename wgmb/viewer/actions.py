@@ -52,7 +52,7 @@ class Actions:
         }
         try:
             return actions[action]() or state
-        except (Error, OSError, UnicodeDecodeError) as error:
+        except (Error, OSError) as error:
             self._say(str(error))
             return state
 
@@ -61,7 +61,7 @@ class Actions:
         self._say(f"saved {path}")
 
     def _load(self, path: Path) -> State:
-        state = State.of_toml(path.read_text(encoding="utf-8"))
+        state = State.read(path)
         self._say(f"loaded {path}")
         return state
 

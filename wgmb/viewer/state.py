@@ -5,12 +5,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
-import tomllib
 from dataclasses import dataclass, fields, replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +15,16 @@ from .. import numbering, scenes
 from ..blur import METHODS
 from ..cone import Cone
 from ..errors import InputError
-from ..options import OWN, BlurOptions, InputOptions, OutputOptions, SceneOptions, ShutterOptions
+from ..options import OWN, ShutterOptions
+from ..source import about
+from ..toml import text_of
+from . import saved
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
 LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")
 TONES = ("clip", "soft")
 REFERENCE = "reference"
-_GROUPS = (BlurOptions, ShutterOptions, SceneOptions, OutputOptions, InputOptions)
-DEFAULTS = {f.name: f.default for group in _GROUPS for f in fields(group)}
+DEFAULTS = {f.name: f.default for group in saved.GROUPS for f in fields(group)}
 """What every option of the command line is when it is not given."""
 
 
@@ -110,7 +109,7 @@ class State:
     def opened(self, source: str) -> State:
         """The same state with another scene or other frames, seen anew."""
         if source not in scenes.SCENES and not (
-            Path(source).is_file() or numbering.is_pattern(source)
+            numbering.readable(Path(source)) or numbering.is_pattern(source)
         ):
             known = ", ".join(scenes.SCENES)
             raise InputError(f"no file or scene {source!r}; scenes: {known}")
@@ -165,9 +164,8 @@ class State:
         said = {name: value for name, value in given.items() if value != DEFAULTS[name]}
         own = {f.name for f in fields(self)} - {"frames"}
         state = replace(self, **{n: v for n, v in said.items() if n in own})
-        inputs = {*(f.name for f in fields(InputOptions)), *_MASKS}
         if not self.is_scene:
-            found = tuple((n, v) for n, v in said.items() if n in inputs)
+            found = tuple((n, v) for n, v in said.items() if n in saved.INPUTS)
             state = replace(state, given=found, frames=str(said.get("frames", state.frames)))
         elif "frames" in said:
             state = replace(state, frames=str(said["frames"]))
@@ -219,7 +217,8 @@ class State:
         """The words after `wgmb` that make `output` of all `frames` as they are seen here."""
         given = self.arguments()
         source = str(given.pop("scene" if self.is_scene else "pattern"))
-        words = ["render" if self.is_scene else "blur", source, "-o", output]
+        words = ["render" if self.is_scene else "blur", no_option(source)]
+        words += ["-o", no_option(output)]
         if self.is_scene or self.frames != _on_disk(source):
             words += ["--frames", self.frames]
         for name, value in given.items():
@@ -231,13 +230,13 @@ class State:
             repeated = name in ("set", "also")
             if repeated:
                 for item in value:  # pyright: ignore[reportGeneralTypeIssues]
-                    words += [flag, str(item)]
+                    words += _said(flag, str(item))
             elif value is True:
                 words += [flag]
             elif isinstance(plain, list):
                 words += [flag, *(f"{x:g}" for x in plain)]
             else:
-                words += [flag, f"{value:g}" if isinstance(value, float) else str(value)]
+                words += _said(flag, f"{value:g}" if isinstance(value, float) else str(value))
         return words
 
     # ---- TOML ----------------------------------------------------------------------------
@@ -247,35 +246,42 @@ class State:
         given = self.arguments()
         if self.is_scene:
             given["time"] = self.frame / self.fps
-        names = set(_VIEW)
-        view = {f.name: getattr(self, f.name) for f in fields(self) if f.name in names}
-        tables = {"render" if self.is_scene else "blur": given, "view": view}
-        return "\n".join(
-            f"[{name}]\n" + "".join(_line(k, v) for k, v in table.items())
-            for name, table in tables.items()
-        )
+        view = {f.name: getattr(self, f.name) for f in fields(self) if f.name in saved.VIEW}
+        return saved.toml({"render" if self.is_scene else "blur": given, "view": view})
+
+    @staticmethod
+    def read(path: Path) -> State:
+        """The state that was saved in a file; `InputError` names the file and what is wrong."""
+        with about(path):
+            return State.of_toml(text_of(path))
 
     @staticmethod
     def of_toml(text: str) -> State:
         """The state that `toml` wrote; `InputError` names what is wrong with it."""
-        try:
-            tables = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"settings: {error}") from None
-        if unknown := tables.keys() - {"render", "blur", "view"}:
-            raise InputError(f"settings have no table {', '.join(sorted(unknown))}")
-        if ("render" in tables) == ("blur" in tables):
-            raise InputError("settings need one of the tables [render] and [blur]")
-        return _of_tables(tables.get("render"), tables.get("blur"), tables.get("view", {}))
+        tables = saved.tables(text)
+        on_disk = "blur" in tables
+        given = dict(tables["blur" if on_disk else "render"])
+        source = given.pop("pattern" if on_disk else "scene", None)
+        if not isinstance(source, str):
+            raise InputError("settings: [render] needs scene, [blur] needs pattern")
+        if on_disk == (source in scenes.SCENES):
+            raise InputError(f"settings: {source!r} is {'a' if on_disk else 'no'} scene")
+        given.pop("time", None)
+        state = State(source, **saved.values(given, tables.get("view", {}), State, on_disk=on_disk))
+        Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
+        for name, value, known in (
+            ("method", state.method, METHODS),
+            ("compare", state.compare, COMPARE),
+            ("tone", state.tone, TONES),
+        ):
+            if value not in known:
+                raise InputError(
+                    f"settings: {name} must be one of {', '.join(known)}, got {value!r}"
+                )
+        return state.settled()
 
 
-_VIEW = (
-    "frames", "frame", "look", "compare", "against", "wipe", "gain", "fastest", "middle",
-    "exposure", "tone", "cone_rate", "cone_peak", "zoom", "center", "playing", "speed", "panel",
-)  # fmt: skip
-_SHOWING = (*(name for name in _VIEW if name != "frame"), "help")
-_MASKS = ("keep", "scale")
-_CHOICES = {"look": None, "compare": COMPARE, "against": None, "tone": TONES}
+_SHOWING = (*(name for name in saved.VIEW if name != "frame"), "help")
 
 
 def _changed(pairs: tuple, name: str, value: object) -> tuple:
@@ -289,81 +295,13 @@ def _on_disk(source: str) -> str:
     return numbering.frame_range(numbering.numbers_on_disk(source))
 
 
-def _line(name: str, value: object) -> str:
-    if value is None or value == []:
-        return ""
-    plain = list(value) if isinstance(value, tuple) else value
-    return f"{name} = {json.dumps(plain, ensure_ascii=False)}\n"
+def no_option(name: str) -> str:
+    """A file's name as a command line takes it, although it may begin with -."""
+    return f"./{name}" if name.startswith("-") else name
 
 
-def _of_tables(render: dict | None, blur: dict | None, view: dict) -> State:
-    given = dict(render if render is not None else blur or {})
-    source = given.pop("scene" if render is not None else "pattern", None)
-    if not isinstance(source, str):
-        raise InputError("settings: [render] needs scene, [blur] needs pattern")
-    if (render is not None) != (source in scenes.SCENES):
-        raise InputError(f"settings: {source!r} is no scene" if render else f"{source!r}: a scene")
-    kinds = {f.name: f for f in fields(State)}
-    given.pop("time", None)
-    values: dict[str, object] = {"source": source}
-    inputs = {*(f.name for f in fields(InputOptions)), *_MASKS}
-    pairs: dict[str, list] = {"options": [], "given": []}
-    for name, value in given.items():
-        if name == "set":
-            pairs["settings"] = [_setting(text) for text in value]
-        elif name in kinds and name not in _VIEW:
-            values[name] = _typed(name, value, kinds[name].default)
-        elif name in OWN:
-            pairs["options"].append((name, value))
-        elif blur is not None and name in inputs:
-            pairs["given"].append((name, tuple(value) if isinstance(value, list) else value))
-        else:
-            raise InputError(f"settings have no {name!r}")
-    for name, value in view.items():
-        if name not in _VIEW:
-            raise InputError(f"settings: [view] has no {name!r}; it has {', '.join(_VIEW)}")
-        values[name] = _typed(name, value, kinds[name].default)
-    values |= {name: tuple(found) for name, found in pairs.items()}
-    state = State(**values)  # pyright: ignore[reportArgumentType]
-    Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
-    if state.method not in METHODS:
-        raise InputError(f"unknown method {state.method!r}, one of {', '.join(METHODS)}")
-    return state.settled()
-
-
-def _setting(text: str) -> tuple[str, float | str]:
-    name, equals, value = str(text).partition("=")
-    if not equals:
-        raise InputError(f"settings: set takes NAME=VALUE, got {text!r}")
-    try:
-        return name, float(value)
-    except ValueError:
-        return name, value
-
-
-def _typed(name: str, value: object, default: object) -> object:
-    """`value` as the field `name` holds it."""
-    if (choices := _CHOICES.get(name)) and value not in choices:
-        raise InputError(f"settings: {name} must be one of {', '.join(choices)}, got {value!r}")
-    try:
-        if isinstance(default, tuple):
-            x, y = value  # pyright: ignore[reportGeneralTypeIssues]
-            return float(x), float(y)
-        if name == "samples":
-            if value != "auto" and (isinstance(value, bool) or not isinstance(value, int)):
-                raise TypeError
-            return value
-        if isinstance(default, bool) or default is None or isinstance(default, str):
-            if isinstance(default, (bool, str)) and not isinstance(value, type(default)):
-                raise TypeError
-            return value
-        if isinstance(value, str) and name == "fps":  # "24", "30000/1001"
-            value = float(Fraction(value))
-        if isinstance(value, (bool, str)) or not math.isfinite(number := float(value)):  # pyright: ignore
-            raise TypeError
-        return int(number) if isinstance(default, int) else number
-    except (TypeError, ValueError, ZeroDivisionError):
-        raise InputError(f"settings: {name} cannot be {value!r}") from None
+def _said(flag: str, text: str) -> list[str]:
+    return [f"{flag}={text}"] if text.startswith("-") else [flag, text]
 
 
 def command_line(words: list[str]) -> str:
