@@ -87,11 +87,11 @@ def rename(temporary: Path, path: Path) -> None:
             os.close(folder)
 
 
-def about(path: Path, error: OSError) -> OSError:
+def about(path: Path, error: Exception) -> OSError:
     """The error with a text that names the file it is about; its number stays."""
-    told = OSError(f"{path}: {error.strerror or error}")
-    told.errno = error.errno
-    return told
+    named = OSError(f"{path}: {getattr(error, 'strerror', None) or error}")
+    named.errno = getattr(error, "errno", None)
+    return named
 
 
 def sweep(folder: Path, names: Collection[str]) -> None:

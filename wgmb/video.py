@@ -76,8 +76,8 @@ class Video:
         try:
             self._open = self._open or self._begin(shown.shape[1], shown.shape[0])
             self._encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(shown), format="rgb24"))
-        except FFmpegError as error:
-            raise self._failed(error) from None
+        except (FFmpegError, OSError) as error:
+            raise atomic.about(self.path, error) from None
 
     def _begin(self, width: int, height: int) -> tuple[OutputContainer, VideoStream]:
         kind, codec, pixels, options = _CODECS[self.path.suffix.lower()]
@@ -124,7 +124,7 @@ class Video:
                 self._open[0].close()
             except FFmpegError as error:
                 self.abandon()
-                raise self._failed(error) from None
+                raise atomic.about(self.path, error) from None
             self._open = None
         if self._lock is not None:
             os.fsync(self._lock)
@@ -135,9 +135,6 @@ class Video:
         if self._lock is not None:
             lock, self._lock = self._lock, None
             os.close(lock)
-
-    def _failed(self, error: FFmpegError) -> OSError:
-        return atomic.about(self.path, error)
 
     def abandon(self) -> None:
         """Leave nothing behind."""
