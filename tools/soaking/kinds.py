@@ -1,0 +1,216 @@
+"""A sound file of every kind that is read, and what reads it.
+
+What a reader returns says what the file holds: the same again means the same picture. It
+raises InputError that names the file, or something that it must not raise.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import tifffile
+from PIL import Image
+
+import make_frames as make
+from wgmb import CameraFile, Clip, InputError, Passes, cli, exr, stills, viewer
+from wgmb.viewer import State
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of file."""
+
+    suffix: str
+    write: Callable[[Path], object]
+    read: Callable[[Path], str]
+    sealed: bool = False
+    """Its checksums find every wrong byte among the pixels."""
+
+    @property
+    def is_text(self) -> bool:
+        """Whether a file that was cut off may be sound, and mean something else."""
+        return self.suffix in (".csv", ".toml")
+
+
+def read(kind: str, path: Path) -> str:
+    """What the file holds, as a digest; raises what its reader raises."""
+    return KINDS[kind].read(path)
+
+
+def write_all(folder: Path) -> None:
+    """A sound file of every kind, under its name."""
+    for name, kind in KINDS.items():
+        kind.write(folder / f"{name}{kind.suffix}")
+
+
+def kind_of(path: Path) -> str:
+    """The kind of a file that is called KIND.WHAT.SUFFIX, as those in tests/crashers are."""
+    return path.name.partition(".")[0]
+
+
+# ---- readers --------------------------------------------------------------------------------
+
+
+def _digest(planes: Iterable[np.ndarray]) -> str:
+    """Of the pixels alone, whatever their channels are called."""
+    each = sorted(hashlib.sha256(np.ascontiguousarray(p).tobytes()).hexdigest() for p in planes)
+    return hashlib.sha256("".join(each).encode()).hexdigest()
+
+
+def _read_exr(path: Path) -> str:
+    return _digest(exr.read(path).channels().values())
+
+
+def _read_still(path: Path) -> str:
+    return _digest([stills.read(path)])
+
+
+def _read_masked(path: Path) -> str:
+    """A picture with a Cryptomatte, one of whose objects is to stay sharp."""
+    clip = Clip(path, passes=Passes(keep="CryptoObject=hero"))
+    frame = clip.frame(clip.source(clip.numbers[0]))
+    return _digest(frame.arrays.values())
+
+
+def _read_camera(path: Path) -> str:
+    found = CameraFile(path).around(2)
+    return _digest([found.matrices(), found.world_from_pixel()])
+
+
+def _read_curve(path: Path) -> str:
+    """Through the command that draws it, which needs no GPU."""
+    drawn = path.with_suffix(".svg")
+    _command(path, "shutter", "--curve", path, "-o", drawn, "--overwrite")
+    return _digest([np.frombuffer(drawn.read_bytes(), np.uint8)])
+
+
+def _read_settings(path: Path) -> str:
+    """Through the command that opens the viewer, without a window."""
+    states: list[State] = []
+    shown = viewer.view
+    viewer.view = lambda state, **_: states.append(state)
+    try:
+        _command(path, "view", "--config", path)
+    finally:
+        viewer.view = shown
+    return hashlib.sha256(states[0].toml().encode()).hexdigest()
+
+
+def _command(path: Path, *words) -> None:
+    """The command line in this process; what it refuses is an InputError with its words."""
+    said = io.StringIO()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
+        code = cli.main([str(word) for word in words])
+    if code != cli.DONE:
+        if code != cli.USAGE:
+            raise AssertionError(f"exit {code}: {said.getvalue()}")
+        raise InputError(said.getvalue().removesuffix("\n"))
+
+
+# ---- sound files ----------------------------------------------------------------------------
+
+
+def _exr(compression: str) -> Callable[[Path], object]:
+    chosen = getattr(OpenEXR, f"{compression}_COMPRESSION")
+    return lambda path: make.write_exr(path, make.frame(1), compression=chosen)
+
+
+def _tiled(path: Path) -> None:
+    tiles = OpenEXR.TileDescription()
+    tiles.xSize = tiles.ySize = 16
+    header = {"type": OpenEXR.tiledimage, "tiles": tiles, "compression": OpenEXR.ZIP_COMPRESSION}
+    channels = {k: np.ascontiguousarray(v) for k, v in make.frame(1).items()}
+    OpenEXR.File(header, channels).write(str(path))
+
+
+def _multipart(path: Path) -> None:
+    picture, motion = make.colors(make.picture(1)), make.written("nuke", *make.motion(1))
+    make.write_parts(path, [make.part(picture, name="rgba"), make.part(motion, name="motion")])
+
+
+def _cryptomatte(path: Path) -> None:
+    ids, coverage = np.full((48, 64), 0x3F000001, np.uint32).view(np.float32), np.ones((48, 64))
+    lead = "cryptomatte/0000000/"
+    about = {"name": "CryptoObject", "hash": "MurmurHash3_32", "conversion": "uint32_to_float32"}
+    about["manifest"] = json.dumps({"hero": "3f000001", "floor": "3f000002"})
+    make.write_exr(
+        path,
+        make.frame(1) | {"CryptoObject00.R": ids, "CryptoObject00.G": coverage.astype(np.float32)},
+        {lead + name: value for name, value in about.items()},
+    )
+
+
+def _still(bits: int, channels: int = 4) -> Callable[[Path], object]:
+    def write(path: Path) -> None:
+        picture = make.picture(1)[..., :channels]
+        path.write_bytes(stills.encode(picture, path.suffix, bits, '{"samples": 16}'))
+
+    return write
+
+
+def _pillow(mode: str, **options) -> Callable[[Path], object]:
+    def write(path: Path) -> None:
+        shown = stills.to_display(make.picture(1)[..., :3], 8)
+        Image.fromarray(shown).convert(mode).save(path, **options)
+
+    return write
+
+
+def _tiff(**options) -> Callable[[Path], object]:
+    def write(path: Path) -> None:
+        picture = np.ascontiguousarray(make.picture(1)[..., :3])
+        tifffile.imwrite(path, picture, photometric="rgb", **options)
+
+    return write
+
+
+def _curve(path: Path) -> None:
+    rows = [f"{x / 16:.4f},{1 - abs(x / 8 - 1):.4f}" for x in range(17)]
+    path.write_text("\n".join(["time,weight", *rows]) + "\n")
+
+
+def _settings(path: Path) -> None:
+    path.write_text(State(playing=True, options=(("path", "straight"),)).toml(), "utf-8")
+
+
+def _camera(path: Path) -> None:
+    body = {"index": 1, "matrix_world": np.eye(4).tolist()}
+    make.write_cameras(path, range(1, 4), objects=lambda n: {"car": body})
+
+
+KINDS = {
+    "exr-none": Kind(".exr", _exr("NO"), _read_exr),
+    "exr-rle": Kind(".exr", _exr("RLE"), _read_exr),
+    "exr-zips": Kind(".exr", _exr("ZIPS"), _read_exr, sealed=True),
+    "exr-zip": Kind(".exr", _exr("ZIP"), _read_exr, sealed=True),
+    "exr-piz": Kind(".exr", _exr("PIZ"), _read_exr),
+    "exr-pxr24": Kind(".exr", _exr("PXR24"), _read_exr),
+    "exr-b44": Kind(".exr", _exr("B44"), _read_exr),
+    "exr-dwaa": Kind(".exr", _exr("DWAA"), _read_exr),
+    "exr-dwab": Kind(".exr", _exr("DWAB"), _read_exr),
+    "exr-tiled": Kind(".exr", _tiled, _read_exr, sealed=True),
+    "exr-multipart": Kind(".exr", _multipart, _read_exr, sealed=True),
+    "cryptomatte": Kind(".exr", _cryptomatte, _read_masked),
+    "png-8": Kind(".png", _still(8), _read_still, sealed=True),
+    "png-16": Kind(".png", _still(16), _read_still, sealed=True),
+    "png-palette": Kind(".png", _pillow("P"), _read_still),
+    "tiff-8": Kind(".tif", _still(8), _read_still),
+    "tiff-16": Kind(".tif", _still(16, 3), _read_still),
+    "tiff-float": Kind(".tif", _tiff(), _read_still),
+    "tiff-tiled": Kind(".tif", _tiff(tile=(16, 16), compression="zlib"), _read_still),
+    "tiff-grey": Kind(".tif", _pillow("L"), _read_still),
+    "jpeg": Kind(".jpg", _still(8, 3), _read_still),
+    "jpeg-progressive": Kind(".jpg", _pillow("RGB", progressive=True, quality=90), _read_still),
+    "jpeg-grey": Kind(".jpg", _pillow("L", quality=90), _read_still),
+    "camera": Kind(".json", _camera, _read_camera),
+    "curve": Kind(".csv", _curve, _read_curve),
+    "viewer": Kind(".toml", _settings, _read_settings),
+}

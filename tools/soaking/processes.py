@@ -1,0 +1,168 @@
+"""Other processes: run within limits, watched, and functions in a process of their own.
+
+A function that uses the GPU, or may end its process, is run by `apart`: this process itself
+has neither a device nor threads, so that it can be forked.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from . import PATHS
+
+WGMB = [sys.executable, "-m", "wgmb"]
+_ENDS = "\nsoaking: "  # what a function returned follows, on stdout
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A process that has ended."""
+
+    code: int  # -9: by signal 9
+    out: str
+    err: str
+    seconds: float
+    peak: float  # MiB
+    late: bool  # it had to be killed
+    value: Any = None  # of a function run by `apart`
+
+    def wrong(self, *codes: int, name: str = "") -> str:
+        """What is wrong with how a command ended; "" where nothing is.
+
+        Right is one of the codes, and if it is not 0, one line that holds `name`.
+        """
+        last = (self.err.strip().splitlines() or ["nothing said"])[-1]
+        if self.late:
+            return f"still running after {self.seconds:.0f} s"
+        if "Traceback" in self.err:
+            return f"traceback, exit {self.code}: {last}"
+        if self.code not in codes:
+            return f"exit {self.code}: {last}"
+        if any(not (c.isprintable() or c in "\n\t") for c in self.out + self.err):
+            return "control characters reach the terminal"
+        if self.code == 0:
+            return ""
+        lines = self.err.strip().splitlines()
+        if len(lines) != 1:
+            return f"{len(lines)} lines of error, the last: {last}"
+        return "" if name in last else f"does not name {name}: {last}"
+
+
+def run(
+    line: list, *, seconds: float = 120, env: dict | None = None, prepare=None, cwd=None
+) -> Ended:
+    """Run a program to its end, or kill it after `seconds`.
+
+    `env` is added to the environment; `prepare` is called in the process before it begins.
+    """
+    started = time.perf_counter()
+    process = subprocess.Popen(
+        [str(word) for word in line],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=environment(env),
+        preexec_fn=prepare,
+        cwd=cwd,
+    )
+    killer = threading.Timer(seconds, process.kill)
+    killer.start()
+    streams = [stream for stream in (process.stdout, process.stderr) if stream]
+    with ThreadPoolExecutor(2) as readers:
+        said, complained = readers.map(_all_of, streams)
+        _, status, used = os.wait4(process.pid, 0)
+    took = time.perf_counter() - started
+    killer.cancel()
+    process.returncode = os.waitstatus_to_exitcode(status)
+    late = process.returncode == -signal.SIGKILL and took >= seconds
+    return Ended(process.returncode, said, complained, took, used.ru_maxrss / 1024, late)
+
+
+def _all_of(stream: IO[bytes]) -> str:
+    with stream:
+        return stream.read().decode("utf-8", "backslashreplace")
+
+
+def wgmb(*arguments, **options) -> Ended:
+    """Run the command line, as `run` does."""
+    return run([*WGMB, *arguments], **options)
+
+
+def apart(work: Callable, *given, **options) -> Ended:
+    """Call a function of a module in a process of its own, as `run` does.
+
+    What it is given and what it returns is JSON; the latter is in `value`, None if it did
+    not come to its end.
+    """
+    name = f"{work.__module__}:{work.__qualname__}"
+    ended = run([sys.executable, "-m", __name__, name, json.dumps(given)], **options)
+    said, _, value = ended.out.rpartition(_ENDS)
+    value = json.loads(value) if value and ended.code == 0 else None
+    return Ended(**{**vars(ended), "out": said, "value": value})
+
+
+def environment(more: dict | None = None) -> dict[str, str]:
+    """This process's environment, in which `wgmb`, these modules and tests' helpers are found."""
+    paths = [*PATHS, *filter(None, [os.environ.get("PYTHONPATH")])]
+    found = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+    return found | {name: str(value) for name, value in (more or {}).items()}
+
+
+def limits(memory: int | None = None, file: int | None = None) -> Callable[[], None]:
+    """For `prepare`: at most so many MiB of address space, so many bytes in a file."""
+
+    def prepare() -> None:
+        if memory is not None:
+            resource.setrlimit(resource.RLIMIT_AS, (memory << 20, memory << 20))
+        if file is not None:  # as on a full disk: an error, not a signal
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (file, file))
+
+    return prepare
+
+
+@dataclass(frozen=True)
+class Use:
+    """What a process holds at a time."""
+
+    memory: float  # KiB of it in RAM
+    files: int
+    threads: int
+
+
+def use(pid: int | str = "self") -> Use:
+    """What a process holds now."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    listed = (len(os.listdir(f"/proc/{pid}/{what}")) for what in ("fd", "task"))
+    return Use(pages * resource.getpagesize() / 1024, *listed)
+
+
+def growth(step: Callable[[int], object], warm: int = 40, count: int = 120) -> float:
+    """KiB that a step leaves behind, on average, once `warm` of them have been made."""
+    for i in range(warm):
+        step(i)
+    start = use().memory
+    for i in range(warm, warm + count):
+        step(i)
+    return (use().memory - start) / count
+
+
+if __name__ == "__main__":
+    _module, _, _function = sys.argv[1].partition(":")
+    _work = getattr(importlib.import_module(_module), _function)
+    _value = _work(*json.loads(sys.argv[2]))
+    sys.stdout.write(_ENDS + json.dumps(_value))
+    sys.stdout.flush()
