@@ -164,6 +164,7 @@ def test_a_shut_stream_does_not_change_what_is_documented(tmp_path, prepare, com
         "compare crossing -o PAGE --methods fusion:tau=x",
         "compare crossing -o PAGE --methods tap:²",
         "compare crossing -o PAGE --size ²x²",
+        "render crossing -o OUT --fps 1e9_999",
     ],
 )
 def test_what_a_command_has_no_place_for_is_one_line(tmp_path, capsys, command):

@@ -155,8 +155,9 @@ def _cryptomatte(attributes: Mapping, layer: str) -> dict[str, str] | None:
     """The `cryptomatte/<key>/...` attributes of the Cryptomatte called `layer`."""
     found: dict[str, dict[str, str]] = {}
     for name, value in attributes.items():
-        if m := re.fullmatch(r"cryptomatte/([^/]+)/(\w+)", name):
-            found.setdefault(m[1], {})[m[2]] = str(value)
+        m = re.fullmatch(r"cryptomatte/([^/]+)/(\w+)", name)
+        if m and isinstance(value, str):  # of another type it may not even be readable
+            found.setdefault(m[1], {})[m[2]] = value
     for crypto in found.values():
         name = crypto.get("name")
         if name and (layer in (name, stem(name)) or stem(name) == layer.lower()):

@@ -396,7 +396,7 @@ class OutputOptions:
 def rate_of(text: str) -> Fraction:
     """`24`, `23.976`, `30000/1001` -> frames per second, exactly; over 0, at most 1000."""
     try:
-        if re.search(r"e[+-]?[0-9]{4}", text, re.IGNORECASE):  # would be worked out in full
+        if re.search(r"e[+-]?[\d_]{4}", text, re.IGNORECASE):  # would be worked out in full
             raise ValueError
         fps = Fraction(text)
     except (ValueError, ZeroDivisionError):

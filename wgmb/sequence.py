@@ -107,9 +107,9 @@ class Clip:
             self.on_disk = [number_in(path)]
             return self.on_disk
         self.on_disk = there = numbers_on_disk(self.pattern)
-        if frames is None and skip_missing:
+        if not frames and skip_missing:
             return there
-        if frames is None and there[-1] - there[0] - len(there) >= MOST_FRAMES:
+        if not frames and there[-1] - there[0] - len(there) >= MOST_FRAMES:
             raise InputError(
                 f"{self.pattern}: {len(there)} of the frames {there[0]} to {there[-1]} are there; "
                 "--skip-missing takes these, --frames chooses"

@@ -138,6 +138,8 @@ def _stops(trial: Trial, made: Shot, unbroken: tuple, early: bool) -> Line:
         if under_way:
             slowest = max(slowest, took)
             there = contents(out)
+            if code == 0 and there == whole:  # it was done before it heard the signal
+                continue
             wrong = _manners(code, said) or apart_from(there, whole, all_there=False)
             tally.note(name, wrong or _rests(there))
     return tally.line(f"gone within {slowest:.2f} s")
