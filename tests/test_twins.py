@@ -1,6 +1,7 @@
 """Every kernel against its slow, obvious twin; the largest differences measured are 5e-5."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -387,11 +388,9 @@ def body(x, angle):
     return m
 
 
-@pytest.mark.parametrize("orthographic", [False, True])
-@pytest.mark.parametrize("kind", ["planar", "clip"])
-@pytest.mark.parametrize("size", [(37, 53), (1, 1), (3, 130)])
-@pytest.mark.parametrize("more", ["", "vectors", "added", "scale", "limit"])
-def test_velocity_is_its_twin(close, size, kind, orthographic, more):
+@cache
+def seen_from_three_cameras(size, kind, orthographic):
+    """Depth, object indices, cameras, and what the twin makes of them."""
     rng = np.random.default_rng(3)
     depth = rng.uniform(2, 30, size).astype("f4")
     ids = rng.integers(0, 5, size).astype("u4")
@@ -408,6 +407,16 @@ def test_velocity_is_its_twin(close, size, kind, orthographic, more):
     window = (5, 3, size[1] + 20, size[0] + 9)
     around = Reprojections(ways[1], ways[0], ways[2], depth_kind=kind, window=window)
     want = velocity_twin.velocity(depth, ids, ways[1], ways[0], ways[2], window=window, kind=kind)
+    return depth, ids, around, want
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+@pytest.mark.parametrize("kind", ["planar", "clip"])
+@pytest.mark.parametrize("size", [(37, 53), (1, 1), (3, 130)])
+@pytest.mark.parametrize("more", ["", "vectors", "added", "scale", "limit"])
+def test_velocity_is_its_twin(close, size, kind, orthographic, more):
+    depth, ids, around, want = seen_from_three_cameras(size, kind, orthographic)
+    rng = np.random.default_rng(6)
     vectors = rng.normal(size=(*size, 4)).astype("f4") * 20
     inputs = {"vectors": {"motion": vectors}, "added": {"motion": vectors, "object_motion": True},
               "scale": {"scale": rng.uniform(-1, 2, size).astype("f4")}}.get(more, {})  # fmt: skip

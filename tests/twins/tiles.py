@@ -13,6 +13,9 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
     motion = motion.astype(float)
     fastest = _fastest(motion, span, edge)
     dominant = _dominant(fastest, span)
+    streak, way = np.zeros((height, width)), np.zeros((height, width, 2))
+    for at in np.ndindex(height, width):
+        streak[at], way[at] = _streak(motion[at], span), _direction(motion[at], span)
     out = np.zeros(color.shape)
     for y, x in np.ndindex(height, width):
         tile = _tile(x, y, noise[y, x], edge, dominant.shape)
@@ -21,8 +24,8 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
         if reach <= SHORT:
             out[y, x] = _own(color, weight, y, x)
             continue
-        own = motion[y, x]
-        here = np.clip(_streak(own, span), SHORT, edge)
+        along = _direction(fast, span)
+        here = np.clip(streak[y, x], SHORT, edge)
         share = (1.0 if published else 0.25) / (KAPPA * here)
         total = share * color[y, x]
         counted = share * (1 if weight is None else weight[y, x])
@@ -31,14 +34,12 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
             far = np.hypot(*offset)
             if i % 2:
                 trust = np.clip((here - SHORT) / GAMMA, 0, 1)
-                odd = _own_direction(_direction(own, span), _direction(fast, span), trust)
-                offset = far * np.sign(t) * odd
+                offset = far * np.sign(t) * _own_direction(way[y, x], along, trust)
             at = np.array([x + 0.5, y + 0.5]) - offset
             column = int(np.clip(np.floor(at[0]), 0, width - 1))
             row = int(np.clip(np.floor(at[1]), 0, height - 1))
-            there = np.clip(_streak(motion[row, column], span), SHORT, edge)
-            w = _weight(far, offset, here, there, _direction(own, span),
-                        _direction(motion[row, column], span),
+            there = np.clip(streak[row, column], SHORT, edge)
+            w = _weight(far, offset, here, there, way[y, x], way[row, column],
                         _depth(depth, y, x), _depth(depth, row, column))  # fmt: skip
             if not published:
                 w /= max(2 * _cone(far, reach) + 2 * _cylinder(far, reach), 1e-3)
