@@ -119,7 +119,9 @@ def test_chens_verdict_is_that_of_the_rates(chen):
     rates = chen.tables[0]
     milliseconds = {row[0]: row[-1] for row in rates.rows}
     times = milliseconds["tap, form published"] / milliseconds["fusion, form published"]
-    said = re.search(r"its own is ([\d.]+) times as fast.* finding (holds|does not hold)", rates.note)
+    said = re.search(
+        r"its own is ([\d.]+) times as fast.* finding (holds|does not hold)", rates.note
+    )
     assert float(said[1]) == pytest.approx(times, abs=0.02)
     if abs(times - 1.05) > 0.02:
         assert said[2] == ("holds" if times > 1.05 else "does not hold")

@@ -468,7 +468,7 @@ def test_killed_runs_leave_whole_files_only_and_resume_to_the_same_bytes(tmp_pat
     pattern, whole = long_shot
     out = tmp_path / "out"
     for frames in (1, 23, 48):
-        process = begun(arguments(pattern, out, "--resume"), lambda: made(out) >= frames)
+        process = begun(arguments(pattern, out, "--resume"), lambda n=frames: made(out) >= n)
         process.kill()
         process.communicate()
         for path in out.glob("o.*.exr"):

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def displacement(motion, t):
-    """Where the parabola through previous, this and next place is at time t, or a column of times."""
+    """Where the parabola through previous, this and next place is at time t, or a column of t."""
     to_prev, to_next = motion[:2], motion[2:]
     return to_prev * (t * (t - 1) / 2) + to_next * (t * (t + 1) / 2)
 
