@@ -7,6 +7,8 @@ import pytest
 import wgmb
 from wgmb import shader
 
+pytestmark = pytest.mark.fast
+
 
 @pytest.mark.parametrize("name", sorted(wgmb.METHODS))
 def test_contract(name):
