@@ -1,12 +1,34 @@
-"""What the numerical tests share: a device, pictures, and a comparison that shows its failures."""
+"""What the tests share: a device, pictures, a comparison that shows its failures, their order."""
+
+import os
 
 import imageio.v3 as iio
 import numpy as np
 import pytest
+import wgpu
 
 from wgmb import gpu
 
 np.seterr(all="raise", under="ignore")
+if "PYTEST_XDIST_WORKER" in os.environ:  # the workers have shared out the cores already
+    os.environ["LP_NUM_THREADS"] = "1"
+
+# Files that take longest are begun first, so that all workers end at about the same time.
+LONGEST = ("test_window", "test_viewer", "test_twins", "test_faults", "test_volume",
+           "test_experiments", "test_reference", "test_perceive")  # fmt: skip
+
+
+def pytest_collection_modifyitems(items):
+    rank = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
+
+
+@pytest.fixture(autouse=True)
+def _without_a_gpu(request, monkeypatch):
+    """A test that says it is fast opens no adapter."""
+    if request.node.get_closest_marker("fast"):
+        for name in ("enumerate_adapters_sync", "request_adapter_sync"):
+            monkeypatch.setattr(wgpu.gpu, name, lambda *_, **__: pytest.fail("not fast: a GPU"))
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,8 @@ import pytest
 
 from conftest import difference
 
+pytestmark = pytest.mark.fast
+
 
 def test_equal_pictures_are_close(close, noise):
     close(noise, noise.copy(), 0)

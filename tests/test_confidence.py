@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from test_gather import SIZE, frame_of
-from test_twins import crossing
 
 import make_frames as make
 import wgmb
+from images import crossing, frame_of
 from wgmb import Clip, InputError, Output, exr
 
+SIZE = (54, 96)
 NAMES = ("accepted", "disocclusion", "residual", "left")
 
 

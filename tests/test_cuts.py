@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_twins import camera
 
 import wgmb
+from images import camera
 from make_frames import HEIGHT, WIDTH, frame, inside, projection, write_exr, write_sequence
 from wgmb import Camera, Clip, Reprojections
 from wgmb.cuts import is_cut, jumps

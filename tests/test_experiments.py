@@ -1,6 +1,7 @@
 """The papers' experiments run, and read their findings off their figures."""
 
 import importlib.util
+import itertools
 import re
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from wgmb import compare, experiments, findings, report
 from wgmb.cases import Case
 from wgmb.errors import InputError
 from wgmb.findings import Entry, Report
+from wgmb.measure import MEASURES
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -29,8 +31,18 @@ def made(lab, name, size=(48, 32), **options):
     return found
 
 
-def test_taylor_has_two_budgets_and_his_findings(lab):
-    found = made(lab, "taylor", moves=["rotation"])
+@pytest.fixture(scope="module")
+def taylor(lab):
+    return made(lab, "taylor", moves=["rotation"])
+
+
+@pytest.fixture(scope="module")
+def chen(lab):
+    return made(lab, "chen", moments=2)
+
+
+def test_taylor_has_two_budgets_and_his_findings(taylor):
+    found = taylor
     (case,) = found.cases
     small, large = sorted({e.budget for e in found.of(case.name, kind="time")})
     assert large == pytest.approx(5 * small)
@@ -41,8 +53,45 @@ def test_taylor_has_two_budgets_and_his_findings(lab):
     assert len(fixed.rows) == 4
 
 
-def test_chen_compares_rates_faces_and_alphas(lab):
-    found = made(lab, "chen", moments=2)
+@pytest.mark.parametrize("judge", ["flip", "psnr"])
+def test_taylors_verdicts_are_those_of_the_figures(taylor, judge):
+    """Which way they go depends on how quick the machine is; that they are true does not."""
+
+    def error(name, budget):
+        (entry,) = taylor.of("rotation", label=name, kind="time", budget=budget)
+        value = entry.measures[judge]
+        return value if judge == "flip" else np.sqrt(10 ** (-value / 10))
+
+    published, distributed = "reproject, form published", "distributed"
+    small, large = sorted({e.budget for e in taylor.of("rotation", kind="time")})
+    want = [
+        error(published, small) < error(distributed, small),
+        error(published, small) < error("accumulate", small),
+        1 - error(published, large) / error(published, small) < 0.1,
+        error(distributed, large) < error(published, large),
+    ]
+    (said,) = (r[2:] for r in taylor.tables[0].rows if r[1] == MEASURES[judge].title)
+    assert said == ["holds" if it else "does not hold" for it in want]
+
+
+def test_taylors_reprojection_gains_little_by_more_samples_and_distributed_gains_much(taylor):
+    """His finding, at equal samples, where no clock has a say."""
+
+    def flip(name, samples):
+        (entry,) = taylor.of("rotation", label=name, kind="samples", samples=samples)
+        return entry.measures["flip"]
+
+    published, distributed = "reproject, form published", "distributed"
+    assert flip(published, 1) < 0.8 * flip("accumulate", 1)
+    assert flip(published, 1) < 0.8 * flip(distributed, 1)
+    assert 0.9 * flip(published, 8) < flip(published, 40) < 1.1 * flip(published, 8)
+    rays = [flip(distributed, n) for n in (1, 2, 4, 8, 16, 40)]
+    assert all(more < 0.8 * fewer for fewer, more in itertools.pairwise(rays))
+    assert rays[-1] < 0.4 * flip(published, 40)
+
+
+def test_chen_compares_rates_faces_and_alphas(chen):
+    found = chen
     titles = [t.title for t in found.tables]
     assert titles[:3] == ["Table 1: frames per second of the blur over a dive",
                           "Table 1, pass by pass", "Quality at 8 samples"]  # fmt: skip
@@ -66,8 +115,35 @@ def test_chen_compares_rates_faces_and_alphas(lab):
         assert faces.columns[-2:] == ["gaussian.wgsl:main [ms]", "blur/fusion.wgsl:main [ms]"]
 
 
-def test_the_page_of_experiments_takes_its_tables_from_reports(lab):
-    found = report.as_json(made(lab, "chen", moments=1))
+def test_chens_verdict_is_that_of_the_rates(chen):
+    rates = chen.tables[0]
+    milliseconds = {row[0]: row[-1] for row in rates.rows}
+    times = milliseconds["tap, form published"] / milliseconds["fusion, form published"]
+    said = re.search(
+        r"its own is ([\d.]+) times as fast.* finding (holds|does not hold)", rates.note
+    )
+    assert float(said[1]) == pytest.approx(times, abs=0.02)
+    if abs(times - 1.05) > 0.02:
+        assert said[2] == ("holds" if times > 1.05 else "does not hold")
+
+
+@pytest.mark.parametrize("scene", ["scaling", "crossing"])
+def test_chens_printed_weights_brighten_instead_of_blurring(chen, scene):
+    """Normalised, they take gradients away as the truth does; as printed they add to them."""
+    (figure,) = (t for t in chen.tables if t.title == f"Figure 5, {scene}: alpha")
+    (plot,) = (p for p in chen.plots if p.title == f"Figure 5, {scene}")
+    (truth,) = {amount for _, amount in plot.curves["the truth's"]}
+    for weights in ("normalised", "published"):
+        amounts, errors = ([row[i] for row in figure.rows if row[0] == weights] for i in (3, 4))
+        if weights == "normalised":
+            assert all(0.3 * truth < amount < 3 * truth for amount in amounts)
+        else:
+            assert all(amount < 0 for amount in amounts)
+            assert errors == sorted(errors) and errors[-1] > 1.1 * errors[0]
+
+
+def test_the_page_of_experiments_takes_its_tables_from_reports(chen):
+    found = report.as_json(chen)
     spec = importlib.util.spec_from_file_location("make_docs", DOCS / "make.py")
     docs = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(docs)
@@ -96,6 +172,7 @@ def test_rosado_finds_that_the_mask_or_the_velocity_buffer_helps(lab):
     error = {row[0]: row[3] for row in found.tables[0].rows}
     assert error["camera only, mask"] < error["camera only"]
     assert error["velocity buffer"] < error["camera only"]
+    assert error["velocity buffer, mask"] < error["velocity buffer"]
     (plot,) = found.plots
     assert [n for n, _ in plot.curves["velocity buffer"]] == sorted({*experiments.TAPS, 16})
 

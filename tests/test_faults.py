@@ -201,12 +201,12 @@ def test_what_is_no_picture_is_refused_by_name(tmp_path, name, what):
 
 
 @pytest.mark.parametrize("kind", ["zip.exr", "8.png", "8.tif", "zip.tif", "a.jpg"])
-def test_a_damaged_frame_is_one_line_without_native_chatter(tmp_path, kind):
+def test_a_damaged_frame_is_one_line_without_native_chatter(tmp_path, capfd, kind):
     path = tmp_path / f"bad.{kind}"
     path.write_bytes(files(tmp_path)[kind][:-400])
-    done = make.command("info", path)
-    assert (done.returncode, done.stdout) == (2, "")
-    (line,) = lines(done.stderr)
+    code, out, err = make.inside(capfd, "info", path)
+    assert (code, out) == (2, "")
+    (line,) = lines(err)
     assert line.startswith(f"wgmb: {path}: ")
 
 
@@ -369,34 +369,39 @@ def test_an_output_that_is_a_folder_fails_and_leaves_nothing(tmp_path, capsys, s
     assert list((out / name).iterdir()) == []
 
 
+@contextlib.contextmanager
 def small_disk(limit: int):
     """Files may not grow beyond `limit` bytes; writing more is an error, not a signal."""
-
-    def prepare():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-
-    return prepare
+    most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, most)
+        signal.signal(signal.SIGXFSZ, before)
 
 
 @pytest.mark.parametrize("suffix", ["exr", "png", "mp4", "gif"])
-def test_a_full_disk_fails_and_leaves_neither_a_bad_file_nor_a_rest(tmp_path, suffix):
+def test_a_full_disk_fails_and_leaves_neither_a_bad_file_nor_a_rest(tmp_path, capsys, suffix):
     pattern = make.write_sequence(tmp_path, (1, 2, 3))
     out = tmp_path / "out"
     target = out / ("o.####." + suffix if suffix in ("exr", "png") else f"o.{suffix}")
-    done = make.command("blur", pattern, "-o", target, preexec_fn=small_disk(1500))
-    assert (done.returncode, done.stdout) == (1, "")
-    assert lines(done.stderr)[0].startswith("wgmb: ")
-    assert str(out) in done.stderr.splitlines()[0]
+    with small_disk(1500):
+        code, said, err = make.inside(capsys, "blur", pattern, "-o", target)
+    assert (code, said) == (1, "")
+    assert lines(err)[0].startswith("wgmb: ")
+    assert str(out) in lines(err)[0]
     assert make.names_in(out) == []
 
 
-def test_a_disk_that_fills_up_keeps_what_was_there(tmp_path):
+def test_a_disk_that_fills_up_keeps_what_was_there(tmp_path, capsys):
     pattern = make.write_sequence(tmp_path, (1,))
     (tmp_path / "o.0001.exr").write_bytes(b"what was there")
-    done = make.command("blur", pattern, "-o", tmp_path / "o.####.exr", "--overwrite",
-                        preexec_fn=small_disk(1500))  # fmt: skip
-    assert done.returncode == 1
+    with small_disk(1500):
+        code, _, _ = make.inside(capsys, "blur", pattern, "-o", tmp_path / "o.####.exr",
+                                 "--overwrite")  # fmt: skip
+    assert code == 1
     assert (tmp_path / "o.0001.exr").read_bytes() == b"what was there"
 
 
@@ -420,18 +425,21 @@ def test_without_a_vulkan_driver_it_is_one_line_and_3(tmp_path, opengl):
 # ---- interruptions --------------------------------------------------------------------------
 
 
+LONG = 96  # frames: many more than a run makes before it is interrupted
+
+
 @pytest.fixture(scope="module")
 def long_shot(tmp_path_factory):
-    """240 frames (of three pictures), and what an unbroken run makes of them."""
+    """Frames (of three pictures) by the dozen, and what an unbroken run makes of them."""
     folder = tmp_path_factory.mktemp("long")
     for n in range(1, 4):
         make.write_exr(folder / f"of.{n}.exr", make.frame(n))
-    for n in range(1, 241):
+    for n in range(1, LONG + 1):
         (folder / f"shot.{n:04d}.exr").hardlink_to(folder / f"of.{(n - 1) % 3 + 1}.exr")
     pattern = str(folder / "shot.####.exr")
-    assert make.command(*arguments(pattern, folder / "whole")).returncode == 0
+    assert cli.main(list(map(str, arguments(pattern, folder / "whole", "-q")))) == 0
     whole = {p.name: p.read_bytes() for p in (folder / "whole").iterdir()}
-    assert len(whole) == 240
+    assert len(whole) == LONG
     return pattern, whole
 
 
@@ -440,14 +448,16 @@ def arguments(pattern, out, *more):
     return ("blur", pattern, "-o", out / "o.####.exr", "--vectors", "blender", *more)
 
 
-def begun(pattern, out, at_least: int, **options) -> subprocess.Popen:
-    """A run that has written `at_least` frames and has more to do."""
-    line = [*make.COMMAND, *map(str, arguments(pattern, out, "--resume"))]
-    process = subprocess.Popen(
-        line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
-    )
+def made(out) -> int:
+    return len(list(out.glob("o.*.exr")))
+
+
+def begun(line, has_begun, **options) -> subprocess.Popen:
+    """A run of which `has_begun()` is true, and which has more to do."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+    process = subprocess.Popen([*make.COMMAND, *map(str, line)], text=True, **pipes)
     ends = time.monotonic() + 60
-    while not (out.exists() and len(list(out.glob("o.*.exr"))) >= at_least):
+    while not has_begun():
         assert time.monotonic() < ends
         assert process.poll() is None, process.communicate()
         time.sleep(0.002)
@@ -458,12 +468,12 @@ def test_killed_runs_leave_whole_files_only_and_resume_to_the_same_bytes(tmp_pat
     pattern, whole = long_shot
     out = tmp_path / "out"
     for frames in (1, 23, 48):
-        process = begun(pattern, out, frames)
+        process = begun(arguments(pattern, out, "--resume"), lambda n=frames: made(out) >= n)
         process.kill()
         process.communicate()
         for path in out.glob("o.*.exr"):
             assert path.read_bytes() == whole[path.name]
-    assert make.command(*arguments(pattern, out, "--resume")).returncode == 0
+    assert cli.main(list(map(str, arguments(pattern, out, "--resume", "-q")))) == 0
     assert {p.name: p.read_bytes() for p in out.iterdir()} == whole
 
 
@@ -481,27 +491,29 @@ def test_an_interrupted_run_ends_with_130_one_line_and_whole_files(
 ):
     pattern, whole = long_shot
     out = tmp_path / "out"
-    process = begun(pattern, out, 5, preexec_fn=prepare)
+    line = arguments(pattern, out, "--resume")
+    process = begun(line, lambda: made(out) >= 5, preexec_fn=prepare)
     process.send_signal(number)
     said, err = process.communicate(timeout=20)
     assert (process.returncode, said) == (130, "")
     assert lines(err) == ["wgmb: interrupted"]
     got = {p.name: p.read_bytes() for p in out.iterdir()}
-    assert 5 <= len(got) < 240
+    assert 5 <= len(got) < LONG
     assert got.items() <= whole.items()
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "gif"])
 def test_an_interrupted_video_leaves_nothing(tmp_path, long_shot, suffix):
     pattern, _ = long_shot
-    out = tmp_path / f"v.{suffix}"
-    line = [*make.COMMAND, "blur", pattern, "-o", str(out), "--samples", "512"]
-    process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(1.5)
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=20)
+    out, said = tmp_path / "out", tmp_path / "said.txt"
+    line = ["blur", pattern, "-o", out / f"v.{suffix}", "--samples", "512", "--verbose"]
+    with said.open("w") as file:
+        process = begun(line, lambda: "settings: " in said.read_text(), stderr=file)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=20)
     assert process.returncode == 130
-    assert make.names_in(tmp_path) == []
+    assert said.read_text().endswith("\nwgmb: interrupted\n")
+    assert make.names_in(out) == []
 
 
 def test_an_interruption_that_python_lost_is_heard_at_the_next_frame(

@@ -5,20 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import wgpu
-from test_twins import crossing
 
 import wgmb
+from images import crossing, frame_of
 from wgmb import Shutter, gpu
 from wgmb.images import Images
 
 SIZE = (54, 96)
 SHUTTER = Shutter(180)
-
-
-def frame_of(sources):
-    """The first of (color, motion, depth) with the other two before and after it."""
-    own, prev, after = (wgmb.Frame(c, motion=m, depth=d) for c, m, d in sources)
-    return wgmb.Frame(own.color, motion=own.motion, depth=own.depth, prev=prev, next=after)
 
 
 @pytest.fixture(scope="module")

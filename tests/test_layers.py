@@ -8,6 +8,8 @@ import pytest
 
 from wgmb import InputError, layers, vectors
 
+pytestmark = pytest.mark.fast
+
 RGBA = "RGBA"
 RENDERERS = {
     # names of one frame: picture, depth channel, convention found

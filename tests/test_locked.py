@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from test_twins import crossing
 
 import wgmb
+from images import crossing
 from wgmb import gpu
 from wgmb.errors import InputError
 from wgmb.images import Images

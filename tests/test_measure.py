@@ -7,6 +7,8 @@ from wgmb import measure
 from wgmb.errors import InputError
 from wgmb.measure import MEASURES
 
+pytestmark = pytest.mark.fast
+
 ALL = pytest.mark.parametrize("name", MEASURES)
 SAME = {name: np.inf if "psnr" in name else 1.0 if name == "ssim" else 0.0 for name in MEASURES}
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_gather import SIZE, frame_of
-from test_twins import crossing
 
 import wgmb
+from images import crossing, frame_of
 
+SIZE = (54, 96)
 METHODS = [("gather", {}), ("reproject", {}), ("reproject", {"variant": "published"})]
 PLACES = {-1: np.s_[16:32, 40:56], 1: np.s_[16:32, 56:72]}
 

@@ -11,6 +11,7 @@ from wgmb import Shutter, scenes
 
 SIZE = (96, 54)
 LATE = Shutter(360, "start")  # open only after the instant: motion the wrong way round is seen
+LOSS = 0.1  # [dB] under what was measured that may be the device's; more is a worse picture
 SETTINGS = {
     "translation": {"speed": 6},
     "scaling": {"dolly": 12},
@@ -48,16 +49,16 @@ def psnr(got, want):
 
 @pytest.mark.parametrize(
     "name, tap, reproject",
-    [("translation", 34.8, 37.4), ("scaling", 29.9, 34.7), ("rotation", 35.0, 37.4),
-     ("zoom", 38.2, 38.0), ("yaw", 31.0, 40.6)],
+    [("translation", 34.74, 37.31), ("scaling", 29.88, 34.69), ("rotation", 35.02, 37.37),
+     ("zoom", 38.12, 37.95), ("yaw", 31.00, 40.52)],
 )  # fmt: skip
 def test_a_moving_camera_blurs_as_the_reference_does(name, tap, reproject):
-    """Measured PSNR [dB], less one; the sharp picture has 20 to 25, one blurred backwards less."""
+    """PSNR as measured [dB]; the sharp picture has 20 to 25, one blurred backwards less."""
     truth = reference(name)
     sharp = psnr(rendered(name, "tap", 1, Shutter(0)), truth)
     for method, measured in (("tap", tap), ("reproject", reproject)):
         got = psnr(rendered(name, method, 32), truth)
-        assert got > measured - 1
+        assert got > measured - LOSS
         assert got > sharp + 7
         assert psnr(rendered(name, method, 32, Shutter(360, "end")), truth) < sharp
 
@@ -65,19 +66,19 @@ def test_a_moving_camera_blurs_as_the_reference_does(name, tap, reproject):
 @pytest.mark.parametrize(
     "name, tap, reproject",
     [
-        ("crossing", 33.8, 37.5),
-        ("bounce", 34.9, 39.0),
-        ("wheel", 32.4, 35.4),
-        ("fence", 26.7, 31.4),
+        ("crossing", 33.83, 37.53),
+        ("bounce", 34.85, 39.04),
+        ("wheel", 32.38, 35.36),
+        ("fence", 26.72, 31.43),
     ],
 )
 def test_moving_bodies_blur_as_the_reference_does(name, tap, reproject):
-    """Measured PSNR [dB], less one; reproject is well above the sharp picture, and above tap."""
+    """PSNR as measured [dB]; reproject is well above the sharp picture, and above tap."""
     truth = reference(name)
     sharp = psnr(rendered(name, "tap", 1, Shutter(0)), truth)
     for method, measured in (("tap", tap), ("reproject", reproject)):
         got = psnr(rendered(name, method, 32), truth)
-        assert got > measured - 1
+        assert got > measured - LOSS
         assert got > sharp + (5 if method == "reproject" else 1)
         assert psnr(rendered(name, method, 32, Shutter(360, "end")), truth) < got - 2.5
 

@@ -9,6 +9,8 @@ import make_frames as make
 from wgmb import InputError, Shutter
 from wgmb.shutter import CURVES, OVERLAPS, read_curve
 
+pytestmark = pytest.mark.fast
+
 DEGREES = (1.0, 90.0, 180.0, 360.0, 540.0, 720.0, 1500.0)
 
 

@@ -16,6 +16,8 @@ from wgmb import InputError, exr, record, stills
 from wgmb.output import Output
 from wgmb.source import Source
 
+pytestmark = pytest.mark.fast
+
 rng = np.random.default_rng(7)
 
 

@@ -1,11 +1,13 @@
 """Every kernel against its slow, obvious twin; the largest differences measured are 5e-5."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 import wgmb
+from images import body, camera, crossing
 from twins import fusion as fusion_twin
 from twins import gather as gather_twin
 from twins import keep as keep_twin
@@ -13,7 +15,7 @@ from twins import reproject as reproject_twin
 from twins import tap as tap_twin
 from twins import tiles as tiles_twin
 from twins import velocity as velocity_twin
-from wgmb import Camera, InputError, Reprojections, Shutter, display
+from wgmb import InputError, Reprojections, Shutter, display
 
 SIZES = [(48, 64), (37, 53), (1, 1), (3, 130)]
 TOLERANCE = 1e-4
@@ -199,46 +201,6 @@ def test_reproject_is_its_twin(size, neighbours):
     assert wrong.mean() < 0.01
 
 
-def crossing(size, offset, seed=0, wall=True):
-    """A box over a wall, both moving and textured, as a renderer with antialiasing sees it.
-
-    Without the `wall`, over nothing, with the vectors of the middles of pixels.
-    """
-    rng = np.random.default_rng(seed)
-    height, width = size
-    fine = 4
-    y, x = (np.mgrid[: height * fine, : width * fine] + 0.5) / fine
-    waves = rng.normal(size=(2, 4, 3))
-    speeds = np.array([[1.5, -0.5], [-14.0, 6.0]])  # of wall and box [px a frame]
-    depths = np.array([9.0, 4.0])
-    bend = np.array([[0, 0], [0.5, 1.0]])
-    way = [v * offset + b * offset**2 for v, b in zip(speeds, bend, strict=True)]
-    box = (abs(x - width / 2 - way[1][0]) < width / 6) & (
-        abs(y - height / 2 - way[1][1]) < height / 4
-    )
-    which = box.astype(int)
-    color = np.zeros((*which.shape, 4))
-    for k in (0, 1):
-        px, py = x - way[k][0], y - way[k][1]
-        tone = np.zeros((*x.shape, 3))
-        for n in range(4):
-            along = px * np.cos(n + k) + py * np.sin(n + k)
-            tone += np.sin(0.3 * (n + 1) * along)[..., None] * waves[k, n]
-        shade = np.concatenate([0.5 + 0.1 * tone, np.ones((*tone.shape[:2], 1))], axis=2)
-        color[which == k] = shade[which == k]
-    velocity = speeds + 2 * bend * offset
-    vectors = np.concatenate([-velocity + bend, velocity + bend], axis=1)
-
-    def mean(a):
-        return a.reshape(height, fine, width, fine, -1).mean(axis=(1, 3)).astype("f4")
-
-    depth, motion = depths[which][::fine, ::fine].astype("f4"), mean(vectors[which])
-    if not wall:
-        color[which == 0], depth[depth == depths[0]] = 0, np.inf
-        motion = vectors[which][::fine, ::fine].astype("f4")
-    return mean(color), motion, depth
-
-
 @pytest.mark.parametrize("frames", [1, 2, 3])
 @pytest.mark.parametrize("size", [(36, 52), (1, 1)])
 @pytest.mark.parametrize("degrees", [180, 400])
@@ -360,39 +322,9 @@ def test_published_reprojection_by_cameras_is_its_twin(options, normals):
         assert free[..., 0].mean() > count.mean() + 0.005
 
 
-def camera(position, yaw=0.0, pitch=0.0, roll=0.0, zoom=1.7, orthographic=False, bodies=None):
-    """A camera looking along -z, turned by radians."""
-    rx, ry, rz = (_turn(i, a) for i, a in enumerate((pitch, yaw, roll)))
-    world_from_view = np.eye(4)
-    world_from_view[:3, :3] = ry @ rx @ rz
-    world_from_view[:3, 3] = position
-    clip = np.array([[zoom / 1.5, 0, 0, 0], [0, zoom, 0, 0], [0, 0, -1.02, -0.2], [0, 0, -1, 0.0]])
-    if orthographic:
-        clip = np.array([[0.2, 0, 0, 0], [0, 0.3, 0, 0], [0, 0, -0.02, -1.0], [0, 0, 0, 1.0]])
-    view = np.linalg.inv(world_from_view)
-    return Camera(clip @ view, view, bodies or {})
-
-
-def _turn(axis, angle):
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    m = np.eye(3)
-    m[i, i] = m[j, j] = np.cos(angle)
-    m[j, i], m[i, j] = np.sin(angle), -np.sin(angle)
-    return m
-
-
-def body(x, angle):
-    m = np.eye(4)
-    m[:3, :3] = 1.4 * _turn(1, angle)
-    m[:3, 3] = x, 0.3, -6
-    return m
-
-
-@pytest.mark.parametrize("orthographic", [False, True])
-@pytest.mark.parametrize("kind", ["planar", "clip"])
-@pytest.mark.parametrize("size", [(37, 53), (1, 1), (3, 130)])
-@pytest.mark.parametrize("more", ["", "vectors", "added", "scale", "limit"])
-def test_velocity_is_its_twin(close, size, kind, orthographic, more):
+@cache
+def seen_from_three_cameras(size, kind, orthographic):
+    """Depth, object indices, cameras, and what the twin makes of them."""
     rng = np.random.default_rng(3)
     depth = rng.uniform(2, 30, size).astype("f4")
     ids = rng.integers(0, 5, size).astype("u4")
@@ -409,6 +341,16 @@ def test_velocity_is_its_twin(close, size, kind, orthographic, more):
     window = (5, 3, size[1] + 20, size[0] + 9)
     around = Reprojections(ways[1], ways[0], ways[2], depth_kind=kind, window=window)
     want = velocity_twin.velocity(depth, ids, ways[1], ways[0], ways[2], window=window, kind=kind)
+    return depth, ids, around, want
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+@pytest.mark.parametrize("kind", ["planar", "clip"])
+@pytest.mark.parametrize("size", [(37, 53), (1, 1), (3, 130)])
+@pytest.mark.parametrize("more", ["", "vectors", "added", "scale", "limit"])
+def test_velocity_is_its_twin(close, size, kind, orthographic, more):
+    depth, ids, around, want = seen_from_three_cameras(size, kind, orthographic)
+    rng = np.random.default_rng(6)
     vectors = rng.normal(size=(*size, 4)).astype("f4") * 20
     inputs = {"vectors": {"motion": vectors}, "added": {"motion": vectors, "object_motion": True},
               "scale": {"scale": rng.uniform(-1, 2, size).astype("f4")}}.get(more, {})  # fmt: skip

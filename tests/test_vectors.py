@@ -9,6 +9,8 @@ import make_frames as make
 from wgmb import InputError, vectors
 from wgmb.vectors import Vectors
 
+pytestmark = pytest.mark.fast
+
 BOTH = ("blender", "nuke", "plain")  # the others write one direction only
 ONE = ("arnold", "vray", "rsmb", "velocity")
 

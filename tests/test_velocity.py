@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from test_twins import body, camera
 
 import wgmb
+from images import body, camera
 from wgmb import Camera, InputError, Reprojections, Shutter
 
 SIZE = (40, 60)  # height, width: the lens of `camera` makes 1.7 half heights of distance 1

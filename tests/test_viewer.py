@@ -30,11 +30,15 @@ from wgmb.viewer import State, actions, controls, offscreen, stage
 from wgmb.viewer.pace import Pace
 from wgmb.viewer.screen import key_box
 from wgmb.viewer.stage import shutter_of
+from wgmb.viewer.state import LOOKS
 from wgmb.viewer.subject import SceneSubject
 from wgmb.viewer.window import frame
 
-SIZE = 640, 1010  # tall enough for the whole panel; the picture is 320 x 180
-PLAIN = State(rays=1, samples=4)
+SIZE = 512, 1010  # tall enough for the whole panel; the picture is 256 x 144
+BESIDE = 256, 144
+BARE, SMALL = (320, 180), (160, 90)  # of the picture alone, for what needs no panel
+PLAIN = State(method="tap", rays=1, samples=4)
+ALONE = replace(PLAIN, panel=False)
 SAMPLE = str(Path(__file__).parent.parent / "sample" / "crossing.####.exr")
 
 
@@ -55,15 +59,19 @@ class Hand:
 
     def look(self, seconds=0.02):
         self.now += seconds
-        return frame(self.viewer)[..., :3].astype(int)
+        return frame(self.viewer)[..., :3].astype(np.int16)
+
+    def look_until(self, done):
+        for _ in range(400):
+            self.look(0.4)
+            if done():
+                return
+        raise AssertionError("never done")
 
     def picture(self):
         """What is shown when all is done, without the panel."""
-        for _ in range(400):
-            self.look(0.4)
-            if not self.viewer.stage.report.busy:
-                return self.viewer.screen.picture()
-        raise AssertionError("never done")
+        self.look_until(lambda: not self.viewer.stage.report.busy)
+        return self.viewer.screen.picture()
 
     def drag(self, start, end, button=1, modifiers=()):
         press = {"button": button, "modifiers": modifiers}
@@ -116,18 +124,47 @@ def hand(shared):
     return shared
 
 
+@pytest.fixture(scope="module")
+def shared_bare():
+    return Hand(ALONE, BARE)
+
+
+@pytest.fixture
+def bare(shared_bare):
+    """As `hand`, without the panel: drawn in a tenth of the time."""
+    shared_bare.viewer.state = ALONE
+    shared_bare.viewer.canvas.set_logical_size(*BARE)
+    shared_bare.look()
+    return shared_bare
+
+
+@pytest.fixture
+def small(bare):
+    """As `bare`, with a quarter of the pixels."""
+    bare.viewer.canvas.set_logical_size(*SMALL)
+    bare.look()
+    return bare
+
+
 # ---- the picture ----------------------------------------------------------------------------
 
 
+def library(state, size=SMALL):
+    """A Render of what the state is set to, and when."""
+    shows = {} if state.look in LOOKS else {"show": state.look}
+    blur = Blur(state.method, samples=state.samples, shutter=shutter_of(state), **shows)
+    scene = scenes.make(state.source, **dict(state.settings))
+    render = Render(scene, blur, size=size, rays=state.rays, fps=state.fps)
+    return render, (state.frame / state.fps, int(state.frame))
+
+
 @pytest.mark.parametrize("method", ["tap", "distributed"])
-def test_the_picture_is_what_render_writes(hand, method):
-    hand.viewer.state = replace(PLAIN, method=method, frame=2.0)
-    got = hand.picture()
-    want = Render(
-        scenes.make("crossing"), Blur(method, samples=4), size=(320, 180), rays=1
-    )(2 / 24, 2)  # fmt: skip
+def test_the_picture_is_what_render_writes(bare, method):
+    state = bare.viewer.state = replace(ALONE, method=method, frame=2.0)
+    got = bare.picture()
+    render, moment = library(state, BARE)
     assert got.shape == (180, 320, 3)
-    assert np.abs(got - stills.srgb(want[..., :3])).max() < 2e-3
+    assert np.abs(got - stills.srgb(render(*moment)[..., :3])).max() < 2e-3
 
 
 def test_the_window_shows_the_picture_in_its_place(hand):
@@ -142,30 +179,37 @@ def test_every_method_and_scene_can_be_chosen(hand):
     assert set(METHODS) - set(methods) == {"volume"}  # there is none in the scene
     for method in methods:
         hand.choose("method", method)
-        assert hand.state.method == method
-        assert hand.picture().std() > 0.01
+        assert hand.state == replace(PLAIN, method=method)
     for name in scenes.SCENES:
-        if name != hand.state.source:
+        before = hand.state
+        if name != before.source:
             hand.choose("scene", name)
-            assert hand.state.source == name
-        assert hand.picture().std() > 0.01
+            possible = hand.viewer.stage.choices.possible
+            assert hand.state == possible(before.opened(name))
+
+
+@pytest.mark.parametrize("name", scenes.SCENES)
+def test_every_scene_is_what_render_draws(small, name):
+    state = small.viewer.state = replace(ALONE.opened(name), frame=3.0)
+    got = small.picture()
+    render, moment = library(state)
+    want = stills.srgb(render(*moment)[..., :3])
+    assert got.std() > 0.01
+    assert np.abs(got - want).max() < 2e-3
 
 
 @pytest.mark.parametrize("tone", ["clip", "soft"])
-def test_exposure_and_tone(hand, tone):
-    hand.viewer.state = replace(PLAIN, exposure=1.5, tone=tone, look="sharp")
-    light = Render(scenes.make("crossing"), Blur("tap", samples=4), size=(320, 180), rays=1).frame(
-        0.0
-    )
-    want = light.color[..., :3] * 2**1.5
+def test_exposure_and_tone(small, tone):
+    state = small.viewer.state = replace(ALONE, exposure=1.5, tone=tone, look="sharp")
+    want = library(state)[0].frame(0.0).color[..., :3] * 2**1.5
     want = want / (1 + want) if tone == "soft" else want
-    assert np.abs(hand.picture() - stills.srgb(want)).max() < 2e-3
+    assert np.abs(small.picture() - stills.srgb(want)).max() < 2e-3
 
 
-def test_velocity_has_the_colours_of_display(hand):
-    hand.viewer.state = replace(PLAIN, look="velocity")
-    shown = hand.picture()
-    render = Render(scenes.make("crossing"), Blur("tap"), size=(320, 180), rays=1)
+def test_velocity_has_the_colours_of_display(bare):
+    state = bare.viewer.state = replace(ALONE, look="velocity")
+    shown = bare.picture()
+    render, _ = library(state, BARE)
     motion = render.blur.motion(render.frame(0.0))[..., 2:]
     want = stills.srgb(display.motion_colors(motion, PLAIN.fastest * 180))
     apart = np.abs(shown - want).max(axis=2)
@@ -175,10 +219,10 @@ def test_velocity_has_the_colours_of_display(hand):
     assert apart.max() < 5e-3
 
 
-def test_depth_is_grey_and_nearer_is_brighter(hand):
-    hand.viewer.state = replace(PLAIN, look="depth")
-    shown = hand.picture()
-    depth = Render(scenes.make("crossing"), Blur("tap"), size=(320, 180), rays=1).frame(0.0).depth
+def test_depth_is_grey_and_nearer_is_brighter(bare):
+    state = bare.viewer.state = replace(ALONE, look="depth")
+    shown = bare.picture()
+    depth = library(state, BARE)[0].frame(0.0).depth
     want = np.where(np.isfinite(depth), 5 / (5 + depth), 0)
     apart = np.abs(shown - want[..., None])
     apart[150:, :160] = 0  # the legend
@@ -193,12 +237,23 @@ def test_what_a_method_shows_of_itself_can_be_looked_at(hand):
     assert np.abs(hand.picture() - result).max() > 0.1
 
 
-def test_all_that_can_be_looked_at_can_be_drawn(hand):
-    for method in hand.viewer.stage.choices.methods(PLAIN):
-        for look in hand.viewer.stage.choices.looks(replace(PLAIN, method=method)):
-            if look != "error":
-                hand.viewer.state = replace(PLAIN, method=method, look=look)
-                assert np.isfinite(hand.picture()).all()
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "volume"])
+def test_all_that_a_method_draws_is_what_render_draws(small, method):
+    """Depth, velocity and error are those of all methods, and have tests of their own."""
+    found = small.viewer.stage.choices.looks(replace(ALONE, method=method))
+    drawn = [look for look in found if look not in ("depth", "velocity", "error")]
+    assert drawn[:3] == ["result", "sharp", "perceived"]
+    for look in drawn:
+        state = small.viewer.state = replace(ALONE, method=method, look=look)
+        render, moment = library(state)
+        if look == "sharp":
+            want = stills.srgb(render.frame(*moment).color[..., :3])
+        elif look == "perceived":
+            numbers = range(1 - state.eye.held(state.fps), 1)
+            want = seen([render(n / state.fps, n) for n in numbers], state.fps)
+        else:
+            want = stills.srgb(render(*moment)[..., :3])
+        assert np.abs(small.picture() - want).max() < 4e-3, look
 
 
 def seen(frames, fps, after=0.0):
@@ -209,34 +264,34 @@ def seen(frames, fps, after=0.0):
     return stills.srgb(np.clip(eye.sees(after)[..., :3], 0, 1))
 
 
-def rendered(numbers, fps=24.0, rays=1, **blur):
-    how = Blur(**{"samples": 4, **blur})
-    render = Render(scenes.make("crossing"), how, size=(320, 180), rays=rays, fps=fps)
+def rendered(numbers, fps=24.0, rays=1, speed=1.0, **blur):
+    how = Blur(**{"method": "tap", "samples": 4, **blur})
+    render = Render(scenes.make("crossing", speed=speed), how, size=SMALL, rays=rays, fps=fps)
     return [render(n / fps, n) for n in numbers]
 
 
 @pytest.mark.parametrize("frame, newest, after", [(3.0, 3, 0.0), (3.4, 3, 0.4), (2.5, 3, -0.5)])
-def test_what_is_perceived_is_what_the_library_says(hand, frame, newest, after):
-    hand.viewer.state = replace(PLAIN, look="perceived", frame=frame)
-    got = hand.picture()
+def test_what_is_perceived_is_what_the_library_says(small, frame, newest, after):
+    small.viewer.state = replace(ALONE, look="perceived", frame=frame)
+    got = small.picture()
     want = seen(rendered(range(newest - 12, newest + 1)), 24.0, after / 24)
     assert np.abs(got - want).max() < 4e-3  # the library keeps pictures as f16
-    hand.viewer.state = replace(hand.state, look="result")
-    assert np.abs(hand.picture() - want).mean() > 0.005
+    small.viewer.state = replace(small.state, look="result")
+    assert np.abs(small.picture() - want).mean() > 0.005
 
 
 @pytest.mark.parametrize("method", ["distributed", "gather"])
-def test_what_stands_still_is_perceived_as_it_is(hand, method):
-    state = replace(PLAIN, settings=(("speed", 0.0),), samples=16, method=method, frame=2.0)
-    hand.viewer.state = state
-    result = hand.picture()
-    hand.viewer.state = replace(state, look="perceived")
-    got = hand.picture()
+def test_what_stands_still_is_perceived_as_it_is(small, method):
+    state = replace(ALONE, settings=(("speed", 0.0),), samples=16, method=method, frame=2.0)
+    small.viewer.state = state
+    result = small.picture()
+    small.viewer.state = replace(state, look="perceived")
+    got = small.picture()
     apart = np.abs(got - result)  # distributed has other noise in every frame
     assert apart.max() < 2e-3 if method == "gather" else apart.mean() < 0.03
 
 
-def test_only_new_frames_are_drawn_while_it_plays(hand, monkeypatch):
+def test_only_new_frames_are_drawn_while_it_plays(small, monkeypatch):
     drawn = []
 
     def draw(self, blur, *given):
@@ -245,22 +300,22 @@ def test_only_new_frames_are_drawn_while_it_plays(hand, monkeypatch):
 
     plain = SceneSubject.draw
     monkeypatch.setattr(SceneSubject, "draw", draw)
-    hand.viewer.state = replace(PLAIN, look="perceived", frame=4.0)
-    hand.picture()
+    small.viewer.state = replace(ALONE, look="perceived", frame=4.0)
+    small.picture()
     held = Cone().held(24)
     assert sorted(drawn) == list(range(5 - held, 5))
     drawn.clear()
     for key, number in (("ArrowRight", [5]), ("ArrowUp", []), ("ArrowRight", [6]), ("h", []),
                         ("ArrowLeft", [6 - held]), ("ArrowLeft", [5 - held])):  # fmt: skip
-        hand.press(key)
-        hand.picture()
+        small.press(key)
+        small.picture()
         assert drawn == number, key
         drawn.clear()
-    hand.viewer.state = replace(hand.state, cone_peak=0.051, exposure=1.0)
-    hand.picture()
+    small.viewer.state = replace(small.state, cone_peak=0.051, exposure=1.0)
+    small.picture()
     assert drawn == []
-    hand.viewer.state = replace(hand.state, shutter=90.0)
-    hand.picture()
+    small.viewer.state = replace(small.state, shutter=90.0)
+    small.picture()
     assert len(drawn) == held
 
 
@@ -276,69 +331,68 @@ def test_who_perceives_is_set_in_the_panel(hand):
     assert np.array_equal(hand.picture(), quick)
 
 
-def test_the_reference_of_what_is_perceived_is_perceived_nature(hand):
+def test_the_reference_of_what_is_perceived_is_perceived_nature(small):
     """Nature is a video of very many frames."""
-    state = replace(PLAIN, look="perceived", compare="wipe", against="reference", wipe=0.0,
-                    frame=4.0)  # fmt: skip
-    hand.viewer.state = state
-    while hand.viewer.stage.report.reference[0] < 200:
-        hand.look(0.4)
-    nature = hand.viewer.screen.picture()
-    assert hand.viewer.stage.report.labels == ("tap, perceived", "nature, perceived")
-    assert hand.viewer.stage.report.measured.psnr > 20
-    sharp = {"rays": 3, "shutter": 0}
+    state = replace(ALONE, look="perceived", compare="wipe", against="reference", wipe=0.0,
+                    frame=4.0, settings=(("speed", 4.0),))  # fmt: skip
+    small.viewer.state = state
+    small.look_until(lambda: small.viewer.stage.report.reference[0] >= 200)
+    nature = small.viewer.screen.picture()
+    assert small.viewer.stage.report.labels == ("tap, perceived", "nature, perceived")
+    assert small.viewer.stage.report.measured.psnr > 20
+    sharp = {"rays": 3, "shutter": 0, "speed": 4.0}
     want = seen(rendered(range(20 - 60, 21), 120.0, **sharp), 120.0)
     video = seen(rendered(range(-8, 5), 24.0, **sharp), 24.0)
     apart = [np.abs(a - want)[:, 3:].mean() for a in (nature, video)]
     assert apart[0] < 0.004 and apart[0] < 0.7 * apart[1], apart
 
 
-def test_nature_is_exact_where_volumes_are(hand):
-    hand.viewer.state = replace(
-        PLAIN.opened("disk"), frame=8.0, look="perceived", compare="difference",
+def test_nature_is_exact_where_volumes_are(small):
+    small.viewer.state = replace(
+        ALONE.opened("disk"), frame=8.0, look="perceived", compare="difference",
         against="reference", gain=1.0,
     )  # fmt: skip
-    boxes = hand.picture().mean()
-    assert hand.viewer.stage.report.labels[1] == "nature, perceived"
-    hand.viewer.state = replace(hand.state, shutter=0.0)
-    assert hand.picture().mean() > 1.2 * boxes > 0
+    boxes = small.picture().mean()
+    assert small.viewer.stage.report.labels[1] == "nature, perceived"
+    small.viewer.state = replace(small.state, shutter=0.0)
+    assert small.picture().mean() > 1.2 * boxes > 0
     for name, choice in (("crossing", True), ("torusphere", False), ("cone", False)):
-        state = replace(PLAIN.opened(name), look="perceived")
-        assert ("reference" in hand.viewer.stage.choices.rivals(state)) is choice
+        state = replace(ALONE.opened(name), look="perceived")
+        assert ("reference" in small.viewer.stage.choices.rivals(state)) is choice
 
 
 # ---- mouse and keys -------------------------------------------------------------------------
 
 
-def test_left_drag_orbits_and_r_puts_it_back(hand):
-    before = hand.picture()
-    hand.drag((100, 500), (180, 520))
-    aside, up = hand.state.orbit
+def test_left_drag_orbits_and_r_puts_it_back(bare):
+    before = bare.picture()
+    bare.drag((100, 85), (180, 105))
+    aside, up = bare.state.orbit
     assert aside == pytest.approx(-80 / 320 * np.degrees(4.0))
-    assert up == pytest.approx(20 / 1010 * np.degrees(4.0))
-    assert np.abs(hand.picture() - before).mean() > 0.02
-    hand.press("r")
-    assert hand.state.orbit == (0, 0)
-    assert np.array_equal(hand.picture(), before)
+    assert up == pytest.approx(20 / 180 * np.degrees(4.0))
+    assert np.abs(bare.picture() - before).mean() > 0.02
+    bare.press("r")
+    assert bare.state.orbit == (0, 0)
+    assert np.array_equal(bare.picture(), before)
 
 
 @pytest.mark.parametrize("button, modifiers", [(2, ()), (1, ("Shift",))])
-def test_right_or_shift_drag_moves_the_picture_with_the_hand(hand, button, modifiers):
-    hand.drag((100, 500), (132, 500), button, modifiers)
-    assert hand.state.orbit == (0, 0)
-    assert hand.state.pan == pytest.approx((-32 / 180 * 6.25, 0))
+def test_right_or_shift_drag_moves_the_picture_with_the_hand(bare, button, modifiers):
+    bare.drag((100, 85), (132, 85), button, modifiers)
+    assert bare.state.orbit == (0, 0)
+    assert bare.state.pan == pytest.approx((-32 / 180 * 6.25, 0))
 
 
-def test_wheel_comes_nearer_and_is_continuous(hand):
-    hand.submit("wheel", x=100, y=500, dx=0, dy=-100, buttons=())
-    hand.look()
-    whole = hand.state.dolly
-    hand.viewer.state = PLAIN
+def test_wheel_comes_nearer_and_is_continuous(bare):
+    bare.submit("wheel", x=100, y=85, dx=0, dy=-100, buttons=())
+    bare.look()
+    whole = bare.state.dolly
+    bare.viewer.state = ALONE
     for _ in range(10):
-        hand.submit("wheel", x=100, y=500, dx=0, dy=-10, buttons=())
-        hand.look()
+        bare.submit("wheel", x=100, y=85, dx=0, dy=-10, buttons=())
+        bare.look()
     assert whole < 1
-    assert hand.state.dolly == pytest.approx(whole)
+    assert bare.state.dolly == pytest.approx(whole)
 
 
 def test_elevation_and_distance_are_held(hand):
@@ -352,16 +406,17 @@ def test_elevation_and_distance_are_held(hand):
 
 
 def test_the_torusphere_asks_for_its_method_and_shutter_and_is_turned(hand):
+    hand.viewer.state = replace(PLAIN, method=State().method)
     hand.choose("scene", "torusphere")
     assert (hand.state.method, hand.state.curve) == ("volume", "cosine")
     before = hand.picture()
-    want = Render(scenes.make("torusphere"), Blur(**blur_of(hand.state)), size=(320, 180))(0.0)
+    want = Render(scenes.make("torusphere"), Blur(**blur_of(hand.state)), size=BESIDE)(0.0)
     assert np.abs(before - stills.srgb(want[..., :3])).max() < 2e-3
-    hand.drag((100, 500), (180, 500))
+    hand.drag((80, 500), (144, 500))
     assert dict(hand.state.settings)["cam_x"] == pytest.approx(-1.0)
     assert np.abs(hand.picture() - before).mean() > 0.005
     hand.choose("scene", "crossing")
-    assert (hand.state.method, hand.state.shutter, hand.state.curve) == ("tap", 180, "box")
+    assert (hand.state.method, hand.state.shutter, hand.state.curve) == ("gather", 180, "box")
 
 
 def blur_of(state):
@@ -529,122 +584,124 @@ def test_the_full_screen_is_that_of_the_monitor_the_window_is_on(monkeypatch):
     assert actions._monitor_of((-5000, 0, 10, 10)) == "left"  # nowhere to be seen
 
 
-def test_nothing_is_drawn_when_nothing_changes(hand):
-    hand.picture()
-    hand.look()
-    assert hand.viewer.stage.report.seconds.keys() == {"draw"}
-    assert not hand.viewer.stage.report.changed
+def test_nothing_is_drawn_when_nothing_changes(bare):
+    bare.picture()
+    bare.look()
+    assert bare.viewer.stage.report.seconds.keys() == {"draw"}
+    assert not bare.viewer.stage.report.changed
 
 
 # ---- comparing ------------------------------------------------------------------------------
 
 
-def pictures(hand):
+def pictures(bare):
     """The result, and the sharp picture."""
-    hand.viewer.state = PLAIN
-    first = hand.picture()
-    hand.viewer.state = replace(PLAIN, look="sharp")
-    return first, hand.picture()
+    bare.viewer.state = ALONE
+    first = bare.picture()
+    bare.viewer.state = replace(ALONE, look="sharp")
+    return first, bare.picture()
 
 
-def test_wipe_shows_either_side_and_its_line_is_dragged(hand):
-    first, second = pictures(hand)
-    hand.viewer.state = replace(PLAIN, compare="wipe", against="sharp", wipe=0.5)
-    shown = hand.picture()
+def test_wipe_shows_either_side_and_its_line_is_dragged(bare):
+    first, second = pictures(bare)
+    bare.viewer.state = replace(ALONE, compare="wipe", against="sharp", wipe=0.5)
+    shown = bare.picture()
     assert np.array_equal(shown[:, :158], first[:, :158])
     assert np.array_equal(shown[:, 162:], second[:, 162:])
-    hand.drag((160, 500), (80, 540))
-    assert hand.state.wipe == pytest.approx(0.25)
-    assert hand.state.orbit == (0, 0)
-    shown = hand.picture()
+    bare.drag((160, 85), (80, 125))
+    assert bare.state.wipe == pytest.approx(0.25)
+    assert bare.state.orbit == (0, 0)
+    shown = bare.picture()
     assert np.array_equal(shown[:, 82:], second[:, 82:])
 
 
-def test_split_shows_both_whole(hand):
-    hand.viewer.state = replace(PLAIN, compare="split", against=PLAIN.method)
-    hand.picture()
-    width = 320
-    whole = hand.look()[:, :width]
-    left, right = whole[460:550, 5:155], whole[460:550, 165:315]
+def test_split_shows_both_whole(bare):
+    bare.viewer.state = replace(ALONE, compare="split", against=ALONE.method)
+    bare.picture()
+    whole = bare.look()
+    left, right = whole[45:135, 5:155], whole[45:135, 165:315]
     assert np.abs(left - right).max() <= 2
     assert left.std() > 10
 
 
-def test_difference_of_the_same_is_black_and_of_others_is_not(hand):
-    hand.viewer.state = replace(PLAIN, compare="difference", against=PLAIN.method)
-    assert hand.picture().max() == 0
-    hand.viewer.state = replace(PLAIN, compare="difference", against="sharp", gain=2.0)
-    got, (first, second) = hand.picture(), pictures(hand)
+def test_difference_of_the_same_is_black_and_of_others_is_not(bare):
+    bare.viewer.state = replace(ALONE, compare="difference", against=ALONE.method)
+    assert bare.picture().max() == 0
+    bare.viewer.state = replace(ALONE, compare="difference", against="sharp", gain=2.0)
+    got, (first, second) = bare.picture(), pictures(bare)
     assert np.abs(got - np.clip(2 * np.abs(first - second), 0, 1)).max() < 5e-3
 
 
-def test_flicker_changes_with_the_clock(hand):
-    first, second = pictures(hand)
-    hand.viewer.state = replace(PLAIN, compare="flicker", against="sharp")
-    hand.picture()
+def test_flicker_changes_with_the_clock(bare):
+    first, second = pictures(bare)
+    bare.viewer.state = replace(ALONE, compare="flicker", against="sharp")
+    bare.picture()
     seen = []
     for _ in range(4):
-        hand.look(0.5)
-        seen.append(hand.viewer.screen.picture())
+        bare.look(0.5)
+        seen.append(bare.viewer.screen.picture())
     assert np.array_equal(seen[0], seen[2]) and np.array_equal(seen[1], seen[3])
     assert {a.tobytes() for a in seen} == {first.tobytes(), second.tobytes()}
 
 
-def test_the_error_is_shown_however_others_are_compared(hand):
+def test_the_error_is_shown_however_others_are_compared(bare):
     shown = []
     for compare in ("off", "wipe", "split", "difference", "flicker"):
-        hand.viewer.state = replace(PLAIN, look="error", compare=compare)
-        hand.look(1.0)
+        bare.viewer.state = replace(ALONE, look="error", compare=compare)
+        bare.look(1.0)
         for _ in range(2):
-            hand.look(0.5)
-            shown.append(hand.viewer.screen.picture())
-        assert key_box(hand.state, "COLOR", (0, 0, 9, 9), (0, 0, 9, 9), 1.0)
+            bare.look(0.5)
+            shown.append(bare.viewer.screen.picture())
+        assert key_box(bare.state, "COLOR", (0, 0, 9, 9), (0, 0, 9, 9), 1.0)
         layout = controls.Layout((0, 0, 320, 1010), (0, 400, 320, 180))
-        assert controls.grip(hand.state, layout, 160, 500, 1, ()) == "orbit"
+        assert controls.grip(bare.state, layout, 160, 500, 1, ()) == "orbit"
     assert all(picture.max() > 0.3 for picture in shown)  # flicker would show black in between
 
 
-def test_the_reference_converges_and_is_measured(hand, monkeypatch):
+def test_the_reference_converges_and_is_measured(small, monkeypatch):
     monkeypatch.setattr(stage, "_STEP", 0.0)  # a sample a frame, however fast the machine is
     at = 7 / 24  # a moment that no other test has measured
-    hand.viewer.state = replace(PLAIN, look="error", gain=1.0, frame=7.0)
+    small.viewer.state = replace(ALONE, look="error", gain=1.0, frame=7.0)
     rays = []
     for _ in range(600):
-        hand.look(0.4)
-        rays.append(hand.viewer.stage.report.reference[0])
-        if (found := hand.viewer.stage.report.measured) and found.samples >= 128:
+        small.look(0.4)
+        rays.append(small.viewer.stage.report.reference[0])
+        if (found := small.viewer.stage.report.measured) and found.samples >= 128:
             break
     assert rays == sorted(rays) and len(set(rays)) > 3
-    render = Render(scenes.make("crossing"), Blur("tap", samples=4), size=(320, 180), rays=1)
+    render = Render(scenes.make("crossing"), Blur("tap", samples=4), size=SMALL, rays=1)
     truth = Render(
-        render.scene, Blur("distributed", samples=found.samples), size=(320, 180), rays=1
+        render.scene, Blur("distributed", samples=found.samples), size=SMALL, rays=1
     )(at, 7)  # fmt: skip
     apart = stills.srgb(render(at, 7)[..., :3]) - stills.srgb(truth[..., :3])
     assert found.psnr == pytest.approx(-10 * np.log10(np.mean(apart.astype("f8") ** 2)), abs=0.01)
     if found.flip:
         assert 0 < found.flip.result(60) < 1
-    hand.submit("pointer_move", x=10, y=10, button=0, buttons=())
-    hand.viewer.state = replace(hand.state, frame=1.0)
-    hand.look()
-    assert hand.viewer.stage.report.reference[0] < rays[-1]  # begun anew
+    small.submit("pointer_move", x=10, y=10, button=0, buttons=())
+    small.viewer.state = replace(small.state, frame=1.0)
+    small.look()
+    assert small.viewer.stage.report.reference[0] < rays[-1]  # begun anew
 
 
-def test_what_is_shown_never_has_less_in_it_than_before(hand, monkeypatch):
+def test_what_is_shown_never_has_less_in_it_than_before(small, monkeypatch):
     monkeypatch.setattr(stage, "_STEP", 0.0)  # a few samples at a time
-    hand.viewer.state = replace(PLAIN, method="accumulate", samples=32)
-    want, shown = hand.picture(), hand.viewer.stage._shown
-    hand.submit("pointer_down", x=100, y=500, button=1, buttons=(1,))
+    small.viewer.state = replace(ALONE, method="accumulate", samples=32)
+    want, shown = small.picture(), small.viewer.stage._shown
+    small.submit("pointer_down", x=50, y=40, button=1, buttons=(1,))
     for _ in range(3):
-        hand.look()
-        assert np.array_equal(hand.viewer.screen.picture(), want)  # nothing has moved yet
-    hand.submit("pointer_move", x=110, y=500, button=0, buttons=(1,))
-    hand.look()
+        small.look()
+        assert np.array_equal(small.viewer.screen.picture(), want)  # nothing has moved yet
+    small.submit("pointer_move", x=60, y=40, button=0, buttons=(1,))
+    small.look()
     assert shown["first"].done == 4
-    hand.submit("pointer_up", x=110, y=500, button=1, buttons=())
+    small.submit("pointer_up", x=60, y=40, button=1, buttons=())
     done = []
-    while hand.viewer.stage.report.busy:
-        hand.look(0.4)
+
+    def all_done():
         done.append(shown["first"].done)
+        return not small.viewer.stage.report.busy
+
+    small.look_until(all_done)
     assert done == sorted(done) and done[0] == 4 and done[-1] == 32 and len(set(done)) > 3
 
 
@@ -753,10 +810,10 @@ def test_moving_is_coarse_and_stillness_is_fine(hand):
     hand.submit("pointer_down", x=100, y=500, button=1, buttons=(1,))
     hand.submit("pointer_move", x=110, y=500, button=0, buttons=(1,))
     hand.look()
-    assert hand.viewer.stage.report.size[0] < 320
+    assert hand.viewer.stage.report.size[0] < 256
     hand.submit("pointer_up", x=110, y=500, button=1, buttons=())
     hand.look()
-    assert hand.viewer.stage.report.size == (320, 180)
+    assert hand.viewer.stage.report.size == BESIDE
 
 
 def test_pace_finds_what_keeps_to_its_target():
@@ -796,7 +853,7 @@ MANY = State(
     pan=(0.25, -0.5),
     dolly=0.8,
     frame=3.5,
-    size="320x180",
+    size="256x144",
     rays=1,
     fps=30.0,
     method="reproject",
@@ -942,14 +999,14 @@ def test_screenshot_and_recording(hand, tmp_path, monkeypatch):
     hand.press("s")
     assert np.abs(iio.imread("wgmb-001.png") / 255 - shown).max() < 0.01
     whole = exr.read(Path("wgmb-001.exr")).parts[0]
-    want = Render(scenes.make("crossing"), Blur("tap", samples=4), size=(320, 180), rays=1)(0.0)
+    want = Render(scenes.make("crossing"), Blur("tap", samples=4), size=BESIDE, rays=1)(0.0)
     assert np.abs(whole.channels["R"].astype("f4") - want[..., 0]).max() < 2e-3
     hand.press("v")
     for _ in range(3):
         hand.look()
     hand.press("v")
     frames = iio.imread("wgmb-001.mp4", plugin="pyav")
-    assert frames.shape[1:] == (180, 320, 3) and len(frames) >= 3
+    assert frames.shape[1:] == (144, 256, 3) and len(frames) >= 3
     assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 0.5  # it moves
     assert not list(tmp_path.glob(".*"))
 
@@ -1003,7 +1060,7 @@ def test_scrubbing_shutter_zoom_and_pan(reel):
     reel.look()
     assert reel.state.zoom > 1.2
     across = reel.state.center[0]
-    reel.drag((100, 500), (50, 500))
+    reel.drag((80, 500), (50, 500))
     assert reel.state.center[0] > across
     reel.press("r")
     assert (reel.state.zoom, reel.state.center) == (1, (0.5, 0.5))

@@ -49,8 +49,8 @@ def fusion(color, motion, depth, times, middle, alphas, *, span=None, delay=(0.0
             at = here + displacement(path, -(middle + late))
             total = sharp * bilinear(color, *at)
             counted = sharp * (1.0 if weight is None else bilinear(weight, *at))
-            for t, share in zip(times, each, strict=True):
-                at = here + displacement(path, -(t + late))
+            places = here + displacement(path, -(np.reshape(times, (-1, 1)) + late))
+            for at, share in zip(places, each, strict=True):
                 total = total + share * bilinear(soft, *at)
                 counted += share * (1.0 if weight is None else bilinear(soft_weight, *at))
             if weight is not None:

@@ -42,19 +42,20 @@ def gather(frames, times):
     span = times[0] - (times[1] - times[0]) / 2, times[-1] + (times[1] - times[0]) / 2
     tiles = [reaching(f, span) for f in layers]
     height, width = frames[0][1].shape[:2]
-    out = frames[0][1].astype(float)
+    own = frames[0][1].astype(float)
+    out = own.copy()
     for y in range(height):
         for x in range(width):
             here = [t[y // TILE][x // TILE] for t in tiles]
             if max(tile["longest"] for tile in here) >= 0.01:
-                seen = [instant(layers, here, x, y, t, frames[0][1]) for t in times]
+                seen = [instant(layers, here, x, y, t, own) for t in times]
                 out[y, x] = np.maximum(np.mean(seen, axis=0), 0)
     return out
 
 
 def moved(path, u):
     """Displacement [px] after `u` frame intervals."""
-    return (path[:2] + path[2:] * u) * u
+    return (path[..., :2] + path[..., 2:] * u) * u
 
 
 # ---- silhouettes ----------------------------------------------------------------------------
@@ -158,15 +159,16 @@ def part(color, motion, z, mixed, y, x):
 
 
 def apart(a, b, u):
-    """How far two paths come apart by the time `u`, before or after [px]."""
-    return max(np.hypot(*moved(a - b, t)) for t in (-u, u))
+    """How far a path, or each of several, is from another by the time `u`, before or after [px]."""
+    return np.maximum(*(np.hypot(*moved(a - b, t).T) for t in (-u, u)))
 
 
 def choose(paths, u):
     """The longest, then always the one that is most unlike those chosen and standing still."""
+    paths = np.reshape(paths, (-1, 4))
     chosen, longest = [], 0.0
     for _ in range(PATHS):
-        unlike = [min(apart(p, c, u) for c in [np.zeros(4), *chosen]) for p in paths]
+        unlike = np.min([apart(paths, c, u) for c in [np.zeros(4), *chosen]], axis=0)
         most = max(unlike, default=0.0)
         longest = longest if chosen else most
         if most <= 0.5:
@@ -178,7 +180,7 @@ def choose(paths, u):
 def most_alike(path, chosen, u):
     """Index of the chosen path, or None if it stands still rather."""
     all_ = list(chosen) + [np.zeros(4)] * (PATHS - len(chosen))
-    best = int(np.argmin([apart(path, c, u) for c in all_]))
+    best = int(np.argmin(apart(np.array(all_), path, u)))
     return best if best < len(chosen) else None
 
 
@@ -192,7 +194,7 @@ def reaching(frame, span):
     for j in range(rows):
         for i in range(columns):
             box = np.s_[j * TILE : (j + 1) * TILE, i * TILE : (i + 1) * TILE]
-            paths = list(frame.path[0][box].reshape(-1, 4))
+            paths = frame.path[0][box].reshape(-1, 4)
             z = frame.depth[0][box].ravel()
             chosen, longest = choose(paths, u)
             depths = [np.inf] * len(chosen)
@@ -268,7 +270,7 @@ def instant(layers, tiles, x, y, t, color):
     if clear < 0.5:
         return sum_ / (1 - clear)
     way = moved(layers[0].path[0][y, x], t)
-    return bilinear(color.astype(float), x + 0.5 - way[0], y + 0.5 - way[1])
+    return bilinear(color, x + 0.5 - way[0], y + 0.5 - way[1])
 
 
 def search(layers, tiles, x, y, t):

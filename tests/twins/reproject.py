@@ -1,5 +1,7 @@
 """Depth-tested time slices, one sample and one pixel at a time."""
 
+from functools import cache
+
 import numpy as np
 
 from twins.tap import bilinear, displacement
@@ -95,11 +97,11 @@ def along(motion, depth, sign):
 def by_camera(depth, normal, here, there, facing=False):
     """A mover by cameras between `here` and `there`; `normal` in the world, 0 for none."""
     height, width = depth.shape
-    eye = np.linalg.inv(here.view_from_world)
+    eye, world_from_clip = np.linalg.inv(here.view_from_world), np.linalg.inv(here.clip_from_world)
 
     def place(column, row):
         x, y = (column + 0.5) / width * 2 - 1, 1 - (row + 0.5) / height * 2
-        ends = [np.linalg.inv(here.clip_from_world) @ (x, y, z, 1.0) for z in (-0.5, 0.5)]
+        ends = [world_from_clip @ (x, y, z, 1.0) for z in (-0.5, 0.5)]
         ends = [end[:3] / end[3] for end in ends]
         axis, start = -eye[:3, 2], ends[0]
         way = ends[1] - ends[0]
@@ -120,9 +122,13 @@ def by_camera(depth, normal, here, there, facing=False):
         n = np.cross(*tangents)
         return n if n @ (eye[:3, 3] - middle) > 0 else -n
 
+    @cache
+    def on_the_way(share):
+        camera = here.toward(there, share)
+        return camera, np.linalg.inv(camera.view_from_world)[:3, 3]
+
     def move(column, row, share, whatever=False):
-        camera, point = here.toward(there, share), place(column, row)
-        at = np.linalg.inv(camera.view_from_world)[:3, 3]
+        (camera, at), point = on_the_way(share), place(column, row)
         if facing and not whatever and surface(column, row) @ (at - point) < 0:
             return None
         clip = camera.clip_from_world @ (*point, 1.0)

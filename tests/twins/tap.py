@@ -1,19 +1,21 @@
 """Taps along each pixel's own path, one pixel and one tap at a time."""
 
+import math
+
 import numpy as np
 
 
 def displacement(motion, t):
-    """Where the parabola through previous, this and next place is at time t."""
+    """Where the parabola through previous, this and next place is at time t, or a column of t."""
     to_prev, to_next = motion[:2], motion[2:]
-    return to_prev * t * (t - 1) / 2 + to_next * t * (t + 1) / 2
+    return to_prev * (t * (t - 1) / 2) + to_next * (t * (t + 1) / 2)
 
 
 def bilinear(image, x, y):
     """The image at a position in pixels, centres at + 0.5, edges repeated."""
     height, width = image.shape[:2]
-    u, v = x - 0.5, y - 0.5
-    i, j = int(np.floor(u)), int(np.floor(v))
+    u, v = float(x) - 0.5, float(y) - 0.5
+    i, j = math.floor(u), math.floor(v)
     total = 0.0
     for dj in (0, 1):
         for di in (0, 1):
@@ -29,7 +31,7 @@ def tap(color, motion, times, delay=(0.0, 0.0), curved=True, weight=None):
     `delay`: rolling shutter, across the width and the height [frame intervals].
     """
     height, width = color.shape[:2]
-    out = np.zeros(color.shape)
+    color, out = color.astype(float), np.zeros(color.shape)
     for y in range(height):
         for x in range(width):
             late = delay[0] * ((x + 0.5) / width - 0.5) + delay[1] * ((y + 0.5) / height - 0.5)
@@ -44,8 +46,8 @@ def pixel(color, motion, x, y, times, curved=True, weight=None):
         mean = (path[2:] - path[:2]) / 2
         path = np.concatenate([-mean, mean])
     total, counted = 0.0, 0.0
-    for t in times:
-        at = np.array([x + 0.5, y + 0.5]) + displacement(path, -t)
+    places = np.array([x + 0.5, y + 0.5]) + displacement(path, -np.reshape(times, (-1, 1)))
+    for at in places:
         total = total + bilinear(color, *at)
         counted += 1.0 if weight is None else bilinear(weight, *at)
     if counted <= 0:
@@ -59,8 +61,8 @@ def published(color, to_prev, samples):
     out = np.zeros(color.shape)
     for y in range(height):
         for x in range(width):
-            velocity = -to_prev[y, x] / 2
+            here, velocity = np.array([x + 0.5, y + 0.5]), -to_prev[y, x] / 2
             for i in range(samples):
-                at = np.array([x + 0.5, y + 0.5]) + velocity * i / samples
+                at = here + velocity * (i / samples)
                 out[y, x] += bilinear(color, *at) / samples
     return out

@@ -1,5 +1,7 @@
 """Guertin, McGuire and Nowrouzezahrai 2014, one tile, one pixel and one tap at a time."""
 
+import math
+
 import numpy as np
 
 from twins.tap import bilinear, displacement
@@ -13,6 +15,9 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
     motion = motion.astype(float)
     fastest = _fastest(motion, span, edge)
     dominant = _dominant(fastest, span)
+    streak, way = np.zeros((height, width)), np.zeros((height, width, 2))
+    for at in np.ndindex(height, width):
+        streak[at], way[at] = _streak(motion[at], span), _direction(motion[at], span)
     out = np.zeros(color.shape)
     for y, x in np.ndindex(height, width):
         tile = _tile(x, y, noise[y, x], edge, dominant.shape)
@@ -21,8 +26,8 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
         if reach <= SHORT:
             out[y, x] = _own(color, weight, y, x)
             continue
-        own = motion[y, x]
-        here = np.clip(_streak(own, span), SHORT, edge)
+        along = _direction(fast, span)
+        here = _within(streak[y, x], SHORT, edge)
         share = (1.0 if published else 0.25) / (KAPPA * here)
         total = share * color[y, x]
         counted = share * (1 if weight is None else weight[y, x])
@@ -30,15 +35,13 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
             offset = displacement(fast, t)
             far = np.hypot(*offset)
             if i % 2:
-                trust = np.clip((here - SHORT) / GAMMA, 0, 1)
-                odd = _own_direction(_direction(own, span), _direction(fast, span), trust)
-                offset = far * np.sign(t) * odd
+                trust = _within((here - SHORT) / GAMMA, 0, 1)
+                offset = far * np.sign(t) * _own_direction(way[y, x], along, trust)
             at = np.array([x + 0.5, y + 0.5]) - offset
-            column = int(np.clip(np.floor(at[0]), 0, width - 1))
-            row = int(np.clip(np.floor(at[1]), 0, height - 1))
-            there = np.clip(_streak(motion[row, column], span), SHORT, edge)
-            w = _weight(far, offset, here, there, _direction(own, span),
-                        _direction(motion[row, column], span),
+            column = int(_within(at[0], 0, width - 1))
+            row = int(_within(at[1], 0, height - 1))
+            there = _within(streak[row, column], SHORT, edge)
+            w = _weight(far, offset, here, there, way[y, x], way[row, column],
                         _depth(depth, y, x), _depth(depth, row, column))  # fmt: skip
             if not published:
                 w /= max(2 * _cone(far, reach) + 2 * _cylinder(far, reach), 1e-3)
@@ -58,8 +61,8 @@ def followed(motion, span, edge):
 
 
 def _weight(far, offset, here, there, own_way, way, z, z_there):
-    front = np.clip(1 - (z_there - z) / min(z, z_there), 0, 1)
-    behind = np.clip(1 - (z - z_there) / min(z, z_there), 0, 1)
+    front = _within(1 - (z_there - z) / min(z, z_there), 0, 1)
+    behind = _within(1 - (z - z_there) / min(z, z_there), 0, 1)
     direction = _unit(offset)
     along_here = abs(own_way @ direction) if here > SHORT and far > 0 else 1.0
     along_there = abs(way @ direction) if there > SHORT and far > 0 else 1.0
@@ -74,7 +77,7 @@ def _farthest(motion, span):
     """When it is farthest from its place: at an end, or where it turns."""
     velocity, curvature = (motion[2:] - motion[:2]) / 2, (motion[2:] + motion[:2]) / 2
     bend = curvature @ curvature
-    turn = np.clip(-0.5 * (velocity @ curvature) / max(bend, 1e-30), *span)
+    turn = _within(-0.5 * (velocity @ curvature) / max(bend, 1e-30), *span)
     return max((span[1], span[0], turn), key=lambda t: np.hypot(*displacement(motion, t)))
 
 
@@ -122,7 +125,7 @@ def _dominant(fastest, span):
 def _tile(x, y, noise, edge, shape):
     at = np.array([x + 0.5, y + 0.5]) / edge
     at += 0.5 * (np.array([noise, (8 * noise + 0.5) % 1]) - 0.5)
-    i, j = (int(np.clip(np.floor(v), 0, n - 1)) for v, n in zip(at, shape[1::-1], strict=True))
+    i, j = (int(_within(v, 0, n - 1)) for v, n in zip(at, shape[1::-1], strict=True))
     return j, i
 
 
@@ -141,7 +144,11 @@ def _own(color, weight, y, x):
 
 
 def _unit(v):
-    return v / max(np.hypot(*v), 1e-6)
+    return v / max(math.hypot(*v), 1e-6)
+
+
+def _within(value, low, high):
+    return min(max(value, low), high)
 
 
 def _depth(depth, y, x):
@@ -152,9 +159,9 @@ def _depth(depth, y, x):
 
 
 def _cone(far, length):
-    return np.clip(1 - far / length, 0, 1)
+    return _within(1 - far / length, 0, 1)
 
 
 def _cylinder(far, length):
-    u = np.clip((far - 0.95 * length) / (0.1 * length), 0, 1)
+    u = _within((far - 0.95 * length) / (0.1 * length), 0, 1)
     return 1 - u * u * (3 - 2 * u)

@@ -10,11 +10,12 @@ NEAREST = 1e-4  # of its distance: closer to the camera plane than this is behin
 def velocity(depth, ids, here, prev, next_, *, window, kind="planar", far=1e9):
     """to_prev, to_next of every pixel; cameras have clip_from_world, view_from_world, bodies."""
     height, width = depth.shape
+    world_from_clip = np.linalg.inv(here.clip_from_world)
     out = np.zeros((height, width, 4))
     for y in range(height):
         for x in range(width):
             out[y, x] = _pixel(x, y, float(depth[y, x]), int(ids[y, x]), here, prev, next_,
-                               window, kind, far)  # fmt: skip
+                               world_from_clip, window, kind, far)  # fmt: skip
     return out
 
 
@@ -29,15 +30,15 @@ def combined(camera, vectors, nothing, *, added=False, scale=None, max_blur=None
         if scale is not None:
             out[y, x] *= scale[y, x]
         if max_blur is not None:
-            times = np.linspace(*span, 401)
-            places = np.array([displacement(out[y, x], t) for t in times])
+            times = np.linspace(*span, 401)[:, None]
+            places = displacement(out[y, x], times)
             ends = places[[0, -1]]
             streak = max(np.hypot(*(places - end).T).max() for end in ends)
             out[y, x] *= min(1, max_blur / max(streak, 1e-6))
     return out
 
 
-def _pixel(x, y, z, body, here, prev, next_, window, kind, far):
+def _pixel(x, y, z, body, here, prev, next_, world_from_clip, window, kind, far):
     left, top, width, height = window
     ndc = np.array([2 * (x + 0.5 + left) / width - 1, 1 - 2 * (y + 0.5 + top) / height])
     orthographic = np.abs(here.clip_from_world[3, :3]).max() == 0
@@ -46,7 +47,7 @@ def _pixel(x, y, z, body, here, prev, next_, window, kind, far):
     )
     if nothing and orthographic:
         return np.zeros(4)
-    point = _world(ndc, z, here, kind, nothing)
+    point = _world(ndc, z, here, world_from_clip, kind, nothing)
     ways = []
     for there in (prev, next_):
         ways.append(
@@ -62,9 +63,8 @@ def _pixel(x, y, z, body, here, prev, next_, window, kind, far):
     return np.concatenate([back, ahead])
 
 
-def _world(ndc, z, here, kind, nothing):
+def _world(ndc, z, here, world_from_clip, kind, nothing):
     """Homogeneous world position; a direction (w = 0) where nothing is there."""
-    world_from_clip = np.linalg.inv(here.clip_from_world)
     if kind == "clip" and not nothing:
         return world_from_clip @ np.array([*ndc, z, 1.0])
     near, beyond = (world_from_clip @ np.array([*ndc, k, 1.0]) for k in (-0.5, 0.5))
