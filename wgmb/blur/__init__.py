@@ -23,7 +23,7 @@ class Method(Protocol):
     """What a method is: a name, the inputs it needs, and how it is recorded.
 
     It may also have `samples`, its own default number of them, and `adaptive`: it can take as
-    many samples as each pixel's streak needs (AUTO of wgsl/common/shutter.wgsl); `confidence`,
+    many samples as each pixel's streak needs (ADAPTIVE of wgsl/common/shutter.wgsl); `confidence`,
     what the four channels of its `show="confidence"` are called; `most_in_software`: the most
     samples it takes without a GPU, if not as many as with one.
     """

@@ -89,7 +89,7 @@ class Fusion:
             self._device,
             "blur/fusion.wgsl",
             {"Output": self._output},
-            EVEN=inputs.even,
+            BOX_SHUTTER=inputs.even,
             NORMALS=turned and inputs.normal is not None,
             WEIGHTED=weighted,
             PUBLISHED=self._published,

@@ -121,7 +121,7 @@ class Gather:
         if self._everywhere is None or self._everywhere[0] != size:
             source = shader.load("blur/gather_listed.wgsl")
             strands, row, wide, side, strip = (
-                int(source.constant(n)) for n in ("STRANDS", "IN_A_ROW", "CELL", "TILE", "STRIP")
+                int(source.constant(n)) for n in ("INTERLEAVE", "IN_A_ROW", "CELL", "TILE", "STRIP")
             )
             across, down = self._grid(size)
             across = -(-across // wide)
@@ -138,7 +138,7 @@ class Gather:
     def _search(self, encoder, inputs, offsets, places, layers, lists, output):
         """Record which times of which blocks are plain, then all pixels."""
         count = len(offsets)
-        timed = {"EVEN": inputs.even, "AUTO": inputs.auto}
+        timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
         plain = gpu.kernel(self._device, "blur/gather_plain.wgsl", **timed)
         data = np.zeros((), plain.source.dtype("Sources"))
         data["offsets"][:count] = offsets

@@ -11,7 +11,7 @@ from .. import gpu
 from ..cameras import Camera, Reprojections
 from ..errors import InputError
 from ..images import Scratch
-from ..velocity import view_of
+from ..velocity import viewport_of
 
 GOLDEN = (5**0.5 - 1) / 2
 FORMS = ("slices", "published")
@@ -87,7 +87,7 @@ class Reproject:
             self._device,
             "blur/reproject.wgsl",
             {"Output": self._output},
-            EVEN=inputs.even,
+            BOX_SHUTTER=inputs.even,
             WEIGHTED=inputs.weight is not None,
             COUNTS=self._show == "count",
         )
@@ -196,7 +196,7 @@ class Reproject:
             table["time"][: len(steps)] = steps
             if camera and way:
                 seen = replace(camera, here=way[0], prev=None, next=way[1])
-                data["view"] = view_of(seen, inputs.given.size)
+                data["viewport"] = viewport_of(seen, inputs.given.size)
                 data["world_from_pixel"] = seen.world_from_pixel().T
                 data["eye"] = _eye(way[0])
                 for row, share in zip(table, np.abs(steps), strict=False):

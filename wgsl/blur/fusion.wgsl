@@ -39,8 +39,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let x = vec2f(id.xy) + 0.5;
     let way = textureLoad(motion, id.xy, 0);
-    var path = path_of(way);
-    if PUBLISHED { path = Path(-way.xy, vec2f(0.0)); }
+    var path = trajectory_from(way);
+    if PUBLISHED { path = Trajectory(-way.xy, vec2f(0.0)); }
 
     let times = shutter_times(x, frame.jitter * (pixel_noise(id.xy) - 0.5));
     var open = shutter.span + times.delay;
@@ -48,7 +48,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if PUBLISHED { open = vec2f(-0.5, 0.0); middle = 0.0; }
     let opening = displacement(path, open.x);
     let closing = displacement(path, open.y);
-    let turn = displacement(path, turning(path, open.x, open.y));
+    let turn = displacement(path, slowest_time(path, open.x, open.y));
     let farthest = max(dot(turn, turn), max(dot(opening, opening), dot(closing, closing)));
     let still = farthest < STILL * STILL;
     let count = select(frame.samples, 0u, still);
@@ -61,7 +61,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
-    let back = Path(-path.velocity * texel, path.curvature * texel);    // in time
+    let back = Trajectory(-path.velocity * texel, path.half_acceleration * texel);    // in time
     let here = uv + displacement(back, middle);
     var sum = share.x * textureSampleLevel(color, linear, here, 0.0);
     var total = 0.0;
@@ -89,7 +89,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 fn faces_ahead(px: vec2u, velocity: vec2f) -> bool {
     if NORMALS {
         let n = textureLoad(normal, px, 0);
-        if is_finite4(n) && any(n.xyz != vec3f(0.0)) { return leads(fusion.facing, n.xyz, velocity); }
+        if is_finite4(n) && any(n.xyz != vec3f(0.0)) { return normal_faces_motion(fusion.facing, n.xyz, velocity); }
     }
-    return leads_by_depth(fusion.facing, depth, px, velocity);
+    return slope_faces_motion(fusion.facing, depth, px, velocity);
 }

@@ -60,8 +60,8 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let share = 1.0 / f32(times.count);     // before adding, so that no sum of finite colours overflows
 
     // Nothing moves, nor does anything come here.
-    let longest = max(abs(shown(0.0).x), abs(shown(0.0).y));
-    let rests = all((abs(path.velocity) + abs(path.curvature) * longest) * longest < vec2f(STILL));
+    let longest = max(abs(exposure_window(0.0).x), abs(exposure_window(0.0).y));
+    let rests = all((abs(path.velocity) + abs(path.half_acceleration) * longest) * longest < vec2f(STILL));
     let all_plain = textureLoad(plain, id / BLOCK, (frame.samples - 1u) / AT_ONCE + 1u, 0).x == 1u;
     let still = is_still(reach0, reach1, reach2) || (rests && all_plain);
     let samples = select(times.count, 0u, still);
@@ -149,7 +149,7 @@ fn unmoved(px: vec2u) -> vec4f {
 }
 
 /// The time of the lowest of 32 bits, of which `first` is the time of the first.
-fn time_in(times: Times, first: u32, bits: u32) -> f32 {
+fn time_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
     return shutter_time(times, min(first + firstTrailingBit(bits), times.count - 1u));
 }
 
@@ -225,7 +225,7 @@ fn nearest_to(q: vec2f) -> vec2u {
 /// its far layer where that shows nothing opaque; then, or far from the frame's instant, in the near layer of
 /// the neighbour on the side of `t`, and of the other one if the background was at best inferred; at
 /// last in their far layers, where it still was and no silhouette is before it.
-fn search(x: vec2f, path: Path, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
+fn search(x: vec2f, path: Trajectory, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
     let count = sources.count;
     let parted = max(a.about.y, max(b.about.y, c.about.y)) > 0.0;
     var solid = nothing();

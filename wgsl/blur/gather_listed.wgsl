@@ -34,7 +34,7 @@ fn place_of(group: vec3u) -> u32 {
     return group.z * IN_A_ROW + group.x;
 }
 
-/// The pixel of an invocation of a strip: eight at once are blocks of 4 x 2, see spread().
+/// The pixel of an invocation of a strip: eight at once are blocks of 4 x 2, see swizzled_pixel().
 fn pixel_in(word: u32, group: vec3u, local: u32) -> vec2u {
     let across = CELL * TILE;
     let row = local / (2u * across);
@@ -45,5 +45,5 @@ fn pixel_in(word: u32, group: vec3u, local: u32) -> vec2u {
 /// Where in a list, or in parts of its cells, an invocation of a pass over the picture stands: the work is
 /// in the first ones.
 fn place_in_list(local: u32, group: vec3u, groups: vec3u) -> u32 {
-    return (strand(group.y, groups.y) * groups.x + group.x) * WG_X * WG_Y + local;
+    return (interleaved_row(group.y, groups.y) * groups.x + group.x) * WG_X * WG_Y + local;
 }

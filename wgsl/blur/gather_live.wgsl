@@ -32,12 +32,12 @@ const BESIDE: i32 = 2;          // tiles, see MARKED
 @compute @workgroup_size(WG_X, WG_Y)
 fn survey(@builtin(local_invocation_index) local: u32,
         @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let here = vec2i(spread(local, group, groups));
+    let here = vec2i(swizzled_pixel(local, group, groups));
     let tiles = vec2i(tiles_of(frame.size));
     if any(here >= tiles) { return; }
     let corner = here * i32(TILE) - HELPED;
     let side = i32(TILE) + 2 * HELPED;
-    let span = shown(source.offset);
+    let span = exposure_window(source.offset);
     var least = vec4f(WILD);        // to_prev, to_next [px]
     var most = vec4f(-WILD);
     for (var i = 0; i < side * side; i++) {
@@ -83,7 +83,7 @@ fn list(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let cells = cells_of(frame.size);
     // Nothing returns before these loops: where eight at once have returned, lavapipe goes on to 65,535 turns.
     let width = select(0u, cells.x, place < cells.y);
-    let row = strand(min(place, cells.y - 1u), cells.y);
+    let row = interleaved_row(min(place, cells.y - 1u), cells.y);
     var within = vec2u(0u);         // how many are live, parted, marked
     var marks = 0u;
     for (var x = 0u; x < width; x++) {

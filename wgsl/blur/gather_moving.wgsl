@@ -1,21 +1,21 @@
-// Motions, and how far they lead while a frame is shown. A path as a vector: velocity, curvature.
+// Motions, and how far they lead while a frame is shown. A path as a vector: velocity, half_acceleration.
 //#include common/path.wgsl
 //#include common/shutter.wgsl
 
 const WILD: f32 = 1e5;          // motions beyond this [px] are errors
 const FARTHEST: i32 = 16;       // tiles that a motion is followed over
 
-fn as_vec4(path: Path) -> vec4f {
-    return vec4f(path.velocity, path.curvature);
+fn as_vec4(path: Trajectory) -> vec4f {
+    return vec4f(path.velocity, path.half_acceleration);
 }
 
 fn displaced(path: vec4f, u: f32) -> vec2f {
-    return displacement(Path(path.xy, path.zw), u);
+    return displacement(Trajectory(path.xy, path.zw), u);
 }
 
 /// How long after, or before, the instant of the frame `offset` intervals away it is shown at most.
 fn longest_time(offset: f32) -> f32 {
-    let span = abs(shown(offset));
+    let span = abs(exposure_window(offset));
     return max(span.x, span.y);
 }
 

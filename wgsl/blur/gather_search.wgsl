@@ -112,14 +112,14 @@ fn is_still(a: Reach, b: Reach, c: Reach) -> bool {
 }
 
 /// The sample times of the pixel at `x`, moved by `shift` within their shares.
-fn times_of(x: vec2f, shift: f32, a: Reach, b: Reach, c: Reach) -> Times {
+fn times_of(x: vec2f, shift: f32, a: Reach, b: Reach, c: Reach) -> SampleTimes {
     let streak = max(streak_of(a, 0u), max(streak_of(b, 1u), streak_of(c, 2u)));
-    return enough_times(shutter_times(x, shift), streak);
+    return with_adaptive_count(shutter_times(x, shift), streak);
 }
 
 /// How long a streak the longest motion of a frame leaves in the exposure [px].
 fn streak_of(here: Reach, f: u32) -> f32 {
-    let since = abs(shown(sources.offsets[f]));
+    let since = abs(exposure_window(sources.offsets[f]));
     return here.about.z * (shutter.span.y - shutter.span.x) / max(max(since.x, since.y), 1e-9);
 }
 

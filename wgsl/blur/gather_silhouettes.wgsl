@@ -115,7 +115,7 @@ fn split(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
         calm = calm && (mark & FLAGS) == 0u && weight_at(at) == counts;
         beside = beside || is_mixed(mark);
     }
-    let path = path_of(textureLoad(motion, px, 0));
+    let path = trajectory_from(textureLoad(motion, px, 0));
     let z = marked_depth(here);
     textureStore(near_color, px, textureLoad(color, px, 0));
     textureStore(near_path, px, packed(path, select(z, -z, beside), calm));
@@ -256,9 +256,9 @@ fn part(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
         }
     }
     textureStore(near_color, px, near);
-    textureStore(near_path, px, packed(path_of(near_motion), -z, false));
+    textureStore(near_path, px, packed(trajectory_from(near_motion), -z, false));
     if far_z > 0.0 { textureStore(far_color, px, far); }        // else nobody reads it
-    textureStore(far_path, px, packed(path_of(far_motion), max(far_z, 0.0), seen));
+    textureStore(far_path, px, packed(trajectory_from(far_motion), max(far_z, 0.0), seen));
     textureStore(surface, px, vec4f(z, far_z, coverage, coverage * counts));
 }
 
@@ -268,7 +268,7 @@ fn whole(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
     let k = place_of(group);
     let px = vec2i(pixel_in(listed.cells[k], group, local));
     if k >= listed.count || any(px >= vec2i(frame.size)) { return; }
-    let path = path_of(textureLoad(motion, px, 0));
+    let path = trajectory_from(textureLoad(motion, px, 0));
     textureStore(near_path, px, packed(path, marked_depth(bitcast<u32>(depth_at(px))), false));
     textureStore(far_path, px, packed(path, 0.0, false));
 }

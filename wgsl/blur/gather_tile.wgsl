@@ -16,17 +16,17 @@ fn tiles_of(size: vec2u) -> vec2u {
     return (size + TILE - 1u) / TILE;
 }
 
-/// A place of a surface: all that the search needs in one texel, rgba32uint. Velocity, curvature in
+/// A place of a surface: all that the search needs in one texel, rgba32uint. Velocity, half_acceleration in
 /// half floats, depth; a depth under 0 is that of a pixel at a silhouette; in a far layer, 0 says that
 /// there is none. The last bit of the depth says whether the pixel is calm.
-fn packed(path: Path, depth: f32, calm: bool) -> vec4u {
-    let curvature = clamp(path.curvature, vec2f(-HALF_MAX), vec2f(HALF_MAX));
+fn packed(path: Trajectory, depth: f32, calm: bool) -> vec4u {
+    let half_acceleration = clamp(path.half_acceleration, vec2f(-HALF_MAX), vec2f(HALF_MAX));
     let bits = (bitcast<u32>(depth) & ~1u) | u32(calm);
-    return vec4u(bitcast<vec2u>(path.velocity), pack2x16float(curvature), bits);
+    return vec4u(bitcast<vec2u>(path.velocity), pack2x16float(half_acceleration), bits);
 }
 
-fn path_in(texel: vec4u) -> Path {
-    return Path(bitcast<vec2f>(texel.xy), unpack2x16float(texel.z));
+fn path_in(texel: vec4u) -> Trajectory {
+    return Trajectory(bitcast<vec2f>(texel.xy), unpack2x16float(texel.z));
 }
 
 fn depth_in(texel: vec4u) -> f32 {

@@ -66,7 +66,7 @@ fn local(@builtin(local_invocation_index) local: u32,
     let corner = id * TILE;
     let end = min(corner + TILE, frame.size) - 1u;
     let pixels = select(0u, TILE * TILE, moves);        // some twice in tiles that are cut off
-    let span = shown(source.offset);
+    let span = exposure_window(source.offset);
     let u = longest_time(source.offset);
     var paths = array<vec4f, 4>();      // the longest, then always the most different
     var box = vec4f(0.0);
@@ -132,7 +132,7 @@ fn reach(@builtin(local_invocation_index) local: u32,
     let tiles = tiles_of(frame.size);
     let id = cell_in(moving.cells[k / CELL]) * vec2u(CELL, 1u) + vec2u(k % CELL, 0u);
     if k / CELL >= moving.count || id.x >= tiles.x { return; }
-    let span = shown(source.offset);
+    let span = exposure_window(source.offset);
     let u = longest_time(source.offset);
     let around = min(i32(ceil(bitcast<f32>(atomicLoad(&farthest)) / f32(TILE))) + 1, FARTHEST);
     let here = vec2i(id);

@@ -101,7 +101,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
         if slices != 0u && seen >> SOURCE_BITS == chunk.source {
             unseen &= ~(1u << k);
             let px = vec2u(seen & ((1u << ROW_BIT) - 1u), (seen & ((1u << SOURCE_BITS) - 1u)) >> ROW_BIT);
-            let moved = way(path_of(textureLoad(motion, px, 0)), times_at(px), k);
+            let moved = way(trajectory_from(textureLoad(motion, px, 0)), times_at(px), k);
             let uv = (vec2f(id.xy) + 0.5 - moved) / vec2f(frame.size);
             let still = all(moved == vec2f(0.0));       // to the bit
             let seen_color = select(textureSampleLevel(color, linear, uv, 0.0), still_color, still);
@@ -149,9 +149,9 @@ fn block_of(px: vec2u) -> u32 {
 
 struct Sample {
     x: vec2f,           // [px], centres of pixels are integers
-    path: Path,
+    path: Trajectory,
     depth: f32,
-    times: Times,
+    times: SampleTimes,
     slices: u32,        // bits of those in which it may be seen
 }
 
@@ -160,11 +160,11 @@ fn sample_at(px: vec2u) -> Sample {
     if !is_finite(z) || z <= 0.0 { z = FAR; }
     var slices = (1u << chunk.count) - 1u;
     if WEIGHTED { slices = select(0u, slices, textureLoad(weight, px, 0).x > 0.0); }
-    return Sample(vec2f(px), path_of(textureLoad(motion, px, 0)), z, times_at(px), slices);
+    return Sample(vec2f(px), trajectory_from(textureLoad(motion, px, 0)), z, times_at(px), slices);
 }
 
 /// Of the source's pixel at `px`, on the source's own clock.
-fn times_at(px: vec2u) -> Times {
+fn times_at(px: vec2u) -> SampleTimes {
     var times = shutter_times(vec2f(px) + 0.5, chunk.shift);
     times.first -= chunk.offset;
     times.delay -= chunk.offset;
@@ -172,7 +172,7 @@ fn times_at(px: vec2u) -> Times {
 }
 
 /// How far it has moved by the time of slice `k` of the chunk [px].
-fn way(path: Path, times: Times, k: u32) -> vec2f {
+fn way(path: Trajectory, times: SampleTimes, k: u32) -> vec2f {
     return displacement(path, shutter_time(times, chunk.first + k));
 }
 

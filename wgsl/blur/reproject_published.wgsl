@@ -12,7 +12,7 @@ struct Step {
 }
 
 struct Chunk {                  // steps of one source that are done together
-    view: View,
+    viewport: Viewport,
     world_from_pixel: mat4x4f,  // of the source's own camera
     eye: vec4f,
     bits: vec2u,                // of a sample's number: those of x, those of x and y
@@ -166,7 +166,7 @@ fn fixed(px: vec2u) -> vec4u {
 }
 
 struct Sample {
-    path: Path,         // without a camera
+    path: Trajectory,         // without a camera
     ndc: vec2f,
     here: vec4f,        // homogeneous pixel
     place: vec4f,       // in the world, up to a positive factor
@@ -181,13 +181,13 @@ fn sample_at(px: vec2u) -> Sample {
     s.counts = true;
     if WEIGHTED { s.counts = textureLoad(weight, px, 0).x > 0.0; }
     if !CAMERA {
-        s.path = path_of(textureLoad(motion, px, 0));
+        s.path = trajectory_from(textureLoad(motion, px, 0));
         return s;
     }
-    let view = chunk.view;
-    s.ndc = ndc_of(view, px);
-    let nothing_there = is_nothing(view, s.depth);
-    s.here = homogeneous(view, s.ndc, s.depth, nothing_there);
+    let viewport = chunk.viewport;
+    s.ndc = ndc_of(viewport, px);
+    let nothing_there = is_nothing(viewport, s.depth);
+    s.here = homogeneous(viewport, s.ndc, s.depth, nothing_there);
     s.place = chunk.world_from_pixel * s.here;
     if FACING && !nothing_there {
         if NORMALS { s.normal = textureLoad(normal, px, 0).xyz; } else { s.normal = slope(vec2i(px), s.place); }
@@ -214,8 +214,8 @@ fn tangent(px: vec2i, step: vec2i, place: vec4f) -> vec3f {
         let there = px + side * step;
         if any(there < vec2i(0)) || any(there >= vec2i(frame.size)) { continue; }
         let z = textureLoad(depth, there, 0).x;
-        if is_nothing(chunk.view, z) { continue; }
-        let other = chunk.world_from_pixel * homogeneous(chunk.view, ndc_of(chunk.view, vec2u(there)), z, false);
+        if is_nothing(chunk.viewport, z) { continue; }
+        let other = chunk.world_from_pixel * homogeneous(chunk.viewport, ndc_of(chunk.viewport, vec2u(there)), z, false);
         let apart = other.xyz / other.w - here;
         if length(apart) < least {
             least = length(apart);
@@ -229,8 +229,8 @@ fn tangent(px: vec2i, step: vec2i, place: vec4f) -> vec3f {
 fn way(s: Sample, k: u32) -> vec2f {
     if !CAMERA { return displacement(s.path, steps[k].time); }
     let clip = steps[k].clip_from_pixel * s.here;
-    if clip.w <= NEAREST { return vec2f(1e9); }
-    return to_pixels(chunk.view, clip, s.ndc);
+    if clip.w <= MIN_W { return vec2f(1e9); }
+    return to_pixels(chunk.viewport, clip, s.ndc);
 }
 
 /// Depth at step 0 of the chunk, as positive floats in their order.

@@ -20,9 +20,9 @@ const STILL: f32 = 0.01;            // paths shorter than this [px] take one tap
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let x = vec2f(id.xy) + 0.5;
-    var path = path_of(textureLoad(motion, id.xy, 0));
-    if !CURVED { path.curvature = vec2f(0.0); }
-    if PUBLISHED { path = Path(-textureLoad(motion, id.xy, 0).xy, vec2f(0.0)); }
+    var path = trajectory_from(textureLoad(motion, id.xy, 0));
+    if !CURVED { path.half_acceleration = vec2f(0.0); }
+    if PUBLISHED { path = Trajectory(-textureLoad(motion, id.xy, 0).xy, vec2f(0.0)); }
 
     // A loop that ends early is the only branch that saves time on every driver.
     let shift = frame.jitter * (pixel_noise(id.xy) - 0.5);
@@ -31,16 +31,16 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let closes = shutter.span.y + all.delay;
     let opening = displacement(path, opens);
     let closing = displacement(path, closes);
-    let turn = displacement(path, turning(path, opens, closes));
+    let turn = displacement(path, slowest_time(path, opens, closes));
     let farthest = max(dot(turn, turn), max(dot(opening, opening), dot(closing, closing)));
     let still = !PUBLISHED && farthest < STILL * STILL;
-    let times = enough_times(all, distance(opening, turn) + distance(turn, closing));
+    let times = with_adaptive_count(all, distance(opening, turn) + distance(turn, closing));
     let count = select(times.count, 0u, still);
 
     let share = 1.0 / f32(times.count);   // before adding, so that no sum of finite colours overflows
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
-    let back = Path(-path.velocity * texel, path.curvature * texel);    // in time
+    let back = Trajectory(-path.velocity * texel, path.half_acceleration * texel);    // in time
     var sum = vec4f(0.0);
     var total = 0.0;
     for (var i = 0u; i < count; i++) {

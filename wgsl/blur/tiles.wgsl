@@ -59,7 +59,7 @@ fn fastest_of_tiles(@builtin(global_invocation_id) id: vec3u) {
     let end = min((id.y + 1u) * tiles.edge, frame.size.y);
     for (var y = id.y * tiles.edge; y < end; y++) {
         let way = rows[y * tiles.count.x + id.x];
-        let long = length(streak(path_of(way), delay_at(vec2f(middle_of(id.xy).x, f32(y) + 0.5))));
+        let long = length(streak(trajectory_from(way), delay_at(vec2f(middle_of(id.xy).x, f32(y) + 0.5))));
         if long > most {
             most = long;
             found = way;
@@ -79,7 +79,7 @@ fn dominant_of_tiles(@builtin(global_invocation_id) id: vec3u) {
         let at = vec2i(id.xy) + by;
         if any(at < vec2i(0)) || any(at >= vec2i(tiles.count)) { continue; }
         let way = fastest[u32(at.y) * tiles.count.x + u32(at.x)];
-        let far = streak(path_of(way), delay_at(middle_of(vec2u(at))));
+        let far = streak(trajectory_from(way), delay_at(middle_of(vec2u(at))));
         let straight = abs(by.x) + abs(by.y) < 2;
         let comes = far.x * f32(by.x) * far.y * f32(by.y) > 0.0;
         if (straight || comes) && length(far) > most {
@@ -98,16 +98,16 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if TILES {
         let tile = id.xy / tiles.edge;
         let way = dominant[tile.y * tiles.count.x + tile.x];
-        let shown = wheel_color(streak(path_of(way), delay_at(middle_of(tile))), f32(tiles.edge));
+        let shown = wheel_color(streak(trajectory_from(way), delay_at(middle_of(tile))), f32(tiles.edge));
         textureStore(output, id.xy, vec4f(shown, 1.0));
         return;
     }
     let most_times = shutter_times(x, frame.jitter * (noise - 0.5));
     let limit = f32(tiles.edge);
-    let fast = held(path_of(dominant[tile_at(x, noise)]), most_times.delay, limit);
+    let fast = held(trajectory_from(dominant[tile_at(x, noise)]), most_times.delay, limit);
     let way = streak(fast, most_times.delay);
     let all = max(length(way), SHORT);
-    let times = enough_times(most_times, 4.0 * all);    // to both sides, in two directions by turns
+    let times = with_adaptive_count(most_times, 4.0 * all);    // to both sides, in two directions by turns
     let still = all <= SHORT;
     let count = select(times.count, 0u, still);
 
@@ -166,9 +166,9 @@ fn middle_of(tile: vec2u) -> vec2f {
 }
 
 /// The path made so short that its streak reaches a tile's edge at most.
-fn held(path: Path, delay: f32, limit: f32) -> Path {
+fn held(path: Trajectory, delay: f32, limit: f32) -> Trajectory {
     let part = min(1.0, limit / max(length(streak(path, delay)), 1e-6));
-    return Path(part * path.velocity, part * path.curvature);
+    return Trajectory(part * path.velocity, part * path.half_acceleration);
 }
 
 /// Index of a tile up to a quarter of an edge away on either side, so that no seam shows.

@@ -15,7 +15,7 @@ const FAR: f32 = 1e10;              // depth of nothing
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
-    let path = path_of(any_motion(textureLoad(motion, id.xy, 0)));
+    let path = trajectory_from(any_motion(textureLoad(motion, id.xy, 0)));
     let times = shutter_times(vec2f(id.xy) + 0.5, 0.0);
     let farthest = streak(path, times.delay);
     var z = 1.0;

@@ -3,10 +3,10 @@
 //#include common/shutter.wgsl
 
 /// The farthest it is from its place while the shutter is open [px]; turned round where that is before time 0.
-fn streak(path: Path, delay: f32) -> vec2f {
+fn streak(path: Trajectory, delay: f32) -> vec2f {
     let opens = shutter.span.x + delay;
     let closes = shutter.span.y + delay;
-    let turns = turning(path, opens, closes);
+    let turns = slowest_time(path, opens, closes);
     let closing = sign(closes) * displacement(path, closes);
     let opening = sign(opens) * displacement(path, opens);
     let turn = sign(turns) * displacement(path, turns);
