@@ -96,7 +96,7 @@ class Fusion:
         )
         data = np.zeros((), kernel.source.dtype("Fusion"))
         data["facing"] = facing_of(camera, kernel.source.dtype("Facing"))
-        data["front"], data["behind"] = (self._shares(a, inputs.samples) for a in self._alphas)
+        data["leading"], data["trailing"] = (self._shares(a, inputs.samples) for a in self._alphas)
         powers = self._tau ** np.arange(inputs.samples)
         data["newest"], data["fading"] = 1 / powers.sum(), self._tau
         data["middle"] = inputs.shutter.time(np.array(0.5))

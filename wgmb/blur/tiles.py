@@ -13,7 +13,7 @@ from ..images import Images, Scratch
 
 FORMS = ("even", "published")
 SHOWN = ("color", "tiles")
-LONGEST = (40, 9)  # streak to either side: so many pixels, or the height over this
+LONGEST = (40, 9)  # blur to either side, and tile: so many pixels, or the height over this
 
 
 class Tiles:
@@ -44,7 +44,7 @@ class Tiles:
             raise InputError(f"show must be one of {', '.join(SHOWN)}, got {show!r}")
         self._device, self._output, self._form, self._show = device, output, form, show
         self._images = Images(device)
-        self._rows, self._fastest, self._dominant = (Scratch(device) for _ in range(3))
+        self._row_max, self._tile_max, self._neighbor_max = (Scratch(device) for _ in range(3))
 
     def encode(self, encoder, inputs, output):
         """Record three passes over the tiles between two over the picture."""
@@ -58,7 +58,9 @@ class Tiles:
             PUBLISHED=self._form == "published",
             TILES=self._show == "tiles",
         )
-        look = gpu.kernel(self._device, "blur/tiles_moves.wgsl", DEEP=inputs.depth is not None)
+        velocity = gpu.kernel(
+            self._device, "blur/tiles_moves.wgsl", HAS_DEPTH=inputs.depth is not None
+        )
         width, height = inputs.given.size
         edge = max(LONGEST[0], height // LONGEST[1])
         count = -(-width // edge), -(-height // edge)
@@ -67,31 +69,31 @@ class Tiles:
         tiles = self._device.create_buffer_with_data(
             label="tiles", data=data, usage=wgpu.BufferUsage.UNIFORM
         )
-        moves = self._images.view("moves", (width, height), "rgba32float")
-        look.run(
+        velocity_depth = self._images.view("velocity, depth", (width, height), "rgba32float")
+        velocity.run(
             encoder,
             "main",
             inputs.given,
             motion=inputs.motion,
             depth=inputs.depth or inputs.none,
-            moves=moves,
+            velocity_depth=velocity_depth,
         )
         own = {
             "tiles": tiles,
             "color": inputs.color,
             "motion": inputs.motion,
-            "moves": moves,
+            "velocity_depth": velocity_depth,
             "weight": inputs.weight or inputs.none,
             "linear": inputs.linear,
-            "rows": self._rows.at_least(16 * count[0] * height),
-            "fastest": self._fastest.at_least(16 * count[0] * count[1]),
-            "dominant": self._dominant.at_least(16 * count[0] * count[1]),
+            "row_max": self._row_max.at_least(16 * count[0] * height),
+            "tile_max": self._tile_max.at_least(16 * count[0] * count[1]),
+            "neighbor_max": self._neighbor_max.at_least(16 * count[0] * count[1]),
             "output": output,
         }
         grids = {
-            "fastest_of_rows": (count[0], height),
-            "fastest_of_tiles": count,
-            "dominant_of_tiles": count,
+            "find_row_max": (count[0], height),
+            "find_tile_max": count,
+            "find_neighbor_max": count,
             "main": (width, height),
         }
         for entry, grid in grids.items():
