@@ -164,7 +164,7 @@ def test_both_clocks_tell_the_same_passes(device, monkeypatch, usable):
     counts = {f.method: f.counts for f in run.figures}
     assert counts["tap"] == {"blur/tap.wgsl:main": 1}
     assert counts["tiles"]["blur/tiles_moves.wgsl:main"] == 1
-    assert counts["gather"]["blur/gather_silhouettes.wgsl:mark"] == 3  # of three frames
+    assert counts["gather"]["blur/gather_silhouettes.wgsl:detect_edges"] == 3  # of three frames
     assert counts["accumulate"] == {"gbuffer.wgsl:main": 3, "blur/accumulate.wgsl:main": 3}
     if not usable:
         assert all(v >= 0 for f in run.figures for v in f.passes.values())

@@ -9,8 +9,12 @@ import wgmb
 from wgmb import Shutter, gpu, shader
 
 SIZE = (150, 340)
-ALL_LIVE = "blur/gather_live.wgsl", "var nearest = BESIDE + 1;", "var nearest = 0;"
-SHORT_ROWS = "blur/gather_listed.wgsl", "const IN_A_ROW: u32 = 32768u;", "const IN_A_ROW: u32 = 5u;"
+ALL_ACTIVE = "blur/gather_live.wgsl", "var nearest = MARGIN + 1;", "var nearest = 0;"
+SHORT_ROWS = (
+    "blur/gather_listed.wgsl",
+    "const GROUPS_PER_ROW: u32 = 32768u;",
+    "const GROUPS_PER_ROW: u32 = 5u;",
+)
 
 
 def ball(number, speed, bend=0.0, start=60):
@@ -76,7 +80,7 @@ def test_lists_leave_nothing_out(with_shader, speed, bend, shutter, alone):
         frame = frame.between(None, None)
     listed = wgmb.Blur("gather", shutter=shutter, samples=5)(frame)
     assert np.abs(listed - frame.color).max() > 0.1
-    with_shader(*ALL_LIVE)
+    with_shader(*ALL_ACTIVE)
     everywhere = wgmb.Blur("gather", shutter=shutter, samples=5)(frame)
     np.testing.assert_array_equal(listed, everywhere)
 

@@ -797,7 +797,7 @@ def test_times_of_the_gpu_are_told_by_pass(monkeypatch):
     monkeypatch.setattr(Timing, "usable", staticmethod(lambda device: True))
     hand = Hand(replace(PLAIN, method="reproject", samples=64))
     passes = hand.viewer.stage.report.passes
-    assert {"gbuffer.wgsl:main", "blur/reproject.wgsl:gather"} <= passes.keys()
+    assert {"gbuffer.wgsl:main", "blur/reproject.wgsl:resolve"} <= passes.keys()
     hand.look()
     assert passes.keys() <= hand.viewer._info.passes.keys()
 

@@ -86,12 +86,12 @@ def densities(device):
     source = shader.Source(text, source.files)
 
     def found(volume, p, shutter, fps, density="exact"):
-        way = method_file.way_of(volume, shutter, fps, density == "exact")
+        rotation = method_file.rotation_of(volume, shutter, fps, density == "exact")
         kernel = gpu.Kernel(
             device,
             source,
             {
-                **overrides(shutter, [way]),
+                **overrides(shutter, [rotation]),
                 "EXACT": density == "exact",
                 "ORBITS": isinstance(volume, Orbit),
                 "TORI": isinstance(volume, Torus),
@@ -99,8 +99,8 @@ def densities(device):
         )
         uniforms = np.zeros((), source.dtype("Volumes"))
         row = uniforms["volumes"][0]
-        method_file.volume_row(row, volume, way, sum(shutter.span) / 2 / fps, (0, 0))
-        way.fill(row["turning"], 0)
+        method_file.volume_row(row, volume, rotation, sum(shutter.span) / 2 / fps, (0, 0))
+        rotation.fill(row["turning"], 0)
         at = np.zeros((len(p), 4), "f4")
         at[:, :3] = p
         create = device.create_buffer_with_data
@@ -114,7 +114,7 @@ def densities(device):
             given,
             points=buffer,
             scene=create(data=uniforms, usage=usage.UNIFORM),
-            tables=create(data=tables(shutter, [way]), usage=usage.STORAGE),
+            tables=create(data=tables(shutter, [rotation]), usage=usage.STORAGE),
         )
         gpu.submit(device, encoder)
         return np.asarray(device.queue.read_buffer(buffer)).view("<f4").reshape(-1, 4)[:, 3]

@@ -1,4 +1,7 @@
-"""How much of an exposure a turning body is at a place: what wgsl/scene/density.wgsl is given."""
+"""Occupancy: the share of an exposure in which a rotating body is at a place.
+
+What wgsl/scene/density.wgsl takes: rotations, and tables of the shutter's integral.
+"""
 
 from __future__ import annotations
 
@@ -17,16 +20,16 @@ TURN = 2 * math.pi
 
 
 @dataclass(frozen=True)
-class Way:
-    """A body turns by `swept` [rad] within the exposure, and is itself `often` times a turn."""
+class Rotation:
+    """By `angle` [rad] within the exposure, of a body with `symmetry`-fold rotational symmetry."""
 
-    swept: float
-    often: int = 1
+    angle: float
+    symmetry: int = 1
 
     @property
     def turns(self) -> float:
-        """How often it comes by."""
-        return self.often * self.swept / TURN
+        """How often one of the body's symmetric parts passes a place within the exposure."""
+        return self.symmetry * self.angle / TURN
 
     @property
     def many(self) -> bool:
@@ -34,28 +37,30 @@ class Way:
         return self.turns > shader.load("scene/density.wgsl").constant("CLOSED_FROM")
 
     def fill(self, row: np.ndarray, index: int) -> None:
-        """Write it into a `Turning`; `index`: which of the `tables` is its own."""
-        row["rate"], row["turns"] = 1 / max(self.often * self.swept, SLOWEST), self.turns
+        """Write it into a `Rotation` of the shader; `index`: which of the `tables` is its own."""
+        row["rate"], row["turns"] = 1 / max(self.symmetry * self.angle, SLOWEST), self.turns
         row["half"] = self.turns / 2 % 1
         row["sum"] = (index + 1) * (_shares() + 1)
 
 
-def overrides(shutter: Shutter, ways: list[Way]) -> dict[str, float]:
+def overrides(shutter: Shutter, rotations: list[Rotation]) -> dict[str, float]:
     """The shader's constants that depend on the shutter and on speeds."""
     closed = shutter.curve in CLOSED
     curve = CLOSED.index(str(shutter.curve)) if closed else len(CLOSED)
-    return {"CURVE": curve, "MANY": any(way.many for way in ways)}
+    return {"CURVE": curve, "MANY": any(rotation.many for rotation in rotations)}
 
 
-def tables(shutter: Shutter, ways: list[Way]) -> np.ndarray:
+def tables(shutter: Shutter, rotations: list[Rotation]) -> np.ndarray:
     """The shutter's integral, and for each fast volume its periodic sum less the mean."""
     if shutter.curve in CLOSED:
         return np.zeros(1, np.float32)
     shares = _shares()
     _, integral = shutter.integral(shares)
     rows = [integral]
-    for way in ways:
-        rows.append(periodic_sum(integral, way.turns) if way.many else np.zeros(shares + 1))
+    for rotation in rotations:
+        rows.append(
+            periodic_sum(integral, rotation.turns) if rotation.many else np.zeros(shares + 1)
+        )
     return np.concatenate(rows).astype(np.float32)
 
 

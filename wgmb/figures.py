@@ -57,7 +57,7 @@ class Figure:
             row["frames"][:WAYS, 1] = cone.weights(time - frames + 0.5 / RATE, 1 / RATE)
             row["frames"][:WAYS, 0] = self._angle(frames)
             row["ways"], time = WAYS, number / RATE
-        row["rotation"] = row["shown"] = self._angle(time)
+        row["rotation"] = row["circle"] = self._angle(time)
 
     def _angle(self, time):
         return np.remainder(self.rotation + self.speed * time, 2 * math.pi)

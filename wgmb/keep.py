@@ -1,4 +1,4 @@
-"""Pixels that stay sharp, and bad ones: taken out before the method, put back after it."""
+"""Holdout: pixels that stay sharp are taken out before the method and put back after it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ FILE = "keep.wgsl"
 View = wgpu.GPUTextureView
 
 
-class KeepPass:
+class HoldoutPass:
     """Records wgsl/keep.wgsl around a method; keeps the textures in between."""
 
     def __init__(self, device: wgpu.GPUDevice, images: Images, none: View):
@@ -23,25 +23,25 @@ class KeepPass:
 
     def before(self, encoder, given: gpu.Given, color: View, keep: View | None, which: str = ""):
         """The colour times its weight, and the weight, in textures of frame `which`."""
-        lifted = self._images.view("lifted" + which, given.size, self._four)
+        weighted = self._images.view("weighted color" + which, given.size, self._four)
         weight = self._images.view("weight" + which, given.size, self._weight)
-        self._run("before", encoder, given, color, keep, self._none, weight, lifted, self._four)
-        return lifted, weight
+        self._run("before", encoder, given, color, keep, self._none, weight, weighted, self._four)
+        return weighted, weight
 
     def after(self, encoder, given, color: View, keep: View | None, blurred, output, texel: str):
-        """Record `output`, of format `texel`: the method's result with what is kept put back."""
+        """Record `output`, of format `texel`: the result, with what was held out put back."""
         spare = self._images.view("spare", (1, 1), self._weight)
         self._run("after", encoder, given, color, keep, blurred, spare, output, texel)
 
     def _run(self, entry, encoder, given, color, keep, blurred, weight, output, texel) -> None:
         texels = {"Output": texel, "Weight": self._weight}
-        kernel = gpu.kernel(self._device, FILE, texels, KEEP=keep is not None)
+        kernel = gpu.kernel(self._device, FILE, texels, HOLDOUT=keep is not None)
         kernel.run(
             encoder,
             entry,
             given,
             color=color,
-            keep=keep or self._none,
+            holdout=keep or self._none,
             blurred=blurred,
             weight=weight,
             output=output,

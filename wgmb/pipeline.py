@@ -19,7 +19,7 @@ from .frame import PASSES, Frame
 from .frame_views import FrameViews, View, check_view
 from .gbuffer import SceneOnGpu
 from .images import Images
-from .keep import KeepPass
+from .keep import HoldoutPass
 from .residency import Residency
 from .shutter import Shutter
 from .timing import Clock
@@ -97,7 +97,7 @@ class Blur:
         self._none = self._images.view("none", (1, 1), gpu.texel(self.device, 4))
         no_object = self._images.view("no object", (1, 1), "r32uint")
         self._velocity = VelocityPass(self.device, self._none, no_object)
-        self._keep = KeepPass(self.device, self._images, self._none)
+        self._keep = HoldoutPass(self.device, self._images, self._none)
         self.shutter = shutter
 
     @property

@@ -55,7 +55,7 @@ class VelocityPass:
         data = np.zeros((), source.dtype("Velocity"))
         table = np.zeros(1, source.dtype("Reprojection"))
         if camera is not None:
-            data["view"] = view_of(camera, size)
+            data["viewport"] = viewport_of(camera, size)
             matrices = camera.matrices()
             table = np.zeros(len(matrices), source.dtype("Reprojection"))
             data["bodies"] = len(matrices)
@@ -69,13 +69,13 @@ class VelocityPass:
         )
 
 
-def view_of(camera: Reprojections, size: tuple[int, int]) -> np.ndarray:
-    """The View of wgsl/common/camera.wgsl for an image of `size`."""
+def viewport_of(camera: Reprojections, size: tuple[int, int]) -> np.ndarray:
+    """The Viewport of wgsl/common/camera.wgsl for an image of `size`."""
     source = shader.load("common/camera.wgsl")
-    view = np.zeros((), source.dtype("View"))
+    viewport = np.zeros((), source.dtype("Viewport"))
     x, y, width, height = camera.window or (0, 0, *size)
-    view["display"], view["origin"] = (width, height), (x, y)
-    view["far"] = camera.far if camera.depth_kind == "planar" else np.inf
+    viewport["display"], viewport["origin"] = (width, height), (x, y)
+    viewport["far"] = camera.far if camera.depth_kind == "planar" else np.inf
     kind = "ORTHOGRAPHIC" if camera.here.orthographic else "PLANAR"
-    view["depth_kind"] = source.constant("CLIP" if camera.depth_kind == "clip" else kind)
-    return view
+    viewport["depth_kind"] = source.constant("CLIP" if camera.depth_kind == "clip" else kind)
+    return viewport

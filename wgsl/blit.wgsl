@@ -1,4 +1,4 @@
-// The composed picture onto the window, texel by texel.
+// Copies the composed image to the window, texel by texel.
 
 @group(0) @binding(0) var picture: texture_2d<f32>;
 

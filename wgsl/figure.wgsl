@@ -1,5 +1,6 @@
-// The article's figures (Cusa 2022): an orbiting disk on a screen and as it is perceived; a turning torus in section.
-// Colours are display values. Positions: 1 is the picture's height, y up, 0 in the middle.
+// The figures of Cusa 2022: an orbiting disk on a screen and as it is perceived, and the section of a rotating torus.
+// Colours are display values. Positions: 1 is the image height, y up, 0 in the middle.
+//#include common/color.wgsl
 //#include common/frame.wgsl
 //#include common/loops.wgsl
 //#include scene/density.wgsl
@@ -9,25 +10,25 @@
 @group(1) @binding(2) var output: Output;
 
 const DISK: u32 = 0u;       // figure 5: a frame of a video
-const NATURAL: u32 = 1u;    // figure 2: a scene without frames, and what a cone cell makes of it
-const SCREEN: u32 = 2u;     // figure 3: a video, and what a cone cell makes of that
+const NATURAL: u32 = 1u;    // figure 2: continuous time, beside the response of a cone cell
+const SCREEN: u32 = 2u;     // figure 3: a video, beside the response of a cone cell
 const SPIRIC: u32 = 3u;     // figure 6
 
 override KIND: u32 = DISK;
 override SHARP: bool = false;   // no blur: the disk, antialiased
 
 struct Figure {
-    turning: Turning,
+    turning: Rotation,
     small: f32,         // radius of the disk; of the torus the minor one
     large: f32,         // of its circle; major radius
     slice: f32,         // where the torus is cut
     speed: f32,         // [rad/s]
-    rotation: f32,      // clockwise, now [rad]
-    shown: f32,         // of the dashed circle [rad]
+    rotation: f32,      // of the disk or torus now, clockwise [rad]
+    circle: f32,        // rotation of the dashed circle [rad]
     dash: f32,          // where its dashes begin [rad]
-    passes: u32,        // of the disk that are still perceived
-    sharpness: vec2f,   // response of a cone cell: rate [1/s], delay times rate
-    ways: u32,          // frames that are still perceived
+    passes: u32,        // of the disk, that still contribute to the response
+    sharpness: vec2f,   // of a cone cell's response: rate [1/s], delay times rate
+    ways: u32,          // frames that still contribute to the response
     frames: array<vec4f, MOST_FRAMES>,    // rotation [rad], weight; 2 unused
 }
 
@@ -35,7 +36,7 @@ const MOST_FRAMES: u32 = 64u;
 const SOLID: vec3f = vec3f(0.8, 0.9, 1.0);
 const GRID: vec3f = vec3f(0.2, 0.2, 0.501);    // 0.5, and on the safe side of 127.5 in 8 bits
 const DASHES: vec3f = vec3f(1.0, 0.2, 0.2);
-const SLOW: f32 = 0.1;      // speed at which perception is the disk as it is [rad/s]
+const SLOW: f32 = 0.1;      // speed at which the disk is perceived as it is [rad/s]
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -47,7 +48,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if KIND == DISK { color = mix(grid(p, size), SOLID, image(p, figure.rotation, size.y)); }
     if KIND == SPIRIC { color = vec3f(section(p)); }
     if KIND == NATURAL || KIND == SCREEN { color = panels(p, size, aspect); }
-    textureStore(output, id.xy, vec4f(linear_light(color), 1.0));
+    textureStore(output, id.xy, vec4f(linear_from_srgb(color), 1.0));
 }
 
 fn grid(p: vec2f, size: vec2f) -> vec3f {
@@ -56,27 +57,28 @@ fn grid(p: vec2f, size: vec2f) -> vec3f {
     return GRID * max(amount.x, amount.y);
 }
 
-/// The disk in a frame of a video whose rotation is `phi`.
+/// Coverage of the disk in a frame in which its rotation is `phi`.
 fn image(p: vec2f, phi: f32, height: f32) -> f32 {
     if SHARP {
         let middle = figure.large * vec2f(cos(PI - phi), sin(PI - phi));
         return 1.0 - smoothstep(figure.small, figure.small + 1.0 / height, distance(p, middle));
     }
-    return presence(-ahead_of(p, phi), disk_half_angle(length(p), figure.small, figure.large), figure.turning);
+    return occupancy(-angle_from_disk(p, phi), disk_half_angle(length(p), figure.small, figure.large), figure.turning);
 }
 
-/// Angle by which a place is ahead of the disk, against its clockwise way, in -pi..pi.
-fn ahead_of(p: vec2f, phi: f32) -> f32 {
+/// Angle of a place relative to the disk, counterclockwise, -pi..pi; the disk turns clockwise.
+fn angle_from_disk(p: vec2f, phi: f32) -> f32 {
     return wrapped(angle(p.x, p.y) - PI + phi, PI);
 }
 
+/// An angle, made to lie in -below..TAU - below.
 fn wrapped(x: f32, below: f32) -> f32 {
-    return x + below - TURN * floor((x + below) / TURN) - below;
+    return x + below - TAU * floor((x + below) / TAU) - below;
 }
 
 fn section(p: vec2f) -> f32 {
     let h = spiric_half_angle(length(p), figure.slice, figure.small, figure.large);
-    return presence(wrapped(2.0 * (angle(p.x, p.y) - figure.rotation), PI), 2.0 * h, figure.turning);
+    return occupancy(wrapped(2.0 * (angle(p.x, p.y) - figure.rotation), PI), 2.0 * h, figure.turning);
 }
 
 fn panels(p: vec2f, size: vec2f, aspect: f32) -> vec3f {
@@ -85,14 +87,14 @@ fn panels(p: vec2f, size: vec2f, aspect: f32) -> vec3f {
     var seen = 0.0;
     if KIND == NATURAL {
         let h = disk_half_angle(length(q), figure.small, figure.large);
-        let passed = wrapped(ahead_of(q, figure.rotation), 1.0);
+        let passed = wrapped(angle_from_disk(q, figure.rotation), 1.0);
         var since = 0.0;
         let passes = turns_of(figure.passes, bitcast<u32>(p.x));
         for (var k = 0u; k < passes; k++) {
-            let beta = passed + TURN * f32(k);
-            since += response((beta + h) / figure.speed) - response((beta - h) / figure.speed);
+            let beta = passed + TAU * f32(k);
+            since += step_response((beta + h) / figure.speed) - step_response((beta - h) / figure.speed);
         }
-        seen = select(response((passed + h) / SLOW) - response((passed - h) / SLOW), since, right);
+        seen = select(step_response((passed + h) / SLOW) - step_response((passed - h) / SLOW), since, right);
     } else {
         var sum = 0.0;
         let ways = turns_of(figure.ways, bitcast<u32>(p.x));
@@ -102,7 +104,7 @@ fn panels(p: vec2f, size: vec2f, aspect: f32) -> vec3f {
         seen = select(image(q, figure.rotation, size.y), sum, right);
     }
     var color = SOLID * seen;
-    let to = q - figure.large * vec2f(cos(PI - figure.shown), sin(PI - figure.shown));
+    let to = q - figure.large * vec2f(cos(PI - figure.circle), sin(PI - figure.circle));
     let dash = fract((atan2(to.y, to.x) - figure.dash) / (0.2 * PI)) * 0.2;
     let amount = (1.0 - smoothstep(1.0, 2.0, abs(length(to) - figure.small) * size.y))
         * smoothstep(0.05, 0.07, abs(dash - 0.1));
@@ -110,7 +112,8 @@ fn panels(p: vec2f, size: vec2f, aspect: f32) -> vec3f {
     return mix(color, vec3f(0.9), 1.0 - smoothstep(3.0, 4.0, abs(p.x) * size.x));
 }
 
-/// Share of a cone cell's response to a flash that is over after `x` seconds (Howlett et al. 2017).
-fn response(x: f32) -> f32 {
+/// Step response of a cone cell: the share of its response to a flash that has come after `x` seconds
+/// (Howlett et al. 2017).
+fn step_response(x: f32) -> f32 {
     return exp(-exp(min(figure.sharpness.y - figure.sharpness.x * x, 80.0)));
 }

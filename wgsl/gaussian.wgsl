@@ -1,4 +1,4 @@
-// One way of a separable Gaussian: 1 2 1 over 4, along rows or columns; edges repeat.
+// One pass of a separable Gaussian, 1 2 1 over 4, along rows or columns; edge pixels repeat.
 //#include common/frame.wgsl
 
 @group(1) @binding(0) var image: texture_2d<f32>;
@@ -11,7 +11,7 @@ override DOWN: bool = false;        // along columns
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let x = vec2f(id.xy) + 0.5;
-    let half = select(vec2f(0.5, 0.0), vec2f(0.0, 0.5), DOWN);  // between two pixels both count alike
+    let half = select(vec2f(0.5, 0.0), vec2f(0.0, 0.5), DOWN);  // halfway between two texels both weigh the same
     let texel = 1.0 / vec2f(frame.size);
     let before = textureSampleLevel(image, linear, (x - half) * texel, 0.0);
     let after = textureSampleLevel(image, linear, (x + half) * texel, 0.0);

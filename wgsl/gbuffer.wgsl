@@ -1,4 +1,4 @@
-// One instant of a scene: colour, depth, normal and object index.
+// The G-buffer of one instant of a scene: colour, depth, normal and object index.
 //#include common/frame.wgsl
 //#include scene/trace.wgsl
 
@@ -9,7 +9,7 @@
 @group(1) @binding(7) var object: texture_storage_2d<r32uint, write>;
 
 struct View {
-    time: f32,      // of the picture [frame intervals], as the rows of poses count it
+    time: f32,      // of the image, in the time of the rows of poses [frame intervals]
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -25,10 +25,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     textureStore(color, id.xy, vec4f(sum / f32(scene.rays * scene.rays), 1.0));
 
-    // Depth, normal and index are of one ray through the middle: they have no mean.
+    // Depth, normal and index are of one ray through the centre: they cannot be averaged.
     let ray = camera_ray(vec2f(id.xy) + 0.5, now);
     let hit = nearest(ray, now);
-    let there = hit.depth < FAR;
+    let there = hit.depth < BACKGROUND_DEPTH;
     textureStore(depth, id.xy, vec4f(hit.depth));
     textureStore(normal, id.xy, vec4f(select(vec3f(0.0), world_normal(hit, ray, now), there), 0.0));
     textureStore(object, id.xy, vec4u(select(0u, bodies[hit.body].object, there)));

@@ -1,4 +1,4 @@
-// What a viewer's cones make of the last pictures: their weighted sum, eight at a time.
+// The response of an observer's cone cells to the last frames: their weighted sum, eight frames per pass.
 //#include common/frame.wgsl
 //#include common/finite.wgsl
 
@@ -15,8 +15,8 @@
 @group(1) @binding(10) var output: Output;
 
 struct Share {
-    weights: array<vec4f, 2>,   // of the eight pictures
-    first: u32,                 // 1: nothing is in `sums` yet
+    weights: array<vec4f, 2>,   // of the eight frames
+    first: u32,                 // 1: `sums` is empty
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -27,14 +27,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let b = share.weights[1];
     var sum = vec4f(0.0);
     if share.first == 0u { sum = sums[at]; }
-    sum += a.x * seen(textureLoad(picture0, id.xy, 0)) + a.y * seen(textureLoad(picture1, id.xy, 0));
-    sum += a.z * seen(textureLoad(picture2, id.xy, 0)) + a.w * seen(textureLoad(picture3, id.xy, 0));
-    sum += b.x * seen(textureLoad(picture4, id.xy, 0)) + b.y * seen(textureLoad(picture5, id.xy, 0));
-    sum += b.z * seen(textureLoad(picture6, id.xy, 0)) + b.w * seen(textureLoad(picture7, id.xy, 0));
+    sum += a.x * finite_or_black(textureLoad(picture0, id.xy, 0)) + a.y * finite_or_black(textureLoad(picture1, id.xy, 0));
+    sum += a.z * finite_or_black(textureLoad(picture2, id.xy, 0)) + a.w * finite_or_black(textureLoad(picture3, id.xy, 0));
+    sum += b.x * finite_or_black(textureLoad(picture4, id.xy, 0)) + b.y * finite_or_black(textureLoad(picture5, id.xy, 0));
+    sum += b.z * finite_or_black(textureLoad(picture6, id.xy, 0)) + b.w * finite_or_black(textureLoad(picture7, id.xy, 0));
     sums[at] = sum;
     textureStore(output, id.xy, sum);
 }
 
-fn seen(color: vec4f) -> vec4f {
+/// Pixels that are not finite count as black.
+fn finite_or_black(color: vec4f) -> vec4f {
     return select(vec4f(0.0), color, is_finite4(color));
 }

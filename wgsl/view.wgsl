@@ -1,4 +1,5 @@
-// What the viewer shows: one or two images, as colour, depth or motion, side by side or compared.
+// The image that the viewer shows: one or two images, as colour, depth or motion, side by side or compared.
+//#include common/color.wgsl
 //#include common/frame.wgsl
 //#include common/wheel.wgsl
 
@@ -9,22 +10,22 @@
 
 struct View {
     area: vec4f,        // x, y, width, height of what the panel leaves free [px]
-    place: vec4f,       // of the whole image, may reach out of the area [px]
-    key: vec4f,         // of the bar that explains the colours [px]; no width: none
-    wheel: vec4f,       // of the wheel that explains the colours of motion [px]
-    line: f32,          // of the wipe, from the left [px]
-    thick: f32,         // half of a line [px]
-    exposure: f32,      // times
-    gain: f32,          // times a difference
+    place: vec4f,       // the same of the whole image, which may extend beyond the area
+    key: vec4f,         // the same of the colour bar; without a width there is none
+    wheel: vec4f,       // the same of the colour wheel of motion
+    line: f32,          // x of the wipe's line [px]
+    thick: f32,         // half the width of a line [px]
+    exposure: f32,      // factor of colours
+    gain: f32,          // factor of differences
     middle: f32,        // depth of middle grey [scene units]
-    fastest: f32,       // at full brightness [image heights per frame]
+    fastest: f32,       // speed of full brightness [image heights per frame]
 }
 
 override FIRST: u32 = 0u;       // what the first image holds
 override SECOND: u32 = 0u;
 override COMPARE: u32 = 0u;
 override TONE: u32 = 0u;
-override TAPS: u32 = 1u;        // a side, for a pixel that shows many texels; 0: texel for texel
+override TAPS: u32 = 1u;        // per side of a pixel that shows many texels; 0: texel for texel
 
 const COLOR: u32 = 0u;
 const DEPTH: u32 = 1u;
@@ -40,26 +41,25 @@ const CLIP: u32 = 0u;
 const SOFT: u32 = 1u;
 
 const BACKGROUND: vec3f = vec3f(0.075, 0.078, 0.086);
-const TURN: f32 = 6.2831853;
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let at = vec2f(id.xy) + 0.5;
-    var shown = BACKGROUND;
+    var color = BACKGROUND;
     if inside(at, view.area) {
-        shown = composed(at);
-        if inside(at, view.key) { shown = explained(at); }
-        if inside(at, view.wheel) { shown = wheel(at, shown); }
+        color = comparison(at);
+        if inside(at, view.key) { color = color_bar(at); }
+        if inside(at, view.wheel) { color = wheel(at, color); }
     }
-    textureStore(picture, id.xy, vec4f(shown, 1.0));
+    textureStore(picture, id.xy, vec4f(color, 1.0));
 }
 
 fn inside(at: vec2f, box: vec4f) -> bool {
     return all(at >= box.xy) && all(at < box.xy + box.zw);
 }
 
-fn composed(at: vec2f) -> vec3f {
+fn comparison(at: vec2f) -> vec3f {
     if COMPARE == SPLIT { return side_by_side(at); }
     if !inside(at, view.place) { return BACKGROUND; }
     let uv = (at - view.place.xy) / view.place.zw;
@@ -77,7 +77,7 @@ fn composed(at: vec2f) -> vec3f {
     return here;
 }
 
-/// Both images whole, half as large.
+/// Both images in full, at half the size.
 fn side_by_side(at: vec2f) -> vec3f {
     let half = vec2f(0.5 * view.area.z, view.area.w);
     let right = at.x >= view.area.x + half.x;
@@ -99,7 +99,7 @@ fn seen(image: texture_2d<f32>, kind: u32, uv: vec2f) -> vec3f {
     return displayed(filtered(image, uv * size, size));
 }
 
-/// Bilinear between texels, or the mean of those that one pixel shows.
+/// Bilinear between texels, or the mean of those under one pixel.
 fn filtered(image: texture_2d<f32>, at: vec2f, size: vec2f) -> vec3f {
     if TAPS == 0u { return finite(textureLoad(image, vec2u(at), 0)); }
     if TAPS == 1u { return bilinear(image, at, size); }
@@ -126,27 +126,23 @@ fn finite(color: vec4f) -> vec3f {
     return select(vec3f(0.0), color.rgb, is_finite4(color));
 }
 
-/// sRGB (IEC 61966-2-1) of exposed linear light.
+/// Display values of linear light: exposure, tone curve, sRGB.
 fn displayed(light: vec3f) -> vec3f {
     var x = max(light * view.exposure, vec3f(0.0));
     if TONE == SOFT { x = x / (1.0 + x); }
-    return srgb(min(x, vec3f(1.0)));
+    return srgb_from_linear(min(x, vec3f(1.0)));
 }
 
-fn srgb(x: vec3f) -> vec3f {
-    let high = 1.055 * pow(max(x, vec3f(0.0031308)), vec3f(1.0 / 2.4)) - 0.055;
-    return select(high, 12.92 * x, x <= vec3f(0.0031308));
-}
-
-/// Near is bright; what is not there is black.
+/// Grey of a depth: near is bright, no depth is black.
 fn grey_of(depth: f32) -> f32 {
     if !is_finite(depth) || depth <= 0.0 { return 0.0; }
     return view.middle / (view.middle + depth);
 }
 
+/// Display colour of motion [image heights per frame].
 fn motion_color(motion: vec2f) -> vec3f {
     if !is_finite(motion.x) || !is_finite(motion.y) { return vec3f(0.2); }
-    return srgb(wheel_color(motion, view.fastest));    // image heights per frame
+    return srgb_from_linear(wheel_color(motion, view.fastest));
 }
 
 /// Black, violet, red, yellow, white for 0 to 1.
@@ -158,8 +154,8 @@ fn heat(x: f32) -> vec3f {
     return mix(color, vec3f(1.0, 1.0, 0.90), clamp(u - 3.0, 0.0, 1.0));
 }
 
-/// The bar of the error's colours, or of depth: both from low to high, left to right.
-fn explained(at: vec2f) -> vec3f {
+/// The colour bar of the error, or of depth; from low to high, left to right.
+fn color_bar(at: vec2f) -> vec3f {
     let x = (at.x - view.key.x) / view.key.z;
     if COMPARE == ERROR { return heat(x); }
     return vec3f(1.0 - x);

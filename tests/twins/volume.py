@@ -24,7 +24,7 @@ def antiderivative(shutter, shares):
     return np.interp(x, np.linspace(0, 1, len(integral)), integral)
 
 
-def presence(shutter, theta, h, swept, published):
+def occupancy(shutter, theta, h, swept, published):
     """Share of the exposure during which the body, `swept` radians wide in it, covers theta."""
     if published:
         return _crossing(shutter, theta, h, swept)
@@ -76,9 +76,9 @@ def density(volume, p, shutter, fps, published=False):
     r, theta, third = polar(volume, p, (opens + closes) / 2 / fps)
     if isinstance(volume, Orbit):
         a = np.sqrt(np.maximum(volume.radius**2 - third**2, 0))
-        return presence(shutter, theta, disk_half_angle(r, a, volume.orbit), swept, published)
+        return occupancy(shutter, theta, disk_half_angle(r, a, volume.orbit), swept, published)
     h = spiric_half_angle(r, third, volume.minor_radius, volume.major_radius)
-    parts = [presence(shutter, wrapped(theta + x), h, swept, published) for x in (0, np.pi)]
+    parts = [occupancy(shutter, wrapped(theta + x), h, swept, published) for x in (0, np.pi)]
     always = h >= np.pi / 2
     return np.where(always, 1, np.minimum(sum(parts), 1) if published else sum(parts))
 

@@ -94,14 +94,14 @@ class Fusion:
             self._device,
             "blur/fusion.wgsl",
             {"Output": self._output},
-            EVEN=inputs.even,
+            BOX_SHUTTER=inputs.even,
             NORMALS=turned and inputs.frame.normal is not None,
             WEIGHTED=weighted,
             PUBLISHED=self._published,
         )
         data = np.zeros((), kernel.source.dtype("Fusion"))
         data["facing"] = facing_of(camera, kernel.source.dtype("Facing"))
-        data["front"], data["behind"] = (self._shares(a, inputs.samples) for a in self._alphas)
+        data["leading"], data["trailing"] = (self._shares(a, inputs.samples) for a in self._alphas)
         powers = self._tau ** np.arange(inputs.samples)
         data["newest"], data["fading"] = 1 / powers.sum(), self._tau
         data["middle"] = inputs.shutter.time(np.array(0.5))

@@ -1,4 +1,4 @@
-"""Three-frame reconstruction: who is seen at every pixel and every time of the exposure."""
+"""Three-frame reconstruction: what is visible at every pixel and every time of the exposure."""
 
 from __future__ import annotations
 
@@ -13,18 +13,21 @@ from ..errors import InputError
 from ..images import Images, Scratch
 from .options import MethodOptions
 
-_STORED = 6  # storage textures of one pass: marks, both layers, their surfaces
+_STORED = 6  # storage textures of one pass: edge flags, both layers, their matte
 
 
 class Gather:
     """Search, for every pixel and time, the samples of up to three frames that are there.
 
-    A fixed-point search along curved paths starts from the pixel's own motion and from the
-    few motions that reach its tile. Silhouettes are parted into two layers before, so that
-    mixed pixels move as what they are made of; their shares are those of alpha before what is
-    transparent, else those of mixed vectors. The nearest sample wins, the frame's own
-    unless a neighbouring frame's is clearly nearer; where no frame saw what is there, the
-    pixel's own path is followed.
+    Fixed-point iterative warping (Bowles et al., "Iterative Image Warping", 2012) of the frame and
+    its neighbours (Yang et al., "Image-Based Bidirectional Scene Reprojection", 2011) along curved
+    trajectories. It starts from the pixel's own motion and from the few candidate motions that
+    reach its tile (after the tile maxima of McGuire et al. 2012 and Guertin et al. 2014).
+    Silhouettes are separated into two layers before, foreground and background, so that mixed
+    pixels move as what they are made of; their coverage is that of alpha in front of what is
+    transparent, else that of filtered vectors. The nearest sample is visible, the frame's own
+    unless a neighbouring frame's is clearly nearer; where no frame shows what is there, a tap
+    follows the pixel's own trajectory.
     `show`: "confidence" gives, instead of colour, the share of times at which a sample was
     accepted, the share that neighbouring frames gave, the mean residual [px] and the share of
     times whose path left the picture, as r, g, b, a.
@@ -59,80 +62,81 @@ class Gather:
             )
         self._device, self._output, self._options = device, output, options
         self._images = Images(device)
-        self._farthest, self._lists = Scratch(device), Scratch(device)
-        self._mixed, self._needed, self._spare = (Scratch(device) for _ in range(3))
+        self._max_displacement, self._lists = Scratch(device), Scratch(device)
+        self._edges, self._edge_groups, self._spare = (Scratch(device) for _ in range(3))
         self._everywhere: tuple[tuple[int, int], dict] | None = None
         self._colors: wgpu.GPUTexture | None = None
-        self._made: dict[int, tuple] = {}  # what the layers at a place were made of
+        self._made: dict[int, tuple] = {}  # what the layers in a slot were made of
 
     def encode(self, encoder, inputs, output):
-        """Record silhouettes and tiles of every frame, then the search."""
+        """Record layers and tile motions of every frame, then the search."""
         size, frames = inputs.given.size, inputs.frames
         layers = self._layers(size, len(frames))
-        places = self._places(frames, layers)
-        lists = self._listed(encoder, inputs)
-        for i, (frame, place) in enumerate(zip(frames, places, strict=True)):
+        slots = self._slots(frames, layers)
+        lists = self._worklists(encoder, inputs)
+        for i, (frame, slot) in enumerate(zip(frames, slots, strict=True)):
             views = {
-                "near_color": _layer(layers["colors"], 2 * place),
-                "far_color": _layer(layers["colors"], 2 * place + 1),
-                "near_path": _layer(layers["paths"], 2 * place),
-                "far_path": _layer(layers["paths"], 2 * place + 1),
-                "surface": _layer(layers["surfaces"], place),
+                "front_color": _layer(layers["layer_colors"], 2 * slot),
+                "back_color": _layer(layers["layer_colors"], 2 * slot + 1),
+                "front_surface": _layer(layers["surfaces"], 2 * slot),
+                "back_surface": _layer(layers["surfaces"], 2 * slot + 1),
+                "matte": _layer(layers["mattes"], slot),
             }
-            if self._made.get(place) != _contents(frame):
-                self._silhouettes(encoder, inputs, frame, views, lists)
-                self._made.pop(place, None)
+            if self._made.get(slot) != _contents(frame):
+                self._separate(encoder, inputs, frame, views, lists)
+                self._made.pop(slot, None)
             if frame.key is not None:
-                self._made[place] = _contents(frame)
-            self._tiles(encoder, inputs, frame.offset, i, len(frames), views, lists)
+                self._made[slot] = _contents(frame)
+            self._candidates(encoder, inputs, frame.offset, i, len(frames), views, lists)
         offsets = [frame.offset for frame in frames]
-        self._search(encoder, inputs, offsets, places, layers, lists, output)
+        self._resolve(encoder, inputs, offsets, slots, layers, lists, output)
 
-    def _places(self, frames, layers) -> list[int]:
+    def _slots(self, frames, layers) -> list[int]:
         """Where the layers of the frames are, or are to be: what is there already stays."""
-        if layers["colors"] is not self._colors:
-            self._colors, self._made = layers["colors"], {}
-        made = {contents: place for place, contents in self._made.items()}
-        places = [made.get(_contents(frame)) for frame in frames]
-        free = (place for place in range(layers["colors"].size[2] // 2) if place not in places)
-        return [next(free) if place is None else place for place in places]
+        if layers["layer_colors"] is not self._colors:
+            self._colors, self._made = layers["layer_colors"], {}
+        made = {contents: slot for slot, contents in self._made.items()}
+        slots = [made.get(_contents(frame)) for frame in frames]
+        free = (slot for slot in range(layers["layer_colors"].size[2] // 2) if slot not in slots)
+        return [next(free) if slot is None else slot for slot in slots]
 
-    def _listed(self, encoder, inputs) -> dict[str, dict]:
-        """What needs work: the lists of gather_live.wgsl, by name."""
+    def _worklists(self, encoder, inputs) -> dict[str, dict]:
+        """Record which tiles are active; the worklists of gather_live.wgsl, by name."""
         kernel = gpu.kernel(self._device, "blur/gather_live.wgsl")
         grid = self._grid(inputs.given.size)
-        words = -(-(grid[0] * grid[1] + int(kernel.source.constant("CELLS"))) // 64) * 64
-        size = 4 * words * int(kernel.source.constant("LISTS"))
+        words = -(-(grid[0] * grid[1] + int(kernel.source.constant("CELLS_WORD"))) // 64) * 64
+        size = 4 * words * int(kernel.source.constant("SECTIONS"))
         lists = self._lists.at_least(size)
         encoder.clear_buffer(lists)
-        data = np.zeros((), kernel.source.dtype("Survey"))
+        data = np.zeros((), kernel.source.dtype("SourceFrame"))
         data["words"] = words
         tiles = replace(inputs.given, size=grid)
         for frame in inputs.frames:
             data["offset"] = frame.offset
-            own = {"source": self._uniform("survey", data), "motion": frame.motion, "lists": lists}
-            kernel.run(encoder, "survey", tiles, **own)
-        kernel.run(encoder, "near", tiles, **own)
-        kernel.run(encoder, "list", replace(inputs.given, size=(grid[1], 1)), **own)
+            own = {"source": self._uniform("source", data), "motion": frame.motion, "lists": lists}
+            kernel.run(encoder, "mark_active_tiles", tiles, **own)
+        kernel.run(encoder, "find_distances", tiles, **own)
+        kernel.run(encoder, "build_worklists", replace(inputs.given, size=(grid[1], 1)), **own)
         return {
             name: {
                 "buffer": lists,
                 "offset": 4 * words * int(kernel.source.constant(name.upper())),
                 "size": 4 * words,
             }
-            for name in ("moving", "resting", "parted", "whole", "marked")
+            for name in ("active", "static", "separated", "motion_only", "flagged")
         }
 
     def _all(self, size) -> dict:
-        """A list of all cells, in an order that spreads every stretch of it over the picture."""
+        """A worklist of all cells, their rows interleaved as by interleaved_row() of frame.wgsl."""
         if self._everywhere is None or self._everywhere[0] != size:
             source = shader.load("blur/gather_listed.wgsl")
-            strands, row, wide, side, strip = (
-                int(source.constant(n)) for n in ("STRANDS", "IN_A_ROW", "CELL", "TILE", "STRIP")
+            interleave, row, wide, side, strip = (
+                int(source.constant(n))
+                for n in ("INTERLEAVE", "GROUPS_PER_ROW", "CELL_TILES", "TILE", "STRIP_HEIGHT")
             )
             across, down = self._grid(size)
             across = -(-across // wide)
-            rows = np.concatenate([np.arange(i, down, strands) for i in range(strands)])
+            rows = np.concatenate([np.arange(i, down, interleave) for i in range(interleave)])
             cells = (np.arange(across) + 65536 * rows[:, None]).ravel()
             head = min(cells.size, row), side // strip, -(-cells.size // row), cells.size
             spare = [0] * (-cells.size % 4)  # a struct's size is a multiple of 16 bytes
@@ -142,30 +146,39 @@ class Gather:
             self._everywhere = size, {"buffer": buffer, "offset": 0, "size": buffer.size}
         return self._everywhere[1]
 
-    def _search(self, encoder, inputs, offsets, places, layers, lists, output):
-        """Record which times of which blocks are plain, then all pixels."""
+    def _resolve(self, encoder, inputs, offsets, slots, layers, lists, output):
+        """Record the classification of blocks, then all pixels."""
         count = len(offsets)
-        timed = {"EVEN": inputs.even, "AUTO": inputs.auto}
-        plain = gpu.kernel(self._device, "blur/gather_plain.wgsl", **timed)
-        data = np.zeros((), plain.source.dtype("Sources"))
+        timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
+        classify = gpu.kernel(self._device, "blur/gather_plain.wgsl", **timed)
+        data = np.zeros((), classify.source.dtype("SourceFrames"))
         data["offsets"][:count] = offsets
-        data["places"][:count] = places
+        data["slots"][:count] = slots
         data["count"] = count
         arrays = {k: t.create_view(dimension="2d-array") for k, t in layers.items()}
         searched = {
             "sources": self._uniform("sources", data),
-            "paths": arrays.pop("paths"),
-            "tiles": self._reaching(inputs.given.size, count),
+            "surfaces": arrays.pop("surfaces"),
+            "tile_candidates": self._tile_candidates(inputs.given.size, count),
         }
         wide, side, block, times = (
-            int(plain.source.constant(n)) for n in ("CELL", "TILE", "BLOCK", "AT_ONCE")
+            int(classify.source.constant(n))
+            for n in ("CELL_TILES", "TILE", "BLOCK", "TIMES_PER_WORD")
         )
         across, down = self._grid(inputs.given.size)
         blocks = -(-across // wide) * wide * side // block, down * side // block
-        words = self._images.texture("plain", blocks, "r32uint", -(-inputs.samples // times) + 1)
-        bits = words.create_view(dimension="2d-array")
-        given = replace(inputs.given, size=blocks)
-        plain.run(encoder, "main", given, plain=bits, moving=lists["moving"], **searched)
+        words = self._images.texture(
+            "single-layer mask", blocks, "r32uint", -(-inputs.samples // times) + 1
+        )
+        mask = words.create_view(dimension="2d-array")
+        classify.run(
+            encoder,
+            "main",
+            replace(inputs.given, size=blocks),
+            single_layer_mask=mask,
+            active_cells=lists["active"],
+            **searched,
+        )
         kernel = gpu.kernel(
             self._device,
             "blur/gather.wgsl",
@@ -174,17 +187,18 @@ class Gather:
             CONFIDENCE=self._options.show == "confidence",
             **timed,
         )
-        bends = self._bends(encoder, inputs, layers["paths"], places[0], lists["parted"])
-        for entry, tiles in (("main", lists["moving"]), ("rest", lists["resting"])):
+        separated = lists["separated"]
+        differences = self._differences(encoder, inputs, layers["surfaces"], slots[0], separated)
+        for entry, cells in (("main", lists["active"]), ("copy_static", lists["static"])):
             kernel.run(
                 encoder,
                 entry,
                 inputs.given,
-                tiles,
-                listed=tiles,
-                plain=bits,
-                bends=bends,
-                own=inputs.frame.color,
+                cells,
+                worklist=cells,
+                single_layer_mask=mask,
+                second_differences=differences,
+                own_color=inputs.frame.color,
                 own_weight=inputs.frame.weight or inputs.none,
                 linear=inputs.linear,
                 output=output,
@@ -192,114 +206,122 @@ class Gather:
                 **arrays,
             )
 
-    def _bends(self, encoder, inputs, paths, place: int, parted) -> wgpu.GPUTextureView:
-        """Record how the frame's own colours bend between pixels."""
-        bends = self._images.view("bends", inputs.given.size, "rgba32uint")
+    def _differences(self, encoder, inputs, surfaces, slot: int, cells) -> wgpu.GPUTextureView:
+        """Record the second differences of the frame's own colours."""
+        differences = self._images.view("second differences", inputs.given.size, "rgba32uint")
         kernel = gpu.kernel(self._device, "blur/gather_bends.wgsl")
         kernel.run(
             encoder,
             "main",
             inputs.given,
-            parted,
+            cells,
             color=inputs.frame.color,
-            near=_layer(paths, 2 * place),
-            bends=bends,
-            listed=parted,
+            front_surface=_layer(surfaces, 2 * slot),
+            second_differences=differences,
+            worklist=cells,
         )
-        return bends
+        return differences
 
     def _layers(self, size, count: int) -> dict[str, wgpu.GPUTexture]:
-        """Two layers a frame, near and far, and what there is to know of both."""
+        """The textures of all layers: front and back per frame, and one matte per frame."""
         if self._colors is not None and self._colors.size[:2] == size:
             count = max(count, self._colors.size[2] // 2)
         color = gpu.texel(self._device, 4)
         return {
-            "colors": self._images.texture("colors", size, color, 2 * count),
-            "paths": self._images.texture("paths", size, "rgba32uint", 2 * count),
-            "surfaces": self._images.texture("surfaces", size, "rgba32float", count),
+            "layer_colors": self._images.texture("layer colors", size, color, 2 * count),
+            "surfaces": self._images.texture("surfaces", size, "rgba32uint", 2 * count),
+            "mattes": self._images.texture("mattes", size, "rgba32float", count),
         }
 
     def _grid(self, size) -> tuple[int, int]:
-        """Tiles across and down a picture."""
+        """Tiles across and down an image."""
         side = int(shader.load("blur/gather_tile.wgsl").constant("TILE"))
         return -(-size[0] // side), -(-size[1] // side)
 
-    def _reaching(self, size, count: int) -> wgpu.GPUTextureView:
-        layers = int(shader.load("blur/gather_tile.wgsl").constant("LAYERS"))
-        texture = self._images.texture("reaching", self._grid(size), "rgba32float", layers * count)
+    def _tile_candidates(self, size, count: int) -> wgpu.GPUTextureView:
+        layers = int(shader.load("blur/gather_tile.wgsl").constant("CANDIDATE_LAYERS"))
+        grid = self._grid(size)
+        texture = self._images.texture("tile candidates", grid, "rgba32float", layers * count)
         return texture.create_view(dimension="2d-array")
 
-    def _silhouettes(self, encoder, inputs, frame, views, lists):
-        """Record them for all that something moves near; for the whole frame if it is kept."""
+    def _separate(self, encoder, inputs, frame, views, lists):
+        """Record the layers of a frame: where something moves near, or all if they are kept."""
         size = inputs.given.size
-        needed = {"buffer": self._needed.at_least(16), "offset": 0, "size": 16}
+        groups = {"buffer": self._edge_groups.at_least(16), "offset": 0, "size": 16}
         if frame.key is None:
-            cells = {"whole": lists["whole"], "mark": lists["marked"], "split": lists["parted"]}
+            cells = {
+                "copy_motion_only": lists["motion_only"],
+                "detect_edges": lists["flagged"],
+                "write_single_layer": lists["separated"],
+            }
         else:
-            cells = dict.fromkeys(("mark", "split"), self._all(size))
+            cells = dict.fromkeys(("detect_edges", "write_single_layer"), self._all(size))
         passes: dict[str, tuple[dict | None, dict]] = {k: (c, c) for k, c in cells.items()}
-        passes |= {"count": (None, cells["split"]), "part": (needed, cells["split"])}
+        edge_cells = cells["write_single_layer"]
+        passes |= {"size_dispatch": (None, edge_cells), "separate_layers": (groups, edge_cells)}
         kernel = gpu.kernel(
             self._device,
             "blur/gather_silhouettes.wgsl",
             {"Color": gpu.texel(self._device, 4)},
             WEIGHTED=frame.weight is not None,
         )
-        marks = self._images.view("marks", size, "r32uint")
-        idle = self._images.view("no marks", size, "r32uint")
-        mixed = self._mixed.at_least(4 + 4 * size[0] * size[1])
-        encoder.clear_buffer(mixed, 0, 4)
-        for entry, (groups, listed) in passes.items():
-            marking = entry == "mark"
+        flags = self._images.view("edge flags", size, "r32uint")
+        unbound = self._images.view("no edge flags", size, "r32uint")
+        edges = self._edges.at_least(4 + 4 * size[0] * size[1])
+        encoder.clear_buffer(edges, 0, 4)
+        for entry, (indirect, worklist) in passes.items():
+            detecting = entry == "detect_edges"
             kernel.run(
                 encoder,
                 entry,
-                inputs.given if groups else replace(inputs.given, size=(1, 1)),
-                groups,
-                listed=listed,
+                inputs.given if indirect else replace(inputs.given, size=(1, 1)),
+                indirect,
+                worklist=worklist,
                 color=frame.color,
                 motion=frame.motion,
                 depth=frame.depth,
                 weight=frame.weight or inputs.none,
-                marked=idle if marking else marks,
-                marks=marks if marking else idle,
-                mixed=mixed,
-                needed=needed if entry == "count" else self._spare.at_least(16),
+                edge_flags=unbound if detecting else flags,
+                edge_flags_out=flags if detecting else unbound,
+                edges=edges,
+                edge_groups=groups if entry == "size_dispatch" else self._spare.at_least(16),
                 **views,
             )
 
-    def _tiles(self, encoder, inputs, offset: int, index: int, count: int, views, lists):
+    def _candidates(self, encoder, inputs, offset: int, index: int, count: int, views, lists):
+        """Record the candidate motions of every tile in the frame that is `index` of `count`."""
         kernel = gpu.kernel(self._device, "blur/gather_tiles.wgsl")
-        data = np.zeros((), kernel.source.dtype("Source"))
+        data = np.zeros((), kernel.source.dtype("SourceFrame"))
         data["offset"] = offset
-        data["first"] = index * int(kernel.source.constant("LAYERS"))
+        data["first"] = index * int(kernel.source.constant("CANDIDATE_LAYERS"))
         source = self._uniform("source", data)
-        grid, held = self._grid(inputs.given.size), int(kernel.source.constant("HELD"))
-        contents = self._images.texture("contents", grid, "rgba32float", held)
-        contents = contents.create_view(dimension="2d-array")
-        idle = self._images.texture("no contents", (1, 1), "rgba32float")
-        idle = idle.create_view(dimension="2d-array")
-        reaching = self._reaching(inputs.given.size, count)
-        wide = int(kernel.source.constant("WIDE"))
-        coarse = -(-grid[0] // wide), -(-grid[1] // wide)
-        boxes = self._images.view("wide boxes", coarse, "rgba32float")
+        grid = self._grid(inputs.given.size)
+        layers = int(kernel.source.constant("MOTION_LAYERS"))
+        motions = self._images.texture("tile motions", grid, "rgba32float", layers)
+        motions = motions.create_view(dimension="2d-array")
+        no_motions = self._images.texture("no tile motions", (1, 1), "rgba32float")
+        no_motions = no_motions.create_view(dimension="2d-array")
+        candidates = self._tile_candidates(inputs.given.size, count)
+        side = int(kernel.source.constant("COARSE"))
+        coarse = -(-grid[0] // side), -(-grid[1] // side)
+        boxes = self._images.view("coarse boxes", coarse, "rgba32float")
         no_boxes = self._images.view("no boxes", (1, 1), "rgba32float")
-        for entry in ("clear", "local", "widen", "reach"):
-            reads, last = entry in ("widen", "reach"), entry == "reach"
+        for entry in ("clear", "cluster_motions", "coarsen", "gather_candidates"):
+            reads, last = entry in ("coarsen", "gather_candidates"), entry == "gather_candidates"
             kernel.run(
                 encoder,
                 entry,
-                replace(inputs.given, size=coarse if entry == "widen" else grid),
+                replace(inputs.given, size=coarse if entry == "coarsen" else grid),
                 source=source,
-                near=views["near_path"],
-                content=contents if reads else idle,
-                contents=idle if reads else contents,
-                reaching=reaching,
-                farthest=self._farthest.at_least(4),
-                wide_box=boxes if last else inputs.none,
-                wide_boxes=no_boxes if last else boxes,
-                moving=lists["moving"],
-                resting=lists["resting"],
+                front_surface=views["front_surface"],
+                tile_motions=motions if reads else no_motions,
+                tile_motions_out=no_motions if reads else motions,
+                tile_candidates=candidates,
+                max_displacement=self._max_displacement.at_least(4),
+                coarse_boxes=boxes if last else inputs.none,
+                coarse_boxes_out=no_boxes if last else boxes,
+                active_cells=lists["active"],
+                static_cells=lists["static"],
             )
 
     def _uniform(self, name: str, data: np.ndarray) -> wgpu.GPUBuffer:

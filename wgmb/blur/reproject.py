@@ -12,7 +12,7 @@ from .. import gpu
 from ..cameras import Camera, Reprojections
 from ..errors import InputError
 from ..images import Scratch
-from ..velocity import view_of
+from ..velocity import viewport_of
 from .options import MethodOptions
 
 GOLDEN = (5**0.5 - 1) / 2
@@ -93,7 +93,7 @@ class Reproject:
             self._device,
             "blur/reproject.wgsl",
             {"Output": self._output},
-            EVEN=inputs.even,
+            BOX_SHUTTER=inputs.even,
             WEIGHTED=inputs.frame.weight is not None,
             COUNTS=self._options.show == "count",
         )
@@ -144,17 +144,17 @@ class Reproject:
                 encoder.clear_buffer(shared[name])
             count = min(most, inputs.samples - first)
             for together in ([0], range(1, len(sources))):
-                for entry in ("depths", "winners", "gather"):
+                for entry in ("splat_depths", "splat_winners", "resolve"):
                     for source in together:
                         run(entry, source, first, count)
         run("finish", 0, 0, 0)
 
     def _published(self, encoder, inputs, output):
         camera: Reprojections | None = inputs.frame.camera if inputs.frame.by_camera else None
-        ways: list[tuple[Camera, Camera]] = []
+        pairs: list[tuple[Camera, Camera]] = []
         if camera and camera.prev and camera.here.view_from_world is not None:
-            ways = [(camera.here, camera.prev), (camera.prev, camera.here)]
-        if self._options.facing and not ways:
+            pairs = [(camera.here, camera.prev), (camera.prev, camera.here)]
+        if self._options.facing and not pairs:
             raise InputError(
                 "facing needs the cameras of this and the previous frame with view_from_world, "
                 "and no vectors"
@@ -165,7 +165,7 @@ class Reproject:
             self._device,
             "blur/reproject_published.wgsl",
             {"Output": self._output},
-            CAMERA=bool(ways),
+            CAMERA=bool(pairs),
             WEIGHTED=inputs.frame.weight is not None,
             COUNTS=self._options.show == "count",
             LINES=self._options.splat == "line",
@@ -193,19 +193,19 @@ class Reproject:
         encoder.clear_buffer(shared["heads"])
         create = self._device.create_buffer_with_data
 
-        def run(entry: str, source, steps: np.ndarray, way, first: bool, last: bool) -> None:
+        def run(entry: str, source, steps: np.ndarray, pair, first: bool, last: bool) -> None:
             data = np.zeros((), kernel.source.dtype("Chunk"))
             data["bits"], data["steps"] = bits, max(len(steps) - 1, 0)
             data["first"], data["last"] = first, last
             table = np.zeros(rows, kernel.source.dtype("Step"))
             table["time"][: len(steps)] = steps
-            if camera and way:
-                seen = replace(camera, here=way[0], prev=None, next=way[1])
-                data["view"] = view_of(seen, inputs.given.size)
+            if camera and pair:
+                seen = replace(camera, here=pair[0], prev=None, next=pair[1])
+                data["viewport"] = viewport_of(seen, inputs.given.size)
                 data["world_from_pixel"] = seen.world_from_pixel().T
-                data["eye"] = _eye(way[0])
+                data["eye"] = _eye(pair[0])
                 for row, share in zip(table, np.abs(steps), strict=False):
-                    between = way[0].toward(way[1], share)
+                    between = pair[0].toward(pair[1], share)
                     row["clip_from_pixel"] = replace(seen, next=between).matrices()[0, 1].T
                     row["eye"] = _eye(between)
             kernel.run(
@@ -228,17 +228,17 @@ class Reproject:
         for k, source in enumerate(sources):
             times = (-1, 1)[k] * np.append(shares, shares[-1])  # what is one too many ends a line
             for i in range(0, inputs.samples, most):
-                jobs.append((source, times[i : i + most + 1], ways[k] if ways else None))
+                jobs.append((source, times[i : i + most + 1], pairs[k] if pairs else None))
         if self._options.splat == "line":
-            run("gather", sources[0], shares[:0], None, True, False)
-        for i, (source, steps, way) in enumerate(jobs):
+            run("resolve", sources[0], shares[:0], None, True, False)
+        for i, (source, steps, pair) in enumerate(jobs):
             if self._options.splat == "line":
-                run("lines", source, steps, way, False, False)
+                run("splat_lines", source, steps, pair, False, False)
             else:
-                run("link", source, steps, way, False, False)
-                run("gather", source, steps, way, i == 0, i == len(jobs) - 1)
+                run("link", source, steps, pair, False, False)
+                run("resolve", source, steps, pair, i == 0, i == len(jobs) - 1)
         if self._options.splat == "line":
-            run("gather", sources[0], shares[:0], None, False, True)
+            run("resolve", sources[0], shares[:0], None, False, True)
 
 
 def _eye(camera: Camera) -> np.ndarray:

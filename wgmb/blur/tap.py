@@ -51,8 +51,8 @@ class Tap:
             self._device,
             "blur/tap.wgsl",
             {"Output": self._output},
-            EVEN=inputs.even,
-            AUTO=inputs.auto,
+            BOX_SHUTTER=inputs.even,
+            ADAPTIVE=inputs.auto,
             WEIGHTED=inputs.frame.weight is not None,
             **self._constants,
         )

@@ -12,7 +12,7 @@ from .. import gpu
 from ..images import Images, Scratch
 from .options import MethodOptions
 
-LONGEST = (40, 9)  # streak to either side: so many pixels, or the height over this
+LONGEST = (40, 9)  # blur to either side, and tile: so many pixels, or the height over this
 
 
 class Tiles:
@@ -51,7 +51,7 @@ class Tiles:
     def __init__(self, device, options: Options, *, output="rgba32float"):
         self._device, self._output, self._options = device, output, options
         self._images = Images(device)
-        self._rows, self._fastest, self._dominant = (Scratch(device) for _ in range(3))
+        self._row_max, self._tile_max, self._neighbor_max = (Scratch(device) for _ in range(3))
 
     def encode(self, encoder, inputs, output):
         """Record three passes over the tiles between two over the picture."""
@@ -59,14 +59,14 @@ class Tiles:
             self._device,
             "blur/tiles.wgsl",
             {"Output": self._output},
-            EVEN=inputs.even,
-            AUTO=inputs.auto,
+            BOX_SHUTTER=inputs.even,
+            ADAPTIVE=inputs.auto,
             WEIGHTED=inputs.frame.weight is not None,
             PUBLISHED=self._options.variant == "published",
             TILES=self._options.show == "tiles",
         )
-        look = gpu.kernel(
-            self._device, "blur/tiles_moves.wgsl", DEEP=inputs.frame.depth is not None
+        velocity = gpu.kernel(
+            self._device, "blur/tiles_moves.wgsl", HAS_DEPTH=inputs.frame.depth is not None
         )
         width, height = inputs.given.size
         edge = max(LONGEST[0], height // LONGEST[1])
@@ -76,31 +76,31 @@ class Tiles:
         tiles = self._device.create_buffer_with_data(
             label="tiles", data=data, usage=wgpu.BufferUsage.UNIFORM
         )
-        moves = self._images.view("moves", (width, height), "rgba32float")
-        look.run(
+        velocity_depth = self._images.view("velocity, depth", (width, height), "rgba32float")
+        velocity.run(
             encoder,
             "main",
             inputs.given,
             motion=inputs.frame.motion,
             depth=inputs.frame.depth or inputs.none,
-            moves=moves,
+            velocity_depth=velocity_depth,
         )
         own = {
             "tiles": tiles,
             "color": inputs.frame.color,
             "motion": inputs.frame.motion,
-            "moves": moves,
+            "velocity_depth": velocity_depth,
             "weight": inputs.frame.weight or inputs.none,
             "linear": inputs.linear,
-            "rows": self._rows.at_least(16 * count[0] * height),
-            "fastest": self._fastest.at_least(16 * count[0] * count[1]),
-            "dominant": self._dominant.at_least(16 * count[0] * count[1]),
+            "row_max": self._row_max.at_least(16 * count[0] * height),
+            "tile_max": self._tile_max.at_least(16 * count[0] * count[1]),
+            "neighbor_max": self._neighbor_max.at_least(16 * count[0] * count[1]),
             "output": output,
         }
         grids = {
-            "fastest_of_rows": (count[0], height),
-            "fastest_of_tiles": count,
-            "dominant_of_tiles": count,
+            "find_row_max": (count[0], height),
+            "find_tile_max": count,
+            "find_neighbor_max": count,
             "main": (width, height),
         }
         for entry, grid in grids.items():

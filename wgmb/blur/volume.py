@@ -9,7 +9,7 @@ import numpy as np
 import wgpu
 
 from .. import gpu, shader
-from ..density import TURN, Way, overrides, tables
+from ..density import TURN, Rotation, overrides, tables
 from ..errors import InputError
 from ..figures import RATE
 from ..shutter import Shutter
@@ -61,9 +61,9 @@ class Volume:
         volumes = [v for v in volumes if v.opacity or v.facing]
         volumes.sort(key=lambda v: isinstance(v, Torus))
         exact = on_gpu.shown.density == "exact"
-        ways = [way_of(v, shutter, on_gpu.fps, exact) for v in volumes]
+        rotations = [rotation_of(v, shutter, on_gpu.fps, exact) for v in volumes]
         constants = {
-            **overrides(shutter, ways),
+            **overrides(shutter, rotations),
             "EXACT": exact,
             "ORBITS": sum(isinstance(v, Orbit) for v in volumes),
             "TORI": sum(isinstance(v, Torus) for v in volumes),
@@ -73,14 +73,14 @@ class Volume:
         source = shader.load("blur/volume.wgsl")
         if len(volumes) > (most := source.constant("MOST_VOLUMES")):
             raise InputError(f"a scene has at most {most} volumes, got {len(volumes)}")
-        data = _uniforms(on_gpu, shutter, stage, volumes, ways)
+        data = _uniforms(on_gpu, shutter, stage, volumes, rotations)
         shared = {
             "scene": self._uniform("volumes", data),
-            "tables": self._storage("tables", tables(shutter, ways)),
+            "tables": self._storage("tables", tables(shutter, rotations)),
             "output": output,
         }
         edges = int(source.constant("WG_X")), int(source.constant("WG_Y"))
-        kinds = tile_kinds(data, len(ways), on_gpu.size, edges)
+        kinds = tile_kinds(data, len(rotations), on_gpu.size, edges)
         row = int(source.constant("TILES_A_ROW"))
         for kind in np.unique(kinds):
             cloud, shadow = bool(kind & CLOUD), bool(kind & SHADOW)
@@ -108,16 +108,16 @@ class Volume:
         if figure.shutter is not None:
             shutter, fps = figure.shutter, RATE
         opens, closes = shutter.span
-        often = 2 if figure.kind == "SPIRIC" else 1  # a torus is itself again after half a turn
-        way = Way(figure.speed * (closes - opens) / fps, often)
+        symmetry = 2 if figure.kind == "SPIRIC" else 1  # a torus looks alike after half a turn
+        rotation = Rotation(figure.speed * (closes - opens) / fps, symmetry)
         data = np.zeros((), source.dtype("Figure"))
         figure.fill(data, inputs.scene.time + (opens + closes) / 2 / fps)
-        way.fill(data["turning"], 0)
+        rotation.fill(data["turning"], 0)
         kernel = gpu.kernel(
             self._device,
             "figure.wgsl",
             {"Output": self._output},
-            **overrides(shutter, [way]),
+            **overrides(shutter, [rotation]),
             KIND=source.constant(figure.kind),
             SHARP=closes == opens,
         )
@@ -126,7 +126,7 @@ class Volume:
             "main",
             inputs.given,
             figure=self._uniform("figure", data),
-            tables=self._storage("tables", tables(shutter, [way])),
+            tables=self._storage("tables", tables(shutter, [rotation])),
             output=output,
         )
 
@@ -140,18 +140,22 @@ class Volume:
 
 
 def volume_row(
-    row: np.ndarray, v: Orbit | Torus, way: Way, middle_of: float, delay: tuple[float, float]
+    row: np.ndarray,
+    v: Orbit | Torus,
+    rotation: Rotation,
+    middle_of: float,
+    delay: tuple[float, float],
 ) -> None:
     """Fill a `Volume` of the shader, all but `turning`.
 
     `middle_of` the exposure, `delay` of a rolling shutter across width and height [s].
     """
-    angle, swept = math.fmod(v.phase + v.speed * middle_of, TURN), way.swept
+    angle, swept = math.fmod(v.phase + v.speed * middle_of, TURN), rotation.angle
     c, s = math.cos(angle), math.sin(angle)
     side = -1 if v.speed < 0 else 1
     speed = 30 * swept  # at the exposure that the pseudo distances were made for
     row["centre"], row["color"], row["opacity"] = v.centre, v.color, v.opacity
-    row["facing"] = 1 if v.facing is None else v.facing
+    row["normal_weight"] = 1 if v.facing is None else v.facing
     row["drift"] = [abs(v.speed) * d for d in delay]
     half = min((swept + np.abs(row["drift"]).sum()) / 2, math.pi / 2)
     middle, reach = np.array(v.centre), v.reach
@@ -178,15 +182,15 @@ def _smoothstep(a: float, b: float, x: float) -> float:
     return u * u * (3 - 2 * u)
 
 
-def way_of(volume: Orbit | Torus, shutter: Shutter, fps: float, exact: bool) -> Way:
-    """How far it turns; a torus is itself again after half a turn, which "published" ignores."""
+def rotation_of(volume: Orbit | Torus, shutter: Shutter, fps: float, exact: bool) -> Rotation:
+    """Its rotation within the exposure; a torus has twofold symmetry, which "published" ignores."""
     opens, closes = shutter.span
-    often = 2 if exact and isinstance(volume, Torus) else 1
-    return Way(abs(volume.speed) * (closes - opens) / fps, often)
+    symmetry = 2 if exact and isinstance(volume, Torus) else 1
+    return Rotation(abs(volume.speed) * (closes - opens) / fps, symmetry)
 
 
 def _uniforms(
-    on_gpu, shutter: Shutter, stage: Stage, volumes: list[Orbit | Torus], ways: list[Way]
+    on_gpu, shutter: Shutter, stage: Stage, volumes: list[Orbit | Torus], rotations: list[Rotation]
 ) -> np.ndarray:
     source = shader.load("blur/volume.wgsl")
     data = np.zeros((), source.dtype("Volumes"))
@@ -201,9 +205,11 @@ def _uniforms(
     stage.fill(data["stage"])
     middle_of = sum(shutter.span) / 2 / on_gpu.fps
     delay = shutter.delay[0] / on_gpu.fps, shutter.delay[1] / on_gpu.fps
-    for i, (row, volume, way) in enumerate(zip(data["volumes"], volumes, ways, strict=False)):
-        volume_row(row, volume, way, middle_of, delay)
-        way.fill(row["turning"], i)
+    for i, (row, volume, rotation) in enumerate(
+        zip(data["volumes"], volumes, rotations, strict=False)
+    ):
+        volume_row(row, volume, rotation, middle_of, delay)
+        rotation.fill(row["turning"], i)
     return data
 
 
@@ -242,7 +248,7 @@ def tile_kinds(
     return CLOUD * seen + SHADOW * (shaded & any_down)
 
 
-def _meets(origin, way, bounds, slabs, spread, wide=0.0) -> np.ndarray:
+def _meets(origin, direction, bounds, slabs, spread, wide=0.0) -> np.ndarray:
     """Whether lines of unit direction, thickened, are in a bound's sphere and slab at once.
 
     They are `wide` at their origin and spread by the tangent `spread`.
@@ -252,17 +258,17 @@ def _meets(origin, way, bounds, slabs, spread, wide=0.0) -> np.ndarray:
         if not bound[3]:
             continue
         to = bound[:3] - origin
-        distance2, along = _dot(to, to), _dot(to, way)
+        distance2, along = _dot(to, to), _dot(to, direction)
         thick = wide + spread * (np.sqrt(distance2) + bound[3])
         root = (bound[3] + thick) ** 2 - (distance2 - along**2)
         half = np.sqrt(np.maximum(root, 0))
-        rise, height = way @ slab[:3], to @ slab[:3]
+        rise, height = direction @ slab[:3], to @ slab[:3]
         rise = np.where(np.abs(rise) < 1e-9, 1e-9, rise)
         edges = [(height + k * (slab[3] + thick)) / rise for k in (-1, 1)]
         first = np.maximum(along - half, np.minimum(*edges))
         last = np.minimum(along + half, np.maximum(*edges))
         found = found | ((root > 0) & (first <= last) & (last > 0))
-    return np.broadcast_to(found, np.broadcast_shapes(np.shape(origin), np.shape(way))[:-1])
+    return np.broadcast_to(found, np.broadcast_shapes(np.shape(origin), np.shape(direction))[:-1])
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,13 +1,13 @@
-// Frame blending (an accumulation buffer): the mean of whole pictures at sub-frame times.
+// Frame blending (the accumulation buffer of Haeberli and Akeley 1990): the mean of whole images at sub-frame times.
 //#include common/frame.wgsl
 
-@group(1) @binding(0) var color: texture_2d<f32>;                   // one more picture
-@group(1) @binding(1) var<storage, read_write> sums: array<vec4f>;  // of the pictures so far
+@group(1) @binding(0) var color: texture_2d<f32>;                   // one more image
+@group(1) @binding(1) var<storage, read_write> sums: array<vec4f>;  // of the images so far
 @group(1) @binding(2) var<uniform> progress: Progress;
 @group(1) @binding(3) var output: Output;
 
 struct Progress {
-    done: u32,          // pictures in `sums`; 0 begins anew
+    done: u32,          // images in `sums`; 0 starts anew
 }
 
 @compute @workgroup_size(WG_X, WG_Y)

@@ -1,347 +1,400 @@
-// For every pixel and every time of the exposure: which samples of three frames are there by then, and
-// which of them is seen. Two-layer silhouettes, nearest first.
+// The image: for every pixel and every time of the exposure, the samples of up to three frames that are there by then
+// are searched, the nearest ones composited front to back, and the results averaged.
+//#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include common/noise.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
 //#include blur/gather_listed.wgsl
+//#include blur/gather_moving.wgsl
 //#include blur/gather_search.wgsl
 
-@group(1) @binding(3) var plain: texture_2d_array<u32>;     // bits of times, see gather_plain.wgsl
-@group(1) @binding(4) var colors: texture_2d_array<f32>;    // premultiplied by alpha, coverage, weight; near, far, a frame
-@group(1) @binding(5) var surfaces: texture_2d_array<f32>;  // near depth, far depth, coverage, weight
-@group(1) @binding(6) var bends: texture_2d<u32>;           // second differences of the frame's own near colours
-@group(1) @binding(7) var own: texture_2d<f32>;             // the frame as it came
+@group(1) @binding(3) var single_layer_mask: texture_2d_array<u32>; // bits of times, see the classification
+@group(1) @binding(4) var layer_colors: texture_2d_array<f32>;  // front, back per frame; premultiplied by alpha, coverage, weight
+@group(1) @binding(5) var mattes: texture_2d_array<f32>;    // per frame: front depth, back depth, coverage, weight
+@group(1) @binding(6) var second_differences: texture_2d<u32>;  // of the frame's own front colours
+@group(1) @binding(7) var own_color: texture_2d<f32>;       // the frame as it came
 @group(1) @binding(8) var own_weight: texture_2d<f32>;
 @group(1) @binding(9) var linear: sampler;
 @group(1) @binding(10) var output: Output;
-@group(1) @binding(11) var<storage, read> listed: Listed;   // the cells to work on
+@group(1) @binding(11) var<storage, read> worklist: WorkList;
 
-override WEIGHTED: bool = false;
+override WEIGHTED: bool = false;    // read `own_weight`
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 
-const BEHIND: f32 = 1.05;       // ratio of depths that makes two surfaces
-const GUESSED: f32 = 1.2;       // and a background that was only inferred as this much
-const SPARED: u32 = 2u;         // steps by which a search from a tile's motion is shorter than one from nowhere
-const ASTRAY: f32 = 0.5;        // of the way back to where the first one led: a longer step ends such a search
-const ROUNDS: u32 = 6u;         // near, far of the frame itself; near of the neighbours; far of these
+const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: what one showed is preferred
+const ITERATIONS_SAVED: u32 = 2u;       // from a tile's motion, compared with a start from nothing
+const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
 
 struct Sample {
-    depth: f32,         // that it competes with
+    depth: f32,         // biased, for comparisons
     true_depth: f32,
-    miss: f32,          // squared distance of its place from the pixel [px^2]
-    at: vec2f,          // where in its frame [px]
-    layer: u32,         // near, far, of the frames one after the other
+    residual2: f32,     // squared distance of its position from the pixel [px^2]
+    at: vec2f,          // in its frame [px]
+    layer: u32,         // see texture_layer()
 }
 
-struct Seen {           // the nearest ones
-    solid: Sample,      // opaque
-    edge: Sample,       // at a silhouette
-    second: Sample,     // the silhouette behind that
+struct Visible {        // the nearest samples of each kind
+    opaque: Sample,
+    front_edge: Sample,
+    back_edge: Sample,  // behind the front edge
 }
 
 // Loops are left from their end, and what is rare has a loop of its own over bits of times: see docs/lavapipe.md.
 
-@compute @workgroup_size(CELL * TILE, STRIP)
+@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
 fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
-    let k = place_of(group);
-    let id = pixel_in(listed.cells[k], group, local);
-    if k >= listed.count || any(id >= frame.size) { return; }
+    let k = worklist_index(group);
+    let id = pixel_in_strip(worklist.cells[k], group, local);
+    if k >= worklist.count || any(id >= frame.size) { return; }
     let x = vec2f(id) + 0.5;
     let tile = id / TILE;
-    let reach0 = reach(tile, 0u);
-    let reach1 = reach(tile, 1u);
-    let reach2 = reach(tile, 2u);
-    let here = stored(0u);
-    let path = path_in(textureLoad(paths, id, here, 0));
-    let start = path_in(textureLoad(paths, id / BLOCK * BLOCK, here, 0));    // see gather_plain.wgsl
-    let times = times_of(x, frame.jitter * (pixel_noise(id) - 0.5), reach0, reach1, reach2);
-    let share = 1.0 / f32(times.count);     // before adding, so that no sum of finite colours overflows
+    let candidates0 = load_candidates(tile, 0u);
+    let candidates1 = load_candidates(tile, 1u);
+    let candidates2 = load_candidates(tile, 2u);
+    let front = texture_layer(0u);
+    let trajectory = unpack_trajectory(textureLoad(surfaces, id, front, 0));
+    let block_trajectory = unpack_trajectory(textureLoad(surfaces, id / BLOCK * BLOCK, front, 0));  // as classified
+    let shift = frame.jitter * (pixel_noise(id) - 0.5);
+    let times = sample_times(x, shift, candidates0, candidates1, candidates2);
+    let share = 1.0 / f32(times.count);     // applied before adding, so that no sum of finite colours overflows
 
-    // Nothing moves, nor does anything come here.
-    let longest = max(abs(shown(0.0).x), abs(shown(0.0).y));
-    let rests = all((abs(path.velocity) + abs(path.curvature) * longest) * longest < vec2f(STILL));
-    let all_plain = textureLoad(plain, id / BLOCK, (frame.samples - 1u) / AT_ONCE + 1u, 0).x == 1u;
-    let still = is_still(reach0, reach1, reach2) || (rests && all_plain);
-    let samples = select(times.count, 0u, still);
+    // Static: nothing moves, nor does anything come here.
+    let longest = max_abs_time(0.0);
+    let v = abs(trajectory.velocity) + abs(trajectory.half_acceleration) * longest;
+    let stays = all(v * longest < vec2f(STATIC_EPSILON));
+    let last_word = (frame.samples - 1u) / TIMES_PER_WORD + 1u;
+    let all_single = textureLoad(single_layer_mask, id / BLOCK, last_word, 0).x == 1u;
+    let is_static = is_static_tile(candidates0, candidates1, candidates2) || (stays && all_single);
+    let samples = select(times.count, 0u, is_static);
 
-    var sum = Shown();
-    var accepted = select(0.0, f32(times.count), still);
-    var left = 0.0;
+    var sum = Composite();
+    var accepted = select(0.0, f32(times.count), is_static);
+    var left_image = 0.0;
     var first = 0u;         // time of this turn's words of bits
     loop {
-        let valid = select(select(0u, (1u << (samples - first)) - 1u, samples > first), ~0u, samples >= first + AT_ONCE);
-        var bits = textureLoad(plain, id / BLOCK, first / AT_ONCE, 0).x & valid;
-        var todo = bits;
+        let valid = select(select(0u, (1u << (samples - first)) - 1u, samples > first), ~0u,
+                           samples >= first + TIMES_PER_WORD);
+        var single = textureLoad(single_layer_mask, id / BLOCK, first / TIMES_PER_WORD, 0).x & valid;
+        var todo = single;
         loop {              // times at which one search is enough
             let t = time_in(times, first, todo);
-            let found = follow(x, displacement(start, t), t, here);
-            let px = nearest_to(x - found.d);
-            var is_even = true;
+            let found = iterate_fixed_point(x, displacement(block_trajectory, t), t, front);
+            let px = nearest_pixel(x - found.d);
+            var is_even = true;     // of one weight
             var counts = 1.0;
             if WEIGHTED {
-                is_even = is_calm(textureLoad(paths, px, here, 0));
-                counts = textureLoad(surfaces, px, here / 2u, 0).w;
+                is_even = is_smooth(textureLoad(surfaces, px, front, 0));
+                counts = textureLoad(mattes, px, front / 2u, 0).w;
             }
             if todo != 0u && is_even {
-                add(&sum, Shown(resampled(x - found.d, here, true), counts, 1.0, sqrt(found.miss), 0.0), share);
+                let color = resampled(x - found.d, front, true);
+                add(&sum, Composite(color, counts, 1.0, sqrt(found.residual2), 0.0), share);
                 accepted += 1.0;
             }
-            if !is_even { bits &= ~(1u << firstTrailingBit(todo)); }
+            if !is_even { single &= ~(1u << firstTrailingBit(todo)); }
             todo &= todo - 1u;
             if todo == 0u { break; }
         }
-        todo = ~bits & valid;
-        var lost = 0u;
+        todo = ~single & valid;
+        var unresolved = 0u;
         loop {              // all others
-            let got = composed(search(x, path, time_in(times, first, todo), reach0, reach1, reach2));
-            let is_seen = got.cover > 0.5;
-            if todo != 0u && is_seen {
-                add(&sum, got, share / got.cover);
+            let t = time_in(times, first, todo);
+            let visible = resolve_visibility(x, trajectory, t, candidates0, candidates1, candidates2);
+            let result = composite_front_to_back(visible);
+            let is_covered = result.coverage > 0.5;
+            if todo != 0u && is_covered {
+                add(&sum, result, share / result.coverage);
                 accepted += 1.0;
             }
-            if !is_seen { lost |= todo & (~todo + 1u); }
+            if !is_covered { unresolved |= todo & (~todo + 1u); }
             todo &= todo - 1u;
             if todo == 0u { break; }
         }
-        loop {              // of them, those that show nothing: the pixel's own path through the frame
-            let q = x - displacement(path, time_in(times, first, lost));
-            if lost != 0u {
+        loop {              // of them, those at which no frame shows anything: a tap along the pixel's own trajectory
+            let p = x - displacement(trajectory, time_in(times, first, unresolved));
+            if unresolved != 0u {
                 var counts = 1.0;
-                if WEIGHTED { counts = textureSampleLevel(own_weight, linear, q / vec2f(frame.size), 0.0).x; }
-                let color = textureSampleLevel(own, linear, q / vec2f(frame.size), 0.0);
-                add(&sum, Shown(color, counts, 1.0, 0.0, 0.0), share);
-                if !inside(q) { left += 1.0; }
+                if WEIGHTED { counts = textureSampleLevel(own_weight, linear, p / vec2f(frame.size), 0.0).x; }
+                let color = textureSampleLevel(own_color, linear, p / vec2f(frame.size), 0.0);
+                add(&sum, Composite(color, counts, 1.0, 0.0, 0.0), share);
+                if !is_inside(p) { left_image += 1.0; }
             }
-            lost &= lost - 1u;
-            if lost == 0u { break; }
+            unresolved &= unresolved - 1u;
+            if unresolved == 0u { break; }
         }
-        first += AT_ONCE;
+        first += TIMES_PER_WORD;
         if first >= samples { break; }
     }
     var result = max(sum.color, vec4f(0.0)) / sum.weight;
-    if still || sum.weight <= 0.0 { result = unmoved(id); }
+    if is_static || sum.weight <= 0.0 { result = static_color(id); }
     if CONFIDENCE {
-        let times_seen = max(accepted * share, 1e-9);
-        result = vec4f(accepted * share, sum.others, sum.missed / times_seen, left * share);
+        let share_accepted = max(accepted * share, 1e-9);
+        result = vec4f(accepted * share, sum.neighbours, sum.residual / share_accepted, left_image * share);
     }
     textureStore(output, id, result);
 }
 
-/// Where nothing moves.
-@compute @workgroup_size(CELL * TILE, STRIP)
-fn rest(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
-    let k = place_of(group);
-    let id = pixel_in(listed.cells[k], group, local);
-    if k >= listed.count || any(id >= frame.size) { return; }
-    var result = unmoved(id);
+/// For static cells.
+@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
+fn copy_static(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = worklist_index(group);
+    let id = pixel_in_strip(worklist.cells[k], group, local);
+    if k >= worklist.count || any(id >= frame.size) { return; }
+    var result = static_color(id);
     if CONFIDENCE { result = vec4f(1.0, 0.0, 0.0, 0.0); }
     textureStore(output, id, result);
 }
 
 /// The frame's own pixel, to the bit.
-fn unmoved(px: vec2u) -> vec4f {
-    let color = textureLoad(own, px, 0);
+fn static_color(px: vec2u) -> vec4f {
+    let color = textureLoad(own_color, px, 0);
     if !WEIGHTED { return color; }
-    let counted = textureLoad(own_weight, px, 0).x;
-    return select(vec4f(0.0), color / counted, counted > 0.0);
+    let counts = textureLoad(own_weight, px, 0).x;
+    return select(vec4f(0.0), color / counts, counts > 0.0);
 }
 
-/// The time of the lowest of 32 bits, of which `first` is the time of the first.
-fn time_in(times: Times, first: u32, bits: u32) -> f32 {
+/// Time of the lowest set bit of a word whose bit 0 is sample `first`.
+fn time_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
     return shutter_time(times, min(first + firstTrailingBit(bits), times.count - 1u));
 }
 
-struct Shown {
-    color: vec4f,
-    weight: f32,
-    cover: f32,
-    missed: f32,        // distance from the pixel of what is shown [px]
-    others: f32,        // how much of it is the neighbours'
+/// The pixel of the image nearest to a position [px].
+fn nearest_pixel(p: vec2f) -> vec2u {
+    return vec2u(clamp(p, vec2f(0.0), vec2f(frame.size) - 1.0));
 }
 
-fn add(sum: ptr<function, Shown>, one: Shown, share: f32) {
+// ---- visibility -----------------------------------------------------------------------------
+
+// The layers are searched in this order, each only if it may add anything: see next_search().
+const OWN_FRONT: u32 = 0u;          // of the frame itself
+const OWN_BACK: u32 = 1u;
+const NEIGHBOUR_FRONT: u32 = 2u;    // of the neighbouring frame on the side of the time
+const OTHER_FRONT: u32 = 3u;        // of the other neighbouring frame
+const NEIGHBOUR_BACK: u32 = 4u;
+const OTHER_BACK: u32 = 5u;
+const SEARCHES: u32 = 6u;
+
+/// The nearest samples that are at `x` [px] by the time `t` [frame intervals], by the candidates of all frames.
+fn resolve_visibility(x: vec2f, trajectory: Trajectory, t: f32,
+                      a: Candidates, b: Candidates, c: Candidates) -> Visible {
+    let has_edge = max(a.header.y, max(b.header.y, c.header.y)) > 0.0;
+    var visible = Visible(nothing(), nothing(), nothing());
+    var hidden = false;             // the front layer of the frame itself shows nothing opaque
+    var search = OWN_FRONT;
+    loop {
+        let f = select(neighbour_of(t, search % 2u == 1u), 0u, search < NEIGHBOUR_FRONT);
+        let is_back = search == OWN_BACK || search > OTHER_FRONT;
+        let u = t - offset_of(f);
+        let query = Query(x, u, 2u * f + u32(is_back), select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u));
+        search_layer(&visible, query, displacement(trajectory, u), candidates_of(f, a, b, c));
+        if search == OWN_FRONT { hidden = visible.opaque.depth >= INFINITE; }
+        search = next_search(search, visible, t, hidden, has_edge);
+        if search >= SEARCHES { break; }
+    }
+    return visible;
+}
+
+/// The search after `last`. The back of the frame itself where its front is `hidden`; the neighbour there too, or far
+/// from the frame's own instant; the other neighbour if the background is at best inferred; their backs at last,
+/// where it still is and no edge is before it.
+fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool) -> u32 {
+    let none = visible.opaque.depth >= INFINITE;
+    let inferred = none || visible.opaque.layer == 1u;
+    let try_back = hidden && has_edge;
+    let try_neighbours_back = try_back && inferred && (none || visible.front_edge.depth >= INFINITE);
+    var next = last + 1u;
+    if next == OWN_BACK && !try_back { next = NEIGHBOUR_FRONT; }
+    if next == NEIGHBOUR_FRONT && !(sources.count > 1u && (hidden || abs(t) > TRUSTED_TIME)) { next = SEARCHES; }
+    if next == OTHER_FRONT && !(sources.count > 2u && inferred) { next = NEIGHBOUR_BACK; }
+    if next == NEIGHBOUR_BACK && !try_neighbours_back { next = SEARCHES; }
+    if next == OTHER_BACK && !(try_neighbours_back && sources.count > 2u) { next = SEARCHES; }
+    return next;
+}
+
+struct Query {          // what is searched, and where
+    x: vec2f,           // the pixel [px]
+    u: f32,             // time since the frame's instant [frame intervals]
+    layer: u32,         // see texture_layer()
+    handicap: f32,      // factor of the layer's depths
+}
+
+struct Found {          // where an iteration ended
+    state: WarpState,
+    is_there: bool,     // a surface is at the pixel by the time
+}
+
+/// Search one layer from `own`, the displacement of the pixel's own trajectory [px]; then, in a front layer, from the
+/// tile's candidates that may be nearer than what is visible already.
+fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candidates: Candidates) {
+    let is_front = query.layer % 2u == 0u;
+    var seeds = Seeds(vec4<bool>(is_front), displacements_x(candidates, query.u), displacements_y(candidates, query.u));
+    var first = Found(WarpState(vec4u(0u), vec2f(INFINITE), INFINITE), false);      // from the own trajectory
+    var is_first = true;
+    loop {
+        let found = find_surface(&seeds, query, own, is_first, first, (*visible).opaque.depth);
+        if is_first { first = found; }
+        if found.is_there { record(visible, query, found.state); }
+        let wanted = may_be_visible(candidates, query.u, (*visible).opaque.depth / query.handicap);
+        seeds.pending = seeds.pending & wanted & !are_solution(seeds.x, seeds.y, first.state.d);
+        is_first = false;
+        if !any(seeds.pending) { break; }
+    }
+}
+
+/// Iterate from `own` at first; after that from pending seeds, one after the other until one leads to a surface. A seed
+/// is given up if it leads to the first solution, to something that is not nearer than `limit`, or astray.
+fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first: bool, first: Found, limit: f32) -> Found {
+    // In a neighbouring frame one more step, from standing still, leads to the pixel's own trajectory.
+    let in_own_frame = query.layer < 2u;
+    var state = WarpState(vec4u(0u), select(vec2f(0.0), own, in_own_frame), INFINITE);
+    var n = u32(in_own_frame);
+    if !is_first {
+        state.d = next_seed(seeds);
+        n = ITERATIONS_SAVED;
+    }
+    var is_there = false;
+    loop {              // a turn is a step
+        let back = state.d - first.state.d;
+        state = warp_step(query.x, state.d, query.u, texture_layer(query.layer));
+        n++;
+        let again = same_solution(state.d, first.state.d);
+        let farther = !is_first && unpack_depth(state.surface) * query.handicap >= limit;
+        let astray = !is_first && state.residual2 > MAX_STEP_RATIO * MAX_STEP_RATIO * dot(back, back);
+        let ended = has_ended(state) || n > MAX_ITERATIONS || again || farther || astray;
+        is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL && !(again && first.is_there) && !farther;
+        if ended && (is_first || is_there || !any((*seeds).pending)) { break; }
+        if ended {
+            state.d = next_seed(seeds);
+            n = ITERATIONS_SAVED;
+        }
+    }
+    return Found(state, is_there);
+}
+
+/// Keep a surface if it is the nearest of its kind.
+fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
+    let z = unpack_depth(state.surface);
+    let is_inferred = query.layer % 2u == 1u && !was_seen(state.surface);
+    let depth = abs(z) * query.handicap * select(1.0, INFERRED_DEPTH_BIAS, is_inferred);
+    let found = Sample(depth, abs(z), state.residual2, query.x - state.d, query.layer);
+    if z > 0.0 && found.depth < (*visible).opaque.depth { (*visible).opaque = found; }
+    if z < 0.0 {
+        let front_edge = (*visible).front_edge;
+        let in_front = found.depth < front_edge.depth;
+        if in_front && is_behind(front_edge, found) { (*visible).back_edge = front_edge; }
+        if !in_front && found.depth < (*visible).back_edge.depth && is_behind(found, front_edge) {
+            (*visible).back_edge = found;
+        }
+        if in_front { (*visible).front_edge = found; }
+    }
+}
+
+fn nothing() -> Sample {
+    return Sample(INFINITE, INFINITE, INFINITE, vec2f(-9.0), 99u);
+}
+
+/// Whether `b` is of another surface, behind that of `a`; neighbouring frames show the same one again.
+fn is_behind(b: Sample, a: Sample) -> bool {
+    return b.depth >= a.depth * SURFACE_DEPTH_RATIO * select(NEIGHBOUR_DEPTH_BIAS, 1.0, a.layer == b.layer);
+}
+
+// ---- compositing ----------------------------------------------------------------------------
+
+struct Composite {
+    color: vec4f,       // premultiplied by coverage
+    weight: f32,
+    coverage: f32,
+    residual: f32,      // distance from the pixel of what is composited, times its coverage [px]
+    neighbours: f32,    // the part of the coverage that neighbouring frames gave
+}
+
+fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
     (*sum).color += share * one.color;
     (*sum).weight += share * one.weight;
-    (*sum).cover += share * one.cover;
-    (*sum).missed += share * one.missed;
-    (*sum).others += share * one.others;
+    (*sum).coverage += share * one.coverage;
+    (*sum).residual += share * one.residual;
+    (*sum).neighbours += share * one.neighbours;
 }
 
-/// Front to back: silhouettes by the texels of their own surface, then what is opaque.
-fn composed(seen: Seen) -> Shown {
-    let edge = seen.edge.depth < seen.solid.depth / BEHIND;
-    let second = edge && seen.second.depth < seen.solid.depth / BEHIND && is_behind(seen.second, seen.edge);
-    let solid = seen.solid.depth < NONE;
-    let at = seen.solid.at;
-    let layer = stored(seen.solid.layer);
-    var whole = solid && seen.solid.layer % 2u == 0u;
-    if WEIGHTED { whole = whole && is_calm(textureLoad(paths, nearest_to(at), layer, 0)); }
-    let parts = u32(edge) + u32(second) + u32(solid && !whole);
-    var sum = Shown();
+/// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then what is opaque.
+fn composite_front_to_back(visible: Visible) -> Composite {
+    let opaque_depth = visible.opaque.depth / SURFACE_DEPTH_RATIO;
+    let front_edge = visible.front_edge.depth < opaque_depth;
+    let back_edge = front_edge && visible.back_edge.depth < opaque_depth
+        && is_behind(visible.back_edge, visible.front_edge);
+    let opaque = visible.opaque.depth < INFINITE;
+    let at = visible.opaque.at;
+    let layer = texture_layer(visible.opaque.layer);
+    var filtered = opaque && visible.opaque.layer % 2u == 0u;   // as a whole, not texel by texel
+    if WEIGHTED { filtered = filtered && is_smooth(textureLoad(surfaces, nearest_pixel(at), layer, 0)); }
+    let parts = u32(front_edge) + u32(back_edge) + u32(opaque && !filtered);
+    var sum = Composite();
     var n = 0u;
     loop {
-        var now = seen.solid;
-        if second && n == 1u { now = seen.second; }
-        if edge && n == 0u { now = seen.edge; }
-        var part = Shown();
+        var part = visible.opaque;
+        if back_edge && n == 1u { part = visible.back_edge; }
+        if front_edge && n == 0u { part = visible.front_edge; }
+        var one = Composite();
         var i = 0u;
         loop {
-            if n < parts { add_texel(&part, now, i); }
+            if n < parts { add_texel(&one, part, i); }
             i++;
             if n >= parts || i >= 4u { break; }
         }
-        if now.layer % 2u == 1u && part.cover > 1e-4 {
-            part.color /= part.cover;
-            part.weight /= part.cover;
-            part.cover = 1.0;
+        if part.layer % 2u == 1u && one.coverage > 1e-4 {       // backgrounds are opaque
+            one.color /= one.coverage;
+            one.weight /= one.coverage;
+            one.coverage = 1.0;
         }
-        part.missed = part.cover * sqrt(now.miss);
-        part.others = select(0.0, part.cover, now.layer > 1u);
-        add(&sum, part, 1.0 - sum.cover);
+        one.residual = one.coverage * sqrt(part.residual2);
+        one.neighbours = select(0.0, one.coverage, part.layer > 1u);
+        add(&sum, one, 1.0 - sum.coverage);
         n++;
         if n >= parts { break; }
     }
-    if whole {
+    if filtered {
         var counts = 1.0;
-        if WEIGHTED { counts = textureLoad(surfaces, nearest_to(at), layer / 2u, 0).w; }
-        let others = select(0.0, 1.0, seen.solid.layer > 1u);
-        add(&sum, Shown(resampled(at, layer, seen.solid.layer == 0u), counts, 1.0, sqrt(seen.solid.miss), others), 1.0 - sum.cover);
+        if WEIGHTED { counts = textureLoad(mattes, nearest_pixel(at), layer / 2u, 0).w; }
+        let neighbours = select(0.0, 1.0, visible.opaque.layer > 1u);
+        let color = resampled(at, layer, visible.opaque.layer == 0u);
+        let one = Composite(color, counts, 1.0, sqrt(visible.opaque.residual2), neighbours);
+        add(&sum, one, 1.0 - sum.coverage);
     }
     return sum;
 }
 
-fn nothing() -> Sample {
-    return Sample(NONE, NONE, NONE, vec2f(-9.0), 99u);
-}
-
-/// The pixel in the picture nearest to a place.
-fn nearest_to(q: vec2f) -> vec2u {
-    return vec2u(clamp(q, vec2f(0.0), vec2f(frame.size) - 1.0));
-}
-
-/// Samples that are at `x` by the time `t`. They are searched for in the near layer of the frame itself, and in
-/// its far layer where that shows nothing opaque; then, or far from the frame's instant, in the near layer of
-/// the neighbour on the side of `t`, and of the other one if the background was at best inferred; at
-/// last in their far layers, where it still was and no silhouette is before it.
-fn search(x: vec2f, path: Path, t: f32, a: Reach, b: Reach, c: Reach) -> Seen {
-    let count = sources.count;
-    let parted = max(a.about.y, max(b.about.y, c.about.y)) > 0.0;
-    var solid = nothing();
-    var edge = nothing();
-    var second = nothing();
-    var hidden = false;         // the frame itself shows nothing opaque
-    var round = 0u;
-    var f = 0u;
-    var u = t;                  // since that frame's instant
-    loop {
-        let is_far = round == 1u || round > 3u;
-        let layer = 2u * f + u32(is_far);
-        let handicap = select(NEIGHBOUR, 1.0, f == 0u);
-        let here = of_frame(f, a, b, c);
-        var todo = Starts(vec4<bool>(!is_far), displaced_x(here, u), displaced_y(here, u));
-        var own = true;             // from the pixel's own path; then from the tile's
-        var first = vec2f(NONE);    // where the former led to
-        var is_first = false;       // and something is there
-        loop {
-            // In a neighbour, one step from here leads to the pixel's own path.
-            var place = Place(vec4u(0u), select(vec2f(0.0), displacement(path, u), f == 0u), NONE);
-            var n = u32(f == 0u);
-            if !own {
-                place.d = next_of(&todo);
-                n = SPARED;
-            }
-            // A turn is a step: from one start until something is there, then from the next.
-            var hit = false;
-            loop {
-                let back = place.d - first;
-                place = step_from(x, place.d, u, stored(layer));
-                n++;
-                let again = alike(place.d, first);
-                let farther = !own && depth_in(place.texel) * handicap >= solid.depth;     // it leads to what is seen
-                let astray = !own && place.miss > ASTRAY * ASTRAY * dot(back, back);
-                let ended = has_ended(place) || n > STEPS || again || farther || astray;
-                hit = place.miss <= MISS * MISS && !(again && is_first) && !farther;
-                if ended && (own || hit || !any(todo.left)) { break; }
-                if ended {
-                    place.d = next_of(&todo);
-                    n = SPARED;
-                }
-            }
-            if own {
-                first = place.d;
-                is_first = hit;
-            }
-
-            let z = depth_in(place.texel);
-            let guess = select(1.0, GUESSED, is_far && !is_calm(place.texel));
-            let found = Sample(abs(z) * handicap * guess, abs(z), place.miss, x - place.d, layer);
-            if hit && z > 0.0 && found.depth < solid.depth { solid = found; }
-            if hit && z < 0.0 {
-                let in_front = found.depth < edge.depth;
-                if in_front && is_behind(edge, found) { second = edge; }
-                if !in_front && found.depth < second.depth && is_behind(found, edge) { second = found; }
-                if in_front { edge = found; }
-            }
-
-            let known = (abs(todo.x - first.x) < vec4f(SAME)) & (abs(todo.y - first.y) < vec4f(SAME));
-            todo.left = todo.left & worth(here, u, solid.depth / handicap) & !known;
-            own = false;
-            if !any(todo.left) { break; }
-        }
-        let none = solid.depth >= NONE;
-        if round == 0u { hidden = none; }
-        let inferred = none || solid.layer == 1u;
-        let behind = hidden && parted;
-        let farther = behind && inferred && (none || edge.depth >= NONE);
-        round++;
-        if round == 1u && !behind { round = 2u; }
-        if round == 2u && !(count > 1u && (hidden || abs(t) > TRUSTED)) { round = ROUNDS; }
-        if round == 3u && !(count > 2u && inferred) { round = 4u; }
-        if round == 4u && !farther { round = ROUNDS; }
-        if round == 5u && !(farther && count > 2u) { round = ROUNDS; }
-        f = select(neighbour_of(t, round % 2u == 1u), 0u, round < 2u);
-        u = t - offset_of(f);
-        if round >= ROUNDS { break; }
-    }
-    return Seen(solid, edge, second);
-}
-
-/// Whether `b` is another surface behind that of `a`: neighbouring frames show the same one again.
-fn is_behind(b: Sample, a: Sample) -> bool {
-    return b.depth >= a.depth * BEHIND * select(NEIGHBOUR, 1.0, a.layer == b.layer);
-}
-
-/// One of the four texels around a sample, if it is of the same surface.
-fn add_texel(part: ptr<function, Shown>, now: Sample, i: u32) {
-    let near = stored(now.layer / 2u * 2u);
-    let is_far = now.layer % 2u == 1u;
-    let corner = floor(now.at - 0.5);
-    let share = now.at - 0.5 - corner;
+/// Add texel `i` of the four around a sample, with its bilinear weight, if it is of the same surface.
+fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32) {
+    let front = texture_layer(sample.layer / 2u * 2u);
+    let is_back = sample.layer % 2u == 1u;
+    let corner = floor(sample.at - 0.5);
+    let share = sample.at - 0.5 - corner;
     let step = vec2f(vec2u(i & 1u, i >> 1u));
-    let px = nearest_to(corner + step);
-    let both = mix(1.0 - share, share, step);
-    let there = textureLoad(surfaces, px, near / 2u, 0);
-    let is_split = there.y > 0.0;
-    let from_far = is_far && is_split;
-    let z = there.x;
-    // Near: what is not behind it. Far: guessed backgrounds, and what lies as deep.
-    let too_far = z > now.true_depth * BEHIND;
-    let too_near = is_far && z < now.true_depth / BEHIND;
-    let counts = from_far || !(too_far || too_near);
-    let amount = select(0.0, both.x * both.y, counts);
-    (*part).color += amount * textureLoad(colors, px, near + u32(from_far), 0);
-    (*part).weight += amount * select(there.w, 1.0, from_far);
-    (*part).cover += amount * select(there.z, 1.0, is_far);
+    let px = nearest_pixel(corner + step);
+    let shares = mix(1.0 - share, share, step);
+    let matte = textureLoad(mattes, px, front / 2u, 0);
+    let has_back = matte.y > 0.0;
+    let from_back = is_back && has_back;
+    let z = matte.x;
+    // Of a front layer: what is not behind it. Of a back layer: the other back layers, and what lies as deep.
+    let is_beyond = z > sample.true_depth * SURFACE_DEPTH_RATIO;
+    let is_before = is_back && z < sample.true_depth / SURFACE_DEPTH_RATIO;
+    let belongs = from_back || !(is_beyond || is_before);
+    let amount = select(0.0, shares.x * shares.y, belongs);
+    (*sum).color += amount * textureLoad(layer_colors, px, front + u32(from_back), 0);
+    (*sum).weight += amount * select(matte.w, 1.0, from_back);
+    (*sum).coverage += amount * select(matte.z, 1.0, is_back);
 }
 
-/// Catmull-Rom interpolation where the frame's own texel is calm, linear elsewhere: what is between two texels
-/// differs from the line by their second differences, of which the nearest texel's stand for both.
+/// Catmull-Rom interpolation where the frame's own texel is smooth, bilinear elsewhere. Between two texels the cubic
+/// differs from the line by their second differences; those of the nearest texel stand for both.
 fn resampled(at: vec2f, layer: u32, is_own: bool) -> vec4f {
     let f = fract(at - 0.5);
-    let bend = textureLoad(bends, nearest_to(at), 0);
-    let across = vec4f(unpack2x16float(bend.x), unpack2x16float(bend.y));
-    let down = vec4f(unpack2x16float(bend.z), unpack2x16float(bend.w));
+    let differences = textureLoad(second_differences, nearest_pixel(at), 0);
+    let across = vec4f(unpack2x16float(differences.x), unpack2x16float(differences.y));
+    let down = vec4f(unpack2x16float(differences.z), unpack2x16float(differences.w));
     let share = select(vec2f(0.0), 0.5 * f * (1.0 - f), is_own);
-    return textureSampleLevel(colors, linear, at / vec2f(frame.size), layer, 0.0) - share.x * across - share.y * down;
+    return textureSampleLevel(layer_colors, linear, at / vec2f(frame.size), layer, 0.0)
+        - share.x * across - share.y * down;
 }

@@ -1,26 +1,28 @@
-// Motions, and how far they lead while a frame is shown. A path as a vector: velocity, curvature.
+// Distances between motions, and how far they lead while a frame is exposed. A trajectory is kept in a texel as
+// a vec4f: velocity, half acceleration.
 //#include common/path.wgsl
 //#include common/shutter.wgsl
 
-const WILD: f32 = 1e5;          // motions beyond this [px] are errors
-const FARTHEST: i32 = 16;       // tiles that a motion is followed over
+const MAX_MOTION: f32 = 1e5;    // motion beyond this [px] is taken for an error
+const MAX_TILE_RADIUS: i32 = 16;    // tiles over which a motion is followed, to every side
 
-fn as_vec4(path: Path) -> vec4f {
-    return vec4f(path.velocity, path.curvature);
+fn as_vec4(trajectory: Trajectory) -> vec4f {
+    return vec4f(trajectory.velocity, trajectory.half_acceleration);
 }
 
-fn displaced(path: vec4f, u: f32) -> vec2f {
-    return displacement(Path(path.xy, path.zw), u);
+/// Displacement by the time `u` [px].
+fn displacement4(trajectory: vec4f, u: f32) -> vec2f {
+    return displacement(Trajectory(trajectory.xy, trajectory.zw), u);
 }
 
-/// How long after, or before, the instant of the frame `offset` intervals away it is shown at most.
-fn longest_time(offset: f32) -> f32 {
-    let span = abs(shown(offset));
-    return max(span.x, span.y);
+/// The longest time from the instant of the frame `offset` intervals away, before or after, at which it is exposed.
+fn max_abs_time(offset: f32) -> f32 {
+    let window = abs(exposure_window(offset));
+    return max(window.x, window.y);
 }
 
-/// How far apart two motions come by the time `u`, before or after, squared.
-fn apart(a: vec4f, b: vec4f, u: f32) -> f32 {
+/// Greatest squared distance [px^2] between two trajectories at the times `u` and -u.
+fn trajectory_distance2(a: vec4f, b: vec4f, u: f32) -> f32 {
     let d = (a - b) * vec4f(u, u, u * u, u * u);
     return dot(d, d) + 2.0 * abs(dot(d.xy, d.zw));
 }

@@ -1,54 +1,60 @@
-// Where what is at a place by some time was at a frame's instant.
+// Image warping by fixed-point iteration: where in a frame is that which is at a pixel at some other time?
+// With p = x - d(p), d the displacement of the content at p, the iteration d <- displacement at (x - d) leads there from a
+// good start (Bowles et al., "Iterative Image Warping", 2012; Yang et al., "Image-Based Bidirectional Scene
+// Reprojection", 2011). It converges where d changes by less than a pixel per pixel, and to different surfaces
+// from different starts: the pixel's own trajectory, and the candidate motions of its tile.
 //#include common/frame.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
 //#include blur/gather_tile.wgsl
 
-struct Sources {
-    offsets: vec4f,         // of the frames [frame intervals]; the first is 0, the frame itself
-    places: vec4u,          // where their layers are
+struct SourceFrames {
+    offsets: vec4f,         // [frame intervals]; the first is 0, the frame itself
+    slots: vec4u,           // of their layers in the textures, see texture_layer()
     count: u32,
 }
 
-@group(1) @binding(0) var<uniform> sources: Sources;
-@group(1) @binding(1) var paths: texture_2d_array<u32>;     // see packed(), stored()
-@group(1) @binding(2) var tiles: texture_2d_array<f32>;     // LAYERS a frame
+@group(1) @binding(0) var<uniform> sources: SourceFrames;
+@group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // see pack_surface(), texture_layer()
+@group(1) @binding(2) var tile_candidates: texture_2d_array<f32>;   // CANDIDATE_LAYERS per frame
 
-const STEPS: u32 = 4u;          // of a search from the pixel's own path, at most
-const FOUND: f32 = 0.5;         // a step shorter than this [px] ends the search
-const MISS: f32 = 1.0;          // a sample farther than this [px] from the pixel is none of it
-const SAME: f32 = 0.75;         // searches, and samples of one layer, closer than this [px] are one
-const NEIGHBOUR: f32 = 1.1;     // a neighbouring frame's sample counts as this much farther
-const TRUSTED: f32 = 0.25;      // times up to which the frame itself needs no second opinion [frame intervals]
+const MAX_ITERATIONS: u32 = 4u; // from the pixel's own trajectory
+const CONVERGED: f32 = 0.5;     // a step shorter than this [px] ends the iteration
+const MAX_RESIDUAL: f32 = 1.0;  // a sample that is farther than this [px] from the pixel is not there
+const SOLUTION_TOLERANCE: f32 = 0.75;   // displacements closer than this [px] in x and y are the same solution
+const NEIGHBOUR_DEPTH_BIAS: f32 = 1.1;  // factor of depths in neighbouring frames: the frame's own sample is preferred
+const TRUSTED_TIME: f32 = 0.25; // up to here from its instant the frame itself is enough, if it shows anything [frame intervals]
 
-// What gather_plain.wgsl writes: a bit a time, blocks of so many px a side, words of so many times.
-const BLOCK: u32 = 4u;
-const AT_ONCE: u32 = 32u;
+// What the classification writes: a bit per time, in words, of every block of pixels.
+const BLOCK: u32 = 4u;          // side [px]
+const TIMES_PER_WORD: u32 = 32u;
 
-struct Reach {          // what a tile may show of a frame, see gather_tile.wgsl
-    about: vec4f,
-    depths: vec4f,
-    comes: vec4f,
-    goes: vec4f,
-    vx: vec4f,          // velocities, curvatures of its motions
+struct Candidates {     // motions that may bring something of one frame into a tile, the nearest first
+    header: vec4f,      // see CANDIDATE_LAYERS
+    min_depth: vec4f,
+    t_enter: vec4f,     // since that frame's instant [frame intervals]
+    t_exit: vec4f,
+    vx: vec4f,          // velocities
     vy: vec4f,
-    cx: vec4f,
-    cy: vec4f,
+    ax: vec4f,          // half accelerations
+    ay: vec4f,
 }
 
-fn reach(tile: vec2u, f: u32) -> Reach {
+fn load_candidates(tile: vec2u, f: u32) -> Candidates {
     let none = vec4f(0.0);
-    if f >= sources.count { return Reach(none, vec4f(NONE), vec4f(NONE), vec4f(-NONE), none, none, none, none); }
-    let first = f * LAYERS;
-    let a = textureLoad(tiles, tile, first + 4u, 0);
-    let b = textureLoad(tiles, tile, first + 5u, 0);
-    let c = textureLoad(tiles, tile, first + 6u, 0);
-    let d = textureLoad(tiles, tile, first + 7u, 0);
-    return Reach(
-        textureLoad(tiles, tile, first, 0),
-        textureLoad(tiles, tile, first + 1u, 0),
-        textureLoad(tiles, tile, first + 2u, 0),
-        textureLoad(tiles, tile, first + 3u, 0),
+    if f >= sources.count {
+        return Candidates(none, vec4f(INFINITE), vec4f(INFINITE), vec4f(-INFINITE), none, none, none, none);
+    }
+    let first = f * CANDIDATE_LAYERS;
+    let a = textureLoad(tile_candidates, tile, first + 4u, 0);
+    let b = textureLoad(tile_candidates, tile, first + 5u, 0);
+    let c = textureLoad(tile_candidates, tile, first + 6u, 0);
+    let d = textureLoad(tile_candidates, tile, first + 7u, 0);
+    return Candidates(
+        textureLoad(tile_candidates, tile, first, 0),
+        textureLoad(tile_candidates, tile, first + 1u, 0),
+        textureLoad(tile_candidates, tile, first + 2u, 0),
+        textureLoad(tile_candidates, tile, first + 3u, 0),
         vec4f(a.x, b.x, c.x, d.x),
         vec4f(a.y, b.y, c.y, d.y),
         vec4f(a.z, b.z, c.z, d.z),
@@ -56,110 +62,116 @@ fn reach(tile: vec2u, f: u32) -> Reach {
     );
 }
 
-fn of_frame(f: u32, a: Reach, b: Reach, c: Reach) -> Reach {
-    var here = a;
-    if f == 1u { here = b; }
-    if f == 2u { here = c; }
-    return here;
+/// Those of frame `f`.
+fn candidates_of(f: u32, a: Candidates, b: Candidates, c: Candidates) -> Candidates {
+    var result = a;
+    if f == 1u { result = b; }
+    if f == 2u { result = c; }
+    return result;
 }
 
-/// Which of a tile's motions may come by the time `u`, and be nearer than `depth`.
-fn worth(here: Reach, u: f32, depth: f32) -> vec4<bool> {
-    return (here.depths < vec4f(depth)) & (here.comes <= vec4f(u)) & (vec4f(u) <= here.goes);
+/// Which candidates may be in the tile at the time `u` and nearer than `depth`.
+fn may_be_visible(candidates: Candidates, u: f32, depth: f32) -> vec4<bool> {
+    return (candidates.min_depth < vec4f(depth)) & (candidates.t_enter <= vec4f(u)) & (vec4f(u) <= candidates.t_exit);
 }
 
-/// Displacements by the time `u` along a tile's motions, x and y [px].
-fn displaced_x(here: Reach, u: f32) -> vec4f {
-    return (here.vx + here.cx * u) * u;
+/// Displacements by the time `u` along the candidate motions, x and y [px].
+fn displacements_x(candidates: Candidates, u: f32) -> vec4f {
+    return (candidates.vx + candidates.ax * u) * u;
 }
 
-fn displaced_y(here: Reach, u: f32) -> vec4f {
-    return (here.vy + here.cy * u) * u;
+fn displacements_y(candidates: Candidates, u: f32) -> vec4f {
+    return (candidates.vy + candidates.ay * u) * u;
 }
 
-struct Starts {         // displacements to search from
-    left: vec4<bool>,
+struct Seeds {          // displacements to start from [px]
+    pending: vec4<bool>,
     x: vec4f,
     y: vec4f,
 }
 
-fn next_of(starts: ptr<function, Starts>) -> vec2f {
-    let s = *starts;
-    (*starts).left = s.left & vec4<bool>(false, s.left.x, any(s.left.xy), any(s.left.xyz));
-    let later = select(vec2f(s.x.w, s.y.w), vec2f(s.x.z, s.y.z), s.left.z);
-    return select(select(later, vec2f(s.x.y, s.y.y), s.left.y), vec2f(s.x.x, s.y.x), s.left.x);
+/// The first pending seed, which is pending no more.
+fn next_seed(seeds: ptr<function, Seeds>) -> vec2f {
+    let s = *seeds;
+    (*seeds).pending = s.pending & vec4<bool>(false, s.pending.x, any(s.pending.xy), any(s.pending.xyz));
+    let later = select(vec2f(s.x.w, s.y.w), vec2f(s.x.z, s.y.z), s.pending.z);
+    return select(select(later, vec2f(s.x.y, s.y.y), s.pending.y), vec2f(s.x.x, s.y.x), s.pending.x);
 }
 
-/// The neighbour on the side of `t`, or the only one; the `second`, the other one.
+/// The neighbouring frame on the side of `t`, or the only one; the `second`: the other one.
 fn neighbour_of(t: f32, second: bool) -> u32 {
     return select(1u, 2u, (sources.count == 3u && t > 0.0) != second);
 }
 
-/// Where in the textures a layer is: near, far, of the frames one after the other.
-fn stored(layer: u32) -> u32 {
+/// Where in the textures a layer is. Layers are counted front, back of the frame itself, front, back of the next one, ...
+fn texture_layer(layer: u32) -> u32 {
     let f = layer / 2u;
-    let places = sources.places;
-    return 2u * select(select(places.z, places.y, f == 1u), places.x, f == 0u) + layer % 2u;
+    let slots = sources.slots;
+    return 2u * select(select(slots.z, slots.y, f == 1u), slots.x, f == 0u) + layer % 2u;
 }
 
 fn offset_of(f: u32) -> f32 {
     return select(select(sources.offsets.z, sources.offsets.y, f == 1u), 0.0, f == 0u);
 }
 
-/// Whether nothing in the reach of a tile moves.
-fn is_still(a: Reach, b: Reach, c: Reach) -> bool {
-    return max(a.about.z, max(b.about.z, c.about.z)) < STILL;
+/// Whether nothing moves that may come into a tile.
+fn is_static_tile(a: Candidates, b: Candidates, c: Candidates) -> bool {
+    return max(a.header.z, max(b.header.z, c.header.z)) < STATIC_EPSILON;
 }
 
-/// The sample times of the pixel at `x`, moved by `shift` within their shares.
-fn times_of(x: vec2f, shift: f32, a: Reach, b: Reach, c: Reach) -> Times {
-    let streak = max(streak_of(a, 0u), max(streak_of(b, 1u), streak_of(c, 2u)));
-    return enough_times(shutter_times(x, shift), streak);
+/// Sample times of the pixel at `x` [px], moved by `shift` within their strata.
+fn sample_times(x: vec2f, shift: f32, a: Candidates, b: Candidates, c: Candidates) -> SampleTimes {
+    let blur_length = max(blur_length_of(a, 0u), max(blur_length_of(b, 1u), blur_length_of(c, 2u)));
+    return with_adaptive_count(shutter_times(x, shift), blur_length);
 }
 
-/// How long a streak the longest motion of a frame leaves in the exposure [px].
-fn streak_of(here: Reach, f: u32) -> f32 {
-    let since = abs(shown(sources.offsets[f]));
-    return here.about.z * (shutter.span.y - shutter.span.x) / max(max(since.x, since.y), 1e-9);
+/// How far the longest candidate motion of frame `f` gets while the shutter is open [px].
+fn blur_length_of(candidates: Candidates, f: u32) -> f32 {
+    let window = abs(exposure_window(sources.offsets[f]));
+    return candidates.header.z * (shutter.span.y - shutter.span.x) / max(max(window.x, window.y), 1e-9);
 }
 
-fn inside(q: vec2f) -> bool {
-    return all(q >= vec2f(0.0)) && all(q < vec2f(frame.size));
+fn is_inside(p: vec2f) -> bool {
+    return all(p >= vec2f(0.0)) && all(p < vec2f(frame.size));
 }
 
-/// Whether two displacements, or two places, are the same.
-fn alike(a: vec2f, b: vec2f) -> bool {
-    return all(abs(a - b) < vec2f(SAME));
+fn same_solution(a: vec2f, b: vec2f) -> bool {
+    return all(abs(a - b) < vec2f(SOLUTION_TOLERANCE));
 }
 
-struct Place {
-    texel: vec4u,       // see packed(): whose displacement it is
-    d: vec2f,           // [px]
-    miss: f32,          // squared distance from the pixel of what is there by the time `u` [px^2]
+/// Which of the displacements are the solution `d`.
+fn are_solution(x: vec4f, y: vec4f, d: vec2f) -> vec4<bool> {
+    return (abs(x - d.x) < vec4f(SOLUTION_TOLERANCE)) & (abs(y - d.y) < vec4f(SOLUTION_TOLERANCE));
 }
 
-/// One step of the fixed point of d = displacement(x - d), in a layer, `u` after its frame's instant.
-fn step_from(x: vec2f, d: vec2f, u: f32, layer: u32) -> Place {
-    let q = x - d;
-    let texel = textureLoad(paths, vec2i(floor(q)), layer, 0);
-    let next = displacement(path_in(texel), u);
+struct WarpState {
+    surface: vec4u,     // see pack_surface(): whose displacement it is
+    d: vec2f,           // [px]; x - d is the next point of the iteration, and the solution when it has ended
+    residual2: f32,     // squared distance from x of where that surface is at the time `u` [px^2]
+}
+
+/// One step d <- displacement at (x - d) in a layer, `u` after its frame's instant. INFINITE residual outside the image.
+fn warp_step(x: vec2f, d: vec2f, u: f32, layer: u32) -> WarpState {
+    let p = x - d;
+    let surface = textureLoad(surfaces, vec2i(floor(p)), layer, 0);
+    let next = displacement(unpack_trajectory(surface), u);
     let step = next - d;
-    return Place(texel, next, select(NONE, dot(step, step), inside(q)));
+    return WarpState(surface, next, select(INFINITE, dot(step, step), is_inside(p)));
 }
 
-/// Whether such steps have ended: at a place, or outside the picture.
-fn has_ended(place: Place) -> bool {
-    return place.miss < FOUND * FOUND || place.miss >= NONE;
+/// Whether the iteration has converged, or left the image.
+fn has_ended(state: WarpState) -> bool {
+    return state.residual2 < CONVERGED * CONVERGED || state.residual2 >= INFINITE;
 }
 
-/// The fixed point, from a displacement.
-fn follow(x: vec2f, start: vec2f, u: f32, layer: u32) -> Place {
-    var place = Place(vec4u(0u), start, NONE);
+/// The fixed point to which the iteration leads from the displacement `start`.
+fn iterate_fixed_point(x: vec2f, start: vec2f, u: f32, layer: u32) -> WarpState {
+    var state = WarpState(vec4u(0u), start, INFINITE);
     var n = 0u;
     loop {
-        place = step_from(x, place.d, u, layer);
+        state = warp_step(x, state.d, u, layer);
         n++;
-        if has_ended(place) || n >= STEPS { break; }
+        if has_ended(state) || n >= MAX_ITERATIONS { break; }
     }
-    return place;
+    return state;
 }

@@ -1,38 +1,46 @@
-// What a tile of a frame may show over the exposure: the few motions that stand for all in it.
+// A surface as the search reads it, packed into one texel; and the tiles for which candidate motions are kept.
 //#include common/path.wgsl
 
 const TILE: u32 = 16u;          // side [px]
-const PATHS: u32 = 4u;          // motions kept a tile
-const LAYERS: u32 = 8u;         // of the texture that holds them: about, depths, from when, till when, then the paths
-
-const NONE: f32 = 3e38;         // depth of nothing
-const STILL: f32 = 0.01;        // what is displaced by less than this [px] needs no search
+const MOTIONS: u32 = 4u;        // motions kept per tile
+const INFINITE: f32 = 3e38;     // over all depths, distances and times: those of nothing at all
 const HALF_MAX: f32 = 65504.0;  // largest finite f16
 
-// `about`: how many paths there are, fewer where the rest is like these or like standing still; 1 if
-// there are silhouettes; the longest displacement [px].
+// The candidate motions of a tile: those which may bring something into it while the shutter is open. Per frame they
+// are layers of one texture: header, min_depth, t_enter, t_exit, then the trajectories. The header is
+// their number, which is smaller where further ones would resemble these or standing still; 1 if an edge may come;
+// the greatest displacement [px]; 0.
+const CANDIDATE_LAYERS: u32 = 8u;
 
+/// Tiles across and down an image.
 fn tiles_of(size: vec2u) -> vec2u {
     return (size + TILE - 1u) / TILE;
 }
 
-/// A place of a surface: all that the search needs in one texel, rgba32uint. Velocity, curvature in
-/// half floats, depth; a depth under 0 is that of a pixel at a silhouette; in a far layer, 0 says that
-/// there is none. The last bit of the depth says whether the pixel is calm.
-fn packed(path: Path, depth: f32, calm: bool) -> vec4u {
-    let curvature = clamp(path.curvature, vec2f(-HALF_MAX), vec2f(HALF_MAX));
-    let bits = (bitcast<u32>(depth) & ~1u) | u32(calm);
-    return vec4u(bitcast<vec2u>(path.velocity), pack2x16float(curvature), bits);
+/// All that the search needs to know of a pixel's front or back layer, as rgba32uint: velocity, half acceleration in
+/// half floats, depth. The sign of the depth and its last bit are flags.
+/// Front layer: depth is negative if an edge is within a pixel; the last bit says that it is smooth, one surface of
+/// one weight in its 3 x 3. Back layer: depth is 0 if there is none; the last bit says that it was seen, not inferred.
+fn pack_surface(trajectory: Trajectory, depth: f32, last_bit: bool) -> vec4u {
+    let half_acceleration = clamp(trajectory.half_acceleration, vec2f(-HALF_MAX), vec2f(HALF_MAX));
+    let bits = (bitcast<u32>(depth) & ~1u) | u32(last_bit);
+    return vec4u(bitcast<vec2u>(trajectory.velocity), pack2x16float(half_acceleration), bits);
 }
 
-fn path_in(texel: vec4u) -> Path {
-    return Path(bitcast<vec2f>(texel.xy), unpack2x16float(texel.z));
+fn unpack_trajectory(surface: vec4u) -> Trajectory {
+    return Trajectory(bitcast<vec2f>(surface.xy), unpack2x16float(surface.z));
 }
 
-fn depth_in(texel: vec4u) -> f32 {
-    return bitcast<f32>(texel.w & ~1u);
+fn unpack_depth(surface: vec4u) -> f32 {
+    return bitcast<f32>(surface.w & ~1u);
 }
 
-fn is_calm(texel: vec4u) -> bool {
-    return (texel.w & 1u) == 1u;
+/// Of a front layer.
+fn is_smooth(surface: vec4u) -> bool {
+    return (surface.w & 1u) == 1u;
+}
+
+/// Of a back layer.
+fn was_seen(surface: vec4u) -> bool {
+    return (surface.w & 1u) == 1u;
 }

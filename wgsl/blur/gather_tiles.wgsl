@@ -1,4 +1,6 @@
-// The motions of every tile, then of every tile that they reach while the shutter is open.
+// Candidate motions of every tile. First the motions within each tile are clustered to a few; then each tile gathers
+// those clusters, of itself and of all tiles around, whose sweep over the exposure meets it. McGuire et al. (2012)
+// keep one motion per tile, TileMax and NeighborMax; this keeps MOTIONS, with depths and the times at which they come.
 //#include common/frame.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
@@ -6,273 +8,287 @@
 //#include blur/gather_listed.wgsl
 //#include blur/gather_tile.wgsl
 
-struct Source {
-    offset: f32,        // of the frame [frame intervals]
-    first: u32,         // where its layers begin in `reaching`
+struct SourceFrame {
+    offset: f32,        // [frame intervals]
+    first: u32,         // its first layer in `tile_candidates`
 }
 
-@group(1) @binding(0) var<uniform> source: Source;
-@group(1) @binding(1) var near: texture_2d<u32>;        // see packed()
-@group(1) @binding(2) var content: texture_2d_array<f32>;   // what `local` wrote
-@group(1) @binding(3) var contents: Vectors;            // of every tile's own pixels, HELD layers
-@group(1) @binding(4) var reaching: Vectors;            // of all that reaches it, LAYERS a frame
-@group(1) @binding(5) var<storage, read_write> farthest: atomic<u32>;   // bits of the longest displacement of all
-@group(1) @binding(6) var<storage, read> moving: Listed;    // cells, see gather_live.wgsl
-@group(1) @binding(7) var<storage, read> resting: Listed;
-@group(1) @binding(8) var wide_box: texture_2d<f32>;    // what `widen` wrote
-@group(1) @binding(9) var wide_boxes: Boxes;            // around the boxes of WIDE x WIDE tiles
+@group(1) @binding(0) var<uniform> source: SourceFrame;
+@group(1) @binding(1) var front_surface: texture_2d<u32>;   // see pack_surface()
+@group(1) @binding(2) var tile_motions: texture_2d_array<f32>;      // what `cluster_motions` wrote
+@group(1) @binding(3) var tile_motions_out: Layers;     // of every tile's own pixels, MOTION_LAYERS
+@group(1) @binding(4) var tile_candidates: Layers;      // of all that may come into it, CANDIDATE_LAYERS per frame
+@group(1) @binding(5) var<storage, read_write> max_displacement: atomic<u32>;   // bits of the greatest of all tiles [px]
+@group(1) @binding(6) var<storage, read> active_cells: WorkList;
+@group(1) @binding(7) var<storage, read> static_cells: WorkList;
+@group(1) @binding(8) var coarse_boxes: texture_2d<f32>;    // what `coarsen` wrote
+@group(1) @binding(9) var coarse_boxes_out: Boxes;      // around the boxes of COARSE x COARSE tiles
 
-alias Vectors = texture_storage_2d_array<rgba32float, write>;
+alias Layers = texture_storage_2d_array<rgba32float, write>;
 alias Boxes = texture_storage_2d<rgba32float, write>;
 
-// Layers of `contents`, after the paths.
-const BOX: u32 = 4u;            // least, greatest displacement of any while the frame is shown [px]
-const DEPTHS: u32 = 5u;         // the least depth of what moves like each path
-const ABOUT: u32 = 6u;          // see gather_tile.wgsl
-const HELD: u32 = 7u;
+// Layers of `tile_motions`, after the MOTIONS trajectories.
+const BOX: u32 = 4u;            // least, greatest displacement of any while the frame is exposed [px]
+const MIN_DEPTH: u32 = 5u;      // the least depth of the pixels of each cluster
+const HEADER: u32 = 6u;         // as of the candidates, see CANDIDATE_LAYERS
+const MOTION_LAYERS: u32 = 7u;
 
-const WIDE: i32 = 4;
-const ALIKE: f32 = 0.5;         // displacements closer than this [px] stand for each other
+const COARSE: i32 = 4;          // tiles per side of a coarse box
+const MERGE_DISTANCE: f32 = 0.5;    // motions closer than this [px] are one
 
-/// The same to the most similar one of `chosen`; those not chosen yet are 0, which stands still.
-fn unlike(path: vec4f, chosen: array<vec4f, 4>, u: f32) -> f32 {
-    return min(min(apart(path, chosen[0], u), apart(path, chosen[1], u)),
-               min(apart(path, chosen[2], u), apart(path, chosen[3], u)));
+/// Squared distance [px^2] to the nearest of the clusters' motions. Those not found yet are 0, standing still, so that
+/// static content needs no cluster.
+fn distance2_to_clusters(trajectory: vec4f, clusters: array<vec4f, 4>, u: f32) -> f32 {
+    return min(min(trajectory_distance2(trajectory, clusters[0], u), trajectory_distance2(trajectory, clusters[1], u)),
+               min(trajectory_distance2(trajectory, clusters[2], u), trajectory_distance2(trajectory, clusters[3], u)));
 }
 
-/// Which of `chosen` is most like `path`.
-fn most_alike(path: vec4f, chosen: array<vec4f, 4>, u: f32) -> vec4<bool> {
-    let d = vec4f(apart(path, chosen[0], u), apart(path, chosen[1], u),
-                  apart(path, chosen[2], u), apart(path, chosen[3], u));
+/// Which of the clusters is nearest; several if they are equally near.
+fn nearest_cluster(trajectory: vec4f, clusters: array<vec4f, 4>, u: f32) -> vec4<bool> {
+    let d = vec4f(trajectory_distance2(trajectory, clusters[0], u), trajectory_distance2(trajectory, clusters[1], u),
+                  trajectory_distance2(trajectory, clusters[2], u), trajectory_distance2(trajectory, clusters[3], u));
     let least = min(min(d.x, d.y), min(d.z, d.w));
     return d == vec4f(least);
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn clear(@builtin(global_invocation_id) id: vec3u) {
-    if all(id.xy == vec2u(0u)) { atomicStore(&farthest, 0u); }
+    if all(id.xy == vec2u(0u)) { atomicStore(&max_displacement, 0u); }
 }
 
-/// The few motions of a tile's own pixels.
+/// Farthest-point clustering of the motions of a tile's own pixels (Gonzalez 1985): the first cluster is at the
+/// longest motion, each further one at the motion farthest from all before.
 @compute @workgroup_size(WG_X, WG_Y)
-fn local(@builtin(local_invocation_index) local: u32,
+fn cluster_motions(@builtin(local_invocation_index) local: u32,
         @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let k = place_in_list(local, group, groups);
-    let n = k / CELL;
-    let moves = n < moving.count;
-    let cell = cell_in(select(resting.cells[n - moving.count], moving.cells[n], moves));
-    let id = cell * vec2u(CELL, 1u) + vec2u(k % CELL, 0u);
-    if n >= moving.count + resting.count || id.x >= tiles_of(frame.size).x { return; }
+    let k = work_index(local, group, groups);
+    let n = k / CELL_TILES;
+    let is_active = n < active_cells.count;
+    let cell = unpack_cell(select(static_cells.cells[n - active_cells.count], active_cells.cells[n], is_active));
+    let id = cell * vec2u(CELL_TILES, 1u) + vec2u(k % CELL_TILES, 0u);
+    if n >= active_cells.count + static_cells.count || id.x >= tiles_of(frame.size).x { return; }
     let corner = id * TILE;
     let end = min(corner + TILE, frame.size) - 1u;
-    let pixels = select(0u, TILE * TILE, moves);        // some twice in tiles that are cut off
-    let span = shown(source.offset);
-    let u = longest_time(source.offset);
-    var paths = array<vec4f, 4>();      // the longest, then always the most different
+    let pixels = select(0u, TILE * TILE, is_active);    // those of tiles that are cut off count several times
+    let window = exposure_window(source.offset);
+    let u = max_abs_time(source.offset);
+    var motions = array<vec4f, 4>();
     var box = vec4f(0.0);
     var count = 0.0;
     var longest = 0.0;
     var more = true;
-    for (var k = 0u; k < PATHS && more; k++) {
-        let chosen = paths;
-        var most = 0.0;
+    for (var k = 0u; k < MOTIONS && more; k++) {
+        let clusters = motions;
+        var farthest = 0.0;
         var found = vec4f(0.0);
         for (var i = 0u; i < pixels; i++) {
-            let path = as_vec4(path_in(textureLoad(near, min(corner + vec2u(i % TILE, i / TILE), end), 0)));
-            let least = unlike(path, chosen, u);
-            if least > most && least < WILD * WILD {
-                most = least;
-                found = path;
+            let px = min(corner + vec2u(i % TILE, i / TILE), end);
+            let trajectory = as_vec4(unpack_trajectory(textureLoad(front_surface, px, 0)));
+            let distance2 = distance2_to_clusters(trajectory, clusters, u);
+            if distance2 > farthest && distance2 < MAX_MOTION * MAX_MOTION {
+                farthest = distance2;
+                found = trajectory;
             }
         }
-        if k == 0u { longest = sqrt(most); }
-        more = most > ALIKE * ALIKE;
+        if k == 0u { longest = sqrt(farthest); }
+        more = farthest > MERGE_DISTANCE * MERGE_DISTANCE;
         if more {
             count += 1.0;
-            paths[k] = found;
-            let a = displaced(found, span.x);
-            let b = displaced(found, span.y);
+            motions[k] = found;
+            let a = displacement4(found, window.x);
+            let b = displacement4(found, window.y);
             box = vec4f(min(box.xy, min(a, b)), max(box.zw, max(a, b)));
         }
     }
-    var split = 0.0;
-    var depths = vec4f(NONE);
+    var has_edge = 0.0;
+    var min_depth = vec4f(INFINITE);
     for (var i = 0u; i < pixels; i++) {
-        let texel = textureLoad(near, min(corner + vec2u(i % TILE, i / TILE), end), 0);
-        let z = abs(depth_in(texel));
-        if depth_in(texel) < 0.0 { split = 1.0; }
-        depths = min(depths, select(vec4f(NONE), vec4f(z), most_alike(as_vec4(path_in(texel)), paths, u)));
+        let surface = textureLoad(front_surface, min(corner + vec2u(i % TILE, i / TILE), end), 0);
+        let z = abs(unpack_depth(surface));
+        if unpack_depth(surface) < 0.0 { has_edge = 1.0; }
+        let is_nearest = nearest_cluster(as_vec4(unpack_trajectory(surface)), motions, u);
+        min_depth = min(min_depth, select(vec4f(INFINITE), vec4f(z), is_nearest));
     }
-    for (var k = 0u; k < PATHS; k++) { textureStore(contents, id, k, paths[k]); }
-    textureStore(contents, id, BOX, box);
-    textureStore(contents, id, DEPTHS, depths);
-    textureStore(contents, id, ABOUT, vec4f(count, split, longest, 0.0));
-    atomicMax(&farthest, bitcast<u32>(longest));
+    for (var k = 0u; k < MOTIONS; k++) { textureStore(tile_motions_out, id, k, motions[k]); }
+    textureStore(tile_motions_out, id, BOX, box);
+    textureStore(tile_motions_out, id, MIN_DEPTH, min_depth);
+    textureStore(tile_motions_out, id, HEADER, vec4f(count, has_edge, longest, 0.0));
+    atomicMax(&max_displacement, bitcast<u32>(longest));
 }
 
-/// The boxes of many tiles as one, so that `reach` need not look at each.
+/// One box around those of many tiles, so that `gather_candidates` need not look at each.
 @compute @workgroup_size(WG_X, WG_Y)
-fn widen(@builtin(global_invocation_id) id: vec3u) {
-    let first = vec2i(id.xy) * WIDE;
+fn coarsen(@builtin(global_invocation_id) id: vec3u) {
+    let first = vec2i(id.xy) * COARSE;
     let tiles = vec2i(tiles_of(frame.size));
     if any(first >= tiles) { return; }
     var box = vec4f(0.0);
-    for (var i = 0; i < WIDE * WIDE; i++) {
-        let one = textureLoad(content, min(first + vec2i(i % WIDE, i / WIDE), tiles - 1), BOX, 0);
+    for (var i = 0; i < COARSE * COARSE; i++) {
+        let one = textureLoad(tile_motions, min(first + vec2i(i % COARSE, i / COARSE), tiles - 1), BOX, 0);
         box = vec4f(min(box.xy, one.xy), max(box.zw, one.zw));
     }
-    textureStore(wide_boxes, id.xy, box);
+    textureStore(coarse_boxes_out, id.xy, box);
 }
 
-/// The few motions that lead to a tile, from wherever they come.
+/// The candidates of one tile: clusters of all motions, from wherever they come, whose sweep meets it.
 @compute @workgroup_size(WG_X, WG_Y)
-fn reach(@builtin(local_invocation_index) local: u32,
+fn gather_candidates(@builtin(local_invocation_index) local: u32,
         @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let k = place_in_list(local, group, groups);
+    let k = work_index(local, group, groups);
     let tiles = tiles_of(frame.size);
-    let id = cell_in(moving.cells[k / CELL]) * vec2u(CELL, 1u) + vec2u(k % CELL, 0u);
-    if k / CELL >= moving.count || id.x >= tiles.x { return; }
-    let span = shown(source.offset);
-    let u = longest_time(source.offset);
-    let around = min(i32(ceil(bitcast<f32>(atomicLoad(&farthest)) / f32(TILE))) + 1, FARTHEST);
+    let id = unpack_cell(active_cells.cells[k / CELL_TILES]) * vec2u(CELL_TILES, 1u) + vec2u(k % CELL_TILES, 0u);
+    if k / CELL_TILES >= active_cells.count || id.x >= tiles.x { return; }
+    let window = exposure_window(source.offset);
+    let u = max_abs_time(source.offset);
+    let longest_of_all = bitcast<f32>(atomicLoad(&max_displacement));
+    let radius = min(i32(ceil(longest_of_all / f32(TILE))) + 1, MAX_TILE_RADIUS);
     let here = vec2i(id);
-    let low = max(here - around, vec2i(0));
-    let high = min(here + around, vec2i(tiles) - 1);
-    let lowest = low / WIDE;
-    let highest = high / WIDE;
-    var first = here;       // of the tiles that may lead here
+    let low = max(here - radius, vec2i(0));
+    let high = min(here + radius, vec2i(tiles) - 1);
+
+    // The range of tiles around of which something may come: first by coarse boxes,
+    let coarse_low = low / COARSE;
+    let coarse_high = high / COARSE;
+    var first = here;
     var last = here;
-    for (var wide = lowest; wide.y <= highest.y; wide = after(wide, lowest, highest)) {
-        let box = textureLoad(wide_box, wide, 0);
-        let side = f32((WIDE - 1) * i32(TILE));
-        let off = vec2f((here - wide * WIDE) * i32(TILE));
-        if meets(vec4f(box.xy, box.zw + side), off) {
-            first = min(first, wide * WIDE);
-            last = max(last, wide * WIDE + WIDE - 1);
+    for (var coarse = coarse_low; coarse.y <= coarse_high.y; coarse = after(coarse, coarse_low, coarse_high)) {
+        let box = textureLoad(coarse_boxes, coarse, 0);
+        let side = f32((COARSE - 1) * i32(TILE));
+        let off = vec2f((here - coarse * COARSE) * i32(TILE));
+        if sweep_overlaps(vec4f(box.xy, box.zw + side), off) {
+            first = min(first, coarse * COARSE);
+            last = max(last, coarse * COARSE + COARSE - 1);
         }
     }
+    // then by their own boxes and if they move.
     let least = max(first, low);
     let most = min(last, high);
-    first = here;           // of those that do, and move
+    first = here;
     last = here;
-    var split = 0.0;
+    var has_edge = 0.0;
     var longest = 0.0;
     for (var tile = least; tile.y <= most.y; tile = after(tile, least, most)) {
-        let there = other(tile, here);
-        if there.leads {
-            let about = textureLoad(content, there.at, ABOUT, 0);
-            split = max(split, about.y);
-            longest = max(longest, about.z);
-            if there.count > 0u {
+        let other = source_tile(tile, here);
+        if other.may_reach {
+            let header = textureLoad(tile_motions, other.at, HEADER, 0);
+            has_edge = max(has_edge, header.y);
+            longest = max(longest, header.z);
+            if other.count > 0u {
                 first = min(first, tile);
                 last = max(last, tile);
             }
         }
     }
-    var chosen = array<vec4f, 4>();
-    var chosen_count = 0u;
+
+    // Farthest-point clustering of all the motions that come.
+    var motions = array<vec4f, 4>();
+    var count = 0u;
     var more = true;
-    for (var k = 0u; k < PATHS && more; k++) {
-        var best = 0.0;
+    for (var k = 0u; k < MOTIONS && more; k++) {
+        var farthest = 0.0;
         var found = vec4f(0.0);
         for (var tile = first; tile.y <= last.y; tile = after(tile, first, last)) {
-            let there = other(tile, here);
-            for (var n = 0u; n < there.count; n++) {
-                let path = textureLoad(content, there.at, n, 0);
-                let least = unlike(path, chosen, u);
-                let when = lands(path, span, there.off);
-                if least > best && when.x <= when.y {
-                    best = least;
-                    found = path;
+            let other = source_tile(tile, here);
+            for (var n = 0u; n < other.count; n++) {
+                let trajectory = textureLoad(tile_motions, other.at, n, 0);
+                let distance2 = distance2_to_clusters(trajectory, motions, u);
+                let interval = sweep_interval(trajectory, window, other.off);
+                if distance2 > farthest && interval.x <= interval.y {
+                    farthest = distance2;
+                    found = trajectory;
                 }
             }
         }
-        more = best > ALIKE * ALIKE;
+        more = farthest > MERGE_DISTANCE * MERGE_DISTANCE;
         if more {
-            chosen[k] = found;
-            chosen_count = k + 1u;
+            motions[k] = found;
+            count = k + 1u;
         }
     }
-    var depths = vec4f(NONE);
-    var comes = vec4f(1.0);
-    var goes = vec4f(0.0);
+
+    // The least depth of each cluster, and when the first of it enters the tile and the last leaves it.
+    var min_depth = vec4f(INFINITE);
+    var t_enter = vec4f(1.0);
+    var t_exit = vec4f(0.0);
     for (var tile = first; tile.y <= last.y; tile = after(tile, first, last)) {
-        let there = other(tile, here);
-        for (var n = 0u; n < there.count; n++) {
-            let path = textureLoad(content, there.at, n, 0);
-            let when = lands(path, span, there.off);
-            if when.x <= when.y {
-                let alike = most_alike(path, chosen, u);
-                depths = min(depths, select(vec4f(NONE), vec4f(textureLoad(content, there.at, DEPTHS, 0)[n]), alike));
-                comes = min(comes, select(vec4f(1.0), vec4f(when.x), alike));
-                goes = max(goes, select(vec4f(0.0), vec4f(when.y), alike));
+        let other = source_tile(tile, here);
+        for (var n = 0u; n < other.count; n++) {
+            let trajectory = textureLoad(tile_motions, other.at, n, 0);
+            let interval = sweep_interval(trajectory, window, other.off);
+            if interval.x <= interval.y {
+                let nearest = nearest_cluster(trajectory, motions, u);
+                let z = textureLoad(tile_motions, other.at, MIN_DEPTH, 0)[n];
+                min_depth = min(min_depth, select(vec4f(INFINITE), vec4f(z), nearest));
+                t_enter = min(t_enter, select(vec4f(1.0), vec4f(interval.x), nearest));
+                t_exit = max(t_exit, select(vec4f(0.0), vec4f(interval.y), nearest));
             }
         }
     }
-    // The nearest first.
-    for (var i = 0u; i < PATHS; i++) {
-        for (var k = 0u; k + 1u < chosen_count; k++) {
-            if depths[k] > depths[k + 1u] {
-                let path = chosen[k];
-                chosen[k] = chosen[k + 1u];
-                chosen[k + 1u] = path;
-                let z = depths[k];
-                depths[k] = depths[k + 1u];
-                depths[k + 1u] = z;
-                let a = comes[k];
-                comes[k] = comes[k + 1u];
-                comes[k + 1u] = a;
-                let b = goes[k];
-                goes[k] = goes[k + 1u];
-                goes[k + 1u] = b;
+
+    // Sorted by depth, the nearest first.
+    for (var i = 0u; i < MOTIONS; i++) {
+        for (var k = 0u; k + 1u < count; k++) {
+            if min_depth[k] > min_depth[k + 1u] {
+                let trajectory = motions[k];
+                motions[k] = motions[k + 1u];
+                motions[k + 1u] = trajectory;
+                let z = min_depth[k];
+                min_depth[k] = min_depth[k + 1u];
+                min_depth[k + 1u] = z;
+                let a = t_enter[k];
+                t_enter[k] = t_enter[k + 1u];
+                t_enter[k + 1u] = a;
+                let b = t_exit[k];
+                t_exit[k] = t_exit[k + 1u];
+                t_exit[k + 1u] = b;
             }
         }
     }
-    let about = vec4f(f32(chosen_count), split, longest, 0.0);
-    textureStore(reaching, id, source.first, about);
-    textureStore(reaching, id, source.first + 1u, depths);
-    let none = depths >= vec4f(NONE);
-    textureStore(reaching, id, source.first + 2u, select(span.x + (span.y - span.x) * comes, vec4f(NONE), none));
-    textureStore(reaching, id, source.first + 3u, select(span.x + (span.y - span.x) * goes, vec4f(-NONE), none));
-    for (var k = 0u; k < PATHS; k++) { textureStore(reaching, id, source.first + 4u + k, chosen[k]); }
+    let duration = window.y - window.x;
+    let none = min_depth >= vec4f(INFINITE);
+    textureStore(tile_candidates, id, source.first, vec4f(f32(count), has_edge, longest, 0.0));
+    textureStore(tile_candidates, id, source.first + 1u, min_depth);
+    textureStore(tile_candidates, id, source.first + 2u, select(window.x + duration * t_enter, vec4f(INFINITE), none));
+    textureStore(tile_candidates, id, source.first + 3u, select(window.x + duration * t_exit, vec4f(-INFINITE), none));
+    for (var k = 0u; k < MOTIONS; k++) { textureStore(tile_candidates, id, source.first + 4u + k, motions[k]); }
 }
 
-/// The tile that comes after another one, row by row of those from `first` to `last`.
+/// The tile that follows another one, row by row of those from `first` to `last`.
 fn after(tile: vec2i, first: vec2i, last: vec2i) -> vec2i {
     return select(vec2i(tile.x + 1, tile.y), vec2i(first.x, tile.y + 1), tile.x >= last.x);
 }
 
-struct Other {
+struct SourceTile {     // a tile, seen from another one, `here`
     at: vec2i,
-    off: vec2f,         // from there to here [px]
-    leads: bool,        // some of its motions may lead here
-    count: u32,         // of its paths, if so
+    off: vec2f,         // from it to `here` [px]
+    may_reach: bool,    // some of its motions may lead to `here`
+    count: u32,         // of its motions, if so
 }
 
-fn other(there: vec2i, here: vec2i) -> Other {
-    let off = vec2f((here - there) * i32(TILE));
-    let leads = meets(textureLoad(content, there, BOX, 0), off);
-    return Other(there, off, leads, select(0u, u32(textureLoad(content, there, ABOUT, 0).x), leads));
+fn source_tile(at: vec2i, here: vec2i) -> SourceTile {
+    let off = vec2f((here - at) * i32(TILE));
+    let may_reach = sweep_overlaps(textureLoad(tile_motions, at, BOX, 0), off);
+    return SourceTile(at, off, may_reach, select(0u, u32(textureLoad(tile_motions, at, HEADER, 0).x), may_reach));
 }
 
-/// Whether any motion of a tile, by its box, leads to the one that lies `off` [px] away.
-fn meets(box: vec4f, off: vec2f) -> bool {
+/// Whether the sweep of a tile, by the box of its displacements, may overlap the tile that is `off` [px] away.
+fn sweep_overlaps(box: vec4f, off: vec2f) -> bool {
     let margin = f32(TILE) + 2.0;
     return all(off + margin > box.xy) && all(off - margin < box.zw);
 }
 
-/// From when to when, in shares of the `span`, a tile moving along `path` touches the one that lies
-/// `off` [px] away; the second is less where it never does.
-fn lands(path: vec4f, span: vec2f, off: vec2f) -> vec2f {
-    let a = displaced(path, span.x) - off;
-    let way = displaced(path, span.y) - off - a;
-    let bend = length(path.zw) * (span.y - span.x) * (span.y - span.x) * 0.25;
+/// When a tile moving along `trajectory` overlaps the one that is `off` [px] away, in shares of the `window`: t_enter,
+/// t_exit; t_exit < t_enter if it never does. A slab test of the line from its first to its last position
+/// against a square, which is larger by the greatest distance of the trajectory from that line.
+fn sweep_interval(trajectory: vec4f, window: vec2f, off: vec2f) -> vec2f {
+    let start = displacement4(trajectory, window.x) - off;
+    let sweep = displacement4(trajectory, window.y) - off - start;
+    let bend = length(trajectory.zw) * (window.y - window.x) * (window.y - window.x) * 0.25;
     let margin = f32(TILE) + bend;
-    // The part of the way between two parallel sides, for both pairs of sides.
-    let steps = select(way, vec2f(1e-6), abs(way) < vec2f(1e-6));
-    let one = (-margin - a) / steps;
-    let two = (margin - a) / steps;
-    let enters = min(one, two);
-    let leaves = max(one, two);
-    return vec2f(max(max(enters.x, enters.y), 0.0), min(min(leaves.x, leaves.y), 1.0));
+    let divisor = select(sweep, vec2f(1e-6), abs(sweep) < vec2f(1e-6));
+    let a = (-margin - start) / divisor;
+    let b = (margin - start) / divisor;
+    let t_enter = min(a, b);
+    let t_exit = max(a, b);
+    return vec2f(max(max(t_enter.x, t_enter.y), 0.0), min(min(t_exit.x, t_exit.y), 1.0));
 }

@@ -1,6 +1,7 @@
-// Sample reprojection as published (Taylor): the samples of two frames, rounded to pixels and counted
-// at every camera between the two. Samples that land on a pixel are linked to a list, which is then summed.
+// Sample reprojection as published (Taylor): the samples of two frames, rounded to pixels and averaged over all
+// cameras between the two. Samples that land on a pixel are linked to a list, which is then summed.
 //#include common/camera.wgsl
+//#include common/depth.wgsl
 //#include common/finite.wgsl
 //#include common/frame.wgsl
 //#include common/loops.wgsl
@@ -8,18 +9,18 @@
 
 struct Step {
     clip_from_pixel: mat4x4f,   // of the interpolated camera
-    eye: vec4f,                 // its place in the world; a direction where it is orthographic
-    time: f32,                  // share of the way to the other frame; negative: to the previous one
+    eye: vec4f,                 // its position in the world; the direction to it if it is orthographic
+    time: f32,                  // share of the interval to the other frame; negative: to the previous one
 }
 
-struct Chunk {                  // steps of one source that are done together
-    view: View,
+struct Chunk {                  // steps of one source frame that are done together
+    viewport: Viewport,
     world_from_pixel: mat4x4f,  // of the source's own camera
     eye: vec4f,
-    bits: vec2u,                // of a sample's number: those of x, those of x and y
+    bits: vec2u,                // of a sample's number: how many x has, how many x and y have
     steps: u32,
-    first: u32,                 // 1: the first, the last of a picture
-    last: u32,
+    first: u32,                 // 1: it is the first one of the image
+    last: u32,                  // 1: it is the last one of the image
 }
 
 @group(1) @binding(0) var<uniform> chunk: Chunk;
@@ -28,32 +29,32 @@ struct Chunk {                  // steps of one source that are done together
 @group(1) @binding(3) var motion: texture_2d<f32>;      // of the source frame: to_prev, to_next [px]
 @group(1) @binding(4) var depth: texture_2d<f32>;       // of the source frame
 @group(1) @binding(5) var normal: texture_2d<f32>;      // of the source frame, in the world
-@group(1) @binding(6) var weight: texture_2d<f32>;      // of the source frame, 0: is not moved
-@group(1) @binding(7) var own: texture_2d<f32>;         // the frame itself, for pixels that nothing reached
-@group(1) @binding(8) var<storage, read_write> heads: array<atomic<u32>>;   // of a pixel's list: number + 1; 0: empty, as a chunk finds and leaves it
-@group(1) @binding(9) var<storage, read_write> links: array<u32>;           // per sample and step: the next one + 1
-@group(1) @binding(10) var<storage, read_write> sums: array<atomic<u32>>;   // r, g, b, a per pixel, low words; of lines times UNIT
+@group(1) @binding(6) var weight: texture_2d<f32>;      // of the source frame, 0: does not count
+@group(1) @binding(7) var own: texture_2d<f32>;         // the frame itself, for pixels that no sample reached
+@group(1) @binding(8) var<storage, read_write> heads: array<atomic<u32>>;   // of every pixel's list: number + 1; 0: it is empty, as it is before and after a chunk
+@group(1) @binding(9) var<storage, read_write> links: array<u32>;           // by step and sample: number + 1 of the next one in the list
+@group(1) @binding(10) var<storage, read_write> sums: array<atomic<u32>>;   // low words of r, g, b, a of every pixel; with LINES times UNIT
 @group(1) @binding(11) var<storage, read_write> carries: array<atomic<u32>>;    // the high words
-@group(1) @binding(12) var<storage, read_write> counts: array<atomic<u32>>; // in shares of UNIT
+@group(1) @binding(12) var<storage, read_write> counts: array<atomic<u32>>; // weight of the sums, in shares of UNIT
 @group(1) @binding(13) var output: Output;
 
-override CAMERA: bool = false;      // move by the interpolated camera, not along the motion
+override CAMERA: bool = false;      // move samples by the interpolated camera, not along the motion
 override WEIGHTED: bool = false;
 override COUNTS: bool = false;      // show the share of the steps that reached a pixel
-override FACING: bool = false;      // leave out surfaces that face away from the interpolated camera
-override NORMALS: bool = false;     // read `normal` for that, not the depth's slope
-override LINES: bool = false;       // `lines` and then `gather`, not `link` and `gather`
-override NEAREST_ONLY: bool = false;    // of the samples on a pixel, the nearest; one step a chunk
+override FACING: bool = false;      // drop surfaces that face away from the interpolated camera
+override NORMALS: bool = false;     // by `normal`, not by the slope of the depth
+override LINES: bool = false;       // the passes are `splat_lines` and `resolve`, not `link` and `resolve`
+override NEAREST_ONLY: bool = false;    // of the samples on a pixel only the nearest counts; one step per chunk
 
-// Fixed point, so that the order of additions does not matter: 64 bits cannot overflow.
+// Colour in fixed point, so that the order of additions does not matter; 64 bits cannot overflow.
 const STEPS_PER_UNIT: f32 = 16384.0;
-const LARGEST: f32 = 262143.0;      // colour beyond this, and below 0, is held to the range [linear]
-const UNIT: u32 = 1024u;            // what a sample counts that lies on one pixel for a whole step
+const LARGEST: f32 = 262143.0;      // colour is clamped to 0..LARGEST [linear]
+const UNIT: u32 = 1024u;            // weight of a sample that is on one pixel for a whole step
 const MOST: u32 = 60000u;           // samples in one pixel's list: loops end soon after, see docs/lavapipe.md
-const ROWS: u32 = 17u;             // steps of a chunk, and one more where a line ends
-const LONGEST: f32 = 4000.0;        // line in one step [px]; beyond it, points have gaps
+const ROWS: u32 = 17u;              // steps of a chunk, and one more at which a line ends
+const LONGEST: f32 = 4000.0;        // line of one step [px]; the points of longer ones have gaps
 
-/// Link every sample to the pixels that it is rounded to, one a step.
+/// Link every sample to the list of the pixel that its position is rounded to, once per step.
 @compute @workgroup_size(WG_X, WG_Y)
 fn link(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
@@ -65,15 +66,15 @@ fn link(@builtin(global_invocation_id) id: vec3u) {
     let number = 1u + (id.y << chunk.bits.x) + id.x;
     let count = select(0u, turns_of(chunk.steps, id.x), sample.counts);
     for (var k = 0u; k < count; k++) {
-        let to = vec2i(floor(vec2f(id.xy) + 0.5 + way(sample, k)));
-        if any(to < vec2i(0)) || any(to >= size) || turned_away(sample, k) { continue; }
+        let to = vec2i(floor(vec2f(id.xy) + 0.5 + displacement_at(sample, k)));
+        if any(to < vec2i(0)) || any(to >= size) || faces_away(sample, k) { continue; }
         links[k * pixels + index] = atomicExchange(&heads[to.y * size.x + to.x], number + (k << shift));
     }
 }
 
-/// Sum a pixel's list: any order gives the same bits.
+/// Sum every pixel's list, whose order does not matter; after the last chunk, the result.
 @compute @workgroup_size(WG_X, WG_Y)
-fn gather(@builtin(global_invocation_id) id: vec3u) {
+fn resolve(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let at = id.y * frame.size.x + id.x;
     let pixels = frame.size.x * frame.size.y;
@@ -96,7 +97,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
         let px = vec2u(number & mask.x, (number & mask.y) >> bits.x);
         next = links[(number >> bits.y) * pixels + px.y * row + px.x];
         if NEAREST_ONLY {
-            let key = bitcast<u32>(depth_then(sample_at(px)));
+            let key = bitcast<u32>(depth_at_step(sample_at(px)));
             if key < best.x || (key == best.x && number < best.y) { best = vec2u(key, number); }
         } else {
             let before = low;
@@ -127,18 +128,18 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
     textureStore(output, id.xy, result);
 }
 
-/// Draw every sample from its place at a step to that at the next; each pixel has its share of the step.
+/// Draw a line of points from every sample's position at a step to that at the next; points share the step's weight.
 @compute @workgroup_size(WG_X, WG_Y)
-fn lines(@builtin(global_invocation_id) id: vec3u) {
+fn splat_lines(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let sample = sample_at(id.xy);
     let value = fixed(id.xy);
     let x = vec2f(id.xy) + 0.5;
     let count = select(0u, turns_of(chunk.steps, id.x), sample.counts);
     for (var k = 0u; k < count; k++) {
-        let start = x + way(sample, k);
-        let along = x + way(sample, k + 1u) - start;     // the last step of all ends where it begins
-        if any(abs(start) > vec2f(1e6)) || any(abs(along) > vec2f(1e6)) || turned_away(sample, k) { continue; }
+        let start = x + displacement_at(sample, k);
+        let along = x + displacement_at(sample, k + 1u) - start;    // the last step of all ends where it begins
+        if any(abs(start) > vec2f(1e6)) || any(abs(along) > vec2f(1e6)) || faces_away(sample, k) { continue; }
         let points = clamp(ceil(max(abs(along.x), abs(along.y))), 1.0, LONGEST);
         let share = u32(f32(UNIT) / points);
         for (var i = 0.0; i < points; i += 1.0) {
@@ -149,7 +150,7 @@ fn lines(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-/// Add a share of a sample to a pixel: 42 bits to 64.
+/// Add a share of a sample to a pixel: a product of 42 bits to a sum of 64.
 fn add(at: u32, value: vec4u, share: u32) {
     let low = value * share;
     let high = ((value >> vec4u(16u)) * share + (((value & vec4u(0xffffu)) * share) >> vec4u(16u))) >> vec4u(16u);
@@ -167,10 +168,10 @@ fn fixed(px: vec2u) -> vec4u {
 }
 
 struct Sample {
-    path: Path,         // without a camera
+    trajectory: Trajectory,     // without CAMERA; the rest is with it
     ndc: vec2f,
-    here: vec4f,        // homogeneous pixel
-    place: vec4f,       // in the world, up to a positive factor
+    here: vec4f,        // see homogeneous()
+    world: vec4f,       // position in the world, up to a positive factor
     normal: vec3f,      // in the world; 0 where none is known
     depth: f32,
     counts: bool,
@@ -182,69 +183,69 @@ fn sample_at(px: vec2u) -> Sample {
     s.counts = true;
     if WEIGHTED { s.counts = textureLoad(weight, px, 0).x > 0.0; }
     if !CAMERA {
-        s.path = path_of(textureLoad(motion, px, 0));
+        s.trajectory = trajectory_from(textureLoad(motion, px, 0));
         return s;
     }
-    let view = chunk.view;
-    s.ndc = ndc_of(view, px);
-    let nothing_there = is_nothing(view, s.depth);
-    s.here = homogeneous(view, s.ndc, s.depth, nothing_there);
-    s.place = chunk.world_from_pixel * s.here;
+    let viewport = chunk.viewport;
+    s.ndc = ndc_of(viewport, px);
+    let nothing_there = is_nothing(viewport, s.depth);
+    s.here = homogeneous(viewport, s.ndc, s.depth, nothing_there);
+    s.world = chunk.world_from_pixel * s.here;
     if FACING && !nothing_there {
-        if NORMALS { s.normal = textureLoad(normal, px, 0).xyz; } else { s.normal = slope(vec2i(px), s.place); }
+        if NORMALS { s.normal = textureLoad(normal, px, 0).xyz; } else { s.normal = normal_from_depth(vec2i(px), s.world); }
         if !is_finite4(vec4f(s.normal, 0.0)) { s.normal = vec3f(0.0); }
     }
     return s;
 }
 
-/// The normal that the depths around `px` have, towards the source's camera.
-fn slope(px: vec2i, place: vec4f) -> vec3f {
-    let right = tangent(px, vec2i(1, 0), place);
-    let down = tangent(px, vec2i(0, 1), place);
+/// The normal of the surface that the depths around `px` form, towards the source's camera; of any length.
+fn normal_from_depth(px: vec2i, world: vec4f) -> vec3f {
+    let right = tangent(px, vec2i(1, 0), world);
+    let down = tangent(px, vec2i(0, 1), world);
     let n = cross(right, down);
-    let seen = dot(n, chunk.eye.xyz * place.w - place.xyz * chunk.eye.w);
-    return select(-n, n, seen > 0.0);
+    let towards_eye = dot(n, chunk.eye.xyz * world.w - world.xyz * chunk.eye.w);
+    return select(-n, n, towards_eye > 0.0);
 }
 
-/// Of the ways to the places of both neighbours the shorter one; 0 without neighbours.
-fn tangent(px: vec2i, step: vec2i, place: vec4f) -> vec3f {
-    let here = place.xyz / place.w;
+/// Of the vectors to the two neighbours' positions the shorter one, along `step`; 0 without neighbours.
+fn tangent(px: vec2i, step: vec2i, world: vec4f) -> vec3f {
+    let here = world.xyz / world.w;
     var best = vec3f(0.0);
     var least = 1e30;
     for (var side = -1; side <= 1; side += 2) {
         let there = px + side * step;
         if any(there < vec2i(0)) || any(there >= vec2i(frame.size)) { continue; }
         let z = textureLoad(depth, there, 0).x;
-        if is_nothing(chunk.view, z) { continue; }
-        let other = chunk.world_from_pixel * homogeneous(chunk.view, ndc_of(chunk.view, vec2u(there)), z, false);
-        let apart = other.xyz / other.w - here;
-        if length(apart) < least {
-            least = length(apart);
-            best = apart * f32(side);
+        if is_nothing(chunk.viewport, z) { continue; }
+        let other = chunk.world_from_pixel * homogeneous(chunk.viewport, ndc_of(chunk.viewport, vec2u(there)), z, false);
+        let difference = other.xyz / other.w - here;
+        if length(difference) < least {
+            least = length(difference);
+            best = difference * f32(side);
         }
     }
     return best;
 }
 
-/// How far the sample has moved at step `k` [px].
-fn way(s: Sample, k: u32) -> vec2f {
-    if !CAMERA { return displacement(s.path, steps[k].time); }
+/// Displacement of the sample at step `k` [px].
+fn displacement_at(s: Sample, k: u32) -> vec2f {
+    if !CAMERA { return displacement(s.trajectory, steps[k].time); }
     let clip = steps[k].clip_from_pixel * s.here;
-    if clip.w <= NEAREST { return vec2f(1e9); }
-    return to_pixels(chunk.view, clip, s.ndc);
+    if clip.w <= MIN_W { return vec2f(1e9); }
+    return to_pixels(chunk.viewport, clip, s.ndc);
 }
 
-/// Depth at step 0 of the chunk, as positive floats in their order.
-fn depth_then(s: Sample) -> f32 {
-    if !CAMERA { return select(1e30, s.depth, is_finite(s.depth) && s.depth > 0.0); }
+/// Depth at step 0 of the chunk, up to an increasing function; over 0.
+fn depth_at_step(s: Sample) -> f32 {
+    if !CAMERA { return valid_depth(s.depth); }
     let clip = steps[0].clip_from_pixel * s.here;
     if steps[0].eye.w == 0.0 { return clip.z / clip.w + 1.0; }
-    return select(1e30, clip.w / s.place.w, s.place.w > 0.0);
+    return select(NO_DEPTH, clip.w / s.world.w, s.world.w > 0.0);
 }
 
 /// Whether the surface faces away from the camera of step `k`.
-fn turned_away(s: Sample, k: u32) -> bool {
+fn faces_away(s: Sample, k: u32) -> bool {
     if !FACING { return false; }
     let eye = steps[k].eye;
-    return dot(s.normal, eye.xyz * s.place.w - s.place.xyz * eye.w) < 0.0;
+    return dot(s.normal, eye.xyz * s.world.w - s.world.xyz * eye.w) < 0.0;
 }

@@ -1,61 +1,63 @@
-// Volume ray casting of motion-blurred density (Cusa 2022): spheres on circles and turning tori.
+// Ray marching of motion-blurred density (Cusa 2022): spheres on circular orbits and rotating tori.
+//#include common/color.wgsl
 //#include common/frame.wgsl
+//#include common/hash.wgsl
 //#include scene/density.wgsl
 //#include scene/stage.wgsl
 
 @group(1) @binding(1) var<uniform> scene: Volumes;
-@group(1) @binding(2) var<storage, read> tiles: array<vec2u>;  // the workgroups' places in the picture
+@group(1) @binding(2) var<storage, read> tiles: array<vec2u>;  // of the workgroups: their places in the image, in workgroups
 @group(1) @binding(3) var output: Output;
 
-// It is told beforehand which tiles a volume, or a shadow, can be in: branches save nothing, see docs/lavapipe.md.
+// Which tiles a volume, or a shadow, can be in is known before the dispatch. Loop form: see docs/lavapipe.md.
 override CLOUD: bool = true;
 override SHADOW: bool = true;
 
-override ORBITS: u32 = 1;           // volumes that are spheres on circles; they come first
-override TORI: u32 = 1;             // volumes that are tori
+override ORBITS: u32 = 1;           // number of orbiting spheres; they come first
+override TORI: u32 = 1;             // number of tori
 override ROLLING: bool = false;     // every pixel has its own delay
-override BLENDED: bool = true;      // normals are mixed alike everywhere, not by density
+override BLENDED: bool = true;      // normals are blended with the same weights everywhere, not by density
 
 struct Volume {
-    turn: vec4f,        // 2 x 2 matrix, rows, into the plane of its turning where it stands at angle 0
+    turn: vec4f,        // rows of a 2 x 2 matrix into the plane of rotation, in which the body is at angle 0
     centre: vec3f,
     opacity: f32,
     color: vec3f,
-    facing: f32,        // weight of its gradient
-    small: f32,         // radius; of a torus the minor one
-    large: f32,         // of the circle; of a torus the major radius
+    normal_weight: f32, // of its gradient among those of all volumes
+    small: f32,         // radius of a sphere, minor radius of a torus
+    large: f32,         // radius of an orbit, major radius of a torus
     lead: f32,          // orbit: cosine of the angle by which its normals run ahead; torus: thickness that they lose
-    swell: f32,         // torus: its normals are those of one so much smaller
-    turning: Turning,
-    bound: vec4f,       // sphere that holds it throughout the exposure: centre, radius
-    slab: vec4f,        // and a slab: its normal, half its thickness
-    drift: vec2f,       // rolling shutter: turning across the width, the height [rad]
+    swell: f32,         // torus: its normals are those of one that is smaller by this factor
+    turning: Rotation,
+    bound: vec4f,       // bounding sphere throughout the exposure: centre, radius
+    slab: vec4f,        // bounding slab through the sphere's centre: normal, half its thickness
+    drift: vec2f,       // rolling shutter: rotation across the width, the height [rad]
     unused: vec2f,
 }
 
 struct Volumes {
-    eye: vec4f,         // w: radius of the sphere around the origin that is searched
-    right: vec4f,       // the view's axes; right and up are as long as half the picture at distance 1
+    eye: vec4f,         // w: radius of the sphere around the origin that is marched through
+    right: vec4f,       // axes of the view; right and up are as long as half the image at distance 1
     up: vec4f,
     forward: vec4f,
     stage: Stage,
     strobe: vec2f,      // phase [rad], amount
-    grain: u32,
+    grain: u32,         // seed of the noise
     volumes: array<Volume, MOST_VOLUMES>,
 }
 
 const MOST_VOLUMES: u32 = 16u;
 const TILES_A_ROW: u32 = 1024u;     // of the dispatch: a dimension has 65,535 workgroups at most
-const STEPS: u32 = 40u;             // at most, a twentieth of the searched sphere's radius each
-const SHADED: u32 = 30u;            // at most
-const SHADOW_STEPS: u32 = 20u;      // at most, twice as long
-const FAINT: f32 = 0.002;           // density that is passed over
+const STEPS: u32 = 40u;             // of a ray at most, each a twentieth of the marched sphere's radius
+const SHADED: u32 = 30u;            // steps of a ray that are shaded, at most
+const SHADOW_STEPS: u32 = 20u;      // at most, each twice as long
+const FAINT: f32 = 0.002;           // density that is skipped
 const FULL: f32 = 0.95;             // coverage at which a ray ends
 
-// Registers, as far as loops over volumes are unrolled: uniforms are dear within loops.
+// Registers, as far as loops over volumes are unrolled: uniforms are slow within loops.
 var<private> volumes: array<Volume, MOST_VOLUMES>;
 
-struct Span {           // of steps
+struct Span {           // the steps from `first` to before `end`
     first: u32,
     end: u32,
 }
@@ -101,16 +103,16 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local
         let seen = march(eye, direction, light, strobe, noise.x);
         color = color * (1.0 - seen.a) + seen.rgb;
     }
-    textureStore(output, id, vec4f(linear_light(color), 1.0));
+    textureStore(output, id, vec4f(linear_from_srgb(color), 1.0));
 }
 
-/// Where a ray meets the ground `drop` above the eye: x, z.
+/// (x, z) of where a ray meets the ground, whose height above the eye is `drop`.
 fn on_ground(ray: vec3f, drop: f32) -> vec2f {
     let along = drop / select(ray.y, -1e-6, abs(ray.y) < 1e-6);
     return scene.eye.xz + along * ray.xz;
 }
 
-/// Light that comes from the volumes, and how much of what is behind them they cover.
+/// Radiance of the volumes along a ray, front to back, and in a their coverage.
 fn march(origin: vec3f, direction: vec3f, light: vec3f, strobe: f32, noise: f32) -> vec4f {
     let step = scene.eye.w / 20.0;
     let strength = strobe * step / 0.05;
@@ -133,6 +135,7 @@ fn march(origin: vec3f, direction: vec3f, light: vec3f, strobe: f32, noise: f32)
     return sum;
 }
 
+/// How much of the light the volumes take from a point on the ground.
 fn shadow_at(at: vec3f, light: vec3f, strobe: f32, noise: f32, there: bool) -> f32 {
     let step = 2.0 * scene.eye.w / 20.0;
     let strength = 0.47 * strobe * step / 0.05;
@@ -148,14 +151,15 @@ fn shadow_at(at: vec3f, light: vec3f, strobe: f32, noise: f32, there: bool) -> f
     return shadow;
 }
 
-/// Distance at which a ray enters the searched sphere; 0 within.
+/// Distance at which a ray enters the marched sphere; 0 from within.
 fn entry(origin: vec3f, direction: vec3f) -> f32 {
     let b = dot(origin, direction);
     let c = dot(origin, origin) - scene.eye.w * scene.eye.w;
     return max(-b - sqrt(max(b * b - c, 0.0)), 0.0);
 }
 
-/// The steps `i` at which a volume can be at start + i * step, within the searched sphere.
+/// The steps `i` at which start + i * step can be in a volume, by its bounding sphere and slab, within the marched
+/// sphere; none if not `there`.
 fn steps(start: vec3f, step: vec3f, most: u32, there: bool) -> Span {
     let all = in_sphere(start, step, vec4f(0.0, 0.0, 0.0, scene.eye.w));
     var near = 1e9;
@@ -180,18 +184,18 @@ fn steps(start: vec3f, step: vec3f, most: u32, there: bool) -> Span {
     return Span(u32(ceil(near)), select(0u, end, there));
 }
 
-/// Where a line is within a sphere, in steps; an empty range where it misses.
+/// The range of steps in which a line is within a sphere; empty if it misses it.
 fn in_sphere(start: vec3f, step: vec3f, sphere: vec4f) -> vec2f {
     let from_centre = start - sphere.xyz;
     let over = 1.0 / dot(step, step);
     let b = dot(from_centre, step) * over;
     let c = (dot(from_centre, from_centre) - sphere.w * sphere.w) * over;
-    let root = b * b - c;
-    let half = sqrt(max(root, 0.0));
-    return select(vec2f(1e9, -1e9), vec2f(-b - half, -b + half), root > 0.0);
+    let discriminant = b * b - c;
+    let half = sqrt(max(discriminant, 0.0));
+    return select(vec2f(1e9, -1e9), vec2f(-b - half, -b + half), discriminant > 0.0);
 }
 
-/// Sum of all volumes at `p`, opacities applied; rgb: their colours times it.
+/// Density at `p`: occupancies times opacities of all volumes; rgb: the same times their colours.
 fn density(p: vec3f) -> vec4f {
     var sum = vec4f(0.0);
     for (var i = 0u; i < ORBITS; i++) {
@@ -213,7 +217,7 @@ fn orbit_density(i: u32, p: vec3f) -> f32 {
     let radius = volumes[i].small;
     let section = radius * radius - q.y * q.y;
     let h = disk_half_angle(sqrt(x * x + y * y), sqrt(max(section, 0.0)), volumes[i].large);
-    let d = presence(angle(x, y), h, volumes[i].turning);
+    let d = occupancy(angle(x, y), h, volumes[i].turning);
     return select(0.0, volumes[i].opacity * d, section > 0.0);
 }
 
@@ -228,8 +232,8 @@ fn torus_density(i: u32, p: vec3f) -> f32 {
     let opposite = theta + select(PI, -PI, theta >= 0.0);
     var d = 0.0;
     if EXACT {
-        // A torus is itself again after half a turn.
-        d = presence(2.0 * select(theta, opposite, abs(theta) > 0.5 * PI), 2.0 * h, turning);
+        // A torus has twofold symmetry.
+        d = occupancy(2.0 * select(theta, opposite, abs(theta) > 0.5 * PI), 2.0 * h, turning);
     } else {
         d = min(crossing(theta, h, turning.rate) + crossing(opposite, h, turning.rate), 1.0);
         d = select(d, 1.0, h >= 0.5 * PI);
@@ -237,23 +241,25 @@ fn torus_density(i: u32, p: vec3f) -> f32 {
     return volumes[i].opacity * d;
 }
 
-/// There is no such thing as a motion-blurred normal: gradients of pseudo distances, mixed.
+/// A unit normal at `p`. Nothing is the normal of motion-blurred density: these are gradients of pseudo distances,
+/// blended.
 fn normal(p: vec3f) -> vec3f {
     var sum = vec3f(0.0);
     for (var i = 0u; i < ORBITS; i++) {
-        var weight = volumes[i].facing;
+        var weight = volumes[i].normal_weight;
         if !BLENDED { weight *= orbit_density(i, p); }
         sum += weight * orbit_gradient(i, p);
     }
     for (var i = ORBITS; i < ORBITS + TORI; i++) {
-        var weight = volumes[i].facing;
+        var weight = volumes[i].normal_weight;
         if !BLENDED { weight *= torus_density(i, p); }
         sum += weight * torus_gradient(i, p);
     }
     return sum * inverseSqrt(max(dot(sum, sum), 1e-20));
 }
 
-/// Of the distance to the standing sphere from where a place less than `lead` ahead or behind is drawn to it.
+/// Gradient of the distance to the sphere at mid exposure, after `p` was rotated towards it by the angle of `lead`,
+/// but not beyond it.
 fn orbit_gradient(i: u32, p: vec3f) -> vec3f {
     let q = p - volumes[i].centre;
     let turn = volumes[i].turn;
@@ -277,7 +283,8 @@ fn orbit_gradient(i: u32, p: vec3f) -> vec3f {
     return far * vec3f(turn.x * gx + turn.z * gy, q.y, turn.y * gx + turn.w * gy);
 }
 
-/// Of the smooth maximum of a thinned standing torus and a shell around its turning ring.
+/// Gradient of the smooth maximum of two distances: to a thinned torus at mid exposure, and to a shell around the
+/// sphere that its ring sweeps.
 fn torus_gradient(i: u32, p: vec3f) -> vec3f {
     let swell = volumes[i].swell;
     let q = swell * (p - volumes[i].centre);
@@ -303,14 +310,7 @@ fn torus_gradient(i: u32, p: vec3f) -> vec3f {
     return swell * vec3f(turn.x * gx + turn.z * gy, turn.y * gx + turn.w * gy, q.z * outward + q.z * inward);
 }
 
-/// Two numbers in [0, 1) for a pixel and a picture (PCG2D: Jarzynski and Olano 2020).
+/// Two numbers in [0, 1) for a pixel and an image.
 fn random2(px: vec2u) -> vec2f {
-    var v = (px + vec2u(scene.grain, 0u)) * 1664525u + 1013904223u;
-    v.x += v.y * 1664525u;
-    v.y += v.x * 1664525u;
-    v ^= v >> vec2u(16u);
-    v.x += v.y * 1664525u;
-    v.y += v.x * 1664525u;
-    v ^= v >> vec2u(16u);
-    return vec2f(v >> vec2u(8u)) / 16777216.0;
+    return unit_float2(pcg2d(px + vec2u(scene.grain, 0u)));
 }

@@ -1,4 +1,4 @@
-// Which way the surface at a pixel faces, as far as the picture's plane shows it.
+// Whether a surface faces the way it moves, as far as the image plane shows it.
 //#include common/finite.wgsl
 
 struct Facing {
@@ -7,25 +7,25 @@ struct Facing {
     planar: vec4f,          // depth along the view axis of a depth d: (x + y d) / (z + w d)
 }
 
-const SLOPE: f32 = 2e-5;    // share of depth a pixel under which a surface has no slope, only rounding
-const SIDEWAYS: f32 = 1e-3; // cosine under which a normal is at a right angle
+const MIN_SLOPE: f32 = 2e-5;    // share of depth per pixel under which a slope is taken for rounding
+const MIN_COSINE: f32 = 1e-3;   // under which a normal counts as being at a right angle to the motion
 
-/// Whether what moves along `way` [px] goes the way its surface faces, by the normal in the world.
-fn leads(facing: Facing, normal: vec3f, way: vec2f) -> bool {
+/// Whether what moves by `motion` [px] moves the way its surface faces, by the normal in the world.
+fn normal_faces_motion(facing: Facing, normal: vec3f, motion: vec2f) -> bool {
     let n = vec2f(dot(facing.right.xyz, normal), -dot(facing.up.xyz, normal));
-    return dot(n, way) > SIDEWAYS * length(normal) * length(way);
+    return dot(n, motion) > MIN_COSINE * length(normal) * length(motion);
 }
 
-/// The same by depth: a surface faces where its depth grows, whatever the field of view.
-fn leads_by_depth(facing: Facing, depth: texture_2d<f32>, px: vec2u, way: vec2f) -> bool {
+/// The same by depth: whatever the field of view, a surface faces the way its depth grows.
+fn slope_faces_motion(facing: Facing, depth: texture_2d<f32>, px: vec2u, motion: vec2f) -> bool {
     let z = planar_depth(facing, depth, vec2i(px));
     if z < 0.0 { return false; }
     let slope = vec2f(slope_along(facing, depth, vec2i(px), vec2i(1, 0), z),
                       slope_along(facing, depth, vec2i(px), vec2i(0, 1), z));
-    return dot(slope, way) > SLOPE * z * length(way);
+    return dot(slope, motion) > MIN_SLOPE * z * length(motion);
 }
 
-/// Of the differences to both sides the smaller one, so that it is the surface's own [per px].
+/// Change of depth per pixel. Of the differences to both sides the smaller one, which stays on the surface.
 fn slope_along(facing: Facing, depth: texture_2d<f32>, px: vec2i, step: vec2i, z: f32) -> f32 {
     let before = planar_depth(facing, depth, px - step);
     let after = planar_depth(facing, depth, px + step);
@@ -35,11 +35,11 @@ fn slope_along(facing: Facing, depth: texture_2d<f32>, px: vec2i, step: vec2i, z
     return select(after - z, z - before, abs(z - before) < abs(after - z));
 }
 
-/// Along the view axis; -1 where nothing is there or the picture ends.
+/// Depth along the view axis; -1 where there is none, or outside the image.
 fn planar_depth(facing: Facing, depth: texture_2d<f32>, px: vec2i) -> f32 {
     if any(px < vec2i(0)) || any(px >= vec2i(textureDimensions(depth))) { return -1.0; }
     let z = textureLoad(depth, px, 0).x;
     let to = facing.planar;
-    let there = (to.x + to.y * z) / (to.z + to.w * z);
-    return select(-1.0, there, is_finite(there) && there > 0.0);
+    let planar = (to.x + to.y * z) / (to.z + to.w * z);
+    return select(-1.0, planar, is_finite(planar) && planar > 0.0);
 }

@@ -1,4 +1,4 @@
-// Not a number, tested by its bits: compilers take `x != x` for false.
+// Whether numbers are finite, by their bits: compilers fold `x != x` to false.
 
 fn is_finite(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;

@@ -1,7 +1,7 @@
-// Noise is a function of pixel and frame: same input, same bits.
+// Noise of a pixel in a frame: same input, same bits.
 //#include common/frame.wgsl
 
-/// Interleaved gradient noise in [0, 1) (Jimenez 2014), moved along by the frame number.
+/// Interleaved gradient noise in [0, 1) (Jimenez 2014), shifted by the frame number.
 fn pixel_noise(px: vec2u) -> f32 {
     let at = vec2f(px) + 5.588238 * f32(frame.index % 64u);
     return fract(52.9829189 * fract(dot(at, vec2f(0.06711056, 0.00583715))));

@@ -1,22 +1,26 @@
-// The path of a pixel's content through the previous, this and the next frame.
+// The trajectory of a pixel's content through the previous, this and the next frame.
 
-struct Path {
-    velocity: vec2f,    // [px per frame interval]
-    curvature: vec2f,   // [px per squared frame interval]
+struct Trajectory {             // position(t) = position(0) + velocity t + half_acceleration t^2
+    velocity: vec2f,            // [px per frame interval]
+    half_acceleration: vec2f,   // [px per squared frame interval]
 }
 
-/// The parabola through the three places; a line where `motion` = (to_prev, to_next) [px] are opposite.
-fn path_of(motion: vec4f) -> Path {
-    return Path(0.5 * (motion.zw - motion.xy), 0.5 * (motion.zw + motion.xy));
+const STATIC_EPSILON: f32 = 0.01;   // what is displaced by less than this [px] does not move
+
+/// The parabola through the three positions; a line where `motion` = (to_prev, to_next) [px] are opposite.
+fn trajectory_from(motion: vec4f) -> Trajectory {
+    return Trajectory(0.5 * (motion.zw - motion.xy), 0.5 * (motion.zw + motion.xy));
 }
 
-/// When between `opens` and `closes` it is slowest: where a path that comes back turns.
-fn turning(path: Path, opens: f32, closes: f32) -> f32 {
-    let t = -0.5 * dot(path.velocity, path.curvature) / max(dot(path.curvature, path.curvature), 1e-30);
-    return clamp(t, opens, closes);
+/// Displacement [px] at time `t` [frame intervals] of what is here at time 0.
+fn displacement(trajectory: Trajectory, t: f32) -> vec2f {
+    return (trajectory.velocity + trajectory.half_acceleration * t) * t;
 }
 
-/// Displacement [px] at time `t` of what is here at time 0.
-fn displacement(path: Path, t: f32) -> vec2f {
-    return (path.velocity + path.curvature * t) * t;
+/// When between `opens` and `closes` it moves slowest: a trajectory that comes back turns there, so that its
+/// farthest displacement is at one of these three times.
+fn slowest_time(trajectory: Trajectory, opens: f32, closes: f32) -> f32 {
+    let v = trajectory.velocity;
+    let a = trajectory.half_acceleration;
+    return clamp(-0.5 * dot(v, a) / max(dot(a, a), 1e-30), opens, closes);
 }

@@ -1,29 +1,29 @@
-// How much of an exposure a turning body is at a place (Cusa 2022, "Motion Blur All the Way Down").
-// Angles are the place's, relative to the body in the middle of the exposure, along its turning.
+// Occupancy: the share of the exposure during which a rotating body is at a place (Cusa 2022, "Motion Blur All
+// the Way Down"). Angles are those of the place, relative to the body at mid exposure, in its direction of rotation.
+//#include common/angle.wgsl
 
+// Curves of the shutter.
 const BOX: u32 = 0u;
 const COSINE: u32 = 1u;
 const TABLE: u32 = 2u;
 const SHARES: u32 = 4096u;      // steps of the shutter's integral, and of the periodic sums
 
 override CURVE: u32 = COSINE;
-override EXACT: bool = true;    // all revolutions; else each crossing of the place once
-override MANY: bool = true;     // some body turns more than 1.5 times within the exposure
+override EXACT: bool = true;    // count all revolutions; else each crossing of the place once
+override MANY: bool = true;     // some body turns more than CLOSED_FROM times within the exposure
 
-@group(1) @binding(0) var<storage, read> tables: array<f32>;    // the shutter's integral, then a periodic sum a body
+@group(1) @binding(0) var<storage, read> tables: array<f32>;    // the shutter's integral, then the periodic sum of each body
 
-const PI: f32 = 3.14159265;
-const TURN: f32 = 6.28318531;
 const CLOSED_FROM: f32 = 1.5;   // turns within the exposure from which on the closed form holds
 
-struct Turning {    // a body's way within the exposure
+struct Rotation {   // of a body within the exposure
     rate: f32,      // shares of the exposure per radian
     turns: f32,     // revolutions within the exposure
-    half: f32,      // fractional part of half of them
+    half: f32,      // fractional part of half the turns
     sum: u32,       // index of its table in `tables`
 }
 
-/// The shutter's integral from its middle to `x` [shares of the exposure], -0.5 to 0.5.
+/// Integral of the shutter's curve from its middle to `x` [shares of the exposure]; -0.5 to 0.5.
 fn integral(x: f32) -> f32 {
     let v = clamp(x, -0.5, 0.5);
     if CURVE == BOX { return v; }
@@ -36,6 +36,7 @@ fn integral(x: f32) -> f32 {
     return table(0u, v + 0.5) - 0.5;
 }
 
+/// The table that begins at `first`, interpolated at `share` of its length.
 fn table(first: u32, share: f32) -> f32 {
     let x = share * f32(SHARES);
     let i = min(u32(x), SHARES - 1u);
@@ -43,41 +44,41 @@ fn table(first: u32, share: f32) -> f32 {
     return mix(a, tables[first + i + 1u], x - f32(i));
 }
 
-/// Share of the exposure during which |theta - angle of the body| < h: one crossing.
+/// Share of the exposure during which |theta - angle of the body| < h, counting one crossing.
 fn crossing(theta: f32, h: f32, rate: f32) -> f32 {
     return integral((theta + h) * rate) - integral((theta - h) * rate);
 }
 
-/// The same for theta in -pi..pi and h in 0..pi with every revolution.
-fn presence(theta: f32, h: f32, t: Turning) -> f32 {
+/// The same for theta in -pi..pi and h in 0..pi, counting every revolution.
+fn occupancy(theta: f32, h: f32, t: Rotation) -> f32 {
     if !EXACT { return crossing(theta, h, t.rate); }
-    let few = crossing(theta - TURN, h, t.rate) + crossing(theta, h, t.rate) + crossing(theta + TURN, h, t.rate);
+    let few = crossing(theta - TAU, h, t.rate) + crossing(theta, h, t.rate) + crossing(theta + TAU, h, t.rate);
     if !MANY { return few; }
-    let many = h / PI + beyond_mean(theta + h, t) - beyond_mean(theta - h, t);
+    let many = h / PI + periodic_residual(theta + h, t) - periodic_residual(theta - h, t);
     return select(few, many, t.turns > CLOSED_FROM);
 }
 
-/// How far the periodic sum of the shutter's integrals is from its mean at an edge of the body.
-fn beyond_mean(edge: f32, t: Turning) -> f32 {
-    if CURVE == TABLE { return table(t.sum, fract(edge / TURN)); }
-    let f = fract(t.half + edge / TURN);
-    let k = fract(t.half - edge / TURN);
+/// The periodic sum of the shutter's integrals at an edge of the body, less its mean and its trend.
+fn periodic_residual(edge: f32, t: Rotation) -> f32 {
+    if CURVE == TABLE { return table(t.sum, fract(edge / TAU)); }
+    let f = fract(t.half + edge / TAU);
+    let k = fract(t.half - edge / TAU);
     let u = f - k;
     let v = 1.0 - f - k;
     let box = u * v / (2.0 * t.turns);
     if CURVE == BOX { return box; }
     let a = PI / t.turns;
-    return box - sin(u * a) * sin(v * a) / (TURN * sin(a));
+    return box - sin(u * a) * sin(v * a) / (TAU * sin(a));
 }
 
-/// arccos of q, given p = 1 - q, which its callers know without cancellation; Abramowitz and Stegun 4.4.46.
+/// arccos of q, given p = 1 - q, which callers know without cancellation (Abramowitz and Stegun 4.4.46).
 fn arccos_from(p: f32) -> f32 {
     let x = 1.0 - p;
     return sqrt(max(p, 0.0)) * (1.5707963050 + x * (-0.2145988016 + x * (0.0889789874 + x * (-0.0501743046
            + x * (0.0308918810 + x * (-0.0170881256 + x * (0.0066700901 + x * -0.0012624911)))))));
 }
 
-/// Half the angle that a disk of radius `a`, `orbit` from the origin, covers on the circle of radius r; 0 to pi.
+/// Half the angle [rad] that a disk of radius `a`, `orbit` from the origin, covers on the circle of radius r; 0 to pi.
 fn disk_half_angle(r: f32, a: f32, orbit: f32) -> f32 {
     let over = 1.0 / max(2.0 * r * orbit, 1e-12);
     let apart = r - orbit;
@@ -87,7 +88,7 @@ fn disk_half_angle(r: f32, a: f32, orbit: f32) -> f32 {
     return select(small, PI - small, p > q);
 }
 
-/// The same of a torus' section at z = c on the circle of radius r: 0 to pi / 2, for each of its two parts.
+/// The same of a torus's section at z = c, a spiric, for each of its two parts; 0 to pi / 2.
 fn spiric_half_angle(r: f32, c: f32, minor: f32, major: f32) -> f32 {
     let far = sqrt(r * r + c * c);
     let apart = far - major;
@@ -97,7 +98,7 @@ fn spiric_half_angle(r: f32, c: f32, minor: f32, major: f32) -> f32 {
     return select(arccos_from(clamp(p2, 0.0, 1.0) / (1.0 + q)), 0.5 * PI, p2 >= 1.0);
 }
 
-/// Angle of (x, y); off by 1e-6 at most, and safe at the origin.
+/// atan2(y, x), off by 1e-6 at most, and 0 at the origin.
 fn angle(x: f32, y: f32) -> f32 {
     let u = abs(x);
     let v = abs(y);

@@ -1,4 +1,6 @@
-// Surface patterns, each filtered over the width of a pixel so that none of them flickers.
+// Surface patterns, each box-filtered over the width of a pixel so that none of them aliases.
+//#include common/angle.wgsl
+//#include common/hash.wgsl
 
 const PLAIN: u32 = 0u;
 const CHECKER: u32 = 1u;
@@ -7,14 +9,14 @@ const BRICKS: u32 = 3u;
 const DOTS: u32 = 4u;
 const GROUND: u32 = 5u;         // of a stage
 
-const FLAT: u32 = 0u;           // how a pattern lies: on faces, round a sphere, round a cylinder
-const BALL: u32 = 1u;
-const TUBE: u32 = 2u;
+// How a pattern lies on a body.
+const FLAT: u32 = 0u;           // on its faces
+const BALL: u32 = 1u;           // round a sphere
+const TUBE: u32 = 2u;           // round a cylinder
 
 const MORTAR: f32 = 0.08;       // share of a brick's height that is mortar
-const TAU: f32 = 6.2831853;
 
-/// Colour at `at` of a unit body of half extents `size`; `width` of the pixel there [scene units].
+/// Colour at the point `at` of a unit body scaled by the half extents `size`; `width` of the pixel there [scene units].
 fn pattern_color(pattern: u32, color: vec3f, other: vec3f, at: vec3f, normal: vec3f, size: vec3f,
                  repeats: vec2f, lies: u32, width: f32) -> vec3f {
     if pattern == PLAIN { return color; }
@@ -45,7 +47,7 @@ fn pattern_color(pattern: u32, color: vec3f, other: vec3f, at: vec3f, normal: ve
     return mix(color, other, share);
 }
 
-/// 1 and -1 by turns, half a unit each, averaged over `w`.
+/// A wave that is 1 and -1 by turns, for half a unit each, averaged over `w`.
 fn square_wave(x: f32, w: f32) -> f32 {
     let before = abs(fract(x - 0.5 * w) - 0.5);
     let after = abs(fract(x + 0.5 * w) - 0.5);
@@ -57,21 +59,16 @@ fn bricks(uv: vec2f, w: f32, color: vec3f, mortar: vec3f) -> vec3f {
     let row = floor(uv.y);
     let x = 0.5 * uv.x + 0.5 * (row - 2.0 * floor(0.5 * row));
     let joint = 1.0 - (1.0 - line(uv.y, MORTAR, w)) * (1.0 - line(x, 0.5 * MORTAR, 0.5 * w));
-    let tone = 0.75 + 0.5 * mix(hash2(vec2f(floor(x), row)), 0.5, min(w, 1.0));
+    let random = unit_float(lattice_hash(vec2i(vec2f(floor(x), row))));
+    let tone = 0.75 + 0.5 * mix(random, 0.5, min(w, 1.0));
     return mix(color * tone, mortar, joint);
 }
 
-/// Share of `w` around `x` that is covered by lines of `wide` at the integers.
+/// Share of the interval of length `w` around `x` that is covered by lines of width `wide` which begin at the integers.
 fn line(x: f32, wide: f32, w: f32) -> f32 {
     return (line_integral(x + 0.5 * w, wide) - line_integral(x - 0.5 * w, wide)) / w;
 }
 
 fn line_integral(x: f32, wide: f32) -> f32 {
     return floor(x) * wide + min(fract(x), wide);
-}
-
-fn hash2(p: vec2f) -> f32 {
-    var h = u32(i32(p.x)) * 0x9E3779B1u ^ u32(i32(p.y)) * 0x85EBCA77u;
-    h = (h ^ (h >> 15u)) * 0x2C1B3C6Du;
-    return f32(h >> 8u) / 16777216.0;
 }

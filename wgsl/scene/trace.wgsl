@@ -1,4 +1,5 @@
-// What a ray meets among rigid bodies at an instant, and the light that comes from there.
+// The nearest hit of a ray among rigid bodies at an instant, and the radiance that comes from there.
+//#include common/color.wgsl
 //#include common/frame.wgsl
 //#include common/loops.wgsl
 //#include scene/pattern.wgsl
@@ -6,7 +7,7 @@
 
 struct Body {
     size: vec4f,            // half extents [scene units]; w unused
-    color: vec4f,           // first colour; w: light it gives off, times the colour
+    color: vec4f,           // first colour; w: emitted radiance, times the colour
     other: vec4f,           // the pattern's second colour; w: gloss 0..1
     repeats: vec2f,         // of the pattern [per scene unit; spheres: per turn]
     pattern: u32,           // PLAIN, CHECKER, ... in pattern.wgsl
@@ -21,35 +22,35 @@ struct Pose {               // rows of an affine matrix: of a body body_from_wor
 
 struct Scene {
     sun: vec4f,             // direction towards it; w: strength
-    sky: vec4f,             // straight up; w: strength of the light from all round
-    horizon: vec4f,         // level and below
+    sky: vec4f,             // radiance straight up; w: strength of the ambient light
+    horizon: vec4f,         // radiance level and below
     first: f32,             // time of the first row of poses [frame intervals]
     step: f32,              // between two rows [frame intervals]
     rows: u32,
     bodies: u32,
     spheres: u32,           // bodies come by shape: spheres, boxes, cylinders, rings
     boxes: u32,
-    pixel: f32,             // width of a pixel at distance 1
-    rays: u32,              // a pixel's rays for antialiasing: this number squared
+    pixel: f32,             // width of a pixel at distance 1 [scene units]
+    rays: u32,              // antialiasing: rays per side of a pixel, this number squared in all
     cylinders: u32,
     stage: Stage,           // where STAGED
-    bounds: array<vec4u, MOST_BODIES>,  // x, y, z: two halves, from where to where each body is at any of the rows
+    bounds: array<vec4u, MOST_BODIES>,  // box around a body in all rows; x, y, z: its low and high end as two f16
 }
 
 @group(1) @binding(0) var<uniform> scene: Scene;
 @group(1) @binding(1) var<storage, read> bodies: array<Body>;
 @group(1) @binding(2) var poses: texture_2d<f32>;   // three texels each, the camera first, then the bodies
 
-const FAR: f32 = 1e10;      // depth where nothing is, as Blender writes it
-const CLOSE: f32 = 1e-3;    // hits nearer than this to a ray's start are the surface it left [scene units]
-const MOST_BODIES: u32 = 1024u;    // bounds are uniforms, poses rows of a texture: storage is a third slower on lavapipe
-const RING_STEPS: u32 = 64u;        // towards a ring's surface at most
-const RING_CLOSE: f32 = 1e-4;       // distance from it that counts as there [scene units]
+const BACKGROUND_DEPTH: f32 = 1e10; // where nothing is hit: what Blender writes, and so what the files written here hold
+const CLOSE: f32 = 1e-3;            // hits nearer than this to a ray's start are the surface it left [scene units]
+const MOST_BODIES: u32 = 1024u;     // bounds are uniforms, poses rows of a texture: storage is a third slower on lavapipe
+const RING_STEPS: u32 = 64u;        // of sphere tracing towards a ring's surface, at most
+const RING_CLOSE: f32 = 1e-4;       // distance from it that counts as a hit [scene units]
 
-override RINGS: bool = false;       // whether there are any
-override STAGED: bool = false;      // bodies are volumes' solids on a stage, lit as those are
+override RINGS: bool = false;       // there are rings among the bodies
+override STAGED: bool = false;      // bodies are the solids of volumes on a stage, and lit as those are
 
-const SHADE: f32 = 0.18;    // share of the sun that is left in a shadow's core
+const SHADE: f32 = 0.18;            // share of the sunlight that is left in a shadow
 
 struct Ray {
     origin: vec3f,
@@ -57,16 +58,17 @@ struct Ray {
 }
 
 struct Hit {
-    depth: f32,             // FAR: nothing
+    depth: f32,             // BACKGROUND_DEPTH if nothing was hit
     body: u32,
-    pose: Pose,             // of the body: to fetch it again is dear
+    pose: Pose,             // of the body, as fetching it again is expensive
 }
 
-struct Instant {            // where among the rows of poses
+struct Instant {            // a time, as a place between two rows of poses
     row: u32,
     after: f32,             // 0..1 towards the next row
 }
 
+/// The instant of time `t` [frame intervals]; before the first row and after the last one it is theirs.
 fn instant(t: f32) -> Instant {
     let x = clamp((t - scene.first) / scene.step, 0.0, f32(scene.rows - 1u));
     let row = min(u32(x), scene.rows - 2u);
@@ -82,7 +84,7 @@ fn pose_row(column: u32, now: Instant) -> vec4f {
     return mix(before, textureLoad(poses, vec2u(column, now.row + 1u), 0), now.after);
 }
 
-fn moved(p: Pose, v: vec4f) -> vec3f {
+fn transformed(p: Pose, v: vec4f) -> vec3f {
     return vec3f(dot(p.x, v), dot(p.y, v), dot(p.z, v));
 }
 
@@ -90,13 +92,13 @@ fn moved(p: Pose, v: vec4f) -> vec3f {
 fn camera_ray(x: vec2f, now: Instant) -> Ray {
     let ndc = (x / vec2f(frame.size) * 2.0 - 1.0) * vec2f(1.0, -1.0);
     let camera = pose(0u, now);
-    return Ray(moved(camera, vec4f(0.0, 0.0, 0.0, 1.0)), moved(camera, vec4f(ndc, 1.0, 0.0)));
+    return Ray(transformed(camera, vec4f(0.0, 0.0, 0.0, 1.0)), transformed(camera, vec4f(ndc, 1.0, 0.0)));
 }
 
-/// Poses are dear to fetch and a ray passes near few bodies: so the bounds sift the bodies
-/// first, 32 at a time with a bit each. For the form of the loops see docs/lavapipe.md.
+/// The nearest hit of a ray. Poses are expensive to fetch and a ray passes near few bodies, so their
+/// bounds are tested first, 32 bodies at a time with a bit each. Loop form: see docs/lavapipe.md.
 fn nearest(ray: Ray, now: Instant) -> Hit {
-    var hit = Hit(FAR, 0u, Pose());
+    var hit = Hit(BACKGROUND_DEPTH, 0u, Pose());
     let boxes = scene.spheres;
     let cylinders = boxes + scene.boxes;
     let rings = cylinders + scene.cylinders;
@@ -122,7 +124,7 @@ fn nearest(ray: Ray, now: Instant) -> Hit {
     return hit;
 }
 
-/// Of `count` bodies from `first` on, bit i: the ray meets the bounds of body first + i.
+/// Slab tests of `count` bodies from `first` on. Bit i: the ray meets the bounding box of body first + i.
 fn sift(first: u32, count: u32, ray: Ray) -> u32 {
     let inverse = 1.0 / away_from_0(ray.direction);
     var near = 0u;
@@ -141,25 +143,25 @@ fn sift(first: u32, count: u32, ray: Ray) -> u32 {
     return near;
 }
 
-/// To divide by.
+/// The same, but no component is too small to divide by.
 fn away_from_0(x: vec3f) -> vec3f {
     return select(x, vec3f(1e-12), abs(x) < vec3f(1e-12));
 }
 
 fn in_body(p: Pose, ray: Ray) -> Ray {
-    return Ray(moved(p, vec4f(ray.origin, 1.0)), moved(p, vec4f(ray.direction, 0.0)));
+    return Ray(transformed(p, vec4f(ray.origin, 1.0)), transformed(p, vec4f(ray.direction, 0.0)));
 }
 
-// Depth at which a ray, both in the body's own space, meets it; below CLOSE where it does not.
+// Depth at which a ray hits a unit body, in the body's own space; below CLOSE where it does not.
 
 fn sphere(ray: Ray) -> f32 {
     let a = dot(ray.direction, ray.direction);
     let b = dot(ray.origin, ray.direction);
-    let miss = b * b - a * (dot(ray.origin, ray.origin) - 1.0);
-    let root = sqrt(max(miss, 0.0));
+    let discriminant = b * b - a * (dot(ray.origin, ray.origin) - 1.0);
+    let root = sqrt(max(discriminant, 0.0));
     let enter = (-b - root) / a;
     let t = select((-b + root) / a, enter, enter >= CLOSE);
-    return select(t, 0.0, miss <= 0.0);
+    return select(t, 0.0, discriminant <= 0.0);
 }
 
 fn box(ray: Ray) -> f32 {
@@ -179,41 +181,41 @@ fn cylinder(ray: Ray) -> f32 {
     let d = ray.direction;
     let a = max(dot(d.xy, d.xy), 1e-12);
     let b = dot(o.xy, d.xy);
-    let miss = b * b - a * (dot(o.xy, o.xy) - 1.0);
-    let root = sqrt(max(miss, 0.0));
+    let discriminant = b * b - a * (dot(o.xy, o.xy) - 1.0);
+    let root = sqrt(max(discriminant, 0.0));
     let dz = select(d.z, 1e-12, abs(d.z) < 1e-12);
     let caps = vec2f((-1.0 - o.z) / dz, (1.0 - o.z) / dz);
     let enter = max((-b - root) / a, min(caps.x, caps.y));
     let leave = min((-b + root) / a, max(caps.x, caps.y));
     let t = select(leave, enter, enter >= CLOSE);
-    return select(t, 0.0, miss <= 0.0 || leave < enter);
+    return select(t, 0.0, discriminant <= 0.0 || leave < enter);
 }
 
-/// A torus about y of half extents `size`, approached by its distance; 0 turns if it is not `there`.
+/// A torus about y of half extents `size`, by sphere tracing; no steps if it is not `there`.
 fn ring(ray: Ray, size: vec3f, there: bool) -> f32 {
     let o = ray.origin * size;
     let d = ray.direction * size;
     let a = dot(d, d);
     let b = dot(o, d);
-    let root = b * b - a * (dot(o, o) - size.x * size.x);
-    let half = sqrt(max(root, 0.0));
+    let discriminant = b * b - a * (dot(o, o) - size.x * size.x);   // of the sphere around it
+    let half = sqrt(max(discriminant, 0.0));
     let leave = (-b + half) / a;
     var t = max((-b - half) / a, CLOSE);
     var met = false;
-    for (var i = 0u; i < select(0u, RING_STEPS, there && root > 0.0); i++) {
+    for (var i = 0u; i < select(0u, RING_STEPS, there && discriminant > 0.0); i++) {
         let p = o + t * d;
-        let apart = length(vec2f(length(p.xz) - (size.x - size.y), p.y)) - size.y;
-        met = apart < RING_CLOSE;
+        let signed_distance = length(vec2f(length(p.xz) - (size.x - size.y), p.y)) - size.y;
+        met = signed_distance < RING_CLOSE;
         if met || t > leave { break; }
-        t += apart * inverseSqrt(a);
+        t += signed_distance * inverseSqrt(a);
     }
     return select(0.0, t, met);
 }
 
 struct Surface {
     at: vec3f,              // in the body's own space, where it is a unit sphere, cube or cylinder
-    normal: vec3f,          // there, not normalised
-    world_normal: vec3f,    // towards where the ray came from
+    normal: vec3f,          // in that space, not normalised
+    world_normal: vec3f,    // a unit vector, towards where the ray came from
 }
 
 fn surface(hit: Hit, ray: Ray) -> Surface {
@@ -225,7 +227,7 @@ fn surface(hit: Hit, ray: Ray) -> Surface {
     var normal = select(vec3f(0.0), sign(at), side >= vec3f(most));
     if hit.body < scene.spheres { normal = at; }
     if hit.body >= scene.spheres + scene.boxes {
-        let cap = abs(at.z) > dot(at.xy, at.xy);    // of the two surfaces, the one that at is closer to
+        let cap = abs(at.z) > dot(at.xy, at.xy);    // whichever surface, cap or side, is closer
         normal = select(vec3f(at.xy, 0.0), vec3f(0.0, 0.0, sign(at.z)), cap);
     }
     if RINGS && hit.body >= scene.spheres + scene.boxes + scene.cylinders {
@@ -243,35 +245,35 @@ fn world_normal(hit: Hit, ray: Ray, now: Instant) -> vec3f {
     return surface(hit, ray).world_normal;
 }
 
-/// Light that comes along the ray backwards: sun with shadow, light from all round, gloss.
+/// Radiance along the ray, towards its origin: sun with its shadow, ambient light, specular highlight, emission.
 fn radiance(hit: Hit, ray: Ray, now: Instant) -> vec3f {
     let view = normalize(ray.direction);
     if STAGED { return staged(hit, ray, view, now); }
-    if hit.depth >= FAR { return mix(scene.horizon.rgb, scene.sky.rgb, smoothstep(0.0, 0.6, view.y)); }
+    if hit.depth >= BACKGROUND_DEPTH { return mix(scene.horizon.rgb, scene.sky.rgb, smoothstep(0.0, 0.6, view.y)); }
     let body = bodies[hit.body];
     let met = surface(hit, ray);
     let n = met.world_normal;
-    let facing = max(abs(dot(n, view)), 0.15);
+    let cosine = max(abs(dot(n, view)), 0.15);
     var lies = FLAT;
     if hit.body < scene.spheres { lies = BALL; }
     if hit.body >= scene.spheres + scene.boxes && met.normal.z == 0.0 { lies = TUBE; }
     let color = pattern_color(body.pattern, body.color.rgb, body.other.rgb, met.at, met.normal,
-                              body.size.xyz, body.repeats, lies, hit.depth * scene.pixel / facing);
+                              body.size.xyz, body.repeats, lies, hit.depth * scene.pixel / cosine);
     let at = ray.origin + hit.depth * ray.direction;
     let towards = scene.sun.xyz;
     var sun = max(dot(n, towards), 0.0);
-    let blocked = nearest(Ray(at + 4.0 * CLOSE * n, towards), now).depth < FAR;
+    let blocked = nearest(Ray(at + 4.0 * CLOSE * n, towards), now).depth < BACKGROUND_DEPTH;
     sun *= select(1.0, SHADE, blocked) * scene.sun.w;
-    let round = scene.sky.w * mix(0.55, 1.0, 0.5 + 0.5 * n.y);
-    let shine = body.other.w * pow(max(dot(reflect(view, n), towards), 0.0), 40.0) * select(1.0, 0.0, blocked);
-    return color * (sun + round + body.color.w) + vec3f(shine * scene.sun.w);
+    let ambient = scene.sky.w * mix(0.55, 1.0, 0.5 + 0.5 * n.y);
+    let specular = body.other.w * pow(max(dot(reflect(view, n), towards), 0.0), 40.0) * select(1.0, 0.0, blocked);
+    return color * (sun + ambient + body.color.w) + vec3f(specular * scene.sun.w);
 }
 
-/// The same for the solids of volumes: as the method "volume" shows them, but one instant.
+/// The same for the solids of volumes, shaded as the method "volume" shades the volumes.
 fn staged(hit: Hit, ray: Ray, view: vec3f, now: Instant) -> vec3f {
     let stage = scene.stage;
     let light = stage.light.xyz;
-    let there = hit.depth < FAR;
+    let there = hit.depth < BACKGROUND_DEPTH;
     let body = bodies[hit.body];
     let at = ray.origin + hit.depth * ray.direction;
     let n = surface(hit, ray).world_normal;
@@ -279,9 +281,9 @@ fn staged(hit: Hit, ray: Ray, view: vec3f, now: Instant) -> vec3f {
     let pixel = hit.depth * scene.pixel;
     let away = normalize(view.xz + vec2f(0.0, 1e-9));
     let width = max(pixel * max(abs(away.yx), abs(away) / max(abs(view.y), 1e-3)), vec2f(1e-6));
-    let blocked = nearest(Ray(at + 4.0 * CLOSE * n, light), now).depth < FAR;
+    let blocked = nearest(Ray(at + 4.0 * CLOSE * n, light), now).depth < BACKGROUND_DEPTH;
     var ground = ground_color(stage, at.xz, width) * select(1.0, 0.3, blocked);
     ground = haze(stage, select(stage.tint.rgb, ground, is_ground), view.y);
     let color = material(body.color.rgb, n, light, view);
-    return linear_light(select(ground, color, there && !is_ground));
+    return linear_from_srgb(select(ground, color, there && !is_ground));
 }
