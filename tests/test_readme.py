@@ -32,7 +32,7 @@ def test_every_option_that_is_named_exists():
             for argument in cli.app[name].assemble_argument_collection():
                 known.update(argument.names)
     named = set(re.findall(r"--[a-z][a-z-]+", TEXT))
-    assert len(named) > 20
+    assert named
     assert named - known == set()
 
 

@@ -43,10 +43,14 @@ def points(volume, rng, count=200):
 
 
 def inside(volume, p, t):
-    """Whether the points p (n, 1, 3) are in the solid at times t [s], 0 the frame's instant."""
-    q = p - np.array(volume.centre)
+    """Whether the points p (n, 3) are in the solid at the time t [s], 0 the frame's instant."""
     angle = volume.phase + volume.speed * t
-    c, s = np.cos(angle), np.sin(angle)
+    return within(volume, p, np.cos(angle), np.sin(angle))
+
+
+def within(volume, p, c, s):
+    """Whether the points p are in the solid turned by angles of cosine `c` and sine `s`."""
+    q = p - np.array(volume.centre)
     x, y, z = q[..., 0], q[..., 1], q[..., 2]
     if isinstance(volume, Orbit):
         apart = (x - volume.orbit * c) ** 2 + y**2 + (z + volume.orbit * s) ** 2
@@ -59,11 +63,9 @@ def brute_force(volume, p, shutter, fps):
     """The exposure in equal shares, one instant each."""
     steps = 20_000 if abs(volume.speed) < 1e3 else 60_000
     shares = (np.arange(steps) + 0.5) / steps
-    t = shutter.time(shares) / fps
-    found = np.empty(len(p))
-    for i, point in enumerate(p):
-        found[i] = inside(volume, point[None, :], t).mean()
-    return found
+    angle = volume.phase + volume.speed * shutter.time(shares) / fps
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([within(volume, point[None, :], c, s).mean() for point in p])
 
 
 @pytest.fixture(scope="module")
