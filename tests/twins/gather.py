@@ -78,7 +78,7 @@ def split(offset, color, motion, depth):
             near = list(around(height, width, y, x, 1))
             depths = [z[p] for p in near]
             apart = max(np.sum((motion[p] - motion[y, x]) ** 2) for p in near)
-            mixed[y, x] = max(depths) > 1.1 * min(depths) and apart > 0.25
+            mixed[y, x] = max(depths) > 1.05**2 * min(depths) and apart > 0.25
     found = [color.copy(), motion.copy(), z.copy(), np.ones((height, width))]
     far = [np.zeros_like(color), motion.copy(), np.zeros((height, width))]
     guessed = np.zeros((height, width), bool)
