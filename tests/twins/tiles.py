@@ -4,25 +4,25 @@ import numpy as np
 
 from twins.tap import bilinear, displacement
 
-KAPPA, GAMMA, SHORT, FAR = 40.0, 1.5, 0.5, 1e10
+KAPPA, GAMMA, MIN_EXTENT, NO_DEPTH = 40.0, 1.5, 0.5, 2.0**33
 
 
 def tiles(color, motion, depth, times, span, noise, edge, published=False, weight=None):
     """`span`: opens, closes; `noise` (height, width) moves the tile look-up."""
     height, width = color.shape[:2]
     motion = motion.astype(float)
-    fastest = _fastest(motion, span, edge)
-    dominant = _dominant(fastest, span)
+    tile_max = _tile_max(motion, span, edge)
+    neighbor_max = _neighbor_max(tile_max, span)
     out = np.zeros(color.shape)
     for y, x in np.ndindex(height, width):
-        tile = _tile(x, y, noise[y, x], edge, dominant.shape)
-        fast = _held(dominant[tile], span, edge)
-        reach = max(_streak(fast, span), SHORT)
-        if reach <= SHORT:
+        tile = _tile(x, y, noise[y, x], edge, neighbor_max.shape)
+        fast = _limited(neighbor_max[tile], span, edge)
+        reach = max(_extent(fast, span), MIN_EXTENT)
+        if reach <= MIN_EXTENT:
             out[y, x] = _own(color, weight, y, x)
             continue
         own = motion[y, x]
-        here = np.clip(_streak(own, span), SHORT, edge)
+        here = np.clip(_extent(own, span), MIN_EXTENT, edge)
         share = (1.0 if published else 0.25) / (KAPPA * here)
         total = share * color[y, x]
         counted = share * (1 if weight is None else weight[y, x])
@@ -30,13 +30,13 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
             offset = displacement(fast, t)
             far = np.hypot(*offset)
             if i % 2:
-                trust = np.clip((here - SHORT) / GAMMA, 0, 1)
+                trust = np.clip((here - MIN_EXTENT) / GAMMA, 0, 1)
                 odd = _own_direction(_direction(own, span), _direction(fast, span), trust)
                 offset = far * np.sign(t) * odd
             at = np.array([x + 0.5, y + 0.5]) - offset
             column = int(np.clip(np.floor(at[0]), 0, width - 1))
             row = int(np.clip(np.floor(at[1]), 0, height - 1))
-            there = np.clip(_streak(motion[row, column], span), SHORT, edge)
+            there = np.clip(_extent(motion[row, column], span), MIN_EXTENT, edge)
             w = _weight(far, offset, here, there, _direction(own, span),
                         _direction(motion[row, column], span),
                         _depth(depth, y, x), _depth(depth, row, column))  # fmt: skip
@@ -50,35 +50,35 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
 
 def followed(motion, span, edge):
     """(rows, columns, 2) what each tile follows [px], as it goes on after time 0."""
-    dominant = _dominant(_fastest(motion.astype(float), span, edge), span)
-    ways = np.zeros((*dominant.shape[:2], 2))
+    neighbor_max = _neighbor_max(_tile_max(motion.astype(float), span, edge), span)
+    ways = np.zeros((*neighbor_max.shape[:2], 2))
     for at in np.ndindex(ways.shape[:2]):
-        ways[at] = _streak(dominant[at], span) * _direction(dominant[at], span)
+        ways[at] = _extent(neighbor_max[at], span) * _direction(neighbor_max[at], span)
     return ways
 
 
 def _weight(far, offset, here, there, own_way, way, z, z_there):
-    front = np.clip(1 - (z_there - z) / min(z, z_there), 0, 1)
-    behind = np.clip(1 - (z - z_there) / min(z, z_there), 0, 1)
+    foreground = np.clip(1 - (z_there - z) / min(z, z_there), 0, 1)
+    background = np.clip(1 - (z - z_there) / min(z, z_there), 0, 1)
     direction = _unit(offset)
-    along_here = abs(own_way @ direction) if here > SHORT and far > 0 else 1.0
-    along_there = abs(way @ direction) if there > SHORT and far > 0 else 1.0
+    along_here = abs(own_way @ direction) if here > MIN_EXTENT and far > 0 else 1.0
+    along_there = abs(way @ direction) if there > MIN_EXTENT and far > 0 else 1.0
     return (
-        front * _cone(far, there) * along_there
-        + behind * _cone(far, here) * along_here
+        foreground * _cone(far, there) * along_there
+        + background * _cone(far, here) * along_here
         + 2 * _cylinder(far, min(there, here)) * max(along_here, along_there)
     )
 
 
 def _farthest(motion, span):
     """When it is farthest from its place: at an end, or where it turns."""
-    velocity, curvature = (motion[2:] - motion[:2]) / 2, (motion[2:] + motion[:2]) / 2
-    bend = curvature @ curvature
-    turn = np.clip(-0.5 * (velocity @ curvature) / max(bend, 1e-30), *span)
+    velocity, half_acceleration = (motion[2:] - motion[:2]) / 2, (motion[2:] + motion[:2]) / 2
+    bend = half_acceleration @ half_acceleration
+    turn = np.clip(-0.5 * (velocity @ half_acceleration) / max(bend, 1e-30), *span)
     return max((span[1], span[0], turn), key=lambda t: np.hypot(*displacement(motion, t)))
 
 
-def _streak(motion, span):
+def _extent(motion, span):
     return np.hypot(*displacement(motion, _farthest(motion, span)))
 
 
@@ -88,34 +88,34 @@ def _direction(motion, span):
     return np.sign(when) * _unit(displacement(motion, when))
 
 
-def _held(motion, span, edge):
-    return motion * min(1, edge / max(_streak(motion, span), 1e-6))
+def _limited(motion, span, edge):
+    return motion * min(1, edge / max(_extent(motion, span), 1e-6))
 
 
-def _fastest(motion, span, edge):
+def _tile_max(motion, span, edge):
     height, width = motion.shape[:2]
     found = np.zeros((-(-height // edge), -(-width // edge), 4))
     for j, i in np.ndindex(found.shape[:2]):
         inside = motion[j * edge : (j + 1) * edge, i * edge : (i + 1) * edge].reshape(-1, 4)
-        found[j, i] = max(inside, key=lambda m: _streak(m, span))
+        found[j, i] = max(inside, key=lambda m: _extent(m, span))
     return found
 
 
-def _dominant(fastest, span):
-    found = np.zeros_like(fastest)
-    rows, columns = fastest.shape[:2]
+def _neighbor_max(tile_max, span):
+    found = np.zeros_like(tile_max)
+    rows, columns = tile_max.shape[:2]
     for j, i in np.ndindex(rows, columns):
         candidates = []
         for dj in (-1, 0, 1):
             for di in (-1, 0, 1):
                 if not (0 <= j + dj < rows and 0 <= i + di < columns):
                     continue
-                motion = fastest[j + dj, i + di]
+                motion = tile_max[j + dj, i + di]
                 along = displacement(motion, span[1]) - displacement(motion, span[0])
                 if di and dj and along[0] * di * along[1] * dj <= 0:
                     continue  # it does not come this way
                 candidates.append(motion)
-        found[j, i] = max(candidates, key=lambda m: _streak(m, span))
+        found[j, i] = max(candidates, key=lambda m: _extent(m, span))
     return found
 
 
@@ -148,7 +148,7 @@ def _depth(depth, y, x):
     if depth is None:
         return 1.0
     z = float(depth[y, x])
-    return min(z, FAR) if np.isfinite(z) and z > 0 else FAR
+    return min(z, NO_DEPTH) if np.isfinite(z) and z > 0 else NO_DEPTH
 
 
 def _cone(far, length):
