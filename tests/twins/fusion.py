@@ -4,7 +4,7 @@ import numpy as np
 
 from twins.tap import bilinear, displacement
 
-SLOPE, SIDEWAYS = 2e-5, 1e-3
+MIN_SLOPE, MIN_COSINE = 2e-5, 1e-3
 
 
 def fusion(color, motion, depth, times, middle, alphas, *, span=None, delay=(0.0, 0.0),
@@ -33,9 +33,9 @@ def fusion(color, motion, depth, times, middle, alphas, *, span=None, delay=(0.0
             velocity = (path[2:] - path[:2]) / 2
             if normal is not None and normal[y, x].any():
                 n = normal[y, x]
-                ahead = n[:2] @ velocity > SIDEWAYS * np.linalg.norm(n) * np.linalg.norm(velocity)
+                ahead = n[:2] @ velocity > MIN_COSINE * np.linalg.norm(n) * np.linalg.norm(velocity)
             else:
-                ahead = leads(depth, x, y, velocity)
+                ahead = faces_motion(depth, x, y, velocity)
             alpha = alphas[0] if ahead else alphas[1]
             if printed:  # equation 8
                 sharp, each = 1.0, alpha * (1 - tau) * fade
@@ -43,8 +43,8 @@ def fusion(color, motion, depth, times, middle, alphas, *, span=None, delay=(0.0
                 share = min(alphas) / alpha
                 sharp, each = 1 - share, share * fade / fade.sum()
             if span is not None:
-                streak = min(1.0, max(np.linalg.norm(a - b) for a in ends for b in ends))
-                sharp, each = sharp + each.sum() * (1 - streak), each * streak
+                blur_length = min(1.0, max(np.linalg.norm(a - b) for a in ends for b in ends))
+                sharp, each = sharp + each.sum() * (1 - blur_length), each * blur_length
             here = np.array([x + 0.5, y + 0.5])
             at = here + displacement(path, -(middle + late))
             total = sharp * bilinear(color, *at)
@@ -63,8 +63,8 @@ def fusion(color, motion, depth, times, middle, alphas, *, span=None, delay=(0.0
 
 def _instants(path, opens, closes):
     """When the shutter opens and closes, and when between the two the path turns."""
-    velocity, curvature = (path[2:] - path[:2]) / 2, (path[2:] + path[:2]) / 2
-    turn = -0.5 * (velocity @ curvature) / max(curvature @ curvature, 1e-30)
+    velocity, half_acceleration = (path[2:] - path[:2]) / 2, (path[2:] + path[:2]) / 2
+    turn = -0.5 * (velocity @ half_acceleration) / max(half_acceleration @ half_acceleration, 1e-30)
     return opens, min(max(turn, opens), closes), closes
 
 
@@ -78,13 +78,13 @@ def gaussian(image):
     return out
 
 
-def leads(depth, x, y, velocity):
+def faces_motion(depth, x, y, velocity):
     """Whether depth grows the way this pixel moves."""
     z = float(depth[y, x])
     if not np.isfinite(z) or z <= 0:
         return False
     slope = np.array([_slope(depth, x, y, 1, 0), _slope(depth, x, y, 0, 1)])
-    return slope @ velocity > SLOPE * z * np.linalg.norm(velocity)
+    return slope @ velocity > MIN_SLOPE * z * np.linalg.norm(velocity)
 
 
 def _slope(depth, x, y, dx, dy):

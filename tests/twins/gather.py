@@ -6,21 +6,21 @@ import numpy as np
 
 from twins.tap import bilinear
 
-FAR, TILE, PATHS = 2.0**33, 16, 4
+NO_DEPTH, TILE, MOTIONS = 2.0**33, 16, 4
 
 
 @dataclass
 class Layers:
-    """A frame whose silhouettes are parted; arrays of (height, width[, channels])."""
+    """A frame whose silhouettes are separated; arrays of (height, width[, channels])."""
 
     offset: float
-    color: list  # near, premultiplied by coverage, and far
-    path: list  # velocity, curvature
-    depth: list  # far: 0 where there is none
+    color: list  # front, premultiplied by coverage, and back
+    trajectory: list  # velocity, half acceleration
+    depth: list  # back: 0 where there is none
     coverage: np.ndarray
-    guessed: np.ndarray  # the far layer was not seen
-    plain: np.ndarray  # no silhouette in the 3 x 3
-    calm: np.ndarray  # none, and nothing brighter than white, in the 3 x 3
+    inferred: np.ndarray  # the back layer was not seen
+    edgeless: np.ndarray  # no edge in the 3 x 3
+    smooth: np.ndarray  # none, and nothing brighter than white, in the 3 x 3
 
 
 @dataclass
@@ -29,18 +29,18 @@ class Sample:
 
     depth: float = np.inf  # it competes with
     true_depth: float = np.inf
-    miss: float = np.inf
+    residual: float = np.inf
     at: np.ndarray | tuple = (np.nan, np.nan)
     frame: int = -1
-    far: bool = False
+    back: bool = False
     pixel: tuple = ()
 
 
 def gather(frames, times):
     """Mean over `times`; frames: (offset, color, motion, depth), the frame itself first."""
-    layers = [split(*f) for f in frames]
+    layers = [separate(*f) for f in frames]
     span = times[0] - (times[1] - times[0]) / 2, times[-1] + (times[1] - times[0]) / 2
-    tiles = [reaching(f, span) for f in layers]
+    tiles = [tile_candidates(f, span) for f in layers]
     height, width = frames[0][1].shape[:2]
     own = frames[0][1].astype(float)
     out = own.copy()
@@ -68,59 +68,59 @@ def around(height, width, y, x, radius):
             yield j, i
 
 
-def split(offset, color, motion, depth):
-    """Part pixels that show two surfaces into a near layer and what is behind it."""
+def separate(offset, color, motion, depth):
+    """Separate pixels that show two surfaces into a front layer and what is behind it."""
     height, width = depth.shape
     color, motion = color.astype(float), motion.astype(float)
-    z = np.where(np.isfinite(depth) & (depth > 0), np.minimum(depth, FAR), FAR)
-    mixed = np.zeros((height, width), bool)
+    z = np.where(np.isfinite(depth) & (depth > 0), np.minimum(depth, NO_DEPTH), NO_DEPTH)
+    edges = np.zeros((height, width), bool)
     for y in range(height):
         for x in range(width):
             near = list(around(height, width, y, x, 1))
             depths = [z[p] for p in near]
             apart = max(np.sum((motion[p] - motion[y, x]) ** 2) for p in near)
-            mixed[y, x] = max(depths) > 1.1 * min(depths) and apart > 0.25
+            edges[y, x] = max(depths) > 1.05**2 * min(depths) and apart > 0.25
     found = [color.copy(), motion.copy(), z.copy(), np.ones((height, width))]
-    far = [np.zeros_like(color), motion.copy(), np.zeros((height, width))]
-    guessed = np.zeros((height, width), bool)
-    for y, x in np.argwhere(mixed):
-        parted = part(color, motion, z, mixed, y, x)
-        if parted:
-            for array, value in zip([*found, *far, guessed], parted, strict=True):
+    back = [np.zeros_like(color), motion.copy(), np.zeros((height, width))]
+    inferred = np.zeros((height, width), bool)
+    for y, x in np.argwhere(edges):
+        separated = separate_pixel(color, motion, z, edges, y, x)
+        if separated:
+            for array, value in zip([*found, *back, inferred], separated, strict=True):
                 array[y, x] = value
-    plain, calm = np.ones((2, height, width), bool)
+    edgeless, smooth = np.ones((2, height, width), bool)
     for y in range(height):
         for x in range(width):
-            plain[y, x] = not any(mixed[p] for p in around(height, width, y, x, 1))
-            calm[y, x] = not any(
-                mixed[p] or (np.abs(color[p]) > 1).any() for p in around(height, width, y, x, 1)
+            edgeless[y, x] = not any(edges[p] for p in around(height, width, y, x, 1))
+            smooth[y, x] = not any(
+                edges[p] or (np.abs(color[p]) > 1).any() for p in around(height, width, y, x, 1)
             )
-    paths = [stored(found[1]), stored(far[1])]
-    depths = [found[2], far[2]]
-    return Layers(offset, [found[0], far[0]], paths, depths, found[3], guessed, plain, calm)
+    paths = [trajectories(found[1]), trajectories(back[1])]
+    depths = [found[2], back[2]]
+    return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred, edgeless, smooth)
 
 
-def stored(motion):
-    """Velocity and curvature, the latter in half precision."""
+def trajectories(motion):
+    """Velocity and half_acceleration, the latter in half precision."""
     velocity = (motion[..., 2:] - motion[..., :2]) / 2
-    curvature = (motion[..., 2:] + motion[..., :2]) / 2
-    return np.concatenate([velocity, curvature.astype("f2").astype(float)], axis=-1)
+    half_acceleration = (motion[..., 2:] + motion[..., :2]) / 2
+    return np.concatenate([velocity, half_acceleration.astype("f2").astype(float)], axis=-1)
 
 
-def part(color, motion, z, mixed, y, x):
-    """Near colour, motion, depth, coverage; far colour, motion, depth; whether that is a guess."""
+def separate_pixel(color, motion, z, edges, y, x):
+    """Front colour, motion, depth, coverage; back colour, motion, depth; whether it is inferred."""
     height, width = z.shape
     inner = list(around(height, width, y, x, 1))
     nearest, farthest = min(z[p] for p in inner), max(z[p] for p in inner)
-    between = 1.5 * nearest if farthest >= FAR else np.sqrt(nearest * farthest)
+    between = 1.5 * nearest if farthest >= NO_DEPTH else np.sqrt(nearest * farthest)
     outer = list(around(height, width, y, x, 2))
     nearer = [p for p in outer if z[p] < between]
     # The corners are too far away for a background.
     farther = [(j, i) for j, i in outer if z[j, i] >= between and abs((j - y) * (i - x)) < 4]
-    front = [p for p in nearer if not mixed[p]]
+    front = [p for p in nearer if not edges[p]]
     thin = not front
     front = front or nearer
-    back = [p for p in farther if not mixed[p]] or farther
+    back = [p for p in farther if not edges[p]] or farther
     if not front or not back:
         return None
 
@@ -142,51 +142,53 @@ def part(color, motion, z, mixed, y, x):
         if opaque - clear > 0.5:
             coverage = (color[y, x, 3] - clear) / (opaque - clear)
     coverage = np.clip(coverage, 0, 1)
-    far_z = mean(z, back)
+    back_depth = mean(z, back)
     if coverage < 1 - 0.98:
-        far_z = z[y, x] if z[y, x] >= between else far_z
-        return 0.0, before, mean(z, front), 0.0, color[y, x], motion[y, x], far_z, False
+        back_depth = z[y, x] if z[y, x] >= between else back_depth
+        return 0.0, before, mean(z, front), 0.0, color[y, x], motion[y, x], back_depth, False
     whole = coverage > 0.98
     coverage = 1.0 if whole else coverage
-    far_color = mean(color, back)
-    near_color = np.maximum(color[y, x] - (1 - coverage) * far_color, 0)
-    near_motion = motion[y, x] if whole else before
-    near_z = z[y, x] if whole and z[y, x] < between else mean(z, front)
-    return near_color, near_motion, near_z, coverage, far_color, behind, far_z, True
+    back_color = mean(color, back)
+    front_color = np.maximum(color[y, x] - (1 - coverage) * back_color, 0)
+    front_motion = motion[y, x] if whole else before
+    front_depth = z[y, x] if whole and z[y, x] < between else mean(z, front)
+    return front_color, front_motion, front_depth, coverage, back_color, behind, back_depth, True
 
 
 # ---- tiles ----------------------------------------------------------------------------------
 
 
-def apart(a, b, u):
+def trajectory_distance(a, b, u):
     """How far a path, or each of several, is from another by the time `u`, before or after [px]."""
     return np.maximum(*(np.hypot(*moved(a - b, t).T) for t in (-u, u)))
 
 
-def choose(paths, u):
+def cluster(paths, u):
     """The longest, then always the one that is most unlike those chosen and standing still."""
     paths = np.reshape(paths, (-1, 4))
     chosen, longest = [], 0.0
-    for _ in range(PATHS):
-        unlike = np.min([apart(paths, c, u) for c in [np.zeros(4), *chosen]], axis=0)
-        most = max(unlike, default=0.0)
+    for _ in range(MOTIONS):
+        distances = np.min(
+            [trajectory_distance(paths, c, u) for c in [np.zeros(4), *chosen]], axis=0
+        )
+        most = max(distances, default=0.0)
         longest = longest if chosen else most
         if most <= 0.5:
             break
-        chosen.append(paths[int(np.argmax(unlike))])
+        chosen.append(paths[int(np.argmax(distances))])
     return chosen, longest
 
 
-def most_alike(path, chosen, u):
+def nearest_cluster(path, chosen, u):
     """Index of the chosen path, or None if it stands still rather."""
-    all_ = list(chosen) + [np.zeros(4)] * (PATHS - len(chosen))
-    best = int(np.argmin(apart(np.array(all_), path, u)))
+    all_ = list(chosen) + [np.zeros(4)] * (MOTIONS - len(chosen))
+    best = int(np.argmin(trajectory_distance(np.array(all_), path, u)))
     return best if best < len(chosen) else None
 
 
-def reaching(frame, span):
+def tile_candidates(frame, span):
     """What every tile may show: chosen paths, nearest first, and what is known of them."""
-    height, width = frame.plain.shape
+    height, width = frame.edgeless.shape
     u0, u1 = span[0] - frame.offset, span[1] - frame.offset
     u = max(abs(u0), abs(u1))
     rows, columns = -(-height // TILE), -(-width // TILE)
@@ -194,18 +196,18 @@ def reaching(frame, span):
     for j in range(rows):
         for i in range(columns):
             box = np.s_[j * TILE : (j + 1) * TILE, i * TILE : (i + 1) * TILE]
-            paths = frame.path[0][box].reshape(-1, 4)
+            paths = frame.trajectory[0][box].reshape(-1, 4)
             z = frame.depth[0][box].ravel()
-            chosen, longest = choose(paths, u)
+            chosen, longest = cluster(paths, u)
             depths = [np.inf] * len(chosen)
             for path, depth in zip(paths, z, strict=True):
-                k = most_alike(path, chosen, u)
+                k = nearest_cluster(path, chosen, u)
                 if k is not None:
                     depths[k] = min(depths[k], depth)
             own[j, i] = {"paths": chosen, "depths": depths, "longest": longest,
-                         "edges": not frame.plain[box].all()}  # fmt: skip
+                         "edges": not frame.edgeless[box].all()}  # fmt: skip
 
-    def lands(path, off):
+    def sweep_interval(path, off):
         """From when to when a tile that moves along the path touches the one `off` away."""
         bend = np.hypot(*path[2:]) * (u1 - u0) ** 2 / 4
         steps = np.linspace(0, 1, 2001)
@@ -213,7 +215,7 @@ def reaching(frame, span):
         touching = steps[(np.abs(at) <= TILE + bend).all(axis=1)]
         return u0 + (u1 - u0) * touching[[0, -1]] if len(touching) else None
 
-    def meets(tile, off):
+    def sweep_overlaps(tile, off):
         places = [np.zeros(2)] + [moved(p, t) for p in tile["paths"] for t in (u0, u1)]
         low, high = np.min(places, axis=0), np.max(places, axis=0)
         return (off + TILE + 2 > low).all() and (off - TILE - 2 < high).all()
@@ -223,21 +225,21 @@ def reaching(frame, span):
         out.append([])
         for i in range(columns):
             offs = {k: np.array([i - k[1], j - k[0]]) * TILE for k in own}
-            met = [k for k in own if meets(own[k], offs[k])]
-            landing = [
-                (path, z, lands(path, offs[k]))
+            met = [k for k in own if sweep_overlaps(own[k], offs[k])]
+            candidates = [
+                (path, z, sweep_interval(path, offs[k]))
                 for k in met
                 for path, z in zip(own[k]["paths"], own[k]["depths"], strict=True)
             ]
-            landing = [entry for entry in landing if entry[2] is not None]
-            chosen, _ = choose([path for path, _, _ in landing], u)
+            candidates = [entry for entry in candidates if entry[2] is not None]
+            chosen, _ = cluster([path for path, _, _ in candidates], u)
             depths = [np.inf] * len(chosen)
             times = [[np.inf, -np.inf] for _ in chosen]
-            for path, z, (comes, goes) in landing:
-                k = most_alike(path, chosen, u)
+            for path, z, (t_enter, t_exit) in candidates:
+                k = nearest_cluster(path, chosen, u)
                 if k is not None:
                     depths[k] = min(depths[k], z)
-                    times[k] = [min(times[k][0], comes), max(times[k][1], goes)]
+                    times[k] = [min(times[k][0], t_enter), max(times[k][1], t_exit)]
             order = np.argsort(depths, kind="stable")
             out[-1].append({
                 "paths": [chosen[k] for k in order],
@@ -254,14 +256,14 @@ def reaching(frame, span):
 
 def instant(layers, tiles, x, y, t, color):
     """What is seen at the pixel at time `t`: edge, the edge behind it, what is opaque."""
-    solid, edge, second = search(layers, tiles, x, y, t)
+    opaque, front_edge, back_edge = resolve_visibility(layers, tiles, x, y, t)
     shown = []
-    if edge.depth < solid.depth / 1.05:
-        shown.append(edge)
-        if is_behind(second, edge) and second.depth < solid.depth / 1.05:
-            shown.append(second)
-    if np.isfinite(solid.depth):
-        shown.append(solid)
+    if front_edge.depth < opaque.depth / 1.05:
+        shown.append(front_edge)
+        if is_behind(back_edge, front_edge) and back_edge.depth < opaque.depth / 1.05:
+            shown.append(back_edge)
+    if np.isfinite(opaque.depth):
+        shown.append(opaque)
     clear, sum_ = 1.0, 0.0
     for s in shown:
         got, cover = fetch(layers[s.frame], s)
@@ -269,86 +271,88 @@ def instant(layers, tiles, x, y, t, color):
         clear *= 1 - cover
     if clear < 0.5:
         return sum_ / (1 - clear)
-    way = moved(layers[0].path[0][y, x], t)
+    way = moved(layers[0].trajectory[0][y, x], t)
     return bilinear(color, x + 0.5 - way[0], y + 0.5 - way[1])
 
 
-def search(layers, tiles, x, y, t):
+def resolve_visibility(layers, tiles, x, y, t):
     """The nearest opaque sample at the pixel at time `t`, the nearest two at silhouettes."""
     centre = np.array([x + 0.5, y + 0.5])
     order = [0, 2, 1] if len(layers) == 3 and t > 0 else list(range(len(layers)))
     seen = [Sample(), Sample(), Sample()]
 
-    def look(f, far, seed, known):
+    def search_layer(f, back, seed, first):
         """One search; where it led, and whether something is there."""
         frame, u = layers[f], t - layers[f].offset
-        d, miss, pixel = follow(frame.path[int(far)], centre, seed, u, known)
-        is_there = pixel is not None and miss <= 1.0
-        again = known is not None and known[1] and (np.abs(d - known[0]) < 0.75).all()
-        if is_there and not again and frame.depth[int(far)][pixel] > 0:
-            z = frame.depth[int(far)][pixel]
-            weight = (1.1 if f else 1.0) * (1.2 if far and frame.guessed[pixel] else 1.0)
-            found = Sample(z * weight, z, miss, centre - d, f, far, pixel)
-            note(seen, found, opaque=far or frame.plain[pixel])
+        d, residual, pixel = iterate_fixed_point(
+            frame.trajectory[int(back)], centre, seed, u, first
+        )
+        is_there = pixel is not None and residual <= 1.0
+        again = first is not None and first[1] and (np.abs(d - first[0]) < 0.75).all()
+        if is_there and not again and frame.depth[int(back)][pixel] > 0:
+            z = frame.depth[int(back)][pixel]
+            weight = (1.1 if f else 1.0) * (1.2 if back and frame.inferred[pixel] else 1.0)
+            found = Sample(z * weight, z, residual, centre - d, f, back, pixel)
+            record(seen, found, is_opaque=back or frame.edgeless[pixel])
         return d, is_there
 
-    def near(f):
+    def search_front(f):
         tile, u = tiles[f], t - layers[f].offset
-        own = look(f, False, None, None)
+        own = search_layer(f, False, None, None)
         for path, z, when in zip(tile["paths"], tile["depths"], tile["times"], strict=True):
             if z * (1.1 if f else 1.0) < seen[0].depth and when[0] <= u <= when[1]:
-                look(f, False, moved(path, u), own)
+                search_layer(f, False, moved(path, u), own)
 
     def inferred():
-        return np.isinf(seen[0].depth) or (seen[0].frame, seen[0].far) == (0, True)
+        return np.isinf(seen[0].depth) or (seen[0].frame, seen[0].back) == (0, True)
 
-    near(0)
+    search_front(0)
     hidden = np.isinf(seen[0].depth)
     behind = hidden and any(tile["edges"] for tile in tiles)
     if behind:
-        look(0, True, None, None)
+        search_layer(0, True, None, None)
     if len(order) > 1 and (hidden or abs(t) > 0.25):
-        near(order[1])
+        search_front(order[1])
         if len(order) > 2 and inferred():
-            near(order[2])
+            search_front(order[2])
         for f in order[1:]:
             if behind and inferred() and (np.isinf(seen[0].depth) or np.isinf(seen[1].depth)):
-                look(f, True, None, None)
+                search_layer(f, True, None, None)
     return seen
 
 
-def follow(paths, centre, seed, u, known):
+def iterate_fixed_point(paths, centre, seed, u, first):
     """Fixed point of d = displacement(centre - d): d, the last step, pixel; None: from 0."""
     height, width = paths.shape[:2]
     d, steps = (np.zeros(2), 5) if seed is None else (seed, 3)
-    miss, pixel = np.inf, None
-    if known is not None and (np.abs(d - known[0]) < 0.75).all():
-        return d, miss, pixel
+    residual, pixel = np.inf, None
+    if first is not None and (np.abs(d - first[0]) < 0.75).all():
+        return d, residual, pixel
     for _ in range(steps):
         q = centre - d
         if not (0 <= q[0] < width and 0 <= q[1] < height):
             return d, np.inf, None
         pixel = int(q[1]), int(q[0])
         step = moved(paths[pixel], u)
-        back = np.inf if known is None else np.hypot(*(d - known[0])) / 2
-        miss, d = np.hypot(*(step - d)), step
-        if miss < 0.5 or miss > back:  # there, or astray
+        back = np.inf if first is None else np.hypot(*(d - first[0])) / 2
+        residual, d = np.hypot(*(step - d)), step
+        if residual < 0.5 or residual > back:  # there, or astray
             break
-        if known is not None and (np.abs(d - known[0]) < 0.75).all():
+        if first is not None and (np.abs(d - first[0]) < 0.75).all():
             break
-    return d, miss, pixel
+    return d, residual, pixel
 
 
-def note(seen, new, opaque):
+def record(seen, new, is_opaque):
     """Keep what is nearest."""
-    solid, edge, second = seen
-    if opaque:
-        if new.depth < solid.depth:
+    opaque, front_edge, back_edge = seen
+    if is_opaque:
+        if new.depth < opaque.depth:
             seen[0] = new
         return
-    if new.depth < edge.depth:
-        seen[1:] = [new, edge if is_behind(edge, new) else second]
-    elif new.depth < second.depth and is_behind(new, edge):
+    if new.depth < front_edge.depth:
+        seen[1:] = [new, front_edge if is_behind(front_edge, new) else back_edge]
+    elif new.depth < back_edge.depth and is_behind(new, front_edge):
         seen[2] = new
 
 
@@ -359,11 +363,11 @@ def is_behind(new, old):
 
 def fetch(frame, s):
     """Colour and coverage of a sample, from the texels of its own surface."""
-    if not s.far and frame.plain[s.pixel]:
-        if frame.calm[s.pixel] and frame.offset == 0:
+    if not s.back and frame.edgeless[s.pixel]:
+        if frame.smooth[s.pixel] and frame.offset == 0:
             return cubic(frame.color[0], *s.at), 1.0
         return bilinear(frame.color[0], *s.at), 1.0
-    height, width = frame.plain.shape
+    height, width = frame.edgeless.shape
     corner = np.floor(s.at - 0.5).astype(int)
     color, cover = 0.0, 0.0
     for dj in (0, 1):
@@ -372,12 +376,12 @@ def fetch(frame, s):
             share = np.prod(1 - np.abs(s.at - 0.5 - (i, j)))
             p = min(max(j, 0), height - 1), min(max(i, 0), width - 1)
             z, behind = frame.depth[0][p], frame.depth[1][p] > 0
-            if s.far and behind:
+            if s.back and behind:
                 color, cover = color + share * frame.color[1][p], cover + share
-            elif z <= 1.05 * s.true_depth and (not s.far or z >= s.true_depth / 1.05):
+            elif z <= 1.05 * s.true_depth and (not s.back or z >= s.true_depth / 1.05):
                 color = color + share * frame.color[0][p]
-                cover += share * (1.0 if s.far else frame.coverage[p])
-    if s.far and cover > 1e-4:
+                cover += share * (1.0 if s.back else frame.coverage[p])
+    if s.back and cover > 1e-4:
         return color / cover, 1.0
     return color, cover
 

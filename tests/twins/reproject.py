@@ -6,7 +6,7 @@ import numpy as np
 
 from twins.tap import bilinear, displacement
 
-FAR = 1e10
+NO_DEPTH = 2.0**33
 
 
 def reproject(sources, times):
@@ -33,7 +33,7 @@ def _nearest(sources, t, height, width):
                 way = displacement(motion[row, column].astype(float), t - offset)
                 x, y = column + way[0], row + way[1]
                 z = depth[row, column]
-                z = float(z) if np.isfinite(z) and z > 0 else FAR
+                z = float(z) if np.isfinite(z) and z > 0 else NO_DEPTH
                 for j in (int(np.floor(y)), int(np.floor(y)) + 1):
                     for i in (int(np.floor(x)), int(np.floor(x)) + 1):
                         off = abs(i - x), abs(j - y)

@@ -38,7 +38,6 @@ const FLAGS: u32 = 3u;
 const EDGE: u32 = 1u;           // the pixel may show two surfaces
 const HDR: u32 = 2u;            // some channel is beyond WHITE
 
-const EDGE_DEPTH_RATIO: f32 = 1.1;      // of two depths of different surfaces
 const EDGE_MOTION: f32 = 0.5;   // difference of the motions of different surfaces [px]
 const WHITE: f32 = 1.0;
 const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and below 1 less it for 0
@@ -89,7 +88,9 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
     }
     let own = textureLoad(motion, px, 0);
     var difference2 = 0.0;
-    let count = select(0, 9, farthest > nearest * EDGE_DEPTH_RATIO);
+    // The 3 x 3 is two pixels from side to side.
+    let differs = farthest > nearest * (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO);
+    let count = select(0, 9, differs);
     for (var i = 0; i < count; i++) {
         let difference = textureLoad(motion, clamped(px + vec2i(i % 3, i / 3) - 1), 0) - own;
         difference2 = max(difference2, dot(difference, difference));
