@@ -1,9 +1,9 @@
-"""Make the gallery: python docs/make.py. Every picture and figure comes from the program.
+"""Make the gallery: python tools/gallery.py. Every picture and figure comes from the program.
 
 Every method draws every scene; the page shows its picture of the first, its error map, and
 the place of all scenes where it is worst, beside the truth.
 
-python docs/make.py REPORT.json... instead puts tables of `wgmb compare --experiment` into
+python tools/gallery.py REPORT.json... instead puts tables of `wgmb compare --experiment` into
 experiments.md, between <!-- TITLE OF THE TABLE --> and <!-- -->.
 """
 
@@ -23,7 +23,7 @@ from wgmb.findings import Entry, Report, machine
 from wgmb.measure import FLIP_GAIN, MEASURES, display, flip_colors
 from wgmb.options import ShutterOptions
 
-HERE = Path(__file__).parent
+DOCS = Path(__file__).parent.parent / "docs"
 SCENES = {"crossing:speed=3": 0.0, "fence:speed=6": 0.0, "wheel": 0.0, "torusphere": 16.0}
 """At these seconds."""
 SIZE, DETAIL = (480, 270), (120, 68)  # [px], of pictures, of the worst place
@@ -34,7 +34,7 @@ def main() -> None:
     """Render, judge, and write gallery.md with its pictures."""
     device = gpu.open_device()
     lab = Laboratory(device, tell=lambda text: print(text, file=sys.stderr))
-    found = Report("Gallery", "python docs/make.py", machine(device), SAMPLES)
+    found = Report("Gallery", "python tools/gallery.py", machine(device), SAMPLES)
     contenders = [Contender(name) for name in METHODS]
     for text, time in SCENES.items():
         name, scene = make_scene(text)
@@ -46,8 +46,8 @@ def main() -> None:
         # Image methods have nothing to start from where there are volumes alone.
         able = contenders if scene.bodies else [c for c in contenders if c.needs_scene]
         lab.compare(found, case, able, (SAMPLES,), budgets=lambda *_: [])
-    (HERE / "gallery").mkdir(exist_ok=True)
-    (HERE / "gallery.md").write_text(_page(found), encoding="utf-8")
+    (DOCS / "images" / "gallery").mkdir(parents=True, exist_ok=True)
+    (DOCS / "laboratory" / "gallery.md").write_text(_page(found), encoding="utf-8")
 
 
 def fill(text: str, reports: list[dict]) -> str:
@@ -111,7 +111,7 @@ def _times_tap(found: Report, entry: Entry) -> str:
 def _section(found: Report, name: str) -> str:
     entries = [e for e in found.entries if e.label == name]
     cases = {c.name: c for c in found.cases}
-    picture = HERE / "gallery" / f"{name}.jpg"
+    picture = DOCS / "images" / "gallery" / f"{name}.jpg"
     errors = [flip_colors(e.picture, cases[e.case].truth) for e in entries]
     worst, corner = max(
         ((i, *_worst(error)) for i, error in enumerate(errors)), key=lambda place: place[1]
@@ -130,7 +130,7 @@ def _section(found: Report, name: str) -> str:
         f"## {name}\n\n{first}\n\n- Strong: {strong}\n- Artefacts: {artefacts}\n"
         f"- {entries[0].case}: {figures}\n\n"
         f"![{name}: picture, error, the worst place ({entries[worst].case}), the truth there]"
-        f"(gallery/{name}.jpg)\n"
+        f"(../images/gallery/{name}.jpg)\n"
     )
 
 
@@ -162,7 +162,7 @@ def _detail(shown: np.ndarray, corner: tuple[int, int]) -> np.ndarray:
 
 if __name__ == "__main__":
     if reports := [json.loads(Path(name).read_text("utf-8")) for name in sys.argv[1:]]:
-        page = HERE / "experiments.md"
+        page = DOCS / "laboratory" / "experiments.md"
         page.write_text(fill(page.read_text("utf-8"), reports), encoding="utf-8")
     else:
         main()

@@ -1,6 +1,7 @@
-"""Score the methods on Blender's scenes: python docs/blender_scores.py FOLDER/SCENE ...
+"""Score the methods on Blender's scenes: python tools/blender_scores.py FOLDER/SCENE ...
 
-Folders as docs/blender_scenes.py makes them. Writes docs/blender.md and a picture a scene.
+Folders as tools/blender_scenes.py makes them. Writes
+docs/laboratory/blender-scores.md and a picture per scene.
 """
 
 import json
@@ -14,7 +15,7 @@ from PIL import Image
 from wgmb import Blur, Clip, Frame, exr, gpu, measure
 from wgmb.findings import machine
 
-HERE = Path(__file__).parent
+DOCS = Path(__file__).parent.parent / "docs"
 SHUTTERS = {"050": 180, "100": 360}
 METHODS = (("tap", 16), ("tiles", 35), ("reproject", 16), ("gather", 16), ("gather", 64))
 SHARP, PEER, NOISE = "sharp", "Vector Blur", "noise"
@@ -27,7 +28,7 @@ def main(folders: list[Path]) -> None:
     device = gpu.open_device()
     blurs = {f"{name} {n}": Blur(name, samples=n, device=device) for name, n in METHODS}
     lines, sections = [["scene", *COLUMNS], ["---"] * (len(COLUMNS) + 1)], []
-    (HERE / "blender").mkdir(exist_ok=True)
+    (DOCS / "images" / "blender").mkdir(exist_ok=True)
     for folder in folders:
         frame = frame_of(folder)
         for text, degrees in SHUTTERS.items():
@@ -47,7 +48,9 @@ def main(folders: list[Path]) -> None:
             print("  ".join(lines[-1]), flush=True)
         sections.append(section(folder, truth, made))
     table = "".join(f"| {' | '.join(line)} |\n" for line in lines)
-    (HERE / "blender.md").write_text(page(device, table, sections), encoding="utf-8")
+    (DOCS / "laboratory" / "blender-scores.md").write_text(
+        page(device, table, sections), encoding="utf-8"
+    )
 
 
 def frame_of(folder: Path) -> Frame:
@@ -71,21 +74,23 @@ def section(folder: Path, truth: np.ndarray, made: dict[str, np.ndarray]) -> str
     errors = [measure.flip_colors(made[k], truth) for k in (PEER, SHOWN)]
     strip = np.vstack([np.hstack(shown), np.hstack(errors)])
     levels = (255 * np.clip(strip, 0, 1) + 0.5).astype(np.uint8)
-    path = HERE / "blender" / f"{folder.name}.jpg"
+    path = DOCS / "images" / "blender" / f"{folder.name}.jpg"
     Image.fromarray(levels).save(path, quality=82, optimize=True)
     about = json.loads((folder / "camera.json").read_text())["doc"]
-    return f"## {folder.name}\n\n{about}\n\n![truth, gather, errors](blender/{path.name})\n"
+    return (
+        f"## {folder.name}\n\n{about}\n\n![truth, gather, errors](../images/blender/{path.name})\n"
+    )
 
 
 def page(device, table: str, sections: list[str]) -> str:
-    """The text of docs/blender.md."""
+    """The text of docs/laboratory/blender-scores.md."""
     about = ", ".join(f"{k} {v}" for k, v in machine(device).items())
     return (
         "# Against a path tracer's own motion blur\n\n"
-        "Made by hand: `python docs/blender_scenes.py FOLDER` renders the scenes with Cycles "
+        "Made by hand: `python tools/blender_scenes.py FOLDER` renders the scenes with Cycles "
         "(`pip install bpy==4.5.15 OpenEXR` in an environment of its own, Python 3.11), "
-        f"`python docs/blender_scores.py FOLDER/*` scores them ({about}). "
-        "`python docs/blender_scenes.py FOLDER FILE.glb` makes a scene of an animated glTF file. "
+        f"`python tools/blender_scores.py FOLDER/*` scores them ({about}). "
+        "`python tools/blender_scenes.py FOLDER FILE.glb` makes a scene of an animated glTF file. "
         "FLIP (lower is better) / PSNR on the display [dB] of 640 x 360 pixels; box shutters "
         f"centred on the frame. `{PEER}`: the node of Blender's compositor, 64 samples. "
         f"`{NOISE}`: one half of the truth's samples against the other, twice the truth's own "
