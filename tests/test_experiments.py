@@ -12,7 +12,7 @@ from wgmb.cases import Case
 from wgmb.errors import InputError
 from wgmb.findings import Entry, Report
 
-DOCS = Path(__file__).parent.parent / "docs"
+ROOT = Path(__file__).parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -68,10 +68,10 @@ def test_chen_compares_rates_faces_and_alphas(lab):
 
 def test_the_page_of_experiments_takes_its_tables_from_reports(lab):
     found = report.as_json(made(lab, "chen", moments=1))
-    spec = importlib.util.spec_from_file_location("make_docs", DOCS / "make.py")
+    spec = importlib.util.spec_from_file_location("gallery", ROOT / "tools" / "gallery.py")
     docs = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(docs)
-    text = (DOCS / "experiments.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "laboratory" / "experiments.md").read_text(encoding="utf-8")
     places = re.findall(r"<!-- (.+?) -->\n", text)
     tables = {t["title"]: t for t in found["tables"]}
     assert places and set(places) <= tables.keys()

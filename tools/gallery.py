@@ -70,18 +70,20 @@ def _page(found: Report) -> str:
     sections = [_section(found, name) for name in METHODS]
     return (
         "# The methods, side by side\n\n"
-        f"Made by `{found.command}` ({about}). Scenes of {SIZE[0]} x {SIZE[1]}, {SAMPLES} samples, "
-        f"truth: {REFERENCE.replace(':', ', ')} rays a pixel. Times are of the blur alone, on the "
-        "adapter named above, and say little about yours; `wgmb compare` makes such a page for "
-        "your frames.\n\n" + _table(found) + "\nUnder every method: its picture; its error, "
-        f"{FLIP_GAIN:g} times FLIP, black is alike; the place where it is worst; the truth "
-        "there.\n\n" + "\n".join(sections)
+        f"FLIP (lower is better) of every method on four built-in scenes of {SIZE[0]} x {SIZE[1]} "
+        f"with {SAMPLES} samples. The truth is {REFERENCE.replace(':', ' with ')} rays per pixel. "
+        "Times are those of the blur alone, on a CPU.[^made] `wgmb compare` makes such a page for "
+        "your frames.\n\n" + _table(found) + "\nEach picture has four parts. Top: the method's "
+        f"picture of the first scene, and its error ({FLIP_GAIN:g} times FLIP; black is no error). "
+        "Bottom: the place of all scenes where the method is worst, and the truth there.\n\n"
+        + "\n".join(sections)
+        + f"\n[^made]: Made by `{found.command}`: {about}.\n"
     )
 
 
 def _table(found: Report) -> str:
     """FLIP by method and scene, and the time of the first scene."""
-    head = ["method", *(c.name for c in found.cases), "PSNR [dB] of the first", "ms", "to `tap`"]
+    head = ["method", *(c.name for c in found.cases), "PSNR [dB], first", "ms", "times `tap`"]
     lines = [head, ["---"] * len(head)]
     for label in ("sharp", *METHODS):
         row, first = [f"`{label}`"], None
@@ -129,7 +131,7 @@ def _section(found: Report, name: str) -> str:
     return (
         f"## {name}\n\n{first}\n\n- Strong: {strong}\n- Artefacts: {artefacts}\n"
         f"- {entries[0].case}: {figures}\n\n"
-        f"![{name}: picture, error, the worst place ({entries[worst].case}), the truth there]"
+        f"![{name}: picture, error, worst place ({entries[worst].case}), truth there]"
         f"(../images/gallery/{name}.jpg)\n"
     )
 
