@@ -62,6 +62,21 @@ def _find(name: str):
     return found
 
 
+def _itemise(app: Sphinx, what: str, name: str, found, options, lines: list[str]) -> None:
+    """Make a list of the lines of a docstring that explain one parameter each: "`name`: ..."."""
+    made, in_item = [], False
+    for line in lines:
+        if re.match(r"`\w+`(, `\w+`)*: ", line):
+            made += ["", f"* {line}"]
+            in_item = True
+        elif in_item and line.strip():
+            made.append(f"  {line}")
+        else:
+            made.append(line)
+            in_item = False
+    lines[:] = made
+
+
 def _fill(app: Sphinx, page: str, source: list[str]) -> None:
     source[0] = re.sub(r"<!-- api (\w+) -->", lambda mark: entries(mark[1]), source[0])
 
@@ -75,4 +90,5 @@ def setup(app: Sphinx) -> dict:
     """Called by Sphinx."""
     app.connect("builder-inited", _complain)
     app.connect("source-read", _fill)
+    app.connect("autodoc-process-docstring", _itemise)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
