@@ -106,3 +106,28 @@ def test_every_method_has_a_page_that_says_where_it_fails(method):
 
 def test_the_readme_is_short():
     assert len(PAGES["README.md"].splitlines()) <= MOST_LINES
+
+
+@pytest.mark.parametrize(
+    ("html", "fault"),
+    [
+        ('<a href="b.html#there">', None),
+        ('<a href="https://example.org/">', None),
+        ('<img src="data:image/png;base64,AAAA">', None),
+        ('<a href="c.html">', "a.html links to c.html, which is not there"),
+        ('<a href="b.html#gone">', "a.html links to b.html#gone, where there is no such place"),
+        ('<a href="#gone">', "a.html links to #gone, where there is no such place"),
+        ('<img src="c.png">', "a.html links to c.png, which is not there"),
+        ('<script src="//example.org/x.js">', "a.html loads //example.org/x.js"),
+        ('<link href="http://example.org/x.css">', "a.html loads http://example.org/x.css"),
+    ],
+)
+def test_a_site_that_does_not_hold_together_is_told(html, fault, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(HERE / "docs" / "extensions")
+    from self_contained import faults
+
+    (tmp_path / "a.html").write_text(html)
+    (tmp_path / "b.html").write_text('<p id="there">')
+    assert faults(tmp_path) == ([fault] if fault else [])
+    (tmp_path / "x.css").write_text("@font-face { src: url('https://example.org/x.woff2') }")
+    assert "x.css loads https://example.org/x.woff2" in faults(tmp_path)

@@ -3,13 +3,16 @@
 Checked on the HTML as it was written, so that it also holds for what the theme adds.
 """
 
+from __future__ import annotations
+
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
-from sphinx.application import Sphinx
-from sphinx.errors import SphinxError
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 _LOADED = {"script", "img", "source", "video", "audio", "iframe", "embed", "object", "track"}
 
@@ -67,6 +70,8 @@ def _has(page: Page, fragment: str) -> bool:
 
 
 def _check(app: Sphinx, exception: Exception | None) -> None:
+    from sphinx.errors import SphinxError  # here, as tests of the above need no Sphinx
+
     if exception is None and app.builder.name == "html" and (found := faults(Path(app.outdir))):
         raise SphinxError("\n".join(("the site does not hold together:", *found)))
 
