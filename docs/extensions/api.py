@@ -12,18 +12,18 @@ from sphinx.util import logging
 import wgmb
 
 GROUPS = {
-    "blurring": ("blur", "Blur", "Frame", "Shutter", "METHODS"),
+    "blurring": ("blur", "Blur", "Frame", "FrameViews", "Shutter", "METHODS"),
     "sequences": (
         "Clip", "Passes", "Vectors", "Output", "blur_sequence", "Report", "BatchReport",
     ),
     "cameras": ("Camera", "Reprojections", "CameraFile"),
     "scenes": (
-        "Scene", "Body", "Shot", "Render", "scenes.make", "scene.at", "scene.moving",
+        "Scene", "Body", "Shot", "Render", "scene.make", "scene.at", "scene.moving",
         "scene.translation", "scene.rotation", "scene.scaling", "scene.Orbit", "scene.Torus",
         "scene.Stage",
     ),
     "perception": ("Cone", "Observer", "Viewer"),
-    "errors": ("Error", "InputError", "DeviceError", "ShaderError"),
+    "errors": ("Error", "InputError", "DeviceError", "GpuMemoryError", "ShaderError"),
 }  # fmt: skip
 
 DATA = {"METHODS": "The methods: classes by name."}
