@@ -14,7 +14,7 @@ from wgmb.errors import InputError
 from wgmb.findings import Entry, Report
 from wgmb.measure import MEASURES
 
-DOCS = Path(__file__).parent.parent / "docs"
+ROOT = Path(__file__).parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def test_taylors_verdicts_are_those_of_the_figures(taylor, judge):
         value = entry.measures[judge]
         return value if judge == "flip" else np.sqrt(10 ** (-value / 10))
 
-    published, distributed = "reproject, form published", "distributed"
+    published, distributed = "reproject, variant published", "distributed"
     small, large = sorted({e.budget for e in taylor.of("rotation", kind="time")})
     want = [
         error(published, small) < error(distributed, small),
@@ -81,7 +81,7 @@ def test_taylors_reprojection_gains_little_by_more_samples_and_distributed_gains
         (entry,) = taylor.of("rotation", label=name, kind="samples", samples=samples)
         return entry.measures["flip"]
 
-    published, distributed = "reproject, form published", "distributed"
+    published, distributed = "reproject, variant published", "distributed"
     assert flip(published, 1) < 0.8 * flip("accumulate", 1)
     assert flip(published, 1) < 0.8 * flip(distributed, 1)
     assert 0.9 * flip(published, 8) < flip(published, 40) < 1.1 * flip(published, 8)
@@ -118,7 +118,7 @@ def test_chen_compares_rates_faces_and_alphas(chen):
 def test_chens_verdict_is_that_of_the_rates(chen):
     rates = chen.tables[0]
     milliseconds = {row[0]: row[-1] for row in rates.rows}
-    times = milliseconds["tap, form published"] / milliseconds["fusion, form published"]
+    times = milliseconds["tap, variant published"] / milliseconds["fusion, variant published"]
     said = re.search(
         r"its own is ([\d.]+) times as fast.* finding (holds|does not hold)", rates.note
     )
@@ -144,10 +144,10 @@ def test_chens_printed_weights_brighten_instead_of_blurring(chen, scene):
 
 def test_the_page_of_experiments_takes_its_tables_from_reports(chen):
     found = report.as_json(chen)
-    spec = importlib.util.spec_from_file_location("make_docs", DOCS / "make.py")
+    spec = importlib.util.spec_from_file_location("gallery", ROOT / "tools" / "gallery.py")
     docs = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(docs)
-    text = (DOCS / "experiments.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "laboratory" / "experiments.md").read_text(encoding="utf-8")
     places = re.findall(r"<!-- (.+?) -->\n", text)
     tables = {t["title"]: t for t in found["tables"]}
     assert places and set(places) <= tables.keys()

@@ -1,6 +1,7 @@
-"""Score the methods on Blender's scenes: python docs/blender_scores.py FOLDER/SCENE ...
+"""Score the methods on Blender's scenes: python tools/blender_scores.py FOLDER/SCENE ...
 
-Folders as docs/blender_scenes.py makes them. Writes docs/blender.md and a picture a scene.
+Folders as tools/blender_scenes.py makes them. Writes
+docs/laboratory/blender-scores.md and a picture per scene.
 """
 
 import json
@@ -14,7 +15,7 @@ from PIL import Image
 from wgmb import Blur, Clip, Frame, exr, gpu, measure
 from wgmb.findings import machine
 
-HERE = Path(__file__).parent
+DOCS = Path(__file__).parent.parent / "docs"
 SHUTTERS = {"050": 180, "100": 360}
 METHODS = (("tap", 16), ("tiles", 35), ("reproject", 16), ("gather", 16), ("gather", 64))
 SHARP, PEER, NOISE = "sharp", "Vector Blur", "noise"
@@ -27,7 +28,7 @@ def main(folders: list[Path]) -> None:
     device = gpu.open_device()
     blurs = {f"{name} {n}": Blur(name, samples=n, device=device) for name, n in METHODS}
     lines, sections = [["scene", *COLUMNS], ["---"] * (len(COLUMNS) + 1)], []
-    (HERE / "blender").mkdir(exist_ok=True)
+    (DOCS / "images" / "blender").mkdir(exist_ok=True)
     for folder in folders:
         frame = frame_of(folder)
         for text, degrees in SHUTTERS.items():
@@ -47,7 +48,9 @@ def main(folders: list[Path]) -> None:
             print("  ".join(lines[-1]), flush=True)
         sections.append(section(folder, truth, made))
     table = "".join(f"| {' | '.join(line)} |\n" for line in lines)
-    (HERE / "blender.md").write_text(page(device, table, sections), encoding="utf-8")
+    (DOCS / "laboratory" / "blender-scores.md").write_text(
+        page(device, table, sections), encoding="utf-8"
+    )
 
 
 def frame_of(folder: Path) -> Frame:
@@ -71,38 +74,49 @@ def section(folder: Path, truth: np.ndarray, made: dict[str, np.ndarray]) -> str
     errors = [measure.flip_colors(made[k], truth) for k in (PEER, SHOWN)]
     strip = np.vstack([np.hstack(shown), np.hstack(errors)])
     levels = (255 * np.clip(strip, 0, 1) + 0.5).astype(np.uint8)
-    path = HERE / "blender" / f"{folder.name}.jpg"
+    path = DOCS / "images" / "blender" / f"{folder.name}.jpg"
     Image.fromarray(levels).save(path, quality=82, optimize=True)
     about = json.loads((folder / "camera.json").read_text())["doc"]
-    return f"## {folder.name}\n\n{about}\n\n![truth, gather, errors](blender/{path.name})\n"
+    return (
+        f"## {folder.name}\n\n{about}\n\n![truth, gather, errors](../images/blender/{path.name})\n"
+    )
 
 
 def page(device, table: str, sections: list[str]) -> str:
-    """The text of docs/blender.md."""
+    """The text of docs/laboratory/blender-scores.md."""
     about = ", ".join(f"{k} {v}" for k, v in machine(device).items())
     return (
         "# Against a path tracer's own motion blur\n\n"
-        "Made by hand: `python docs/blender_scenes.py FOLDER` renders the scenes with Cycles "
-        "(`pip install bpy==4.5.15 OpenEXR` in an environment of its own, Python 3.11), "
-        f"`python docs/blender_scores.py FOLDER/*` scores them ({about}). "
-        "`python docs/blender_scenes.py FOLDER FILE.glb` makes a scene of an animated glTF file. "
-        "FLIP (lower is better) / PSNR on the display [dB] of 640 x 360 pixels; box shutters "
-        f"centred on the frame. `{PEER}`: the node of Blender's compositor, 64 samples. "
-        f"`{NOISE}`: one half of the truth's samples against the other, twice the truth's own "
-        "error.\n\n"
+        "Scenes rendered by Cycles, sharp and with its own motion blur; the sharp frames blurred "
+        "by wgmb and by Blender's compositor. FLIP (lower is better) / PSNR on the display in dB "
+        "(higher is better), 640 x 360 pixels, box shutters centred on the frame.[^made] "
+        f"`{PEER}` is the node of Blender's compositor with 64 samples. `{NOISE}` compares one "
+        "half of the truth's samples with the other; it is twice the truth's own error.\n\n"
         + table
-        + "\nWhat is left of gather's error: shadows and shading that move over a surface, of "
-        "which no vector tells (runner, propeller, cesium_man's shadow); places hidden in all "
-        "three frames (c_crossing); a silhouette that turns under its own outline (milk_truck's "
-        "tyres at their arches); paths that bend more than three positions can tell (flag: a wave "
-        "turns by up to 75° a frame; cesium_man: the file's straight keys leave the parabola "
-        "through three frames by up to a pixel).\n"
-        "\nThe glTF models are Cesium Man and Cesium Milk Truck, (c) Cesium, from CesiumJS 1.10 "
+        + "\n## What is left of gather's error\n\n"
+        "* Shadows and shading that move over a surface, of which no vector tells (runner, "
+        "propeller, the shadow of cesium_man).\n"
+        "* Places that are hidden in all three frames (c_crossing).\n"
+        "* A silhouette that turns under its own outline (milk_truck's tyres at their arches).\n"
+        "* Paths that bend more than three positions can tell (flag: a wave turns by up to 75° per "
+        "frame; cesium_man: the file's straight keys leave the parabola through three frames by up "
+        "to a pixel).\n"
+        "\n## Make your own\n\n"
+        "```sh\npython tools/blender_scenes.py FOLDER\n"
+        "python tools/blender_scenes.py FOLDER FILE.glb\n"
+        "python tools/blender_scores.py FOLDER/*\n```\n\n"
+        "The first two render the scenes above, and a scene of an animated glTF file. They need an "
+        "environment of their own (Python 3.11, `pip install bpy==4.5.15 OpenEXR`). The third "
+        "writes this page.\n\n"
+        "The glTF models are Cesium Man and Cesium Milk Truck, (c) Cesium, from CesiumJS 1.10 "
         "(Apache 2.0; also among Khronos's glTF sample assets, CC-BY 4.0 with trademark "
-        "limitations). Their files of glTF 0.9 were made 2.0 by gltf-pipeline, and each file's "
-        "animations of one channel joined to one. The files are not part of this project.\n"
-        "\nPictures, at 360°: the truth, gather with 16 samples; below, "
-        f"{measure.FLIP_GAIN:g} times FLIP of {PEER} and of gather.\n\n" + "\n".join(sections)
+        "limitations). Their files of glTF 0.9 were converted to 2.0 by gltf-pipeline, and the "
+        "animations of each file's channels were joined into one. The files are not part of this "
+        "project.\n\n"
+        "In the pictures below, at 360°: the truth and gather with 16 samples; below them, "
+        f"{measure.FLIP_GAIN:g} times FLIP of {PEER} and of gather.\n\n"
+        + "\n".join(sections)
+        + f"\n[^made]: {about}.\n"
     )
 
 

@@ -1,4 +1,4 @@
-"""Scenes with a path tracer's own motion blur: python docs/blender_scenes.py FOLDER [SCENE ...]
+"""Scenes with a path tracer's own motion blur: python tools/blender_scenes.py FOLDER [SCENE ...]
 
 A scene is one of this file's, or an animated glTF file, FILE.glb or FILE.glb:ANIMATION (else
 its first): its cycle is played SPEED times as fast as the file says, so that a walk blurs like

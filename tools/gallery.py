@@ -1,9 +1,9 @@
-"""Make the gallery: python docs/make.py. Every picture and figure comes from the program.
+"""Make the gallery: python tools/gallery.py. Every picture and figure comes from the program.
 
 Every method draws every scene; the page shows its picture of the first, its error map, and
 the place of all scenes where it is worst, beside the truth.
 
-python docs/make.py REPORT.json... instead puts tables of `wgmb compare --experiment` into
+python tools/gallery.py REPORT.json... instead puts tables of `wgmb compare --experiment` into
 experiments.md, between <!-- TITLE OF THE TABLE --> and <!-- -->.
 """
 
@@ -23,7 +23,7 @@ from wgmb.findings import Entry, Report, machine
 from wgmb.measure import FLIP_GAIN, MEASURES, display, flip_colors
 from wgmb.options import ShutterOptions
 
-HERE = Path(__file__).parent
+DOCS = Path(__file__).parent.parent / "docs"
 SCENES = {"crossing:speed=3": 0.0, "fence:speed=6": 0.0, "wheel": 0.0, "torusphere": 16.0}
 """At these seconds."""
 SIZE, DETAIL = (480, 270), (120, 68)  # [px], of pictures, of the worst place
@@ -34,7 +34,7 @@ def main() -> None:
     """Render, judge, and write gallery.md with its pictures."""
     device = gpu.open_device()
     lab = Laboratory(device, tell=lambda text: print(text, file=sys.stderr))
-    found = Report("Gallery", "python docs/make.py", machine(device), SAMPLES)
+    found = Report("Gallery", "python tools/gallery.py", machine(device), SAMPLES)
     contenders = [Contender(name) for name in METHODS]
     for text, time in SCENES.items():
         name, scene = make_scene(text)
@@ -46,8 +46,8 @@ def main() -> None:
         # Image methods have nothing to start from where there are volumes alone.
         able = contenders if scene.bodies else [c for c in contenders if c.needs_scene]
         lab.compare(found, case, able, (SAMPLES,), budgets=lambda *_: [])
-    (HERE / "gallery").mkdir(exist_ok=True)
-    (HERE / "gallery.md").write_text(_page(found), encoding="utf-8")
+    (DOCS / "images" / "gallery").mkdir(parents=True, exist_ok=True)
+    (DOCS / "laboratory" / "gallery.md").write_text(_page(found), encoding="utf-8")
 
 
 def fill(text: str, reports: list[dict]) -> str:
@@ -70,18 +70,20 @@ def _page(found: Report) -> str:
     sections = [_section(found, name) for name in METHODS]
     return (
         "# The methods, side by side\n\n"
-        f"Made by `{found.command}` ({about}). Scenes of {SIZE[0]} x {SIZE[1]}, {SAMPLES} samples, "
-        f"truth: {REFERENCE.replace(':', ', ')} rays a pixel. Times are of the blur alone, on the "
-        "adapter named above, and say little about yours; `wgmb compare` makes such a page for "
-        "your frames.\n\n" + _table(found) + "\nUnder every method: its picture; its error, "
-        f"{FLIP_GAIN:g} times FLIP, black is alike; the place where it is worst; the truth "
-        "there.\n\n" + "\n".join(sections)
+        f"FLIP (lower is better) of every method on four built-in scenes of {SIZE[0]} x {SIZE[1]} "
+        f"with {SAMPLES} samples. The truth is {REFERENCE.replace(':', ' with ')} rays per pixel. "
+        "Times are those of the blur alone, on a CPU.[^made] `wgmb compare` makes such a page for "
+        "your frames.\n\n" + _table(found) + "\nEach picture has four parts. Top: the method's "
+        f"picture of the first scene, and its error ({FLIP_GAIN:g} times FLIP; black is no error). "
+        "Bottom: the place of all scenes where the method is worst, and the truth there.\n\n"
+        + "\n".join(sections)
+        + f"\n[^made]: Made by `{found.command}`: {about}.\n"
     )
 
 
 def _table(found: Report) -> str:
     """FLIP by method and scene, and the time of the first scene."""
-    head = ["method", *(c.name for c in found.cases), "PSNR [dB] of the first", "ms", "to `tap`"]
+    head = ["method", *(c.name for c in found.cases), "PSNR [dB], first", "ms", "times `tap`"]
     lines = [head, ["---"] * len(head)]
     for label in ("sharp", *METHODS):
         row, first = [f"`{label}`"], None
@@ -111,7 +113,7 @@ def _times_tap(found: Report, entry: Entry) -> str:
 def _section(found: Report, name: str) -> str:
     entries = [e for e in found.entries if e.label == name]
     cases = {c.name: c for c in found.cases}
-    picture = HERE / "gallery" / f"{name}.jpg"
+    picture = DOCS / "images" / "gallery" / f"{name}.jpg"
     errors = [flip_colors(e.picture, cases[e.case].truth) for e in entries]
     worst, corner = max(
         ((i, *_worst(error)) for i, error in enumerate(errors)), key=lambda place: place[1]
@@ -129,8 +131,8 @@ def _section(found: Report, name: str) -> str:
     return (
         f"## {name}\n\n{first}\n\n- Strong: {strong}\n- Artefacts: {artefacts}\n"
         f"- {entries[0].case}: {figures}\n\n"
-        f"![{name}: picture, error, the worst place ({entries[worst].case}), the truth there]"
-        f"(gallery/{name}.jpg)\n"
+        f"![{name}: picture, error, worst place ({entries[worst].case}), truth there]"
+        f"(../images/gallery/{name}.jpg)\n"
     )
 
 
@@ -162,7 +164,7 @@ def _detail(shown: np.ndarray, corner: tuple[int, int]) -> np.ndarray:
 
 if __name__ == "__main__":
     if reports := [json.loads(Path(name).read_text("utf-8")) for name in sys.argv[1:]]:
-        page = HERE / "experiments.md"
+        page = DOCS / "laboratory" / "experiments.md"
         page.write_text(fill(page.read_text("utf-8"), reports), encoding="utf-8")
     else:
         main()

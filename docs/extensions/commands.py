@@ -1,0 +1,137 @@
+"""The command line's reference, and tables of scenes and conventions, asked of the program.
+
+A page gets them where it has a comment such as `<!-- commands -->`.
+"""
+
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+from cyclopts import App
+from sphinx.application import Sphinx
+
+from wgmb import scenes
+from wgmb.cli import app as wgmb_app
+from wgmb.vectors import CONVENTIONS
+
+_KINDS = {bool: "", int: "N", float: "X", str: "TEXT", Path: "PATH"}
+_TITLES = {"Parameters": "General"}
+_GROUPS = ("Parameters", "Input", "Compare", "Blur", "Shutter", "Perception", "Output")
+
+
+def reference() -> str:
+    """Every command with its options, as Markdown."""
+    names = [name for name in wgmb_app if not name.startswith("-")]
+    return "\n".join(_command(name, wgmb_app[name]) for name in names)
+
+
+def scene_table() -> str:
+    """Every built-in scene with its parameters and their defaults, as Markdown."""
+    rows = ["| scene | shows | parameters of `--set` |", "|---|---|---|"]
+    for name, make in scenes.SCENES.items():
+        about = _plain(inspect.getdoc(make) or "").partition("\n")[0]
+        parameters = inspect.signature(make).parameters.values()
+        settings = ", ".join(f"`{p.name}={p.default}`" for p in parameters)
+        rows.append(f"| `{name}` | {about} | {settings} |")
+    return "\n".join(rows) + "\n"
+
+
+def convention_table() -> str:
+    """What `--vectors` can be told, as Markdown."""
+    rows = ["| `--vectors` | what the numbers mean |", "|---|---|"]
+    rows += [f"| `{name}` | {_plain(c.about)} |" for name, c in CONVENTIONS.items()]
+    return "\n".join(rows) + "\n"
+
+
+def _command(name: str, command: App) -> str:
+    """A section about one command."""
+    # The options of the whole program are not repeated under each command.
+    found = command.assemble_argument_collection(parse_docstring=True)
+    shown = [argument for argument in found if argument.show]
+    words = [_usage(argument) for argument in shown if argument.required]
+    text, examples = _help(command)
+    lines = [f"(wgmb-{name})=", f"## wgmb {name}", "", text, ""]
+    lines += ["```sh", f"wgmb {' '.join((name, *words))} [OPTIONS]", *examples, "```", ""]
+    groups: dict[str, list[Any]] = {}
+    for argument in shown:
+        groups.setdefault(argument.parameter.group[0].name, []).append(argument)
+    for group in sorted(groups, key=lambda g: _GROUPS.index(g) if g in _GROUPS else 99):
+        lines += [f"### {_TITLES.get(group, group)}", ""]
+        for argument in groups[group]:
+            lines += [*_option(name, argument), ""]
+    return "\n".join(lines)
+
+
+def _help(command: App) -> tuple[str, list[str]]:
+    """What a command does, and its examples."""
+    paragraphs = inspect.getdoc(command.default_command).split("\n\n")
+    about = paragraphs[: next(
+        (i for i, p in enumerate(paragraphs) if p.startswith("Parameters\n")), len(paragraphs)
+    )]  # fmt: skip
+    examples = [line.removeprefix("Example: ") for p in about for line in p.splitlines()
+                if line.startswith("Example: ")]  # fmt: skip
+    text = [p for p in about if not p.startswith("Example: ")]
+    return "\n\n".join(map(_plain, text)), examples
+
+
+def _names(argument) -> list[str]:
+    """How an option is written, the long form first; a position has its name in capitals."""
+    names = [n for n in argument.names if not n.startswith(("--no-", "--empty-"))]
+    if argument.field_info.is_positional and not argument.field_info.is_keyword_only:
+        return [names[0].lstrip("-").upper()]
+    return sorted(names, key=len, reverse=True)
+
+
+def _usage(argument) -> str:
+    name, kind = _names(argument)[0], _kind(argument)
+    return f"{name} {kind}" if kind else name
+
+
+def _kind(argument) -> str:
+    """What is written after an option: the words it takes, or of which kind they are."""
+    if not _names(argument)[0].startswith("-"):
+        return ""
+    hint, choices = argument.hint, argument.get_choices() or ()
+    inner = getattr(hint, "__args__", ()) or (hint,)
+    kinds = [_KINDS[kind] for kind in dict.fromkeys(inner) if kind in _KINDS]
+    if str(hint).startswith("tuple[float, float]"):
+        return "X X"
+    return "|".join((*choices, *(kind for kind in kinds if kind)))
+
+
+def _option(command: str, argument) -> list[str]:
+    """An entry of a definition list that other pages can refer to."""
+    names, kind = _names(argument), _kind(argument)
+    default, notes = argument.field_info.default, []
+    if argument.required:
+        notes.append("Required.")
+    elif default not in (None, False, (), inspect.Parameter.empty):
+        shown = " ".join(f"{x:g}" for x in default) if isinstance(default, tuple) else default
+        shown = f"{shown:g}" if isinstance(shown, float) else shown
+        notes.append(f"Default: `{shown}`.")
+    written = ", ".join(f"`{name} {kind}`".replace(" `", "`") for name in names)
+    about = _plain(argument.parameter.help or "")
+    anchor = f"wgmb-{command}-{names[0].strip('-').lower()}"
+    return [f"({anchor})=", written, f": {' '.join((about, *notes))}"]
+
+
+def _plain(text: str) -> str:
+    """Text whose options and file names are marked as such, and nothing else is."""
+    text = text.replace("*", "\\*").replace("|", "\\|")
+    return re.sub(r"(?<![\w`-])(--[a-z][a-z-]+|[A-Za-z_]+\.[#%]\S*\w|[A-Z]+=[A-Z]+)", r"`\1`", text)
+
+
+_TABLES = {"commands": reference, "scenes": scene_table, "conventions": convention_table}
+
+
+def _fill(app: Sphinx, page: str, source: list[str]) -> None:
+    for mark, make in _TABLES.items():
+        if f"<!-- {mark} -->" in source[0]:
+            source[0] = source[0].replace(f"<!-- {mark} -->", make())
+
+
+def setup(app: Sphinx) -> dict:
+    """Called by Sphinx."""
+    app.connect("source-read", _fill)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
