@@ -294,7 +294,7 @@ def test_a_record_is_read_back_and_any_changed_bit_of_the_file_is_noticed(tmp_pa
         data = exr.encode(exr.new(make.picture(1), {record.KEY: text}))
     else:
         data = stills.encode(make.picture(1), suffix, 8, text)
-    sealed = record.seal(data, text)
+    sealed = b"".join(record.seal(data, text))
     assert record.read(sealed) == content
     assert record.read(data) is None
     (tmp_path / f"a{suffix}").write_bytes(sealed)
@@ -311,7 +311,7 @@ def test_a_record_is_read_back_and_any_changed_bit_of_the_file_is_noticed(tmp_pa
 
 def test_the_text_in_a_png_keeps_the_checksum_that_the_format_asks_for():
     text = record.blank({"a": 1})
-    png = record.seal(stills.encode(make.picture(1), ".png", 8, text), text)
+    png = b"".join(record.seal(stills.encode(make.picture(1), ".png", 8, text), text))
     with Image.open(io.BytesIO(png)) as image:
         image.verify()
         assert image.info[record.KEY].startswith('{"seal": "')
@@ -334,7 +334,7 @@ def test_a_temporary_file_is_not_written_through_a_link(tmp_path):
     temporary = tmp_path / ".o.part"
     temporary.symlink_to(victim)
     with pytest.raises(OSError, match=r"o\.exr"):
-        atomic.write_file(tmp_path / "o.exr", b"new", temporary)
+        atomic.write_file(tmp_path / "o.exr", b"new", temporary=temporary)
     assert victim.read_bytes() == b"precious"
     assert not (tmp_path / "o.exr").exists()
 

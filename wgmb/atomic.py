@@ -15,6 +15,8 @@ import socket
 from collections.abc import Collection
 from pathlib import Path
 
+Buffer = bytes | memoryview
+
 try:
     import fcntl
 except ImportError:  # Windows, where a file that is open cannot be removed
@@ -25,15 +27,16 @@ _HOST = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())[:32] or "host"
 _TEMPORARY = re.compile(r"\.(?P<name>.+)\.(?P<host>\w+)-(?P<process>\d+)-[0-9a-f]{8}\.part", re.S)
 
 
-def write_file(path: Path, data: bytes, temporary: Path | None = None) -> None:
-    """Put `data` at `path`: all of it under a temporary name, then renamed.
+def write_file(path: Path, *pieces: Buffer, temporary: Path | None = None) -> None:
+    """Put the pieces, one after the other, at `path`: under a temporary name, then renamed.
 
     Raises OSError, whose text names `path`, and then nothing has changed.
     """
     temporary = temporary or temporary_name(path)
     try:
         with os.fdopen(create(temporary), "wb") as file:
-            file.write(data)
+            for piece in pieces:
+                file.write(piece)
             file.flush()
             os.fsync(file.fileno())
         rename(temporary, path)

@@ -161,7 +161,7 @@ class Output:
         if not (self._resume or self._overwrite) and path.exists():
             raise InputError(f"{path} was written by somebody else during this run")
         self._under_way = atomic.temporary_name(path)
-        atomic.write_file(path, record.seal(data, text), self._under_way)
+        atomic.write_file(path, *record.seal(data, text), temporary=self._under_way)
 
     def close(self) -> None:
         """Finish a video (OSError if it cannot be); pictures are finished one by one."""

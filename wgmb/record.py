@@ -25,13 +25,13 @@ def blank(content: dict) -> str:
     return json.dumps({"seal": _BLANK.decode(), **dict(sorted(content.items()))})
 
 
-def seal(data: bytes, text: str) -> bytes:
-    """The file with the digits of the seal set; `text` is the record that it was made with."""
+def seal(data: bytes, text: str) -> list[bytes | memoryview]:
+    """The file in pieces, with the digits of the seal set; `text` is the record in it."""
     record = text.encode()
     at = data.find(record)
     if at < 0:
         raise ValueError("the record is not in the file")
-    return _sealed(data, at, at + len(record))
+    return _sealed(memoryview(data), at, at + len(record))
 
 
 def read(data: bytes) -> dict | None:
@@ -42,7 +42,12 @@ def read(data: bytes) -> dict | None:
             content, length = json.JSONDecoder().raw_decode(text)
         except (ValueError, RecursionError):
             continue
-        if _sealed(data, found.start(), found.start() + length) == data:
+        at, whole = 0, memoryview(data)
+        for piece in _sealed(whole, found.start(), found.start() + length):
+            if whole[at : at + len(piece)] != piece:
+                break
+            at += len(piece)
+        else:
             del content["seal"]
             return content
     return None
@@ -53,14 +58,18 @@ def is_ours(data: bytes) -> bool:
     return _SEAL.search(data) is not None or not data.strip(b"\0")
 
 
-def _sealed(data: bytes, begin: int, end: int) -> bytes:
+def _sealed(data: memoryview, begin: int, end: int) -> list[bytes | memoryview]:
+    """`data` in pieces, with the digits set of the seal of the record from `begin` to `end`."""
     digits = begin + len(_BEGIN)
-    sealed = bytearray(data)
-    for value in (_BLANK, None):
-        if value is None:
-            value = f"{len(sealed):012d}-{zlib.crc32(sealed):08x}".encode()
-        sealed[digits : digits + len(_BLANK)] = value
-        if data.startswith(_PNG):  # the text is a chunk, which has a CRC of its own
-            chunk = sealed[begin - _AFTER_KEYWORD : end]
-            sealed[end : end + 4] = zlib.crc32(chunk).to_bytes(4, "big")
-    return bytes(sealed)
+    after = digits + len(_BLANK)
+    checked = end + 4 if bytes(data[:8]) == _PNG else end  # a PNG's text is a chunk with a CRC
+
+    def pieces(seal: bytes) -> list[bytes | memoryview]:
+        chunk = [bytes(data[begin - _AFTER_KEYWORD : digits]), seal, bytes(data[after:end])]
+        crc = zlib.crc32(b"".join(chunk)).to_bytes(4, "big")[: checked - end]
+        return [data[:digits], seal, data[after:end], crc, data[checked:]]
+
+    crc = 0
+    for piece in pieces(_BLANK):
+        crc = zlib.crc32(piece, crc)
+    return pieces(f"{len(data):012d}-{crc:08x}".encode())

@@ -352,9 +352,8 @@ class Clip:
             channels = read([file], source.number, None, self._max_mb).channels
             plane = layers.grey(channels).astype(np.float32)
         else:
-            plane = stills.srgb(
-                stills.read(file, max_mb=self._max_mb)[..., 0]
-            )  # grey values as painted
+            light = stills.read(file, max_mb=self._max_mb)
+            plane = stills.srgb(light[..., 0])  # grey values as painted
         if plane.shape[::-1] != source.size:
             raise InputError(
                 f"{file} must be {size_text(source.size)} like the picture, is {size_text(plane)}"
