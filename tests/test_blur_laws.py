@@ -227,6 +227,29 @@ def test_a_bad_value_spoils_nothing(method, noise, where, value):
     np.testing.assert_allclose(out[far], clean[far], atol=ZERO)
 
 
+@pytest.mark.parametrize("value", [1.01e30, 1e34, 1e38, 3.4e38, -3.4e38])
+@pytest.mark.parametrize("variant", [None, "published"])
+def test_colours_that_are_too_bright_to_be_added_weigh_nothing(method, noise, value, variant):
+    options = {"variant": variant} if variant and method != "gather" else {}
+    spoilt = noise.copy()
+    spoilt[20:22, 30:33] = value
+    spoilt[20, 40] = -value
+    spoilt[40:] = value
+    given = {"shutter": 360, "samples": 8, "method": method, **options}
+    out = blurred(spoilt, moving(noise, 6, 2), **given)
+    assert np.isfinite(out).all()
+    infinite = np.where(abs(spoilt) > 1e30, np.float32(np.inf), spoilt)
+    assert np.array_equal(out, blurred(infinite, moving(noise, 6, 2), **given))
+
+
+def test_the_brightest_colours_can_be_added(method, noise):
+    bright = np.where(noise > 0.5, np.float32(1e30), np.float32(-1e30))
+    assert not wgmb.Frame(bright).bad
+    for shutter in (180, 720):
+        out = blurred(bright, moving(noise, 6, 2), shutter=shutter, method=method)
+        assert np.isfinite(out).all()
+
+
 @pytest.mark.parametrize("value", [*BAD, 0.0, -1.0])
 def test_a_bad_depth_spoils_nothing(method, noise, value):
     depth = np.full(noise.shape[:2], 5, "f4")

@@ -28,6 +28,17 @@ def test_it_is_what_show_gives_and_the_picture_stays_the_same():
     assert told["disocclusion"].max() > 0.1
 
 
+@pytest.mark.parametrize("value", [1e19, 1e30, 3e38])
+def test_a_wild_motion_spoils_no_channel(noise, value):
+    scale = np.ones(noise.shape[:2], "f4")
+    scale[21:23, 30:33] = value
+    frame = wgmb.Frame(noise, np.full((*scale.shape, 2), 4, "f4"), depth=5 + 0 * scale, scale=scale)
+    picture, told = wgmb.Blur("gather", shutter=360, samples=8).with_confidence(frame)
+    assert np.isfinite(picture).all()
+    for name, plane in told.items():
+        assert np.isfinite(plane).all(), name
+
+
 def test_a_method_that_cannot_tell_names_those_that_can():
     frame = frame_of([crossing(SIZE, offset) for offset in (0, -1, 1)])
     with pytest.raises(InputError, match="'tap' has no confidence; gather has"):

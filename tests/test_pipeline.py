@@ -25,6 +25,17 @@ def motion(x=6.0, y=2.0, size=(48, 64)):
     [
         ({"color": np.zeros((48, 64, 3), "u1")}, "color must be floating point, got uint8"),
         ({"color": np.zeros((48, 64, 3), "c8")}, "color must be floating point, got complex64"),
+        ({"color": np.ma.zeros((48, 64, 3), "f4")}, "color must not be a masked array"),
+        ({"depth": np.zeros((48, 64), np.longdouble)}, "depth must be float16, float32 or float64"),
+        ({"to_next": np.ma.zeros((48, 64, 2), "f4")}, "to_next must not be a masked array"),
+        (
+            {
+                "object_id": np.ma.zeros((48, 64), "u4"),
+                "camera": STILL,
+                "depth": np.ones((48, 64), "f4"),
+            },
+            "object_id must not be a masked array",
+        ),
         ({"color": np.zeros((48, 64), "f4")}, r"color must be \(height, width, 3 or 4\)"),
         ({"color": np.zeros((0, 64, 3), "f4")}, "color must be"),
         ({"to_next": motion(size=(47, 64))}, r"to_next must be \(48, 64, 2\) like color, got \(47"),

@@ -17,9 +17,11 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
+from . import shader
 from .cameras import Reprojections
 from .errors import InputError
 
+_F32_MAX = float(np.finfo(np.float32).max)
 _CHANNELS = {
     "to_next": (2,),
     "to_prev": (2,),
@@ -33,7 +35,10 @@ _CHANNELS = {
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a method may be given; only `color` must be there."""
+    """What a method may be given; only `color` must be there.
+
+    Arrays of floats are float16, float32 or float64; masked arrays are refused.
+    """
 
     color: np.ndarray
     """(height, width, 3 or 4) float, linear, premultiplied alpha."""
@@ -66,8 +71,9 @@ class Frame:
     bad: dict[str, int] = field(init=False, default_factory=dict)
     """How many pixels of each input are not finite, or have no depth in front of the camera.
 
-    Bad colours weigh nothing, bad motion stands still, bad depth is infinitely far (values of
-    a depth buffer that are not finite stand still).
+    Colours beyond 1e30 count as infinite: sums of them would overflow. Bad colours weigh
+    nothing, bad motion stands still, bad depth is infinitely far (values of a depth buffer that
+    are not finite stand still).
     """
 
     def __post_init__(self):
@@ -81,7 +87,7 @@ class Frame:
                 want = (*color.shape[:2], *channels)
                 object.__setattr__(self, name, _shaped(name, _float_array(name, given), want))
         if self.object_id is not None:
-            ids = np.asarray(self.object_id)
+            ids = _array("object_id", self.object_id)
             if ids.dtype.kind not in "iu":
                 raise InputError(f"object_id must be integers, got {ids.dtype}")
             if ids.size and ids.min() < 0:
@@ -96,8 +102,10 @@ class Frame:
         if self.motion is not None and not (self.to_next is None and self.to_prev is None):
             raise InputError("motion stands instead of to_next and to_prev: give one or the other")
         self._check_neighbours()
+        brightest = shader.load("common/finite.wgsl").constant("BRIGHTEST")
         for name in ("color", "to_next", "to_prev", "motion", "scale", "keep"):
-            if given := _count_bad(getattr(self, name)):
+            most = brightest if name == "color" else _F32_MAX
+            if given := _count_bad(getattr(self, name), most):
                 self.bad[name] = given
         if self.camera is not None and self.depth is not None:
             with np.errstate(invalid="ignore"):
@@ -159,11 +167,19 @@ class Frame:
 PASSES = tuple(f.name for f in fields(Frame) if f.init and f.name != "color")
 
 
+def _array(name: str, given) -> np.ndarray:
+    if isinstance(given, np.ma.MaskedArray):
+        raise InputError(f"{name} must not be a masked array: fill it, with NaN for no value")
+    return np.asarray(given)
+
+
 def _float_array(name: str, given) -> np.ndarray:
-    array = np.asarray(given)
-    if array.dtype.kind != "f" or array.dtype.itemsize > 8:
+    array = _array(name, given)
+    if array.dtype.kind != "f":
         hint = "; divide by its maximum and undo its gamma first" if name == "color" else ""
         raise InputError(f"{name} must be floating point, got {array.dtype}{hint}")
+    if array.dtype.itemsize > 8:
+        raise InputError(f"{name} must be float16, float32 or float64, got {array.dtype}")
     return array
 
 
@@ -173,12 +189,14 @@ def _shaped(name: str, array: np.ndarray, want: tuple[int, ...]) -> np.ndarray:
     return array
 
 
-def _count_bad(array: np.ndarray | None) -> int:
-    """Pixels with a value that is not finite."""
+def _count_bad(array: np.ndarray | None, most: float) -> int:
+    """Pixels with a value that is not a number, or beyond `most` either way, as float32."""
     if array is None:
         return 0
-    with np.errstate(all="ignore"):
-        if np.isfinite(np.sum(array, dtype=np.float32)):  # quick: any bad value spoils the sum
+    with np.errstate(all="ignore"):  # quick: any bad value spoils these; halves have slow extremes
+        half = array.dtype == np.float16
+        spoilt = [np.sum(array, dtype=np.float32)] if half else [array.min(), array.max()]
+        if (np.abs(np.array(spoilt, np.float32)) <= most).all():
             return 0
-        bad = ~np.isfinite(array.astype(np.float32, copy=False))
+        bad = ~(np.abs(array.astype(np.float32, copy=False)) <= most)
     return int(np.count_nonzero(bad.any(axis=2) if bad.ndim == 3 else bad))

@@ -24,7 +24,7 @@ fn holdout_amount(px: vec2u) -> f32 {
 fn before(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let own = textureLoad(color, id.xy, 0);
-    let counts = select(0.0, 1.0 - holdout_amount(id.xy), is_finite4(own));
+    let counts = select(0.0, 1.0 - holdout_amount(id.xy), is_color(own));
     textureStore(weight, id.xy, vec4f(counts));
     textureStore(output, id.xy, select(vec4f(0.0), own * counts, counts > 0.0));
 }
@@ -34,7 +34,7 @@ fn before(@builtin(global_invocation_id) id: vec3u) {
 fn after(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let own = textureLoad(color, id.xy, 0);
-    let amount = select(0.0, holdout_amount(id.xy), is_finite4(own));
+    let amount = select(0.0, holdout_amount(id.xy), is_color(own));
     let result = textureLoad(blurred, id.xy, 0);
     textureStore(output, id.xy, select(result, mix(result, own, amount), amount > 0.0));
 }

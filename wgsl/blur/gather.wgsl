@@ -89,7 +89,8 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
             }
             if todo != 0u && is_even {
                 let color = resampled(x - found.d, front, true);
-                add(&sum, Composite(color, counts, 1.0, sqrt(found.residual2), 0.0), share);
+                let residual = min(sqrt(found.residual2), HALF_MAX);    // a wild motion may end it anywhere
+                add(&sum, Composite(color, counts, 1.0, residual, 0.0), share);
                 accepted += 1.0;
             }
             if !is_even { single &= ~(1u << firstTrailingBit(todo)); }
