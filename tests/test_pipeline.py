@@ -144,20 +144,6 @@ def script(code: str) -> subprocess.CompletedProcess:
     )
 
 
-def test_a_forked_child_is_told_so():
-    done = script(
-        "import os, numpy as np, wgmb\n"
-        "c, v = np.ones((8, 8, 3), 'f4'), np.ones((8, 8, 2), 'f4')\n"
-        "blur = wgmb.Blur(); blur(c, v)\n"
-        "if os.fork() == 0:\n"
-        "    try: blur(c, v)\n"
-        "    except wgmb.DeviceError as e: print(e, flush=True)\n"
-        "    os._exit(0)\n"
-        "os.wait()\n"
-    )
-    assert "forked" in done.stdout
-
-
 def test_importing_touches_no_gpu_and_no_environment():
     done = script(
         "import os, wgpu\n"

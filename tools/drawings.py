@@ -216,32 +216,3 @@ def flow() -> None:
           stroke=BLUE)  # fmt: skip
     d.line((510, 66), (510, 114), arrow=True)
     d.save("flow")
-
-
-def rooms() -> None:
-    """Packages in layers; imports point downwards."""
-    d = Drawing(720, 380)
-    layers = (
-        ("cli",),
-        ("viewer", "lab"),
-        ("pipeline · render · settings · batch",),
-        ("methods",),
-        ("io", "scene", "velocity · holdout · observer"),
-        ("gpu", "frame · shutter · camera · metrics"),
-        ("errors · color",),
-    )
-    for i, layer in enumerate(layers):
-        y, width = 16 + 51 * i, (600 - 12 * (len(layer) - 1)) / len(layer)
-        for k, words in enumerate(layer):
-            package = " " not in words
-            fill, stroke = ("#eef4fa", BLUE) if package else ("#f6f7f9", GREY)
-            words += "/" if package else ""
-            d.box(20 + k * (width + 12), y, width, 38, words, fill=fill, stroke=stroke)
-    d.line((660, 24), (660, 350), color=INK, arrow=True)
-    d.text(674, 190, "imports", anchor="start", size=12)
-    d.save("rooms")
-
-
-if __name__ == "__main__":
-    for draw in (displacement, exposures, tiles, reproject, flow, rooms):
-        draw()

@@ -117,4 +117,4 @@ if not TYPE_CHECKING:  # a checker takes every name for known otherwise
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)
