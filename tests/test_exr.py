@@ -64,8 +64,8 @@ def test_reading_and_writing_overlap(tmp_path, monkeypatch):
 THREADS = """
     import os, sys, threading
     import OpenEXR
-    from wgmb import InputError, cli, exr
-    cli._own_streams()
+    from wgmb import InputError, exr, terminal
+    terminal.own_streams()
     sound, bad = sys.argv[1:]
     stdout, whole = sys.stdout, exr.read(sound)
     before = [(os.fstat(fd).st_dev, os.fstat(fd).st_ino) for fd in (1, 2)]

@@ -82,7 +82,7 @@ def work(blur, frames, monkeypatch):
         return upload(self, name, image, format)
 
     def ran(self, encoder, entry, *given, **own):
-        counts[-1]["splits"] += entry == "split"
+        counts[-1]["splits"] += entry == "write_single_layer"
         return run(self, encoder, entry, *given, **own)
 
     monkeypatch.setattr(Images, "upload", uploaded)
@@ -113,7 +113,7 @@ def test_uploaded_views_are_worked_on_every_time(monkeypatch):
     run = gpu.Kernel.run
 
     def ran(self, encoder, entry, *given, **own):
-        splits.append(entry == "split")
+        splits.append(entry == "write_single_layer")
         return run(self, encoder, entry, *given, **own)
 
     monkeypatch.setattr(gpu.Kernel, "run", ran)
