@@ -53,9 +53,9 @@ class Layers:
         """(rows, columns) of tiles: whether anything moves in them or may move into them."""
         source = shader.load("blur/gather_live.wgsl")
         across, down = tiles_of(size)
-        words = -(-(across * down + int(source.constant("CELLS"))) // 64) * 64
+        words = -(-(across * down + int(source.constant("CELLS_WORD"))) // 64) * 64
         data = self._device.queue.read_buffer(self._lists)
-        flags = np.frombuffer(data, np.uint32)[int(source.constant("LIVE")) * words :]
+        flags = np.frombuffer(data, np.uint32)[int(source.constant("TILE_FLAGS")) * words :]
         return flags[: across * down].reshape(down, across) > 0
 
 
@@ -142,8 +142,8 @@ def pixels_of(cells: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 def silhouettes(frame: Frame, layers: Layers) -> None:
     """One edge as it was rendered, and its two layers."""
     place = 0
-    near, far = layers.read("colors", 2 * place), layers.read("colors", 2 * place + 1)
-    surface = layers.read("surfaces", place)
+    near, far = layers.read("layer colors", 2 * place), layers.read("layer colors", 2 * place + 1)
+    surface = layers.read("mattes", place)
     split = surface[..., 1] > 0
     grey = np.full_like(near[..., :3], 0.5)
     coverage = surface[..., 2]
@@ -161,7 +161,7 @@ def silhouettes(frame: Frame, layers: Layers) -> None:
 
 def motions(frame: Frame, live: np.ndarray, layers: Layers) -> None:
     """The motions that may reach every tile, as streaks of the exposure through its middle."""
-    header, paths = layers.read("reaching", 0), [layers.read("reaching", 4 + k) for k in range(4)]
+    header, paths = layers.read("tile candidates", 0), [layers.read("tile candidates", 4 + k) for k in range(4)]
     left, top, across, down, scale = 12, 3, 12, 8, 5  # tiles, pixels of the drawing per pixel
     corner, size = (tile() * left, tile() * top), (tile() * across, tile() * down)
     grey = levels(0.45 + 0.55 * display(frame.color).mean(axis=2))
@@ -185,7 +185,7 @@ def motions(frame: Frame, live: np.ndarray, layers: Layers) -> None:
 
 def classified(frame: Frame, layers: Layers) -> None:
     """For every block, the share of the sample times at which one search is enough."""
-    bits = layers.read("plain", 0)[..., 0]
+    bits = layers.read("single-layer mask", 0)[..., 0]
     share = np.array([[int(word).bit_count() for word in row] for row in bits]) / 16
     side = int(shader.load("blur/gather_search.wgsl").constant("BLOCK"))
     share = share.repeat(side, 0).repeat(side, 1)[: frame.size[1], : frame.size[0]]
