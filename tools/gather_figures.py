@@ -161,7 +161,8 @@ def silhouettes(frame: Frame, layers: Layers) -> None:
 
 def motions(frame: Frame, live: np.ndarray, layers: Layers) -> None:
     """The motions that may reach every tile, as streaks of the exposure through its middle."""
-    header, paths = layers.read("tile candidates", 0), [layers.read("tile candidates", 4 + k) for k in range(4)]
+    header = layers.read("tile candidates", 0)
+    paths = [layers.read("tile candidates", 4 + k) for k in range(4)]
     left, top, across, down, scale = 12, 3, 12, 8, 5  # tiles, pixels of the drawing per pixel
     corner, size = (tile() * left, tile() * top), (tile() * across, tile() * down)
     grey = levels(0.45 + 0.55 * display(frame.color).mean(axis=2))
