@@ -184,6 +184,15 @@ def test_on_still_frames_it_says_that_it_cannot_tell():
     assert "cannot" in found.text
 
 
+def test_on_a_picture_of_one_colour_it_says_that_it_cannot_tell():
+    flat = np.full((make.HEIGHT, make.WIDTH, 4), 0.5, "f4")
+    motion = np.full((make.HEIGHT, make.WIDTH, 4), 3.0, "f4")
+    found = vectors.detect(flat, motion, flat, flat, told("plain"))
+    assert not found.sure
+    assert found.vectors == told("plain")
+    assert "cannot" in found.text
+
+
 def test_on_a_single_frame_it_says_that_it_cannot_tell():
     wanted, found = detect("blender", sides=())
     assert not found.sure

@@ -34,13 +34,21 @@ class Report:
 
 @dataclass
 class _Job:
-    """One frame on its way through the three threads."""
+    """One frame, read and to be blurred."""
 
     source: Source
     frame: Frame
     made_of: dict
-    result: np.ndarray = field(init=False)
-    told: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass
+class _Blurred:
+    """One frame, blurred and to be written."""
+
+    source: Source
+    made_of: dict
+    picture: np.ndarray
+    confidence: dict[str, np.ndarray]
 
 
 IN_FLIGHT = 3  # frames: one being read, one on the GPU, one being written
@@ -129,14 +137,15 @@ def blur_sequence(
 
     def write() -> None:
         reasons: list[str] = []
-        while (job := to_write.get()) is not None:
+        while (blurred := to_write.get()) is not None:
+            number = blurred.source.number
             if hopeless.is_set():
                 places.put(None)
                 continue
             try:
-                output.write(job.result, job.source, job.told, job.made_of)
+                output.write(blurred.picture, blurred.source, blurred.confidence, blurred.made_of)
             except (Error, OSError, MemoryError, RuntimeError) as error:
-                fail(job.source.number, error)
+                fail(number, error)
                 reasons.append(output.why_hopeless(error))
                 if reasons[-1] and (
                     output.is_video or reasons[-HOPELESS:] == HOPELESS * reasons[-1:]
@@ -146,9 +155,9 @@ def blur_sequence(
             else:
                 reasons.clear()
                 places.put(None)
-                report.done.append(job.source.number)
-                tell(job.source.number, "done")
-            del job
+                report.done.append(number)
+                tell(number, "done")
+            del blurred
 
     def guarded(work: Callable[[], None]) -> None:
         try:
@@ -196,14 +205,15 @@ def blur_sequence(
 
 
 def _blur_one(blur: Blur, job: _Job, confidence: bool, report: Report, to_write, fail) -> None:
+    told: dict[str, np.ndarray] = {}
     try:
         if confidence:
-            job.result, job.told = blur.with_confidence(job.frame)
+            picture, told = blur.with_confidence(job.frame)
         else:
-            job.result = blur(job.frame)
+            picture = blur(job.frame)
     except (InputError, GpuMemoryError) as error:
         fail(job.source.number, InputError(f"{job.source.path}: {error}"))
         return
     if job.frame.bad:
         report.bad[job.source.number] = job.frame.bad
-    to_write.put(job)
+    to_write.put(_Blurred(job.source, job.made_of, picture, told))

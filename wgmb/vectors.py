@@ -250,6 +250,9 @@ def detect(color, motion: np.ndarray, prev_color, next_color, vectors: Vectors) 
             vectors, False, f"{vectors}, by name (nothing moves, so it cannot be tested)"
         )
     still = _difference(color, pairs, at, 0.0, "")
+    if still == 0:
+        text = f"{vectors}, by name (what moves is alike in all frames, so it cannot be tested)"
+        return Finding(vectors, False, text)
     left = {
         (flip, scale): _difference(color, pairs, at, scale, flip) for flip, scale in _ALTERNATIVES
     }
