@@ -5,7 +5,7 @@ processes  other processes: run, limited, asked for memory; functions in a proce
 forked     many cases in forked processes, of which a crash costs one
 kinds      a sound file of every kind, and what reads it; spoiled: bytes that are wrong
 shots      frames on disk, and what an unbroken run makes of them
-parts      all that may draw a frame: every method and form, scenes, the viewer
+parts      all that may draw a frame: every method and variant, scenes, the viewer
 
 memory, damage, hostile, stopping, resuming, numbers, devices, disks, names, videos: the rows
 """

@@ -14,6 +14,7 @@ from .processes import WGMB, Use, apart, environment, growth, use
 from .table import Line, Trial, row
 
 MOST = 24.0  # KiB a frame of 96 x 54: what allocators scatter about
+_WARM = 60  # frames, until the viewer has found its quality
 _SETTLED = 0.15  # share of a run after which memory counts
 _MOST_A_THOUSAND = 4.0  # MiB per 1,000 frames of a long run
 
@@ -25,8 +26,8 @@ def grown(name: str, warm: int, count: int) -> float:
 
 @row(quick=40, full=400)
 def leaks(trial: Trial) -> Iterator[Line]:
-    """KiB that a frame leaves behind: every method and form, rendered scenes, the viewer."""
-    warm = max(10, trial.count // 2)
+    """KiB that a frame leaves behind: every method and variant, rendered scenes, the viewer."""
+    warm = max(_WARM, trial.count // 2)
 
     def tried(name: str) -> Line:
         ended = apart(grown, name, warm, trial.count, seconds=60 + 3 * trial.count)

@@ -1,4 +1,4 @@
-"""All that may draw a frame, by name: every method and form, rendered scenes, the viewer.
+"""All that may draw a frame, by name: every method and variant, rendered scenes, the viewer.
 
 `make(name)` gives a function that draws frame `number` and returns it. They use the GPU: only
 in a process of its own (processes.apart).
@@ -107,16 +107,16 @@ def _viewer(method: str, **state) -> Callable[[], Step]:
 
 PARTS: dict[str, Callable[[], Step]] = {
     "tap": _image("tap"),
-    "tap, published": _image("tap", form="published"),
+    "tap, published": _image("tap", variant="published"),
     "tiles": _image("tiles"),
-    "tiles, published": _image("tiles", form="published"),
+    "tiles, published": _image("tiles", variant="published"),
     "fusion": _image("fusion"),
     "fusion, published": _image("fusion", weights="published"),
     "gather": _image("gather"),
     "gather, arrays": _unlocked("gather"),
     "gather with confidence": _confidence,
     "reproject": _image("reproject"),
-    "reproject, published": _image("reproject", form="published"),
+    "reproject, published": _image("reproject", variant="published"),
     "volume": _scene("torusphere", "volume"),
     "render tap": _scene("crossing", "tap"),
     "render gather": _scene("crossing", "gather"),
