@@ -24,7 +24,7 @@ def grown(name: str, warm: int, count: int) -> float:
     return growth(parts.make(name), warm, count)
 
 
-@row(quick=40, full=400)
+@row(quick=100, full=400)
 def leaks(trial: Trial) -> Iterator[Line]:
     """KiB that a frame leaves behind: every method and variant, rendered scenes, the viewer."""
     warm = max(_WARM, trial.count // 2)
