@@ -13,7 +13,7 @@ copyright = "2026, the wgmb authors"
 version = release = __version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "api", "commands", "mathml", "self_contained"]
-exclude_patterns = ["extensions", "lavapipe.md"]
+exclude_patterns = ["extensions"]
 language = "en"
 
 myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]

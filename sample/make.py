@@ -6,7 +6,8 @@ from pathlib import Path
 import imageio.v3 as iio
 import numpy as np
 
-from wgmb import cli, sequence, stills
+from wgmb.cli import app
+from wgmb.io import clip, stills
 
 HERE = Path(__file__).parent
 OUT = HERE.parent / "out"
@@ -15,7 +16,7 @@ FRAMES = str(HERE / "crossing.####.exr")
 
 def picture(pattern: str) -> np.ndarray:
     """Frame 10 of a pattern of EXR files as display values."""
-    source = sequence.Clip(pattern, frames="10").source(10)
+    source = clip.Clip(pattern, frames="10").source(10)
     return stills.to_display(source.rgba[..., :3].astype(np.float32), 8)
 
 
@@ -24,7 +25,7 @@ def main() -> int:
     for output in ("blurred.####.exr", "blurred.####.png", "blurred.mp4"):
         command = ["blur", FRAMES, "-o", str(OUT / output), "--shutter", "180", "--fps", "2"]
         sys.stderr.write(f"wgmb {' '.join(command)}\n")
-        if code := cli.main([*command, "--overwrite"]):
+        if code := app.main([*command, "--overwrite"]):
             return code
     before, after = picture(FRAMES), picture(str(OUT / "blurred.####.exr"))
     gap = np.full((before.shape[0], 4, 3), 255, np.uint8)

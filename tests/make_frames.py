@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
-from wgmb import cli
+from wgmb.cli import app
 
 WIDTH, HEIGHT = 64, 48
 VELOCITY = (4.0, 2.0)  # pixels per frame, y down
@@ -175,7 +175,7 @@ def command(*arguments, env: dict | None = None, **options) -> subprocess.Comple
 def inside(capsys, *arguments) -> tuple[int, str, str]:
     """`wgmb` in this process: exit code, what it said on stdout and on stderr."""
     capsys.readouterr()
-    code = cli.main([str(a) for a in arguments])
+    code = app.main([str(a) for a in arguments])
     said = capsys.readouterr()
     return code, said.out, said.err
 

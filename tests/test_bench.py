@@ -7,10 +7,12 @@ from dataclasses import replace
 import pytest
 
 import make_frames as make
-from wgmb import bench, bench_page, cli, report, timing
-from wgmb.blur import METHODS
-from wgmb.cases import Contender
+from wgmb.cli import app
 from wgmb.errors import InputError
+from wgmb.gpu import timing
+from wgmb.lab import bench, bench_report, report
+from wgmb.lab.cases import Contender
+from wgmb.methods import METHODS
 
 SIZES = ((64, 36), (96, 54))
 
@@ -48,7 +50,7 @@ def test_figures_are_kept_and_compared(run, tmp_path):
     run.save(tmp_path / "kept.json")
     kept = bench.Bench.load(tmp_path / "kept.json")
     assert kept == run
-    table = bench_page.against(run, kept)
+    table = bench_report.against(run, kept)
     assert len(table.rows) == len(run.figures)
     assert all(row[-2] == 1.0 for row in table.rows)
 
@@ -60,7 +62,7 @@ def test_what_was_not_kept_is_refused(run, tmp_path):
 
 
 def test_another_run_with_nothing_in_common_says_so(run):
-    table = bench_page.against(run, bench.Bench({}, 1.0, []))
+    table = bench_report.against(run, bench.Bench({}, 1.0, []))
     assert not table.rows and "in common" in table.note
 
 
@@ -75,31 +77,31 @@ def test_another_run_with_nothing_in_common_says_so(run):
 def test_wrong_usage_is_said_before_the_work(tmp_path, monkeypatch, capsys, arguments, named):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(bench, "bench", lambda *a: pytest.fail("measured"))
-    assert cli.main(["bench", "--size", "64x36", *arguments]) == 2
+    assert app.main(["bench", "--size", "64x36", *arguments]) == 2
     assert named in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
 def test_slower_is_over_one(run):
     slow = [replace(f, gpu=2 * f.gpu) for f in run.figures]
-    table = bench_page.against(bench.Bench(run.machine, run.copy, slow), run)
+    table = bench_report.against(bench.Bench(run.machine, run.copy, slow), run)
     assert all(row[-2] == 2.0 for row in table.rows)
 
 
 def test_text_and_page_tell_every_method(run):
-    said = bench_page.text(run)
-    page = report.page(bench_page.report(run, "wgmb bench", run))
+    said = bench_report.text(run)
+    page = report.page(bench_report.report(run, "wgmb bench", run))
     for method in METHODS:
         assert f", {method}, 4 samples" in said
         assert page.count(f"{method}</td>") >= 4
     several = {f.method for f in run.figures if len(f.passes) > 1}
     assert {"tiles", "gather", "reproject", "accumulate"} <= several
     assert page.count("<svg") == 2 + len(several)
-    assert "blur/accumulate.wgsl:main x 4" in said
+    assert "methods/accumulate.wgsl:main x 4" in said
 
 
 def test_without_entries_the_tables_are_the_csv(run):
-    every, passes = report.as_csv(bench_page.report(run, "")).split("\n\n")
+    every, passes = report.as_csv(bench_report.report(run, "")).split("\n\n")
     assert len(every.splitlines()) == 1 + len(run.figures)
     assert len(passes.splitlines()) == 1 + sum(len(f.passes) for f in run.figures)
     assert passes.startswith("method,size,samples,pass,times")
@@ -144,11 +146,11 @@ def test_wrong_usage_is_one_line_and_2(capsys, options):
 def test_every_method_has_its_passes(run):
     for figure in run.figures:
         assert figure.passes.keys() == figure.counts.keys()
-        assert any(label.startswith(f"blur/{figure.method}") for label in figure.passes)
-    every = bench_page.report(run, "").tables[1]
+        assert any(label.startswith(f"methods/{figure.method}") for label in figure.passes)
+    every = bench_report.report(run, "").tables[1]
     assert len(every.rows) == sum(len(f.passes) for f in run.figures)
     for f in run.figures:
-        shares = [row[-1] for row in every.rows if row[:3] == bench_page._first(f)]
+        shares = [row[-1] for row in every.rows if row[:3] == bench_report._first(f)]
         if any(f.passes.values()):  # too short for a wall clock, all may be 0
             assert sum(shares) == pytest.approx(1, abs=0.01)
 
@@ -159,13 +161,13 @@ def test_both_clocks_tell_the_same_passes(device, monkeypatch, usable):
     several = [Contender(m) for m in ("tap", "tiles", "gather", "accumulate")]
     run = bench.bench(device, several, SIZES[:1], (3,), 1)
     assert run.clock == ("timestamps" if usable else "wall clock")
-    assert run.clock.split()[-1] in bench_page.report(run, "").tables[1].note
+    assert run.clock.split()[-1] in bench_report.report(run, "").tables[1].note
     assert (run.empty > 0) != usable
     counts = {f.method: f.counts for f in run.figures}
-    assert counts["tap"] == {"blur/tap.wgsl:main": 1}
-    assert counts["tiles"]["blur/tiles_moves.wgsl:main"] == 1
-    assert counts["gather"]["blur/gather_silhouettes.wgsl:detect_edges"] == 3  # of three frames
-    assert counts["accumulate"] == {"gbuffer.wgsl:main": 3, "blur/accumulate.wgsl:main": 3}
+    assert counts["tap"] == {"methods/tap.wgsl:main": 1}
+    assert counts["tiles"]["methods/tiles_velocity.wgsl:main"] == 1
+    assert counts["gather"]["methods/gather/layers.wgsl:detect_edges"] == 3  # of three frames
+    assert counts["accumulate"] == {"scene/gbuffer.wgsl:main": 3, "methods/accumulate.wgsl:main": 3}
     if not usable:
         assert all(v >= 0 for f in run.figures for v in f.passes.values())
 
@@ -189,7 +191,7 @@ def test_what_takes_too_long_is_left_out_and_said(device):
         "96 x 54, 2 samples: tap", "96 x 54, 2 samples: gather"
     ]  # fmt: skip
     assert set(run.notes) <= set(said)
-    assert all(note in bench_page.text(run) and note in bench_page.report(run, "").notes
+    assert all(note in bench_report.text(run) and note in bench_report.report(run, "").notes
                for note in run.notes)  # fmt: skip
 
 

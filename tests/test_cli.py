@@ -8,7 +8,7 @@ from PIL import Image
 
 import make_frames as make
 import wgmb
-from wgmb import cli
+from wgmb.cli import app
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def test_help_of_every_command_shows_an_example(capsys, command):
 
 def test_help_of_every_command_is_there(capsys):
     _, out, _ = make.inside(capsys, "--help")
-    for name in cli.app:
+    for name in app.app:
         if not name.startswith("-"):
             assert name in out
             assert "Example" in make.inside(capsys, name, "--help")[1], name

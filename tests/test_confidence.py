@@ -6,7 +6,8 @@ import pytest
 import make_frames as make
 import wgmb
 from images import crossing, frame_of
-from wgmb import Clip, InputError, Output, exr
+from wgmb import Clip, InputError, Output
+from wgmb.io import exr
 
 SIZE = (54, 96)
 NAMES = ("accepted", "disocclusion", "residual", "left")

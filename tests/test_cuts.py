@@ -9,7 +9,7 @@ import wgmb
 from images import camera
 from make_frames import HEIGHT, WIDTH, frame, inside, projection, write_exr, write_sequence
 from wgmb import Camera, Clip, Reprojections
-from wgmb.cuts import is_cut, jumps
+from wgmb.io.cuts import is_cut, jumps
 
 
 @pytest.fixture

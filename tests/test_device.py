@@ -10,7 +10,7 @@ import pytest
 
 import make_frames as make
 import wgmb
-from wgmb import images
+from wgmb.gpu import textures
 
 
 def in_a_process(script: str, *arguments) -> subprocess.CompletedProcess:
@@ -20,7 +20,8 @@ def in_a_process(script: str, *arguments) -> subprocess.CompletedProcess:
 
 LOST = """
 import sys
-from wgmb import Blur, cli
+from wgmb import Blur
+from wgmb.cli import app
 blur, calls = Blur.__call__, []
 def lost_at_3(self, *given):
     calls.append(self)
@@ -28,8 +29,8 @@ def lost_at_3(self, *given):
         self.device.destroy()
     return blur(self, *given)
 Blur.__call__ = lost_at_3
-code = cli.main(["blur", sys.argv[1], "-o", sys.argv[2], "--method", "tap"])
-again = cli.main(["blur", sys.argv[1], "-o", sys.argv[3], "--method", "tap", "-q"])
+code = app.main(["blur", sys.argv[1], "-o", sys.argv[2], "--method", "tap"])
+again = app.main(["blur", sys.argv[1], "-o", sys.argv[3], "--method", "tap", "-q"])
 sys.exit(10 * code + again)
 """
 
@@ -52,7 +53,8 @@ def test_a_lost_device_is_one_line_and_3_and_the_next_blur_works(tmp_path):
 LITTLE_MEMORY = """
 import resource, sys
 import numpy as np, wgmb
-from wgmb import cli, stills
+from wgmb.cli import app
+from wgmb.io import stills
 blur = wgmb.Blur("tap")
 small = np.ones((40, 60, 3), "f4")
 blur(small, small[..., :2])
@@ -169,11 +171,11 @@ def test_a_process_forked_before_there_is_a_device_works_and_one_forked_after_is
 
 
 def test_a_picture_that_is_read_back_in_bands_is_the_same(device, monkeypatch):
-    pool = images.Images(device)
+    pool = textures.Images(device)
     picture = np.random.default_rng(2).random((50, 37, 4), "f4")
     pool.upload("a", picture, "rgba32float")
     texture = pool.texture("a", (37, 50), "rgba32float")
     for at_once in (768, 5 * 768, 1 << 20):
-        monkeypatch.setattr(images, "_READBACK", at_once)
+        monkeypatch.setattr(textures, "_READBACK", at_once)
         got = pool.download(device.create_command_encoder(), texture)
         assert np.array_equal(got, picture)

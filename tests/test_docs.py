@@ -10,8 +10,9 @@ from urllib.parse import unquote
 import cyclopts
 import pytest
 
-from wgmb import METHODS, scenes
-from wgmb.cli import app
+from wgmb import METHODS
+from wgmb.cli.app import app
+from wgmb.scene import builtin
 
 HERE = Path(__file__).parent.parent
 PAGES = {
@@ -71,7 +72,7 @@ def test_command_lines_are_understood(line, monkeypatch):
     for option, word in pairwise(words):
         assert option != "--method" or word in METHODS
     if command == "render" and not words[0].startswith("-"):
-        assert words[0] in scenes.SCENES
+        assert words[0] in builtin.SCENES
 
 
 def test_a_wrong_option_is_not_understood():

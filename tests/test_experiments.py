@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wgmb import compare, experiments, findings, report
-from wgmb.cases import Case
 from wgmb.errors import InputError
-from wgmb.findings import Entry, Report
-from wgmb.measure import MEASURES
+from wgmb.lab import compare, experiments, report, results
+from wgmb.lab.cases import Case
+from wgmb.lab.results import Entry, Report
+from wgmb.metrics import MEASURES
 
 ROOT = Path(__file__).parent.parent
 
@@ -23,7 +23,7 @@ def lab(device):
 
 
 def made(lab, name, size=(48, 32), **options):
-    found = Report(name, "", findings.machine(lab.device), 16)
+    found = Report(name, "", results.machine(lab.device), 16)
     experiments.EXPERIMENTS[name](lab, found, size, **options)
     assert "<svg" in report.page(found)
     for table in found.tables:
@@ -102,7 +102,9 @@ def test_chen_compares_rates_faces_and_alphas(chen):
         assert (name, times) == ("all", sum(row[2] for row in parts))
         assert whole == pytest.approx(sum(row[3] for row in parts), abs=0.03)
         assert ratio == 1 or method.startswith("fusion")
-    assert {"gaussian.wgsl:main", "blur/fusion.wgsl:main"} <= {row[1] for row in by_pass.rows}
+    assert {"methods/fusion_gaussian.wgsl:main", "methods/fusion.wgsl:main"} <= {
+        row[1] for row in by_pass.rows
+    }
     for scene in ("scaling", "crossing"):
         rows = {row[1]: row[2:] for row in quality.rows if row[0] == scene}
         assert {"sharp", "noise floor", "tap, variant published", "fusion"} <= rows.keys()
@@ -112,7 +114,10 @@ def test_chen_compares_rates_faces_and_alphas(chen):
         assert len(figure.rows) == 2 * len(experiments.ALPHAS)
         faces = next(t for t in found.tables if t.title.startswith(f"{scene}: front and back"))
         assert len({row[2] for row in faces.rows}) > 1  # telling faces apart changes the blur
-        assert faces.columns[-2:] == ["gaussian.wgsl:main [ms]", "blur/fusion.wgsl:main [ms]"]
+        assert faces.columns[-2:] == [
+            "methods/fusion_gaussian.wgsl:main [ms]",
+            "methods/fusion.wgsl:main [ms]",
+        ]
 
 
 def test_chens_verdict_is_that_of_the_rates(chen):

@@ -11,7 +11,8 @@ import OpenEXR
 import pytest
 
 import make_frames as make
-from wgmb import Clip, InputError, Output, exr, limits, native, record, stills
+from wgmb import Clip, InputError, Output
+from wgmb.io import exr, limits, native, record, stills
 
 LOSSLESS = ("none", "rle", "zips", "zip", "piz")
 LOSSY = ("pxr24", "b44", "b44a", "dwaa", "dwab")
@@ -64,7 +65,9 @@ def test_reading_and_writing_overlap(tmp_path, monkeypatch):
 THREADS = """
     import os, sys, threading
     import OpenEXR
-    from wgmb import InputError, exr, terminal
+    from wgmb import InputError
+    from wgmb.cli import terminal
+    from wgmb.io import exr
     terminal.own_streams()
     sound, bad = sys.argv[1:]
     stdout, whole = sys.stdout, exr.read(sound)
@@ -200,7 +203,7 @@ def test_without_a_stdout_files_are_read_and_damaged_ones_refused(tmp_path, monk
 BUSY = """
     import os, sys, threading, time
     import numpy as np
-    from wgmb import exr
+    from wgmb.io import exr
     path, made = sys.argv[1], exr.new(np.random.default_rng(0).random((600, 600, 3), "f4"))
     once = exr.encode(made)
 
@@ -238,7 +241,7 @@ def test_a_program_that_chose_how_many_threads_the_library_has_keeps_them():
     done = script("""
         import OpenEXR
         import numpy as np
-        from wgmb import exr
+        from wgmb.io import exr
         OpenEXR.set_global_thread_count(3)
         exr.encode(exr.new(np.zeros((4, 4, 3), "f4")))
         print(OpenEXR.global_thread_count())
@@ -488,7 +491,8 @@ def test_too_many_channels_are_refused(tmp_path):
 
 SHORT = """
     import resource, sys
-    from wgmb import InputError, exr, stills
+    from wgmb import InputError
+    from wgmb.io import exr, stills
     small, damaged, large, png = sys.argv[1:]
     exr.read(small)
     used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()

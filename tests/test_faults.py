@@ -16,7 +16,9 @@ import pytest
 import tifffile
 
 import make_frames as make
-from wgmb import Blur, CameraFile, InputError, cli, exr, stills, terminal
+from wgmb import Blur, CameraFile, InputError
+from wgmb.cli import app, terminal
+from wgmb.io import exr, stills
 
 READ = {".exr": exr.read, ".png": stills.read, ".jpg": stills.read, ".tif": stills.read}
 
@@ -437,7 +439,7 @@ def long_shot(tmp_path_factory):
     for n in range(1, LONG + 1):
         (folder / f"shot.{n:04d}.exr").hardlink_to(folder / f"of.{(n - 1) % 3 + 1}.exr")
     pattern = str(folder / "shot.####.exr")
-    assert cli.main(list(map(str, arguments(pattern, folder / "whole", "-q")))) == 0
+    assert app.main(list(map(str, arguments(pattern, folder / "whole", "-q")))) == 0
     whole = {p.name: p.read_bytes() for p in (folder / "whole").iterdir()}
     assert len(whole) == LONG
     return pattern, whole
@@ -473,7 +475,7 @@ def test_killed_runs_leave_whole_files_only_and_resume_to_the_same_bytes(tmp_pat
         process.communicate()
         for path in out.glob("o.*.exr"):
             assert path.read_bytes() == whole[path.name]
-    assert cli.main(list(map(str, arguments(pattern, out, "--resume", "-q")))) == 0
+    assert app.main(list(map(str, arguments(pattern, out, "--resume", "-q")))) == 0
     assert {p.name: p.read_bytes() for p in out.iterdir()} == whole
 
 
@@ -530,6 +532,6 @@ def test_an_interruption_that_python_lost_is_heard_at_the_next_frame(
         return blur(*given)
 
     monkeypatch.setattr(Blur, "__call__", blurred)
-    code = cli.main(list(map(str, arguments(long_shot[0], tmp_path / "out", "-q"))))
+    code = app.main(list(map(str, arguments(long_shot[0], tmp_path / "out", "-q"))))
     assert code == 130
     assert 0 < len(list((tmp_path / "out").glob("o.*.exr"))) < 10

@@ -6,8 +6,10 @@ import pytest
 import make_frames as make
 import wgmb
 from twins import figure as twin
-from wgmb import InputError, Shutter, scenes, stills
+from wgmb import InputError, Shutter
 from wgmb.cone import VIDEOS
+from wgmb.io import stills
+from wgmb.scene import builtin
 
 SIZE = (96, 54)
 WIDE = (96, 48)
@@ -15,7 +17,7 @@ WIDE = (96, 48)
 
 def rendered(name, size, shutter=0, time=0.0, **settings):
     render = wgmb.Render(
-        scenes.make(name, **settings), wgmb.Blur("volume", shutter=shutter), size=size, fps=60
+        builtin.make(name, **settings), wgmb.Blur("volume", shutter=shutter), size=size, fps=60
     )
     return stills.srgb(render(time)[..., :3])
 
@@ -73,7 +75,7 @@ def test_natural_cone_is_the_past_weighted(speed):
 
 def cone(video, speed, time):
     render = wgmb.Render(
-        scenes.make("cone", video=video, time=time, speed=speed), wgmb.Blur("volume"), size=WIDE
+        builtin.make("cone", video=video, time=time, speed=speed), wgmb.Blur("volume"), size=WIDE
     )
     return stills.srgb(render(0.0)[..., :3])
 
@@ -114,4 +116,4 @@ def test_senseless_settings_are_one_line(capsys, tmp_path, arguments):
 
 def test_a_figure_needs_its_method():
     with pytest.raises(InputError, match="flat"):
-        wgmb.Render(scenes.make("disk"), wgmb.Blur("distributed"), size=(8, 8))(0.0)
+        wgmb.Render(builtin.make("disk"), wgmb.Blur("distributed"), size=(8, 8))(0.0)

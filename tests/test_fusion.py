@@ -5,7 +5,9 @@ import pytest
 
 import make_frames as make
 import wgmb
-from wgmb import Camera, Clip, Reprojections, cli, layers
+from wgmb import Camera, Clip, Reprojections
+from wgmb.cli import app
+from wgmb.io import layers
 
 HERE = Camera(
     np.array([[1, 0, 0, 0], [0, 1.3, 0, 0], [0, 0, -1.02, -0.2], [0, 0, -1, 0]]), np.eye(4)
@@ -107,7 +109,7 @@ def test_options_reach_the_command_line(tmp_path):
     results = []
     for more in ([], ["--weights", "published"], ["--alpha-back", "0.01"], ["--tau", "0.5"]):
         out = tmp_path / f"out{len(results)}.exr"
-        assert cli.main(["blur", str(path), "-o", str(out), "--method", "fusion", "-q", *more]) == 0
+        assert app.main(["blur", str(path), "-o", str(out), "--method", "fusion", "-q", *more]) == 0
         results.append(next(iter(Clip(out))).color)
     apart = [np.abs(results[0].astype("f4") - r.astype("f4")).max() for r in results[1:]]
     assert apart[0] > 0.01  # brighter

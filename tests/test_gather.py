@@ -9,7 +9,7 @@ import wgpu
 import wgmb
 from images import crossing, frame_of
 from wgmb import Shutter, gpu
-from wgmb.images import Images
+from wgmb.gpu.textures import Images
 
 SIZE = (54, 96)
 SHUTTER = Shutter(180)

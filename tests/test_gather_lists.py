@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 import wgmb
-from wgmb import Shutter, gpu, shader
+from wgmb import Shutter
+from wgmb.gpu import kernels, wgsl
 
 SIZE = (150, 340)
-ALL_ACTIVE = "blur/gather_live.wgsl", "var nearest = MARGIN + 1;", "var nearest = 0;"
+ALL_ACTIVE = "methods/gather/active_tiles.wgsl", "var nearest = MARGIN + 1;", "var nearest = 0;"
 SHORT_ROWS = (
-    "blur/gather_listed.wgsl",
+    "methods/gather/worklist.wgsl",
     "const GROUPS_PER_ROW: u32 = 32768u;",
     "const GROUPS_PER_ROW: u32 = 5u;",
 )
@@ -46,17 +47,17 @@ def with_shader(monkeypatch):
     """Change a shader: its file, what is there, what shall be there."""
 
     def change(file, old, new):
-        original = shader.load.__wrapped__
+        original = wgsl.load.__wrapped__
 
         @cache
         def load(name):
             source = original(name)
             included = any(one == file for one, _ in source.files)
             assert not included or source.text.count(old) == 1
-            return shader.Source(source.text.replace(old, new), source.files)
+            return wgsl.Source(source.text.replace(old, new), source.files)
 
-        monkeypatch.setattr(shader, "load", load)
-        monkeypatch.setattr(gpu, "_kernel", lru_cache(gpu._kernel.__wrapped__))
+        monkeypatch.setattr(wgsl, "load", load)
+        monkeypatch.setattr(kernels, "_kernel", lru_cache(kernels._kernel.__wrapped__))
 
     return change
 

@@ -1,4 +1,4 @@
-"""Memory does not grow with the frames, whatever method, form or scene (docs/lavapipe.md)."""
+"""Memory does not grow with the frames, whatever method, variant or scene (see lavapipe.md)."""
 
 import ctypes
 from dataclasses import replace
@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wgmb import Blur, Frame, Render, Shutter, gpu, scenes
-from wgmb.blur import METHODS
-from wgmb.cameras import Camera, Reprojections
-from wgmb.perceive import Viewer
+from wgmb import Blur, Frame, Render, Shutter, gpu
+from wgmb.camera import Camera, Reprojections
+from wgmb.methods import METHODS
+from wgmb.observer import Viewer
+from wgmb.scene import builtin
 from wgmb.viewer import State
-from wgmb.viewer.stage import Stage
+from wgmb.viewer.renderer import Stage
 
 MOST = 24  # KiB a frame
 WARM, COUNT, ROUNDS = 8, 12, 6  # frames, frames a round; tables that have to grow do so in some
@@ -106,7 +107,7 @@ def blurring(method: str, confidence: bool = False, given=dict, **options):
 def rendering(scene: str, method: str, **options):
     def make(device):
         blur = Blur(method, device=device, **options)
-        render, numbers = Render(scenes.make(scene), blur, size=(64, 36)), iter(range(10**6))
+        render, numbers = Render(builtin.make(scene), blur, size=(64, 36)), iter(range(10**6))
         return lambda: render(next(numbers) % 6 / 24)
 
     return make

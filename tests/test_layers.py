@@ -6,7 +6,8 @@ import struct
 import numpy as np
 import pytest
 
-from wgmb import InputError, layers, vectors
+from wgmb import InputError
+from wgmb.io import layers, vectors
 
 pytestmark = pytest.mark.fast
 

@@ -7,7 +7,7 @@ import wgmb
 from images import crossing
 from wgmb import gpu
 from wgmb.errors import InputError
-from wgmb.images import Images
+from wgmb.gpu.textures import Images
 
 SIZE = (40, 60)
 

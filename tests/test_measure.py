@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from wgmb import measure
+from wgmb import metrics
 from wgmb.errors import InputError
-from wgmb.measure import MEASURES
+from wgmb.metrics import MEASURES
 
 pytestmark = pytest.mark.fast
 
@@ -90,23 +90,23 @@ def test_alpha_and_bad_pixels_do_not_spoil_a_judge(name, picture):
 
 def test_psnr_of_a_known_error():
     truth = np.full((12, 12, 3), 0.5)
-    assert measure.psnr_linear(truth + 0.1, truth) == pytest.approx(20)
-    encoded = measure.display(truth + 0.1)[0, 0, 0] - measure.display(truth)[0, 0, 0]
-    assert measure.psnr(truth + 0.1, truth) == pytest.approx(-20 * np.log10(encoded), abs=1e-3)
+    assert metrics.psnr_linear(truth + 0.1, truth) == pytest.approx(20)
+    encoded = metrics.display(truth + 0.1)[0, 0, 0] - metrics.display(truth)[0, 0, 0]
+    assert metrics.psnr(truth + 0.1, truth) == pytest.approx(-20 * np.log10(encoded), abs=1e-3)
 
 
 def test_display_is_srgb():
     known = {0.0: 0, 0.0031308: 0.04045, 0.214041: 0.5, 0.5: 0.735357, 1.0: 1.0, 7.0: 1.0}
     light = np.array(list(known), np.float64).reshape(1, -1, 1).repeat(3, axis=2)
     np.testing.assert_allclose(
-        measure.display(light)[0, :, 0], list(known.values()), rtol=0, atol=2e-6
+        metrics.display(light)[0, :, 0], list(known.values()), rtol=0, atol=2e-6
     )
 
 
 def test_ssim_against_its_definition(picture):
     """Every window by itself, as the paper writes it."""
     other = np.roll(picture, 2, axis=1) + 0.03
-    a, b = (measure.display(p).astype("f8")[:15, :17] for p in (other, picture))
+    a, b = (metrics.display(p).astype("f8")[:15, :17] for p in (other, picture))
     x = np.arange(-5, 6)
     weights = np.exp(-(x[:, None] ** 2 + x**2) / (2 * 1.5**2))
     weights /= weights.sum()
@@ -120,42 +120,42 @@ def test_ssim_against_its_definition(picture):
                 cov = (weights * (p - mp) * (q - mq)).sum()
                 top_part = (2 * mp * mq + 1e-4) * (2 * cov + 9e-4)
                 found.append(top_part / ((mp**2 + mq**2 + 1e-4) * (vp + vq + 9e-4)))
-    got = measure.ssim(other[:15, :17], picture[:15, :17])
+    got = metrics.ssim(other[:15, :17], picture[:15, :17])
     assert got == pytest.approx(np.mean(found), abs=1e-6)
 
 
 def test_energy_is_the_share_of_light_too_much(picture):
-    assert measure.energy_error(1.06 * picture, picture) == pytest.approx(0.06, rel=1e-5)
-    assert measure.energy_error(0 * picture, picture) == pytest.approx(1.0)
-    assert measure.energy_error(picture, 0 * picture) == np.inf
+    assert metrics.energy_error(1.06 * picture, picture) == pytest.approx(0.06, rel=1e-5)
+    assert metrics.energy_error(0 * picture, picture) == pytest.approx(1.0)
+    assert metrics.energy_error(picture, 0 * picture) == np.inf
 
 
 def test_energy_sees_highlights_beyond_white(picture):
     bright = picture.copy()
     bright[10, 10] = 50.0
-    assert measure.energy_error(picture, bright) > 0.05
+    assert metrics.energy_error(picture, bright) > 0.05
 
 
 def test_energy_forgives_noise_more_than_moved_light(picture):
     noise = np.random.default_rng(5).normal(0, 0.05, picture.shape)
     moved = np.roll(picture, 8, axis=1)
-    assert 4 * measure.energy_error(picture + noise, picture) < measure.energy_error(moved, picture)
+    assert 4 * metrics.energy_error(picture + noise, picture) < metrics.energy_error(moved, picture)
 
 
 def test_a_picture_without_edges_has_edge_error_1(picture):
-    assert measure.edge_error(np.full_like(picture, 0.3), picture) == pytest.approx(1.0)
+    assert metrics.edge_error(np.full_like(picture, 0.3), picture) == pytest.approx(1.0)
 
 
 def test_flip_colors_are_dark_where_alike_and_bright_where_not(picture):
     other = picture.copy()
     other[20:30, 30:40] = 1.0
-    colors = measure.flip_colors(other, picture)
+    colors = metrics.flip_colors(other, picture)
     assert colors.shape == picture.shape
     assert colors[:8, :8].max() < 0.1
     assert colors[25, 35].max() > 0.5
 
 
 def test_measure_asks_every_judge(picture):
-    found = measure.measure(picture + 0.01, picture)
+    found = metrics.measure(picture + 0.01, picture)
     assert list(found) == list(MEASURES)
     assert all(np.isfinite(v) for v in found.values())

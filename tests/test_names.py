@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 import make_frames as make
-from wgmb import Clip, InputError, cli, numbering
-from wgmb.numbering import frame_numbers, frame_path
+from wgmb import Clip, InputError
+from wgmb.cli import app
+from wgmb.io import frame_numbers as numbering
+from wgmb.io.frame_numbers import frame_numbers, frame_path
 from wgmb.viewer.state import State
 
 
@@ -141,7 +143,7 @@ def test_the_viewers_command_line_takes_names_that_begin_with_a_hyphen(tmp_path,
     state = State().opened(name).told({"keep": "-layer", "method": "tap"})
     assert "--keep=-layer" in state.command("x.png")
     words = State().opened(name).command("-x.####.png")
-    assert cli.main([*words, "--quiet"]) == 0
+    assert app.main([*words, "--quiet"]) == 0
     assert {"-x.0001.png", "-x.0002.png"} <= set(make.names_in(tmp_path))
 
 

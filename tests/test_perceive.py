@@ -6,10 +6,11 @@ from PIL import Image
 
 import make_frames as make
 from twins import perceive as twin
-from wgmb import InputError, Shutter, stills
+from wgmb import InputError, Shutter
 from wgmb.cone import VIDEOS, Cone
-from wgmb.perceive import Viewer
-from wgmb.shutter_study import best_shutter, compare, difference
+from wgmb.io import stills
+from wgmb.lab.shutter_study import best_shutter, compare, difference
+from wgmb.observer import Viewer
 
 # Mean differences to perceived nature at 20, 40, 60, 80 rad/s and 60 frames a second.
 TABLE = {

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import make_frames as make
-from wgmb import cli
+from wgmb.cli import app
 from wgmb.viewer import State
 
 HERE = Path(__file__).parent.parent
@@ -27,9 +27,9 @@ def test_python_blocks_run_in_their_order(tmp_path, monkeypatch):
 
 def test_every_option_that_is_named_exists():
     known = {"--version", "--help"}
-    for name in cli.app:
+    for name in app.app:
         if not name.startswith("-"):
-            for argument in cli.app[name].assemble_argument_collection():
+            for argument in app.app[name].assemble_argument_collection():
                 known.update(argument.names)
     named = set(re.findall(r"--[a-z][a-z-]+", TEXT))
     assert named
@@ -82,6 +82,6 @@ def test_command_lines_make_what_they_say(line, desk):
     made = words[words.index("-o") + 1].replace("####", "*")
     for path in desk.glob(made):
         path.unlink()
-    assert cli.main(words) == 0
+    assert app.main(words) == 0
     frames = 1 if "*" not in made else 2 if "--frames" in words else 3
     assert len(list(desk.glob(made))) == frames

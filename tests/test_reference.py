@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 import wgmb
-from wgmb import Body, InputError, Scene, Shot, Shutter, scenes
-from wgmb.blur.accumulate import spread
-from wgmb.bodies import rotation, translation
+from wgmb import Body, InputError, Scene, Shot, Shutter
+from wgmb.methods.accumulate import spread
 from wgmb.render import Render
+from wgmb.scene import builtin
+from wgmb.scene.bodies import rotation, translation
 
 STILL = Shot(lambda t: (0 * t, 0 * t, 0 * t))
 AWAY, THIN = 8.0, 1e-4  # distance to the flat bodies, half their thickness [m]
@@ -194,7 +195,7 @@ def test_more_rays_refine_the_same_picture():
 @pytest.mark.parametrize("method", ["distributed", "accumulate"])
 def test_bit_by_bit_is_the_same_as_at_once(method):
     blur = wgmb.Blur(method, samples=24, shutter=Shutter(270, "start", "triangle"))
-    render = wgmb.Render(scenes.make("crossing"), blur, size=(40, 23), rays=1)
+    render = wgmb.Render(builtin.make("crossing"), blur, size=(40, 23), rays=1)
     on_gpu = render.on_gpu(0.1)
     pictures = []
     for bits in ([(0, 24)], [(0, 7), (7, 1), (8, 16)]):
@@ -209,7 +210,7 @@ def test_bit_by_bit_is_the_same_as_at_once(method):
 
 
 def test_a_seed_is_its_noise():
-    scene, shutter = scenes.make("crossing"), Shutter(180)
+    scene, shutter = builtin.make("crossing"), Shutter(180)
     one, again, other = (rendered(scene, (48, 27), shutter, 16, seed=s) for s in (5, 5, 6))
     assert np.array_equal(one, again)
     assert (one != other).mean() > 0.5
@@ -229,7 +230,7 @@ def test_accumulate_is_wrong_by_half_a_picture_at_most(curve):
 
 def test_accumulate_approaches_distributed_until_its_antialiasing_is_what_is_left():
     """Root of the mean square: 0.055 sharp, 0.0049, 0.0039, 0.0039; 4 x 4 rays have no filter."""
-    scene, shutter, size = scenes.make("crossing", speed=4), Shutter(360, "start"), (64, 36)
+    scene, shutter, size = builtin.make("crossing", speed=4), Shutter(360, "start"), (64, 36)
     truth = rendered(scene, size, shutter)
 
     def wrong(*arguments):
@@ -246,9 +247,9 @@ def test_accumulate_approaches_distributed_until_its_antialiasing_is_what_is_lef
 def test_accumulate_is_the_mean_of_its_pictures():
     shutter = Shutter(360, "start", "triangle")
     times = shutter.sample_times(5)
-    each = [rendered(scenes.make("crossing"), (32, 18), Shutter(1e-4, float(t)), 1, "accumulate")
+    each = [rendered(builtin.make("crossing"), (32, 18), Shutter(1e-4, float(t)), 1, "accumulate")
             for t in times]  # fmt: skip
-    got = rendered(scenes.make("crossing"), (32, 18), shutter, 5, "accumulate")
+    got = rendered(builtin.make("crossing"), (32, 18), shutter, 5, "accumulate")
     np.testing.assert_allclose(got, np.mean(each, axis=0), atol=2e-4)
 
 
@@ -267,6 +268,6 @@ def test_accumulate_cannot_roll():
 
 
 def test_every_frame_has_noise_of_its_own():
-    render = Render(scenes.make("crossing"), wgmb.Blur("distributed", samples=1), size=(32, 18))
+    render = Render(builtin.make("crossing"), wgmb.Blur("distributed", samples=1), size=(32, 18))
     assert np.array_equal(render(0.0, number=3), render(0.0, number=3))
     assert np.abs(render(0.0, number=3) - render(0.0, number=4)).max() > 0.05

@@ -7,7 +7,8 @@ import pytest
 
 import make_frames as make
 import wgmb
-from wgmb import Shutter, scenes
+from wgmb import Shutter
+from wgmb.scene import builtin
 
 SIZE = (96, 54)
 LATE = Shutter(360, "start")  # open only after the instant: motion the wrong way round is seen
@@ -28,7 +29,7 @@ BUILT_IN = {"zoom": "scaling", "yaw": "rotation"}
 
 @cache
 def rendered(name, method, samples, shutter=LATE, rays=3, size=SIZE, **options):
-    scene = scenes.make(BUILT_IN.get(name, name), **SETTINGS[name])
+    scene = builtin.make(BUILT_IN.get(name, name), **SETTINGS[name])
     blur = wgmb.Blur(method, samples=samples, shutter=shutter, **options)
     return wgmb.Render(scene, blur, size=size, rays=rays)(0.0)[..., :3].astype(float)
 
@@ -100,14 +101,14 @@ def test_few_rays_do_more_when_they_are_reprojected(name):
 
 @pytest.mark.parametrize("method", ["tap", "reproject"])
 def test_nothing_moves_before_a_camera_that_stands_still(method):
-    scene = scenes.make("translation", speed=0)
+    scene = builtin.make("translation", speed=0)
     render = wgmb.Render(scene, wgmb.Blur(method, shutter=720), size=SIZE)
     assert np.array_equal(render(0.2), render.frame(0.2).color)
 
 
 def test_nor_in_the_published_form():
     """But for its sums of fixed point numbers."""
-    scene = scenes.make("translation", speed=0)
+    scene = builtin.make("translation", speed=0)
     render = wgmb.Render(scene, wgmb.Blur("reproject", variant="published"), size=SIZE)
     np.testing.assert_allclose(render(0.2), render.frame(0.2).color, atol=1e-4)
 
@@ -138,7 +139,7 @@ def test_passes_hold_what_the_frame_holds(tmp_path, capsys):
         capsys, "render", "crossing", "--size", "48x27", "--time", 0.1, "--passes", "-o", path
     )
     got = make.plain_read(path)
-    render = wgmb.Render(scenes.make("crossing"), wgmb.Blur("gather"), size=(48, 27))
+    render = wgmb.Render(builtin.make("crossing"), wgmb.Blur("gather"), size=(48, 27))
     frame = render.frame(0.1)
     assert np.array_equal(got["Z"], frame.depth)
     assert np.array_equal(got["object_id.X"], frame.object_id)

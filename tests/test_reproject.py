@@ -8,7 +8,8 @@ import pytest
 
 import make_frames as make
 import wgmb
-from wgmb import Clip, InputError, cli
+from wgmb import Clip, InputError
+from wgmb.cli import app
 
 PUBLISHED = [{}, {"depth_test": True}, {"splat": "line"}]
 
@@ -55,7 +56,7 @@ def test_many_steps_are_done_in_several_chunks(monkeypatch):
     rng = np.random.default_rng(2)
     given = frame(rng.random((48, 64, 3), "f4"), 9 * rng.normal(size=(48, 64, 2)))
     whole = published(given, samples=10)
-    monkeypatch.setattr(sys.modules["wgmb.blur.reproject"], "AT_ONCE", 3 * 4 * 48 * 64)
+    monkeypatch.setattr(sys.modules["wgmb.methods.reproject"], "AT_ONCE", 3 * 4 * 48 * 64)
     assert np.array_equal(published(given, samples=10), whole)
 
 
@@ -109,8 +110,8 @@ def test_options_reach_the_command_line(tmp_path):
     for i, more in enumerate([[], ["--depth-test"], ["--splat", "line"]]):
         out = tmp_path / f"out{i}.exr"
         words = ["blur", str(path), "-o", str(out), "--method", "reproject", "-q"]
-        assert cli.main([*words, "--variant", "published", "--samples", "3", *more]) == 0
+        assert app.main([*words, "--variant", "published", "--samples", "3", *more]) == 0
         seen.append(next(iter(Clip(out))).color)
     assert not np.array_equal(seen[0], seen[1])
     assert not np.array_equal(seen[0], seen[2])
-    assert cli.main([*words[:3], str(tmp_path / "b.exr"), *words[4:], "--facing"]) == 2
+    assert app.main([*words[:3], str(tmp_path / "b.exr"), *words[4:], "--facing"]) == 2

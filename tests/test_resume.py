@@ -11,10 +11,10 @@ import pytest
 from PIL import Image
 
 import make_frames as make
-from wgmb import atomic, exr, record, stills
-from wgmb.output import Output
-from wgmb.sequence import Clip
-from wgmb.video import Video
+from wgmb.io import atomic, exr, record, stills
+from wgmb.io.clip import Clip
+from wgmb.io.output import Output
+from wgmb.io.video import Video
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,11 @@ import pytest
 import make_frames as make
 import wgmb
 from twins import gbuffer as twin
-from wgmb import Body, InputError, Scene, Shot, gpu, scenes
-from wgmb.bodies import SHAPES, at, rotation, translation
-from wgmb.gbuffer import SceneOnGpu, _bounds, _halves
-from wgmb.images import Images
+from wgmb import Body, InputError, Scene, Shot, gpu
+from wgmb.gpu.textures import Images
+from wgmb.scene import builtin
+from wgmb.scene.bodies import SHAPES, at, rotation, translation
+from wgmb.scene.gbuffer import SceneOnGpu, _bounds, _halves
 
 SIZE = (96, 54)
 STILL = Shot(lambda t: (0 * t, 0 * t, 0 * t))
@@ -28,7 +29,7 @@ def frame(scene, seconds=0.0, size=SIZE, rays=1):
     return seen, render.blur.motion(seen)
 
 
-OF_BODIES = [n for n in scenes.SCENES if not scenes.make(n).has_volumes]
+OF_BODIES = [n for n in builtin.SCENES if not builtin.make(n).has_volumes]
 
 
 def turned(axis, angle, turn, x=0.0, y=0.0, z=-2.4):
@@ -39,7 +40,7 @@ def turned(axis, angle, turn, x=0.0, y=0.0, z=-2.4):
 @pytest.mark.parametrize("name", OF_BODIES)
 def test_built_in_scenes_are_their_twin(name, seconds):
     """Rays that graze a silhouette may miss in f32 what they hit in f64: 0 pixels measured."""
-    scene = plain(scenes.make(name))
+    scene = plain(builtin.make(name))
     seen, motion = frame(scene, seconds)
     want = twin.see(scene, SIZE, seconds)
     same = seen.object_id == want["object_id"]
@@ -104,7 +105,7 @@ def at_instant(scene, seconds, moment, span):
 @pytest.mark.parametrize("name", ["wheel", "bounce", "rotation", "crossing"])
 def test_other_instants_are_their_twin(name, moment):
     """Poses between two rows are interpolated, as good as exactly at these speeds."""
-    scene = plain(scenes.make(name))
+    scene = plain(builtin.make(name))
     got = at_instant(scene, 0.1, moment, (-0.5, 0.5))
     want = twin.see(scene, SIZE, 0.1 + moment / 24)
     same = got["object"][..., 0] == want["object_id"]
@@ -188,7 +189,7 @@ def test_a_body_beyond_the_range_of_halves_is_seen():
 def test_every_scene_is_finite_and_something_is_to_be_seen():
     for name in OF_BODIES:
         for seconds in (-1.0, 0.0, 0.4, 3.0):
-            render = wgmb.Render(scenes.make(name), wgmb.Blur("tap"), size=(64, 36), rays=2)
+            render = wgmb.Render(builtin.make(name), wgmb.Blur("tap"), size=(64, 36), rays=2)
             picture = render(seconds)
             assert np.isfinite(picture).all(), (name, seconds)
             assert picture.min() >= 0
@@ -282,7 +283,7 @@ def test_what_is_no_body_is_refused():
 @pytest.mark.parametrize("method", ["tap", "distributed"])
 def test_what_leaves_the_numbers_is_refused(name, settings, who, method):
     with pytest.raises(InputError, match=who):
-        wgmb.Render(scenes.make(name, **settings), wgmb.Blur(method), size=(32, 18))(0.1)
+        wgmb.Render(builtin.make(name, **settings), wgmb.Blur(method), size=(32, 18))(0.1)
 
 
 @pytest.mark.parametrize("options", [{"fps": 0}, {"fps": float("nan")}, {"rays": 0}, {"rays": 9}])
@@ -296,7 +297,7 @@ def test_what_is_no_rendering_is_refused(options):
 
 def test_antialiasing_is_the_mean_of_rays():
     """n x n rays of a picture are the middles of the pixels of one n times as large."""
-    scene = scenes.make("crossing")
+    scene = builtin.make("crossing")
     size = (48, 27)
     got = frame(plain(scene), 0.0, size, rays=3)[0].color
     fine = frame(plain(scene), 0.0, (144, 81), rays=1)[0].color

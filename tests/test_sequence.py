@@ -5,10 +5,11 @@ import pytest
 from PIL import Image
 
 import make_frames as make
-from wgmb import Blur, Frame, InputError, sequence
-from wgmb.output import Output
-from wgmb.sequence import Clip, Passes
-from wgmb.vectors import Vectors
+from wgmb import Blur, Frame, InputError
+from wgmb.io import frame_numbers
+from wgmb.io.clip import Clip, Passes
+from wgmb.io.output import Output
+from wgmb.io.vectors import Vectors
 
 
 @pytest.fixture(scope="module")
@@ -26,15 +27,15 @@ def contents(folder) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("name", ["s.####.exr", "s.%04d.exr", "s.$F4.exr", "s.@@@@.exr"])
 def test_patterns_of_every_program_stand_for_the_same_files(tmp_path, name):
-    assert sequence.is_pattern(name)
-    assert sequence.frame_path(tmp_path / name, 7) == tmp_path / "s.0007.exr"
-    assert sequence.frame_path(tmp_path / name, 12345) == tmp_path / "s.12345.exr"
+    assert frame_numbers.is_pattern(name)
+    assert frame_numbers.frame_path(tmp_path / name, 7) == tmp_path / "s.0007.exr"
+    assert frame_numbers.frame_path(tmp_path / name, 12345) == tmp_path / "s.12345.exr"
 
 
 def test_a_name_without_pattern_stands_for_itself():
-    assert not sequence.is_pattern("shot.0001.exr")
-    assert not sequence.is_pattern("a.####/shot.0001.exr")
-    assert sequence.frame_path("x.exr", 5).name == "x.exr"
+    assert not frame_numbers.is_pattern("shot.0001.exr")
+    assert not frame_numbers.is_pattern("a.####/shot.0001.exr")
+    assert frame_numbers.frame_path("x.exr", 5).name == "x.exr"
 
 
 @pytest.mark.parametrize(
@@ -42,13 +43,13 @@ def test_a_name_without_pattern_stands_for_itself():
     [("1-10x3", [1, 4, 7, 10]), ("1,3,5-8", [1, 3, 5, 6, 7, 8]), ("7", [7]), ("3-1", [3, 2, 1])],
 )
 def test_frame_ranges_are_understood(text, numbers):
-    assert sequence.frame_numbers(text) == numbers
+    assert frame_numbers.frame_numbers(text) == numbers
 
 
 @pytest.mark.parametrize("text", ["a-b", "1-", "1-5x0", "one"])
 def test_senseless_frame_ranges_are_refused_by_name(text):
     with pytest.raises(InputError, match="frames"):
-        sequence.frame_numbers(text)
+        frame_numbers.frame_numbers(text)
 
 
 @pytest.mark.parametrize("folder", ["plain", "with space (1)", "brackets [2]", "hash#4 at@ %d"])

@@ -8,21 +8,22 @@ import numpy as np
 import pytest
 import wgpu
 
-from wgmb import ShaderError, gpu, shader
+from wgmb import ShaderError, gpu
+from wgmb.gpu import wgsl
 
 LEAVES = ["f32", "u32", "i32", "vec2f", "vec2u", "vec3f", "vec3u", "vec4f", "vec4<i32>", "mat4x4f",
           "array<vec4f, 3>"]  # fmt: skip
-FILES = sorted(p.relative_to(shader.ROOT).as_posix() for p in shader.ROOT.rglob("*.wgsl"))
-ENTERED = [f for f in FILES if shader.load(f).entry_points()]
+FILES = sorted(p.relative_to(wgsl.ROOT).as_posix() for p in wgsl.ROOT.rglob("*.wgsl"))
+ENTERED = [f for f in FILES if wgsl.load(f).entry_points()]
 ONE = "const WG_X: u32 = 1u;\nconst WG_Y: u32 = 1u;\n"
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(shader, "ROOT", tmp_path)
-    shader.load.cache_clear()
+    monkeypatch.setattr(wgsl, "ROOT", tmp_path)
+    wgsl.load.cache_clear()
     yield tmp_path
-    shader.load.cache_clear()
+    wgsl.load.cache_clear()
 
 
 INNER = "struct Inner {\n    a: vec3f,\n    b: u32,\n    c: array<vec4f, 2>,\n}\n"
@@ -72,7 +73,7 @@ def test_python_and_gpu_agree_on_struct_layout(device, seed, folder):
         "@group(1) @binding(1) var<storage, read_write> out: array<u32>;\n"
         f"@compute @workgroup_size(1)\nfn main() {{\n{code}}}\n"
     )
-    source = shader.load("probe.wgsl")
+    source = wgsl.load("probe.wgsl")
     kind = source.dtype("Probe")
     data, want = np.zeros(kind.itemsize // 4, "<u4"), np.arange(1, len(reads) + 1, dtype="<u4")
     data[[at // 4 for at in places(kind)]] = want
@@ -85,16 +86,16 @@ def test_python_and_gpu_agree_on_struct_layout(device, seed, folder):
 
 @pytest.mark.parametrize("file", ENTERED)
 def test_every_shader_compiles_with_every_override(device, file):
-    names = re.findall(r"^override (\w+): bool", shader.load(file).text, re.M)
+    names = re.findall(r"^override (\w+): bool", wgsl.load(file).text, re.M)
     many = list(itertools.product((0, 1), repeat=len(names)))
     for values in random.Random(7).sample(many, min(len(many), 64)):
-        gpu.Kernel(device, shader.load(file), dict(zip(names, values, strict=True)))
+        gpu.Kernel(device, wgsl.load(file), dict(zip(names, values, strict=True)))
 
 
 @pytest.mark.parametrize("file", FILES)
 def test_every_shader_begins_with_what_it_does(file):
     lines = itertools.takewhile(
-        lambda line: line.startswith("// "), (shader.ROOT / file).read_text().splitlines()
+        lambda line: line.startswith("// "), (wgsl.ROOT / file).read_text().splitlines()
     )
     text = " ".join(line[3:] for line in lines)
     assert re.match(r"[A-Z][^.]{10,}\.", text), text
@@ -107,7 +108,7 @@ def test_an_error_names_the_included_file(device, folder):
         "@compute @workgroup_size(1)\nfn main() { let x = broken(); }\n"
     )
     with pytest.raises(ShaderError, match=r"inc\.wgsl:2"):
-        gpu.Kernel(device, shader.load("main.wgsl"))
+        gpu.Kernel(device, wgsl.load("main.wgsl"))
 
 
 def test_an_error_in_the_file_itself_keeps_its_line(device, folder):
@@ -116,21 +117,21 @@ def test_an_error_in_the_file_itself_keeps_its_line(device, folder):
         f"//#include inc.wgsl\n{ONE}@compute @workgroup_size(1)\nfn main() {{ let x = A +; }}\n"
     )
     with pytest.raises(ShaderError, match=r"main\.wgsl:5"):
-        gpu.Kernel(device, shader.load("main.wgsl"))
+        gpu.Kernel(device, wgsl.load("main.wgsl"))
 
 
 def test_a_missing_include_names_both_files(folder):
     (folder / "main.wgsl").write_text("//#include nope.wgsl\n")
     with pytest.raises(ShaderError, match=r"main\.wgsl: no such file wgsl/nope\.wgsl"):
-        shader.load("main.wgsl")
+        wgsl.load("main.wgsl")
 
 
 def test_a_file_included_twice_is_there_once(folder):
     (folder / "c.wgsl").write_text("const C: u32 = 7u;\n")
     (folder / "b.wgsl").write_text("//#include c.wgsl\n")
     (folder / "a.wgsl").write_text("//#include b.wgsl\n//#include c.wgsl\n")
-    assert shader.load("a.wgsl").text.count("const C") == 1
-    assert shader.load("a.wgsl").constant("C") == 7
+    assert wgsl.load("a.wgsl").text.count("const C") == 1
+    assert wgsl.load("a.wgsl").constant("C") == 7
 
 
 @pytest.mark.parametrize(
@@ -146,12 +147,12 @@ def test_a_file_included_twice_is_there_once(folder):
 )
 def test_what_is_not_supported_is_refused(kind, text):
     with pytest.raises(ShaderError):
-        shader.layout(kind, text)
+        wgsl.layout(kind, text)
 
 
 def test_a_missing_constant_is_named():
     with pytest.raises(ShaderError, match="no constant NOPE in keep"):
-        shader.load("keep.wgsl").constant("NOPE")
+        wgsl.load("holdout.wgsl").constant("NOPE")
 
 
 @pytest.mark.parametrize("given", [{}, {"p": None, "q": None}])
@@ -161,13 +162,13 @@ def test_too_few_or_too_many_names_are_listed(device, folder, given):
         "@compute @workgroup_size(1)\nfn main() { let x = p; }\n"
     )
     with pytest.raises(ShaderError, match=r"binds \['p'\], got"):
-        run(device, shader.load("m.wgsl"), **given)
+        run(device, wgsl.load("m.wgsl"), **given)
 
 
 @pytest.mark.parametrize(
-    "file", sorted(p.relative_to(shader.ROOT).as_posix() for p in shader.ROOT.rglob("*.wgsl"))
+    "file", sorted(p.relative_to(wgsl.ROOT).as_posix() for p in wgsl.ROOT.rglob("*.wgsl"))
 )
 def test_every_scalar_constant_can_be_read(file):
-    source = shader.load(file)
+    source = wgsl.load(file)
     for name in re.findall(r"^const (\w+)\s*:\s*[fiu]32", source.text, re.M):
         assert np.isfinite(source.constant(name))

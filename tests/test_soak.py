@@ -19,7 +19,8 @@ from soaking import CRASHERS, damage, hostile, kinds, numbers, parts, resuming, 
 from soaking.forked import forked
 from soaking.processes import Ended, apart, growth, limits, run, use, wgmb
 from soaking.table import Line, Tally, Trial
-from wgmb import InputError, exr
+from wgmb import InputError
+from wgmb.io import exr
 
 SEED = int(time.strftime("%Y%m%d"))
 

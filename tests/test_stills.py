@@ -12,9 +12,10 @@ import tifffile
 from PIL import Image
 
 import make_frames as make
-from wgmb import InputError, exr, record, stills
-from wgmb.output import Output
-from wgmb.source import Source
+from wgmb import InputError
+from wgmb.io import exr, record, stills
+from wgmb.io.frame_file import Source
+from wgmb.io.output import Output
 
 pytestmark = pytest.mark.fast
 

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from wgmb import METHODS, Blur, Frame, Render, gpu, scenes, timing
-from wgmb.images import Images
-from wgmb.timing import Timing, WallClock
+from wgmb import METHODS, Blur, Frame, Render, gpu
+from wgmb.gpu import timing
+from wgmb.gpu.textures import Images
+from wgmb.gpu.timing import Timing, WallClock
+from wgmb.scene import builtin
 
 SIZE = (64, 36)
 CLOCKS = pytest.mark.parametrize("clock", [Timing, WallClock])
@@ -23,7 +25,7 @@ def drawn(blur, clock):
     encoder = blur.device.create_command_encoder()
     if "scene" in blur.method.needs:
         name = "torusphere" if blur.method.name == "volume" else "crossing"
-        render = Render(scenes.make(name), blur, size=SIZE, rays=1)
+        render = Render(builtin.make(name), blur, size=SIZE, rays=1)
         render.draw(output.create_view(), 0.0, timing=clock)
     else:
         frame = Frame(**{**vars_of(FRAME), "prev": FRAME, "next": FRAME})

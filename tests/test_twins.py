@@ -15,7 +15,8 @@ from twins import reproject as reproject_twin
 from twins import tap as tap_twin
 from twins import tiles as tiles_twin
 from twins import velocity as velocity_twin
-from wgmb import InputError, Reprojections, Shutter, display
+from wgmb import InputError, Reprojections, Shutter
+from wgmb.color import motion_colors
 
 SIZES = [(48, 64), (37, 53), (1, 1), (3, 130)]
 TOLERANCE = 1e-4
@@ -245,7 +246,7 @@ def test_tiles_shows_what_it_follows():
     got = wgmb.blur(color, motion=motion, method="tiles", shutter=shutter, show="tiles")
     ways = tiles_twin.followed(motion, shutter.span, 40)
     y, x = np.mgrid[: size[0], : size[1]] // 40
-    np.testing.assert_allclose(got[..., :3], display.motion_colors(ways[y, x], 40), atol=1e-3)
+    np.testing.assert_allclose(got[..., :3], motion_colors(ways[y, x], 40), atol=1e-3)
     with pytest.raises(InputError, match="tiles"):
         wgmb.Blur("tiles", show="depth")
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import make_frames as make
-from wgmb import InputError, vectors
-from wgmb.vectors import Vectors
+from wgmb import InputError
+from wgmb.io import vectors
+from wgmb.io.vectors import Vectors
 
 pytestmark = pytest.mark.fast
 

@@ -10,9 +10,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from PIL import Image
 
 import make_frames as make
-from wgmb import InputError, stills
-from wgmb.output import Output
-from wgmb.video import Video
+from wgmb import InputError
+from wgmb.io import stills
+from wgmb.io.output import Output
+from wgmb.io.video import Video
 
 SETTINGS = "{}"
 

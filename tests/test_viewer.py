@@ -9,29 +9,19 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 
-from wgmb import (
-    Blur,
-    Clip,
-    DeviceError,
-    InputError,
-    Render,
-    cli,
-    display,
-    exr,
-    gpu,
-    perceive,
-    scenes,
-    stills,
-)
-from wgmb.blur import METHODS
+from wgmb import Blur, Clip, DeviceError, InputError, Render, color, gpu, observer
+from wgmb.cli import app
 from wgmb.cone import Cone
-from wgmb.timing import Timing
-from wgmb.viewer import State, actions, controls, offscreen, stage
-from wgmb.viewer.pace import Pace
+from wgmb.gpu.timing import Timing
+from wgmb.io import exr, stills
+from wgmb.methods import METHODS
+from wgmb.scene import builtin
+from wgmb.viewer import State, actions, controls, offscreen, renderer
+from wgmb.viewer.adaptive import Pace
+from wgmb.viewer.renderer import shutter_of
 from wgmb.viewer.screen import key_box
-from wgmb.viewer.stage import shutter_of
+from wgmb.viewer.source import SceneSubject
 from wgmb.viewer.state import LOOKS
-from wgmb.viewer.subject import SceneSubject
 from wgmb.viewer.window import frame
 
 SIZE = 512, 1010  # tall enough for the whole panel; the picture is 256 x 144
@@ -153,7 +143,7 @@ def library(state, size=SMALL):
     """A Render of what the state is set to, and when."""
     shows = {} if state.look in LOOKS else {"show": state.look}
     blur = Blur(state.method, samples=state.samples, shutter=shutter_of(state), **shows)
-    scene = scenes.make(state.source, **dict(state.settings))
+    scene = builtin.make(state.source, **dict(state.settings))
     render = Render(scene, blur, size=size, rays=state.rays, fps=state.fps)
     return render, (state.frame / state.fps, int(state.frame))
 
@@ -180,7 +170,7 @@ def test_every_method_and_scene_can_be_chosen(hand):
     for method in methods:
         hand.choose("method", method)
         assert hand.state == replace(PLAIN, method=method)
-    for name in scenes.SCENES:
+    for name in builtin.SCENES:
         before = hand.state
         if name != before.source:
             hand.choose("scene", name)
@@ -188,7 +178,7 @@ def test_every_method_and_scene_can_be_chosen(hand):
             assert hand.state == possible(before.opened(name))
 
 
-@pytest.mark.parametrize("name", scenes.SCENES)
+@pytest.mark.parametrize("name", builtin.SCENES)
 def test_every_scene_is_what_render_draws(small, name):
     opened = replace(ALONE, method=State().method).opened(name)
     method = "tap" if opened.method == State().method else opened.method
@@ -213,7 +203,7 @@ def test_velocity_has_the_colours_of_display(bare):
     shown = bare.picture()
     render, _ = library(state, BARE)
     motion = render.blur.motion(render.frame(0.0))[..., 2:]
-    want = stills.srgb(display.motion_colors(motion, PLAIN.fastest * 180))
+    want = stills.srgb(color.motion_colors(motion, PLAIN.fastest * 180))
     apart = np.abs(shown - want).max(axis=2)
     wheel = slice(110, None), slice(240, None)
     assert apart[wheel].max() > 0.5  # the legend
@@ -259,8 +249,8 @@ def test_all_that_a_method_draws_is_what_render_draws(small, method):
 
 
 def seen(frames, fps, after=0.0):
-    """What wgmb/perceive.py makes of the frames, the first of which was always there."""
-    eye = perceive.Viewer(fps)
+    """What wgmb/observer.py makes of the frames, the first of which was always there."""
+    eye = observer.Viewer(fps)
     for picture in frames:
         eye.look(picture)
     return stills.srgb(np.clip(eye.sees(after)[..., :3], 0, 1))
@@ -268,7 +258,7 @@ def seen(frames, fps, after=0.0):
 
 def rendered(numbers, fps=24.0, rays=1, speed=1.0, **blur):
     how = Blur(**{"method": "tap", "samples": 4, **blur})
-    render = Render(scenes.make("crossing", speed=speed), how, size=SMALL, rays=rays, fps=fps)
+    render = Render(builtin.make("crossing", speed=speed), how, size=SMALL, rays=rays, fps=fps)
     return [render(n / fps, n) for n in numbers]
 
 
@@ -412,7 +402,7 @@ def test_the_torusphere_asks_for_its_method_and_shutter_and_is_turned(hand):
     hand.choose("scene", "torusphere")
     assert (hand.state.method, hand.state.curve) == ("volume", "cosine")
     before = hand.picture()
-    want = Render(scenes.make("torusphere"), Blur(**blur_of(hand.state)), size=BESIDE)(0.0)
+    want = Render(builtin.make("torusphere"), Blur(**blur_of(hand.state)), size=BESIDE)(0.0)
     assert np.abs(before - stills.srgb(want[..., :3])).max() < 2e-3
     hand.drag((80, 500), (144, 500))
     assert dict(hand.state.settings)["cam_x"] == pytest.approx(-1.0)
@@ -427,9 +417,9 @@ def blur_of(state):
 
 def test_a_scene_with_a_camera_of_its_own_is_turned_by_it(monkeypatch):
     def own(cam_x: float = 0.0, cam_y: float = 0.0):
-        return scenes.crossing()
+        return builtin.crossing()
 
-    monkeypatch.setitem(scenes.SCENES, "own", own)
+    monkeypatch.setitem(builtin.SCENES, "own", own)
     state, layout = State(source="own"), controls.Layout((0, 0, 400, 200), (0, 0, 400, 200))
     moved = controls.drag(state, layout, "orbit", 100, 20)
     assert dict(moved.settings) == pytest.approx({"cam_x": -1.0, "cam_y": 0.4})
@@ -554,7 +544,7 @@ def test_a_parameter_of_the_scene(hand):
     assert np.abs(hand.picture() - before).mean() > 1e-3
 
 
-@pytest.mark.parametrize("name", list(scenes.SCENES))
+@pytest.mark.parametrize("name", list(builtin.SCENES))
 def test_the_panel_changes_nothing_by_itself(hand, name):
     opened = PLAIN.opened(name)
     for method in hand.viewer.stage.choices.methods(opened):
@@ -661,7 +651,7 @@ def test_the_error_is_shown_however_others_are_compared(bare):
 
 
 def test_the_reference_converges_and_is_measured(small, monkeypatch):
-    monkeypatch.setattr(stage, "_STEP", 0.0)  # a sample a frame, however fast the machine is
+    monkeypatch.setattr(renderer, "_STEP", 0.0)  # a sample a frame, however fast the machine is
     at = 7 / 24  # a moment that no other test has measured
     small.viewer.state = replace(ALONE, look="error", gain=1.0, frame=7.0)
     rays = []
@@ -671,7 +661,7 @@ def test_the_reference_converges_and_is_measured(small, monkeypatch):
         if (found := small.viewer.stage.report.measured) and found.samples >= 128:
             break
     assert rays == sorted(rays) and len(set(rays)) > 3
-    render = Render(scenes.make("crossing"), Blur("tap", samples=4), size=SMALL, rays=1)
+    render = Render(builtin.make("crossing"), Blur("tap", samples=4), size=SMALL, rays=1)
     truth = Render(
         render.scene, Blur("distributed", samples=found.samples), size=SMALL, rays=1
     )(at, 7)  # fmt: skip
@@ -686,7 +676,7 @@ def test_the_reference_converges_and_is_measured(small, monkeypatch):
 
 
 def test_what_is_shown_never_has_less_in_it_than_before(small, monkeypatch):
-    monkeypatch.setattr(stage, "_STEP", 0.0)  # a few samples at a time
+    monkeypatch.setattr(renderer, "_STEP", 0.0)  # a few samples at a time
     small.viewer.state = replace(ALONE, method="accumulate", samples=32)
     want, shown = small.picture(), small.viewer.stage._shown
     small.submit("pointer_down", x=50, y=40, button=1, buttons=(1,))
@@ -799,7 +789,7 @@ def test_times_of_the_gpu_are_told_by_pass(monkeypatch):
     monkeypatch.setattr(Timing, "usable", staticmethod(lambda device: True))
     hand = Hand(replace(PLAIN, method="reproject", samples=64))
     passes = hand.viewer.stage.report.passes
-    assert {"gbuffer.wgsl:main", "blur/reproject.wgsl:resolve"} <= passes.keys()
+    assert {"scene/gbuffer.wgsl:main", "methods/reproject.wgsl:resolve"} <= passes.keys()
     hand.look()
     assert passes.keys() <= hand.viewer._info.passes.keys()
 
@@ -977,7 +967,7 @@ def test_render_takes_the_saved_settings(hand, tmp_path, monkeypatch):
     shown = hand.picture()
     hand.viewer.do("save", "wgmb.toml")
     assert tomllib.loads(Path("wgmb.toml").read_text())["render"]["samples"] == 5
-    assert cli.main(["render", "--config", "wgmb.toml", "-o", "still.png", "--quiet"]) == 0
+    assert app.main(["render", "--config", "wgmb.toml", "-o", "still.png", "--quiet"]) == 0
     written = iio.imread("still.png")[..., :3] / 255
     assert np.abs(written - shown).max() < 0.02
     hand.viewer.state = PLAIN
@@ -991,7 +981,7 @@ def test_render_takes_the_saved_settings(hand, tmp_path, monkeypatch):
 def test_the_command_line_is_one(state, tmp_path):
     state = replace(state, frames="9-10") if not state.is_scene else replace(state, frames="0-1")
     out = tmp_path / "out.####.png"
-    assert cli.main([*state.command(str(out)), "--quiet"]) == 0
+    assert app.main([*state.command(str(out)), "--quiet"]) == 0
     assert len(list(tmp_path.glob("out.*.png"))) == 2
 
 
@@ -1001,7 +991,7 @@ def test_screenshot_and_recording(hand, tmp_path, monkeypatch):
     hand.press("s")
     assert np.abs(iio.imread("wgmb-001.png") / 255 - shown).max() < 0.01
     whole = exr.read(Path("wgmb-001.exr")).parts[0]
-    want = Render(scenes.make("crossing"), Blur("tap", samples=4), size=BESIDE, rays=1)(0.0)
+    want = Render(builtin.make("crossing"), Blur("tap", samples=4), size=BESIDE, rays=1)(0.0)
     assert np.abs(whole.channels["R"].astype("f4") - want[..., 0]).max() < 2e-3
     hand.press("v")
     for _ in range(3):
@@ -1098,7 +1088,7 @@ def test_a_method_that_needs_a_scene_gives_way_to_one_that_does_not(reel):
 def test_what_cannot_be_opened_is_told(tmp_path):
     with pytest.raises(InputError, match="nowhere"):
         State().opened("nowhere")
-    assert cli.main(["view", str(tmp_path / "nowhere.####.exr")]) == 2
+    assert app.main(["view", str(tmp_path / "nowhere.####.exr")]) == 2
 
 
 def test_options_of_the_command_line_reach_the_state():

@@ -10,10 +10,13 @@ import wgpu
 import make_frames as make
 import wgmb
 from twins import volume as twin
-from wgmb import InputError, Scene, Shutter, gpu, scenes, shader, stills
-from wgmb.blur import volume as method_file
-from wgmb.density import overrides, tables
-from wgmb.volumes import Orbit, Stage, Torus
+from wgmb import InputError, Scene, Shutter, gpu
+from wgmb.gpu import wgsl
+from wgmb.io import stills
+from wgmb.methods import volume as method_file
+from wgmb.scene import builtin
+from wgmb.scene.density import overrides, tables
+from wgmb.scene.volumes import Orbit, Stage, Torus
 
 CURVES = ["box", "trapezoid", "triangle", "cosine", "gaussian"]
 SPEEDS = [0.0, 1.0, 30.0, 160.0, 400.0, 1e4]
@@ -22,7 +25,7 @@ ALLOWED = {"box": 1e-4, "cosine": 1e-4}  # the others go through tables: 1e-3
 
 
 def shots():
-    return scenes.make("torusphere").shot
+    return builtin.make("torusphere").shot
 
 
 def volumes(speed, rng):
@@ -71,7 +74,7 @@ def brute_force(volume, p, shutter, fps):
 @pytest.fixture(scope="module")
 def densities(device):
     """densities(volume, p, shutter, fps, density): what the shader finds at the points."""
-    source = shader.load("blur/volume.wgsl")
+    source = wgsl.load("methods/volume.wgsl")
     start = source.text.index("@compute")
     end = source.text.index("\n}\n", start) + 3
     probe = (
@@ -85,7 +88,7 @@ def densities(device):
     )
     text = source.text[:start] + probe + source.text[end:]
     text = re.sub(r"@group\(1\) .* (tiles|output): .*", "", text)
-    source = shader.Source(text, source.files)
+    source = wgsl.Source(text, source.files)
 
     def found(volume, p, shutter, fps, density="exact"):
         rotation = method_file.rotation_of(volume, shutter, fps, density == "exact")
@@ -203,7 +206,7 @@ def test_the_published_form_counts_each_crossing_once(densities):
 def test_the_torusphere_is_its_twin(time, cam_y, density):
     """Eight times of the cycle; rays that graze a body may differ, all others agree."""
     scene, shutter = (
-        scenes.make("torusphere", cam_y=cam_y, density=density),
+        builtin.make("torusphere", cam_y=cam_y, density=density),
         Shutter(720, curve="cosine"),
     )
     size = (96, 54)
@@ -248,7 +251,7 @@ def test_a_rolling_shutter_exposes_every_line_in_its_time(way):
 @pytest.mark.parametrize("time, cam_y", [(2, -1.0), (13, 0.75), (19.5, -0.4), (31, 0.3)])
 def test_no_tile_that_shows_a_volume_is_left_out(monkeypatch, time, cam_y):
     render = wgmb.Render(
-        scenes.make("torusphere", cam_y=cam_y),
+        builtin.make("torusphere", cam_y=cam_y),
         wgmb.Blur("volume", shutter=Shutter(720, curve="cosine")), fps=FPS, size=(320, 180),
     )  # fmt: skip
     chosen = render(time)
@@ -338,7 +341,7 @@ def test_senseless_settings_are_one_line(capsys, tmp_path, options):
 
 def test_a_scene_without_volumes_is_refused():
     with pytest.raises(InputError, match="crossing"):
-        wgmb.Render(scenes.make("crossing"), wgmb.Blur("volume"))(0.0)
+        wgmb.Render(builtin.make("crossing"), wgmb.Blur("volume"))(0.0)
 
 
 def test_too_many_volumes_are_refused():

@@ -11,7 +11,7 @@ import pytest
 from hatchling import build
 
 import make_frames as make
-from wgmb import cli
+from wgmb.cli import app
 
 ROOT = Path(__file__).parent.parent
 pytestmark = pytest.mark.slow
@@ -70,7 +70,7 @@ def test_installed_by_itself_it_renders_a_scene(wheel, tmp_path):
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert Path(done.stdout.strip()).is_relative_to(site)
-    assert cli.main([*words, str(tmp_path / "here.exr")]) == 0
+    assert app.main([*words, str(tmp_path / "here.exr")]) == 0
     there, here = (make.plain_read(tmp_path / f"{name}.exr") for name in ("there", "here"))
     assert there.keys() == here.keys()
     assert all(np.array_equal(there[name], here[name]) for name in here)

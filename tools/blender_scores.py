@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from wgmb import Blur, Clip, Frame, exr, gpu, measure
-from wgmb.findings import machine
+from wgmb import Blur, Clip, Frame, gpu, metrics
+from wgmb.io import exr
+from wgmb.lab.results import machine
 
 DOCS = Path(__file__).parent.parent / "docs"
 SHUTTERS = {"050": 180, "100": 360}
@@ -42,7 +43,7 @@ def main(folders: list[Path]) -> None:
             if all(half.is_file() for half in halves):
                 pairs[NOISE] = picture(halves[0]), picture(halves[1])
             cells = {
-                k: f"{measure.flip(*p):.4f} / {measure.psnr(*p):.1f}" for k, p in pairs.items()
+                k: f"{metrics.flip(*p):.4f} / {metrics.psnr(*p):.1f}" for k, p in pairs.items()
             }
             lines.append([f"{folder.name} {degrees}°", *(cells.get(k, "") for k in COLUMNS)])
             print("  ".join(lines[-1]), flush=True)
@@ -70,8 +71,8 @@ def picture(path: Path) -> np.ndarray:
 
 def section(folder: Path, truth: np.ndarray, made: dict[str, np.ndarray]) -> str:
     """What a scene shows, at the last shutter."""
-    shown = [measure.display(p[..., :3]) for p in (truth, made[SHOWN])]
-    errors = [measure.flip_colors(made[k], truth) for k in (PEER, SHOWN)]
+    shown = [metrics.display(p[..., :3]) for p in (truth, made[SHOWN])]
+    errors = [metrics.flip_colors(made[k], truth) for k in (PEER, SHOWN)]
     strip = np.vstack([np.hstack(shown), np.hstack(errors)])
     levels = (255 * np.clip(strip, 0, 1) + 0.5).astype(np.uint8)
     path = DOCS / "images" / "blender" / f"{folder.name}.jpg"
@@ -114,7 +115,7 @@ def page(device, table: str, sections: list[str]) -> str:
         "animations of each file's channels were joined into one. The files are not part of this "
         "project.\n\n"
         "In the pictures below, at 360°: the truth and gather with 16 samples; below them, "
-        f"{measure.FLIP_GAIN:g} times FLIP of {PEER} and of gather.\n\n"
+        f"{metrics.FLIP_GAIN:g} times FLIP of {PEER} and of gather.\n\n"
         + "\n".join(sections)
         + f"\n[^made]: {about}.\n"
     )

@@ -11,9 +11,11 @@ import numpy as np
 from PIL import Image
 
 from pictures import IMAGES, enlarged, grid, levels, save
-from wgmb import Blur, Clip, Passes, Render, Shutter, Vectors, cli, scenes
-from wgmb.cases import Staged
-from wgmb.measure import display
+from wgmb import Blur, Clip, Passes, Render, Shutter, Vectors
+from wgmb.cli import app
+from wgmb.lab.cases import Staged
+from wgmb.metrics import display
+from wgmb.scene import builtin
 
 SAMPLE = IMAGES.parent.parent / "sample" / "crossing.####.exr"
 SIZE = 480, 270  # [px] of built-in scenes
@@ -28,7 +30,7 @@ def sample(**passes):
 
 def methods() -> None:
     """The same place of a scene by every method that takes rendered frames."""
-    staged = Staged(scenes.make("crossing", speed=3), size=SIZE, rays=4)
+    staged = Staged(builtin.make("crossing", speed=3), size=SIZE, rays=4)
     frame = staged.frame(Blur("tap").device)
     sheet = {"sharp": frame.color}
     sheet |= {name: Blur(name)(frame) for name in ("tap", "tiles", "fusion", "reproject", "gather")}
@@ -41,7 +43,7 @@ def methods() -> None:
 
 def shutters() -> None:
     """A wheel at several shutters, ray traced."""
-    scene, blur = scenes.make("wheel"), Blur("distributed", samples=REFERENCE)
+    scene, blur = builtin.make("wheel"), Blur("distributed", samples=REFERENCE)
     sheet = {}
     for label, shutter in {
         "90 degrees": Shutter(90),
@@ -84,8 +86,8 @@ def wrong_vectors() -> None:
 def built_in() -> None:
     """Every built-in scene."""
     sheet = {}
-    for name in scenes.SCENES:
-        scene = scenes.make(name)
+    for name in builtin.SCENES:
+        scene = builtin.make(name)
         if scene.has_volumes:
             blur = Blur("volume", shutter=Shutter(288, curve="cosine"))
         else:
@@ -97,7 +99,7 @@ def built_in() -> None:
 
 def torusphere() -> None:
     """A moment of the animation, by the method that was made for it."""
-    scene = scenes.make("torusphere", cam_x=-0.6, cam_y=0.3)
+    scene = builtin.make("torusphere", cam_x=-0.6, cam_y=0.3)
     shutter = Shutter(288, curve="cosine")
     picture = Render(scene, Blur("volume", shutter=shutter), size=(800, 450))(7.5)
     save(levels(display(picture)), "torusphere.jpg")
@@ -112,7 +114,7 @@ def drawn_by_commands() -> None:
         ["perceive", "--report", "-o", str(IMAGES / "perception.svg"), "--fps", "60"],
     ]
     for line in lines:
-        assert cli.main([*line, "--overwrite"]) == 0
+        assert app.main([*line, "--overwrite"]) == 0
     shown = np.asarray(Image.open(motion), np.float32)[..., :3] / 255
     save(levels(shown), "motion.png")
 

@@ -17,11 +17,11 @@ import numpy as np
 from PIL import Image
 
 from wgmb import METHODS, gpu
-from wgmb.cases import Contender, Staged, make_scene, scene_case
-from wgmb.compare import Laboratory
-from wgmb.findings import Entry, Report, machine
-from wgmb.measure import FLIP_GAIN, MEASURES, display, flip_colors
-from wgmb.options import ShutterOptions
+from wgmb.lab.cases import Contender, Staged, make_scene, scene_case
+from wgmb.lab.compare import Laboratory
+from wgmb.lab.results import Entry, Report, machine
+from wgmb.metrics import FLIP_GAIN, MEASURES, display, flip_colors
+from wgmb.settings import ShutterSettings
 
 DOCS = Path(__file__).parent.parent / "docs"
 SCENES = {"crossing:speed=3": 0.0, "fence:speed=6": 0.0, "wheel": 0.0, "torusphere": 16.0}
@@ -39,7 +39,7 @@ def main() -> None:
     for text, time in SCENES.items():
         name, scene = make_scene(text)
         exposure, staged = (
-            ShutterOptions().settled(scene).make(),
+            ShutterSettings().resolved(scene).make(),
             Staged(scene, time, SIZE, rays=RAYS),
         )
         case = scene_case(name, exposure, Contender.parse(REFERENCE), staged, device, lab.tell)

@@ -13,11 +13,13 @@ import wgpu
 from PIL import Image, ImageDraw
 
 from pictures import IMAGES, enlarged, grid, levels, save
-from wgmb import Blur, Clip, Frame, Render, Shutter, scenes, shader
-from wgmb.display import motion_picture
-from wgmb.images import numpy_of
-from wgmb.measure import display
-from wgmb.plot import Chart, svg
+from wgmb import Blur, Clip, Frame, Render, Shutter
+from wgmb.color import motion_picture
+from wgmb.gpu import wgsl
+from wgmb.gpu.textures import numpy_of
+from wgmb.lab.charts import Chart, svg
+from wgmb.metrics import display
+from wgmb.scene import builtin
 
 SAMPLE = IMAGES.parent.parent / "sample" / "crossing.####.exr"
 SIZE = 480, 270  # [px] of built-in scenes
@@ -51,7 +53,7 @@ class Layers:
 
     def live(self, size: tuple[int, int]) -> np.ndarray:
         """(rows, columns) of tiles: whether anything moves in them or may move into them."""
-        source = shader.load("blur/gather_live.wgsl")
+        source = wgsl.load("methods/gather/active_tiles.wgsl")
         across, down = tiles_of(size)
         words = -(-(across * down + int(source.constant("CELLS_WORD"))) // 64) * 64
         data = self._device.queue.read_buffer(self._lists)
@@ -61,7 +63,7 @@ class Layers:
 
 def tile() -> int:
     """Side of a tile [px]."""
-    return int(shader.load("blur/gather_tile.wgsl").constant("TILE"))
+    return int(wgsl.load("methods/gather/surface.wgsl").constant("TILE"))
 
 
 def tiles_of(size: tuple[int, int]) -> tuple[int, int]:
@@ -84,7 +86,7 @@ def sample() -> None:
 
 def rendered(name: str, **settings: float) -> Frame:
     """The first frame of a built-in scene, with its neighbours."""
-    render = Render(scenes.make(name, **settings), Blur("tap"), size=SIZE, rays=4)
+    render = Render(builtin.make(name, **settings), Blur("tap"), size=SIZE, rays=4)
     before, here, after = (render.frame(k / 24, k + 1) for k in (-1, 0, 1))
     return here.between(before, after)
 
@@ -188,7 +190,7 @@ def classified(frame: Frame, layers: Layers) -> None:
     """For every block, the share of the sample times at which one search is enough."""
     bits = layers.read("single-layer mask", 0)[..., 0]
     share = np.array([[int(word).bit_count() for word in row] for row in bits]) / 16
-    side = int(shader.load("blur/gather_search.wgsl").constant("BLOCK"))
+    side = int(wgsl.load("methods/gather/search.wgsl").constant("BLOCK"))
     share = share.repeat(side, 0).repeat(side, 1)[: frame.size[1], : frame.size[0]]
     live = pixels_of(layers.live(frame.size), frame.size)
     low, high = np.array([0.85, 0.25, 0.15]), np.array([0.2, 0.5, 0.85])
@@ -252,7 +254,7 @@ def confidence(blur: Blur, frame: Frame) -> None:
 def neighbours() -> None:
     """A fence that passes fast: what the frames beside it are good for."""
     frame, gather = rendered("fence", speed=6), Blur("gather")
-    reference = Render(scenes.make("fence", speed=6), Blur("distributed", samples=512), size=SIZE)
+    reference = Render(builtin.make("fence", speed=6), Blur("distributed", samples=512), size=SIZE)
     sheet = {
         "tap": Blur("tap")(frame),
         "gather, this frame alone": gather(frame.between(None, None)),

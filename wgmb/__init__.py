@@ -1,37 +1,34 @@
 """wgmb: motion blur on the GPU.
 
-frames on disk ─ sequence ─┐
-arrays you have ─ Frame ───┼─ velocity ── one method of blur/ ── array | sequence ─ files
-your own wgpu textures ────┤                  │
-Scene ── gbuffer ──────────┘                  │
-Shutter ── times of the samples ──────────────┘
+frames on disk ── io ─────────┐
+arrays you have ── Frame ─────┼─ velocity ── one of methods/ ── array | batch ── io ── files
+your own textures ─ FrameViews┤                   │
+Scene ── scene/gbuffer ───────┘                   │
+Shutter ── times of the samples ──────────────────┘
 
 `blur` is one frame at once, `Blur` the same kept for many frames or for your own encoder.
 """
 
-__version__ = "0.1.0"
-
-import sys
+from ._version import __version__ as __version__
 
 TYPE_CHECKING = False  # typing's own, without the time that loading it takes
 if TYPE_CHECKING:
-    from .blur import METHODS
-    from .bodies import Body
-    from .camera_file import CameraFile
-    from .cameras import Camera, Reprojections
+    from .batch import Report, blur_sequence
+    from .camera import Camera, Reprojections
     from .cone import Cone
     from .errors import DeviceError, Error, GpuMemoryError, InputError, ShaderError
     from .frame import Frame
     from .frame_views import FrameViews
-    from .output import Output
-    from .perceive import Viewer
+    from .io.camera_file import CameraFile
+    from .io.clip import Clip, Passes
+    from .io.output import Output
+    from .io.vectors import Vectors
+    from .methods import METHODS
+    from .observer import Viewer
     from .pipeline import Blur, blur
     from .render import Render
-    from .run import Report, blur_sequence
-    from .scene import Scene, Shot
-    from .sequence import Clip, Passes
+    from .scene import Body, Scene, Shot
     from .shutter import Shutter
-    from .vectors import Vectors
 
 __all__ = [
     "METHODS",
@@ -63,37 +60,24 @@ __all__ = [
 ]
 
 _PLACES = {
-    "blur": ("METHODS",),
-    "bodies": ("Body",),
-    "camera_file": ("CameraFile",),
-    "cameras": ("Camera", "Reprojections"),
+    "batch": ("Report", "blur_sequence"),
+    "camera": ("Camera", "Reprojections"),
     "cone": ("Cone",),
     "errors": ("DeviceError", "Error", "GpuMemoryError", "InputError", "ShaderError"),
     "frame": ("Frame",),
     "frame_views": ("FrameViews",),
-    "output": ("Output",),
-    "perceive": ("Viewer",),
+    "io.camera_file": ("CameraFile",),
+    "io.clip": ("Clip", "Passes"),
+    "io.output": ("Output",),
+    "io.vectors": ("Vectors",),
+    "methods": ("METHODS",),
+    "observer": ("Viewer",),
     "pipeline": ("Blur", "blur"),
     "render": ("Render",),
-    "run": ("Report", "blur_sequence"),
-    "scene": ("Scene", "Shot"),
-    "sequence": ("Clip", "Passes"),
+    "scene": ("Body", "Scene", "Shot"),
     "shutter": ("Shutter",),
-    "vectors": ("Vectors",),
 }
-_Module = type(sys)
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}
-
-
-class _Package(_Module):
-    """Importing the folder of methods leaves `wgmb.blur` the function of that name."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name == "blur" and isinstance(value, _Module)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
 
 if not TYPE_CHECKING:  # a checker takes every name for known otherwise
 

@@ -16,7 +16,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     signal.signal(signal.SIGINT, _leave)
     signal.signal(signal.SIGTERM, _leave)
-    from .cli import run
+    from .cli.app import run
 
     run(arguments)
 

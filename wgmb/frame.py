@@ -7,7 +7,7 @@ time     frame intervals, 0 = the frame's instant; a 180 degree shutter is open 
 depth    distance along the view axis [scene units], larger is farther, inf = nothing there
 matrix   `clip_from_world`: destination first, so that products read as chains
 
-Foreign conventions are translated in vectors.py and cameras.py, nowhere else.
+Foreign conventions are translated in io/vectors.py and io/camera_file.py, nowhere else.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from . import shader
-from .cameras import Reprojections
+from .camera import Reprojections
 from .errors import InputError
+from .gpu import wgsl
 
 _F32_MAX = float(np.finfo(np.float32).max)
 _CHANNELS = {
@@ -102,7 +102,7 @@ class Frame:
         if self.motion is not None and not (self.to_next is None and self.to_prev is None):
             raise InputError("motion stands instead of to_next and to_prev: give one or the other")
         self._check_neighbours()
-        brightest = shader.load("common/finite.wgsl").constant("BRIGHTEST")
+        brightest = wgsl.load("common/finite.wgsl").constant("BRIGHTEST")
         for name in ("color", "to_next", "to_prev", "motion", "scale", "keep"):
             most = brightest if name == "color" else _F32_MAX
             if given := _count_bad(getattr(self, name), most):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 
 import wgpu
 
-from .cameras import Reprojections
+from .camera import Reprojections
 from .errors import InputError
 
 View = wgpu.GPUTextureView

@@ -10,19 +10,20 @@ from functools import cached_property
 import numpy as np
 import wgpu
 
-from . import gpu, shader
-from .blur import METHODS, default_method
-from .blur.contract import Inputs, PreparedFrame
-from .blur.options import options_of
+from . import gpu
 from .errors import InputError
 from .frame import PASSES, Frame
 from .frame_views import FrameViews, View, check_view
-from .gbuffer import SceneOnGpu
-from .images import Images
-from .keep import HoldoutPass
+from .gpu import wgsl
+from .gpu.textures import Images
+from .gpu.timing import Clock
+from .holdout import HoldoutPass
+from .methods import METHODS, default_method
+from .methods.contract import Inputs, PreparedFrame
+from .methods.options import options_of
 from .residency import Residency
+from .scene.gbuffer import SceneOnGpu
 from .shutter import Shutter
-from .timing import Clock
 from .velocity import VelocityPass
 
 MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
@@ -129,7 +130,7 @@ class Blur:
                 raise InputError(f"shutter must be {wanted}, got {shutter!r}") from None
             shutter = Shutter(degrees)
         self._shutter = shutter
-        data = np.zeros((), shader.load("common/shutter.wgsl").dtype("Shutter"))
+        data = np.zeros((), wgsl.load("common/shutter.wgsl").dtype("Shutter"))
         opens, closes = self._shutter.span
         data["span"] = opens, closes
         data["step"] = (closes - opens) / self.samples
@@ -355,7 +356,7 @@ class Blur:
 
     def given(self, size: tuple[int, int], number: int = 0) -> gpu.Given:
         """What every pass of a frame is given: frame, shutter, times of the samples."""
-        data = np.zeros((), shader.load("common/frame.wgsl").dtype("Frame"))
+        data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
         data["size"], data["samples"], data["jitter"] = size, self.samples, self.jitter
         data["index"] = number % 2**32
         data["max_blur"] = np.inf if self.max_blur is None else self.max_blur

@@ -12,17 +12,18 @@ from pathlib import Path
 import numpy as np
 import wgpu
 
-from . import exr, gpu
+from . import gpu
 from .errors import InputError
 from .frame import Frame
 from .frame_views import FrameViews
-from .gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
-from .images import Images
-from .output import Output
+from .gpu.textures import Images
+from .gpu.timing import Clock
+from .io import exr
+from .io.frame_file import Source
+from .io.output import Output
 from .pipeline import Blur
-from .scene import Scene
-from .source import Source
-from .timing import Clock
+from .scene.gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
+from .scene.scene import Scene
 
 _BUSY = 0.1  # seconds of GPU work handed over at once, so that Ctrl-C is heard
 Progress = Callable[[int, int], None]
@@ -303,7 +304,7 @@ def render_frames(
 
 
 def _with_passes(render: Render, frame: Frame, number: int) -> Source:
-    """A frame's passes as layers that sequence.py finds by their names."""
+    """A frame's passes as layers that io/clip.py finds by their names."""
     motion = render.blur.motion(frame)
     assert frame.depth is not None and frame.normal is not None and frame.object_id is not None
     channels = {name: frame.color[..., i] for i, name in enumerate("RGBA")}

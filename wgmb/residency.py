@@ -20,7 +20,7 @@ import numpy as np
 from . import gpu
 from .frame import Frame
 from .frame_views import TEXTURES, FrameViews, View
-from .images import Images
+from .gpu.textures import Images
 
 _PLACES = (" a", " b", " c")  # for a frame and its neighbours, by the end of their textures' names
 

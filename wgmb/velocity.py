@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import wgpu
 
-from . import gpu, shader
-from .cameras import Reprojections
+from . import gpu
+from .camera import Reprojections
 from .frame_views import FrameViews, View
+from .gpu import wgsl
 
 FILE = "velocity.wgsl"
 
@@ -51,7 +52,7 @@ class VelocityPass:
         )
 
     def _matrices(self, size: tuple[int, int], camera: Reprojections | None):
-        source = shader.load(FILE)
+        source = wgsl.load(FILE)
         data = np.zeros((), source.dtype("Velocity"))
         table = np.zeros(1, source.dtype("Reprojection"))
         if camera is not None:
@@ -71,7 +72,7 @@ class VelocityPass:
 
 def viewport_of(camera: Reprojections, size: tuple[int, int]) -> np.ndarray:
     """The Viewport of wgsl/common/camera.wgsl for an image of `size`."""
-    source = shader.load("common/camera.wgsl")
+    source = wgsl.load("common/camera.wgsl")
     viewport = np.zeros((), source.dtype("Viewport"))
     x, y, width, height = camera.window or (0, 0, *size)
     viewport["display"], viewport["origin"] = (width, height), (x, y)

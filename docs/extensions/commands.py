@@ -11,9 +11,9 @@ from typing import Any
 from cyclopts import App
 from sphinx.application import Sphinx
 
-from wgmb import scenes
-from wgmb.cli import app as wgmb_app
-from wgmb.vectors import CONVENTIONS
+from wgmb.cli.app import app as wgmb_app
+from wgmb.io.vectors import CONVENTIONS
+from wgmb.scene import builtin
 
 _KINDS = {bool: "", int: "N", float: "X", str: "TEXT", Path: "PATH"}
 _TITLES = {"Parameters": "General"}
@@ -29,7 +29,7 @@ def reference() -> str:
 def scene_table() -> str:
     """Every built-in scene with its parameters and their defaults, as Markdown."""
     rows = ["| scene | shows | parameters of `--set` |", "|---|---|---|"]
-    for name, make in scenes.SCENES.items():
+    for name, make in builtin.SCENES.items():
         about = _plain(inspect.getdoc(make) or "").partition("\n")[0]
         parameters = inspect.signature(make).parameters.values()
         settings = ", ".join(f"`{p.name}={p.default}`" for p in parameters)

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from wgmb.volumes import Orbit
+from wgmb.scene.volumes import Orbit
 
 TURN = 2 * math.pi
 

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 import make_frames as make
-from wgmb import Blur, DeviceError, Error, Frame, cli
+from wgmb import Blur, DeviceError, Error, Frame
+from wgmb.cli import app
 
 from . import ROOT, parts
 from .processes import Ended, apart, limits, wgmb
@@ -70,7 +71,7 @@ def lost(arguments: list[str]) -> int:
         return blur(self, *given, **more)
 
     Blur.__call__ = blurred
-    return cli.main(arguments)
+    return app.main(arguments)
 
 
 def after_loss() -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from make_frames import attribute_bytes
 from wgmb import InputError
-from wgmb import exr as wgmb_exr
+from wgmb.io import exr as wgmb_exr
 
 from .processes import Ended, apart, limits, wgmb
 from .table import Line, Tally, Trial, row

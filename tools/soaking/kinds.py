@@ -20,7 +20,9 @@ import tifffile
 from PIL import Image
 
 import make_frames as make
-from wgmb import CameraFile, Clip, InputError, Passes, cli, exr, stills, viewer
+from wgmb import CameraFile, Clip, InputError, Passes, viewer
+from wgmb.cli import app
+from wgmb.io import exr, stills
 from wgmb.viewer import State
 
 
@@ -108,9 +110,9 @@ def _command(path: Path, *words) -> None:
     """The command line in this process; what it refuses is an InputError with its words."""
     said = io.StringIO()
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
-        code = cli.main([str(word) for word in words])
-    if code != cli.DONE:
-        if code != cli.USAGE:
+        code = app.main([str(word) for word in words])
+    if code != app.DONE:
+        if code != app.USAGE:
             raise AssertionError(f"exit {code}: {said.getvalue()}")
         raise InputError(said.getvalue().removesuffix("\n"))
 

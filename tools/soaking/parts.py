@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from wgmb import Blur, Frame, Render, Viewer, scenes, viewer
+from wgmb import Blur, Frame, Render, Viewer, viewer
+from wgmb.scene import builtin
 from wgmb.viewer.window import frame as viewed
 
 Step = Callable[[int], np.ndarray]
@@ -72,7 +73,7 @@ def _confidence() -> Step:
 def _scene(scene: str, method: str) -> Callable[[], Step]:
     def begin() -> Step:
         blur = Blur(method, samples=_MANY)
-        render = Render(scenes.make(scene), blur, size=SIZE, rays=2)
+        render = Render(builtin.make(scene), blur, size=SIZE, rays=2)
         return lambda number: render(number / 24, number)
 
     return begin

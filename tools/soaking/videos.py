@@ -12,7 +12,7 @@ import av
 import numpy as np
 
 from wgmb import Output
-from wgmb.source import Source
+from wgmb.io.frame_file import Source
 
 from .processes import apart, use
 from .shots import contents, shot

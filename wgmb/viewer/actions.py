@@ -12,13 +12,13 @@ import glfw
 import numpy as np
 from imgui_bundle import imgui
 
-from .. import exr, stills
-from ..atomic import temporary_name, write_file
 from ..errors import Error, InputError
-from ..record import KEY
-from ..video import Video
+from ..io import exr, stills
+from ..io.atomic import temporary_name, write_file
+from ..io.record import KEY
+from ..io.video import Video
+from .renderer import Stage
 from .screen import Screen
-from .stage import Stage
 from .state import State
 
 

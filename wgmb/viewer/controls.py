@@ -9,7 +9,7 @@ import inspect
 import math
 from dataclasses import dataclass, replace
 
-from .. import scenes
+from ..scene import builtin
 from .state import State
 
 Box = tuple[float, float, float, float]  # x, y, width, height [logical px]
@@ -157,7 +157,7 @@ def played(state: State, seconds: float) -> State:
 
 
 def _own_camera(state: State) -> tuple[float, float] | None:
-    known = inspect.signature(scenes.SCENES[state.source]).parameters
+    known = inspect.signature(builtin.SCENES[state.source]).parameters
     if not {"cam_x", "cam_y"} <= known.keys():
         return None
     values = {name: known[name].default for name in ("cam_x", "cam_y")} | dict(state.settings)

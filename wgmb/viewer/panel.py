@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from imgui_bundle import imgui
 
-from ..blur.options import Option
-from . import sections, words
+from ..methods.options import Option
+from . import overlay, sections
 from .controls import Box
-from .stage import Report
+from .renderer import Report
 from .state import State, command_line
 from .widgets import Widgets
 
@@ -65,12 +65,12 @@ class Panel:
         """
         self._ui.places, self.actions = {}, []
         report, (x, y, wide, _) = info.report, area
-        words.name_images(state, report.labels, info.flicked, x, y + 12, wide)
+        overlay.name_images(state, report.labels, info.flicked, x, y + 12, wide)
         if key is not None:
-            words.explain(state, key, report.full[1])
-        words.tell(info.recording, info.message, area)
+            overlay.explain(state, key, report.full[1])
+        overlay.tell(info.recording, info.message, area)
         if state.help:
-            words.give_help(area)
+            overlay.give_help(area)
         width = self.width(state, window)
         if width:
             imgui.set_next_window_pos((window[0] - width, 0))

@@ -11,19 +11,19 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..errors import InputError
-from ..options import (
-    OWN,
-    BlurOptions,
-    InputOptions,
-    OutputOptions,
-    SceneOptions,
-    ShutterOptions,
+from ..settings import (
+    METHOD_OPTIONS,
+    BlurSettings,
+    InputSettings,
+    OutputSettings,
+    SceneSettings,
+    ShutterSettings,
     rate_of,
 )
-from ..toml import parse
+from ..settings_toml import parse
 
-GROUPS = (BlurOptions, ShutterOptions, SceneOptions, OutputOptions, InputOptions)
-INPUTS = frozenset({*(f.name for f in fields(InputOptions)), "keep", "scale"})
+GROUPS = (BlurSettings, ShutterSettings, SceneSettings, OutputSettings, InputSettings)
+INPUTS = frozenset({*(f.name for f in fields(InputSettings)), "keep", "scale"})
 """Options that say what frames on disk hold."""
 VIEW = (
     "frames", "frame", "look", "compare", "against", "wipe", "gain", "fastest", "middle",
@@ -64,7 +64,7 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
     """Fields of the dataclass `state` from what the tables [render], or [blur], and [view] hold."""
     known = _hints(*GROUPS) | {"fps": str | float}
     own = {f.name for f in fields(state)} & known.keys() - set(VIEW)
-    allowed = own | {"set", *OWN} | (INPUTS if on_disk else set())
+    allowed = own | {"set", *METHOD_OPTIONS} | (INPUTS if on_disk else set())
     found: dict[str, Any] = {}
     pairs: dict[str, list] = {"settings": [], "options": [], "given": []}
     for name, value in given.items():
@@ -76,7 +76,7 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
         elif name in own:
             found[name] = float(rate_of(str(fit))) if name == "fps" else fit
         else:
-            pairs["options" if name in OWN else "given"].append((name, fit))
+            pairs["options" if name in METHOD_OPTIONS else "given"].append((name, fit))
     hints = _hints(state)
     for name, value in view.items():
         if name not in VIEW:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import wgpu
 
-from .. import gpu, shader
-from ..images import Images
+from .. import gpu
+from ..gpu import wgsl
+from ..gpu.textures import Images
 from .state import State
 
 _WHEEL, _KEY_HEIGHT, _KEY_WIDTH, _MARGIN = 96, 8, 180, 16  # logical pixels
@@ -62,10 +63,10 @@ class Screen:
         self._composed, self._size, self._visible = shown, size, overlap(place, area)
         started = time.perf_counter()
         first, second = images
-        source = shader.load("view.wgsl")
+        source = wgsl.load("viewer/compose.wgsl")
         kernel = gpu.kernel(
             self.device,
-            "view.wgsl",
+            "viewer/compose.wgsl",
             FIRST=source.constant(first.kind),
             SECOND=source.constant(second.kind),
             COMPARE=source.constant(mode),
@@ -80,7 +81,7 @@ class Screen:
         if (key := key_box(state, first.kind, place, area, ratio)) is not None:
             data["wheel" if first.kind == "MOTION" else "key"] = key
         buffer = self.device.create_buffer_with_data
-        given = np.zeros((), shader.load("common/frame.wgsl").dtype("Frame"))
+        given = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
         given["size"] = size
         uniform = wgpu.BufferUsage.UNIFORM
         frame = buffer(label="frame", data=given, usage=uniform)
@@ -124,9 +125,9 @@ class Screen:
         return self._images.texture("picture", self._size, "rgba16float")
 
     def _blitter(self, format: str):
-        module = self.device.create_shader_module(code=shader.load("blit.wgsl").text)
+        module = self.device.create_shader_module(code=wgsl.load("viewer/blit.wgsl").text)
         return self.device.create_render_pipeline(
-            label="blit.wgsl",
+            label="viewer/blit.wgsl",
             layout="auto",
             vertex={"module": module, "entry_point": "corner"},
             primitive={"topology": "triangle-list"},

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from .. import scenes
-from ..blur import METHODS
-from ..numbering import frame_numbers
+from ..io.frame_numbers import frame_numbers
+from ..methods import METHODS
 from ..pipeline import SAMPLES
+from ..scene import builtin
 from ..shutter import CURVES, PHASES, ROLLING
-from .stage import shutter_of
+from .renderer import shutter_of
 from .state import COMPARE, REFERENCE, TONES, State
 from .theme import ACCENT, COLORS, DIM, packed
 from .widgets import LOG, Widgets, plain
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 def scene(ui: Widgets, state: State, info: Info) -> State:
     """Another scene, its parameters, its camera; of frames on disk what was found out."""
-    names = list(scenes.SCENES) if state.is_scene else [state.source, *scenes.SCENES]
+    names = list(builtin.SCENES) if state.is_scene else [state.source, *builtin.SCENES]
     label = "scene" if state.is_scene else "shown"
     chosen = ui.combo(label, state.source, names, shown=plain(state.source))
     if chosen != state.source:
@@ -36,7 +36,7 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
         if info.finding:
             ui.dim(f"vectors: {info.finding}")
         return state
-    known = inspect.signature(scenes.SCENES[state.source]).parameters
+    known = inspect.signature(builtin.SCENES[state.source]).parameters
     defaults = {name: parameter.default for name, parameter in known.items()}
     for name, value in (defaults | dict(state.settings)).items():
         new = _parameter(ui, name, value, defaults[name])

@@ -11,13 +11,14 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from .. import numbering, scenes
-from ..blur import METHODS
 from ..cone import Cone
 from ..errors import InputError
-from ..options import OWN, ShutterOptions
-from ..source import about
-from ..toml import text_of
+from ..io import frame_numbers
+from ..io.frame_file import about
+from ..methods import METHODS
+from ..scene import builtin
+from ..settings import METHOD_OPTIONS, ShutterSettings
+from ..settings_toml import text_of
 from . import saved
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
@@ -37,7 +38,7 @@ class State:
     settings: tuple[tuple[str, float | str], ...] = ()
     """The scene's parameters that differ from their defaults."""
     given: tuple[tuple[str, object], ...] = ()
-    """InputOptions, keep and scale of frames on disk that differ from their defaults."""
+    """InputSettings, keep and scale of frames on disk that differ from their defaults."""
     orbit: tuple[float, float] = (0.0, 0.0)  # degrees to the right, up
     pan: tuple[float, float] = (0.0, 0.0)  # scene units to the right, up
     dolly: float = 1.0
@@ -81,7 +82,7 @@ class State:
     @property
     def is_scene(self) -> bool:
         """Whether `source` is a built-in scene."""
-        return self.source in scenes.SCENES
+        return self.source in builtin.SCENES
 
     @property
     def eye(self) -> Cone | None:
@@ -103,15 +104,15 @@ class State:
     @property
     def span(self) -> tuple[int, int]:
         """First and last frame of `frames`."""
-        numbers = numbering.frame_numbers(self.frames)
+        numbers = frame_numbers.frame_numbers(self.frames)
         return min(numbers), max(numbers)
 
     def opened(self, source: str) -> State:
         """The same state with another scene or other frames, seen anew."""
-        if source not in scenes.SCENES and not (
-            numbering.readable(Path(source)) or numbering.is_pattern(source)
+        if source not in builtin.SCENES and not (
+            frame_numbers.readable(Path(source)) or frame_numbers.is_pattern(source)
         ):
-            known = ", ".join(scenes.SCENES)
+            known = ", ".join(builtin.SCENES)
             raise InputError(f"no file or scene {source!r}; scenes: {known}")
         state = replace(self.unmoved(), source=source, settings=(), given=())
         before, after = self.suited(), state.suited()
@@ -121,7 +122,7 @@ class State:
         if state.method != self.method:
             state = replace(state, options=())
         if state.is_scene:
-            plain, loop = State(), scenes.make(source).loop
+            plain, loop = State(), builtin.make(source).loop
             if loop:
                 last = round(loop * state.fps) - 1
                 return replace(state, frames=f"0-{last}", frame=0.0, speed=1.0)
@@ -130,8 +131,8 @@ class State:
 
     def suited(self) -> dict[str, Any]:
         """Method, shutter and curve that the scene asks for; else those that are usual."""
-        scene = scenes.make(self.source) if self.is_scene else None
-        when = ShutterOptions().settled(scene, self.fps)
+        scene = builtin.make(self.source) if self.is_scene else None
+        when = ShutterSettings().resolved(scene, self.fps)
         volumes = scene is not None and scene.has_volumes
         method = "volume" if volumes else "gather"  # where frames have no depth: tap
         return {"method": method, "shutter": when.shutter, "curve": when.curve}
@@ -169,7 +170,7 @@ class State:
             state = replace(state, given=found, frames=str(said.get("frames", state.frames)))
         elif "frames" in said:
             state = replace(state, frames=str(said["frames"]))
-        for name in OWN:
+        for name in METHOD_OPTIONS:
             if name in said:
                 state = state.with_option(name, said[name])
         if state.method not in METHODS:
@@ -264,7 +265,7 @@ class State:
         source = given.pop("pattern" if on_disk else "scene", None)
         if not isinstance(source, str):
             raise InputError("settings: [render] needs scene, [blur] needs pattern")
-        if on_disk == (source in scenes.SCENES):
+        if on_disk == (source in builtin.SCENES):
             raise InputError(f"settings: {source!r} is {'a' if on_disk else 'no'} scene")
         given.pop("time", None)
         state = State(source, **saved.values(given, tables.get("view", {}), State, on_disk=on_disk))
@@ -290,9 +291,9 @@ def _changed(pairs: tuple, name: str, value: object) -> tuple:
 
 
 def _on_disk(source: str) -> str:
-    if not numbering.is_pattern(source):
-        return str(numbering.number_in(Path(source)))
-    return numbering.frame_range(numbering.numbers_on_disk(source))
+    if not frame_numbers.is_pattern(source):
+        return str(frame_numbers.number_in(Path(source)))
+    return frame_numbers.frame_range(frame_numbers.numbers_on_disk(source))
 
 
 def no_option(name: str) -> str:

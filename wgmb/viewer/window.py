@@ -20,8 +20,8 @@ from ..errors import DeviceError, InputError
 from . import controls
 from .actions import Actions
 from .panel import Info, Panel
+from .renderer import Stage
 from .screen import Screen, key_box
-from .stage import Stage
 from .state import COMPARE, State
 from .theme import style
 

@@ -1,0 +1,122 @@
+"""Rooms: imports point one way, third parties stay at home, Python and WGSL have the same stems."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.fast
+
+ROOT = Path(__file__).parents[1]
+PACKAGE, SHADERS = ROOT / "wgmb", ROOT / "wgsl"
+
+# A room imports only from lines above its own, and from itself.
+LAYERS = [
+    {"_version", "errors", "color"},
+    {"gpu", "shutter", "camera", "metrics"},
+    {"frame", "cone"},
+    {"frame_views"},
+    {"velocity", "holdout"},
+    {"io", "scene", "observer"},
+    {"methods"},
+    {"residency"},
+    {"pipeline"},
+    {"render", "settings"},
+    {"batch", "settings_toml"},
+    {"lab", "viewer"},  # never each other
+    {"cli"},  # may start the viewer
+    {"__init__", "__main__"},
+]
+PLACE = {room: number for number, layer in enumerate(LAYERS) for room in layer}
+GPU = {
+    "gpu", "scene", "methods", "velocity", "holdout", "observer", "residency", "pipeline",
+    "render", "lab", "viewer", "frame_views",
+}  # fmt: skip
+HOMES = {
+    "wgpu": GPU,
+    "OpenEXR": {"io"},
+    "av": {"io"},
+    "tifffile": {"io"},
+    "imageio": {"io"},
+    "PIL": {"io", "lab"},
+    "fileseq": {"io"},
+    "cyclopts": {"cli"},
+    "rich": {"cli"},
+    "imgui_bundle": {"viewer"},
+    "glfw": {"viewer"},
+    "rendercanvas": {"viewer"},
+}
+FILES = sorted(PACKAGE.rglob("*.py"))
+KERNELS = sorted(SHADERS.rglob("*.wgsl"))
+
+
+def room_of(file: Path) -> str:
+    first = file.relative_to(PACKAGE).parts[0]
+    return first.removesuffix(".py")
+
+
+def imported(file: Path):
+    """Every imported module, as its parts: those of wgmb from its name on."""
+    here = ("wgmb", *file.relative_to(PACKAGE).with_suffix("").parts)
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name.split(".")
+        elif isinstance(node, ast.ImportFrom):
+            start = list(here[: len(here) - node.level]) if node.level else []
+            module = start + (node.module.split(".") if node.module else [])
+            for alias in node.names:
+                yield [*module, alias.name]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(PACKAGE)))
+def test_imports_point_upwards_in_the_table_and_third_parties_stay_at_home(file):
+    room = room_of(file)
+    assert room in PLACE, f"{room} is in no layer: say where it belongs"
+    for module in imported(file):
+        if module[0] == "wgmb":
+            other = module[1] if module[1] in PLACE else "__init__"
+            ok = room == other or PLACE[other] < PLACE[room] or room == "__main__"
+            assert ok, f"{room} imports {'.'.join(module)}"
+        elif module[0] in HOMES:
+            assert room in HOMES[module[0]], f"{room} imports {module[0]}"
+
+
+def test_every_third_party_has_a_home():
+    text = (ROOT / "pyproject.toml").read_text()
+    (listed,) = re.findall(r"^dependencies = \[(.*?)^\]", text, re.M | re.S)
+    names = {n.lower() for n in re.findall(r'^\s*"([A-Za-z_-]+)', listed, re.M)}
+    known = {n.lower().replace("_", "-") for n in HOMES} | {"numpy", "pillow"}
+    assert {n.replace("_", "-") for n in names} <= known
+
+
+def test_no_room_stands_empty():
+    assert {room_of(file) for file in FILES} == set(PLACE)
+
+
+@pytest.mark.parametrize("file", KERNELS, ids=lambda f: str(f.relative_to(SHADERS)))
+def test_shaders_include_what_is_common_and_their_own(file):
+    own = file.relative_to(SHADERS).parts
+    for name in re.findall(r"^//#include (\S+)", file.read_text(), re.M):
+        parts = Path(name).parts
+        assert (SHADERS / name).is_file()
+        if own[0] == "common":
+            assert parts[0] == "common", f"{file.name} includes {name}"
+        elif own[0] == "methods":
+            stem = own[1].removesuffix(".wgsl").split("_")[0]
+            mine = parts[0] == "methods" and parts[1].removesuffix(".wgsl").split("_")[0] == stem
+            assert mine or parts[0] in ("common", "scene"), f"{file.name} includes {name}"
+        else:
+            assert parts[0] in ("common", own[0]), f"{file.name} includes {name}"
+
+
+@pytest.mark.parametrize("file", KERNELS, ids=lambda f: str(f.relative_to(SHADERS)))
+def test_shaders_lie_where_their_python_does(file):
+    """`wgsl/X/y.wgsl` belongs to `wgmb/X/y.py`, or to `wgmb/X/` as one of its stages."""
+    own = file.relative_to(SHADERS)
+    if own.parts[0] != "common":
+        stem = PACKAGE / own.parent / own.stem
+        begun = PACKAGE / own.parent / own.stem.split("_")[0]
+        places = stem.with_suffix(".py"), begun.with_suffix(".py"), PACKAGE / own.parent
+        assert any(p.exists() and p != PACKAGE for p in places)

@@ -1,0 +1,127 @@
+"""The command line: commands, and errors as one line and an exit code.
+
+A command's file is loaded when it is asked for.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import signal
+import sys
+import warnings
+from pathlib import Path
+
+import cyclopts
+from cyclopts import Parameter
+from cyclopts.config import Dict
+
+from .._version import __version__
+from ..errors import DeviceError, Error, InputError
+from . import terminal
+from .exit_codes import DONE, INTERRUPTED, NO_DEVICE, SOME_FAILED, USAGE
+
+COMMANDS = {
+    "blur": "Blur rendered frames.",
+    "render": "Render a built-in scene with motion blur.",
+    "view": "Look at a scene or at frames interactively.",
+    "info": "Say what a frame holds: layers, sizes, what its motion vectors mean, speeds.",
+    "devices": "List the GPUs that --adapter (or WGMB_ADAPTER) can choose; * is the default.",
+    "compare": "Judge and time methods against a truth; write a page, and JSON and CSV beside it.",
+    "bench": "Time methods on this machine: median milliseconds a frame, transfers apart.",
+    "perceive": "Show frames as a viewer perceives them: each held for its time, the past fading.",
+    "shutter": "Draw a shutter: its curve, its integral, and the sum of neighbouring windows.",
+}
+"""Every command, wgmb/cli/NAME.py, and the first line of its help."""
+
+app = cyclopts.App(
+    name="wgmb",
+    version=__version__,
+    help="GPU motion blur for rendered frames.\n\n"
+    "Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180",
+    result_action="return_value",
+    suppress_keyboard_interrupt=False,
+    default_parameter=Parameter(negative=()),
+)
+for _name, _help in COMMANDS.items():
+    app.command(f"wgmb.cli.{_name}:{_name}", name=_name, help=_help)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    terminal.own_streams()
+    terminal.interrupted.clear()
+    words = sys.argv[1:] if arguments is None else arguments
+    try:
+        signal.signal(signal.SIGTERM, terminal.interrupt)
+        signal.signal(signal.SIGINT, terminal.interrupt)  # a shell may have set it to be ignored
+        warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
+        logging.getLogger().addHandler(logging.NullHandler())  # nor their logs
+        _check_text(words)
+        app.config = _config(words)
+        result = app(words, exit_on_error=False, print_error=False)
+        terminal.flush()
+        return result if isinstance(result, int) else DONE
+    except cyclopts.CycloptsError as error:
+        return _say_why(f"{error}{_hint(words)}", USAGE)
+    except DeviceError as error:
+        return _say_why(str(error), NO_DEVICE)
+    except Error as error:
+        return _say_why(str(error), USAGE)
+    except OSError as error:
+        why = error.strerror.lower() if error.strerror else str(error)
+        if error.filename is not None:  # what was named cannot be opened
+            return _say_why(f"{error.filename}: {why}", USAGE)
+        return _say_why(why, SOME_FAILED)
+    except MemoryError:
+        return _say_why("there is not enough memory", SOME_FAILED)
+    except KeyboardInterrupt:
+        return _say_why("interrupted", INTERRUPTED)
+
+
+def _check_text(words: list[str]) -> None:
+    """Names go into files and libraries that take text only."""
+    for word in words:
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            shown = os.fsencode(word).decode("utf-8", "backslashreplace")
+            raise InputError(f"{shown}: not UTF-8; please rename the file or folder") from None
+
+
+def _hint(words: list[str]) -> str:
+    """What may be meant where a file's name was taken for an option."""
+    for word in words:
+        if re.fullmatch(r"-[^=]*\.[A-Za-z]\w*", word):
+            return f" For a file whose name begins with -, write ./{word}"
+    return ""
+
+
+def _config(words: list[str]) -> tuple[Dict, ...]:
+    """The file named by --config; what stands on the command line wins over it."""
+    for i, word in enumerate(words if words[:1] != ["view"] else []):
+        name, _, given = word.partition("=")
+        if name == "--config" and (given or words[i + 1 :]):
+            from ..io.frame_file import about
+            from ..settings_toml import parse, text_of
+
+            path = Path(given or "".join(words[i + 1 : i + 2]))
+            with about(path):
+                return (Dict(parse(text_of(path)), source=str(path)),)
+    return ()
+
+
+def _say_why(text: str, code: int) -> int:
+    terminal.note(f"wgmb: {' '.join(text.split())}")
+    return code
+
+
+def run(arguments: list[str] | None = None) -> None:
+    """Run the command line and end the process with its exit code."""
+    sys.unraisablehook = terminal.hush
+    code = main(arguments)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    terminal.drop_streams()
+    sys.exit(code)

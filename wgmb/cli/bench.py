@@ -1,0 +1,129 @@
+"""`wgmb bench`: how long methods take on this machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .. import gpu
+from ..errors import InputError
+from ..lab.cases import Contender
+from ..lab.report import write
+from ..methods import METHODS
+from ..pipeline import Blur
+from ..settings import size_of
+from ..shutter import Shutter
+from . import terminal
+from .pages import command_line, pages_of, teller, whole_numbers
+from .terminal import out
+
+
+def bench(
+    *,
+    methods: str | None = None,
+    samples: str = "16",
+    size: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    rounds: int = 9,
+    seconds: float = 60.0,
+    output: Annotated[Path | None, Parameter(alias="-o")] = None,
+    save: Path | None = None,
+    against: Path | None = None,
+    article: bool = False,
+    adapter: str | None = None,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+) -> int:
+    """Time methods on this machine: median milliseconds a frame, transfers apart.
+
+    Example: wgmb bench --methods tap,reproject --size 960x540 1920x1080 --samples 4,16,64
+
+    Example: wgmb bench --methods all --size 960x540 1920x1080 3840x2160 --samples 4,16,64
+
+    Ctrl-C ends it with what was measured until then.
+
+    Parameters
+    ----------
+    methods
+        NAME[:OPTION=VALUE]..., separated by commas, or all; by default those that blur rendered
+        frames. The others are timed on a built-in scene.
+    samples
+        Numbers of samples, separated by commas.
+    size
+        Pictures to time it on; 1920x1080 by default.
+    rounds
+        How often everything is done.
+    seconds
+        For a method at one size with one number of samples: where it would take longer it gets
+        fewer rounds, or is left out.
+    output
+        A page with tables and plots, .html; JSON and CSV beside it.
+    save
+        Keep the figures, for --against.
+    against
+        Compare with figures kept earlier.
+    article
+        Instead, the torusphere (640x360: beside the article's own shader on two cores).
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    quiet
+        Do not say how far it is.
+    """
+    from ..lab import baselines, bench_report
+    from ..lab.bench import Bench
+    from ..lab.bench import bench as measure
+
+    device, sizes = gpu.open_device(adapter), [size_of(text) for text in size or ["1920x1080"]]
+    if article:
+        blur = Blur("volume", device=device, shutter=Shutter(720, curve="cosine"))
+        for width, height in sizes:
+            _tell_article(baselines.bench_torusphere(blur, width, height, rounds), width, height)
+        return 0
+    contenders = [Contender(name) for name in METHODS]
+    if methods is None:
+        contenders = [c for c in contenders if not c.needs_scene]
+    elif methods != "all":
+        contenders = [Contender.parse(text) for text in methods.split(",")]
+    if wrong := [c for c in contenders if c.samples]:
+        raise InputError(
+            f"bench takes samples from --samples, got {wrong[0].label}:{wrong[0].samples}"
+        )
+    labels = [c.label for c in contenders]
+    if twice := [label for label in labels if labels.count(label) > 1]:
+        raise InputError(f"methods must differ, got {twice[0]} twice")
+    pages = pages_of(output) if output else []
+    if save and save.resolve() in [page.resolve() for page in pages]:
+        raise InputError(f"{save} is written beside {output} already; save the figures elsewhere")
+    if save and not save.parent.is_dir():
+        raise InputError(f"there is no folder {save.parent}")
+    counts = whole_numbers("samples", samples)
+    before = Bench.load(against) if against else None
+    run = measure(device, contenders, sizes, counts, rounds, seconds, teller(quiet))
+    if save:
+        run.save(save)
+    for line in bench_report.text(run).splitlines():
+        out(line)
+    if before:
+        table = bench_report.against(run, before)
+        out(table.note)
+        for row in (table.columns, *table.rows):
+            out("".join(f"{cell!s:>20}" for cell in row))
+    if output:
+        write(bench_report.report(run, command_line(), before), output)
+    terminal.check()
+    return 0
+
+
+def _tell_article(found: dict, width: int, height: int) -> None:
+    from ..lab.baselines import ARTICLE
+
+    out(f"{width} x {height}, torusphere, published density")
+    for time_, (frame, recording, work) in found.items():
+        line = f"  iTime {time_:<6g}{frame:9.2f} ms a frame, {recording:.2f} of them recording, "
+        line += f"{work:.2f} ms of all cores"
+        if (width, height) == (640, 360):
+            ratios = frame / ARTICLE[time_], work / 2 / ARTICLE[time_]
+            line += "; to the article's shader {:.2f}, as work of two free cores {:.2f}".format(
+                *ratios
+            )
+        out(line)

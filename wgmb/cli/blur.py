@@ -1,0 +1,129 @@
+"""`wgmb blur`: rendered frames."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .._version import __version__
+from ..batch import Report, blur_sequence
+from ..errors import InputError
+from ..io.frame_file import odd_sizes
+from ..io.output import Output
+from ..pipeline import Blur
+from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
+from .exit_codes import DONE, SOME_FAILED
+from .options import BlurOptions, Given, InputOptions, Look, ShutterOptions, Target, When
+from .terminal import note, progress
+
+
+def blur(
+    pattern: str,
+    output: Target,
+    look: Look = BlurOptions(),
+    when: When = ShutterOptions(),
+    given: Given = InputOptions(),
+    *,
+    confidence: bool = False,
+    config: Path | None = None,
+    adapter: str | None = None,
+    verbose: Annotated[bool, Parameter(alias="-v")] = False,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+) -> int:
+    """Blur rendered frames.
+
+    Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180 --frames 1-100
+
+    Parameters
+    ----------
+    pattern
+        Frames to blur: shot.####.exr, shot.%04d.exr, or one file.
+    confidence
+        EXR, gather: with how sure the result is, as layers confidence.*; takes twice as long.
+    config
+        TOML file whose table [blur] holds options, as `wgmb view` saves it.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    verbose
+        Say which GPU, layers and settings are used.
+    quiet
+        Print errors only.
+    """
+    when = when.resolved()
+    clip = given.open(pattern, look.keep, look.scale)
+    look = look.resolved(clip=clip)
+    made = look.make(when.make(), adapter)
+    settings = _settings(look, when, given) | {"samples": samples_of(made)} | output.looks
+    settings["curve"] = when.curve_read()
+    if confidence:
+        check_confidence(made, output)
+        settings["confidence"] = True
+    files = Output(
+        output.output,
+        settings=settings,
+        numbers=clip.numbers,
+        bits=output.bits,
+        fps=output.rate,
+        inputs=clip.inputs,
+        overwrite=output.overwrite,
+        resume=output.resume,
+        layers=output.layers,
+        compression=output.compression,
+    )
+    if verbose:
+        note(f"adapter: {made.device.adapter.summary}")
+        note(f"settings: {files.settings}")
+    started = time.perf_counter()
+    with progress(len(clip.numbers), quiet) as tick:
+        report = blur_sequence(
+            clip, made, files, resume=output.resume, confidence=confidence, progress=tick
+        )
+    took = f"{time.perf_counter() - started:.1f} s with {made.method.name}"
+    return _conclude(clip, files, report, took, quiet, verbose)
+
+
+def _settings(look: BlurSettings, when: ShutterSettings, given: InputSettings) -> dict:
+    """Everything that changes a result, as it is written into the files."""
+    every = {"wgmb": __version__} | plain(look) | plain(when) | plain(given)
+    for not_a_look in ("frames", "skip_missing", "max_mb"):
+        del every[not_a_look]
+    return every
+
+
+def _conclude(clip, files, report: Report, took: str, quiet: bool, verbose: bool) -> int:
+    """Say what became of the run; return the exit code."""
+    for number, why in sorted(report.failed.items()):
+        note(f"wgmb: frame {number} failed: {why}")
+    if report.stopped:
+        rest = len(clip.numbers) - len(report.done) - len(report.skipped) - len(report.failed)
+        note(f"wgmb: stopped: {report.stopped}; {rest} other frames were not written")
+    if not quiet:
+        for number, bad in sorted(report.bad.items()):
+            what = ", ".join(f"{n} in {name}" for name, n in bad.items())
+            note(f"frame {number}: pixels that are not finite were given no weight: {what}")
+        if verbose or "because" in clip.finding or "check them" in clip.finding:
+            note(f"vectors: {clip.finding}")
+        if clip.cuts:
+            note(f"camera cut before frame {', '.join(map(str, sorted(clip.cuts)))}")
+        if odd := odd_sizes({n: clip.sizes[n] for n in report.done}):
+            note(odd)
+        done = f"{len(report.done)} frames in {took} -> {files.pattern}"
+        note(done + (f", {len(report.skipped)} were there" if report.skipped else ""))
+    if report.failed:
+        note(f"wgmb: {len(report.failed)} of {len(clip.numbers)} frames failed")
+    return SOME_FAILED if report.failed or report.stopped else DONE
+
+
+def check_confidence(made: Blur, output: OutputSettings) -> None:
+    """InputError unless the method is sure of something and the output can hold it."""
+    layers = ", ".join(made.confidence)
+    if not output.output.lower().endswith(".exr"):
+        raise InputError(f"--confidence ({layers}) needs an .exr output, got {output.output}")
+
+
+def samples_of(blur: Blur) -> int | str:
+    """The samples for a file's record: a number, or "auto"."""
+    return "auto" if blur.auto else blur.samples

@@ -1,0 +1,174 @@
+"""`wgmb compare`: methods against a truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Group, Parameter
+
+from .. import gpu
+from ..errors import InputError
+from ..lab.cases import Case, Contender, Staged, clip_case, make_scene, scene_case
+from ..lab.compare import Laboratory, crossings
+from ..lab.experiments import EXPERIMENTS
+from ..lab.report import write
+from ..lab.results import Report, machine
+from ..methods import METHODS
+from ..scene.scene import Scene
+from ..settings import ShutterSettings, size_of
+from ..shutter import Shutter
+from .options import Given, InputOptions, ShutterOptions, When
+from .pages import command_line, pages_of, teller, whole_numbers
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareSettings:
+    """Who is compared, and how."""
+
+    methods: str | None = None
+    "NAME[:SAMPLES][:OPTION=VALUE]..., separated by commas; all by default."
+    reference: str = "distributed:1024"
+    "What renders the truth of scenes."
+    samples: int = 16
+    "Of every method, where samples are equal."
+    ladder: str = "4,8,16,32,64"
+    "Numbers of samples for the curves."
+    budget: float | None = None
+    "Milliseconds where time is equal; by default those of the slowest method of pictures."
+    shutters: str | None = None
+    "Several in degrees, such as 90,180,360, instead of --shutter."
+    rounds: int = 3
+    "How often everything is timed; the least counts."
+
+    def contenders(self) -> list[Contender]:
+        """Who takes part."""
+        return [Contender.parse(text) for text in (self.methods or ",".join(METHODS)).split(",")]
+
+    def steps(self) -> list[int]:
+        """Numbers of samples."""
+        return whole_numbers("ladder", self.ladder)
+
+    def budgets(self) -> Callable[[Report, Case], list[float]] | None:
+        """The times that everyone is to fit [s], if they are asked for."""
+        if self.budget is None:
+            return None
+        if not self.budget > 0:
+            raise InputError(f"budget must be over 0 ms, got {self.budget}")
+        seconds = self.budget / 1e3
+        return lambda report, case: [seconds]
+
+    def exposures(self, when: ShutterSettings, scene: Scene | None = None) -> dict[str, Shutter]:
+        """The shutters, by what to call them; what is left open is the scene's."""
+        settled = when.resolved(scene)
+        try:
+            degrees = [float(d) for d in (self.shutters or str(settled.shutter)).split(",")]
+        except ValueError:
+            raise InputError(f"shutters must be like 90,180, got {self.shutters!r}") from None
+        return {f"{d:g}°": replace(settled, shutter=d).make() for d in degrees}
+
+
+Who = Annotated[CompareSettings, Parameter(name="*", group=Group("Compare", sort_key=2))]
+
+
+def compare(
+    *scene: str,
+    output: Annotated[Path, Parameter(alias="-o")],
+    who: Who = CompareSettings(),
+    when: When = ShutterOptions(),
+    given: Given = InputOptions(),
+    size: str = "480x270",
+    time: float = 0.0,
+    rays: int = 3,
+    truth: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
+    inputs: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    frame: int | None = None,
+    peer: tuple[str, ...] = (),
+    experiment: str | None = None,
+    adapter: str | None = None,
+    overwrite: bool = False,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+) -> int:
+    """Judge and time methods against a truth; write a page, and JSON and CSV beside it.
+
+    Example: wgmb compare crossing fence:speed=5 --methods tap,reproject -o report.html
+
+    Example: wgmb compare --truth t.exr --inputs 'shot.####.exr' --frame 2 -o report.html
+
+    Parameters
+    ----------
+    scene
+        Built-in scenes, NAME[:SETTING=VALUE]...
+    output
+        The page, .html.
+    size
+        Of scenes' pictures.
+    time
+        Moment of the scenes in seconds.
+    rays
+        Antialiasing of scenes' sharp frames: rays a pixel's side.
+    truth
+        What the blurred frame should look like: a file, or two that were rendered with half the
+        samples and other seeds, whose mean it is: their difference tells how noisy it is.
+    inputs
+        Rendered frames: a pattern, or the files of the frame before, this one and the next.
+    frame
+        Number of the pattern's frame that the truth shows.
+    peer
+        NAME=FILE: another program's picture of it; may be repeated.
+    experiment
+        Repeat a paper's experiment instead: taylor, chen or rosado.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    overwrite
+        Replace files that exist.
+    quiet
+        Print errors only.
+    """
+    pages = pages_of(output)
+    for file in pages:
+        if file.exists() and not overwrite:
+            raise InputError(f"{file} exists; --overwrite replaces it")
+    if (truth is None) != (not inputs) or bool(scene) + bool(inputs) + bool(experiment) != 1:
+        raise InputError("give scenes, or --truth with --inputs, or --experiment")
+    device = gpu.open_device(adapter)
+    tell = teller(quiet)
+    lab = Laboratory(device, rounds=who.rounds, tell=tell)
+    report = Report("", command_line(), machine(device), who.samples)
+    wanted, contenders = size_of(size), who.contenders()
+    steps, budgets = who.steps(), who.budgets()
+    if experiment:
+        if experiment not in EXPERIMENTS:
+            known = ", ".join(EXPERIMENTS)
+            raise InputError(f"experiment must be one of {known}, got {experiment!r}")
+        report.title = f"{experiment.capitalize()}'s experiment"
+        EXPERIMENTS[experiment](lab, report, wanted)
+        write(report, output)
+        tell(f"-> {output}")
+        return 0
+    reference = Contender.parse(who.reference)
+    baselines = {name: Path(file) for name, _, file in (p.partition("=") for p in peer)}
+    cases: list[Callable[[], Case]] = []
+    for name, made in map(make_scene, scene):
+        staged = Staged(made, time, wanted, rays=rays)
+        for degrees, shutter in who.exposures(when, made).items():
+            cases.append(partial(scene_case, f"{name}, {degrees}", shutter, reference,
+                                 staged, device, tell))  # fmt: skip
+    if truth is not None and inputs:
+        name = truth[0].parent.name or truth[0].stem
+        for degrees, shutter in who.exposures(when).items():
+            cases.append(partial(clip_case, f"{name}, {degrees}", shutter, inputs, frame,
+                                 truth, baselines, given.open))  # fmt: skip
+    able = contenders if who.methods or scene else [c for c in contenders if not c.needs_scene]
+    for make in cases:
+        case = make()
+        lab.compare(report, case, able, steps, budgets)
+        if found := crossings(report, case):
+            report.tables.append(found)
+    report.title = "Motion blur compared: " + ", ".join(c.name for c in report.cases)
+    write(report, output)
+    tell(f"-> {output}")
+    return 0

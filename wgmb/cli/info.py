@@ -1,0 +1,111 @@
+"""`wgmb info`: what a frame holds, in lines for people; its motion as a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+
+from ..color import motion_picture
+from ..errors import InputError
+from ..io import layers, stills
+from ..io.atomic import write_file
+from ..io.clip import Clip
+from ..io.frame_file import Source
+from ..io.frame_numbers import frame_list
+from ..io.output import refuse_inputs
+from ..pipeline import Blur
+from .exit_codes import DONE
+from .options import Given, InputOptions
+from .terminal import out
+
+_MUCH = 0.25  # of the width: a 99th percentile of speed above it is worth a warning
+
+
+def info(
+    pattern: str,
+    /,
+    given: Given = InputOptions(),
+    *,
+    output: Annotated[Path | None, Parameter(alias="-o")] = None,
+    overwrite: bool = False,
+) -> int:
+    """Say what a frame holds: layers, sizes, what its motion vectors mean, speeds.
+
+    Example: wgmb info 'shot.####.exr' --frames 10 -o motion.png
+
+    Parameters
+    ----------
+    pattern
+        A file, or a pattern (its first frame is shown, neighbours test the vectors).
+    output
+        Draw the motion as a picture: hue is direction, brightness speed.
+    overwrite
+        Replace that picture if it exists.
+    """
+    clip = given.open(pattern)
+    if output is not None and output.exists() and not overwrite:
+        raise InputError(f"{output} exists; --overwrite replaces it")
+    lines = describe(clip, output)
+    for name, text in lines:
+        out(f"{name:10}{text}")
+    return DONE
+
+
+def describe(clip: Clip, output: Path | None = None) -> list[tuple[str, str]]:
+    """Name and text of every line about the clip's first frame; `output`: draw its motion."""
+    if output is not None and output.suffix.lower() not in stills.SUFFIXES:
+        raise InputError(f"output {output}: a picture, {', '.join(stills.SUFFIXES)}")
+    if output is not None:
+        refuse_inputs(output.parent, [output.name], [output], clip.inputs)
+    source = clip.source(clip.numbers[0])
+    lines = [("file", str(source.path))]
+    if len(clip.numbers) > 1:
+        lines.append(("frames", f"{frame_list(clip.numbers)} ({len(clip.numbers)})"))
+    lines.append(("size", "{} x {}".format(*source.size)))
+    for part in source.file.parts if source.file else ():
+        if part.data_window != part.display_window:
+            lines.append(("window", f"data {part.data_window} in display {part.display_window}"))
+    for layer, members in layers.layers(source.channels).items():
+        kinds = [f"{layers.component(m).upper()} {source.channels[m].dtype}" for m in members]
+        lines.append(("layer", f"{layer or '(picture)'}: {', '.join(kinds)}"))
+    lines.append(("picture", ", ".join(source.color) if source.beside else "none found"))
+    depth = layers.find_depth(source.channels, clip.passes.depth, source.beside)
+    lines.append(("depth", depth or "none"))
+    lines.append(("vectors", clip.finding))
+    return lines + _about_motion(clip, source, output)
+
+
+def _about_motion(clip: Clip, source: Source, output: Path | None) -> list[tuple[str, str]]:
+    """What the frame's motion is like; drawn into `output`."""
+    frame = clip.frame(source, picture=source.beside is not None)
+    lines = []
+    if frame.bad:
+        found = [f"{n} pixels of {name}" for name, n in frame.bad.items()]
+        lines.append(("bad", f"not finite or not in front of the camera: {', '.join(found)}"))
+    if "motion" not in frame.has:
+        if output:
+            raise InputError(f"{source.path}: no motion to draw: no vectors, no camera")
+        return lines
+    motion = Blur("tap").motion(frame)[..., 2:]
+    speed = np.hypot(motion[..., 0], motion[..., 1])
+    half, most, nearly, fastest = np.percentile(speed, (50, 90, 99, 100))
+    lines.append((
+        "speed",
+        f"pixels per frame: half are under {half:.1f}, 90 % under {most:.1f}, "
+        f"99 % under {nearly:.1f}, the fastest is {fastest:.1f}",
+    ))  # fmt: skip
+    if nearly > _MUCH * frame.size[0]:
+        lines.append((
+            "warning",
+            f"one pixel in a hundred moves over {nearly:.0f} px, a quarter of the width: "
+            "check the vectors' convention and scale",
+        ))  # fmt: skip
+    if output is not None:
+        full = max(float(nearly), 1.0)
+        picture = motion_picture(motion, full)
+        write_file(output, stills.encode(picture, output.suffix, 8, "motion"))
+        lines.append(("motion", f"{output} (full brightness: {full:.1f} px per frame)"))
+    return lines

@@ -1,0 +1,53 @@
+"""`wgmb view`: the interactive viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import DeviceError
+from ..settings import size_of
+from .exit_codes import DONE
+from .options import BlurOptions, Given, InputOptions, Look, ShutterOptions, When
+
+
+def view(
+    what: str | None = None,
+    given: Given = InputOptions(),
+    look: Look = BlurOptions(),
+    when: When = ShutterOptions(),
+    *,
+    config: Path | None = None,
+    window: str = "1280x720",
+    adapter: str | None = None,
+) -> int:
+    """Look at a scene or at frames interactively.
+
+    Example: wgmb view wheel
+    Example: wgmb view 'shot.####.exr' --method reproject
+
+    Parameters
+    ----------
+    what
+        A scene, a file or a pattern; crossing if there is no --config either.
+    config
+        TOML file that the viewer saved: begin as it says.
+    window
+        Width x height of the window.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    """
+    try:
+        from .. import viewer
+    except ImportError as error:  # of a system library: the packages are required
+        raise DeviceError(
+            f"the viewer cannot be loaded: {error}; on Debian, Ubuntu: "
+            "apt-get install libx11-6 libxext6"
+        ) from None
+    state = viewer.State()
+    if config is not None:
+        state = viewer.State.read(config)
+    if what is not None:
+        state = state.opened(what)
+    state = state.told(vars(given) | vars(look) | vars(when))
+    viewer.view(state, adapter=adapter, size=size_of(window))
+    return DONE

@@ -1,0 +1,29 @@
+"""The thin layer over wgpu: devices, kernels, textures, timing. It knows nothing of blur."""
+
+from .device import (
+    SOFTWARE,
+    adapters,
+    check_size,
+    choose_adapter,
+    claim,
+    open_device,
+    reported,
+    submit,
+    texel,
+)
+from .kernels import Given, Kernel, kernel
+
+__all__ = [
+    "SOFTWARE",
+    "Given",
+    "Kernel",
+    "adapters",
+    "check_size",
+    "choose_adapter",
+    "claim",
+    "kernel",
+    "open_device",
+    "reported",
+    "submit",
+    "texel",
+]

@@ -1,0 +1,153 @@
+"""The device: choosing an adapter, opening it, submitting work to it.
+
+Nothing else in the project submits: an error inside a submission would end the process instead
+of raising, so `submit` is the only place that does.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from contextlib import contextmanager
+from functools import cache
+
+import wgpu
+
+from ..errors import DeviceError, GpuMemoryError, InputError
+from .kernels import forget_kernels
+
+SOFTWARE = "CPU"  # adapter_type of lavapipe, SwiftShader, WARP
+_PREFERENCE = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", SOFTWARE)
+
+
+def adapters() -> list[wgpu.GPUAdapter]:
+    """Every adapter wgpu finds, OpenGL last, the fastest kind first."""
+    if not os.environ.get("XDG_RUNTIME_DIR"):  # Mesa complains on stderr without one
+        os.environ["XDG_RUNTIME_DIR"] = tempfile.gettempdir()
+    found = wgpu.gpu.enumerate_adapters_sync()
+
+    def rank(adapter: wgpu.GPUAdapter) -> tuple[bool, int]:
+        kind = adapter.info["adapter_type"]
+        return _is_opengl(adapter), _PREFERENCE.index(kind) if kind in _PREFERENCE else 3
+
+    return sorted(found, key=rank)
+
+
+def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
+    """The adapter whose number in `adapters()` or part of whose summary is `name`.
+
+    Without a name, `WGMB_ADAPTER` is asked, then the fastest kind is taken. OpenGL is
+    refused unless `name` asks for it ("opengl" is enough): it lacks features and precision.
+    """
+    name = name or os.environ.get("WGMB_ADAPTER") or ""
+    found = adapters()
+    listing = "; ".join(f"{i}: {a.summary}" for i, a in enumerate(found)) or "none at all"
+    if name.isdigit():
+        if int(name) >= len(found):
+            raise DeviceError(f"no adapter number {name}; found {listing}")
+        return found[int(name)]
+    matching = [a for a in found if name.lower() in a.summary.lower()]
+    if not matching:
+        hint = "" if name else "; install a Vulkan driver (Debian, Ubuntu: mesa-vulkan-drivers)"
+        raise DeviceError(
+            f"no adapter matches {name!r}; found {listing}{hint}"
+            if name
+            else f"no GPU adapter; found {listing}{hint}"
+        )
+    if _is_opengl(matching[0]) and "opengl" not in name.lower():
+        raise DeviceError(
+            f"only OpenGL adapters found ({listing}); install a Vulkan driver "
+            "(Debian, Ubuntu: mesa-vulkan-drivers) or ask for it with --adapter opengl"
+        )
+    return matching[0]
+
+
+def _is_opengl(adapter: wgpu.GPUAdapter) -> bool:
+    return adapter.info["backend_type"].startswith("OpenGL")
+
+
+def open_device(name: str | None = None) -> wgpu.GPUDevice:
+    """A device of the chosen adapter with all it can do; the same one every time.
+
+    A new one where the last one was lost.
+    """
+    claim()
+    name = name or os.environ.get("WGMB_ADAPTER") or ""
+    try:
+        _device(name).create_buffer(size=4, usage=wgpu.BufferUsage.COPY_DST)
+    except wgpu.GPUError:
+        _device.cache_clear()
+        forget_kernels()
+    return _device(name)
+
+
+@cache
+def _device(name: str) -> wgpu.GPUDevice:
+    adapter = choose_adapter(name)
+    wanted = ("float32-filterable", "timestamp-query")
+    limits = ("max-texture-dimension-2d", "max-buffer-size", "max-storage-buffer-binding-size")
+    try:
+        return adapter.request_device_sync(
+            label="wgmb",
+            required_features=[f for f in wanted if f in adapter.features],
+            required_limits={k: adapter.limits[k] for k in limits},
+        )
+    except (RuntimeError, wgpu.GPUError) as error:
+        raise DeviceError(f"{adapter.summary}: no device: {error}") from None
+
+
+def check_size(device: wgpu.GPUDevice, width: int, height: int) -> None:
+    """Refuse an image that the device cannot hold as one texture."""
+    most = device.limits["max-texture-dimension-2d"]
+    if not (0 < width <= most and 0 < height <= most):
+        raise InputError(f"image is {width} x {height}, the adapter takes 1 to {most} a side")
+
+
+def texel(device: wgpu.GPUDevice, channels: int) -> str:
+    """Format of a float texture that a linear sampler may read: f32, or f16 where it must be."""
+    bits = 32 if "float32-filterable" in device.features else 16
+    return {1: f"r{bits}float", 2: f"rg{bits}float", 4: f"rgba{bits}float"}[channels]
+
+
+_process: int | None = None  # the one that has a device
+
+
+def claim() -> None:
+    """Note that this process has a device.
+
+    DeviceError where it was forked from one that has: GPU drivers do not survive a fork.
+    """
+    global _process
+    if _process not in (None, os.getpid()):
+        raise DeviceError(
+            "this process was forked from one that has a GPU device; GPU work needs a process "
+            'that is spawned, or forked before (multiprocessing.get_context("spawn"))'
+        )
+    _process = os.getpid()
+
+
+@contextmanager
+def reported(size: tuple[int, int]):
+    """Turn what wgpu raises while it works on a picture of `size` into errors of ours.
+
+    GpuMemoryError names the size. DeviceError: the device was lost; the next `open_device`
+    makes a new one.
+    """
+    try:
+        yield
+    except wgpu.GPUError as error:
+        text = " ".join(str(error).split())
+        if "memory" in text.lower() or isinstance(error, wgpu.GPUOutOfMemoryError):
+            width, height = size
+            raise GpuMemoryError(f"too little GPU memory for {width} x {height} pixels") from None
+        if "lost" in text.lower():
+            _device.cache_clear()
+            forget_kernels()
+            raise DeviceError(f"the GPU device was lost: {text}") from None
+        raise
+
+
+def submit(device: wgpu.GPUDevice, *encoders: wgpu.GPUCommandEncoder) -> None:
+    """Run what was recorded. The one place that submits."""
+    claim()
+    device.queue.submit([encoder.finish() for encoder in encoders])

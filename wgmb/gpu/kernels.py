@@ -1,0 +1,141 @@
+"""Kernels: one compiled WGSL file each, its passes recorded by the names of its bindings."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+import wgpu
+
+from ..errors import ShaderError
+from . import wgsl
+
+
+@dataclass(frozen=True)
+class Given:
+    """What every pass of a frame is given: group 0 of its shader."""
+
+    size: tuple[int, int]  # width, height [px]
+    resources: dict[str, wgpu.GPUBuffer]  # by binding name
+
+
+class Kernel:
+    """All entry points of one WGSL file, sharing the same bind groups.
+
+    `kernel.run(encoder, "main", given, color=..., output=...)` binds by the names
+    used in the shader; a missing or unknown name is an error before any GPU work.
+    """
+
+    def __init__(
+        self,
+        device: wgpu.GPUDevice,
+        source: wgsl.Source,
+        constants: dict[str, float] | None = None,
+    ):
+        self.device, self.source = device, source
+        self.bindings = {b.name: b for b in source.bindings()}
+        self.workgroup = int(source.constant("WG_X")), int(source.constant("WG_Y"))
+        try:
+            module = device.create_shader_module(code=source.text, label=source.name)
+        except wgpu.GPUError as error:
+            raise ShaderError(_located(str(error), source)) from None
+        self.groups = range(1 + max((b.group for b in self.bindings.values()), default=-1))
+        self.layouts = [
+            device.create_bind_group_layout(
+                label=f"{source.name}:{group}",
+                entries=[
+                    _layout_entry(b, source) for b in self.bindings.values() if b.group == group
+                ],
+            )
+            for group in self.groups
+        ]
+        layout = device.create_pipeline_layout(bind_group_layouts=self.layouts)
+        self.pipelines = {
+            name: device.create_compute_pipeline(
+                label=f"{source.name}:{name}",
+                layout=layout,
+                compute={"module": module, "entry_point": name, "constants": constants or {}},
+            )
+            for name in source.entry_points()
+        }
+
+    def run(self, encoder, entry: str, given: Given, groups: dict | None = None, /, **own) -> None:
+        """Record one dispatch over the image: group 0 from `given`, group 1 from `own`.
+
+        `groups`: the part of a buffer that holds how many workgroups it takes instead.
+        """
+        wanted = {name for name, b in self.bindings.items() if b.group > 0}
+        if own.keys() != wanted:
+            raise ShaderError(f"{self.source.name} binds {sorted(wanted)}, got {sorted(own)}")
+        resources = given.resources | own
+        compute = encoder.begin_compute_pass(label=f"{self.source.name}:{entry}")
+        compute.set_pipeline(self.pipelines[entry])
+        for group, layout in zip(self.groups, self.layouts, strict=True):
+            entries = [
+                {"binding": b.index, "resource": _resource(resources[name])}
+                for name, b in self.bindings.items()
+                if b.group == group
+            ]
+            bound = self.device.create_bind_group(layout=layout, entries=entries)
+            compute.set_bind_group(group, bound)
+        if groups:
+            compute.dispatch_workgroups_indirect(groups["buffer"], groups["offset"])
+        else:
+            compute.dispatch_workgroups(
+                *(-(-n // edge) for n, edge in zip(given.size, self.workgroup, strict=True))
+            )
+        compute.end()
+
+
+@lru_cache(maxsize=256)
+def _kernel(device, file: str, texels: tuple, constants: tuple) -> Kernel:
+    return Kernel(device, wgsl.load(file).with_texels(**dict(texels)), dict(constants))
+
+
+def kernel(device, file: str, texels: dict[str, str] | None = None, **constants: float) -> Kernel:
+    """The compiled kernel of `wgsl/<file>`, kept for the next time it is asked for.
+
+    `texels` are the storage texel formats (`Output`), `constants` the overrides.
+    """
+    formats = tuple(sorted((texels or {}).items()))
+    return _kernel(device, file, formats, tuple(sorted(constants.items())))
+
+
+def forget_kernels() -> None:
+    """Let go of all compiled kernels: their device is lost."""
+    _kernel.cache_clear()
+
+
+def _located(message: str, source: wgsl.Source) -> str:
+    """The compiler's message with lines of the joined text turned into file:line."""
+    return re.sub(r"wgsl:(\d+):(\d+)", lambda m: f"{source.where(int(m[1]))}:{m[2]}", message)
+
+
+def _resource(given):
+    if isinstance(given, wgpu.GPUBuffer):
+        return {"buffer": given, "offset": 0, "size": given.size}
+    return given
+
+
+def _layout_entry(b: wgsl.Binding, source: wgsl.Source) -> dict:
+    entry = {"binding": b.index, "visibility": wgpu.ShaderStage.COMPUTE}
+    if b.space == "uniform":
+        size = source.dtype(b.type).itemsize
+        return entry | {"buffer": {"type": "uniform", "min_binding_size": size}}
+    if b.space.startswith("storage"):
+        kind = "storage" if "read_write" in b.space else "read-only-storage"
+        return entry | {"buffer": {"type": kind}}
+    dimension = {"view_dimension": "2d-array" if "_2d_array" in b.type else "2d"}
+    if m := re.fullmatch(r"texture_storage_2d(?:_array)?<(\w+),\s*(\w+)>", b.type):
+        access = {"write": "write-only", "read": "read-only"}[m[2]]
+        return entry | {"storage_texture": {"format": m[1], "access": access} | dimension}
+    if b.type == "sampler":
+        return entry | {"sampler": {"type": "filtering"}}
+    if b.type in ("texture_2d<f32>", "texture_2d_array<f32>"):
+        sampled = re.search(rf"textureSample\w*\(\s*{b.name}\b", source.text)
+        kind = {"sample_type": "float" if sampled else "unfilterable-float"}
+        return entry | {"texture": kind | dimension}
+    if b.type in ("texture_2d<u32>", "texture_2d_array<u32>"):
+        return entry | {"texture": {"sample_type": "uint"} | dimension}
+    raise ShaderError(f"{source.name}: cannot bind {b.name}: {b.type}")

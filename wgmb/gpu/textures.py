@@ -1,0 +1,129 @@
+"""Images on the GPU: textures kept from frame to frame, arrays up and down."""
+
+from __future__ import annotations
+
+import numpy as np
+import wgpu
+
+from ..errors import InputError
+from .device import check_size, submit
+
+_BAND = 4 << 20  # bytes written at once: five times faster at 4K than all at once
+_READBACK = 256 << 20  # bytes read back at once: a buffer has a limit, and memory is not endless
+_HALF_MAX = 65504.0  # largest finite f16
+_USAGE = wgpu.TextureUsage
+_NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4"}
+_STORABLE = ("rgba16float", "rgba32float", "r32float", "r32uint", "rgba32uint")
+_CHANNELS = {"r": 1, "rg": 2, "rgba": 4}
+
+
+def numpy_of(format: str) -> tuple[np.dtype, int]:
+    """Numpy type and number of channels of a texture format such as `rgba16float`."""
+    letters, _, _ = format.partition("32" if "32" in format else "16")
+    return np.dtype(_NUMPY[format[len(letters) :]]), _CHANNELS[letters]
+
+
+class Scratch:
+    """A storage buffer that is only remade when it has to grow."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device: wgpu.GPUDevice = device
+        self._buffer: wgpu.GPUBuffer | None = None
+
+    def at_least(self, size: int) -> wgpu.GPUBuffer:
+        """The buffer, of `size` bytes or more; what is in it is undefined."""
+        most = self._device.limits["max-storage-buffer-binding-size"]
+        if size > most:
+            raise InputError(f"the picture needs a buffer of {size} bytes, the adapter has {most}")
+        if self._buffer is None or self._buffer.size < size:
+            self._buffer = self._device.create_buffer(
+                label="scratch",
+                size=size,
+                usage=wgpu.BufferUsage.STORAGE
+                | wgpu.BufferUsage.COPY_DST
+                | wgpu.BufferUsage.INDIRECT,
+            )
+        return self._buffer
+
+
+class Images:
+    """Textures kept from frame to frame under a name, remade when size or format changes."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self.device = device
+        self._textures: dict[str, wgpu.GPUTexture] = {}
+        self._staging: wgpu.GPUBuffer | None = None
+
+    def texture(
+        self, name: str, size: tuple[int, int], format: str, layers: int = 1
+    ) -> wgpu.GPUTexture:
+        """The texture called `name`; its contents are whatever was last put there."""
+        kept = self._textures.get(name)
+        if kept is None or kept.size != (*size, layers) or kept.format != format:
+            check_size(self.device, *size)
+            usage = _USAGE.TEXTURE_BINDING | _USAGE.COPY_DST | _USAGE.COPY_SRC
+            if format in _STORABLE:
+                usage |= _USAGE.STORAGE_BINDING
+            kept = self.device.create_texture(
+                label=name, size=(*size, layers), format=format, usage=usage
+            )
+            self._textures[name] = kept
+        return kept
+
+    def view(self, name: str, size: tuple[int, int], format: str) -> wgpu.GPUTextureView:
+        """A view of the texture called `name`."""
+        return self.texture(name, size, format).create_view()
+
+    def upload(self, name: str, image: np.ndarray, format: str) -> wgpu.GPUTextureView:
+        """Put `image` (height, width[, channels]) into the texture called `name`."""
+        height, width = image.shape[:2]
+        kind, channels = numpy_of(format)
+        if kind == np.float16 and image.dtype != np.float16:
+            image = np.where(np.isinf(image), image, np.clip(image, -_HALF_MAX, _HALF_MAX))
+        with np.errstate(over="ignore"):  # what f32 cannot hold is infinite, and counted as bad
+            image = np.ascontiguousarray(image, kind)
+        texture = self.texture(name, (width, height), format)
+        row = width * channels * kind.itemsize
+        band = max(1, _BAND // row)
+        for top in range(0, height, band):
+            rows = image[top : top + band]
+            self.device.queue.write_texture(
+                {"texture": texture, "origin": (0, top, 0)},
+                rows,
+                {"bytes_per_row": row},
+                (width, len(rows), 1),
+            )
+            submit(self.device)  # what is written is held in memory until a submit
+        return texture.create_view()
+
+    def download(self, encoder, texture: wgpu.GPUTexture) -> np.ndarray:
+        """Submit `encoder` and return `texture` as a new (height, width, channels) array."""
+        width, height, _ = texture.size
+        kind, channels = numpy_of(texture.format)
+        row = width * channels * kind.itemsize
+        pitch = -(-row // 256) * 256  # rows in a buffer start at multiples of 256 bytes
+        picture = np.empty((height, width, channels), kind)
+        band = max(1, min(height, _READBACK // pitch))
+        if self._staging is None or self._staging.size != pitch * band:
+            usage = wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.MAP_READ
+            self._staging = self.device.create_buffer(
+                label="readback", size=pitch * band, usage=usage
+            )
+        for top in range(0, height, band):
+            rows = min(band, height - top)
+            if top:
+                encoder = self.device.create_command_encoder(label="readback")
+            encoder.copy_texture_to_buffer(
+                {"texture": texture, "origin": (0, top, 0)},
+                {"buffer": self._staging, "bytes_per_row": pitch, "rows_per_image": rows},
+                (width, rows, 1),
+            )
+            submit(self.device, encoder)
+            self._staging.map_sync(wgpu.MapMode.READ)
+            try:
+                data = np.asarray(self._staging.read_mapped(copy=False)).view(np.uint8)
+                data = data[: pitch * rows].reshape(rows, pitch)[:, :row]
+                picture[top : top + rows] = data.view(kind).reshape(rows, width, channels)
+            finally:
+                self._staging.unmap()
+        return picture

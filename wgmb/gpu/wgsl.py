@@ -1,0 +1,160 @@
+"""Read shaders: includes, struct layouts, constants and bindings.
+
+WGSL is the one place where a struct, a constant or a binding is written down.
+This module reads those declarations so that Python never repeats them.
+
+Supported on purpose: structs of f32/i32/u32, vec2..4, mat4x4f and fixed arrays
+of those. Anything else (@size, @align, f16, mat3x3) raises, it is not guessed.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import ShaderError
+
+_HERE = Path(__file__).parents[1]
+ROOT = next(p for p in (_HERE / "wgsl", _HERE.parent / "wgsl") if p.is_dir())  # wheel, checkout
+_SCALAR = {"f32": "<f4", "i32": "<i4", "u32": "<u4"}
+_SUFFIX = {"f": "f32", "i": "i32", "u": "u32"}
+
+
+@dataclass(frozen=True)
+class Binding:
+    """One `@group(..) @binding(..) var` declaration."""
+
+    group: int
+    index: int
+    name: str
+    space: str  # "uniform", "storage, read_write", "" for textures and samplers
+    type: str
+
+
+@dataclass(frozen=True)
+class Source:
+    """One shader file followed by everything it includes, each file once."""
+
+    text: str
+    files: tuple[tuple[str, int], ...]  # (file, its first line in text)
+
+    @property
+    def name(self) -> str:
+        """The file that was asked for."""
+        return self.files[0][0]
+
+    def where(self, line: int) -> str:
+        """Name the file and line that line number `line` of `text` came from."""
+        name, first = max((f for f in self.files if f[1] <= line), key=lambda f: f[1])
+        return f"{name}:{line - first + 1}"
+
+    def constant(self, name: str) -> float | int:
+        """Value of `const name: type = value;`."""
+        m = re.search(rf"^const {name}\s*:\s*\w+\s*=\s*([-\d.eExXa-fA-F]+?)u?;", self.text, re.M)
+        if not m:
+            raise ShaderError(f"no constant {name} in {self.name}")
+        return int(m[1], 0) if re.fullmatch(r"-?(\d+|0[xX].+)", m[1]) else float(m[1])
+
+    def dtype(self, name: str) -> np.dtype:
+        """The numpy dtype with exactly the layout the GPU gives struct `name`."""
+        return layout(name, self.text)[0]
+
+    def bindings(self) -> list[Binding]:
+        """Every binding of the file and its includes, type aliases resolved."""
+        pattern = r"^@group\((\d+)\) @binding\((\d+)\)\s+var(?:<([^>]*)>)?\s+(\w+)\s*:\s*(.+?);"
+        alias = dict(re.findall(r"^alias (\w+)\s*=\s*(.+?);", self.text, re.M))
+        return [
+            Binding(int(g), int(b), name, space, alias.get(kind, kind))
+            for g, b, space, name, kind in re.findall(pattern, self.text, re.M)
+        ]
+
+    def entry_points(self) -> list[str]:
+        """Names of the compute entry points."""
+        return re.findall(r"@compute\s+@workgroup_size\([^)]*\)\s+fn (\w+)", self.text)
+
+    def with_texels(self, **formats: str) -> Source:
+        """The same shader with other texel formats in its aliases, as `Output="rgba16float"`."""
+        text = self.text
+        for alias, texel in formats.items():
+            pattern = rf"^(alias {alias} = texture_storage_2d<)\w+"
+            text = re.sub(pattern, rf"\g<1>{texel}", text, flags=re.M)
+        return Source(text, self.files)
+
+
+@cache
+def load(name: str) -> Source:
+    """Read `wgsl/<name>` and append what it includes.
+
+    WGSL does not care about the order of declarations, so includes go to the end
+    and the file keeps its own line numbers in error messages.
+    """
+    todo, text, files = [(name, name)], "", []
+    while todo:
+        current, asker = todo.pop(0)
+        if any(current == f for f, _ in files):
+            continue
+        path = ROOT / current
+        if not path.is_file():
+            raise ShaderError(f"{asker}: no such file wgsl/{current}")
+        files.append((current, text.count("\n") + 1))
+        body = path.read_text(encoding="utf-8")
+        todo += [(i, current) for i in re.findall(r"^//#include (\S+)$", body, re.M)]
+        text += body.rstrip("\n") + "\n"
+    return Source(text, tuple(files))
+
+
+@cache
+def layout(kind: str, text: str) -> tuple[np.dtype, int]:
+    """Numpy dtype and alignment of a WGSL type (WGSL specification, "Alignment and Size")."""
+    kind = kind.replace(" ", "")
+    if kind in _SCALAR:
+        return np.dtype(_SCALAR[kind]), 4
+    if m := re.fullmatch(r"atomic<(\w+)>", kind):
+        return layout(m[1], text)
+    if m := re.fullmatch(r"vec([234])(?:([fiu])|<([fiu]32)>)", kind):
+        n = int(m[1])
+        return np.dtype((_SCALAR[m[3] or _SUFFIX[m[2]]], (n,))), 4 * (2 if n == 2 else 4)
+    if kind in ("mat4x4f", "mat4x4<f32>"):
+        return np.dtype(("<f4", (4, 4))), 16  # row i here is column i in WGSL
+    if m := re.fullmatch(r"array<(.+),(\w+)>", kind):
+        return _array(m[1], m[2], kind, text)
+    return _struct(kind, text)
+
+
+def _array(item_kind: str, count: str, kind: str, text: str) -> tuple[np.dtype, int]:
+    item, align = layout(item_kind, text)
+    if item.itemsize % align:
+        raise ShaderError(f"{kind}: elements would need padding, use vec4")
+    n = (
+        count.rstrip("u")
+        if count.rstrip("u").isdigit()
+        else Source(text, (("shader", 1),)).constant(count)
+    )
+    return np.dtype((item, (int(n),))), align
+
+
+def _struct(kind: str, text: str) -> tuple[np.dtype, int]:
+    m = re.search(rf"^struct {kind} \{{(.*?)^\}}", text, re.M | re.S)
+    if not m:
+        raise ShaderError(f"unsupported type {kind}")
+    body = re.sub(r"//[^\n]*", "", m[1])
+    if "@" in body:
+        raise ShaderError(f"struct {kind}: attributes are not supported")
+    names, formats, offsets, end, widest = [], [], [], 0, 4
+    for field in re.split(r",(?![^<]*>)", body):
+        if not field.strip():
+            continue
+        name, _, field_kind = field.partition(":")
+        item, align = layout(field_kind.strip(), text)
+        end = -(-end // align) * align
+        names.append(name.strip())
+        formats.append(item)
+        offsets.append(end)
+        end, widest = end + item.itemsize, max(widest, align)
+    size = -(-end // widest) * widest
+    dtype = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
+    return dtype, widest

@@ -1,0 +1,1 @@
+"""Files: pictures, videos, layers, sequences. Nothing here knows a GPU."""

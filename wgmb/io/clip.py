@@ -1,0 +1,374 @@
+"""Frame sequences on disk: a pattern in, Frames out.
+
+`Clip` reads frames, finds their layers, settles what the vectors mean and keeps neighbours.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..frame import Frame
+from . import layers, limits, stills, vectors
+from .camera_file import CameraFile
+from .cuts import is_cut, jumps, straightened
+from .frame_file import Source, about, read, size_text
+from .frame_numbers import (
+    MOST_FRAMES,
+    frame_list,
+    frame_numbers,
+    frame_path,
+    is_pattern,
+    number_in,
+    numbers_on_disk,
+    readable,
+)
+
+DEPTHS = ("planar", "inverse", "clip")
+_OBJECT_STEMS = ("indexob", "objectindex", "object_id")
+
+
+@dataclass(frozen=True)
+class Passes:
+    """Which layers of the files to use, and what they mean.
+
+    `color`, `depth`: layer names where they are unusual. `depth_kind`: "planar" distance
+    along the view axis, "inverse" 1 / that (Nuke), "clip" z after projection. `camera`: a
+    JSON file (see CameraFile) for motion where there are no vectors. `object_layer`: the
+    index layer by which the camera file's objects are told apart. `object_motion`: vectors
+    leave the camera's motion out. `keep`, `scale`: a layer, `LAYER=VALUE`, or an image file
+    or pattern. `also`: patterns of files that hold further layers of the same frames.
+    """
+
+    color: str | None = None
+    vectors: vectors.Vectors = field(default_factory=vectors.Vectors)
+    depth: str | None = None
+    depth_kind: str = "planar"
+    far: float = 1e9
+    camera: Path | None = None
+    object_layer: str | None = None
+    object_motion: bool = False
+    keep: str | None = None
+    scale: str | None = None
+    also: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        if self.depth_kind not in DEPTHS:
+            raise InputError(f"depth must be one of {', '.join(DEPTHS)}, got {self.depth_kind!r}")
+        if not self.far > 0:
+            raise InputError(f"far must be over 0, got {self.far}")
+
+
+class Clip:
+    """A frame sequence, or one picture, being read.
+
+    Iterating gives Frames. `numbers` are the frames asked for, `on_disk` all that there are.
+    `finding` says what the vectors were found to mean; `cuts` has the frames read so far that
+    come after a camera cut, `unread` the neighbours that could not be read, `sizes` how large
+    those read so far are.
+    """
+
+    def __init__(
+        self,
+        pattern: str | Path,
+        *,
+        frames: str | None = None,
+        passes: Passes | None = None,
+        skip_missing: bool = False,
+        max_mb: float = limits.MAX_MB,
+    ):
+        """`frames`: "1-100x2", "1,3,5-8"; all that exist by default, and none may be missing
+        between them unless `skip_missing`. `max_mb`: megabytes that a file may unpack to.
+        """
+        self._max_mb = max_mb
+        self.sizes: dict[int, tuple[int, int]] = {}
+        self.pattern, self.passes = str(pattern), passes or Passes()
+        self.numbers = self._numbers(frames, skip_missing)
+        self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
+        self.cuts: set[int] = set()
+        self.unread: set[int] = set()
+        self._kept: OrderedDict[int, Source] = OrderedDict()
+        self._ready: OrderedDict[int, tuple[Source, bool, Frame]] = OrderedDict()
+        self._found: vectors.Finding | None = None
+
+    def _numbers(self, frames: str | None, skip_missing: bool) -> list[int]:
+        if not is_pattern(self.pattern):
+            path = Path(self.pattern)
+            if not readable(path):
+                raise InputError(f"{path}: no such file")
+            if frames is not None:
+                raise InputError(f"--frames needs a pattern such as shot.####.exr, got {path.name}")
+            self.on_disk = [number_in(path)]
+            return self.on_disk
+        self.on_disk = there = numbers_on_disk(self.pattern)
+        if not frames and skip_missing:
+            return there
+        if not frames and there[-1] - there[0] - len(there) >= MOST_FRAMES:
+            raise InputError(
+                f"{self.pattern}: {len(there)} of the frames {there[0]} to {there[-1]} are there; "
+                "--skip-missing takes these, --frames chooses"
+            )
+        wanted = frame_numbers(frames) if frames else list(range(there[0], there[-1] + 1))
+        found = set(there)
+        missing = sorted(set(wanted) - found)
+        if missing and not skip_missing:
+            raise InputError(
+                f"{self.pattern}: missing frames {frame_list(missing)}; "
+                "--skip-missing leaves them out"
+            )
+        if not found & set(wanted):
+            raise InputError(f"{self.pattern}: none of the frames {frames} exist")
+        return [n for n in wanted if n in found]
+
+    def __iter__(self):
+        for number in self.numbers:
+            yield self.frame(self.source(number))
+
+    @property
+    def has(self) -> frozenset[str]:
+        """What the first frame that can be read has for methods (see Frame.has).
+
+        Of all frames on disk, so that it does not depend on which of them are asked for.
+        """
+        for number in self.on_disk:
+            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                return self.frame(self.source(number), picture=False, normal=False).has
+        return frozenset()
+
+    def files(self, number: int) -> list[Path]:
+        """Every file that the result of frame `number` depends on."""
+        passes = self.passes
+        masks = [m for m in (passes.keep, passes.scale) if m is not None and _is_file(m, number)]
+        patterns = (self.pattern, *passes.also, *masks)
+        camera = [passes.camera] if passes.camera else []
+        return [*(frame_path(p, number) for p in patterns), *camera]
+
+    @property
+    def inputs(self) -> Iterator[Path]:
+        """Every file that may be read, whichever frames are asked for."""
+        for number in self.on_disk:
+            yield from self.files(number)
+
+    def made_of(self, number: int, neighbours: bool) -> dict:
+        """What the result of frame `number` depends on beside the settings, as JSON has it.
+
+        Name, size [bytes] and time of change [ns] of every file, those of the frames before and
+        after too if the method uses `neighbours`; and what the vectors were found to mean.
+        """
+        around = [number]
+        if neighbours and is_pattern(self.pattern):
+            near = (number - 1, number + 1)
+            around += [n for n in near if frame_path(self.pattern, n).is_file()]
+        files = dict.fromkeys(path for n in around for path in self.files(n))
+        meaning = self._decide().vectors
+        return {
+            "files": [[path.name, *_size_and_time(path)] for path in files],
+            "vectors_mean": str(meaning) if meaning else None,
+        }
+
+    def source(self, number: int) -> Source:
+        """Frame `number` as stored; the last three are kept for their neighbours."""
+        if number not in self._kept:
+            while len(self._kept) > 2:
+                self._kept.popitem(last=False)
+            paths = [frame_path(p, number) for p in (self.pattern, *self.passes.also)]
+            self._kept[number] = source = read(paths, number, self.passes.color, self._max_mb)
+            self.sizes[number] = source.whole
+        return self._kept[number]
+
+    def forget(self, number: int) -> None:
+        """Let go of a frame that nobody will ask for again."""
+        self._kept.pop(number, None)
+        self._ready.pop(number, None)
+
+    @property
+    def finding(self) -> str:
+        """What the vectors were found to mean, for people."""
+        return self._decide().text
+
+    def _decide(self) -> vectors.Finding:
+        """Settle, once for all frames, what the vectors mean.
+
+        By name, and tested on the first frame on disk, or the middle or last one where nothing
+        moves; so every run settles it alike, whichever frames it is asked for.
+        """
+        if self._found is None:
+            wanted = self.passes.vectors
+            self._found = vectors.Finding(None, False, "none asked for")
+            if wanted.convention != "none":
+                there = self.on_disk
+                tested = dict.fromkeys(there[i] for i in (0, len(there) // 2, -1))
+                for number in tested:
+                    with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                        self._found = self._test(number, wanted)
+                    if self._found.sure or wanted.convention != "auto":
+                        break
+        return self._found
+
+    def _test(self, number: int, wanted: vectors.Vectors) -> vectors.Finding:
+        source = self.source(number)
+        named = vectors.named(source.channels, wanted, source.beside)
+        if named is None:
+            return vectors.Finding(None, False, "no vector layer found")
+        if wanted.convention != "auto":
+            return vectors.Finding(named, True, str(named))
+        motion = vectors.read(source.channels, named, source.beside)
+        prev, next_ = self._neighbour(number - 1), self._neighbour(number + 1)
+        if source.beside is None:
+            return vectors.Finding(named, False, f"{named}, by name (no picture to test it on)")
+        return vectors.detect(source.rgba, motion, prev, next_, named)
+
+    def _neighbour(self, number: int) -> np.ndarray | None:
+        if not is_pattern(self.pattern) or not frame_path(self.pattern, number).is_file():
+            return None
+        wanted = number in self.numbers
+        try:
+            return self.source(number).rgba
+        except (InputError, OSError):
+            return None
+        finally:
+            if not wanted:
+                self.forget(number)
+
+    def with_neighbours(self, source: Source, normal: bool = True) -> Frame:
+        """`frame`, and the frames before and after as far as they can be read.
+
+        Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
+        Blur, once, though it is shown in three.
+        """
+        near = {}
+        for side, number in (("prev", source.number - 1), ("next", source.number + 1)):
+            path = frame_path(self.pattern, number)
+            if is_pattern(self.pattern) and path.is_file():
+                try:
+                    other = self.source(number)
+                    if other.size == source.size:
+                        near[side] = self._locked(other, normal)
+                except (InputError, OSError):  # its turn to fail comes
+                    self.unread.add(number)
+        frame = self._locked(source, normal)
+        for side in list(near):
+            if is_cut(frame, near[side], -1 if side == "prev" else 1):
+                del near[side]
+                self.cuts.add(source.number if side == "prev" else source.number + 1)
+        return frame.between(near.get("prev"), near.get("next"))
+
+    def _locked(self, source: Source, normal: bool) -> Frame:
+        """`frame`, made once for the three frames that it is shown in."""
+        made, with_normal, frame = self._ready.get(source.number, (None, None, None))
+        if frame is None or made is not source or with_normal != normal:
+            self._ready.pop(source.number, None)
+            while len(self._ready) > 2:
+                self._ready.popitem(last=False)
+            frame = self.frame(source, normal=normal).locked()
+            self._ready[source.number] = source, normal, frame
+        return frame
+
+    def frame(self, source: Source, picture: bool = True, normal: bool = True) -> Frame:
+        """What a method is given of `source`; without `picture`, all but the colour (0); without
+        `normal`, no normals.
+
+        Motion that leads across a camera cut is left out (see cuts.jumps).
+        """
+        frame = self._frame(source, picture, normal)
+        for side in (-1, 1):
+            if jumps(frame, side):
+                self.cuts.add(source.number + (side > 0))
+                frame = straightened(frame, side)
+        return frame
+
+    def _frame(self, source: Source, picture: bool, normal: bool) -> Frame:
+        meaning = self._decide().vectors
+        with about(source.path):
+            if meaning is None:  # where a layer was asked for, this says why there is none
+                meaning = vectors.named(source.channels, self.passes.vectors, source.beside)
+            motion = reprojections = ids = None
+            depth = self._depth(source)
+            if meaning is not None:
+                motion = vectors.read(source.channels, meaning, source.beside)
+            if self._camera is not None:
+                if depth is None:
+                    there = ", ".join(layers.layers(source.channels))
+                    raise InputError(f"motion from a camera needs a depth layer; there is {there}")
+                kind = "clip" if self.passes.depth_kind == "clip" else "planar"
+                reprojections = self._camera.around(
+                    source.number, depth_kind=kind, far=self.passes.far, window=source.window
+                )
+                ids = self._object_ids(source) if reprojections.here.bodies else None
+            return Frame(
+                source.rgba if picture else np.zeros((*source.size[::-1], 3), np.float16),
+                motion=motion,
+                depth=depth,
+                normal=self._normal(source) if normal else None,
+                camera=reprojections,
+                object_id=ids,
+                keep=self._mask(source, self.passes.keep),
+                scale=self._mask(source, self.passes.scale),
+                object_motion=self.passes.object_motion,
+                number=source.number,
+            )
+
+    def _depth(self, source: Source) -> np.ndarray | None:
+        name = layers.find_depth(source.channels, self.passes.depth, source.beside)
+        if name is None:
+            return None
+        depth = source.channels[name].astype(np.float32, copy=False)
+        if self.passes.depth_kind == "inverse":
+            with np.errstate(divide="ignore"):
+                depth = np.where(depth > 0, 1 / depth, np.inf).astype(np.float32)
+        return depth
+
+    def _normal(self, source: Source) -> np.ndarray | None:
+        names = layers.find_normal(source.channels, source.beside)
+        if not names:
+            return None
+        return np.stack([source.channels[name] for name in names], 2, dtype=np.float32)
+
+    def _object_ids(self, source: Source) -> np.ndarray | None:
+        by_layer = layers.layers(source.channels, near=source.beside)
+        name = self.passes.object_layer
+        if name is None:
+            named = [k for k in by_layer if layers.stem(k) in _OBJECT_STEMS]
+            if not named:
+                return None
+            name = named[0]
+        plane = source.channels[layers.one_channel(by_layer, name, "object index layer")]
+        with np.errstate(invalid="ignore"):
+            return np.where(plane > 0, np.minimum(np.rint(plane), 2**31), 0).astype(np.uint32)
+
+    def _mask(self, source: Source, wanted: str | None) -> np.ndarray | None:
+        if wanted is None:
+            return None
+        if not _is_file(wanted, source.number):
+            return layers.mask(source.channels, source.attributes, wanted)
+        file = frame_path(wanted, source.number)
+        if file.suffix.lower() == ".exr":
+            channels = read([file], source.number, None, self._max_mb).channels
+            plane = layers.grey(channels).astype(np.float32)
+        else:
+            light = stills.read(file, max_mb=self._max_mb)
+            plane = stills.srgb(light[..., 0])  # grey values as painted
+        if plane.shape[::-1] != source.size:
+            raise InputError(
+                f"{file} must be {size_text(source.size)} like the picture, is {size_text(plane)}"
+            )
+        return plane
+
+
+def _size_and_time(path: Path) -> tuple[int, int]:
+    """Of a file; -1 where there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return -1, -1
+    return found.st_size, found.st_mtime_ns
+
+
+def _is_file(mask: str, number: int) -> bool:
+    return frame_path(mask, number).suffix.lower() in (".exr", *stills.SUFFIXES)

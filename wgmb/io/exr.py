@@ -1,0 +1,252 @@
+"""EXR files: every part, channel and attribute in, the same out, and no fault passed over.
+
+The OpenEXR library answers a damaged file with a line on the terminal and fewer parts; here
+that is an error that names the file.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+
+from ..errors import InputError
+from . import limits
+from .limits import MOST_PIXELS_A_SIDE
+from .native import hushed, inside
+
+COMPRESSIONS = {
+    "none": OpenEXR.NO_COMPRESSION,
+    "rle": OpenEXR.RLE_COMPRESSION,
+    "zips": OpenEXR.ZIPS_COMPRESSION,
+    "zip": OpenEXR.ZIP_COMPRESSION,
+    "piz": OpenEXR.PIZ_COMPRESSION,
+    "pxr24": OpenEXR.PXR24_COMPRESSION,
+    "b44": OpenEXR.B44_COMPRESSION,
+    "b44a": OpenEXR.B44A_COMPRESSION,
+    "dwaa": OpenEXR.DWAA_COMPRESSION,
+    "dwab": OpenEXR.DWAB_COMPRESSION,
+}
+"""The library's names of what every program reads; see also `check_compression`."""
+_LOSSY = tuple(COMPRESSIONS[name] for name in ("pxr24", "b44", "b44a", "dwaa", "dwab"))
+_SAME = "same"
+_WRITTEN_ANEW = (
+    "channels",
+    "compression",
+    "dataWindow",
+    "displayWindow",
+    "type",
+    "lineOrder",
+    "tiles",
+    "chunkCount",
+    "version",
+    "name",
+)
+
+
+@dataclass
+class Part:
+    """One part: channels by name as stored, (height, width) float16, float32 or uint32."""
+
+    name: str
+    channels: dict[str, np.ndarray]
+    attributes: dict
+    data_window: tuple[int, int, int, int]  # left, top, right, bottom; the last pixels belong to it
+    display_window: tuple[int, int, int, int]
+    compression: OpenEXR.Compression = OpenEXR.ZIP_COMPRESSION  # as it was stored
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the data window [px]."""
+        left, top, right, bottom = self.data_window
+        return right - left + 1, bottom - top + 1
+
+
+@dataclass
+class Exr:
+    """A whole file."""
+
+    path: Path
+    parts: list[Part] = field(default_factory=list)
+
+    def channels(self) -> dict[str, np.ndarray]:
+        """Every channel by its full name; in a multi-part file the part's name leads."""
+        return {full: part.channels[name] for full, part, name in self.places()}
+
+    def places(self) -> list[tuple[str, Part, str]]:
+        """Full name, part and name within the part of every channel."""
+        found = []
+        for part in self.parts:
+            for name in part.channels:
+                leads = len(self.parts) > 1 and part.name and not name.startswith(part.name + ".")
+                found.append((f"{part.name}.{name}" if leads else name, part, name))
+        return found
+
+
+def read(path: str | Path, *, header_only: bool = False, max_mb: float = limits.MAX_MB) -> Exr:
+    """Read `path`; `header_only` leaves every channel an empty array.
+
+    `max_mb`: megabytes that its pixels may take. `InputError` names the file where it is missing,
+    damaged, cut off, deep, absurdly large or beyond that limit, and where memory is short.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    with inside():
+        header = _open(path, header_only=True)
+    try:
+        promised = [_promised(path, part) for part in header.parts]
+    except (UnicodeDecodeError, KeyError, TypeError, IndexError) as error:
+        raise InputError(f"{path}: not a readable EXR file: {_first_line(error)}") from None
+    if (count := sum(len(part.channels) for part in promised)) > limits.MOST_CHANNELS:
+        raise InputError(f"{path}: {count} channels; at most {limits.MOST_CHANNELS}")
+    if header_only:
+        return Exr(path, promised)
+    needed = sum(limits.unpacked(part.size, len(part.channels)) for part in promised)
+    what = "{} x {}, ".format(*promised[0].size) + f"{count} channels,"
+    limits.check(path, what, needed, path.stat().st_size, max_mb)
+    with inside(), hushed() as heard:
+        content = _open(path, header_only=False)
+    if len(content.parts) != len(promised):
+        if _short_of_memory(heard, needed):
+            raise InputError(f"{path}: not enough memory for {needed >> 20} MB of pixels")
+        raise InputError(
+            f"{path}: damaged or cut off: pixels of {len(content.parts)} of "
+            f"{len(promised)} parts could be read"
+        )
+    for want, got in zip(promised, content.parts, strict=True):
+        for name in want.channels:
+            pixels = got.channels[name].pixels if name in got.channels else None
+            width, height = want.size
+            if pixels is None or pixels.shape != (height, width):
+                shape = "nothing" if pixels is None else f"{pixels.shape[::-1]}"
+                raise InputError(
+                    f"{path}: channel {name} must be {width} x {height}, got {shape} "
+                    "(damaged, or subsampled, which is not supported)"
+                )
+            want.channels[name] = pixels
+    return Exr(path, promised)
+
+
+def check_compression(name: str) -> None:
+    """InputError unless `name` is in COMPRESSIONS, or "same": as the file that was read."""
+    if name not in (*COMPRESSIONS, _SAME):
+        known = ", ".join((*COMPRESSIONS, _SAME))
+        raise InputError(f"compression must be one of {known}, got {name!r}")
+
+
+def encode(exr: Exr, compression: str = "zip") -> bytes:
+    """The file's bytes: every part in scan lines; the same parts give the same bytes.
+
+    InputError where a lossy compression would change the ids of a Cryptomatte.
+    """
+    check_compression(compression)
+    parts = []
+    for part in exr.parts:
+        kind = part.compression if compression == _SAME else COMPRESSIONS[compression]
+        if kind in _LOSSY and (crypto := _cryptomatte(part)):
+            raise InputError(
+                f"{exr.path}: {kind.name.partition('_')[0].lower()} compression is lossy and would "
+                f"change the ids of the Cryptomatte {crypto}; zip keeps them"
+            )
+        # An empty list says nothing, and the library cannot write it.
+        kept = {k: v for k, v in part.attributes.items() if not (isinstance(v, list) and not v)}
+        header = {k: v for k, v in kept.items() if k not in _WRITTEN_ANEW} | {
+            "compression": kind,
+            "type": OpenEXR.scanlineimage,
+            "dataWindow": _box(part.data_window),
+            "displayWindow": _box(part.display_window),
+        }
+        # The library ignores strides and would write wrong pixels.
+        channels = {k: np.ascontiguousarray(v) for k, v in part.channels.items()}
+        parts.append((header, channels, part.name))
+    stream = io.BytesIO()
+    try:
+        with inside():
+            OpenEXR.File([OpenEXR.Part(*part) for part in parts]).write(stream)
+    except (RuntimeError, TypeError, ValueError) as error:
+        raise InputError(f"{exr.path}: cannot be written as EXR: {_first_line(error)}") from None
+    return stream.getvalue()
+
+
+def _cryptomatte(part: Part) -> str | None:
+    """The name of a Cryptomatte that has channels in `part`."""
+    for key, name in part.attributes.items():
+        if re.fullmatch(r"cryptomatte/[^/]+/name", key):
+            for channel in part.channels:
+                if channel.startswith(str(name)) or part.name.startswith(str(name)):
+                    return str(name)
+    return None
+
+
+def new(rgba: np.ndarray, attributes: dict | None = None) -> Exr:
+    """A file with one part of half channels R, G, B and, for four channels, A."""
+    height, width, count = rgba.shape
+    window = (0, 0, width - 1, height - 1)
+    channels = {c: to_half(rgba[..., i]) for i, c in enumerate("RGBA"[:count])}
+    return Exr(Path(), [Part("", channels, attributes or {}, window, window)])
+
+
+def to_half(values: np.ndarray) -> np.ndarray:
+    """Float16, with what is too large for it held to its largest value."""
+    limit = np.finfo(np.float16).max
+    return np.clip(values, -limit, limit).astype(np.float16)
+
+
+def _open(path: Path, *, header_only: bool):
+    try:
+        return OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
+    except MemoryError:
+        raise InputError(f"{path}: not enough memory to read it") from None
+    except (RuntimeError, ValueError, TypeError, OSError) as error:
+        raise InputError(f"{path}: not a readable EXR file: {_first_line(error)}") from None
+
+
+def _short_of_memory(heard: list[str], needed: int) -> bool:
+    """Whether pixels could not be read for want of memory: the library says so of arrays, but not
+    of its own rooms, which are smaller.
+    """
+    if "MemoryError" in "".join(heard):
+        return True
+    try:
+        np.empty(needed + (needed >> 3), np.uint8)
+    except MemoryError:
+        return True
+    return False
+
+
+def _promised(path: Path, part) -> Part:
+    """What the header says the part holds, with empty arrays."""
+    header = part.header
+    if header.get("type") in (OpenEXR.deepscanline, OpenEXR.deeptile):
+        raise InputError(f"{path}: deep images are not supported")
+    data, display = (_corners(header[k]) for k in ("dataWindow", "displayWindow"))
+    width, height = data[2] - data[0] + 1, data[3] - data[1] + 1
+    if not (0 < width <= MOST_PIXELS_A_SIDE and 0 < height <= MOST_PIXELS_A_SIDE):
+        raise InputError(
+            f"{path}: image of {width} x {height}; at most {MOST_PIXELS_A_SIDE} a side"
+        )
+    channels = {c.name: np.empty((0, 0), np.float32) for c in header["channels"]}
+    if not channels:
+        raise InputError(f"{path}: a part without channels")
+    attributes = {k: v for k, v in header.items() if k not in _WRITTEN_ANEW}
+    name, compression = header.get("name", "") or "", header["compression"]
+    return Part(name, channels, attributes, data, display, compression)
+
+
+def _corners(box) -> tuple[int, int, int, int]:
+    (left, top), (right, bottom) = box
+    return int(left), int(top), int(right), int(bottom)
+
+
+def _box(corners: tuple[int, int, int, int]):
+    left, top, right, bottom = corners
+    return np.array([left, top], np.int32), np.array([right, bottom], np.int32)
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -1,0 +1,121 @@
+"""Frame numbers and file names: `shot.####.exr`, `shot.%04d.exr`, `$F4`; `1-100x2`."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from fileseq.exceptions import FileSeqException
+from fileseq.frameset import FrameSet
+
+from ..errors import InputError
+
+MOST_FRAMES = 1_000_000
+"""How many frames one run can be asked for."""
+_NUMBER = re.compile(r"[#@]+|%0*([0-9]{0,3})d|\$F0*([0-9]{0,3})")
+_RANGE = re.compile(r"(-?\d+)\s*-\s*(-?\d+)(?:\s*x\s*(\d+))?")
+
+
+@dataclass(frozen=True)
+class _Pattern:
+    """A path in whose file name a number is left open."""
+
+    folder: Path
+    begin: str
+    digits: int
+    end: str
+
+    def name(self, number: int) -> str:
+        return f"{self.begin}{number:0{self.digits}d}{self.end}"
+
+
+@lru_cache(maxsize=256)
+def _parsed(path: str | Path) -> _Pattern | None:
+    """The last run of # or @, %04d or $F4 in the file name is the number, all else literal."""
+    whole = Path(path)
+    places = list(_NUMBER.finditer(whole.name))
+    if not places:
+        return None
+    place = places[-1]
+    digits = len(place[0]) if place[0][0] in "#@" else int(place[1] or place[2] or 1)
+    return _Pattern(whole.parent, whole.name[: place.start()], digits, whole.name[place.end() :])
+
+
+def is_pattern(path: str | Path) -> bool:
+    """Whether a path stands for many frames."""
+    return _parsed(path) is not None
+
+
+def frame_path(pattern: str | Path, number: int) -> Path:
+    """The file of frame `number`; a path that is no pattern stands for itself."""
+    parsed = _parsed(pattern)
+    return Path(pattern) if parsed is None else parsed.folder / parsed.name(number)
+
+
+def readable(path: Path) -> bool:
+    """Whether the path is a file; InputError names one that must not be read."""
+    try:
+        if not path.is_file():
+            return False
+        with open(path, "rb"):
+            return True
+    except OSError as error:
+        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def numbers_on_disk(pattern: str | Path) -> list[int]:
+    """The frames of a pattern that exist, padded as it says, in order; at least one."""
+    parsed = _parsed(pattern)
+    if parsed is None:
+        raise InputError(f"{pattern}: not a frame pattern such as shot.####.exr")
+    name = re.compile(f"{re.escape(parsed.begin)}(-?[0-9]+){re.escape(parsed.end)}")
+    try:
+        matches = [m for m in map(name.fullmatch, os.listdir(parsed.folder)) if m]
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError(f"{parsed.folder}: {(why or str(error)).lower()}") from None
+    found = sorted(int(m[1]) for m in matches if parsed.name(int(m[1])) == m[0])
+    if not found:
+        raise InputError(f"{pattern}: no such frames")
+    return found
+
+
+def frame_numbers(text: str) -> list[int]:
+    """The numbers that `1-100x2` or `1,3,5-8` stands for, in that order; MOST_FRAMES of them
+    at most.
+    """
+    asked = f"frames {text if len(text) < 60 else f'{text[:60]}...'!r}"
+    try:
+        ranges = [(int(a), int(b), int(step or 1)) for a, b, step in _RANGE.findall(text)]
+        count = sum(abs(b - a) // max(step, 1) + 1 for a, b, step in ranges)
+        sensible = count <= MOST_FRAMES and "." not in text
+        numbers = [int(n) for n in FrameSet(text)] if sensible else []
+    except (FileSeqException, ValueError):
+        count, numbers = 0, []
+    if count > MOST_FRAMES:
+        raise InputError(f"{asked}: {count} frames, but one run takes {MOST_FRAMES} at most")
+    if not numbers:
+        raise InputError(f"{asked}: must be whole numbers such as 1-100, 1-100x2 or 1,3,5-8")
+    return numbers
+
+
+def frame_range(numbers: list[int]) -> str:
+    """Numbers as `frame_numbers` takes them: `1-4,9`."""
+    return str(FrameSet(numbers))
+
+
+def frame_list(numbers: list[int], longest: int = 120) -> str:
+    """Numbers for people: as `frame_range`, cut off after `longest` characters."""
+    text = frame_range(numbers)
+    if len(text) <= longest:
+        return text
+    return f"{text[:longest].rpartition(',')[0]},... ({len(numbers)} frames)"
+
+
+def number_in(path: Path) -> int:
+    """The frame number at the end of a file's name; 0 if there is none."""
+    m = re.search(r"([0-9]+)(?=\.[^.\d][^.]*$)", path.name)
+    return int(m[1]) if m else 0

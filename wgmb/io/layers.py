@@ -1,0 +1,205 @@
+"""Finding the layers of a rendered frame by the names that renderers give them."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from ..errors import InputError
+
+Channels = Mapping[str, np.ndarray]
+
+_COMPONENTS = (
+    {"x": 0, "y": 1, "z": 2, "w": 3},
+    {"r": 0, "g": 1, "b": 2, "a": 3},
+    {"u": 0, "v": 1},
+    {"red": 0, "green": 1, "blue": 2, "alpha": 3},
+)
+_COLOR = ("combined", "rgba", "rgb", "beauty", "color", "colour", "image", "final", "noisy image")
+_NORMAL = ("normal", "normals", "n")
+_DEPTH = ("depth", "z", "zdepth", "vrayzdepth", "z-depth", "z_depth", "worlddepth")
+
+
+def layers(names: Iterable[str], near: str | None = None) -> dict[str, list[str]]:
+    """Channel names by layer, in the order x y z w, r g b a, or u v; the rest by name.
+
+    Layers beside the channel `near` (of the same view layer, say) come first.
+    """
+    found: dict[str, list[str]] = {}
+    for name in names:
+        found.setdefault(name.rpartition(".")[0], []).append(name)
+    beside = (near or "").rpartition(".")[0].rpartition(".")[0]
+    first = sorted(found, key=lambda layer: (layer.rpartition(".")[0] != beside, layer))
+    return {layer: sorted(found[layer], key=_order) for layer in first}
+
+
+def _order(channel: str) -> tuple[int, str]:
+    last = component(channel)
+    return next((c[last] for c in _COMPONENTS if last in c), 9), channel
+
+
+def component(channel: str) -> str:
+    """The last part of a channel's name, in lower case: "ViewLayer.Depth.Z" -> "z"."""
+    return channel.rpartition(".")[2].lower()
+
+
+def stem(layer: str) -> str:
+    """The last part of a layer's name, in lower case: "ViewLayer.Depth" -> "depth"."""
+    return layer.rpartition(".")[2].lower()
+
+
+def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
+    """The channels of the picture: 3, or 4 with alpha."""
+    by_layer = {k: _rgba(v) for k, v in layers(names).items()}
+    by_layer = {k: v for k, v in by_layer.items() if v}
+    if wanted is not None:
+        chosen = pick(by_layer, wanted, "colour layer")
+    elif "" in by_layer:
+        chosen = ""
+    else:
+        named = [k for word in _COLOR for k in by_layer if stem(k) == word]
+        if not named and len(by_layer) != 1:
+            raise InputError(
+                f"which layer is the picture? say --layer; it has {', '.join(by_layer) or 'no RGB'}"
+            )
+        chosen = named[0] if named else next(iter(by_layer))
+    return by_layer[chosen]
+
+
+def _rgba(members: list[str]) -> list[str]:
+    by_component = {component(m): m for m in members}
+    for r, g, b, a in (("r", "g", "b", "a"), ("red", "green", "blue", "alpha")):
+        if {r, g, b} <= by_component.keys():
+            return [by_component[c] for c in (r, g, b, a) if c in by_component]
+    return []
+
+
+def find_depth(
+    names: Iterable[str], wanted: str | None = None, near: str | None = None
+) -> str | None:
+    """The channel that holds depth, beside the channel `near`; None if no name says so."""
+    by_layer = layers(names, near)
+    if wanted is not None:
+        return one_channel(by_layer, wanted, "depth layer")
+    if "Z" in by_layer.get("", ()):
+        return "Z"
+    named = [k for word in _DEPTH for k in by_layer if stem(k) == word]
+    return by_layer[named[0]][0] if named else None
+
+
+def find_normal(names: Iterable[str], near: str | None = None) -> list[str]:
+    """The three channels (x, y, z or r, g, b) of a layer called normal, normals or n, in any
+    case, beside the channel `near`; none if no name says so.
+    """
+    for layer, members in layers(names, near).items():
+        if stem(layer) in _NORMAL and len(members) == 3:
+            return members
+    return []
+
+
+def pick(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:
+    """The layer called `wanted`: its full name, or its last part if that is unambiguous."""
+    if wanted in by_layer:
+        return wanted
+    alike = [k for k in by_layer if stem(k) == wanted.lower()]
+    if len(alike) == 1:
+        return alike[0]
+    raise InputError(f"no {what} {wanted!r}; there is {', '.join(map(repr, by_layer))}")
+
+
+def one_channel(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:
+    """The channel called `wanted`, or the first of the layer of that name."""
+    everything = [name for members in by_layer.values() for name in members]
+    return wanted if wanted in everything else by_layer[pick(by_layer, wanted, what)][0]
+
+
+def grey(channels: Channels) -> np.ndarray:
+    """The one channel of a grey picture, or the red one of a coloured one."""
+    for name in ("Y", "R"):
+        if name in channels:
+            return channels[name]
+    return channels[next(iter(layers(channels).values()))[0]]
+
+
+# ---- masks ----------------------------------------------------------------------------------
+
+
+def mask(channels: Channels, attributes: Mapping, wanted: str) -> np.ndarray:
+    """A mask 0..1 from `LAYER` or `LAYER=VALUE`.
+
+    A grey layer is the mask itself. With a number for VALUE, the pixels of the layer that
+    hold it (object or material index). Where LAYER is a Cryptomatte, VALUE is an object's
+    name in its manifest or its id as 0x and eight digits, and the mask its coverage.
+    """
+    layer, _, value = wanted.partition("=")
+    crypto = _cryptomatte(attributes, layer)
+    if crypto is not None:
+        return _crypto_coverage(channels, crypto, value)
+    plane = np.asarray(channels[one_channel(layers(channels), layer, "layer")], np.float32)
+    if not value:
+        return np.clip(plane, 0, 1)
+    try:
+        number = float(value)
+    except ValueError:
+        raise InputError(
+            f"layer {layer!r} is no Cryptomatte, so {value!r} must be a number"
+        ) from None
+    return (np.abs(plane - number) < 0.5).astype(np.float32)
+
+
+def _cryptomatte(attributes: Mapping, layer: str) -> dict[str, str] | None:
+    """The `cryptomatte/<key>/...` attributes of the Cryptomatte called `layer`."""
+    found: dict[str, dict[str, str]] = {}
+    for name, value in attributes.items():
+        m = re.fullmatch(r"cryptomatte/([^/]+)/(\w+)", name)
+        if m and isinstance(value, str):  # of another type it may not even be readable
+            found.setdefault(m[1], {})[m[2]] = value
+    for crypto in found.values():
+        name = crypto.get("name")
+        if name and (layer in (name, stem(name)) or stem(name) == layer.lower()):
+            return crypto
+    return None
+
+
+def _crypto_coverage(channels: Channels, crypto: Mapping[str, str], value: str) -> np.ndarray:
+    """Coverage of one id (Cryptomatte specification 1.2): pairs of id and coverage, by rank."""
+    name = crypto["name"]
+    wanted = np.uint32(_crypto_id(crypto, value))
+    ranks = {
+        k: v for k, v in layers(channels).items() if re.fullmatch(re.escape(name) + r"\d\d", k)
+    }
+    if not ranks:
+        raise InputError(f"Cryptomatte {name!r} has no layers {name}00, {name}01, ...")
+    total = np.zeros(next(iter(channels.values())).shape, np.float32)
+    for members in ranks.values():
+        for id_, coverage in zip(members[0::2], members[1::2], strict=False):
+            ids = np.ascontiguousarray(channels[id_], np.float32).view(np.uint32)
+            total += np.where(ids == wanted, np.asarray(channels[coverage], np.float32), 0)
+    return np.clip(total, 0, 1)
+
+
+def _crypto_id(crypto: Mapping[str, str], value: str) -> int:
+    if not value:
+        raise InputError(f"Cryptomatte {crypto['name']!r}: say which object, as LAYER=NAME")
+    if re.fullmatch(r"0[xX][0-9a-fA-F]{1,8}", value):
+        return int(value, 16)
+    try:
+        manifest = json.loads(crypto.get("manifest") or "{}")
+    except (ValueError, RecursionError):
+        manifest = {}
+    if not isinstance(manifest, dict) or value not in manifest:
+        known = (
+            ", ".join(list(manifest)[:8] if isinstance(manifest, dict) else ())
+            or "nothing; give the id as 0x and eight digits"
+        )
+        raise InputError(
+            f"Cryptomatte {crypto['name']!r} has no {value!r}; its manifest has {known}"
+        )
+    try:
+        return struct.unpack(">I", bytes.fromhex(manifest[value]))[0]
+    except (ValueError, struct.error, TypeError):
+        raise InputError(f"Cryptomatte {crypto['name']!r}: bad id for {value!r}") from None

@@ -1,0 +1,228 @@
+"""PNG, JPEG and TIFF stills: display values in the file, linear light here.
+
+Integer samples are sRGB and unassociated alpha; float TIFF samples are linear and
+premultiplied already. 16 bits stay 16 bits both ways.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import cast
+
+import av
+import imageio.v3 as iio
+import numpy as np
+import tifffile
+from av.container import InputContainer
+from PIL import JpegImagePlugin
+
+from ..errors import InputError
+from . import limits
+from .record import KEY
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
+_AFTER_HEADER = 33  # bytes of a PNG's signature and IHDR
+
+
+def read(path: str | Path, *, max_mb: float = limits.MAX_MB) -> np.ndarray:
+    """(height, width, 3 or 4) float32, linear, premultiplied.
+
+    `max_mb`: megabytes that it may unpack to. `InputError` names the file where it is missing,
+    damaged, cut off, no picture or beyond that limit, and where memory is short.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+
+    def allow(width: int, height: int) -> None:
+        if width < 1 or height < 1:
+            raise ValueError(f"{width} x {height} pixels")
+        unpacked = limits.unpacked((width, height), 4)
+        limits.check(path, f"{width} x {height}", unpacked, path.stat().st_size, max_mb)
+
+    try:
+        return _to_linear(_READERS[path.suffix.lower()](path.read_bytes(), allow))
+    except InputError:
+        raise
+    except MemoryError:
+        raise InputError(f"{path}: not enough memory for its pixels") from None
+    except Exception as error:  # decoders raise whatever they like on damaged data
+        lines = str(error).splitlines() or [type(error).__name__]
+        raise InputError(f"{path}: not a readable picture: {lines[0]}") from None
+
+
+Allow = Callable[[int, int], None]
+"""Told the width and height before any pixel is read; raises where they are too large."""
+
+
+def _read_png(data: bytes, allow: Allow) -> np.ndarray:
+    if len(data) < _AFTER_HEADER or data[:8] != b"\x89PNG\r\n\x1a\n":
+        raise ValueError("no PNG header")
+    if b"IEND" not in data[-1024:]:
+        raise ValueError("cut off before its end")
+    allow(*struct.unpack(">II", data[16:24]))
+    with cast(InputContainer, av.open(io.BytesIO(data), format="png_pipe")) as container:
+        frame = next(container.decode(video=0))
+    name = frame.format.name
+    alpha = name.startswith(("rgba", "ya", "pal8"))
+    deep = "16" in name or "48" in name or "64" in name
+    wanted = {
+        (False, False): "rgb24",
+        (False, True): "rgb48le",
+        (True, False): "rgba",
+        (True, True): "rgba64le",
+    }[alpha, deep]
+    return frame.to_ndarray(format=wanted)
+
+
+def _read_jpeg(data: bytes, allow: Allow) -> np.ndarray:
+    with JpegImagePlugin.JpegImageFile(io.BytesIO(data)) as image:  # `open` has its own limit
+        allow(*image.size)
+        if image.mode not in ("L", "RGB"):
+            raise ValueError(f"must be grey or RGB, is {image.mode}")
+        return np.asarray(image)
+
+
+def _read_tiff(data: bytes, allow: Allow) -> np.ndarray:
+    with tifffile.TiffFile(io.BytesIO(data)) as file:
+        page = file.pages.first
+        if len(file.pages) != 1:
+            raise ValueError(f"must be one picture, has {len(file.pages)} pages")
+        allow(page.imagewidth, page.imagelength)
+        if page.photometric not in (tifffile.PHOTOMETRIC.RGB, tifffile.PHOTOMETRIC.MINISBLACK):
+            raise ValueError(
+                f"must be grey or RGB, is {tifffile.PHOTOMETRIC(page.photometric).name}"
+            )
+        if sum(page.databytecounts) > len(data) or page.samplesperpixel > 4:
+            raise ValueError("damaged: more data promised than there is")
+        return page.asarray()
+
+
+_READERS = {
+    ".png": _read_png,
+    ".jpg": _read_jpeg,
+    ".jpeg": _read_jpeg,
+    ".tif": _read_tiff,
+    ".tiff": _read_tiff,
+}
+
+
+def _to_linear(samples: np.ndarray) -> np.ndarray:
+    if samples.ndim == 2:
+        samples = samples[..., None]
+    if samples.ndim != 3 or 0 in samples.shape or samples.shape[2] not in (1, 2, 3, 4):
+        raise ValueError(f"must be one grey, RGB or RGBA image, got shape {samples.shape}")
+    if samples.shape[2] < 3:  # grey, grey and alpha
+        samples = np.concatenate([samples[..., :1]] * 3 + [samples[..., 1:]], axis=2)
+    if samples.dtype.kind == "f":
+        return samples.astype(np.float32)
+    if samples.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"samples must be 8 or 16 bit or float, got {samples.dtype}")
+    most = np.iinfo(samples.dtype).max
+    table = linear(np.arange(most + 1, dtype=np.float32) / np.float32(most))
+    light = table[samples[..., :3]]
+    if samples.shape[2] == 3:
+        return light
+    alpha = samples[..., 3:] / np.float32(most)
+    return np.concatenate([light * alpha, alpha], axis=2)
+
+
+def encode(rgba: np.ndarray, suffix: str, bits: int, text: str) -> bytes:
+    """The bytes of a still of (height, width, 3 or 4) linear light, with the record's text."""
+    suffix = suffix.lower()
+    if suffix in (".jpg", ".jpeg"):
+        samples = to_display(rgba[..., :3], 8)
+        return iio.imwrite(
+            "<bytes>",
+            samples,
+            extension=".jpg",
+            quality=95,
+            subsampling=0,
+            comment=text.encode(),
+        )
+    samples = to_display(rgba, bits)
+    if suffix == ".png":
+        return _with_text(_png(samples), text)
+    stream = io.BytesIO()
+    extra = ["unassalpha"] if samples.shape[2] == 4 else None
+    tifffile.imwrite(
+        stream,
+        samples,
+        photometric="rgb",
+        extrasamples=extra,
+        compression="zlib",
+        description=f"{KEY} {text}",
+        metadata=None,
+    )
+    return stream.getvalue()
+
+
+def _png(samples: np.ndarray) -> bytes:
+    kinds = {
+        (3, 1): ("rgb24", "rgb24"),
+        (4, 1): ("rgba", "rgba"),
+        (3, 2): ("rgb48le", "rgb48be"),
+        (4, 2): ("rgba64le", "rgba64be"),
+    }
+    given, stored = kinds[samples.shape[2], samples.itemsize]
+    frame = av.VideoFrame.from_ndarray(samples, format=given)
+    codec = av.CodecContext.create("png", "w")
+    codec.width, codec.height, codec.pix_fmt = frame.width, frame.height, stored
+    codec.time_base = Fraction(1, 25)
+    codec.options = {"pred": "mixed"}
+    packets = [*codec.encode(frame.reformat(format=stored)), *codec.encode(None)]
+    return b"".join(bytes(p) for p in packets)
+
+
+def _with_text(png: bytes, text: str) -> bytes:
+    """The PNG with a tEXt chunk after its header (PNG specification, 11.3.3)."""
+    body = b"tEXt" + KEY.encode() + b"\0" + text.encode("latin-1", "replace")
+    chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+    return png[:_AFTER_HEADER] + chunk + png[_AFTER_HEADER:]
+
+
+# ---- light and display values ---------------------------------------------------------------
+
+
+def linear(display: np.ndarray) -> np.ndarray:
+    """sRGB display values 0..1 -> linear light (IEC 61966-2-1)."""
+    high = ((np.maximum(display, 0.04045) + 0.055) / 1.055) ** 2.4
+    return np.where(display <= 0.04045, display / 12.92, high).astype(np.float32)
+
+
+def srgb(light: np.ndarray) -> np.ndarray:
+    """Linear light -> sRGB display values, held to 0..1."""
+    light = np.clip(light, 0, 1)
+    high = 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(light <= 0.0031308, 12.92 * light, high).astype(np.float32)
+
+
+def to_display(rgba: np.ndarray, bits: int) -> np.ndarray:
+    """Linear premultiplied (height, width, 3 or 4) -> sRGB integers of 8 or 16 bits."""
+    rgb, alpha = rgba[..., :3], rgba[..., 3:]
+    if alpha.shape[2]:
+        rgb = np.divide(rgb, alpha, out=np.zeros_like(rgb), where=alpha > 0)
+    if bits == 8:
+        shown = _eight_bits()[rgb.astype(np.float16).view(np.uint16)]
+        covered = np.rint(np.clip(alpha, 0, 1) * 255).astype(np.uint8)
+    else:
+        shown = np.rint(srgb(rgb) * 65535).astype(np.uint16)
+        covered = np.rint(np.clip(alpha, 0, 1) * 65535).astype(np.uint16)
+    return np.concatenate([shown, covered], axis=2) if alpha.shape[2] else shown
+
+
+def _eight_bits() -> np.ndarray:
+    """sRGB of every f16 by its bits: a table instead of a power per pixel."""
+    if not _TABLE:
+        with np.errstate(all="ignore"):
+            halves = np.nan_to_num(np.arange(65536, dtype=np.uint16).view(np.float16).astype("f4"))
+        _TABLE.append(np.rint(srgb(halves) * 255).astype(np.uint8))
+    return _TABLE[0]
+
+
+_TABLE: list[np.ndarray] = []

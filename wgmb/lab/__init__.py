@@ -1,0 +1,1 @@
+"""The laboratory: comparing methods with a ground truth, timing them, experiments."""

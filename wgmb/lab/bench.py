@@ -1,0 +1,385 @@
+"""How fast the methods are: GPU work alone, transfers apart, beside the same filter in numba.
+
+Figures of different days or machines say little; ratios of one run do. Candidates take
+turns, and medians are reported.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import itertools
+import json
+import math
+import os
+import statistics
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..errors import InputError
+from ..frame import Frame
+from ..frame_views import FrameViews
+from ..gpu import timing
+from ..gpu.textures import Images, numpy_of
+from ..gpu.timing import Timing
+from ..io.atomic import write_file
+from ..pipeline import Blur
+from ..scene import builtin
+from ..shutter import Shutter
+from .baselines import numba_tap
+from .cases import Contender, Staged, Tell
+from .results import machine
+
+MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
+_COPY = 64 << 20  # bytes, of the copy that tells the machine's bandwidth
+_HEAVY = 3  # parts of a figure that draw a whole frame: work, passes, call
+_MEMORY = 0.75  # share of the machine's memory that textures and buffers may take
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One method at one size with one number of samples; milliseconds."""
+
+    method: str
+    width: int
+    height: int
+    samples: int
+    gpu: float
+    """All passes, from recording to the end of the work."""
+    call: float | None = None
+    """Arrays in, array out."""
+    upload: float | None = None
+    readback: float | None = None
+    passes: dict[str, float] = field(default_factory=dict)
+    """Every pass, by name; those of one name together."""
+    counts: dict[str, int] = field(default_factory=dict)
+    """How many passes have that name."""
+    bytes: int = 0
+    """Of all inputs and the output, each once: the least that must be moved."""
+    numba: float | None = None
+    """The tap blur on the CPU with as many samples, in the same rounds."""
+    memory: int = 0
+    """Of all textures and buffers that the method holds, inputs and output too [bytes]."""
+    peak: int = 0
+    """The process's largest memory so far [bytes]."""
+
+    @property
+    def key(self) -> tuple:
+        """What another run's figure must share to be compared."""
+        return self.method, self.width, self.height, self.samples
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width, height [px]."""
+        return self.width, self.height
+
+    @property
+    def bandwidth(self) -> float:
+        """`bytes` over `gpu` [GB/s]."""
+        return self.bytes / self.gpu / 1e6
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A run's figures, and the copy bandwidth [GB/s] that went with them."""
+
+    machine: dict[str, str]
+    copy: float
+    figures: list[Figure]
+    clock: str = Timing.name
+    """What timed the passes: "timestamps" of the GPU, or "wall clock" around each alone."""
+    empty: float = 0.0
+    """Milliseconds of an empty submission, taken from every pass that wall clock timed."""
+    notes: list[str] = field(default_factory=list)
+    """What was left out, and why."""
+
+    def save(self, path: Path) -> None:
+        """As JSON, for `load`."""
+        write_file(path, (json.dumps(asdict(self), indent=1) + "\n").encode())
+
+    @classmethod
+    def load(cls, path: Path) -> Bench:
+        """What `save` wrote; the error names the file."""
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+            figures = [Figure(**f) for f in data["figures"]]
+            return cls(**data | {"copy": float(data["copy"]), "figures": figures})
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+            raise InputError(f"{path}: not a saved bench: {error}") from None
+
+
+def synthetic_frame(width: int, height: int) -> Frame:
+    """Noise under a camera that turns and comes closer; every pixel moves."""
+    rng = np.random.default_rng(0)
+    color = rng.random((height, width, 4), np.float32)
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    x, y = (x - width / 2) / width, (y - height / 2) / width
+    motion = np.stack([x - 0.5 * y + 0.2, y + 0.5 * x + 0.05], axis=2)
+    motion *= MEAN_SPEED / np.hypot(motion[..., 0], motion[..., 1]).mean()
+    depth = 5 + 4 * np.sin(9 * x) * np.cos(9 * y)
+    return Frame(color, motion=np.concatenate([-motion, motion], axis=2), depth=depth)
+
+
+def bench(
+    device: wgpu.GPUDevice,
+    contenders: Iterable[Contender],
+    sizes: Iterable[tuple[int, int]] = ((1920, 1080),),
+    samples: Iterable[int] = (16,),
+    rounds: int = 9,
+    limit: float = math.inf,
+    tell: Tell = lambda text: None,
+) -> Bench:
+    """Time every contender at every size with every number of samples.
+
+    `limit`: seconds for one of them at one size and number. It gets fewer rounds where they
+    would take longer, and is left out, which `notes` say, where three frames would, going by
+    smaller figures; so is what the memory does not hold. What is interrupted (Ctrl-C) has the
+    figures up to then.
+    """
+    if rounds < 1:
+        raise InputError(f"rounds must be 1 or more, got {rounds}")
+    if not limit > 0:
+        raise InputError(f"seconds must be over 0, got {limit}")
+    matrix = _Matrix(device, list(contenders), rounds, limit, tell)
+    groups = list(itertools.product(sorted(sizes, key=math.prod), sorted(samples)))
+    pace = 1.0  # what a group took in proportion to what was told
+    try:
+        for i, (size, count) in enumerate(groups):
+            left = [pace * matrix.seconds(*group) for group in groups[i:]]
+            about = f": about {_about(left[0])}, to the end {_about(sum(left))}" if i else ""
+            tell(f"{_what(size, count)} ({i + 1} of {len(groups)}){about}")
+            started = time.perf_counter()
+            matrix.measure(size, count)
+            if left[0]:
+                pace *= (time.perf_counter() - started) / left[0]
+    except KeyboardInterrupt:
+        if not matrix.figures:
+            raise
+        matrix.notes.append("interrupted: the rest is left out")
+    if not matrix.figures:
+        raise InputError(matrix.notes[-1] if matrix.notes else "no methods to time")
+    name, empty = matrix.clock.name, 1e3 * matrix.clock.empty
+    copy = copy_bandwidth(device)
+    return Bench(machine(device), copy, matrix.figures, name, empty, matrix.notes)
+
+
+def _what(size: tuple[int, int], samples: int) -> str:
+    return f"{size[0]} x {size[1]}, {samples} samples"
+
+
+def _about(seconds: float) -> str:
+    """A time to come, for people."""
+    return f"{seconds:.2g} s" if seconds < 99 else f"{seconds / 60:.0f} min"
+
+
+class _Matrix:
+    """Figures of contenders at growing sizes, each telling what the next will take."""
+
+    def __init__(self, device, contenders, rounds: int, limit: float, tell: Tell):
+        self.device, self.contenders, self.rounds, self.limit = device, contenders, rounds, limit
+        self.tell, self.clock = tell, timing.clock(device)
+        self.figures: list[Figure] = []
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+        self.tell(text)
+
+    def seconds(self, size: tuple[int, int], samples: int) -> float:
+        """What all contenders will take, as far as figures tell."""
+        runs = _HEAVY * (self.rounds + 1)
+        each = (self._frame(c.label, size, samples) for c in self.contenders)
+        return sum(min(runs * s, self.limit) for s in each if _HEAVY * s <= self.limit)
+
+    def measure(self, size: tuple[int, int], samples: int) -> None:
+        """All contenders that fit, in turns, and the numba peer with them."""
+        gc.collect()  # what the last figures held
+        frame, jobs, timed = synthetic_frame(*size), {}, {}
+        for c in self.contenders:
+            blur, name = c.blur(samples, Shutter(180), self.device), c.label
+            try:
+                self._check(name, size, samples, sum(t.memory for t in timed.values()))
+                make = (
+                    partial(_Traced, size=size) if c.needs_scene else partial(_Filter, frame=frame)
+                )
+                timed[name] = one = make(blur, self.clock)
+            except (InputError, wgpu.GPUError) as error:
+                self.note(f"{_what(size, samples)}: {name} left out: {error}")
+                continue
+            for part in one.parts:
+                jobs[f"{name} {part}"] = getattr(one, part)
+        if peer := numba_tap(frame, samples):
+            jobs["numba"] = peer
+        every = timing.alternate(jobs, self.rounds, self.limit / _HEAVY)
+        median = {k: 1e3 * statistics.median(v) for k, v in every.items()}
+        for name, one in timed.items():
+            parts = {part: median.get(f"{name} {part}") for part in ("call", "upload", "readback")}
+            self.figures.append(
+                Figure(
+                    name,
+                    *size,
+                    samples,
+                    median[f"{name} work"],
+                    **parts,
+                    passes={
+                        k: 1e3 * s for k, s in timing.medians(one.runs[1:] or one.runs).items()
+                    },
+                    counts=one.counts,
+                    bytes=one.bytes,
+                    numba=median.get("numba"),
+                    memory=one.memory,
+                    peak=_peak(),
+                )
+            )
+
+    def _check(self, name: str, size: tuple[int, int], samples: int, held: int) -> None:
+        """Refuse what will take too long, or more memory than there is."""
+        gpu.check_size(self.device, *size)
+        if (seconds := _HEAVY * self._frame(name, size, samples)) > self.limit:
+            raise InputError(f"{_HEAVY} frames would take about {_about(seconds)}, more than "
+                             f"{self.limit:g} s")  # fmt: skip
+        known = [f for f in self.figures if f.method == name]
+        wanted = min((f.memory * math.prod(size) / math.prod(f.size) for f in known), default=0)
+        if wanted + held > (most := _MEMORY * _memory()):
+            raise InputError(f"it would hold {wanted / 2**30:.1f} GB beside {held / 2**30:.1f} GB "
+                             f"of the others, of {most / 2**30:.1f} GB")  # fmt: skip
+
+    def _frame(self, name: str, size: tuple[int, int], samples: int) -> float:
+        """Seconds of a frame, in proportion to pixels and samples; 0 where nothing is known."""
+        known = [f for f in self.figures if f.method == name]
+        return min(
+            (f.gpu / 1e3 * math.prod(size) / math.prod(f.size) * max(1, samples / f.samples)
+             for f in known), default=0.0,
+        )  # fmt: skip
+
+
+class _Timed:
+    """One method in the parts that are timed; has drawn one frame when it is made."""
+
+    parts: tuple[str, ...] = ("work", "passes")
+    bytes = 0
+
+    def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
+        self.blur, self.clock, self._held = blur, clock, _held()
+        self.images = Images(blur.device)
+        self.output = self.images.texture("output", size, blur.output)
+        self.memory, self.runs, self.counts = 0, [], {}
+
+    def draw(self, encoder, clock: timing.Clock | None) -> None:
+        """One frame, as the method draws it."""
+        raise NotImplementedError
+
+    def work(self) -> None:
+        """All passes at once."""
+        timing.work(self.blur.device, lambda encoder: self.draw(encoder, None))
+        self.memory = self.memory or _held() - self._held
+
+    def passes(self) -> None:
+        """All passes, each timed by itself."""
+        timing.work(self.blur.device, lambda encoder: self.draw(encoder, self.clock))
+        self.runs.append(self.clock.read())
+        self.counts = self.clock.counts
+
+
+class _Traced(_Timed):
+    """A method of scenes, on the first of two that it can draw: bodies, or volumes."""
+
+    def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
+        super().__init__(blur, clock, size)
+        for name in ("crossing", "torusphere"):
+            self._render = Staged(builtin.make(name), size=size).render(blur)
+            with contextlib.suppress(InputError):
+                self.work()
+                return
+        raise InputError(f"method {blur.method.name!r} draws none of the scenes it is timed on")
+
+    def draw(self, encoder, clock):
+        self._render.draw(self.output.create_view(), 0.0, timing=clock)
+
+
+class _Filter(_Timed):
+    """A method of pictures, on one frame."""
+
+    parts = ("work", "passes", "call", "upload", "readback")
+
+    def __init__(self, blur: Blur, clock: timing.Clock, frame: Frame):
+        super().__init__(blur, clock, frame.size)
+        self.frame = frame
+        if "neighbours" in blur.method.uses:
+            near = {"prev": replace(frame, number=-1), "next": replace(frame, number=1)}
+            self.frame = replace(frame, **near)
+        self.views = blur.upload(self.frame)
+        self.bytes = _bytes(self.views, self.output)
+        self.work()
+
+    def draw(self, encoder, clock):
+        output = self.output.create_view()
+        self.blur.encode(encoder, output=output, timing=clock, **self.views)
+
+    def call(self) -> None:
+        """Arrays in, array out."""
+        self.blur(self.frame)
+
+    def upload(self) -> None:
+        """The frame's arrays as textures."""
+        self.blur.upload(self.frame)
+        timing.work(self.blur.device, lambda encoder: None)
+
+    def readback(self) -> None:
+        """The result as an array."""
+        self.images.download(self.blur.device.create_command_encoder(), self.output)
+
+
+def _held() -> int:
+    """What all textures and buffers of the process hold [bytes]."""
+    counts = wgpu.diagnostics.object_counts  # pyright: ignore[reportAttributeAccessIssue]
+    return counts.get_dict()["total"]["resource_mem"]
+
+
+def _memory() -> int:
+    """The machine's memory [bytes]; infinite where the system does not tell."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return sys.maxsize
+
+
+def _peak() -> int:
+    """The process's largest memory so far [bytes]; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return 0
+    unit = 1 if sys.platform == "darwin" else 1024
+    return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def _bytes(views: dict, output: wgpu.GPUTexture) -> int:
+    """What all textures of `encode`'s inputs and the output hold."""
+    every = [v for one in views.values() if isinstance(one, FrameViews) for v in vars(one).values()]
+    read = [v.texture for v in every if isinstance(v, wgpu.GPUTextureView)]
+    total = 0
+    for texture in (*read, output):
+        kind, channels = numpy_of(texture.format)
+        total += texture.size[0] * texture.size[1] * channels * kind.itemsize
+    return total
+
+
+def copy_bandwidth(device: wgpu.GPUDevice, rounds: int = 7) -> float:
+    """GB/s that a copy from buffer to buffer reads and writes."""
+    usage = wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
+    a, b = (device.create_buffer(size=_COPY, usage=usage) for _ in range(2))
+
+    def copy(encoder) -> None:
+        encoder.copy_buffer_to_buffer(a, 0, b, 0, _COPY)
+
+    seconds = [timing.work(device, copy) for _ in range(rounds + 1)][1:]
+    return 2 * _COPY / statistics.median(seconds) / 1e9

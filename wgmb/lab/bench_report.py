@@ -1,0 +1,142 @@
+"""What bench.py measured, for people: text, tables, curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..gpu.timing import Timing
+from .bench import Bench, Figure
+from .results import Plot, Report, Table
+
+
+def text(run: Bench) -> str:
+    """A run's figures for people."""
+    lines = [f"{run.machine['adapter']}; a copy moves {run.copy:.1f} GB/s", _clocked(run)]
+    for f in run.figures:
+        pixels = f.width * f.height
+        lines.append(f"{f.width} x {f.height}, {f.method}, {f.samples} samples")
+        rows = [("gpu", f.gpu), *((f"  {_times(f, k)}", v) for k, v in f.passes.items()),
+                ("upload", f.upload), ("readback", f.readback), ("call", f.call),
+                ("numba tap", f.numba)]  # fmt: skip
+        for name, milliseconds in rows:
+            if milliseconds is not None:
+                each = 1e6 * milliseconds / pixels
+                lines.append(f"  {name:42}{milliseconds:9.2f} ms {each:8.1f} ns a pixel")
+        if f.numba:
+            lines.append(f"  gpu / numba tap{f.gpu / f.numba:36.2f}")
+        if f.bytes:
+            share = f.bandwidth / run.copy
+            lines.append(f"  at least{f.bandwidth:43.2f} GB/s {share:6.0%} of a copy")
+        lines.append(f"  holds{f.memory / 2**20:46.2f} MB {f.memory / pixels:8.1f} B a pixel")
+    lines += run.notes
+    return "\n".join(lines) + "\n"
+
+
+def _times(f: Figure, label: str) -> str:
+    """A pass and how often it ran."""
+    return label if f.counts.get(label, 1) == 1 else f"{label} x {f.counts[label]}"
+
+
+def _clocked(run: Bench) -> str:
+    """How the passes were timed."""
+    if run.clock == Timing.name:
+        return "Passes by the GPU's timestamps"
+    return (
+        "Passes by wall clock, each submitted by itself, less the "
+        f"{run.empty:.2f} ms of an empty submission"
+    )
+
+
+def against(run: Bench, before: Bench) -> Table:
+    """This run over an earlier one: under 1 is faster now."""
+    old = {f.key: f for f in before.figures}
+    rows = []
+    for f in run.figures:
+        if (was := old.get(f.key)) is None:
+            continue
+        peers = f.gpu / f.numba / (was.gpu / was.numba) if f.numba and was.numba else None
+        rows.append([*_first(f), round(was.gpu, 2), round(f.gpu, 2), round(f.gpu / was.gpu, 2),
+                     None if peers is None else round(peers, 2)])  # fmt: skip
+    columns = ["method", "size", "samples", "before [ms]", "now [ms]", "now / before",
+               "the same, by numba"]  # fmt: skip
+    note = f"Before: {before.machine.get('adapter')}, {before.machine.get('made')}."
+    if not rows:
+        note += " The two runs have no method, size and samples in common."
+    return Table("Against an earlier run", columns, rows, note)
+
+
+def report(run: Bench, command: str, before: Bench | None = None) -> Report:
+    """The figures as tables and plots, for report.py."""
+    made = Report("Speed of the methods", command, run.machine, 0)
+    columns = ["method", "size", "samples", "GPU [ms]", "ns a pixel", "/ numba tap"]
+    columns += ["upload [ms]", "readback [ms]", "call [ms]", "at least [GB/s]", "of a copy"]
+    rows = []
+    for f in run.figures:
+        each, moved = 1e6 * f.gpu / (f.width * f.height), f.bandwidth if f.bytes else None
+        values = (f.gpu, each, f.numba and f.gpu / f.numba, f.upload, f.readback, f.call, moved,
+                  moved and moved / run.copy)  # fmt: skip
+        rows.append([*_first(f), *map(_round, values), f.memory >> 20, f.peak >> 20])
+    columns += ["holds [MB]", "peak of the process [MB]"]
+    note = (
+        f"A copy moves {run.copy:.1f} GB/s. Bytes are those of inputs and output, each once. "
+        "A method holds textures and buffers, inputs and output too; the process's memory is its "
+        "largest so far, with all methods in it, sizes in this order."
+    )
+    made.tables.append(Table("Every method", columns, rows, note))
+    passes = [
+        [*_first(f), k, f.counts.get(k, 1), round(v, 3), round(v / total, 3) if total else None]
+        for f in run.figures
+        for total in [sum(f.passes.values())]
+        for k, v in f.passes.items()
+    ]
+    columns = ["method", "size", "samples", "pass", "times", "all of them [ms]", "share"]
+    made.tables.append(Table("Every pass", columns, passes, f"{_clocked(run)}."))
+    made.notes += run.notes
+    if before:
+        made.tables.append(against(run, before))
+    made.plots += _curves(run.figures)
+    return made
+
+
+def _curves(figures: Sequence[Figure]) -> list[Plot]:
+    """Time a pixel against size, time and passes against samples, where there are several."""
+    sizes = sorted({(f.width * f.height, f.width, f.height) for f in figures})
+    counts = sorted({f.samples for f in figures})
+    plots = []
+    if len(sizes) > 1:
+        curves: dict[str, list[tuple[float, float]]] = {}
+        for f in figures:
+            if f.samples == counts[len(counts) // 2]:
+                pixels = f.width * f.height
+                curves.setdefault(f.method, []).append((pixels / 1e6, 1e6 * f.gpu / pixels))
+        title = f"Time a pixel, {counts[len(counts) // 2]} samples"
+        plots.append(Plot(title, "megapixels", "ns a pixel", curves))
+    if len(counts) > 1:
+        _, width, height = sizes[len(sizes) // 2]
+        curves = {}
+        for f in figures:
+            if (f.width, f.height) == (width, height):
+                curves.setdefault(f.method, []).append((f.samples, f.gpu))
+        plots.append(Plot(f"Time against samples, {width} x {height}", "samples", "ms", curves))
+        plots += _pass_curves([f for f in figures if f.size == (width, height)])
+    return plots
+
+
+def _pass_curves(figures: Sequence[Figure]) -> list[Plot]:
+    """Every pass against samples, of each method that has several."""
+    plots: dict[str, Plot] = {}
+    for f in figures:
+        title = f"{f.method}: its passes, {f.width} x {f.height}"
+        plot = plots.setdefault(f.method, Plot(title, "samples", "ms", {}))
+        for label, milliseconds in f.passes.items():
+            plot.curves.setdefault(label, []).append((f.samples, milliseconds))
+    several = (p for p in plots.values() if len(p.curves) > 1)
+    return [p for p in several if any(len(curve) > 1 for curve in p.curves.values())]
+
+
+def _first(f: Figure) -> list:
+    return [f.method, f"{f.width} x {f.height}", f.samples]
+
+
+def _round(value: float | None) -> float | None:
+    return None if value is None else round(value, 2)

@@ -1,0 +1,427 @@
+"""A Report as one page that needs no network, as JSON and as CSV."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import json
+import math
+from collections.abc import Iterable
+from html import escape
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from ..io.atomic import write_file
+from ..metrics import FLIP_GAIN, MEASURES, display, flip_colors
+from .cases import Case
+from .results import Entry, Plot, Report, Table
+
+_COLORS = 10  # in report.html
+_TEMPLATE = Path(__file__).with_name("report.html")
+_WIDTH, _HEIGHT, _LEFT, _RIGHT, _TOP, _BOTTOM = 380, 240, 46, 12, 10, 34  # of a plot
+
+
+def write(report: Report, path: Path) -> list[Path]:
+    """Write the page to `path`, and .json and .csv beside it; returns the three paths."""
+    written = {
+        path: page(report),
+        path.with_suffix(".json"): json.dumps(as_json(report), indent=1) + "\n",
+        path.with_suffix(".csv"): as_csv(report),
+    }
+    for file, text in written.items():
+        write_file(file, text.encode())
+    return list(written)
+
+
+def as_json(report: Report) -> dict:
+    """All figures of a report; a number that is not finite is null."""
+    return {
+        "title": report.title,
+        "command": report.command,
+        "machine": report.machine,
+        "cases": [
+            {
+                "name": c.name,
+                "truth": c.about,
+                "floor": c.floor and {k: _plain(v) for k, v in c.floor.items()},
+            }
+            for c in report.cases
+        ],
+        "entries": [_row(e) for e in report.entries],
+        "tables": [
+            {
+                "title": t.title,
+                "note": t.note,
+                "columns": list(t.columns),
+                "rows": [[_plain(v) for v in row] for row in t.rows],
+            }
+            for t in report.tables
+        ],
+        "plots": [
+            {"title": p.title, "x": p.x, "y": p.y, "floor": p.floor, "curves": p.curves}
+            for p in report.plots
+        ],
+        "notes": report.notes,
+    }
+
+
+def as_csv(report: Report) -> str:
+    """One line an entry; where there are none, the tables one below the other."""
+    text = io.StringIO()
+    rows = [_row(e) for e in report.entries]
+    if rows:
+        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    for i, table in enumerate([] if rows else report.tables):
+        lines = csv.writer(text, lineterminator="\n")
+        lines.writerows([*([[]] if i else []), table.columns, *table.rows])
+    return text.getvalue()
+
+
+def _row(e: Entry) -> dict:
+    own = {"case": e.case, "method": e.label, "kind": e.kind, "samples": e.samples,
+           "seconds": e.seconds, "frame_seconds": e.frame_seconds, "budget": e.budget}  # fmt: skip
+    return own | {name: _plain(value) for name, value in e.measures.items()}
+
+
+def _plain(value):
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+# ---- the page -------------------------------------------------------------------------------
+
+
+def page(report: Report) -> str:
+    """The report as HTML: styles, pictures, plots and script all within."""
+    colors: dict[str, str] = {}
+    for label in (e.label for e in report.entries if e.kind in ("samples", "time")):
+        colors.setdefault(label, f"var(--c{len(colors) % _COLORS})")
+    parts = [_head(report)]
+    if len(report.cases) > 1:
+        parts.append(_means(report, colors))
+    parts += [_table(t, colors) for t in report.tables]
+    parts += [_plots(report.plots, colors)]
+    parts += [_case(report, i, case, colors) for i, case in enumerate(report.cases)]
+    parts.append(_foot(report))
+    text = _TEMPLATE.read_text(encoding="utf-8")
+    return text.replace("{{title}}", escape(report.title)).replace("{{body}}", "\n".join(parts))
+
+
+def _head(report: Report) -> str:
+    links = "".join(f'<a href="#case{i}">{escape(c.name)}</a>' for i, c in enumerate(report.cases))
+    nav = f"<nav>{links}</nav>" if len(report.cases) > 1 else ""
+    about = " · ".join(escape(f"{k} {v}") for k, v in report.machine.items())
+    return (
+        f"<h1>{escape(report.title)}</h1><p class=soft>{about}</p>"
+        f"<pre>{escape(report.command)}</pre>{nav}"
+    )
+
+
+def _means(report: Report, colors) -> str:
+    """Every method's mean over the cases, at equal samples."""
+    by_label: dict[str, list[Entry]] = {}
+    for e in report.entries:
+        if e.shown and e.kind != "time":
+            by_label.setdefault(e.label, []).append(e)
+    everywhere = {k: v for k, v in by_label.items() if len(v) == len(report.cases)}
+    columns = ["method", *(m.title for m in MEASURES.values())]
+    rows = [
+        [label, *(float(np.mean([e.measures[name] for e in found])) for name in MEASURES)]
+        for label, found in everywhere.items()
+    ]
+    note = f"Mean of {len(report.cases)} cases, {report.samples} samples each; best in green."
+    return f"<h2>All cases</h2><p class=soft>{note}</p>" + _grid(columns, rows, colors, judged=1)
+
+
+def _case(report: Report, index: int, case: Case, colors) -> str:
+    truth = Entry(case.name, "truth", "truth", {}, picture=case.truth)
+    still = [e for e in report.of(case.name, shown=True) if e.kind != "time"]
+    timed = report.of(case.name, kind="time")
+    parts = [
+        f'<h2 id="case{index}">{escape(case.name)}</h2>',
+        f"<p class=soft>Truth: {escape(case.about)}</p>",
+        _viewer(index, [*still, truth, *timed]),
+        f"<h3>Equal samples: {report.samples}</h3>",
+        _cards(index, case, [*still, truth]),
+    ]
+    for budget in sorted({e.budget for e in timed if e.budget is not None}):
+        parts.append(f"<h3>Equal time: {1e3 * budget:.0f} ms</h3>")
+        parts.append(_cards(index, case, [e for e in timed if e.budget == budget]))
+    parts.append("<h3>Figures</h3>")
+    parts.append(_figures(report.of(case.name), colors))
+    if case.staged is not None:
+        parts.append(
+            "<p class=soft>Times of methods that take rendered frames include rendering one.</p>"
+        )
+    parts.append("<h3>Error against time and samples</h3>")
+    parts.append(_plots(_curves(report.of(case.name, kind="samples"), case.floor or {}), colors))
+    return "\n".join(parts)
+
+
+def _viewer(index: int, entries: list[Entry]) -> str:
+    names = [_name(e) for e in entries]
+    right = next(i for i, e in enumerate(entries) if e.kind == "truth")
+    left = next((i for i, e in enumerate(entries) if e.kind == "samples"), 0)
+
+    def picker(side: str, chosen: int) -> str:
+        options = "".join(
+            f"<option{' selected' if i == chosen else ''}>{escape(name)}</option>"
+            for i, name in enumerate(names)
+        )
+        return f'<label>{side} <select class="{side}">{options}</select></label>'
+
+    return (
+        f'<div class="viewer" data-case="{index}"><div class="stage" style="--at:50%">'
+        '<img class="right" alt=""><img class="left" alt=""><div class="bar"></div>'
+        '<span class="name-left"></span><span class="name-right"></span>'
+        '<input type="range" min="0" max="100" step="0.1" value="50" aria-label="compare"></div>'
+        f'<div class="pick">{picker("left", left)}{picker("right", right)}'
+        '<label><input type="checkbox"> error maps</label></div></div>'
+    )
+
+
+def _name(e: Entry) -> str:
+    if e.kind == "time" and e.budget is not None:
+        return f"{e.label}, {e.samples} in {1e3 * e.budget:.0f} ms"
+    return e.label if e.samples is None else f"{e.label}, {e.samples}"
+
+
+def _cards(index: int, case: Case, entries: Iterable[Entry]) -> str:
+    return f'<div class="cards">{"".join(_card(index, case, e) for e in entries)}</div>'
+
+
+def _card(index: int, case: Case, e: Entry) -> str:
+    assert e.picture is not None
+    name = escape(_name(e))
+    images = f'<img src="{_uri(display(e.picture))}" alt="{name}">'
+    about = "what the others should be"
+    if e.measures:
+        errors = flip_colors(e.picture, case.truth)
+        images += f'<img src="{_uri(errors)}" alt="error of {name}">'
+        about = f"FLIP {e.measures['flip']:.4f} · PSNR {e.measures['psnr']:.1f} dB"
+        if e.seconds is not None:
+            about += f" · {1e3 * e.seconds:.0f} ms"
+    return (
+        f'<figure class="card" data-case="{index}" data-name="{name}">'
+        f'<button title="show on the left above">{images}</button>'
+        f"<figcaption><b>{name}</b><br>{about}</figcaption></figure>"
+    )
+
+
+def _uri(shown: np.ndarray) -> str:
+    """A picture of display values 0..1 within the page."""
+    data = io.BytesIO()
+    levels = (255 * np.clip(shown, 0, 1) + 0.5).astype(np.uint8)
+    Image.fromarray(levels).save(data, "WEBP", quality=90, method=4)
+    return "data:image/webp;base64," + base64.b64encode(data.getvalue()).decode()
+
+
+def _figures(entries: list[Entry], colors) -> str:
+    framed = any(e.frame_seconds for e in entries)
+    columns = ["method", "samples", "time [ms]", *["without frame [ms]"][: int(framed)]]
+    columns += [m.title for m in MEASURES.values()]
+    rows, floor = [], None
+    for e in entries:
+        times: list[float | None] = [None, None]
+        if e.seconds is not None:
+            times = [round(1e3 * s, 2) for s in (e.seconds, e.seconds - e.frame_seconds)]
+        rows.append([e.label, e.samples, *times[: 1 + framed], *e.measures.values()])
+        floor = rows[-1] if e.kind == "floor" else floor
+    return _grid(columns, rows, colors, judged=3 + framed, floor=floor)
+
+
+def _table(table: Table, colors) -> str:
+    note = f"<p class=soft>{escape(table.note)}</p>" if table.note else ""
+    return f"<h3>{escape(table.title)}</h3>{note}{_grid(table.columns, table.rows, colors)}"
+
+
+def _grid(columns, rows, colors, judged: int | None = None, floor=None) -> str:
+    """A sortable table; from column `judged` on stand the MEASURES, the best of each marked.
+
+    The row `floor` takes no part in that.
+    """
+    heads = "".join(
+        f'<th scope="col"><button type="button">{escape(str(c))}</button></th>' for c in columns
+    )
+    best: dict[int, float] = {}
+    ranked = [row for row in rows if row is not floor]
+    if judged is not None and len(ranked) > 1:
+        for i, m in enumerate(MEASURES.values(), judged):
+            best[i] = (max if m.more_is_better else min)(row[i] for row in ranked)
+    digits = {i: _digits(row[i] for row in rows) for i in range(len(columns))}
+    if judged is not None:
+        digits |= {i: m.digits for i, m in enumerate(MEASURES.values(), judged)}
+    lines = []
+    for row in rows:
+        cells = []
+        for i, value in enumerate(row):
+            wins = i in best and value == best[i] and row is not floor
+            mark = " class=best" if wins else ""
+            key = f' data-value="{value}"' if isinstance(value, int | float) else ""
+            key = ' data-value=""' if value is None else key
+            text = escape(_text(value, digits[i]))
+            if i == 0 and str(value) in colors:
+                text = f'<span class="dot" style="background:{colors[value]}"></span>{text}'
+            cells.append(f"<td{mark}{key}>{text}</td>")
+        lines.append(f"<tr>{''.join(cells)}</tr>")
+    return (
+        f'<div class="scroll"><table class="sort"><thead><tr>{heads}</tr></thead>'
+        f"<tbody>{''.join(lines)}</tbody></table></div>"
+    )
+
+
+def _digits(values: Iterable[object]) -> int:
+    """Decimals that the numbers of a column need, four at most."""
+    numbers = [f"{v:.4f}".rstrip("0") for v in values if isinstance(v, float) and math.isfinite(v)]
+    return max((len(n.partition(".")[2]) for n in numbers), default=0)
+
+
+def _text(value, digits: int) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        if math.isinf(value):
+            return "∞"
+        return f"{value + 0.0:.{digits}f}"
+    return str(value)
+
+
+def _foot(report: Report) -> str:
+    notes = "".join(f"<p>{escape(n)}</p>" for n in report.notes)
+    if not report.cases:
+        return notes and f"<h2>Notes</h2>{notes}"
+    judges = "".join(f"<dt>{m.title}</dt><dd>{m.about}</dd>" for m in MEASURES.values())
+    return (
+        f"<h2>How to read this</h2>{notes}<dl>{judges}<dt>error maps</dt>"
+        f"<dd>{FLIP_GAIN:g} times FLIP of every pixel: black is alike, white very different</dd>"
+        "<dt>time</dt><dd>wall clock from recording to the end of the GPU's work, the least of "
+        "several rounds in turns; compare times of one page only</dd>"
+        "<dt>noise floor</dt><dd>what a perfect picture would get, as the truth has noise: each "
+        "of two independent halves of the truth against their mean</dd></dl>"
+        "<p class=soft>Figures were taken from floating point pictures; those on this page are "
+        "compressed. JSON and CSV lie beside it.</p>"
+    )
+
+
+# ---- plots ----------------------------------------------------------------------------------
+
+
+def _curves(entries: list[Entry], floor: dict[str, float]) -> list[Plot]:
+    plots = []
+    for judge in ("flip", "psnr"):
+        m = MEASURES[judge]
+        unit = " [dB]" if judge == "psnr" else ""
+        for title, x, key in (("time", "ms", lambda e: 1e3 * (e.seconds or 0)),
+                              ("samples", "samples", lambda e: e.samples)):  # fmt: skip
+            curves: dict[str, list[tuple[float, float]]] = {}
+            for e in entries:
+                curves.setdefault(e.label, []).append((key(e), e.measures[judge]))
+            better = "higher is better" if m.more_is_better else "lower is better"
+            plots.append(
+                Plot(f"{m.title} against {title}", x, f"{m.title}{unit}, {better}", curves,
+                     floor=floor.get(judge))
+            )  # fmt: skip
+    return plots
+
+
+def _plots(plots: Iterable[Plot], colors) -> str:
+    drawn = "".join(_plot(p, colors) for p in plots)
+    return f'<div class="plots">{drawn}</div>' if drawn else ""
+
+
+def _plot(plot: Plot, colors: dict[str, str]) -> str:
+    named = {k: colors.get(k, f"var(--c{i % _COLORS})") for i, k in enumerate(plot.curves)}
+    legend = "".join(
+        f'<span><i class="dot" style="background:{color}"></i>{escape(name)}</span>'
+        for name, color in named.items()
+    )
+    return (
+        f'<figure class="plot"><figcaption><b>{escape(plot.title)}</b></figcaption>'
+        f"{svg(plot, named)}<figcaption>{legend}</figcaption></figure>"
+    )
+
+
+def svg(plot: Plot, colors: dict[str, str]) -> str:
+    """The curves as SVG, in the colours by name."""
+    points = [p for curve in plot.curves.values() for p in curve if all(map(math.isfinite, p))]
+    if not points:
+        return ""
+    xs, ys = ([p[i] for p in points] for i in (0, 1))
+    x_ticks = _log_ticks(min(xs), max(xs)) if plot.log else _ticks(min(xs), max(xs))
+    floor = [plot.floor] if plot.floor is not None and math.isfinite(plot.floor) else []
+    y_ticks = _ticks(min(ys + floor), max(ys + floor))
+    along = math.log if plot.log else float
+    low_x = along(min(*x_ticks, *xs))
+    high_x = along(max(*x_ticks, *xs))
+    low_y, high_y = y_ticks[0], y_ticks[-1]
+
+    def x(value: float) -> float:
+        share = (along(value) - low_x) / ((high_x - low_x) or 1)
+        return round(_LEFT + share * (_WIDTH - _LEFT - _RIGHT), 1)
+
+    def y(value: float) -> float:
+        share = (value - low_y) / ((high_y - low_y) or 1)
+        return round(_HEIGHT - _BOTTOM - share * (_HEIGHT - _TOP - _BOTTOM), 1)
+
+    bottom = _HEIGHT - _BOTTOM
+    parts = [
+        f'<line class="grid" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{y(t)}" y2="{y(t)}"/>'
+        f'<text x="{_LEFT - 6}" y="{y(t) + 4}" text-anchor="end">{t:g}</text>'
+        for t in y_ticks
+    ]
+    parts += [
+        f'<line class="grid" x1="{x(t)}" x2="{x(t)}" y1="{_TOP}" y2="{bottom}"/>'
+        f'<text x="{x(t)}" y="{bottom + 15}" text-anchor="middle">{t:g}</text>'
+        for t in x_ticks
+    ]
+    parts.append(
+        f'<text x="{_WIDTH - _RIGHT}" y="{_HEIGHT - 4}" text-anchor="end">{escape(plot.x)}</text>'
+        f'<text x="{_LEFT}" y="{_HEIGHT - 4}">{escape(plot.y)}</text>'
+    )
+    for level in floor:
+        above = y(level) > _TOP + 16
+        parts.append(
+            f'<line class="floor" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{y(level)}" '
+            f'y2="{y(level)}"><title>noise floor of the truth: {level:.4g}</title></line>'
+            f'<text x="{_LEFT + 4}" y="{y(level) + (-4 if above else 13)}">noise floor</text>'
+        )
+    for name, curve in plot.curves.items():
+        at = [(x(a), y(b), a, b) for a, b in sorted(curve) if math.isfinite(b)]
+        line = "M" + "L".join(f"{a},{b}" for a, b, *_ in at)
+        parts.append(f'<path d="{line}" style="stroke:{colors[name]}"/>')
+        parts += [
+            f'<circle cx="{a}" cy="{b}" r="3.5" style="fill:{colors[name]}">'
+            f"<title>{escape(name)}: {p:.4g} {escape(plot.x)}, {q:.4g}</title></circle>"
+            for a, b, p, q in at
+        ]
+    return (
+        f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{escape(plot.title)}">'
+        f"{''.join(parts)}</svg>"
+    )
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """About five round numbers that hold the range."""
+    span = (high - low) or abs(high) or 1.0
+    rough = span / 4
+    power = 10 ** math.floor(math.log10(rough))
+    step = next(k * power for k in (1, 2, 2.5, 5, 10) if k * power >= rough * 0.999)
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return [round(k * step, 12) for k in range(first, max(last, first + 1) + 1)]
+
+
+def _log_ticks(low: float, high: float) -> list[float]:
+    """Powers of two for small numbers of samples, else 1, 2 and 5 times powers of ten."""
+    low, high = max(low, 1e-9), max(high, low * 1.01)
+    if float(low).is_integer() and float(high).is_integer() and high <= 4096:
+        twos = [2.0**k for k in range(13) if low <= 2**k <= high]
+        if len(twos) >= 2:
+            return twos
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    every = [k * 10.0**d for d in decades for k in (1, 2, 5)]
+    inside = [t for t in every if low <= t <= high]
+    return inside if 2 <= len(inside) <= 8 else [t for t in inside if f"{t:e}"[0] == "1"] or [low]

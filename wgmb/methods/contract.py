@@ -1,0 +1,83 @@
+"""The contract between the pipeline and a method: what a method is, and what it may read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import wgpu
+
+from .. import gpu
+from ..frame_views import FrameViews, View
+from ..scene.gbuffer import SceneOnGpu
+from ..shutter import Shutter
+from .options import MethodOptions
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PreparedFrame(FrameViews):
+    """A frame as methods read it: `motion` is complete, `color` is multiplied by `weight`."""
+
+    offset: int
+    """-1, 0, 1: how far it is from the frame that is blurred [frame intervals]."""
+    weight: View | None
+    """How much each pixel counts, 0..1; None: all alike. All frames have one, or none has."""
+    by_camera: bool
+    """The motion is the camera's alone: there are no vectors."""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What a method may read while it records one frame."""
+
+    given: gpu.Given
+    samples: int
+    number: int
+    jitter: float
+    shutter: Shutter
+    frames: tuple[PreparedFrame, ...]
+    """The frame itself, then those neighbours that there are; none for a scene."""
+    none: View
+    """Bound where an input is not there."""
+    linear: wgpu.GPUSampler
+    even: bool
+    """The shutter is a box."""
+    auto: bool
+    """`samples` is the most a pixel may take."""
+    scene: SceneOnGpu | None
+    progress: tuple[int, int]
+    """Samples done before, samples to do now."""
+
+    @property
+    def frame(self) -> PreparedFrame:
+        """The frame that is blurred."""
+        return self.frames[0]
+
+
+class Method(Protocol):
+    """What a method is: a name, the inputs it needs, and how it is recorded.
+
+    It may also have `samples`, its own default number of them, and `adaptive`: it can take as
+    many samples as each pixel's streak needs (AUTO of wgsl/common/shutter.wgsl); `confidence`,
+    what the four channels of its `show="confidence"` are called; `most_in_software`: the most
+    samples it takes without a GPU, if not as many as with one.
+    """
+
+    name: str
+    """Also the stem of its Python file, its WGSL file and its twin in the tests."""
+    needs: frozenset[str]
+    """Of "color", "motion", "depth", "scene"."""
+    uses: frozenset[str]
+    """What it takes if it is there: "neighbours", "depth", "normal"; "progress": its samples may
+    be recorded bit by bit."""
+
+    Options: type[MethodOptions]
+    """Its own options; see options.py."""
+
+    def __init__(self, device: wgpu.GPUDevice, options: MethodOptions, *, output: str): ...
+
+    def encode(
+        self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView
+    ) -> None:
+        """Record its passes; never submit, never wait."""
+        ...

@@ -1,0 +1,73 @@
+"""Distributed ray tracing in time: the reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..gpu.textures import Scratch
+from .options import MethodOptions, Range
+
+TIMES = 4096  # equal shares of the exposure between which times are interpolated
+
+
+class Distributed:
+    """Every ray has its own instant and place in the pixel (Cook, Porter, Carpenter 1984).
+
+    `samples` are rays a pixel. Times go through the shutter's inverse integral; time and
+    place come from one low-discrepancy sequence that is shifted by the pixel and the `seed`,
+    so more rays refine the same picture, and the same seed gives the same bits.
+
+    Strong: converges to the truth for any motion, the only one that needs nothing but a
+    scene. Artefacts: noise that falls with the number of rays, and takes the longest to fall.
+    """
+
+    name = "distributed"
+    needs = frozenset({"scene"})
+    uses = frozenset({"progress"})
+
+    @dataclass(frozen=True, kw_only=True)
+    class Options(MethodOptions):
+        """Which noise."""
+
+        seed: Annotated[int, Range(0, 2**32 - 1), "another seed is other noise"] = 0
+
+    def __init__(self, device, options: Options, *, output="rgba32float"):
+        self._device, self._output, self._seed = device, output, options.seed
+        self._sums = Scratch(device)
+        self._times: tuple[object, wgpu.GPUBuffer] | None = None
+
+    def encode(self, encoder, inputs, output):
+        """Record the rays of `inputs.progress`; `output` is the mean of all so far."""
+        kernel = gpu.kernel(
+            self._device,
+            "methods/distributed.wgsl",
+            {"Output": self._output},
+            **inputs.scene.constants,
+        )
+        data = np.zeros((), kernel.source.dtype("Progress"))
+        data["first"], data["count"] = inputs.progress
+        data["seed"] = self._seed
+        create = self._device.create_buffer_with_data
+        width, height = inputs.given.size
+        kernel.run(
+            encoder,
+            "main",
+            replace(inputs.given, resources=inputs.given.resources | self._fine(inputs.shutter)),
+            progress=create(label="progress", data=data, usage=wgpu.BufferUsage.UNIFORM),
+            sums=self._sums.at_least(16 * width * height),
+            output=output,
+            **inputs.scene.resources,
+        )
+
+    def _fine(self, shutter) -> dict:
+        if self._times is None or self._times[0] is not shutter:
+            buffer = self._device.create_buffer_with_data(
+                label="times", data=shutter.strata(TIMES), usage=wgpu.BufferUsage.STORAGE
+            )
+            self._times = shutter, buffer
+        return {"strata": self._times[1]}

@@ -1,0 +1,82 @@
+"""Which tiles are active: something moves in them or near them. The others are copied."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import wgpu
+
+from ... import gpu
+from ...gpu import wgsl
+from ...gpu.textures import Scratch
+
+
+def grid_of(size: tuple[int, int]) -> tuple[int, int]:
+    """Tiles across and down an image of `size` [px]."""
+    side = int(wgsl.load("methods/gather/surface.wgsl").constant("TILE"))
+    return -(-size[0] // side), -(-size[1] // side)
+
+
+def uniform(device: wgpu.GPUDevice, name: str, data: np.ndarray) -> wgpu.GPUBuffer:
+    """A uniform buffer that holds the struct `data`."""
+    usage = wgpu.BufferUsage.UNIFORM
+    return device.create_buffer_with_data(label=name, data=data, usage=usage)
+
+
+class ActiveTiles:
+    """Worklists of cells, a cell being a few tiles side by side."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device, self._lists = device, Scratch(device)
+        self._everywhere: tuple[tuple[int, int], dict] | None = None
+
+    def encode(self, encoder, inputs) -> dict[str, dict]:
+        """Record which tiles are active; the worklists of active_tiles.wgsl, by name."""
+        kernel = gpu.kernel(self._device, "methods/gather/active_tiles.wgsl")
+        grid = grid_of(inputs.given.size)
+        words = -(-(grid[0] * grid[1] + int(kernel.source.constant("CELLS_WORD"))) // 64) * 64
+        size = 4 * words * int(kernel.source.constant("SECTIONS"))
+        lists = self._lists.at_least(size)
+        encoder.clear_buffer(lists)
+        data = np.zeros((), kernel.source.dtype("SourceFrame"))
+        data["words"] = words
+        tiles = replace(inputs.given, size=grid)
+        for frame in inputs.frames:
+            data["offset"] = frame.offset
+            own = {
+                "source": uniform(self._device, "source", data),
+                "motion": frame.motion,
+                "lists": lists,
+            }
+            kernel.run(encoder, "mark_active_tiles", tiles, **own)
+        kernel.run(encoder, "find_distances", tiles, **own)
+        kernel.run(encoder, "build_worklists", replace(inputs.given, size=(grid[1], 1)), **own)
+        return {
+            name: {
+                "buffer": lists,
+                "offset": 4 * words * int(kernel.source.constant(name.upper())),
+                "size": 4 * words,
+            }
+            for name in ("active", "static", "separated", "motion_only", "flagged")
+        }
+
+    def everywhere(self, size) -> dict:
+        """A worklist of all cells, their rows interleaved as by interleaved_row() of frame.wgsl."""
+        if self._everywhere is None or self._everywhere[0] != size:
+            source = wgsl.load("methods/gather/worklist.wgsl")
+            interleave, row, wide, side, strip = (
+                int(source.constant(n))
+                for n in ("INTERLEAVE", "GROUPS_PER_ROW", "CELL_TILES", "TILE", "STRIP_HEIGHT")
+            )
+            across, down = grid_of(size)
+            across = -(-across // wide)
+            rows = np.concatenate([np.arange(i, down, interleave) for i in range(interleave)])
+            cells = (np.arange(across) + 65536 * rows[:, None]).ravel()
+            head = min(cells.size, row), side // strip, -(-cells.size // row), cells.size
+            spare = [0] * (-cells.size % 4)  # a struct's size is a multiple of 16 bytes
+            data = np.array([*head, *cells, *spare], np.uint32)
+            usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDIRECT
+            buffer = self._device.create_buffer_with_data(label="all", data=data, usage=usage)
+            self._everywhere = size, {"buffer": buffer, "offset": 0, "size": buffer.size}
+        return self._everywhere[1]

@@ -1,0 +1,99 @@
+"""The search: what is visible at every pixel and time, composited and averaged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import wgpu
+
+from ... import gpu
+from ...gpu.textures import Images
+from .active_tiles import grid_of, uniform
+from .layers import layer_view
+
+
+class Search:
+    """The passes that read layers and candidates and write the picture."""
+
+    def __init__(self, device: wgpu.GPUDevice, images: Images, *, confidence: bool, output: str):
+        self._device, self._images = device, images
+        self._confidence, self._output = confidence, output
+
+    def encode(self, encoder, inputs, slots, layers, candidates, worklists, output):
+        """Record the classification of blocks, then all pixels.
+
+        `slots`: where in the textures `layers` each frame of `inputs` is.
+        """
+        timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
+        classify = gpu.kernel(self._device, "methods/gather/classify.wgsl", **timed)
+        data = np.zeros((), classify.source.dtype("SourceFrames"))
+        data["offsets"][: len(slots)] = [frame.offset for frame in inputs.frames]
+        data["slots"][: len(slots)] = slots
+        data["count"] = len(slots)
+        arrays = {k: t.create_view(dimension="2d-array") for k, t in layers.items()}
+        searched = {
+            "sources": uniform(self._device, "sources", data),
+            "surfaces": arrays.pop("surfaces"),
+            "tile_candidates": candidates,
+        }
+        wide, side, block, times = (
+            int(classify.source.constant(n))
+            for n in ("CELL_TILES", "TILE", "BLOCK", "TIMES_PER_WORD")
+        )
+        across, down = grid_of(inputs.given.size)
+        blocks = -(-across // wide) * wide * side // block, down * side // block
+        words = self._images.texture(
+            "single-layer mask", blocks, "r32uint", -(-inputs.samples // times) + 1
+        )
+        mask = words.create_view(dimension="2d-array")
+        classify.run(
+            encoder,
+            "main",
+            replace(inputs.given, size=blocks),
+            single_layer_mask=mask,
+            active_cells=worklists["active"],
+            **searched,
+        )
+        kernel = gpu.kernel(
+            self._device,
+            "methods/gather/resolve.wgsl",
+            {"Output": self._output},
+            WEIGHTED=inputs.frame.weight is not None,
+            CONFIDENCE=self._confidence,
+            **timed,
+        )
+        separated = worklists["separated"]
+        differences = self._differences(encoder, inputs, layers["surfaces"], slots[0], separated)
+        for entry, cells in (("main", worklists["active"]), ("copy_static", worklists["static"])):
+            kernel.run(
+                encoder,
+                entry,
+                inputs.given,
+                cells,
+                worklist=cells,
+                single_layer_mask=mask,
+                second_differences=differences,
+                own_color=inputs.frame.color,
+                own_weight=inputs.frame.weight or inputs.none,
+                linear=inputs.linear,
+                output=output,
+                **searched,
+                **arrays,
+            )
+
+    def _differences(self, encoder, inputs, surfaces, slot: int, cells) -> wgpu.GPUTextureView:
+        """Record the second differences of the frame's own colours."""
+        differences = self._images.view("second differences", inputs.given.size, "rgba32uint")
+        kernel = gpu.kernel(self._device, "methods/gather/cubic.wgsl")
+        kernel.run(
+            encoder,
+            "main",
+            inputs.given,
+            cells,
+            color=inputs.frame.color,
+            front_surface=layer_view(surfaces, 2 * slot),
+            second_differences=differences,
+            worklist=cells,
+        )
+        return differences

@@ -1,0 +1,247 @@
+"""Sample reprojection: samples of up to three frames moved to every time of the exposure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..camera import Camera, Reprojections
+from ..errors import InputError
+from ..gpu.textures import Scratch
+from ..velocity import viewport_of
+from .options import MethodOptions
+
+GOLDEN = (5**0.5 - 1) / 2
+AT_ONCE = 64 << 20  # bytes of depths, or links: how many slices, or steps, are done together
+
+
+class Reproject:
+    """Every sample moves to its place at every time; the nearest one is seen.
+
+    Taylor's "Fast Motion Blur through Sample Reprojection" with what he names as future work:
+    a depth test in every time slice, moving objects, the GPU. `samples` are time slices.
+    Samples come from the frame itself; what they leave open is filled from the neighbouring
+    frames, where there are any. Integer atomics alone decide what is seen: the same bits every run.
+    `variant`: "published" is the paper's: the previous frame's samples go towards this frame's
+    camera and back in `samples` steps, are rounded to pixels and counted without a depth test,
+    so the exposure is the interval between the two whatever the shutter. Cameras are
+    interpolated; where there are vectors, samples follow those. Colour is summed in fixed
+    point of 64 bits: 0 to 262143 in steps of 1/16384, what is beyond is held to that range, and
+    60,000 samples on one pixel in a few steps do not overflow; more are not all counted.
+    What he describes and leaves out is optional there. `facing`: a sample whose surface faces
+    away from the interpolated camera is dropped; needs cameras; the surface is that of the
+    normals, or of the depth. `depth_test`: of the samples that a step puts on one pixel only
+    the nearest counts, the least number among equals. `splat`: "line" draws every sample from
+    its place at a step to that at the next, each pixel having its share of the step.
+    `show`: "count" gives the share of slices that reached a pixel (his figure 4).
+
+    Strong: blur goes over silhouettes, what is hidden appears, many samples cost little more
+    quality loss than few. Artefacts: copies where motion is fast against `samples`, edges up
+    to a pixel wide of their place, holes where no frame saw what is there.
+    """
+
+    name = "reproject"
+    needs = frozenset({"color", "motion", "depth"})
+    uses = frozenset({"neighbours", "normal"})
+
+    @dataclass(frozen=True, kw_only=True)
+    class Options(MethodOptions):
+        """The variant, and what the paper names and leaves out."""
+
+        variant: Annotated[
+            Literal["slices", "published"],
+            "with a depth test in every time slice, or the paper's counting",
+        ] = "slices"
+        show: Annotated[
+            Literal["color", "count"],
+            "the blurred picture, or the share of slices that reached a pixel",
+        ] = "color"
+        facing: Annotated[
+            bool, "published: leave out what faces away from the interpolated camera"
+        ] = False
+        depth_test: Annotated[bool, "published: only the nearest of the samples on a pixel"] = False
+        splat: Annotated[
+            Literal["point", "line"], "published: points, or lines between the steps"
+        ] = "point"
+
+        def __post_init__(self):
+            super().__post_init__()
+            published = self.facing or self.depth_test or self.splat != "point"
+            if self.variant != "published" and published:
+                raise InputError("facing, depth_test and splat need the variant 'published'")
+            if self.depth_test and self.splat == "line":
+                raise InputError("a line is at many depths: depth_test needs splat 'point'")
+
+    def __init__(self, device, options: Options, *, output="rgba32float"):
+        self._device, self._output, self._options = device, output, options
+        self._nearest, self._winner = Scratch(device), Scratch(device)
+        self._hits, self._open = Scratch(device), Scratch(device)
+        self._means, self._counts = Scratch(device), Scratch(device)
+        self._carries, self._links, self._heads = (Scratch(device) for _ in range(3))
+
+    def encode(self, encoder, inputs, output):
+        """Record three passes a source for several slices, or two for several steps."""
+        record = self._published if self._options.variant == "published" else self._slices
+        record(encoder, inputs, output)
+
+    def _slices(self, encoder, inputs, output):
+        kernel = gpu.kernel(
+            self._device,
+            "methods/reproject.wgsl",
+            {"Output": self._output},
+            BOX_SHUTTER=inputs.even,
+            WEIGHTED=inputs.frame.weight is not None,
+            COUNTS=self._options.show == "count",
+        )
+        width, height = inputs.given.size
+        pixels = width * height
+        bits = int(kernel.source.constant("BLOCK_BITS"))
+        blocks = ((width >> bits) + 1) * ((height >> bits) + 1)
+        sources = inputs.frames
+        most = max(1, min(int(kernel.source.constant("SLICES")), AT_ONCE // (4 * pixels)))
+        most = min(most, inputs.samples)
+        shared = {
+            "own": inputs.frame.color,
+            "linear": inputs.linear,
+            "nearest": self._nearest.at_least(4 * most * pixels),
+            "winner": self._winner.at_least(4 * most * pixels),
+            "hits": self._hits.at_least(4 * len(sources) * pixels),
+            "open": self._open.at_least(4 * blocks),
+            "means": self._means.at_least(16 * pixels),
+            "counts": self._counts.at_least(4 * pixels),
+            "output": output,
+        }
+
+        def run(entry: str, source: int, first: int, count: int) -> None:
+            frame = sources[source]
+            data = np.zeros((), kernel.source.dtype("Chunk"))
+            data["first"], data["count"], data["source"] = first, count, source
+            data["offset"] = frame.offset
+            # All pixels share a slice's time, so jitter is the frame's: its next golden section.
+            data["shift"] = inputs.jitter * (inputs.number * GOLDEN % 1 - 0.5)
+            kernel.run(
+                encoder,
+                entry,
+                inputs.given,
+                chunk=self._device.create_buffer_with_data(
+                    label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM
+                ),
+                color=frame.color,
+                motion=frame.motion,
+                depth=frame.depth,
+                weight=frame.weight or inputs.none,
+                **shared,
+            )
+
+        encoder.clear_buffer(shared["means"])
+        encoder.clear_buffer(shared["counts"])
+        for first in range(0, inputs.samples, most):
+            for name in ("nearest", "winner", "open"):
+                encoder.clear_buffer(shared[name])
+            count = min(most, inputs.samples - first)
+            for together in ([0], range(1, len(sources))):
+                for entry in ("splat_depths", "splat_winners", "resolve"):
+                    for source in together:
+                        run(entry, source, first, count)
+        run("finish", 0, 0, 0)
+
+    def _published(self, encoder, inputs, output):
+        camera: Reprojections | None = inputs.frame.camera if inputs.frame.by_camera else None
+        pairs: list[tuple[Camera, Camera]] = []
+        if camera and camera.prev and camera.here.view_from_world is not None:
+            pairs = [(camera.here, camera.prev), (camera.prev, camera.here)]
+        if self._options.facing and not pairs:
+            raise InputError(
+                "facing needs the cameras of this and the previous frame with view_from_world, "
+                "and no vectors"
+            )
+        prev = [n for n in inputs.frames[1:] if n.offset == -1]
+        normals = inputs.frame.normal is not None and all(n.normal is not None for n in prev)
+        kernel = gpu.kernel(
+            self._device,
+            "methods/reproject_published.wgsl",
+            {"Output": self._output},
+            CAMERA=bool(pairs),
+            WEIGHTED=inputs.frame.weight is not None,
+            COUNTS=self._options.show == "count",
+            LINES=self._options.splat == "line",
+            FACING=self._options.facing,
+            NORMALS=normals,
+            NEAREST_ONLY=self._options.depth_test,
+        )
+        width, height = inputs.given.size
+        bits = (width - 1).bit_length(), (width - 1).bit_length() + (height - 1).bit_length()
+        rows = int(kernel.source.constant("ROWS"))
+        most = max(
+            1,
+            min(rows - 1, 2 ** (32 - bits[1]) - 2, AT_ONCE // (4 * width * height), inputs.samples),
+        )
+        most = 1 if self._options.depth_test else most
+        shared = {
+            "own": inputs.frame.color,
+            "heads": self._heads.at_least(4 * width * height),
+            "links": self._links.at_least(4 * most * width * height),
+            "sums": self._means.at_least(16 * width * height),
+            "carries": self._carries.at_least(16 * width * height),
+            "counts": self._counts.at_least(4 * width * height),
+            "output": output,
+        }
+        encoder.clear_buffer(shared["heads"])
+        create = self._device.create_buffer_with_data
+
+        def run(entry: str, source, steps: np.ndarray, pair, first: bool, last: bool) -> None:
+            data = np.zeros((), kernel.source.dtype("Chunk"))
+            data["bits"], data["steps"] = bits, max(len(steps) - 1, 0)
+            data["first"], data["last"] = first, last
+            table = np.zeros(rows, kernel.source.dtype("Step"))
+            table["time"][: len(steps)] = steps
+            if camera and pair:
+                seen = replace(camera, here=pair[0], prev=None, next=pair[1])
+                data["viewport"] = viewport_of(seen, inputs.given.size)
+                data["world_from_pixel"] = seen.world_from_pixel().T
+                data["eye"] = _eye(pair[0])
+                for row, share in zip(table, np.abs(steps), strict=False):
+                    between = pair[0].toward(pair[1], share)
+                    row["clip_from_pixel"] = replace(seen, next=between).matrices()[0, 1].T
+                    row["eye"] = _eye(between)
+            kernel.run(
+                encoder,
+                entry,
+                inputs.given,
+                chunk=create(label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM),
+                steps=create(label="steps", data=table, usage=wgpu.BufferUsage.UNIFORM),
+                color=source.color,
+                motion=source.motion,
+                depth=source.depth,
+                normal=source.normal if self._options.facing and normals else inputs.none,
+                weight=source.weight or inputs.none,
+                **shared,
+            )
+
+        sources = [inputs.frame, *prev]
+        shares = np.linspace(0, 1, inputs.samples) if inputs.samples > 1 else np.zeros(1)
+        jobs = []
+        for k, source in enumerate(sources):
+            times = (-1, 1)[k] * np.append(shares, shares[-1])  # what is one too many ends a line
+            for i in range(0, inputs.samples, most):
+                jobs.append((source, times[i : i + most + 1], pairs[k] if pairs else None))
+        if self._options.splat == "line":
+            run("resolve", sources[0], shares[:0], None, True, False)
+        for i, (source, steps, pair) in enumerate(jobs):
+            if self._options.splat == "line":
+                run("splat_lines", source, steps, pair, False, False)
+            else:
+                run("link", source, steps, pair, False, False)
+                run("resolve", source, steps, pair, i == 0, i == len(jobs) - 1)
+        if self._options.splat == "line":
+            run("resolve", sources[0], shares[:0], None, False, True)
+
+
+def _eye(camera: Camera) -> np.ndarray:
+    """A camera's place in the world, or the direction to it where it is orthographic."""
+    assert camera.view_from_world is not None
+    return np.linalg.inv(camera.view_from_world)[:, 2 if camera.orthographic else 3]

@@ -1,0 +1,110 @@
+"""An observer: what is perceived of pictures shown one after the other, on the GPU."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+
+import numpy as np
+import wgpu
+
+from . import gpu
+from .cone import Cone
+from .errors import InputError
+from .gpu import wgsl
+from .gpu.textures import Images, Scratch
+
+EIGHT = 8  # pictures that one pass takes
+
+
+class WeightedSum:
+    """The sum of pictures on the GPU, each times a weight; a pixel that is not finite is 0."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device, self._sums = device, Scratch(device)
+
+    def encode(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        pictures: Sequence[wgpu.GPUTexture],
+        weights: np.ndarray,
+        output: wgpu.GPUTexture,
+    ) -> None:
+        """Record it into `encoder`: float textures of one size, one weight each.
+
+        `output`: rgba32float, of that size.
+        """
+        width, height, _ = output.size
+        kernel = gpu.kernel(self._device, "observer.wgsl")
+        data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
+        data["size"] = width, height
+        uniform = wgpu.BufferUsage.UNIFORM
+        create = self._device.create_buffer_with_data
+        given = gpu.Given((width, height), {"frame": create(data=data, usage=uniform)})
+        views = [picture.create_view() for picture in pictures]
+        for first in range(0, len(views), EIGHT):
+            share = np.zeros((), kernel.source.dtype("Share"))
+            share["weights"].flat[: len(views) - first] = weights[first : first + EIGHT]
+            share["first"] = first == 0
+            kernel.run(
+                encoder,
+                "main",
+                given,
+                share=create(data=share, usage=uniform),
+                sums=self._sums.at_least(16 * width * height),
+                output=output.create_view(),
+                **{f"picture{i}": views[min(first + i, len(views) - 1)] for i in range(EIGHT)},
+            )
+
+
+class Viewer:
+    """What is seen of pictures shown one after the other, on the GPU.
+
+    `rate`: pictures a second, each held until the next. Before the first one it was there too.
+    `device`: a wgpu device of yours, the name of an adapter, or None for the best.
+    """
+
+    def __init__(
+        self,
+        rate: float,
+        cone: Cone | None = None,
+        *,
+        device: wgpu.GPUDevice | str | None = None,
+    ):
+        self.rate, self.cone = rate, cone or Cone()
+        self.held = self.cone.held(rate)  # pictures in the ring
+        self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
+        self._images, self._sum = Images(self.device), WeightedSum(self.device)
+        self._size, self._shown = (0, 0), 0
+        self._lock = threading.RLock()
+
+    def look(self, picture: np.ndarray) -> None:
+        """Show one more: (height, width, 3 or 4), linear light."""
+        if picture.ndim != 3 or picture.shape[2] not in (3, 4):
+            raise InputError(f"a picture is (height, width, 3 or 4), got {picture.shape}")
+        height, width, channels = picture.shape
+        if self._shown and self._size != (width, height):
+            raise InputError(
+                f"picture of {width} x {height} after those of {self._size[0]} x {self._size[1]}"
+            )
+        if channels == 3:
+            picture = np.concatenate([picture, np.ones_like(picture[..., :1])], axis=2)
+        with self._lock, gpu.reported((width, height)):
+            self._size = width, height
+            self._images.upload(f"ring {self._shown % self.held}", picture, "rgba16float")
+            self._shown += 1
+
+    def sees(self, after: float = 0.0) -> np.ndarray:
+        """(height, width, 4) float32: what is seen `after` [s] the middle of the last picture."""
+        if not self._shown:
+            raise InputError("nothing was shown yet")
+        with self._lock, gpu.reported(self._size):
+            count = min(self._shown, self.held)
+            pictures = [
+                self._images.texture(f"ring {number % self.held}", self._size, "rgba16float")
+                for number in range(self._shown - 1, self._shown - 1 - count, -1)
+            ]
+            output = self._images.texture("output", self._size, "rgba32float")
+            encoder = self.device.create_command_encoder(label="perceive")
+            self._sum.encode(encoder, pictures, self.cone.shares(count, self.rate, after), output)
+            return self._images.download(encoder, output)

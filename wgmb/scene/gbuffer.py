@@ -1,0 +1,179 @@
+"""A scene on the GPU: its bodies, where they are over a span of time, and pictures of instants."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..camera import Camera, Reprojections
+from ..errors import InputError
+from ..gpu import wgsl
+from ..gpu.textures import Images
+from .bodies import SHAPES
+from .scene import Scene
+
+ROWS = 257  # poses between which the GPU interpolates
+MOST_RAYS = 8  # a side, for antialiasing
+MOST = 1e15  # coordinates and zooms: the square of a number must fit into f32
+MOST_LOOPS = 32_768  # turns of a shader's loops: lavapipe ends them all at twice that, silently
+
+
+class SceneOnGpu:
+    """A scene's buffers for one picture: group 1, bindings 0 to 2, of wgsl/scene/trace.wgsl."""
+
+    def __init__(
+        self,
+        device,
+        scene: Scene,
+        *,
+        size: tuple[int, int],
+        time: float,
+        fps: float,
+        span: tuple[float, float],
+        rays: int,
+    ):
+        """`time` of the frame [s]; `span` of interest around it [frame intervals]."""
+        self.device, self.size, self.time, self.fps = device, size, time, fps
+        self.shown = scene
+        self.scene = scene = scene.solid(time)
+        n = len(scene.bodies)
+        source = wgsl.load("scene/trace.wgsl")
+        # Of one ray and its shadow: both sift, then meet, all bodies.
+        rings = sum(b.shape == "ring" for b in scene.bodies)
+        self.loops = 4 * n + n // 16 + 4 + 2 * rings * int(source.constant("RING_STEPS"))
+        if n > (most := source.constant("MOST_BODIES")):
+            raise InputError(f"a scene has at most {most} bodies, got {n}")
+        self.rays, self.span = rays, span
+        self.constants = {"RINGS": rings > 0, "STAGED": scene.stage is not None}
+
+    @cached_property
+    def resources(self) -> dict[str, wgpu.GPUBuffer | wgpu.GPUTextureView]:
+        """What it binds, made when the first kernel binds them."""
+        if self.scene.figure is not None:
+            raise InputError(f"scene {self.scene.name!r} is flat: only method 'volume' draws it")
+        scene, size, time, source = (
+            self.scene,
+            self.size,
+            self.time,
+            wgsl.load("scene/trace.wgsl"),
+        )
+        first, last = self.span
+        step = max((last - first) / (ROWS - 1), 1e-6)
+        times = time + (first + step * np.arange(ROWS)) / self.fps
+        with np.errstate(all="ignore"):
+            places = [body.world_from_body(times) for body in scene.bodies]
+            camera = _world_from_picture(scene, times, size)
+        _check_finite(camera, places)
+        data = np.zeros((), source.dtype("Scene"))
+        sun = np.array(scene.sun[:3]) / np.linalg.norm(scene.sun[:3])
+        data["sun"], data["sky"] = (*sun, scene.sun[3]), scene.sky
+        data["horizon"] = (*scene.horizon, 0)
+        data["first"], data["step"], data["rows"] = first, step, ROWS
+        data["bodies"] = len(scene.bodies)
+        shapes = [b.shape for b in scene.bodies]
+        data["spheres"], data["boxes"], data["cylinders"] = map(shapes.count, SHAPES[:3])
+        if scene.stage is not None:
+            scene.stage.fill(data["stage"])
+        zoom = float(np.ravel(scene.shot.zoom(np.array([time])))[0])
+        data["pixel"] = 2 / (zoom * size[1])
+        data["rays"] = self.rays
+        for bounds, place in zip(data["bounds"], places, strict=False):
+            bounds[:3] = _halves(*_bounds(place))
+        buffer = self.device.create_buffer_with_data
+        return {
+            "scene": buffer(label="scene", data=data, usage=wgpu.BufferUsage.UNIFORM),
+            "bodies": buffer(
+                label="bodies", data=_bodies(scene, source), usage=wgpu.BufferUsage.STORAGE
+            ),
+            "poses": Images(self.device).upload("poses", _poses(camera, places), "rgba32float"),
+        }
+
+    def encode(self, encoder, given: gpu.Given, images: Images, name: str, time: float) -> dict:
+        """Record the picture at `time` [frame intervals from this frame]; its textures."""
+        rays, bodies = self.rays, len(self.scene.bodies)
+        if self.loops * rays * rays > MOST_LOOPS:
+            raise InputError(f"{bodies} bodies are too many for {rays} x {rays} rays")
+        kernel = gpu.kernel(self.device, "scene/gbuffer.wgsl", None, **self.constants)
+        view = np.zeros((), kernel.source.dtype("View"))
+        view["time"] = time
+        buffer = self.device.create_buffer_with_data(
+            label="view", data=view, usage=wgpu.BufferUsage.UNIFORM
+        )
+        formats = {
+            "color": "rgba32float",
+            "depth": "r32float",
+            "normal": "rgba32float",
+            "object": "r32uint",
+        }
+        textures = {k: images.texture(f"{name} {k}", self.size, f) for k, f in formats.items()}
+        views = {k: t.create_view() for k, t in textures.items()}
+        kernel.run(encoder, "main", given, view=buffer, **self.resources, **views)
+        return textures
+
+    def reprojections(self, time: float = 0.0) -> Reprojections:
+        """How everything moves around the instant `time` [frame intervals from this frame]."""
+        prev, here, next_ = (self._camera(time + k) for k in (-1, 0, 1))
+        return Reprojections(here, prev, next_)
+
+    def _camera(self, frames: float) -> Camera:
+        t = self.time + frames / self.fps
+        shot = self.scene.shot
+        view = np.linalg.inv(shot.world_from_camera(t)[0])
+        clip = shot.clip_from_camera(t, self.size[0] / self.size[1])[0]
+        bodies = {i + 1: b.world_from_body(t)[0] for i, b in enumerate(self.scene.bodies)}
+        return Camera(clip @ view, view, bodies)
+
+
+def _bodies(scene: Scene, source: wgsl.Source) -> np.ndarray:
+    table = np.zeros(max(len(scene.bodies), 1), source.dtype("Body"))
+    for i, body in enumerate(scene.bodies):
+        row = table[i : i + 1]
+        row["size"] = (*body.size, 0)
+        row["color"], row["other"] = (*body.color, body.light), (*body.other, body.gloss)
+        row["repeats"], row["object"] = body.repeats, i + 1
+        row["pattern"] = source.constant(body.pattern)
+    return table
+
+
+def _bounds(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two corners of a box along the world's axes around a body at all its places (rows, 4, 4)."""
+    middle, reach = place[:, :3, 3], np.abs(place[:, :3, :3]).sum(axis=-1)
+    # Between two rows a body strays from both by less than they differ; the rest is rounding.
+    margin = np.abs(np.diff(place, axis=0)).max() + 1e-4 + 1e-6 * np.abs(place).max()
+    return (middle - reach).min(axis=0) - margin, (middle + reach).max(axis=0) + margin
+
+
+def _halves(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(3,) uint32: both numbers as float16 in a word, the low one first, rounded outwards."""
+    with np.errstate(over="ignore"):  # what is beyond a half's range is infinite
+        halves = np.stack([low, high], axis=1).astype(np.float16)
+    inward = np.stack([halves[:, 0] > low, halves[:, 1] < high], axis=1)
+    outward = np.nextafter(halves, np.array([-np.inf, np.inf], np.float16))
+    return np.where(inward, outward, halves).view(np.uint32)[:, 0]
+
+
+def _world_from_picture(scene: Scene, times: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """(rows, 4, 4) from -1..1, y up, and 1: the ray's direction; from the origin: its start."""
+    zoom = np.broadcast_to(scene.shot.zoom(times), times.shape)
+    if not ((zoom > 1 / MOST) & (zoom < MOST)).all():
+        raise InputError(f"the camera's zoom must be over 0, got {zoom.min():g} to {zoom.max():g}")
+    lens = np.zeros((len(times), 4, 4))
+    lens[:, 0, 0], lens[:, 1, 1] = size[0] / size[1] / zoom, 1 / zoom
+    lens[:, 2, 2], lens[:, 3, 3] = -1, 1  # looking along -z
+    return scene.shot.world_from_camera(times) @ lens
+
+
+def _check_finite(camera: np.ndarray, places: list[np.ndarray]) -> None:
+    for i, matrix in enumerate([camera, *places]):
+        name = f"body {i}" if i else "the camera"
+        if not np.abs(matrix).max() < MOST:  # NaN is not
+            raise InputError(f"{name} must stay within {MOST:g} of the middle, all finite")
+
+
+def _poses(camera: np.ndarray, places: list[np.ndarray]) -> np.ndarray:
+    """(rows, 3 + 3 bodies, 4): rows of the picture into the world, of the world into bodies."""
+    matrices = np.stack([camera, *map(np.linalg.inv, places)], axis=1)
+    return matrices[:, :, :3].reshape(len(camera), -1, 4)

@@ -1,0 +1,164 @@
+"""Scenes as data: rigid bodies, volumes, a camera and light, anywhere in time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+from .bodies import PATTERNS, SHAPES, Body, Color, rotation, times_of, translation
+from .volumes import Instant, Stage, Volume
+
+if TYPE_CHECKING:
+    from .figure import Figure
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A camera over time: where it is and looks, and how wide [functions of seconds]."""
+
+    position: Callable[[np.ndarray], tuple]
+    yaw: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
+    pitch: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
+    roll: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
+    zoom: Callable[[np.ndarray], np.ndarray] = lambda t: 1.6 + 0 * t
+    """Focal length in halves of the picture's height."""
+    orbit: tuple[float, float] = (0.0, 0.0)
+    """Angles by which a viewer went round the pivot: to the right, and up [radians]."""
+    pan: tuple[float, float] = (0.0, 0.0)
+    """How far a viewer then went to the right, and up [scene units]."""
+    dolly: float = 1.0
+    """Times the distance to the pivot."""
+    pivot: float = 5.0
+    """How far in front of the camera the pivot is [scene units]."""
+
+    def world_from_camera(self, t) -> np.ndarray:
+        """(n, 4, 4); the camera looks along -z, y up."""
+        t = times_of(t)
+        x, y, z = self.position(t)
+        turned = rotation("y", self.yaw(t), t) @ rotation("x", self.pitch(t), t)
+        own = translation(x, y, z, t) @ turned @ rotation("z", self.roll(t), t)
+        if (self.orbit, self.pan, self.dolly) == ((0.0, 0.0), (0.0, 0.0), 1.0):
+            return own
+        px, py, pz = (own @ np.array([0, 0, -self.pivot, 1.0]))[:, :3].T
+        aside, up = self.orbit
+        round_ = (
+            translation(px, py, pz, t) @ rotation("y", aside, t) @ translation(-px, -py, -pz, t)
+        )
+        over = translation(0, 0, -self.pivot, t) @ rotation("x", -up, t)
+        return round_ @ own @ over @ translation(*self.pan, self.pivot * self.dolly, t)
+
+    def clip_from_camera(self, t, aspect: float, near: float = 0.05, far: float = 1000.0):
+        """(n, 4, 4) OpenGL projections."""
+        zoom = np.broadcast_to(self.zoom(times_of(t)), times_of(t).shape)
+        m = np.zeros((len(zoom), 4, 4))
+        m[:, 0, 0], m[:, 1, 1] = zoom / aspect, zoom
+        m[:, 2, 2] = -(far + near) / (far - near)
+        m[:, 2, 3] = -2 * far * near / (far - near)
+        m[:, 3, 2] = -1
+        return m
+
+
+DENSITIES = ("exact", "published")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is rendered.
+
+    `volumes` are shown blurred by the method "volume", and as solid bodies by all others. A
+    function gives them and their stage around an instant [s], with `phase` the angle at it.
+    `density`: "exact" counts every revolution within the exposure, "published" one crossing.
+    """
+
+    name: str
+    bodies: tuple[Body, ...]
+    shot: Shot
+    sun: tuple[float, float, float, float] = (0.45, 0.8, 0.5, 0.95)
+    """Direction towards it (any length) and its strength."""
+    sky: tuple[float, float, float, float] = (0.22, 0.42, 0.78, 0.32)
+    """Colour straight up; strength of the light from all round."""
+    horizon: Color = (0.62, 0.72, 0.82)
+    volumes: tuple[Volume, ...] | Callable[[float], Instant] = ()
+    stage: Stage | None = None
+    density: str = "exact"
+    exposure: tuple[float, str] | None = None
+    """The shutter it is made for: seconds, curve."""
+    loop: float | None = None
+    """After this time it begins anew [s]."""
+    figure: Figure | None = None
+    """A flat picture instead, for the method "volume"."""
+
+    def __post_init__(self):
+        for body in self.bodies:
+            if body.shape not in SHAPES:
+                raise InputError(f"shape must be one of {', '.join(SHAPES)}, got {body.shape!r}")
+            if not all(1e-15 < s < 1e15 for s in body.size):
+                raise InputError(f"a {body.shape} needs positive sizes, got {body.size}")
+            if body.pattern not in PATTERNS:
+                raise InputError(
+                    f"pattern must be one of {', '.join(PATTERNS)}, got {body.pattern!r}"
+                )
+            looks = (*body.color, *body.other, *body.repeats, body.light, body.gloss)
+            if not _all_finite(looks):
+                raise InputError(f"a {body.shape} needs colours and lights in f32, got {looks}")
+        if not _all_finite((*self.sun, *self.sky, *self.horizon)) or not any(self.sun[:3]):
+            raise InputError(
+                f"sun and sky must be finite and somewhere, got {self.sun}, {self.sky}"
+            )
+        if self.density not in DENSITIES:
+            raise InputError(f"density must be one of {', '.join(DENSITIES)}, got {self.density!r}")
+        # Bodies come by shape on the GPU; the stable order keeps indices.
+        object.__setattr__(
+            self, "bodies", tuple(sorted(self.bodies, key=lambda b: SHAPES.index(b.shape)))
+        )
+
+    @property
+    def has_volumes(self) -> bool:
+        """Whether the method "volume" has anything to show."""
+        return bool(self.volumes) or self.figure is not None
+
+    def instant(self, time: float) -> Instant:
+        """Its volumes and their stage around `time` [s]; phases are the angles at it."""
+        if callable(self.volumes):
+            return self.volumes(time)
+        turned = tuple(
+            replace(v, phase=math.fmod(v.phase + v.speed * time, 2 * math.pi)) for v in self.volumes
+        )
+        return turned, self.stage or Stage()
+
+    def solid(self, time: float) -> Scene:
+        """The scene around `time` [s], its volumes turned into bodies.
+
+        Of volumes that are blended into one another, the densest is there.
+        """
+        volumes, stage = self.instant(time)
+        if not volumes:
+            return self
+        most = max((v.opacity for v in volumes if v.facing is not None), default=0.0)
+        there = [v for v in volumes if v.facing is None or v.opacity == most]
+        bodies = [_since(v.solid(), time) for v in there]
+        return replace(self, bodies=(*self.bodies, *bodies, stage.body()), stage=stage)
+
+    def seen_from(
+        self, orbit: tuple[float, float], pan: tuple[float, float], dolly: float
+    ) -> Scene:
+        """The same scene, its camera moved as `Shot.orbit`, `pan` and `dolly` say."""
+        values = (*orbit, *pan, dolly)
+        if not _all_finite(values) or not 0 < dolly <= 1000:
+            raise InputError(f"orbit, pan and dolly must be finite, dolly over 0, got {values}")
+        return replace(self, shot=replace(self.shot, orbit=orbit, pan=pan, dolly=dolly))
+
+
+def _since(body: Body, time: float) -> Body:
+    """A body whose path counts from `time` [s]."""
+    return replace(body, path=lambda t: body.path(t - time))
+
+
+def _all_finite(numbers) -> bool:
+    """As the GPU has them, with room for a product."""
+    return all(abs(x) < 1e30 for x in numbers)

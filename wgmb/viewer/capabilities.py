@@ -1,0 +1,85 @@
+"""What there is to choose from: subjects, methods and their options, looks, rivals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import wgpu
+
+from ..methods import METHODS
+from ..methods.options import Option, options_of
+from .source import ClipSubject, SceneSubject, Subject
+from .state import LOOKS, REFERENCE, State
+
+
+class Choices:
+    """What the device and the scene, or the frames, allow."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device = device
+        self._scene: SceneSubject | None = None
+        self._clip: tuple[tuple, ClipSubject] | None = None
+
+    def subject(self, state: State) -> Subject:
+        """The scene or the frames that the state is about."""
+        if state.is_scene:
+            self._scene = self._scene or SceneSubject(self._device)
+            return self._scene
+        key = (state.source, state.given)
+        if self._clip is None or self._clip[0] != key:
+            self._clip = key, ClipSubject(self._device, state)
+        return self._clip[1]
+
+    def methods(self, state: State) -> list[str]:
+        """Names of the methods that can be used."""
+        return self.subject(state).methods(state)
+
+    def options(self, method: str) -> dict[str, Option]:
+        """The method's own options that have a control: words, numbers and switches."""
+        every = options_of(METHODS[method].Options)
+        return {name: option for name, option in every.items() if option.default is not None}
+
+    def shows(self, state: State) -> list[str]:
+        """What the method can show of its inner life instead of its result."""
+        show = self.options(state.method).get("show")
+        return [word for word in show.choices if word != show.default] if show else []
+
+    def looks(self, state: State) -> list[str]:
+        """What can be looked at: also what the method shows of its inner life."""
+        has, methods = self.subject(state).has(state), self.methods(state)
+        blurred = state.method in methods
+        can = {
+            "result": blurred,
+            "sharp": "color" in has,
+            "perceived": blurred,
+            "depth": "depth" in has,
+            "velocity": "motion" in has,
+            "error": blurred and "distributed" in methods,
+        }
+        return [look for look in LOOKS if can[look]] + (self.shows(state) if blurred else [])
+
+    def reference(self, state: State) -> str | None:
+        """The method that draws what the picture should be, if there is one.
+
+        Where it is looked at what is perceived, that is nature: a world without frames.
+        """
+        if state.eye:
+            return self.subject(state).nature(state)
+        return "distributed" if "distributed" in self.methods(state) else None
+
+    def rivals(self, state: State) -> list[str]:
+        """What the result can be compared with."""
+        sharp = ["sharp"] if "sharp" in self.looks(state) else []
+        reference = [REFERENCE] if self.reference(state) else []
+        return [*sharp, *reference, *self.methods(state)]
+
+    def possible(self, state: State) -> State:
+        """The same state; a method or look that is not to be had is replaced by one that is."""
+        methods = self.methods(state)
+        if methods and state.method not in methods:
+            state = state.with_method(methods[0])
+        if state.look not in (looks := self.looks(state)):
+            state = replace(state, look=looks[0])
+        if state.against not in (rivals := self.rivals(state)):
+            state = replace(state, against=rivals[0])
+        return state

@@ -1,0 +1,306 @@
+"""A State becomes one or two images on the GPU, a bit at a time, so that no frame takes long.
+
+While something moves, scenes are drawn as small as keeps the window quick (Pace); when all
+is still the picture is drawn in full, and what converges (rays, the reference) goes on.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..errors import InputError
+from ..gpu.textures import Images
+from ..gpu.timing import Timing
+from ..methods import METHODS
+from ..pipeline import SAMPLES, Blur
+from ..settings import ShutterSettings
+from ..shutter import Shutter
+from .adaptive import QUICK, Pace
+from .capabilities import Choices
+from .perception import Perceived
+from .quality import Judge, Measured
+from .screen import Box, Image, fit, whole
+from .source import SceneSubject, Subject
+from .state import REFERENCE, State
+
+REFERENCE_SAMPLES = 1024
+_STEP = 0.07  # seconds of work on what converges, between two frames of the window
+_QUICK_STEP = 0.03  # while something moves
+_SETTLE = 0.35  # seconds of stillness before antialiasing
+_BLURS_KEPT = 12
+_PASSES = {"sharp": "color", "depth": "depth", "velocity": "motion"}
+
+
+@dataclass
+class Shown:
+    """One image and how far it has come."""
+
+    label: str = ""
+    key: tuple = ()  # what is drawn
+    fine: tuple = ()  # how finely: width and height, rays, level while moving
+    name: str = ""  # of its texture
+    kind: str = "COLOR"
+    texture: wgpu.GPUTexture | None = None
+    done: int = 0
+    total: int = 1
+
+    @property
+    def ready(self) -> bool:
+        """Whether nothing is left to do."""
+        return self.texture is not None and self.done >= self.total
+
+    @property
+    def image(self) -> Image:
+        """For the screen."""
+        return Image(self.texture, self.kind, (self.key, self.fine, self.done))
+
+
+@dataclass
+class Report:
+    """What became of one update, for the panel."""
+
+    full: tuple[int, int] = (0, 0)
+    place: Box = (0, 0, 0, 0)
+    area: Box = (0, 0, 0, 0)
+    moving: bool = False
+    size: tuple[int, int] = (0, 0)
+    seconds: dict[str, float] = field(default_factory=dict)  # on the clock
+    passes: dict[str, float] = field(default_factory=dict)  # on the GPU, where it tells
+    labels: tuple[str, str] = ("", "")
+    kind: str = "COLOR"
+    reference: tuple[int, int] = (0, 1)  # samples done, of how many
+    measured: Measured | None = None
+    busy: bool = False
+    changed: bool = False
+
+
+class Stage:
+    """The textures of what is shown, and the passes that draw them."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self.device = device
+        self.choices, self.judge = Choices(device), Judge()
+        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        self.pace = Pace(5 if software else 0)
+        self.report = Report()
+        self._images, self._perceived = Images(device), Perceived(device)
+        self._past: SceneSubject | None = None
+        self._blurs: dict[tuple, Blur] = {}
+        self._shown = {"first": Shown(), "second": Shown()}
+        self._coming = dict(self._shown)  # takes the place of what is shown
+        self._level, self._still_since, self._still = 0, 0.0, ()
+        self._moved = False
+        self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
+        self._timing = Timing(device) if Timing.usable(device) else None
+
+    def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> Report:
+        """Go on with what `state` shows in `area` [px] of the canvas, `now` [s].
+
+        `moving`: quick is better than fine. `full`: everything now, however long it takes.
+        """
+        started = time.perf_counter()
+        subject = self.choices.subject(state)
+        shape = subject.size(state)
+        place = fit(shape, area, state)
+        size, rays = self._quality(state, shape, place, now, moving, full)
+        report = Report(shape if not state.is_scene else whole(place), place, area, moving)
+        quick = moving and not full
+        names = self._wanted(state)
+        if "perceived" not in names:
+            self._perceived.forget()
+        for slot, name in zip(("first", "second"), names, strict=False):
+            self._advance(slot, name, state, subject, size, rays, quick, full, report)
+        slots = ("first", "second")[: len(names)]
+        first, last = self._shown["first"], self._shown[slots[-1]]
+        assert first.texture is not None
+        report.size, report.kind = first.texture.size[:2], first.kind
+        report.labels = (first.label, last.label)
+        unfinished = not all(self._coming[slot].ready for slot in slots)
+        report.busy = moving or unfinished or self._level > 0
+        if REFERENCE in names:
+            report.reference = last.done, last.total
+            report.measured = measured = self._measure(first, last)
+            if measured and measured.flip and not measured.flip.done():
+                report.busy = True
+        report.seconds["draw"] = time.perf_counter() - started
+        self.report = report
+        return report
+
+    def images(self, flicked: bool) -> tuple[Image, Image]:
+        """What is on either side; `flicked`: the second one on both."""
+        first, second = self._shown["first"].image, self._shown["second"].image
+        return (second if flicked else first), second
+
+    def download(self, shown: Shown | None = None) -> np.ndarray:
+        """(height, width, channels) float32 of the first image, or of another."""
+        shown = shown or self._shown["first"]
+        assert shown.texture is not None
+        encoder = self.device.create_command_encoder(label="download")
+        return self._images.download(encoder, shown.texture)
+
+    def finished(self, seconds: float, rays: int) -> None:
+        """The window's frame took so long; moving frames set the pace."""
+        if not self.report.moving:
+            self._moved = False
+        elif self.report.changed:
+            if self._moved:  # the first one may have had shaders to compile
+                self.pace.observe(seconds, self.report.seconds["draw"], rays)
+            self._moved = True
+
+    def _quality(self, state, shape, place, now, moving, full) -> tuple[tuple[int, int], int]:
+        """Size to draw [px] and rays: coarse while moving, then in full, then antialiased."""
+        if not state.is_scene:
+            self._level = 0
+            return shape, 1
+        if full:
+            self._level = 0
+        elif moving:
+            self._level, self._still_since = self.pace.level, now
+        elif (key := (state.picture, place)) != self._still:
+            self._still, self._still_since = key, now
+            self._level = min(self._level, 1) if self._level else min(self.pace.level, 1)
+        elif self._level > 1:
+            self._level = 1
+        elif self._level == 1 and now - self._still_since > _SETTLE:
+            self._level = 0
+        scale, rays = self.pace.quality(self._level, state.rays)
+        width, height = whole(place)
+        return (max(round(width * scale), 1), max(round(height * scale), 1)), rays
+
+    def _wanted(self, state: State) -> list[str]:
+        """One or two names: of a look, a method or the reference."""
+        if state.mode == "error":
+            return ["result", REFERENCE]
+        return [state.look] if state.mode == "off" else [state.look, state.against]
+
+    def _advance(
+        self, slot, name, state, subject, size, rays, quick: bool, full: bool, report: Report
+    ) -> None:
+        """Draw some of `name`; it is shown once it is no coarser than what it replaces."""
+        shown, coming = self._shown[slot], self._coming[slot]
+        eye = state.eye if name in ("perceived", REFERENCE) else None
+        key = (name, state.picture, eye, state.frame if name == "perceived" else None)
+        fine = (size, rays, self._level if quick else None)
+        if (coming.key, coming.fine) != (key, fine):
+            if self._level and shown.key == key and not _coarser(shown.fine, fine):
+                return
+            texture = f"{slot} {1 + shown.name.endswith('1')}"
+            coming = Shown(self._label(name, state), key, fine, texture)
+            self._coming[slot] = coming
+        if coming.ready:
+            return
+        started = time.perf_counter()
+        seconds = float("inf") if full else _QUICK_STEP if quick else _STEP
+        subject.look_at(state, size, rays)
+        self._draw(coming, slot, name, state, subject, seconds, quick)
+        if self._timing:
+            report.passes |= self._timing.read()
+        self.device.queue.read_buffer(self._token)  # waits
+        if shown.key != key or coming.done >= min(shown.done, coming.total):
+            self._shown[slot] = coming
+        report.changed = True
+        report.seconds[coming.label] = time.perf_counter() - started
+
+    def _draw(
+        self, coming, slot, name, state, subject: Subject, seconds: float, quick: bool
+    ) -> None:
+        size, rays, _ = coming.fine
+        volumes = state.is_scene and "volume" in self.choices.methods(state)
+        if name in _PASSES and not (name == "sharp" and volumes):
+            passes = subject.passes()
+            if _PASSES[name] not in passes:
+                raise InputError(f"there is no {name} in these frames")
+            coming.texture, coming.done = passes[_PASSES[name]], 1
+            coming.kind = {"depth": "DEPTH", "velocity": "MOTION"}.get(name, "COLOR")
+            return
+        blur = self._blur(slot, name, state, quick)
+        coming.texture = self._images.texture(coming.name, size, blur.output)
+        if name == "perceived" and (eye := state.eye):
+            if state.is_scene:  # of its own, so that what else is drawn keeps its moment
+                subject = self._past = self._past or SceneSubject(self.device)
+            coming.total = eye.held(state.fps)
+            coming.done = self._perceived.draw(
+                coming.texture, state, eye, subject, blur, rays, seconds, self._timing
+            )
+            return
+        budget = coming.done, float("inf") if quick else seconds
+        coming.total = blur.samples
+        coming.done = subject.draw(blur, coming.texture, budget, self._timing)
+
+    def _label(self, name: str, state: State) -> str:
+        if name == "result":
+            return state.method
+        if name == "perceived":
+            return f"{state.method}, perceived"
+        if name == REFERENCE and state.eye:
+            return "nature, perceived"
+        return f"{state.method}: {name}" if name in self.choices.shows(state) else name
+
+    def _blur(self, slot: str, name: str, state: State, quick: bool) -> Blur:
+        """The compiled method called `name`, kept for the next time it is asked for."""
+        options: dict[str, Any] = dict(state.options)
+        method, samples, shutter = state.method, state.samples, shutter_of(state)
+        if name == REFERENCE:
+            options, method, samples = {}, self.choices.reference(state), REFERENCE_SAMPLES
+            shutter = state.eye.shutter(state.fps) if state.eye else shutter
+        elif name in self.choices.shows(state):
+            options["show"] = name
+        elif name == "sharp":
+            options, method, shutter = {}, "volume", Shutter(0)
+        elif name not in ("result", "perceived", state.method):
+            options, method = {}, name
+        if method not in (allowed := self.choices.methods(state)):
+            raise InputError(f"method {method!r} cannot be used here, only {', '.join(allowed)}")
+        if quick:
+            count = samples if isinstance(samples, int) else SAMPLES
+            traced = "progress" in METHODS[method].uses
+            fewer = min(count, QUICK) if traced else self.pace.samples(self._level, count)
+            samples = fewer if fewer < count else samples
+        kept = slot if name != "perceived" else name  # each has the sums of a picture of its own
+        key = (kept, method, samples, state.jitter, state.max_blur, *options.items())
+        if key not in self._blurs:
+            while len(self._blurs) >= _BLURS_KEPT:
+                del self._blurs[next(iter(self._blurs))]
+            self._blurs[key] = Blur(
+                method,
+                samples=samples,
+                jitter=state.jitter,
+                max_blur=state.max_blur,
+                device=self.device,
+                **options,
+            )
+        blur = self._blurs[key] = self._blurs.pop(key)
+        if blur.shutter != shutter:
+            blur.shutter = shutter
+        return blur
+
+    def _measure(self, first: Shown, last: Shown) -> Measured | None:
+        """How far the first image is from the reference, once both are worth it."""
+        key = (first.key, first.fine, last.key, last.fine)
+        if first.kind == "COLOR" and first.ready:
+            self.judge.measure(
+                key, last.done, last.total, lambda: [self.download(s) for s in (first, last)]
+            )
+        return self.judge.found(key)
+
+
+def shutter_of(state: State) -> Shutter:
+    """The Shutter that the state describes."""
+    return ShutterSettings(
+        shutter=state.shutter,
+        phase=state.phase,
+        curve=state.curve,
+        rolling=state.rolling,  # pyright: ignore[reportArgumentType]
+        rolling_duration=state.rolling_duration,
+    ).make()
+
+
+def _coarser(a: tuple, b: tuple) -> bool:
+    """Whether a picture drawn as finely as `a` says has less in it than one of `b`."""
+    return a[0][0] < b[0][0] or a[1] < b[1]

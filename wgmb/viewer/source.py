@@ -1,0 +1,196 @@
+"""What is looked at: a built-in scene, or frames on disk; drawn into textures on the GPU."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..frame import Frame
+from ..gpu.textures import Images
+from ..gpu.timing import Timing
+from ..methods import METHODS
+from ..pipeline import Blur
+from ..render import Render
+from ..scene import builtin
+from ..scene.scene import Scene
+from ..settings import InputSettings, SceneSettings, size_of
+from .state import State
+
+_MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
+_FRAMES_KEPT = 2, 16  # but so many at least, at most
+Texture = wgpu.GPUTexture
+Budget = tuple[int, float]
+"""Samples done before, and seconds to spend on more."""
+
+
+class SceneSubject:
+    """A built-in scene: any size, any moment, every method that it has what to show for."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._render = Render(builtin.make(next(iter(builtin.SCENES))), Blur("tap", device=device))
+        self._seen: tuple = ()
+        self._made = self._render.scene
+
+    def has(self, state: State) -> frozenset[str]:
+        """What a method may ask for; figures are flat: they have no pictures of instants."""
+        flat = self._scene(state).figure is not None
+        return frozenset({"scene"} if flat else {"color", "motion", "depth", "scene"})
+
+    def methods(self, state: State) -> list[str]:
+        """Names of the methods that can draw it."""
+        scene, can = self._scene(state), methods_for(self.has(state))
+        if scene.figure is not None:
+            return ["volume"]
+        return can if scene.has_volumes else [name for name in can if name != "volume"]
+
+    def nature(self, state: State) -> str | None:
+        """The method that shows it under a shutter of any length, if there is one."""
+        scene = self._scene(state)
+        if scene.figure is not None:
+            perceived = scene.figure.kind in ("NATURAL", "SCREEN")  # already
+            return None if perceived else "volume"
+        if callable(scene.volumes):  # their speeds are those of a moment
+            return None
+        return "volume" if scene.volumes and state.method == "volume" else "distributed"
+
+    def size(self, state: State) -> tuple[int, int]:
+        """Width and height that give the picture its shape [px]."""
+        return size_of(state.size)
+
+    def look_at(self, state: State, size: tuple[int, int], rays: int) -> None:
+        """What the next draws are of."""
+        self._render.scene = self._scene(state)
+        self._render.size, self._render.rays, self._render.fps = size, rays, state.fps
+        self._time, self._number = state.frame / state.fps, int(state.frame // 1)
+
+    def _scene(self, state: State) -> Scene:
+        seen = (state.source, state.settings, state.orbit, state.pan, state.dolly)
+        if seen != self._seen:
+            given = SceneSettings(
+                set=state.set_arguments(),
+                orbit=state.orbit,
+                pan=state.pan,
+                dolly=state.dolly,
+            )
+            self._made, self._seen = given.make(state.source), seen
+        return self._made
+
+    def passes(self) -> dict[str, Texture]:
+        """The sharp picture and what lies under it, by name."""
+        return self._render.passes(self._time, self._number)
+
+    def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Timing | None) -> int:
+        """Draw with `blur`; samples done, which may be less than it has where it is slow."""
+        view, (done, seconds) = output.create_view(), budget
+        if "progress" in blur.method.uses:
+            return self._render.refine(
+                view, self._time, self._number, done=done, seconds=seconds, blur=blur
+            )
+        self._render.draw(view, self._time, self._number, blur=blur, timing=timing)
+        return blur.samples
+
+
+class ClipSubject:
+    """Frames on disk: their own size, their own moments, the methods they have passes for."""
+
+    def __init__(self, device: wgpu.GPUDevice, state: State):
+        self._device, self._images = device, Images(device)
+        given: dict[str, Any] = dict(state.given)
+        masks = given.pop("keep", None), given.pop("scale", None)
+        self._clip = InputSettings(**given).open(state.source, *masks)
+        self._frames: OrderedDict[int, Frame] = OrderedDict()
+        self._sharp = Blur("tap", device=device)
+        self._number = self._clip.numbers[0]
+        self._uploaders: dict[tuple, Blur] = {}
+        self._uploaded: dict[tuple, tuple[int, dict]] = {}
+        self.finding = self._clip.finding
+
+    def has(self, state: State) -> frozenset[str]:
+        """What a method may ask for."""
+        return self._frame().has
+
+    def methods(self, state: State) -> list[str]:
+        """Names of the methods that can be fed."""
+        return methods_for(self.has(state))
+
+    def nature(self, state: State) -> str | None:
+        """The method that shows it under a shutter of any length: nobody knows more than frames."""
+        return None
+
+    def size(self, state: State) -> tuple[int, int]:
+        """Width and height of the frames [px]."""
+        return self._frame().size
+
+    def look_at(self, state: State, size: tuple[int, int], rays: int) -> None:
+        """What the next draws are of."""
+        numbers = self._clip.numbers
+        self._number = min(numbers, key=lambda n: abs(n - state.frame))
+
+    def _frame(self) -> Frame:
+        number = self._number
+        if number not in self._frames:
+            frame = self._clip.with_neighbours(self._clip.source(number))
+            least, most = _FRAMES_KEPT
+            kept = min(max(_MEMORY // (3 * _bytes(frame)), least), most)  # with its neighbours
+            while len(self._frames) >= kept:
+                self._frames.popitem(last=False)
+            self._frames[number] = frame
+        self._frames.move_to_end(number)
+        return self._frames[number]
+
+    def _inputs(self, blur: Blur) -> dict:
+        """The frame's textures, one set for all methods that take the same."""
+        key = blur.method.needs, blur.method.uses
+        number, inputs = self._uploaded.get(key, (None, {}))
+        if number != self._number:
+            inputs = self._uploaders.setdefault(key, blur).upload(self._frame())
+            self._uploaded[key] = self._number, inputs
+        return dict(inputs)
+
+    def passes(self) -> dict[str, Texture]:
+        """The sharp picture and what lies under it, by name; only what there is."""
+        frame, images = self._frame(), self._images
+        inputs = self._inputs(self._sharp)
+        images.upload("color", self._sharp_rgba(frame), "rgba32float")
+        found = {"color": images.texture("color", frame.size, "rgba32float")}
+        if frame.depth is not None:
+            images.upload("depth", frame.depth, "r32float")
+            found["depth"] = images.texture("depth", frame.size, "r32float")
+        if "motion" in frame.has:
+            motion = images.texture("motion", frame.size, "rgba32float")
+            encoder = self._device.create_command_encoder(label="motion")
+            self._sharp.encode_motion(encoder, inputs["frame"], motion.create_view())
+            gpu.submit(self._device, encoder)
+            found["motion"] = motion
+        return found
+
+    def _sharp_rgba(self, frame: Frame) -> np.ndarray:
+        rgba = np.ones((*frame.color.shape[:2], 4), np.float32)
+        rgba[..., : frame.color.shape[2]] = frame.color
+        return rgba
+
+    def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Timing | None) -> int:
+        """Draw with `blur`, all its samples."""
+        encoder = self._device.create_command_encoder(label="blur")
+        view = output.create_view()
+        blur.encode(encoder, output=view, timing=timing, **self._inputs(blur))
+        gpu.submit(self._device, encoder)
+        return blur.samples
+
+
+def _bytes(frame: Frame) -> int:
+    arrays = (getattr(frame, f.name) for f in fields(frame))
+    return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
+
+
+Subject = SceneSubject | ClipSubject
+
+
+def methods_for(has: frozenset[str]) -> list[str]:
+    """The methods that can be fed with what there is."""
+    return [name for name, method in METHODS.items() if method.needs <= has]

@@ -1,0 +1,93 @@
+// Classification of blocks of pixels, an early out: at which times is one smooth surface all that can be visible?
+// Such a time needs one search, in the front layer of the frame itself; most times of most pixels are such.
+//#include common/frame.wgsl
+//#include common/loops.wgsl
+//#include common/shutter.wgsl
+//#include methods/gather/worklist.wgsl
+//#include methods/gather/search.wgsl
+
+@group(1) @binding(3) var single_layer_mask: Mask;  // by block: words of bits, TIMES_PER_WORD a layer; last, 1 if all are set
+@group(1) @binding(4) var<storage, read> active_cells: WorkList;
+
+alias Mask = texture_storage_2d_array<r32uint, write>;
+
+/// One block. The searches of all its pixels are made from its corners: a time has a single layer if they end on
+/// surfaces that no edge is near, and if all other starts lead to the same. Edges are two pixels wide, so that none
+/// hides between the corners.
+@compute @workgroup_size(WG_X, WG_Y)
+fn main(@builtin(local_invocation_index) local: u32,
+        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let k = work_index(local, group, groups);
+    let down = TILE / BLOCK;        // blocks of a cell
+    let across = CELL_TILES * down;
+    let n = k / (across * down);
+    let id = unpack_cell(active_cells.cells[n]) * vec2u(across, down) + vec2u(k % across, k / across % down);
+    let low = id * BLOCK;
+    let tile = low / TILE;
+    if n >= active_cells.count || any(low >= frame.size) { return; }
+    let high = min(low + BLOCK, frame.size) - 1u;
+    let candidates0 = load_candidates(tile, 0u);
+    let candidates1 = load_candidates(tile, 1u);
+    let candidates2 = load_candidates(tile, 2u);
+    let times = sample_times(0.5 * vec2f(low + high) + 0.5, 0.0, candidates0, candidates1, candidates2);
+    // Jittered pixels have times of their own.
+    let is_static = is_static_tile(candidates0, candidates1, candidates2);
+    let count = select(times.count, 0u, frame.jitter > 0.0 || is_static);
+    let samples = turns_of(frame.samples, active_cells.count);
+    var bits = 0u;
+    var all_single = true;
+    var i = 0u;
+    loop {
+        let t = shutter_time(times, min(i, times.count - 1u));
+        var is_single = i < count;
+        var deepest = 0.0;          // depth that the frame itself shows
+        var f = 0u;
+        loop {          // the frame itself; then, away from its instant, the neighbour on the side of `t`
+            let u = t - offset_of(f);
+            let layer = texture_layer(2u * f);
+            let handicap = select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u);
+            let candidates = candidates_of(f, candidates0, candidates1, candidates2);
+            let dx = displacements_x(candidates, u);
+            let dy = displacements_y(candidates, u);
+            let start = displacement(unpack_trajectory(textureLoad(surfaces, low, layer, 0)), u);
+            let visible_depth = deepest;
+            var n = 0u;
+            loop {      // the corners
+                let x = vec2f(select(low, high, vec2<bool>(n % 2u == 1u, n / 2u == 1u))) + 0.5;
+                let found = iterate_fixed_point(x, start, u, layer);
+                let z = unpack_depth(found.surface) * handicap;
+                deepest = max(deepest, z);
+                let wanted = may_be_visible(candidates, u, select(visible_depth, z, f == 0u) / handicap);
+                let is_there = found.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
+                is_single = is_single && z > 0.0 && is_there && z >= visible_depth;
+                var seeds = Seeds(wanted & !are_solution(dx, dy, found.d), dx, dy);
+                loop {
+                    let is_pending = any(seeds.pending);
+                    let converges = converges_to(x, next_seed(&seeds), found.d, u, layer);
+                    is_single = is_single && (!is_pending || converges);
+                    if !is_single || !any(seeds.pending) { break; }
+                }
+                n++;
+                if !is_single || n >= 4u { break; }
+            }
+            let again = is_single && f == 0u && sources.count > 1u && abs(t) > TRUSTED_TIME;
+            f = neighbour_of(t, false);
+            if !again { break; }
+        }
+        bits |= u32(is_single) << (i % TIMES_PER_WORD);
+        all_single = all_single && (is_single || i >= times.count);
+        i++;
+        if i % TIMES_PER_WORD == 0u || i >= samples {
+            textureStore(single_layer_mask, id, (i - 1u) / TIMES_PER_WORD, vec4u(bits));
+            bits = 0u;
+        }
+        if i >= samples { break; }
+    }
+    textureStore(single_layer_mask, id, (frame.samples - 1u) / TIMES_PER_WORD + 1u, vec4u(u32(all_single)));
+}
+
+/// Whether one step from the displacement `start` leads to the `solution`, not by way of an edge; or leaves the image.
+fn converges_to(x: vec2f, start: vec2f, solution: vec2f, u: f32, layer: u32) -> bool {
+    let state = warp_step(x, start, u, layer);
+    return state.residual2 >= INFINITE || (unpack_depth(state.surface) > 0.0 && same_solution(state.d, solution));
+}

@@ -1,0 +1,29 @@
+// Second differences of the frame's own colours, for cubic interpolation: see resampled() of the resolve.
+//#include common/frame.wgsl
+//#include common/path.wgsl
+//#include methods/gather/worklist.wgsl
+//#include methods/gather/surface.wgsl
+
+@group(1) @binding(0) var color: texture_2d<f32>;       // premultiplied by alpha and weight
+@group(1) @binding(1) var front_surface: texture_2d<u32>;   // see pack_surface()
+@group(1) @binding(2) var second_differences: Differences;  // across, down, in half floats; 0 where not smooth
+@group(1) @binding(3) var<storage, read> worklist: WorkList;
+
+alias Differences = texture_storage_2d<rgba32uint, write>;
+
+fn color_at(px: vec2i) -> vec4f {
+    return textureLoad(color, clamp(px, vec2i(0), vec2i(frame.size) - 1), 0);
+}
+
+@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
+fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = worklist_index(group);
+    let px = vec2i(pixel_in_strip(worklist.cells[k], group, local));
+    if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
+    let wanted = is_smooth(textureLoad(front_surface, px, 0));
+    let twice = 2.0 * color_at(px);
+    let across = select(vec4f(0.0), color_at(px - vec2i(1, 0)) - twice + color_at(px + vec2i(1, 0)), wanted);
+    let down = select(vec4f(0.0), color_at(px - vec2i(0, 1)) - twice + color_at(px + vec2i(0, 1)), wanted);
+    textureStore(second_differences, px, vec4u(
+        pack2x16float(across.xy), pack2x16float(across.zw), pack2x16float(down.xy), pack2x16float(down.zw)));
+}

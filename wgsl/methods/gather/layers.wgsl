@@ -1,0 +1,280 @@
+// Silhouettes as two layers. A renderer filters colours and vectors over the surfaces that a pixel shows; here these
+// are separated again, as in matting: a front layer with its coverage, and what is behind it.
+//#include common/depth.wgsl
+//#include common/frame.wgsl
+//#include common/path.wgsl
+//#include methods/gather/worklist.wgsl
+//#include methods/gather/surface.wgsl
+
+@group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
+@group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
+@group(1) @binding(2) var depth: texture_2d<f32>;
+@group(1) @binding(3) var weight: texture_2d<f32>;
+@group(1) @binding(4) var edge_flags: texture_2d<u32>;  // what `detect_edges` wrote: depth and flags
+@group(1) @binding(5) var edge_flags_out: Flags;
+@group(1) @binding(6) var front_color: Color;           // premultiplied by coverage too
+@group(1) @binding(7) var front_surface: Packed;        // see pack_surface()
+@group(1) @binding(8) var back_color: Color;
+@group(1) @binding(9) var back_surface: Packed;
+@group(1) @binding(10) var matte: Matte;                // front depth; back depth, 0 if there is none; coverage; weight
+@group(1) @binding(11) var<storage, read> worklist: WorkList;
+@group(1) @binding(12) var<storage, read_write> edges: EdgeList;
+@group(1) @binding(13) var<storage, read_write> edge_groups: array<u32>;    // workgroups of `separate_layers`, for an indirect dispatch
+
+struct EdgeList {       // the edge pixels, which may show two surfaces
+    count: atomic<u32>,
+    pixels: array<u32>, // packed as cells are
+}
+
+alias Flags = texture_storage_2d<r32uint, write>;
+alias Color = texture_storage_2d<rgba32float, write>;
+alias Packed = texture_storage_2d<rgba32uint, write>;
+alias Matte = texture_storage_2d<rgba32float, write>;
+
+override WEIGHTED: bool = false;    // read `weight`
+
+// Flags in the last two bits of a depth.
+const FLAGS: u32 = 3u;
+const EDGE: u32 = 1u;           // the pixel may show two surfaces
+const HDR: u32 = 2u;            // some channel is beyond WHITE
+
+const EDGE_MOTION: f32 = 0.5;   // difference of the motions of different surfaces [px]
+const WHITE: f32 = 1.0;
+const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and below 1 less it for 0
+const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
+
+fn clamped(px: vec2i) -> vec2i {
+    return clamp(px, vec2i(0), vec2i(frame.size) - 1);
+}
+
+fn depth_at(px: vec2i) -> f32 {
+    return valid_depth(textureLoad(depth, clamped(px), 0).x);
+}
+
+fn color_at(px: vec2i) -> vec4f {
+    return textureLoad(color, clamped(px), 0);
+}
+
+fn flags_at(px: vec2i) -> u32 {
+    return textureLoad(edge_flags, clamped(px), 0).x;
+}
+
+fn is_edge(flags: u32) -> bool {
+    return (flags & EDGE) != 0u;
+}
+
+/// The depth that is packed with flags.
+fn flagged_depth(flags: u32) -> f32 {
+    return bitcast<f32>(flags & ~FLAGS);
+}
+
+fn weight_at(px: vec2i) -> f32 {
+    if !WEIGHTED { return 1.0; }
+    return textureLoad(weight, clamped(px), 0).x;
+}
+
+/// First pass: a pixel is at an edge if depths differ in its 3 x 3, and motions from its own too.
+@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
+fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = worklist_index(group);
+    let px = vec2i(pixel_in_strip(worklist.cells[k], group, local));
+    if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
+    var nearest = NO_DEPTH;
+    var farthest = 0.0;
+    for (var i = 0; i < 9; i++) {
+        let z = depth_at(px + vec2i(i % 3, i / 3) - 1);
+        nearest = min(nearest, z);
+        farthest = max(farthest, z);
+    }
+    let own = textureLoad(motion, px, 0);
+    var difference2 = 0.0;
+    // The 3 x 3 is two pixels from side to side.
+    let differs = farthest > nearest * (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO);
+    let count = select(0, 9, differs);
+    for (var i = 0; i < count; i++) {
+        let difference = textureLoad(motion, clamped(px + vec2i(i % 3, i / 3) - 1), 0) - own;
+        difference2 = max(difference2, dot(difference, difference));
+    }
+    let is_hdr = any(abs(textureLoad(color, px, 0)) > vec4f(WHITE));
+    let flags = select(0u, EDGE, difference2 > EDGE_MOTION * EDGE_MOTION) | select(0u, HDR, is_hdr);
+    textureStore(edge_flags_out, px, vec4u((bitcast<u32>(depth_at(px)) & ~FLAGS) | flags));
+}
+
+/// Second pass: every pixel as one layer, and the list of edge pixels, which `separate_layers` corrects.
+@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
+fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = worklist_index(group);
+    let px = vec2i(pixel_in_strip(worklist.cells[k], group, local));
+    if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
+    let counts = weight_at(px);
+    var near_edge = false;
+    var smooth_here = true;     // one surface of one weight, nothing beyond white, in the 3 x 3
+    let here = flags_at(px);
+    for (var i = 0; i < 9; i++) {
+        let at = px + vec2i(i % 3, i / 3) - 1;
+        let flags = flags_at(at);
+        smooth_here = smooth_here && (flags & FLAGS) == 0u && weight_at(at) == counts;
+        near_edge = near_edge || is_edge(flags);
+    }
+    let trajectory = trajectory_from(textureLoad(motion, px, 0));
+    let z = flagged_depth(here);
+    textureStore(front_color, px, textureLoad(color, px, 0));
+    textureStore(front_surface, px, pack_surface(trajectory, select(z, -z, near_edge), smooth_here));
+    textureStore(back_surface, px, pack_surface(trajectory, 0.0, false));
+    textureStore(matte, px, vec4f(z, 0.0, 1.0, counts));
+    if is_edge(here) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
+}
+
+/// Third pass: workgroups for the list of edge pixels.
+@compute @workgroup_size(1)
+fn size_dispatch() {
+    let wanted = (atomicLoad(&edges.count) + WG_X * WG_Y - 1u) / (WG_X * WG_Y);
+    edge_groups[0] = min(wanted, GROUPS_PER_ROW);
+    edge_groups[1] = (wanted + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW;
+    edge_groups[2] = 1u;
+}
+
+struct Side {           // weighted sums over the pixels on one side of an edge
+    total: f32,         // of the shares
+    motion: vec4f,
+    depth: f32,
+    color: vec4f,
+    weight: f32,        // of the colour
+}
+
+fn add(side: ptr<function, Side>, share: f32, motion_there: vec4f, z: f32, color_there: vec4f, weight_there: f32) {
+    (*side).total += share;
+    (*side).motion += share * motion_there;
+    (*side).depth += share * z;
+    (*side).color += share * color_there;
+    (*side).weight += share * weight_there;
+}
+
+struct Neighbour {      // a pixel of the 5 x 5 around an edge pixel
+    at: vec2i,
+    distance2: f32,     // [px^2]
+    z: f32,
+    counts: bool,
+    is_front: bool,
+    is_pure: bool,      // it shows one surface
+}
+
+fn neighbour(px: vec2i, i: i32, between: f32) -> Neighbour {
+    let off = vec2i(i % 5, i / 5) - 2;
+    let at = px + off;
+    let flags = flags_at(at);
+    let z = flagged_depth(flags);
+    let distance2 = f32(off.x * off.x + off.y * off.y);
+    let is_inside = all(at >= vec2i(0)) && all(at < vec2i(frame.size));
+    // The corners are too far away for a background: they may show another one.
+    let counts = is_inside && (z < between || distance2 < 8.0);
+    return Neighbour(at, distance2, z, counts, z < between, !is_edge(flags));
+}
+
+/// Fourth pass: the two layers of edge pixels. The pure pixels around are front or back by their depth; the pixel's
+/// coverage is where its own alpha, or its own filtered motion, is between theirs.
+@compute @workgroup_size(WG_X, WG_Y)
+fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = (group.y * GROUPS_PER_ROW + group.x) * WG_X * WG_Y + local;
+    if k >= atomicLoad(&edges.count) { return; }
+    let px = vec2i(unpack_cell(edges.pixels[k]));
+    let counts = weight_at(px);
+    var nearest = NO_DEPTH;
+    var farthest = 0.0;
+    for (var i = 0; i < 9; i++) {
+        let z = flagged_depth(flags_at(px + vec2i(i % 3, i / 3) - 1));
+        nearest = min(nearest, z);
+        farthest = max(farthest, z);
+    }
+    let own_color = textureLoad(color, px, 0);
+    let own_motion = textureLoad(motion, px, 0);
+    // One layer, if there are not two after all.
+    var z = flagged_depth(flags_at(px));
+    var front = own_color;
+    var front_motion = own_motion;
+    var back = vec4f(0.0);
+    var back_motion = own_motion;
+    var back_depth = 0.0;
+    var coverage = 1.0;
+    var back_seen = false;      // the back layer is not inferred
+
+    let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= NO_DEPTH);    // depth of neither
+    var thin = true;                // no pure pixel is in front: a wire
+    var no_pure_background = true;
+    for (var i = 0; i < 25; i++) {
+        let there = neighbour(px, i, between);
+        thin = thin && !(there.counts && there.is_front && there.is_pure);
+        no_pure_background = no_pure_background && !(there.counts && !there.is_front && there.is_pure);
+    }
+    var front_side = Side();
+    var back_side = Side();
+    for (var i = 0; i < 25; i++) {
+        let there = neighbour(px, i, between);
+        let wanted = there.counts && (there.is_pure || select(no_pure_background, thin, there.is_front));
+        let motion_there = select(vec4f(0.0), textureLoad(motion, clamped(there.at), 0), wanted);
+        let color_there = select(vec4f(0.0), color_at(there.at), wanted);
+        // The farther away, the smaller the share.
+        let share = select(0.0, 1.0 / (1.0 + there.distance2 * there.distance2), wanted);
+        let weight_there = weight_at(there.at);
+        add(&front_side, select(0.0, share, there.is_front), motion_there, there.z, color_there, weight_there);
+        add(&back_side, select(share, 0.0, there.is_front), motion_there, there.z, color_there, weight_there);
+    }
+    let background_motion = back_side.motion / back_side.total;
+    var foreground_motion = select(front_side.motion / front_side.total, background_motion, thin);
+    var most = 0.0;
+    for (var i = 0; i < select(0, 9, thin); i++) {      // of a wire, the motion that differs most from the background's
+        let there = neighbour(px, i % 3 + i / 3 * 5 + 6, between);
+        let motion_there = textureLoad(motion, clamped(there.at), 0);
+        let difference2 = dot(motion_there - background_motion, motion_there - background_motion);
+        if there.counts && there.is_front && difference2 > most {
+            most = difference2;
+            foreground_motion = motion_there;
+        }
+    }
+
+    if front_side.total > 0.0 && back_side.total > 0.0 && back_side.weight > 0.0 {
+        let axis = foreground_motion - background_motion;
+        if dot(axis, axis) >= EDGE_MOTION * EDGE_MOTION {
+            // Where alphas differ they tell coverage better than vectors, which some renderers do not filter.
+            let front_alpha = select(front_side.color.a / max(front_side.weight, 1e-9), 1.0, thin);
+            let back_alpha = back_side.color.a / back_side.weight;
+            let by_alpha = front_alpha - back_alpha > MATTE_CONTRAST && counts > 0.0;
+            let measured = clamp(select(dot(own_motion - background_motion, axis) / dot(axis, axis),
+                (own_color.a / counts - back_alpha) / (front_alpha - back_alpha), by_alpha), 0.0, 1.0);
+            back_depth = back_side.depth / back_side.total;
+            if measured < 1.0 - FULL {      // all background, whatever the one sample of the depth says
+                back_seen = true;
+                coverage = 0.0;
+                back = select(back_side.color / back_side.weight, own_color / counts, counts > 0.0);
+                front = vec4f(0.0);
+                front_motion = foreground_motion;
+                if z >= between { back_depth = z; }
+                z = front_side.depth / front_side.total;
+            } else {
+                coverage = select(measured, 1.0, measured > FULL);
+                back = back_side.color / back_side.weight;
+                front = max(own_color - (1.0 - coverage) * counts * back, vec4f(0.0));
+                back_motion = background_motion;
+                if measured <= FULL { front_motion = foreground_motion; }
+                if measured <= FULL || z >= between { z = front_side.depth / front_side.total; }
+            }
+        }
+    }
+    textureStore(front_color, px, front);
+    textureStore(front_surface, px, pack_surface(trajectory_from(front_motion), -z, false));
+    if back_depth > 0.0 { textureStore(back_color, px, back); }     // else nobody reads it
+    textureStore(back_surface, px, pack_surface(trajectory_from(back_motion), max(back_depth, 0.0), back_seen));
+    textureStore(matte, px, vec4f(z, back_depth, coverage, coverage * counts));
+}
+
+/// For cells far from all that moves: searches may pass over them, but nobody reads their colours.
+@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
+fn copy_motion_only(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = worklist_index(group);
+    let px = vec2i(pixel_in_strip(worklist.cells[k], group, local));
+    if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
+    let trajectory = trajectory_from(textureLoad(motion, px, 0));
+    let z = flagged_depth(bitcast<u32>(depth_at(px)));
+    textureStore(front_surface, px, pack_surface(trajectory, z, false));
+    textureStore(back_surface, px, pack_surface(trajectory, 0.0, false));
+}

@@ -1,0 +1,401 @@
+// The image: for every pixel and every time of the exposure, the samples of up to three frames that are there by then
+// are searched, the nearest ones composited front to back, and the results averaged.
+//#include common/depth.wgsl
+//#include common/frame.wgsl
+//#include common/noise.wgsl
+//#include common/path.wgsl
+//#include common/shutter.wgsl
+//#include methods/gather/worklist.wgsl
+//#include methods/gather/motion.wgsl
+//#include methods/gather/search.wgsl
+
+@group(1) @binding(3) var single_layer_mask: texture_2d_array<u32>; // bits of times, see the classification
+@group(1) @binding(4) var layer_colors: texture_2d_array<f32>;  // front, back per frame; premultiplied by alpha, coverage, weight
+@group(1) @binding(5) var mattes: texture_2d_array<f32>;    // per frame: front depth, back depth, coverage, weight
+@group(1) @binding(6) var second_differences: texture_2d<u32>;  // of the frame's own front colours
+@group(1) @binding(7) var own_color: texture_2d<f32>;       // the frame as it came
+@group(1) @binding(8) var own_weight: texture_2d<f32>;
+@group(1) @binding(9) var linear: sampler;
+@group(1) @binding(10) var output: Output;
+@group(1) @binding(11) var<storage, read> worklist: WorkList;
+
+override WEIGHTED: bool = false;    // read `own_weight`
+override CONFIDENCE: bool = false;  // show how sure the result is instead of it
+
+const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: what one showed is preferred
+const ITERATIONS_SAVED: u32 = 2u;       // from a tile's motion, compared with a start from nothing
+const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
+
+struct Sample {
+    depth: f32,         // biased, for comparisons
+    true_depth: f32,
+    residual2: f32,     // squared distance of its position from the pixel [px^2]
+    at: vec2f,          // in its frame [px]
+    layer: u32,         // see texture_layer()
+}
+
+struct Visible {        // the nearest samples of each kind
+    opaque: Sample,
+    front_edge: Sample,
+    back_edge: Sample,  // behind the front edge
+}
+
+// Loops are left from their end, and what is rare has a loop of its own over bits of times: see lavapipe.md.
+
+@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
+fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = worklist_index(group);
+    let id = pixel_in_strip(worklist.cells[k], group, local);
+    if k >= worklist.count || any(id >= frame.size) { return; }
+    let x = vec2f(id) + 0.5;
+    let tile = id / TILE;
+    let candidates0 = load_candidates(tile, 0u);
+    let candidates1 = load_candidates(tile, 1u);
+    let candidates2 = load_candidates(tile, 2u);
+    let front = texture_layer(0u);
+    let trajectory = unpack_trajectory(textureLoad(surfaces, id, front, 0));
+    let block_trajectory = unpack_trajectory(textureLoad(surfaces, id / BLOCK * BLOCK, front, 0));  // as classified
+    let shift = frame.jitter * (pixel_noise(id) - 0.5);
+    let times = sample_times(x, shift, candidates0, candidates1, candidates2);
+    let share = 1.0 / f32(times.count);     // applied before adding, so that no sum of finite colours overflows
+
+    // Static: nothing moves, nor does anything come here.
+    let longest = max_abs_time(0.0);
+    let v = abs(trajectory.velocity) + abs(trajectory.half_acceleration) * longest;
+    let stays = all(v * longest < vec2f(STATIC_EPSILON));
+    let last_word = (frame.samples - 1u) / TIMES_PER_WORD + 1u;
+    let all_single = textureLoad(single_layer_mask, id / BLOCK, last_word, 0).x == 1u;
+    let is_static = is_static_tile(candidates0, candidates1, candidates2) || (stays && all_single);
+    let samples = select(times.count, 0u, is_static);
+
+    var sum = Composite();
+    var accepted = select(0.0, f32(times.count), is_static);
+    var left_image = 0.0;
+    var first = 0u;         // time of this turn's words of bits
+    loop {
+        let valid = select(select(0u, (1u << (samples - first)) - 1u, samples > first), ~0u,
+                           samples >= first + TIMES_PER_WORD);
+        var single = textureLoad(single_layer_mask, id / BLOCK, first / TIMES_PER_WORD, 0).x & valid;
+        var todo = single;
+        loop {              // times at which one search is enough
+            let t = time_in(times, first, todo);
+            let found = iterate_fixed_point(x, displacement(block_trajectory, t), t, front);
+            let px = nearest_pixel(x - found.d);
+            var is_even = true;     // of one weight
+            var counts = 1.0;
+            if WEIGHTED {
+                is_even = is_smooth(textureLoad(surfaces, px, front, 0));
+                counts = textureLoad(mattes, px, front / 2u, 0).w;
+            }
+            if todo != 0u && is_even {
+                let color = resampled(x - found.d, front, true);
+                let residual = min(sqrt(found.residual2), HALF_MAX);    // a wild motion may end it anywhere
+                add(&sum, Composite(color, counts, 1.0, residual, 0.0), share);
+                accepted += 1.0;
+            }
+            if !is_even { single &= ~(1u << firstTrailingBit(todo)); }
+            todo &= todo - 1u;
+            if todo == 0u { break; }
+        }
+        todo = ~single & valid;
+        var unresolved = 0u;
+        loop {              // all others
+            let t = time_in(times, first, todo);
+            let visible = resolve_visibility(x, trajectory, t, candidates0, candidates1, candidates2);
+            let result = composite_front_to_back(visible);
+            let is_covered = result.coverage > 0.5;
+            if todo != 0u && is_covered {
+                add(&sum, result, share / result.coverage);
+                accepted += 1.0;
+            }
+            if !is_covered { unresolved |= todo & (~todo + 1u); }
+            todo &= todo - 1u;
+            if todo == 0u { break; }
+        }
+        loop {              // of them, those at which no frame shows anything: a tap along the pixel's own trajectory
+            let p = x - displacement(trajectory, time_in(times, first, unresolved));
+            if unresolved != 0u {
+                var counts = 1.0;
+                if WEIGHTED { counts = textureSampleLevel(own_weight, linear, p / vec2f(frame.size), 0.0).x; }
+                let color = textureSampleLevel(own_color, linear, p / vec2f(frame.size), 0.0);
+                add(&sum, Composite(color, counts, 1.0, 0.0, 0.0), share);
+                if !is_inside(p) { left_image += 1.0; }
+            }
+            unresolved &= unresolved - 1u;
+            if unresolved == 0u { break; }
+        }
+        first += TIMES_PER_WORD;
+        if first >= samples { break; }
+    }
+    var result = max(sum.color, vec4f(0.0)) / sum.weight;
+    if is_static || sum.weight <= 0.0 { result = static_color(id); }
+    if CONFIDENCE {
+        let share_accepted = max(accepted * share, 1e-9);
+        result = vec4f(accepted * share, sum.neighbours, sum.residual / share_accepted, left_image * share);
+    }
+    textureStore(output, id, result);
+}
+
+/// For static cells.
+@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
+fn copy_static(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = worklist_index(group);
+    let id = pixel_in_strip(worklist.cells[k], group, local);
+    if k >= worklist.count || any(id >= frame.size) { return; }
+    var result = static_color(id);
+    if CONFIDENCE { result = vec4f(1.0, 0.0, 0.0, 0.0); }
+    textureStore(output, id, result);
+}
+
+/// The frame's own pixel, to the bit.
+fn static_color(px: vec2u) -> vec4f {
+    let color = textureLoad(own_color, px, 0);
+    if !WEIGHTED { return color; }
+    let counts = textureLoad(own_weight, px, 0).x;
+    return select(vec4f(0.0), color / counts, counts > 0.0);
+}
+
+/// Time of the lowest set bit of a word whose bit 0 is sample `first`.
+fn time_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
+    return shutter_time(times, min(first + firstTrailingBit(bits), times.count - 1u));
+}
+
+/// The pixel of the image nearest to a position [px].
+fn nearest_pixel(p: vec2f) -> vec2u {
+    return vec2u(clamp(p, vec2f(0.0), vec2f(frame.size) - 1.0));
+}
+
+// ---- visibility -----------------------------------------------------------------------------
+
+// The layers are searched in this order, each only if it may add anything: see next_search().
+const OWN_FRONT: u32 = 0u;          // of the frame itself
+const OWN_BACK: u32 = 1u;
+const NEIGHBOUR_FRONT: u32 = 2u;    // of the neighbouring frame on the side of the time
+const OTHER_FRONT: u32 = 3u;        // of the other neighbouring frame
+const NEIGHBOUR_BACK: u32 = 4u;
+const OTHER_BACK: u32 = 5u;
+const SEARCHES: u32 = 6u;
+
+/// The nearest samples that are at `x` [px] by the time `t` [frame intervals], by the candidates of all frames.
+fn resolve_visibility(x: vec2f, trajectory: Trajectory, t: f32,
+                      a: Candidates, b: Candidates, c: Candidates) -> Visible {
+    let has_edge = max(a.header.y, max(b.header.y, c.header.y)) > 0.0;
+    var visible = Visible(nothing(), nothing(), nothing());
+    var hidden = false;             // the front layer of the frame itself shows nothing opaque
+    var search = OWN_FRONT;
+    loop {
+        let f = select(neighbour_of(t, search % 2u == 1u), 0u, search < NEIGHBOUR_FRONT);
+        let is_back = search == OWN_BACK || search > OTHER_FRONT;
+        let u = t - offset_of(f);
+        let query = Query(x, u, 2u * f + u32(is_back), select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u));
+        search_layer(&visible, query, displacement(trajectory, u), candidates_of(f, a, b, c));
+        if search == OWN_FRONT { hidden = visible.opaque.depth >= INFINITE; }
+        search = next_search(search, visible, t, hidden, has_edge);
+        if search >= SEARCHES { break; }
+    }
+    return visible;
+}
+
+/// The search after `last`. The back of the frame itself where its front is `hidden`; the neighbour there too, or far
+/// from the frame's own instant; the other neighbour if the background is at best inferred; their backs at last,
+/// where it still is and no edge is before it.
+fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool) -> u32 {
+    let none = visible.opaque.depth >= INFINITE;
+    let inferred = none || visible.opaque.layer == 1u;
+    let try_back = hidden && has_edge;
+    let try_neighbours_back = try_back && inferred && (none || visible.front_edge.depth >= INFINITE);
+    var next = last + 1u;
+    if next == OWN_BACK && !try_back { next = NEIGHBOUR_FRONT; }
+    if next == NEIGHBOUR_FRONT && !(sources.count > 1u && (hidden || abs(t) > TRUSTED_TIME)) { next = SEARCHES; }
+    if next == OTHER_FRONT && !(sources.count > 2u && inferred) { next = NEIGHBOUR_BACK; }
+    if next == NEIGHBOUR_BACK && !try_neighbours_back { next = SEARCHES; }
+    if next == OTHER_BACK && !(try_neighbours_back && sources.count > 2u) { next = SEARCHES; }
+    return next;
+}
+
+struct Query {          // what is searched, and where
+    x: vec2f,           // the pixel [px]
+    u: f32,             // time since the frame's instant [frame intervals]
+    layer: u32,         // see texture_layer()
+    handicap: f32,      // factor of the layer's depths
+}
+
+struct Found {          // where an iteration ended
+    state: WarpState,
+    is_there: bool,     // a surface is at the pixel by the time
+}
+
+/// Search one layer from `own`, the displacement of the pixel's own trajectory [px]; then, in a front layer, from the
+/// tile's candidates that may be nearer than what is visible already.
+fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candidates: Candidates) {
+    let is_front = query.layer % 2u == 0u;
+    var seeds = Seeds(vec4<bool>(is_front), displacements_x(candidates, query.u), displacements_y(candidates, query.u));
+    var first = Found(WarpState(vec4u(0u), vec2f(INFINITE), INFINITE), false);      // from the own trajectory
+    var is_first = true;
+    loop {
+        let found = find_surface(&seeds, query, own, is_first, first, (*visible).opaque.depth);
+        if is_first { first = found; }
+        if found.is_there { record(visible, query, found.state); }
+        let wanted = may_be_visible(candidates, query.u, (*visible).opaque.depth / query.handicap);
+        seeds.pending = seeds.pending & wanted & !are_solution(seeds.x, seeds.y, first.state.d);
+        is_first = false;
+        if !any(seeds.pending) { break; }
+    }
+}
+
+/// Iterate from `own` at first; after that from pending seeds, one after the other until one leads to a surface. A seed
+/// is given up if it leads to the first solution, to something that is not nearer than `limit`, or astray.
+fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first: bool, first: Found, limit: f32) -> Found {
+    // In a neighbouring frame one more step, from standing still, leads to the pixel's own trajectory.
+    let in_own_frame = query.layer < 2u;
+    var state = WarpState(vec4u(0u), select(vec2f(0.0), own, in_own_frame), INFINITE);
+    var n = u32(in_own_frame);
+    if !is_first {
+        state.d = next_seed(seeds);
+        n = ITERATIONS_SAVED;
+    }
+    var is_there = false;
+    loop {              // a turn is a step
+        let back = state.d - first.state.d;
+        state = warp_step(query.x, state.d, query.u, texture_layer(query.layer));
+        n++;
+        let again = same_solution(state.d, first.state.d);
+        let farther = !is_first && unpack_depth(state.surface) * query.handicap >= limit;
+        let astray = !is_first && state.residual2 > MAX_STEP_RATIO * MAX_STEP_RATIO * dot(back, back);
+        let ended = has_ended(state) || n > MAX_ITERATIONS || again || farther || astray;
+        is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL && !(again && first.is_there) && !farther;
+        if ended && (is_first || is_there || !any((*seeds).pending)) { break; }
+        if ended {
+            state.d = next_seed(seeds);
+            n = ITERATIONS_SAVED;
+        }
+    }
+    return Found(state, is_there);
+}
+
+/// Keep a surface if it is the nearest of its kind.
+fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
+    let z = unpack_depth(state.surface);
+    let is_inferred = query.layer % 2u == 1u && !was_seen(state.surface);
+    let depth = abs(z) * query.handicap * select(1.0, INFERRED_DEPTH_BIAS, is_inferred);
+    let found = Sample(depth, abs(z), state.residual2, query.x - state.d, query.layer);
+    if z > 0.0 && found.depth < (*visible).opaque.depth { (*visible).opaque = found; }
+    if z < 0.0 {
+        let front_edge = (*visible).front_edge;
+        let in_front = found.depth < front_edge.depth;
+        if in_front && is_behind(front_edge, found) { (*visible).back_edge = front_edge; }
+        if !in_front && found.depth < (*visible).back_edge.depth && is_behind(found, front_edge) {
+            (*visible).back_edge = found;
+        }
+        if in_front { (*visible).front_edge = found; }
+    }
+}
+
+fn nothing() -> Sample {
+    return Sample(INFINITE, INFINITE, INFINITE, vec2f(-9.0), 99u);
+}
+
+/// Whether `b` is of another surface, behind that of `a`; neighbouring frames show the same one again.
+fn is_behind(b: Sample, a: Sample) -> bool {
+    return b.depth >= a.depth * SURFACE_DEPTH_RATIO * select(NEIGHBOUR_DEPTH_BIAS, 1.0, a.layer == b.layer);
+}
+
+// ---- compositing ----------------------------------------------------------------------------
+
+struct Composite {
+    color: vec4f,       // premultiplied by coverage
+    weight: f32,
+    coverage: f32,
+    residual: f32,      // distance from the pixel of what is composited, times its coverage [px]
+    neighbours: f32,    // the part of the coverage that neighbouring frames gave
+}
+
+fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
+    (*sum).color += share * one.color;
+    (*sum).weight += share * one.weight;
+    (*sum).coverage += share * one.coverage;
+    (*sum).residual += share * one.residual;
+    (*sum).neighbours += share * one.neighbours;
+}
+
+/// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then what is opaque.
+fn composite_front_to_back(visible: Visible) -> Composite {
+    let opaque_depth = visible.opaque.depth / SURFACE_DEPTH_RATIO;
+    let front_edge = visible.front_edge.depth < opaque_depth;
+    let back_edge = front_edge && visible.back_edge.depth < opaque_depth
+        && is_behind(visible.back_edge, visible.front_edge);
+    let opaque = visible.opaque.depth < INFINITE;
+    let at = visible.opaque.at;
+    let layer = texture_layer(visible.opaque.layer);
+    var filtered = opaque && visible.opaque.layer % 2u == 0u;   // as a whole, not texel by texel
+    if WEIGHTED { filtered = filtered && is_smooth(textureLoad(surfaces, nearest_pixel(at), layer, 0)); }
+    let parts = u32(front_edge) + u32(back_edge) + u32(opaque && !filtered);
+    var sum = Composite();
+    var n = 0u;
+    loop {
+        var part = visible.opaque;
+        if back_edge && n == 1u { part = visible.back_edge; }
+        if front_edge && n == 0u { part = visible.front_edge; }
+        var one = Composite();
+        var i = 0u;
+        loop {
+            if n < parts { add_texel(&one, part, i); }
+            i++;
+            if n >= parts || i >= 4u { break; }
+        }
+        if part.layer % 2u == 1u && one.coverage > 1e-4 {       // backgrounds are opaque
+            one.color /= one.coverage;
+            one.weight /= one.coverage;
+            one.coverage = 1.0;
+        }
+        one.residual = one.coverage * sqrt(part.residual2);
+        one.neighbours = select(0.0, one.coverage, part.layer > 1u);
+        add(&sum, one, 1.0 - sum.coverage);
+        n++;
+        if n >= parts { break; }
+    }
+    if filtered {
+        var counts = 1.0;
+        if WEIGHTED { counts = textureLoad(mattes, nearest_pixel(at), layer / 2u, 0).w; }
+        let neighbours = select(0.0, 1.0, visible.opaque.layer > 1u);
+        let color = resampled(at, layer, visible.opaque.layer == 0u);
+        let one = Composite(color, counts, 1.0, sqrt(visible.opaque.residual2), neighbours);
+        add(&sum, one, 1.0 - sum.coverage);
+    }
+    return sum;
+}
+
+/// Add texel `i` of the four around a sample, with its bilinear weight, if it is of the same surface.
+fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32) {
+    let front = texture_layer(sample.layer / 2u * 2u);
+    let is_back = sample.layer % 2u == 1u;
+    let corner = floor(sample.at - 0.5);
+    let share = sample.at - 0.5 - corner;
+    let step = vec2f(vec2u(i & 1u, i >> 1u));
+    let px = nearest_pixel(corner + step);
+    let shares = mix(1.0 - share, share, step);
+    let matte = textureLoad(mattes, px, front / 2u, 0);
+    let has_back = matte.y > 0.0;
+    let from_back = is_back && has_back;
+    let z = matte.x;
+    // Of a front layer: what is not behind it. Of a back layer: the other back layers, and what lies as deep.
+    let is_beyond = z > sample.true_depth * SURFACE_DEPTH_RATIO;
+    let is_before = is_back && z < sample.true_depth / SURFACE_DEPTH_RATIO;
+    let belongs = from_back || !(is_beyond || is_before);
+    let amount = select(0.0, shares.x * shares.y, belongs);
+    (*sum).color += amount * textureLoad(layer_colors, px, front + u32(from_back), 0);
+    (*sum).weight += amount * select(matte.w, 1.0, from_back);
+    (*sum).coverage += amount * select(matte.z, 1.0, is_back);
+}
+
+/// Catmull-Rom interpolation where the frame's own texel is smooth, bilinear elsewhere. Between two texels the cubic
+/// differs from the line by their second differences; those of the nearest texel stand for both.
+fn resampled(at: vec2f, layer: u32, is_own: bool) -> vec4f {
+    let f = fract(at - 0.5);
+    let differences = textureLoad(second_differences, nearest_pixel(at), 0);
+    let across = vec4f(unpack2x16float(differences.x), unpack2x16float(differences.y));
+    let down = vec4f(unpack2x16float(differences.z), unpack2x16float(differences.w));
+    let share = select(vec2f(0.0), 0.5 * f * (1.0 - f), is_own);
+    return textureSampleLevel(layer_colors, linear, at / vec2f(frame.size), layer, 0.0)
+        - share.x * across - share.y * down;
+}

@@ -1,0 +1,177 @@
+// Image warping by fixed-point iteration: where in a frame is that which is at a pixel at some other time?
+// With p = x - d(p), d the displacement of the content at p, the iteration d <- displacement at (x - d) leads there from a
+// good start (Bowles et al., "Iterative Image Warping", 2012; Yang et al., "Image-Based Bidirectional Scene
+// Reprojection", 2011). It converges where d changes by less than a pixel per pixel, and to different surfaces
+// from different starts: the pixel's own trajectory, and the candidate motions of its tile.
+//#include common/frame.wgsl
+//#include common/path.wgsl
+//#include common/shutter.wgsl
+//#include methods/gather/surface.wgsl
+
+struct SourceFrames {
+    offsets: vec4f,         // [frame intervals]; the first is 0, the frame itself
+    slots: vec4u,           // of their layers in the textures, see texture_layer()
+    count: u32,
+}
+
+@group(1) @binding(0) var<uniform> sources: SourceFrames;
+@group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // see pack_surface(), texture_layer()
+@group(1) @binding(2) var tile_candidates: texture_2d_array<f32>;   // CANDIDATE_LAYERS per frame
+
+const MAX_ITERATIONS: u32 = 4u; // from the pixel's own trajectory
+const CONVERGED: f32 = 0.5;     // a step shorter than this [px] ends the iteration
+const MAX_RESIDUAL: f32 = 1.0;  // a sample that is farther than this [px] from the pixel is not there
+const SOLUTION_TOLERANCE: f32 = 0.75;   // displacements closer than this [px] in x and y are the same solution
+const NEIGHBOUR_DEPTH_BIAS: f32 = 1.1;  // factor of depths in neighbouring frames: the frame's own sample is preferred
+const TRUSTED_TIME: f32 = 0.25; // up to here from its instant the frame itself is enough, if it shows anything [frame intervals]
+
+// What the classification writes: a bit per time, in words, of every block of pixels.
+const BLOCK: u32 = 4u;          // side [px]
+const TIMES_PER_WORD: u32 = 32u;
+
+struct Candidates {     // motions that may bring something of one frame into a tile, the nearest first
+    header: vec4f,      // see CANDIDATE_LAYERS
+    min_depth: vec4f,
+    t_enter: vec4f,     // since that frame's instant [frame intervals]
+    t_exit: vec4f,
+    vx: vec4f,          // velocities
+    vy: vec4f,
+    ax: vec4f,          // half accelerations
+    ay: vec4f,
+}
+
+fn load_candidates(tile: vec2u, f: u32) -> Candidates {
+    let none = vec4f(0.0);
+    if f >= sources.count {
+        return Candidates(none, vec4f(INFINITE), vec4f(INFINITE), vec4f(-INFINITE), none, none, none, none);
+    }
+    let first = f * CANDIDATE_LAYERS;
+    let a = textureLoad(tile_candidates, tile, first + 4u, 0);
+    let b = textureLoad(tile_candidates, tile, first + 5u, 0);
+    let c = textureLoad(tile_candidates, tile, first + 6u, 0);
+    let d = textureLoad(tile_candidates, tile, first + 7u, 0);
+    return Candidates(
+        textureLoad(tile_candidates, tile, first, 0),
+        textureLoad(tile_candidates, tile, first + 1u, 0),
+        textureLoad(tile_candidates, tile, first + 2u, 0),
+        textureLoad(tile_candidates, tile, first + 3u, 0),
+        vec4f(a.x, b.x, c.x, d.x),
+        vec4f(a.y, b.y, c.y, d.y),
+        vec4f(a.z, b.z, c.z, d.z),
+        vec4f(a.w, b.w, c.w, d.w),
+    );
+}
+
+/// Those of frame `f`.
+fn candidates_of(f: u32, a: Candidates, b: Candidates, c: Candidates) -> Candidates {
+    var result = a;
+    if f == 1u { result = b; }
+    if f == 2u { result = c; }
+    return result;
+}
+
+/// Which candidates may be in the tile at the time `u` and nearer than `depth`.
+fn may_be_visible(candidates: Candidates, u: f32, depth: f32) -> vec4<bool> {
+    return (candidates.min_depth < vec4f(depth)) & (candidates.t_enter <= vec4f(u)) & (vec4f(u) <= candidates.t_exit);
+}
+
+/// Displacements by the time `u` along the candidate motions, x and y [px].
+fn displacements_x(candidates: Candidates, u: f32) -> vec4f {
+    return (candidates.vx + candidates.ax * u) * u;
+}
+
+fn displacements_y(candidates: Candidates, u: f32) -> vec4f {
+    return (candidates.vy + candidates.ay * u) * u;
+}
+
+struct Seeds {          // displacements to start from [px]
+    pending: vec4<bool>,
+    x: vec4f,
+    y: vec4f,
+}
+
+/// The first pending seed, which is pending no more.
+fn next_seed(seeds: ptr<function, Seeds>) -> vec2f {
+    let s = *seeds;
+    (*seeds).pending = s.pending & vec4<bool>(false, s.pending.x, any(s.pending.xy), any(s.pending.xyz));
+    let later = select(vec2f(s.x.w, s.y.w), vec2f(s.x.z, s.y.z), s.pending.z);
+    return select(select(later, vec2f(s.x.y, s.y.y), s.pending.y), vec2f(s.x.x, s.y.x), s.pending.x);
+}
+
+/// The neighbouring frame on the side of `t`, or the only one; the `second`: the other one.
+fn neighbour_of(t: f32, second: bool) -> u32 {
+    return select(1u, 2u, (sources.count == 3u && t > 0.0) != second);
+}
+
+/// Where in the textures a layer is. Layers are counted front, back of the frame itself, front, back of the next one, ...
+fn texture_layer(layer: u32) -> u32 {
+    let f = layer / 2u;
+    let slots = sources.slots;
+    return 2u * select(select(slots.z, slots.y, f == 1u), slots.x, f == 0u) + layer % 2u;
+}
+
+fn offset_of(f: u32) -> f32 {
+    return select(select(sources.offsets.z, sources.offsets.y, f == 1u), 0.0, f == 0u);
+}
+
+/// Whether nothing moves that may come into a tile.
+fn is_static_tile(a: Candidates, b: Candidates, c: Candidates) -> bool {
+    return max(a.header.z, max(b.header.z, c.header.z)) < STATIC_EPSILON;
+}
+
+/// Sample times of the pixel at `x` [px], moved by `shift` within their strata.
+fn sample_times(x: vec2f, shift: f32, a: Candidates, b: Candidates, c: Candidates) -> SampleTimes {
+    let blur_length = max(blur_length_of(a, 0u), max(blur_length_of(b, 1u), blur_length_of(c, 2u)));
+    return with_adaptive_count(shutter_times(x, shift), blur_length);
+}
+
+/// How far the longest candidate motion of frame `f` gets while the shutter is open [px].
+fn blur_length_of(candidates: Candidates, f: u32) -> f32 {
+    let window = abs(exposure_window(sources.offsets[f]));
+    return candidates.header.z * (shutter.span.y - shutter.span.x) / max(max(window.x, window.y), 1e-9);
+}
+
+fn is_inside(p: vec2f) -> bool {
+    return all(p >= vec2f(0.0)) && all(p < vec2f(frame.size));
+}
+
+fn same_solution(a: vec2f, b: vec2f) -> bool {
+    return all(abs(a - b) < vec2f(SOLUTION_TOLERANCE));
+}
+
+/// Which of the displacements are the solution `d`.
+fn are_solution(x: vec4f, y: vec4f, d: vec2f) -> vec4<bool> {
+    return (abs(x - d.x) < vec4f(SOLUTION_TOLERANCE)) & (abs(y - d.y) < vec4f(SOLUTION_TOLERANCE));
+}
+
+struct WarpState {
+    surface: vec4u,     // see pack_surface(): whose displacement it is
+    d: vec2f,           // [px]; x - d is the next point of the iteration, and the solution when it has ended
+    residual2: f32,     // squared distance from x of where that surface is at the time `u` [px^2]
+}
+
+/// One step d <- displacement at (x - d) in a layer, `u` after its frame's instant. INFINITE residual outside the image.
+fn warp_step(x: vec2f, d: vec2f, u: f32, layer: u32) -> WarpState {
+    let p = x - d;
+    let surface = textureLoad(surfaces, vec2i(floor(p)), layer, 0);
+    let next = displacement(unpack_trajectory(surface), u);
+    let step = next - d;
+    return WarpState(surface, next, select(INFINITE, dot(step, step), is_inside(p)));
+}
+
+/// Whether the iteration has converged, or left the image.
+fn has_ended(state: WarpState) -> bool {
+    return state.residual2 < CONVERGED * CONVERGED || state.residual2 >= INFINITE;
+}
+
+/// The fixed point to which the iteration leads from the displacement `start`.
+fn iterate_fixed_point(x: vec2f, start: vec2f, u: f32, layer: u32) -> WarpState {
+    var state = WarpState(vec4u(0u), start, INFINITE);
+    var n = 0u;
+    loop {
+        state = warp_step(x, state.d, u, layer);
+        n++;
+        if has_ended(state) || n >= MAX_ITERATIONS { break; }
+    }
+    return state;
+}

@@ -1,0 +1,294 @@
+// Candidate motions of every tile. First the motions within each tile are clustered to a few; then each tile gathers
+// those clusters, of itself and of all tiles around, whose sweep over the exposure meets it. McGuire et al. (2012)
+// keep one motion per tile, TileMax and NeighborMax; this keeps MOTIONS, with depths and the times at which they come.
+//#include common/frame.wgsl
+//#include common/path.wgsl
+//#include common/shutter.wgsl
+//#include methods/gather/motion.wgsl
+//#include methods/gather/worklist.wgsl
+//#include methods/gather/surface.wgsl
+
+struct SourceFrame {
+    offset: f32,        // [frame intervals]
+    first: u32,         // its first layer in `tile_candidates`
+}
+
+@group(1) @binding(0) var<uniform> source: SourceFrame;
+@group(1) @binding(1) var front_surface: texture_2d<u32>;   // see pack_surface()
+@group(1) @binding(2) var tile_motions: texture_2d_array<f32>;      // what `cluster_motions` wrote
+@group(1) @binding(3) var tile_motions_out: Layers;     // of every tile's own pixels, MOTION_LAYERS
+@group(1) @binding(4) var tile_candidates: Layers;      // of all that may come into it, CANDIDATE_LAYERS per frame
+@group(1) @binding(5) var<storage, read_write> max_displacement: atomic<u32>;   // bits of the greatest of all tiles [px]
+@group(1) @binding(6) var<storage, read> active_cells: WorkList;
+@group(1) @binding(7) var<storage, read> static_cells: WorkList;
+@group(1) @binding(8) var coarse_boxes: texture_2d<f32>;    // what `coarsen` wrote
+@group(1) @binding(9) var coarse_boxes_out: Boxes;      // around the boxes of COARSE x COARSE tiles
+
+alias Layers = texture_storage_2d_array<rgba32float, write>;
+alias Boxes = texture_storage_2d<rgba32float, write>;
+
+// Layers of `tile_motions`, after the MOTIONS trajectories.
+const BOX: u32 = 4u;            // least, greatest displacement of any while the frame is exposed [px]
+const MIN_DEPTH: u32 = 5u;      // the least depth of the pixels of each cluster
+const HEADER: u32 = 6u;         // as of the candidates, see CANDIDATE_LAYERS
+const MOTION_LAYERS: u32 = 7u;
+
+const COARSE: i32 = 4;          // tiles per side of a coarse box
+const MERGE_DISTANCE: f32 = 0.5;    // motions closer than this [px] are one
+
+/// Squared distance [px^2] to the nearest of the clusters' motions. Those not found yet are 0, standing still, so that
+/// static content needs no cluster.
+fn distance2_to_clusters(trajectory: vec4f, clusters: array<vec4f, 4>, u: f32) -> f32 {
+    return min(min(trajectory_distance2(trajectory, clusters[0], u), trajectory_distance2(trajectory, clusters[1], u)),
+               min(trajectory_distance2(trajectory, clusters[2], u), trajectory_distance2(trajectory, clusters[3], u)));
+}
+
+/// Which of the clusters is nearest; several if they are equally near.
+fn nearest_cluster(trajectory: vec4f, clusters: array<vec4f, 4>, u: f32) -> vec4<bool> {
+    let d = vec4f(trajectory_distance2(trajectory, clusters[0], u), trajectory_distance2(trajectory, clusters[1], u),
+                  trajectory_distance2(trajectory, clusters[2], u), trajectory_distance2(trajectory, clusters[3], u));
+    let least = min(min(d.x, d.y), min(d.z, d.w));
+    return d == vec4f(least);
+}
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn clear(@builtin(global_invocation_id) id: vec3u) {
+    if all(id.xy == vec2u(0u)) { atomicStore(&max_displacement, 0u); }
+}
+
+/// Farthest-point clustering of the motions of a tile's own pixels (Gonzalez 1985): the first cluster is at the
+/// longest motion, each further one at the motion farthest from all before.
+@compute @workgroup_size(WG_X, WG_Y)
+fn cluster_motions(@builtin(local_invocation_index) local: u32,
+        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let k = work_index(local, group, groups);
+    let n = k / CELL_TILES;
+    let is_active = n < active_cells.count;
+    let cell = unpack_cell(select(static_cells.cells[n - active_cells.count], active_cells.cells[n], is_active));
+    let id = cell * vec2u(CELL_TILES, 1u) + vec2u(k % CELL_TILES, 0u);
+    if n >= active_cells.count + static_cells.count || id.x >= tiles_of(frame.size).x { return; }
+    let corner = id * TILE;
+    let end = min(corner + TILE, frame.size) - 1u;
+    let pixels = select(0u, TILE * TILE, is_active);    // those of tiles that are cut off count several times
+    let window = exposure_window(source.offset);
+    let u = max_abs_time(source.offset);
+    var motions = array<vec4f, 4>();
+    var box = vec4f(0.0);
+    var count = 0.0;
+    var longest = 0.0;
+    var more = true;
+    for (var k = 0u; k < MOTIONS && more; k++) {
+        let clusters = motions;
+        var farthest = 0.0;
+        var found = vec4f(0.0);
+        for (var i = 0u; i < pixels; i++) {
+            let px = min(corner + vec2u(i % TILE, i / TILE), end);
+            let trajectory = as_vec4(unpack_trajectory(textureLoad(front_surface, px, 0)));
+            let distance2 = distance2_to_clusters(trajectory, clusters, u);
+            if distance2 > farthest && distance2 < MAX_MOTION * MAX_MOTION {
+                farthest = distance2;
+                found = trajectory;
+            }
+        }
+        if k == 0u { longest = sqrt(farthest); }
+        more = farthest > MERGE_DISTANCE * MERGE_DISTANCE;
+        if more {
+            count += 1.0;
+            motions[k] = found;
+            let a = displacement4(found, window.x);
+            let b = displacement4(found, window.y);
+            box = vec4f(min(box.xy, min(a, b)), max(box.zw, max(a, b)));
+        }
+    }
+    var has_edge = 0.0;
+    var min_depth = vec4f(INFINITE);
+    for (var i = 0u; i < pixels; i++) {
+        let surface = textureLoad(front_surface, min(corner + vec2u(i % TILE, i / TILE), end), 0);
+        let z = abs(unpack_depth(surface));
+        if unpack_depth(surface) < 0.0 { has_edge = 1.0; }
+        let is_nearest = nearest_cluster(as_vec4(unpack_trajectory(surface)), motions, u);
+        min_depth = min(min_depth, select(vec4f(INFINITE), vec4f(z), is_nearest));
+    }
+    for (var k = 0u; k < MOTIONS; k++) { textureStore(tile_motions_out, id, k, motions[k]); }
+    textureStore(tile_motions_out, id, BOX, box);
+    textureStore(tile_motions_out, id, MIN_DEPTH, min_depth);
+    textureStore(tile_motions_out, id, HEADER, vec4f(count, has_edge, longest, 0.0));
+    atomicMax(&max_displacement, bitcast<u32>(longest));
+}
+
+/// One box around those of many tiles, so that `gather_candidates` need not look at each.
+@compute @workgroup_size(WG_X, WG_Y)
+fn coarsen(@builtin(global_invocation_id) id: vec3u) {
+    let first = vec2i(id.xy) * COARSE;
+    let tiles = vec2i(tiles_of(frame.size));
+    if any(first >= tiles) { return; }
+    var box = vec4f(0.0);
+    for (var i = 0; i < COARSE * COARSE; i++) {
+        let one = textureLoad(tile_motions, min(first + vec2i(i % COARSE, i / COARSE), tiles - 1), BOX, 0);
+        box = vec4f(min(box.xy, one.xy), max(box.zw, one.zw));
+    }
+    textureStore(coarse_boxes_out, id.xy, box);
+}
+
+/// The candidates of one tile: clusters of all motions, from wherever they come, whose sweep meets it.
+@compute @workgroup_size(WG_X, WG_Y)
+fn gather_candidates(@builtin(local_invocation_index) local: u32,
+        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let k = work_index(local, group, groups);
+    let tiles = tiles_of(frame.size);
+    let id = unpack_cell(active_cells.cells[k / CELL_TILES]) * vec2u(CELL_TILES, 1u) + vec2u(k % CELL_TILES, 0u);
+    if k / CELL_TILES >= active_cells.count || id.x >= tiles.x { return; }
+    let window = exposure_window(source.offset);
+    let u = max_abs_time(source.offset);
+    let longest_of_all = bitcast<f32>(atomicLoad(&max_displacement));
+    let radius = min(i32(ceil(longest_of_all / f32(TILE))) + 1, MAX_TILE_RADIUS);
+    let here = vec2i(id);
+    let low = max(here - radius, vec2i(0));
+    let high = min(here + radius, vec2i(tiles) - 1);
+
+    // The range of tiles around of which something may come: first by coarse boxes,
+    let coarse_low = low / COARSE;
+    let coarse_high = high / COARSE;
+    var first = here;
+    var last = here;
+    for (var coarse = coarse_low; coarse.y <= coarse_high.y; coarse = after(coarse, coarse_low, coarse_high)) {
+        let box = textureLoad(coarse_boxes, coarse, 0);
+        let side = f32((COARSE - 1) * i32(TILE));
+        let off = vec2f((here - coarse * COARSE) * i32(TILE));
+        if sweep_overlaps(vec4f(box.xy, box.zw + side), off) {
+            first = min(first, coarse * COARSE);
+            last = max(last, coarse * COARSE + COARSE - 1);
+        }
+    }
+    // then by their own boxes and if they move.
+    let least = max(first, low);
+    let most = min(last, high);
+    first = here;
+    last = here;
+    var has_edge = 0.0;
+    var longest = 0.0;
+    for (var tile = least; tile.y <= most.y; tile = after(tile, least, most)) {
+        let other = source_tile(tile, here);
+        if other.may_reach {
+            let header = textureLoad(tile_motions, other.at, HEADER, 0);
+            has_edge = max(has_edge, header.y);
+            longest = max(longest, header.z);
+            if other.count > 0u {
+                first = min(first, tile);
+                last = max(last, tile);
+            }
+        }
+    }
+
+    // Farthest-point clustering of all the motions that come.
+    var motions = array<vec4f, 4>();
+    var count = 0u;
+    var more = true;
+    for (var k = 0u; k < MOTIONS && more; k++) {
+        var farthest = 0.0;
+        var found = vec4f(0.0);
+        for (var tile = first; tile.y <= last.y; tile = after(tile, first, last)) {
+            let other = source_tile(tile, here);
+            for (var n = 0u; n < other.count; n++) {
+                let trajectory = textureLoad(tile_motions, other.at, n, 0);
+                let distance2 = distance2_to_clusters(trajectory, motions, u);
+                let interval = sweep_interval(trajectory, window, other.off);
+                if distance2 > farthest && interval.x <= interval.y {
+                    farthest = distance2;
+                    found = trajectory;
+                }
+            }
+        }
+        more = farthest > MERGE_DISTANCE * MERGE_DISTANCE;
+        if more {
+            motions[k] = found;
+            count = k + 1u;
+        }
+    }
+
+    // The least depth of each cluster, and when the first of it enters the tile and the last leaves it.
+    var min_depth = vec4f(INFINITE);
+    var t_enter = vec4f(1.0);
+    var t_exit = vec4f(0.0);
+    for (var tile = first; tile.y <= last.y; tile = after(tile, first, last)) {
+        let other = source_tile(tile, here);
+        for (var n = 0u; n < other.count; n++) {
+            let trajectory = textureLoad(tile_motions, other.at, n, 0);
+            let interval = sweep_interval(trajectory, window, other.off);
+            if interval.x <= interval.y {
+                let nearest = nearest_cluster(trajectory, motions, u);
+                let z = textureLoad(tile_motions, other.at, MIN_DEPTH, 0)[n];
+                min_depth = min(min_depth, select(vec4f(INFINITE), vec4f(z), nearest));
+                t_enter = min(t_enter, select(vec4f(1.0), vec4f(interval.x), nearest));
+                t_exit = max(t_exit, select(vec4f(0.0), vec4f(interval.y), nearest));
+            }
+        }
+    }
+
+    // Sorted by depth, the nearest first.
+    for (var i = 0u; i < MOTIONS; i++) {
+        for (var k = 0u; k + 1u < count; k++) {
+            if min_depth[k] > min_depth[k + 1u] {
+                let trajectory = motions[k];
+                motions[k] = motions[k + 1u];
+                motions[k + 1u] = trajectory;
+                let z = min_depth[k];
+                min_depth[k] = min_depth[k + 1u];
+                min_depth[k + 1u] = z;
+                let a = t_enter[k];
+                t_enter[k] = t_enter[k + 1u];
+                t_enter[k + 1u] = a;
+                let b = t_exit[k];
+                t_exit[k] = t_exit[k + 1u];
+                t_exit[k + 1u] = b;
+            }
+        }
+    }
+    let duration = window.y - window.x;
+    let none = min_depth >= vec4f(INFINITE);
+    textureStore(tile_candidates, id, source.first, vec4f(f32(count), has_edge, longest, 0.0));
+    textureStore(tile_candidates, id, source.first + 1u, min_depth);
+    textureStore(tile_candidates, id, source.first + 2u, select(window.x + duration * t_enter, vec4f(INFINITE), none));
+    textureStore(tile_candidates, id, source.first + 3u, select(window.x + duration * t_exit, vec4f(-INFINITE), none));
+    for (var k = 0u; k < MOTIONS; k++) { textureStore(tile_candidates, id, source.first + 4u + k, motions[k]); }
+}
+
+/// The tile that follows another one, row by row of those from `first` to `last`.
+fn after(tile: vec2i, first: vec2i, last: vec2i) -> vec2i {
+    return select(vec2i(tile.x + 1, tile.y), vec2i(first.x, tile.y + 1), tile.x >= last.x);
+}
+
+struct SourceTile {     // a tile, seen from another one, `here`
+    at: vec2i,
+    off: vec2f,         // from it to `here` [px]
+    may_reach: bool,    // some of its motions may lead to `here`
+    count: u32,         // of its motions, if so
+}
+
+fn source_tile(at: vec2i, here: vec2i) -> SourceTile {
+    let off = vec2f((here - at) * i32(TILE));
+    let may_reach = sweep_overlaps(textureLoad(tile_motions, at, BOX, 0), off);
+    return SourceTile(at, off, may_reach, select(0u, u32(textureLoad(tile_motions, at, HEADER, 0).x), may_reach));
+}
+
+/// Whether the sweep of a tile, by the box of its displacements, may overlap the tile that is `off` [px] away.
+fn sweep_overlaps(box: vec4f, off: vec2f) -> bool {
+    let margin = f32(TILE) + 2.0;
+    return all(off + margin > box.xy) && all(off - margin < box.zw);
+}
+
+/// When a tile moving along `trajectory` overlaps the one that is `off` [px] away, in shares of the `window`: t_enter,
+/// t_exit; t_exit < t_enter if it never does. A slab test of the line from its first to its last position
+/// against a square, which is larger by the greatest distance of the trajectory from that line.
+fn sweep_interval(trajectory: vec4f, window: vec2f, off: vec2f) -> vec2f {
+    let start = displacement4(trajectory, window.x) - off;
+    let sweep = displacement4(trajectory, window.y) - off - start;
+    let bend = length(trajectory.zw) * (window.y - window.x) * (window.y - window.x) * 0.25;
+    let margin = f32(TILE) + bend;
+    let divisor = select(sweep, vec2f(1e-6), abs(sweep) < vec2f(1e-6));
+    let a = (-margin - start) / divisor;
+    let b = (margin - start) / divisor;
+    let t_enter = min(a, b);
+    let t_exit = max(a, b);
+    return vec2f(max(max(t_enter.x, t_enter.y), 0.0), min(min(t_exit.x, t_exit.y), 1.0));
+}

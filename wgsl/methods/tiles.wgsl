@@ -1,0 +1,204 @@
+// Reconstruction filter over tiles (Guertin, McGuire, Nowrouzezahrai 2014, after McGuire et al. 2012): taps along the
+// dominant motion around and along the pixel's own, each weighted by whether its motion and depth let it be seen here.
+// Names are the papers': TileMax, NeighborMax, f and b (foreground, background), cone, cylinder.
+//#include common/frame.wgsl
+//#include common/noise.wgsl
+//#include common/shutter.wgsl
+//#include common/wheel.wgsl
+//#include methods/tiles_extent.wgsl
+
+struct Tiles {
+    count: vec2u,       // tiles across, down
+    edge: u32,          // of a tile [px]; no blur extends farther to either side
+    unused: u32,
+}
+
+@group(1) @binding(0) var<uniform> tiles: Tiles;
+@group(1) @binding(1) var color: texture_2d<f32>;       // linear, premultiplied by alpha and by weight
+@group(1) @binding(2) var motion: texture_2d<f32>;      // to_prev, to_next [px]
+@group(1) @binding(3) var velocity_depth: texture_2d<f32>;  // direction and length of the blur extent [px], depth
+@group(1) @binding(4) var weight: texture_2d<f32>;      // 0: stays out of its neighbours' blur
+@group(1) @binding(5) var linear: sampler;
+@group(1) @binding(6) var<storage, read_write> row_max: array<vec4f>;       // motion of every tile's every row
+@group(1) @binding(7) var<storage, read_write> tile_max: array<vec4f>;      // motion of every tile
+@group(1) @binding(8) var<storage, read_write> neighbor_max: array<vec4f>;  // motion of every tile and those around
+@group(1) @binding(9) var output: Output;
+
+override WEIGHTED: bool = false;    // read `weight`
+override PUBLISHED: bool = false;   // weights as printed, not divided by those of uniform motion
+override TILES: bool = false;       // show the motion that every tile follows instead of the colour
+
+// The paper's constants.
+const KAPPA: f32 = 40.0;            // the greater, the less the pixel's own colour counts
+const GAMMA: f32 = 1.5;             // extent beyond MIN_EXTENT [px] from which the pixel's own direction is trusted
+const MIN_EXTENT: f32 = 0.5;        // shorter ones [px] are taken to be as long
+
+/// The motion of greatest extent in a row of a tile.
+@compute @workgroup_size(WG_X, WG_Y)
+fn find_row_max(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= tiles.count.x || id.y >= frame.size.y { return; }
+    var greatest = -1.0;
+    var found = id.x * tiles.edge;
+    let end = min((id.x + 1u) * tiles.edge, frame.size.x);
+    let nonsense = 4.0 * f32(frame.size.x + frame.size.y);  // a single bad vector must not rule its tile
+    for (var x = found; x < end; x++) {
+        let extent = textureLoad(velocity_depth, vec2u(x, id.y), 0).z;
+        if extent > greatest && extent < nonsense {
+            greatest = extent;
+            found = x;
+        }
+    }
+    row_max[id.y * tiles.count.x + id.x] =
+        select(vec4f(0.0), textureLoad(motion, vec2u(found, id.y), 0), greatest >= 0.0);
+}
+
+/// TileMax: the motion of greatest extent in a tile.
+@compute @workgroup_size(WG_X, WG_Y)
+fn find_tile_max(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= tiles.count) { return; }
+    var greatest = -1.0;
+    var found = vec4f(0.0);
+    let end = min((id.y + 1u) * tiles.edge, frame.size.y);
+    for (var y = id.y * tiles.edge; y < end; y++) {
+        let candidate = row_max[y * tiles.count.x + id.x];
+        let delay = delay_at(vec2f(centre_of(id.xy).x, f32(y) + 0.5));
+        let extent = length(blur_extent(trajectory_from(candidate), delay));
+        if extent > greatest {
+            greatest = extent;
+            found = candidate;
+        }
+    }
+    tile_max[id.y * tiles.count.x + id.x] = found;
+}
+
+/// NeighborMax: the motion of greatest extent in a tile and those around; of a diagonal neighbour only if it leads
+/// this way (Guertin).
+@compute @workgroup_size(WG_X, WG_Y)
+fn find_neighbor_max(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= tiles.count) { return; }
+    var greatest = -1.0;
+    var found = vec4f(0.0);
+    for (var i = 0u; i < 9u; i++) {
+        let by = vec2i(vec2u(i % 3u, i / 3u)) - 1;
+        let at = vec2i(id.xy) + by;
+        if any(at < vec2i(0)) || any(at >= vec2i(tiles.count)) { continue; }
+        let candidate = tile_max[u32(at.y) * tiles.count.x + u32(at.x)];
+        let extent = blur_extent(trajectory_from(candidate), delay_at(centre_of(vec2u(at))));
+        let is_beside = abs(by.x) + abs(by.y) < 2;
+        let leads_here = extent.x * f32(by.x) * extent.y * f32(by.y) > 0.0;
+        if (is_beside || leads_here) && length(extent) > greatest {
+            greatest = length(extent);
+            found = candidate;
+        }
+    }
+    neighbor_max[id.y * tiles.count.x + id.x] = found;
+}
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let x = vec2f(id.xy) + 0.5;
+    let noise = pixel_noise(id.xy);
+    if TILES {
+        let tile = id.xy / tiles.edge;
+        let followed = neighbor_max[tile.y * tiles.count.x + tile.x];
+        let extent = blur_extent(trajectory_from(followed), delay_at(centre_of(tile)));
+        textureStore(output, id.xy, vec4f(wheel_color(extent, f32(tiles.edge)), 1.0));
+        return;
+    }
+    let all = shutter_times(x, frame.jitter * (noise - 0.5));
+    let limit = f32(tiles.edge);
+    let dominant = limited(trajectory_from(neighbor_max[tile_at(x, noise)]), all.delay, limit);
+    let dominant_extent = blur_extent(dominant, all.delay);
+    let reach = max(length(dominant_extent), MIN_EXTENT);
+    let times = with_adaptive_count(all, 4.0 * reach);      // to both sides, in two directions by turns
+    let is_static = reach <= MIN_EXTENT;
+    let count = select(times.count, 0u, is_static);
+
+    // The paper's v_max is along `dominant`, its v_c is `odd_direction`, followed by every second tap.
+    let own = textureLoad(velocity_depth, id.xy, 0);
+    let own_extent = clamp(own.z, MIN_EXTENT, limit);
+    let trust = clamp((own_extent - MIN_EXTENT) / GAMMA, 0.0, 1.0);
+    let odd_direction = own_or_across(own.xy, dominant_extent, trust);
+    let z = own.w;
+    // The paper's weight of the pixel itself, or a quarter of it where a tap's weight is 1 instead of 4. All
+    // weights are over the number of taps, so that no sum of finite colours overflows.
+    let centre_weight = select(0.25, 1.0, PUBLISHED) / (KAPPA * own_extent);
+    let share = 1.0 / f32(times.count);
+    var sum = centre_weight * textureLoad(color, id.xy, 0);
+    var total = centre_weight;
+    if WEIGHTED { total *= textureLoad(weight, id.xy, 0).x; }
+    let texel = 1.0 / vec2f(frame.size);
+    let last = vec2f(frame.size) - 1.0;
+    for (var i = 0u; i < count; i++) {
+        let t = shutter_time(times, i);
+        let offset = displacement(dominant, t);
+        let far = length(offset);
+        let even_direction = offset / max(far, 1e-6);
+        let direction = select(even_direction, odd_direction * sign(t), i % 2u == 1u);
+        let at = x - far * direction;
+        let tap = textureLoad(velocity_depth, vec2u(clamp(floor(at), vec2f(0.0), last)), 0);
+        let tap_extent = clamp(tap.z, MIN_EXTENT, limit);
+        let per_depth = 1.0 / min(z, tap.w);
+        let foreground = clamp(1.0 - (tap.w - z) * per_depth, 0.0, 1.0);
+        let background = clamp(1.0 - (z - tap.w) * per_depth, 0.0, 1.0);
+        let own_along = select(1.0, abs(dot(own.xy, direction)), own_extent > MIN_EXTENT && far > 0.0);
+        let tap_along = select(1.0, abs(dot(tap.xy, direction)), tap_extent > MIN_EXTENT && far > 0.0);
+        var w = foreground * cone(far, tap_extent) * tap_along + background * cone(far, own_extent) * own_along
+            + 2.0 * cylinder(far, min(tap_extent, own_extent)) * max(own_along, tap_along);
+        if !PUBLISHED { w /= max(2.0 * cone(far, reach) + 2.0 * cylinder(far, reach), 1e-3); }
+        w *= share;
+        sum += w * textureSampleLevel(color, linear, at * texel, 0.0);
+        if WEIGHTED { total += w * textureSampleLevel(weight, linear, at * texel, 0.0).x; } else { total += w; }
+    }
+    var result = sum / total;
+    if is_static || total <= 0.0 {      // the pixel itself, to the bit
+        result = textureLoad(color, id.xy, 0);
+        if WEIGHTED {
+            let counts = textureLoad(weight, id.xy, 0).x;
+            result = select(vec4f(0.0), result / counts, counts > 0.0);
+        }
+    }
+    textureStore(output, id.xy, result);
+}
+
+/// Delay of the rolling shutter at `x` [px].
+fn delay_at(x: vec2f) -> f32 {
+    return shutter_times(x, 0.0).delay;
+}
+
+fn centre_of(tile: vec2u) -> vec2f {
+    return (vec2f(tile) + 0.5) * f32(tiles.edge);
+}
+
+/// The trajectory scaled so that its extent is at most `limit` [px].
+fn limited(trajectory: Trajectory, delay: f32, limit: f32) -> Trajectory {
+    let factor = min(1.0, limit / max(length(blur_extent(trajectory, delay)), 1e-6));
+    return Trajectory(factor * trajectory.velocity, factor * trajectory.half_acceleration);
+}
+
+/// Index of a tile, jittered by up to a quarter of an edge to either side so that no seams show.
+fn tile_at(x: vec2f, noise: f32) -> u32 {
+    let other_noise = fract(noise * 8.0 + 0.5);
+    let at = x / f32(tiles.edge) + 0.5 * (vec2f(noise, other_noise) - 0.5);
+    let tile = clamp(vec2i(floor(at)), vec2i(0), vec2i(tiles.count) - 1);
+    return u32(tile.y) * tiles.count.x + u32(tile.x);
+}
+
+/// The pixel's own direction; perpendicular to the dominant motion as far as its own is not trusted.
+fn own_or_across(own: vec2f, dominant: vec2f, trust: f32) -> vec2f {
+    let along = unit(dominant);
+    var across = vec2f(-along.y, along.x);
+    if dot(across, own) < 0.0 { across = -across; }
+    return unit(mix(across, own, trust));
+}
+
+/// Share, at the distance `far`, of a blur of `extent` to either side that is brightest in its middle.
+fn cone(far: f32, extent: f32) -> f32 {
+    return clamp(1.0 - far / extent, 0.0, 1.0);
+}
+
+/// The same of a blur that is equally bright throughout.
+fn cylinder(far: f32, extent: f32) -> f32 {
+    return 1.0 - smoothstep(0.95 * extent, 1.05 * extent, far);
+}
