@@ -130,11 +130,11 @@ def test_energy_is_kept_under_one_motion(method):
 def test_what_is_kept_stays_sharp_and_out_of_its_neighbours(method, noise):
     picture = noise * 0.1
     picture[20:28, 30:38] = 100.0
-    keep = np.zeros(noise.shape[:2], "f4")
-    keep[20:28, 30:38] = 1
-    out = blurred(picture, moving(picture, 20), keep=keep, method=method)
-    assert np.array_equal(out[keep > 0], picture[keep > 0])
-    assert out[keep == 0].max() < 0.11
+    holdout = np.zeros(noise.shape[:2], "f4")
+    holdout[20:28, 30:38] = 1
+    out = blurred(picture, moving(picture, 20), holdout=holdout, method=method)
+    assert np.array_equal(out[holdout > 0], picture[holdout > 0])
+    assert out[holdout == 0].max() < 0.11
 
 
 @pytest.mark.parametrize("zoom", [0.0, 0.3, -0.3])
@@ -145,20 +145,20 @@ def test_white_stays_white_whatever_is_kept(method, kept, zoom):
     to_next = np.stack([6 + (x - 40) * zoom, 3 + (y - 24) * zoom], axis=2)
     bar = (abs(x - 40) < 10) & (abs(y - 24) < 12)
     to_next[bar] = (20, 0)
-    keep = {
+    holdout = {
         "checker": (x // 3 + y // 3) % 2,
         "ring": (x > 27) & (x < 31),
         "block": (abs(x - 32) < 2) & (abs(y - 22) < 2),
     }[kept].astype("f4")
     white = np.ones((48, 80, 3), "f4")
     depth = np.where(bar, 3.0, 10.0).astype("f4")
-    out = wgmb.blur(white, to_next, keep=keep, depth=depth, method=method)
+    out = wgmb.blur(white, to_next, holdout=holdout, depth=depth, method=method)
     np.testing.assert_allclose(out, 1, atol=ZERO)
 
 
 def test_half_kept_is_half_way(method, noise):
-    keep = np.full(noise.shape[:2], 0.5, "f4")
-    out = blurred(noise, moving(noise), keep=keep, method=method)
+    holdout = np.full(noise.shape[:2], 0.5, "f4")
+    out = blurred(noise, moving(noise), holdout=holdout, method=method)
     want = (blurred(noise, moving(noise), method=method) + noise) / 2
     np.testing.assert_allclose(out, want, atol=ZERO)
 
@@ -206,13 +206,13 @@ BAD = [np.nan, np.inf, -np.inf, 1e-42, 3e38, -3e38]
 
 
 @pytest.mark.parametrize("value", BAD)
-@pytest.mark.parametrize("where", ["color", "to_next", "to_prev", "keep", "scale"])
+@pytest.mark.parametrize("where", ["color", "to_next", "to_prev", "holdout", "scale"])
 def test_a_bad_value_spoils_nothing(method, noise, where, value):
     inputs = {
         "color": noise,
         "to_next": moving(noise, 6, 2),
         "to_prev": moving(noise, -6, -2),
-        "keep": np.zeros(noise.shape[:2], "f4"),
+        "holdout": np.zeros(noise.shape[:2], "f4"),
         "scale": np.ones(noise.shape[:2], "f4"),
     }
     clean = blurred(**inputs, method=method)
@@ -304,10 +304,12 @@ def test_missing_inputs_are_named(method, noise):
 @pytest.mark.parametrize("phase", [0.5, "centre"])
 def test_constant_colour_stays_constant_around_what_is_kept(method, phase):
     grey = np.full((48, 64, 3), 0.25, "f4")
-    keep = np.zeros((48, 64), "f4")
-    keep[:, 20:] = 1
-    keep[:, 30] = 0
-    out = blurred(grey, moving(grey, -20), keep=keep, shutter=Shutter(90, phase), method=method)
+    holdout = np.zeros((48, 64), "f4")
+    holdout[:, 20:] = 1
+    holdout[:, 30] = 0
+    out = blurred(
+        grey, moving(grey, -20), holdout=holdout, shutter=Shutter(90, phase), method=method
+    )
     np.testing.assert_allclose(out[:, :60], 0.25, atol=2**-12)
 
 

@@ -171,7 +171,7 @@ def test_a_process_forked_before_there_is_a_device_works_and_one_forked_after_is
 
 
 def test_a_picture_that_is_read_back_in_bands_is_the_same(device, monkeypatch):
-    pool = textures.Images(device)
+    pool = textures.TexturePool(device)
     picture = np.random.default_rng(2).random((50, 37, 4), "f4")
     pool.upload("a", picture, "rgba32float")
     texture = pool.texture("a", (37, 50), "rgba32float")

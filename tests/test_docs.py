@@ -11,7 +11,7 @@ import cyclopts
 import pytest
 
 from wgmb import METHODS
-from wgmb.cli.app import app
+from wgmb.cli import app as cli
 from wgmb.scene import builtin
 
 HERE = Path(__file__).parent.parent
@@ -19,7 +19,8 @@ PAGES = {
     str(path.relative_to(HERE)): path.read_text(encoding="utf-8")
     for path in (HERE / "README.md", HERE / "CONTRIBUTING.md", *sorted(HERE.glob("docs/**/*.md")))
 }
-COMMANDS = {name: app[name] for name in app if not name.startswith("-")}
+app = cli.make_app(*cli.COMMANDS)
+COMMANDS = {name: app[name] for name in cli.COMMANDS}
 MOST_LINES = 110  # of the README
 
 

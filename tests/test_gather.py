@@ -9,7 +9,7 @@ import wgpu
 import wgmb
 from images import crossing, frame_of
 from wgmb import Shutter, gpu
-from wgmb.gpu.textures import Images
+from wgmb.gpu.textures import TexturePool
 
 SIZE = (54, 96)
 SHUTTER = Shutter(180)
@@ -147,7 +147,7 @@ def test_a_neighbour_that_lacks_what_the_method_needs_is_named(sources):
     blur = wgmb.Blur("gather", shutter=360)
     frame = frame_of(sources)
     inputs = blur.upload(frame)
-    output = Images(blur.device).view("picture", frame.size, blur.output)
+    output = TexturePool(blur.device).view("picture", frame.size, blur.output)
     inputs["next"] = replace(inputs["next"], depth=None)
     with pytest.raises(wgmb.InputError, match=r"needs next\.depth"):
         blur.encode(blur.device.create_command_encoder(), output=output, **inputs)

@@ -54,7 +54,7 @@ def with_shader(monkeypatch):
             source = original(name)
             included = any(one == file for one, _ in source.files)
             assert not included or source.text.count(old) == 1
-            return wgsl.Source(source.text.replace(old, new), source.files)
+            return wgsl.WgslSource(source.text.replace(old, new), source.files)
 
         monkeypatch.setattr(wgsl, "load", load)
         monkeypatch.setattr(kernels, "_kernel", lru_cache(kernels._kernel.__wrapped__))
@@ -107,8 +107,8 @@ def test_far_from_all_that_moves_the_frame_stays_as_it_is():
 
 def test_masks_hold_where_nothing_moves():
     frame = shot(30)
-    keep = np.random.default_rng(2).random(SIZE, dtype="f4")
-    masked = wgmb.Frame(frame.color, motion=frame.motion, depth=frame.depth, keep=keep)
+    holdout = np.random.default_rng(2).random(SIZE, dtype="f4")
+    masked = wgmb.Frame(frame.color, motion=frame.motion, depth=frame.depth, holdout=holdout)
     out = wgmb.Blur("gather", samples=5)(masked.between(frame.prev, frame.next))
     np.testing.assert_allclose(out[:, 200:], frame.color[:, 200:], atol=1e-6)
 

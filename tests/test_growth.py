@@ -10,7 +10,7 @@ import pytest
 from wgmb import Blur, Frame, Render, Shutter, gpu
 from wgmb.camera import Camera, Reprojections
 from wgmb.methods import METHODS
-from wgmb.observer import Viewer
+from wgmb.observer import Observer
 from wgmb.scene import builtin
 from wgmb.viewer import State
 from wgmb.viewer.renderer import Stage
@@ -90,9 +90,9 @@ def camera() -> Reprojections:
 
 
 def mask() -> np.ndarray:
-    keep = np.zeros(SIZE[::-1], "f4")
-    keep[5:30, 5:40] = 1
-    return keep
+    holdout = np.zeros(SIZE[::-1], "f4")
+    holdout[5:30, 5:40] = 1
+    return holdout
 
 
 def blurring(method: str, confidence: bool = False, given=dict, **options):
@@ -129,7 +129,7 @@ def staging(**state):
 
 
 def seeing(device):
-    viewer, picture = Viewer(24.0, device=device), np.ones((*SIZE[::-1], 3), "f4")
+    viewer, picture = Observer(24.0, device=device), np.ones((*SIZE[::-1], 3), "f4")
 
     def step():
         viewer.look(picture)
@@ -150,7 +150,7 @@ PARTS |= {
     "auto": blurring("gather", samples="auto"),
     "one sample": blurring("gather", samples=1),
     "confidence": blurring("gather", True),
-    "masked": blurring("gather", given=lambda: {"keep": mask()}),
+    "masked": blurring("gather", given=lambda: {"holdout": mask()}),
     "tap, published": blurring("tap", variant="published", jitter=1),
     "tiles, published": blurring("tiles", variant="published", samples="auto"),
     "fusion, published": blurring("fusion", variant="published", weights="published"),

@@ -7,7 +7,7 @@ import wgmb
 from images import crossing
 from wgmb import gpu
 from wgmb.errors import InputError
-from wgmb.gpu.textures import Images
+from wgmb.gpu.textures import TexturePool
 
 SIZE = (40, 60)
 
@@ -42,9 +42,9 @@ def test_a_sequence_is_what_every_frame_alone_would_be(method, order):
 def test_nothing_is_left_of_another_size_mask_or_shutter():
     frames, small = locked(shot(range(3))), locked(shot(range(3), (24, 32)))
     masked = dict(frames)
-    keep = np.zeros(SIZE, "f4")
-    keep[10:20, 10:30] = 1
-    masked[2] = shot([2], keep=keep)[2].locked()
+    holdout = np.zeros(SIZE, "f4")
+    holdout[10:20, 10:30] = 1
+    masked[2] = shot([2], holdout=holdout)[2].locked()
     blur = wgmb.Blur("gather", samples=4)
     for clip, degrees in ((frames, 180), (small, 180), (frames, 360), (masked, 360), (frames, 90)):
         blur.shutter = degrees
@@ -75,7 +75,7 @@ def test_confidence_comes_with_it():
 def work(blur, frames, monkeypatch):
     """Uploaded arrays and passes of every frame in turn."""
     counts = []
-    upload, run = Images.upload, gpu.Kernel.run
+    upload, run = TexturePool.upload, gpu.Kernel.run
 
     def uploaded(self, name, image, format):
         counts[-1]["uploads"] += 1
@@ -85,7 +85,7 @@ def work(blur, frames, monkeypatch):
         counts[-1]["splits"] += entry == "write_single_layer"
         return run(self, encoder, entry, *given, **own)
 
-    monkeypatch.setattr(Images, "upload", uploaded)
+    monkeypatch.setattr(TexturePool, "upload", uploaded)
     monkeypatch.setattr(gpu.Kernel, "run", ran)
     for n in range(1, 5):
         counts.append({"uploads": 0, "splits": 0})
@@ -109,7 +109,7 @@ def test_uploaded_views_are_worked_on_every_time(monkeypatch):
     frames, splits = locked(shot(range(3))), []
     blur = wgmb.Blur("gather", samples=4)
     views = blur.upload(with_neighbours(frames, 1))
-    output = Images(blur.device).view("out", SIZE[::-1], "rgba32float")
+    output = TexturePool(blur.device).view("out", SIZE[::-1], "rgba32float")
     run = gpu.Kernel.run
 
     def ran(self, encoder, entry, *given, **own):
@@ -141,7 +141,7 @@ def test_an_interrupted_frame_leaves_nothing_behind(monkeypatch):
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Images, "download", interrupted)
+    monkeypatch.setattr(TexturePool, "download", interrupted)
     with pytest.raises(KeyboardInterrupt):
         blur(with_neighbours(frames, 1))
     monkeypatch.undo()

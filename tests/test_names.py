@@ -140,8 +140,8 @@ def test_the_viewers_command_line_takes_names_that_begin_with_a_hyphen(tmp_path,
     for n in (1, 2):
         (tmp_path / f"shot.{n:04d}.exr").rename(tmp_path / name.replace("####", f"{n:04d}"))
     monkeypatch.chdir(tmp_path)
-    state = State().opened(name).told({"keep": "-layer", "method": "tap"})
-    assert "--keep=-layer" in state.command("x.png")
+    state = State().opened(name).told({"holdout": "-layer", "method": "tap"})
+    assert "--holdout=-layer" in state.command("x.png")
     words = State().opened(name).command("-x.####.png")
     assert app.main([*words, "--quiet"]) == 0
     assert {"-x.0001.png", "-x.0002.png"} <= set(make.names_in(tmp_path))

@@ -29,7 +29,7 @@ def passing(offset, kept, size=(48, 112)):
     if offset:
         at = PLACES[offset]
         color[at], motion[at], depth[at], mask[at] = (9, 0, 0), (-20, 0, 20, 0), 3, 1
-    return wgmb.Frame(color, motion=motion, depth=depth, keep=mask if kept else None)
+    return wgmb.Frame(color, motion=motion, depth=depth, holdout=mask if kept else None)
 
 
 @pytest.mark.parametrize("all_frames", [False, True])
@@ -45,7 +45,7 @@ def test_what_is_kept_there_leaves_no_trace_here(blur, all_frames):
 
 def test_an_empty_mask_changes_nothing(blur):
     frame = frame_of([crossing(SIZE, offset) for offset in (0, -1, 1)])
-    masked = replace(frame, keep=np.zeros(SIZE, "f4"))
+    masked = replace(frame, holdout=np.zeros(SIZE, "f4"))
     np.testing.assert_allclose(blur(masked), blur(frame), atol=1e-5)
 
 

@@ -10,7 +10,7 @@ from wgmb import InputError, Shutter
 from wgmb.cone import VIDEOS, Cone
 from wgmb.io import stills
 from wgmb.lab.shutter_study import best_shutter, compare, difference
-from wgmb.observer import Viewer
+from wgmb.observer import Observer
 
 # Mean differences to perceived nature at 20, 40, 60, 80 rad/s and 60 frames a second.
 TABLE = {
@@ -28,7 +28,7 @@ def pictures(count, channels=4, size=(20, 33)):
 @pytest.mark.parametrize("rate, count", [(24, 1), (24, 5), (60, 3), (60, 40), (250, 150)])
 @pytest.mark.parametrize("cone", [Cone(), Cone(120, 0.02), Cone(30, 0.1)])
 def test_a_viewer_is_its_twin(device, cone, rate, count):
-    viewer, shown = Viewer(rate, cone, device=device), pictures(count)
+    viewer, shown = Observer(rate, cone, device=device), pictures(count)
     for picture in shown:
         viewer.look(picture)
     for after in (0.0, 0.4 / rate):
@@ -37,14 +37,14 @@ def test_a_viewer_is_its_twin(device, cone, rate, count):
 
 
 def test_what_does_not_change_is_seen_as_it_is(device):
-    viewer, picture = Viewer(60, device=device), pictures(1, 3)[0]
+    viewer, picture = Observer(60, device=device), pictures(1, 3)[0]
     for _ in range(30):
         viewer.look(picture)
     np.testing.assert_allclose(viewer.sees()[..., :3], picture, atol=1e-3)
 
 
 def test_a_bad_pixel_leaves_its_neighbours_alone(device):
-    viewer, picture = Viewer(60, device=device), pictures(1)[0]
+    viewer, picture = Observer(60, device=device), pictures(1)[0]
     picture[3, 4] = np.nan
     viewer.look(picture)
     seen = viewer.sees()
@@ -93,10 +93,10 @@ def test_overlapping_windows_win_once_the_disk_moves_its_own_width_a_frame():
         (lambda: Cone(rate=0), "rate"),
         (lambda: Cone(rate=np.nan), "rate"),
         (lambda: Cone(peak=-1), "peak"),
-        (lambda: Viewer(0), "rate"),
-        (lambda: Viewer(1e6), "too many"),
-        (lambda: Viewer(60).sees(), "shown"),
-        (lambda: Viewer(60).look(np.zeros((4, 4))), "picture"),
+        (lambda: Observer(0), "rate"),
+        (lambda: Observer(1e6), "too many"),
+        (lambda: Observer(60).sees(), "shown"),
+        (lambda: Observer(60).look(np.zeros((4, 4))), "picture"),
         (lambda: difference(Shutter(0), -1, 60), "speed"),
         (lambda: difference(Shutter(0), 1, np.nan), "fps"),
     ],
@@ -107,7 +107,7 @@ def test_senseless_values_are_named(make_it, word):
 
 
 def test_pictures_of_two_sizes_are_refused(device):
-    viewer = Viewer(60, device=device)
+    viewer = Observer(60, device=device)
     viewer.look(np.zeros((4, 4, 3), "f4"))
     with pytest.raises(InputError, match="5 x 4"):
         viewer.look(np.zeros((4, 5, 3), "f4"))

@@ -10,7 +10,7 @@ import wgpu
 import wgmb
 from wgmb import Camera, InputError, Reprojections, gpu
 from wgmb.frame_views import FrameViews
-from wgmb.gpu.textures import Images
+from wgmb.gpu.textures import TexturePool
 
 STILL = Reprojections(*[Camera(np.array([[1, 0, 0, 0], [0, 1.3, 0, 0], [0, 0, -1.02, -0.2],
                                          [0, 0, -1, 0]]))] * 3)  # fmt: skip
@@ -41,7 +41,7 @@ def motion(x=6.0, y=2.0, size=(48, 64)):
         ({"to_next": motion(size=(47, 64))}, r"to_next must be \(48, 64, 2\) like color, got \(47"),
         ({"to_prev": np.zeros((48, 64), "f4")}, r"to_prev must be \(48, 64, 2\)"),
         ({"motion": np.zeros((48, 64, 4), "f4")}, "instead of to_next and to_prev"),
-        ({"keep": np.zeros((48, 64), int)}, "keep must be floating point"),
+        ({"holdout": np.zeros((48, 64), int)}, "keep must be floating point"),
         ({"scale": np.zeros((64, 48), "f4")}, r"scale must be \(48, 64\)"),
         ({"object_id": np.zeros((48, 64), "u4")}, "object_id needs the camera"),
         ({"samples": 0}, "samples must be 1 to 4096 or auto, got 0"),
@@ -103,7 +103,7 @@ def own_device():
 @pytest.mark.parametrize("output", ["rgba32float", "rgba16float"])
 def test_encode_in_your_own_frame_is_the_same_as_arrays(noise, output):
     device = own_device()
-    images = Images(device)
+    images = TexturePool(device)
     rgba = np.concatenate([noise, np.ones_like(noise[..., :1])], axis=2).astype("f2")
     texture = images.texture("mine", (64, 48), output)
     blur = wgmb.Blur("tap", device=device, output=output)
@@ -119,17 +119,17 @@ def test_encode_in_your_own_frame_is_the_same_as_arrays(noise, output):
 
 
 def test_a_device_that_cannot_filter_f32_does_with_f16(noise):
-    color, keep = noise.copy(), np.zeros(noise.shape[:2], "f4")
+    color, holdout = noise.copy(), np.zeros(noise.shape[:2], "f4")
     color[10, 12] = np.nan
-    keep[20:30, 20:30] = 1
-    got = wgmb.blur(color, motion(), keep=keep, device=own_device())
-    want = wgmb.blur(color, motion(), keep=keep)
+    holdout[20:30, 20:30] = 1
+    got = wgmb.blur(color, motion(), holdout=holdout, device=own_device())
+    want = wgmb.blur(color, motion(), holdout=holdout)
     np.testing.assert_allclose(got, want, atol=2e-3)
 
 
 def test_work_is_recorded_but_not_submitted(noise, monkeypatch):
     blur = wgmb.Blur("tap")
-    images = Images(blur.device)
+    images = TexturePool(blur.device)
     output = images.texture("o", (64, 48), "rgba32float").create_view()
     color = images.upload("c", np.ones((48, 64, 4), "f4"), "rgba32float")
     to_next = images.upload("v", motion(), "rg32float")
@@ -165,11 +165,11 @@ def test_what_is_public_is_what_is_there():
 
 def test_a_passes_time_is_told_by_its_name(noise):
     """Software adapters' clocks lie, so only the names are looked at here."""
-    from wgmb.gpu.timing import Timing
+    from wgmb.gpu.timing import TimestampClock
 
     blur = wgmb.Blur("tap")
-    timing = Timing(blur.device)
-    images = Images(blur.device)
+    timing = TimestampClock(blur.device)
+    images = TexturePool(blur.device)
     encoder = blur.device.create_command_encoder()
     frame = FrameViews(
         color=images.upload("c", np.ones((48, 64, 4), "f4"), "rgba32float"),
@@ -179,7 +179,7 @@ def test_a_passes_time_is_told_by_its_name(noise):
     blur.encode(encoder, frame, output, timing=timing)
     gpu.submit(blur.device, encoder)
     assert set(timing.read()) == {"velocity.wgsl:main", "methods/tap.wgsl:main"}
-    assert Timing.usable(blur.device) == (blur.device.adapter_info["adapter_type"] != "CPU")
+    assert TimestampClock.usable(blur.device) == (blur.device.adapter_info["adapter_type"] != "CPU")
 
 
 def test_opengl_is_refused_unless_asked_for(monkeypatch):
@@ -222,14 +222,14 @@ def test_the_device_is_the_same_one_every_time():
         ({"camera": STILL}, "needs depth"),
         ({"motion": (64, 48), "to_next": (64, 48)}, "either motion or to_next"),
         ({"motion": (64, 47)}, "motion is 64 x 47, the image 64 x 48"),
-        ({"to_next": (64, 48), "keep": (32, 48)}, "keep is 32 x 48"),
+        ({"to_next": (64, 48), "holdout": (32, 48)}, "keep is 32 x 48"),
         ({"to_next": (64, 48), "output": (65, 48)}, "output is 65 x 48"),
         ({"to_next": (63, 48), "color": (64, 48)}, "to_next is 63 x 48"),
     ],
 )
 def test_encode_refuses_what_does_not_fit_together(inputs, words):
     blur = wgmb.Blur("tap")
-    images, encoder = Images(blur.device), blur.device.create_command_encoder()
+    images, encoder = TexturePool(blur.device), blur.device.create_command_encoder()
     inputs = {"color": (64, 48), "output": (64, 48), **inputs}
     views = {
         name: images.view(name, size, "rgba32float") if isinstance(size, tuple) else size
@@ -248,7 +248,7 @@ def test_a_shutter_that_is_no_number_is_named(shutter):
 
 def test_a_picture_of_many_bands_comes_back_as_it_was(device):
     """More than 4 MiB are written piece by piece."""
-    images = Images(device)
+    images = TexturePool(device)
     picture = np.arange(700 * 500 * 4, dtype="f4").reshape(700, 500, 4)
     images.upload("big", picture, "rgba32float")
     got = images.download(
@@ -258,7 +258,7 @@ def test_a_picture_of_many_bands_comes_back_as_it_was(device):
 
 
 def test_f16_textures_take_the_greatest_number_they_have(device):
-    images = Images(device)
+    images = TexturePool(device)
     picture = np.full((2, 2, 4), (1e5, -1e5, np.inf, 1.0), "f4")
     images.upload("half", picture, "rgba16float")
     got = images.download(

@@ -27,9 +27,10 @@ def test_python_blocks_run_in_their_order(tmp_path, monkeypatch):
 
 def test_every_option_that_is_named_exists():
     known = {"--version", "--help"}
-    for name in app.app:
+    program = app.make_app()
+    for name in program:
         if not name.startswith("-"):
-            for argument in app.app[name].assemble_argument_collection():
+            for argument in program[name].assemble_argument_collection():
                 known.update(argument.names)
     named = set(re.findall(r"--[a-z][a-z-]+", TEXT))
     assert named

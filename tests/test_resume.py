@@ -90,7 +90,7 @@ def test_masks_layers_from_beside_and_other_commands_pictures_are_inputs_too(tmp
     Image.new("RGB", (64, 48)).save(still)
     before = contents(tmp_path)
     for words in (
-        ("blur", path, "-o", mask, "--keep", mask),
+        ("blur", path, "-o", mask, "--holdout", mask),
         ("blur", path, "-o", also, "--also", also),
         ("perceive", path, "-o", path),
         ("info", still, "--also", path, "-o", still),
@@ -252,7 +252,7 @@ def test_resume_redoes_frames_whose_input_is_newer(tmp_path, capsys):
     assert "1 frames" in err
 
 
-@pytest.mark.parametrize("option", ["--also", "--camera", "--keep", "--scale"])
+@pytest.mark.parametrize("option", ["--also", "--camera", "--holdout", "--scale"])
 def test_resume_redoes_frames_whose_other_files_are_newer(tmp_path, capsys, option):
     pattern = make.write_depth_sequence(tmp_path, (1, 2))
     camera = make.write_cameras(tmp_path / "cam.json", (1, 2, 3))

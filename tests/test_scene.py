@@ -10,7 +10,7 @@ import make_frames as make
 import wgmb
 from twins import gbuffer as twin
 from wgmb import Body, InputError, Scene, Shot, gpu
-from wgmb.gpu.textures import Images
+from wgmb.gpu.textures import TexturePool
 from wgmb.scene import builtin
 from wgmb.scene.bodies import SHAPES, at, rotation, translation
 from wgmb.scene.gbuffer import SceneOnGpu, _bounds, _halves
@@ -92,10 +92,10 @@ def test_bricks_are_their_colour_with_mortar_between():
 def at_instant(scene, seconds, moment, span):
     """What SceneOnGpu draws at `moment` [frame intervals] from the frame at `seconds`."""
     blur = wgmb.Blur("tap")
-    images = Images(blur.device)
+    images = TexturePool(blur.device)
     on_gpu = SceneOnGpu(blur.device, scene, size=SIZE, time=seconds, fps=24, span=span, rays=1)
     encoder = blur.device.create_command_encoder()
-    textures = on_gpu.encode(encoder, blur.given(SIZE), images, "instant", moment)
+    textures = on_gpu.encode(encoder, blur.frame_bindings(SIZE), images, "instant", moment)
     gpu.submit(blur.device, encoder)
     encoder = blur.device.create_command_encoder
     return {name: images.download(encoder(), texture) for name, texture in textures.items()}

@@ -168,22 +168,22 @@ def test_a_grey_image_is_a_mask(tmp_path, shot, kind):
         Image.fromarray(levels).save(path)
     else:
         make.write_exr(path, {"Y": levels.astype("f4") / 255})
-    (frame,) = Clip(shot, frames="2", passes=Passes(keep=str(path)))
-    np.testing.assert_allclose(frame.keep, levels / 255, atol=2e-3)
+    (frame,) = Clip(shot, frames="2", passes=Passes(holdout=str(path)))
+    np.testing.assert_allclose(frame.holdout, levels / 255, atol=2e-3)
 
 
 def test_a_mask_of_another_size_is_refused_with_both_sizes(tmp_path, shot):
     Image.new("L", (64, 40)).save(tmp_path / "m.png")
     with pytest.raises(InputError, match=r"m\.png.*64 x 48.*64 x 40"):
-        list(Clip(shot, frames="2", passes=Passes(keep=str(tmp_path / "m.png"))))
+        list(Clip(shot, frames="2", passes=Passes(holdout=str(tmp_path / "m.png"))))
 
 
 def test_masks_come_from_layers_of_the_frame(tmp_path):
     index = np.arange(48 * 64).reshape(48, 64).astype("f4") % 3
     make.write_exr(tmp_path / "a.exr", make.frame(1) | {"ViewLayer.IndexOB.X": index})
-    passes = Passes(keep="IndexOB=2", scale="IndexOB=1")
+    passes = Passes(holdout="IndexOB=2", scale="IndexOB=1")
     (frame,) = Clip(tmp_path / "a.exr", passes=passes)
-    np.testing.assert_array_equal(frame.keep, index == 2)
+    np.testing.assert_array_equal(frame.holdout, index == 2)
     np.testing.assert_array_equal(frame.scale, index == 1)
 
 
@@ -192,17 +192,17 @@ def test_neighbours_have_masks_of_their_own(tmp_path):
     for n, plane in index.items():
         channels = make.frame(n) | {"ViewLayer.IndexOB.X": plane}
         make.write_exr(tmp_path / f"a.{n:04d}.exr", channels)
-    clip = Clip(tmp_path / "a.####.exr", passes=Passes(keep="IndexOB=1"))
+    clip = Clip(tmp_path / "a.####.exr", passes=Passes(holdout="IndexOB=1"))
     frame = clip.with_neighbours(clip.source(2))
     for n, one in ((1, frame.prev), (2, frame), (3, frame.next)):
-        np.testing.assert_array_equal(one.keep, index[n])
+        np.testing.assert_array_equal(one.holdout, index[n])
 
 
 @pytest.mark.parametrize(
     "passes",
-    [Passes(color="nope"), Passes(keep="nope"), Passes(vectors=Vectors("nuke")),
+    [Passes(color="nope"), Passes(holdout="nope"), Passes(vectors=Vectors("nuke")),
      Passes(vectors=Vectors(layer="nope"))],
-    ids=["colour", "keep", "convention", "vector layer"],
+    ids=["colour", "holdout", "convention", "vector layer"],
 )  # fmt: skip
 def test_a_missing_layer_is_refused_with_the_files_name_once(shot, passes):
     with pytest.raises(InputError) as error:

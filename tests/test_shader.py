@@ -57,7 +57,7 @@ def places(kind: np.dtype) -> list[int]:
 def run(device, source, size=(1, 1), **own):
     kernel = gpu.Kernel(device, source)
     encoder = device.create_command_encoder()
-    kernel.run(encoder, "main", gpu.Given(size, {}), **own)
+    kernel.run(encoder, "main", gpu.FrameBindings(size, {}), **own)
     gpu.submit(device, encoder)
 
 

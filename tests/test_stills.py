@@ -14,7 +14,7 @@ from PIL import Image
 import make_frames as make
 from wgmb import InputError
 from wgmb.io import exr, record, stills
-from wgmb.io.frame_file import Source
+from wgmb.io.frame_file import FrameFile
 from wgmb.io.output import Output
 
 pytestmark = pytest.mark.fast
@@ -191,7 +191,7 @@ def test_a_result_replaces_the_picture_only(tmp_path):
     path = make.write_exr(tmp_path / "a.exr", channels, {"owner": "me"}, data=(-3, 4, 60, 51),
                           display=(0, 0, 59, 59))  # fmt: skip
     file = exr.read(path)
-    source = Source(1, path, file, file.channels(), {}, part=file.parts[0])
+    source = FrameFile(1, path, file, file.channels(), {}, part=file.parts[0])
     result = make.picture(9)
     out = Output(tmp_path / "o.exr", settings={"shutter": 180}, numbers=[1])
     out.write(result, source)
@@ -348,7 +348,7 @@ def test_videos_hold_every_frame_in_its_colours(tmp_path, suffix, size):
     frames = [smooth(n)[: size[0], : size[1]] for n in range(6)]
     out = Output(path, settings={"a": 1}, numbers=list(range(6)), fps=Fraction(25))
     for n, rgba in enumerate(frames):
-        out.write(rgba, Source(n, path, None, {}, {}))
+        out.write(rgba, FrameFile(n, path, None, {}, {}))
     assert not path.exists()  # not before it is complete
     out.close()
     assert make.names_in(tmp_path) == [path.name]
@@ -368,7 +368,7 @@ def test_videos_hold_every_frame_in_its_colours(tmp_path, suffix, size):
 def test_an_abandoned_video_leaves_nothing(tmp_path, suffix):
     path = tmp_path / f"v{suffix}"
     out = Output(path, settings={}, numbers=[1, 2])
-    out.write(smooth(1), Source(1, path, None, {}, {}))
+    out.write(smooth(1), FrameFile(1, path, None, {}, {}))
     out.abandon()
     assert make.names_in(tmp_path) == []
 

@@ -99,7 +99,7 @@ def test_no_file_steers_the_terminal(tmp_path, capsys, hostile, command):
     [
         f"info {LONG}.exr",
         f"blur {LONG}.exr -o OUT",
-        f"blur FRAME -o OUT --keep {LONG}.png",
+        f"blur FRAME -o OUT --holdout {LONG}.png",
         f"blur FRAME -o OUT --also {LONG}.exr",
         f"blur FRAME -o OUT --curve {LONG}.csv",
         f"blur FRAME -o OUT --config {LONG}.toml",

@@ -5,12 +5,12 @@ import pytest
 
 from wgmb import METHODS, Blur, Frame, Render, gpu
 from wgmb.gpu import timing
-from wgmb.gpu.textures import Images
-from wgmb.gpu.timing import Timing, WallClock
+from wgmb.gpu.textures import TexturePool
+from wgmb.gpu.timing import TimestampClock, WallClock
 from wgmb.scene import builtin
 
 SIZE = (64, 36)
-CLOCKS = pytest.mark.parametrize("clock", [Timing, WallClock])
+CLOCKS = pytest.mark.parametrize("clock", [TimestampClock, WallClock])
 FRAME = Frame(
     np.random.default_rng(2).random((36, 64, 4), np.float32),
     np.full((36, 64, 2), (5.0, 2.0), np.float32),
@@ -21,7 +21,7 @@ FRAME = Frame(
 
 def drawn(blur, clock):
     """One frame of every kind that the method takes, with or without a clock."""
-    output = Images(blur.device).texture("output", SIZE, blur.output)
+    output = TexturePool(blur.device).texture("output", SIZE, blur.output)
     encoder = blur.device.create_command_encoder()
     if "scene" in blur.method.needs:
         name = "torusphere" if blur.method.name == "volume" else "crossing"
@@ -30,7 +30,7 @@ def drawn(blur, clock):
     else:
         frame = Frame(**{**vars_of(FRAME), "prev": FRAME, "next": FRAME})
         blur.encode(encoder, output=output.create_view(), timing=clock, **blur.upload(frame))
-    return Images(blur.device).download(encoder, output)
+    return TexturePool(blur.device).download(encoder, output)
 
 
 def vars_of(frame):
@@ -99,8 +99,8 @@ def test_the_least_empty_submission_is_taken_off(device, monkeypatch):
 
 
 def test_the_clock_is_one_that_can_be_believed(device, monkeypatch):
-    for usable, kind in ((True, Timing), (False, WallClock)):
-        monkeypatch.setattr(Timing, "usable", staticmethod(lambda device, it=usable: it))
+    for usable, kind in ((True, TimestampClock), (False, WallClock)):
+        monkeypatch.setattr(TimestampClock, "usable", staticmethod(lambda device, it=usable: it))
         assert isinstance(timing.clock(device), kind)
 
 

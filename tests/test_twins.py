@@ -10,7 +10,7 @@ import wgmb
 from images import body, camera, crossing
 from twins import fusion as fusion_twin
 from twins import gather as gather_twin
-from twins import keep as keep_twin
+from twins import holdout as holdout_twin
 from twins import reproject as reproject_twin
 from twins import tap as tap_twin
 from twins import tiles as tiles_twin
@@ -79,13 +79,13 @@ def test_the_published_form_is_its_twin(close, size):
 def test_kept_and_bad_pixels_are_their_twin(close, size):
     color, motion = pictures(size)
     rng = np.random.default_rng(2)
-    keep = np.round(rng.random(size) * 4).clip(0, 2).astype("f4") / 2
+    holdout = np.round(rng.random(size) * 4).clip(0, 2).astype("f4") / 2
     color[rng.random(size) < 0.05] = np.nan
-    got = wgmb.blur(color, motion=motion, keep=keep, samples=5)
-    lifted, weight = keep_twin.before(color, keep)
+    got = wgmb.blur(color, motion=motion, holdout=holdout, samples=5)
+    lifted, weight = holdout_twin.before(color, holdout)
     times = Shutter(180).sample_times(5).astype(float)
     blurred = tap_twin.tap(lifted, motion, times, weight=weight)
-    close(got, keep_twin.after(color, keep, blurred), 5e-4)  # a quotient of two sums
+    close(got, holdout_twin.after(color, holdout, blurred), 5e-4)  # a quotient of two sums
 
 
 @pytest.mark.parametrize("curve", ["box", "triangle", lambda x: np.exp(-5 * x)])
@@ -145,18 +145,18 @@ def test_fusion_of_kept_pixels_by_normals_is_its_twin(close):
     rng = np.random.default_rng(4)
     normal = rng.normal(size=(*size, 3)).astype("f4")
     normal[::6] = 0
-    keep = (rng.random(size) < 0.2).astype("f4")
+    holdout = (rng.random(size) < 0.2).astype("f4")
     around = Reprojections(camera((0, 0, 0), 0.7, 0.3), camera((0, 0, 0)))
     depth = np.minimum(depths(size), 9)
     got = wgmb.blur(color, motion=motion, depth=depth, normal=normal, camera=around,
-                    keep=keep, method="fusion")  # fmt: skip
+                    holdout=holdout, method="fusion")  # fmt: skip
     view = around.here.view_from_world[:3, :3]
     seen = (normal @ view.T) * (1, -1, 1)
-    lifted, weight = keep_twin.before(color, keep)
+    lifted, weight = holdout_twin.before(color, holdout)
     times = Shutter(180).sample_times(8).astype(float)
     blurred = fusion_twin.fusion(lifted, motion, depth, times, 0.0, (0.08, 0.04),
                                  span=(-0.25, 0.25), normal=seen, weight=weight)  # fmt: skip
-    close(got, keep_twin.after(color, keep, blurred), 5e-4)
+    close(got, holdout_twin.after(color, holdout, blurred), 5e-4)
 
 
 @pytest.mark.parametrize("orthographic", [False, True])

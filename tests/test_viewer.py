@@ -12,7 +12,7 @@ import pytest
 from wgmb import Blur, Clip, DeviceError, InputError, Render, color, gpu, observer
 from wgmb.cli import app
 from wgmb.cone import Cone
-from wgmb.gpu.timing import Timing
+from wgmb.gpu.timing import TimestampClock
 from wgmb.io import exr, stills
 from wgmb.methods import METHODS
 from wgmb.scene import builtin
@@ -250,7 +250,7 @@ def test_all_that_a_method_draws_is_what_render_draws(small, method):
 
 def seen(frames, fps, after=0.0):
     """What wgmb/observer.py makes of the frames, the first of which was always there."""
-    eye = observer.Viewer(fps)
+    eye = observer.Observer(fps)
     for picture in frames:
         eye.look(picture)
     return stills.srgb(np.clip(eye.sees(after)[..., :3], 0, 1))
@@ -786,7 +786,7 @@ def test_a_lost_gpu_is_told():
 
 
 def test_times_of_the_gpu_are_told_by_pass(monkeypatch):
-    monkeypatch.setattr(Timing, "usable", staticmethod(lambda device: True))
+    monkeypatch.setattr(TimestampClock, "usable", staticmethod(lambda device: True))
     hand = Hand(replace(PLAIN, method="reproject", samples=64))
     passes = hand.viewer.stage.report.passes
     assert {"scene/gbuffer.wgsl:main", "methods/reproject.wgsl:resolve"} <= passes.keys()

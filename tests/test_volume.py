@@ -88,7 +88,7 @@ def densities(device):
     )
     text = source.text[:start] + probe + source.text[end:]
     text = re.sub(r"@group\(1\) .* (tiles|output): .*", "", text)
-    source = wgsl.Source(text, source.files)
+    source = wgsl.WgslSource(text, source.files)
 
     def found(volume, p, shutter, fps, density="exact"):
         rotation = method_file.rotation_of(volume, shutter, fps, density == "exact")

@@ -64,7 +64,7 @@ def holdout() -> None:
     blur = Blur("gather")
     sheet = {
         "everything blurs": display(blur(sample())),
-        "--keep IndexOB=9": display(blur(sample(keep="IndexOB=9"))),
+        "--holdout IndexOB=9": display(blur(sample(holdout="IndexOB=9"))),
     }
     save(grid(sheet, 2), "holdout.jpg")
 

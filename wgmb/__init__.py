@@ -13,7 +13,7 @@ from ._version import __version__ as __version__
 
 TYPE_CHECKING = False  # typing's own, without the time that loading it takes
 if TYPE_CHECKING:
-    from .batch import Report, blur_sequence
+    from .batch import BatchReport, blur_sequence
     from .camera import Camera, Reprojections
     from .cone import Cone
     from .errors import DeviceError, Error, GpuMemoryError, InputError, ShaderError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .io.output import Output
     from .io.vectors import Vectors
     from .methods import METHODS
-    from .observer import Viewer
+    from .observer import Observer
     from .pipeline import Blur, blur
     from .render import Render
     from .scene import Body, Scene, Shot
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "METHODS",
+    "BatchReport",
     "Blur",
     "Body",
     "Camera",
@@ -44,23 +45,22 @@ __all__ = [
     "FrameViews",
     "GpuMemoryError",
     "InputError",
+    "Observer",
     "Output",
     "Passes",
     "Render",
-    "Report",
     "Reprojections",
     "Scene",
     "ShaderError",
     "Shot",
     "Shutter",
     "Vectors",
-    "Viewer",
     "blur",
     "blur_sequence",
 ]
 
 _PLACES = {
-    "batch": ("Report", "blur_sequence"),
+    "batch": ("BatchReport", "blur_sequence"),
     "camera": ("Camera", "Reprojections"),
     "cone": ("Cone",),
     "errors": ("DeviceError", "Error", "GpuMemoryError", "InputError", "ShaderError"),
@@ -71,7 +71,7 @@ _PLACES = {
     "io.output": ("Output",),
     "io.vectors": ("Vectors",),
     "methods": ("METHODS",),
-    "observer": ("Viewer",),
+    "observer": ("Observer",),
     "pipeline": ("Blur", "blur"),
     "render": ("Render",),
     "scene": ("Body", "Scene", "Shot"),

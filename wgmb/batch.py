@@ -16,13 +16,13 @@ import numpy as np
 from .errors import Error, GpuMemoryError, InputError
 from .frame import Frame
 from .io.clip import Clip
-from .io.frame_file import Source
+from .io.frame_file import FrameFile
 from .io.output import Output
 from .pipeline import Blur
 
 
 @dataclass
-class Report:
+class BatchReport:
     """What became of a run."""
 
     done: list[int] = field(default_factory=list)
@@ -36,7 +36,7 @@ class Report:
 class _Job:
     """One frame, read and to be blurred."""
 
-    source: Source
+    source: FrameFile
     frame: Frame
     made_of: dict
 
@@ -45,7 +45,7 @@ class _Job:
 class _Blurred:
     """One frame, blurred and to be written."""
 
-    source: Source
+    source: FrameFile
     made_of: dict
     picture: np.ndarray
     confidence: dict[str, np.ndarray]
@@ -87,7 +87,7 @@ def blur_sequence(
     resume: bool = False,
     confidence: bool = False,
     progress: Progress | None = None,
-) -> Report:
+) -> BatchReport:
     """Blur every frame of `clip` into `output`; with `confidence`, as layers beside the picture.
 
     Frames that cannot be read, blurred or written are in the report's `failed`, with the
@@ -95,7 +95,7 @@ def blur_sequence(
     full disk, a folder that is gone), or a video cannot go on, the run stops and `stopped`
     says why. Interrupted, nothing half written is left and the interruption goes on.
     """
-    report, stop, tell = Report(), threading.Event(), progress or (lambda number, what: None)
+    report, stop, tell = BatchReport(), threading.Event(), progress or (lambda number, what: None)
     hopeless = threading.Event()
     to_blur, to_write = _Handover(stop), _Handover(stop)
     neighbours = "neighbours" in blur.method.uses
@@ -204,7 +204,7 @@ def blur_sequence(
     return report
 
 
-def _blur_one(blur: Blur, job: _Job, confidence: bool, report: Report, to_write, fail) -> None:
+def _blur_one(blur: Blur, job: _Job, confidence: bool, report: BatchReport, to_write, fail) -> None:
     told: dict[str, np.ndarray] = {}
     try:
         if confidence:

@@ -28,7 +28,7 @@ _CHANNELS = {
     "motion": (4,),
     "normal": (3,),
     "depth": (),
-    "keep": (),
+    "holdout": (),
     "scale": (),
 }
 
@@ -56,7 +56,7 @@ class Frame:
     """(height, width) integer: which body of `camera` a pixel shows; 0 is the world."""
     normal: np.ndarray | None = None
     """(height, width, 3) float: unit vectors in the world; 0 where nothing is."""
-    keep: np.ndarray | None = None
+    holdout: np.ndarray | None = None
     """(height, width) float 0..1: 1 stays sharp and out of its neighbours' blur."""
     scale: np.ndarray | None = None
     """(height, width) float: multiplies the motion."""
@@ -103,7 +103,7 @@ class Frame:
             raise InputError("motion stands instead of to_next and to_prev: give one or the other")
         self._check_neighbours()
         brightest = wgsl.load("common/finite.wgsl").constant("BRIGHTEST")
-        for name in ("color", "to_next", "to_prev", "motion", "scale", "keep"):
+        for name in ("color", "to_next", "to_prev", "motion", "scale", "holdout"):
             most = brightest if name == "color" else _F32_MAX
             if given := _count_bad(getattr(self, name), most):
                 self.bad[name] = given

@@ -45,7 +45,7 @@ class FrameViews:
     """Which body of `camera` a pixel shows; 0 is the world."""
     normal: View | None = field(default=None, metadata=_XYZ_IF_USED)
     """Unit vectors in the world in x, y, z."""
-    keep: View | None = field(default=None, metadata=_X)
+    holdout: View | None = field(default=None, metadata=_X)
     """0..1 in x: 1 stays sharp and out of its neighbours' blur."""
     scale: View | None = field(default=None, metadata=_X)
     """Multiplies the motion, in x."""

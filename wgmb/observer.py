@@ -12,7 +12,7 @@ from . import gpu
 from .cone import Cone
 from .errors import InputError
 from .gpu import wgsl
-from .gpu.textures import Images, Scratch
+from .gpu.textures import ScratchBuffer, TexturePool
 
 EIGHT = 8  # pictures that one pass takes
 
@@ -21,7 +21,7 @@ class WeightedSum:
     """The sum of pictures on the GPU, each times a weight; a pixel that is not finite is 0."""
 
     def __init__(self, device: wgpu.GPUDevice):
-        self._device, self._sums = device, Scratch(device)
+        self._device, self._sums = device, ScratchBuffer(device)
 
     def encode(
         self,
@@ -40,7 +40,7 @@ class WeightedSum:
         data["size"] = width, height
         uniform = wgpu.BufferUsage.UNIFORM
         create = self._device.create_buffer_with_data
-        given = gpu.Given((width, height), {"frame": create(data=data, usage=uniform)})
+        bindings = gpu.FrameBindings((width, height), {"frame": create(data=data, usage=uniform)})
         views = [picture.create_view() for picture in pictures]
         for first in range(0, len(views), EIGHT):
             share = np.zeros((), kernel.source.dtype("Share"))
@@ -49,7 +49,7 @@ class WeightedSum:
             kernel.run(
                 encoder,
                 "main",
-                given,
+                bindings,
                 share=create(data=share, usage=uniform),
                 sums=self._sums.at_least(16 * width * height),
                 output=output.create_view(),
@@ -57,7 +57,7 @@ class WeightedSum:
             )
 
 
-class Viewer:
+class Observer:
     """What is seen of pictures shown one after the other, on the GPU.
 
     `rate`: pictures a second, each held until the next. Before the first one it was there too.
@@ -74,7 +74,7 @@ class Viewer:
         self.rate, self.cone = rate, cone or Cone()
         self.held = self.cone.held(rate)  # pictures in the ring
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
-        self._images, self._sum = Images(self.device), WeightedSum(self.device)
+        self._images, self._sum = TexturePool(self.device), WeightedSum(self.device)
         self._size, self._shown = (0, 0), 0
         self._lock = threading.RLock()
 

@@ -15,7 +15,7 @@ from .errors import InputError
 from .frame import PASSES, Frame
 from .frame_views import FrameViews, View, check_view
 from .gpu import wgsl
-from .gpu.textures import Images
+from .gpu.textures import TexturePool
 from .gpu.timing import Clock
 from .holdout import HoldoutPass
 from .methods import METHODS, default_method
@@ -91,14 +91,14 @@ class Blur:
         self.method = METHODS[method](self.device, self._options, output=output)
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._lock = threading.RLock()
-        self._images = Images(self.device)
+        self._images = TexturePool(self.device)
         wanted = self.method.needs | self.method.uses
         self._residency = Residency(self._images, wanted)
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
-        self._none = self._images.view("none", (1, 1), gpu.texel(self.device, 4))
+        self._unbound = self._images.view("unbound", (1, 1), gpu.texel(self.device, 4))
         no_object = self._images.view("no object", (1, 1), "r32uint")
-        self._velocity = VelocityPass(self.device, self._none, no_object)
-        self._keep = HoldoutPass(self.device, self._images, self._none)
+        self._velocity = VelocityPass(self.device, self._unbound, no_object)
+        self._holdout = HoldoutPass(self.device, self._images, self._unbound)
         self.shutter = shutter
 
     @property
@@ -178,19 +178,21 @@ class Blur:
         for whose, (_, one) in around.items():
             one.check_fit(size, whose)
             self._require(one.has, whose)
-        given = self.given(size, number)
+        bindings = self.frame_bindings(size, number)
         encoder = timing.watch(encoder) if timing else encoder
-        masked = any(one.keep is not None or one.check for _, one in around.values())
+        masked = any(one.holdout is not None or one.check for _, one in around.values())
         frames = tuple(
-            self._prepare(encoder, given, one, offset, masked) for offset, one in around.values()
+            self._prepare(encoder, bindings, one, offset, masked) for offset, one in around.values()
         )
-        inputs = self._inputs(given, number, frames=frames)
+        inputs = self._inputs(bindings, number, frames=frames)
         if not masked:
             self._record(encoder, inputs, output, confidence)
             return
         result = self._images.view("blurred", size, self.output)
         self._record(encoder, inputs, result, confidence)
-        self._keep.after(encoder, given, frame.color, frame.keep, result, output, self.output)
+        self._holdout.after(
+            encoder, bindings, frame.color, frame.holdout, result, output, self.output
+        )
 
     def encode_scene(
         self,
@@ -211,27 +213,36 @@ class Blur:
         check_view("output", output, scene.size)
         self._require({"scene"})
         encoder = timing.watch(encoder) if timing else encoder
-        given = self.given(scene.size, number)
-        self._record(encoder, self._inputs(given, number, scene=scene, progress=progress), output)
+        bindings = self.frame_bindings(scene.size, number)
+        self._record(
+            encoder, self._inputs(bindings, number, scene=scene, progress=progress), output
+        )
 
     def _prepare(
-        self, encoder, given: gpu.Given, frame: FrameViews, offset: int, masked: bool
+        self,
+        encoder,
+        bindings: gpu.FrameBindings,
+        frame: FrameViews,
+        offset: int,
+        masked: bool,
     ) -> PreparedFrame:
         """Record what a frame, the one that is blurred or a neighbour, is to methods."""
         motion = frame.motion
         if not frame.has_plain_motion or self.max_blur is not None or frame.check:
-            motion = self._images.view(f"motion {offset}", given.size, "rgba32float")
-            self._velocity.encode(encoder, given, frame, self.max_blur is not None, motion)
+            motion = self._images.view(f"motion {offset}", bindings.size, "rgba32float")
+            self._velocity.encode(encoder, bindings, frame, self.max_blur is not None, motion)
         color, weight = frame.color, None
         if masked:
-            color, weight = self._keep.before(encoder, given, color, frame.keep, f" {offset}")
+            color, weight = self._holdout.before(
+                encoder, bindings, color, frame.holdout, f" {offset}"
+            )
         by_camera = frame.camera is not None and not frame.has_vectors
         changed = {"color": color, "motion": motion, "offset": offset, "weight": weight}
         return PreparedFrame(**vars(frame) | changed, by_camera=by_camera)
 
     def _inputs(
         self,
-        given: gpu.Given,
+        bindings: gpu.FrameBindings,
         number: int,
         *,
         frames: tuple[PreparedFrame, ...] = (),
@@ -239,13 +250,13 @@ class Blur:
         progress: tuple[int, int] | None = None,
     ) -> Inputs:
         return Inputs(
-            given=given,
+            bindings=bindings,
             samples=self.samples,
             number=number,
             jitter=self.jitter,
             shutter=self._shutter,
             frames=frames,
-            none=self._none,
+            unbound=self._unbound,
             linear=self._linear,
             even=self._shutter.curve == "box",
             auto=self.auto,
@@ -310,8 +321,8 @@ class Blur:
     ) -> None:
         """Record to_prev and to_next [px] into `output`, rgba32float."""
         frame.check_fit(output.size[:2])
-        given = self.given(frame.size, number)
-        self._velocity.encode(encoder, given, frame, self.max_blur is not None, output)
+        bindings = self.frame_bindings(frame.size, number)
+        self._velocity.encode(encoder, bindings, frame, self.max_blur is not None, output)
 
     def upload(self, frame: Frame) -> dict:
         """The frame's and its neighbours' arrays as textures: keywords of `encode`.
@@ -354,7 +365,7 @@ class Blur:
             what = ", ".join(whose + name for name in sorted(missing))
             raise InputError(f"method {self.method.name!r} needs {what}")
 
-    def given(self, size: tuple[int, int], number: int = 0) -> gpu.Given:
+    def frame_bindings(self, size: tuple[int, int], number: int = 0) -> gpu.FrameBindings:
         """What every pass of a frame is given: frame, shutter, times of the samples."""
         data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
         data["size"], data["samples"], data["jitter"] = size, self.samples, self.jitter
@@ -363,7 +374,7 @@ class Blur:
         frame = self.device.create_buffer_with_data(
             label="frame", data=data, usage=wgpu.BufferUsage.UNIFORM
         )
-        return gpu.Given(size, {"frame": frame, **self._group0})
+        return gpu.FrameBindings(size, {"frame": frame, **self._group0})
 
 
 def most_samples(method: str, device: wgpu.GPUDevice) -> int:

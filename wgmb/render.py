@@ -16,10 +16,10 @@ from . import gpu
 from .errors import InputError
 from .frame import Frame
 from .frame_views import FrameViews
-from .gpu.textures import Images
+from .gpu.textures import TexturePool
 from .gpu.timing import Clock
 from .io import exr
-from .io.frame_file import Source
+from .io.frame_file import FrameFile
 from .io.output import Output
 from .pipeline import Blur
 from .scene.gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
@@ -54,7 +54,7 @@ class Render:
             raise InputError(f"rays must be 1 to {MOST_RAYS}, got {rays}")
         self.scene, self.blur, self.size, self.fps, self.rays = scene, blur, size, fps, rays
         self._lock = threading.RLock()
-        self._images = Images(blur.device)
+        self._images = TexturePool(blur.device)
         self._token = blur.device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._moment: tuple = ()
         self._spans: dict[tuple[float, float], SceneOnGpu] = {}
@@ -221,9 +221,9 @@ class Render:
         on_gpu = self.on_gpu(time, blur)
         if offset not in self._pictures:
             encoder = blur.device.create_command_encoder(label="render")
-            given, name = blur.given(self.size, number), f"frame {offset}"
+            bindings, name = blur.frame_bindings(self.size, number), f"frame {offset}"
             watched = timing.watch(encoder) if timing else encoder
-            drawn = on_gpu.encode(watched, given, self._images, name, float(offset))
+            drawn = on_gpu.encode(watched, bindings, self._images, name, float(offset))
             gpu.submit(blur.device, encoder)
             self._pictures[offset] = {**drawn, "camera": on_gpu.reprojections(offset)}
         seen = self._pictures[offset]
@@ -295,7 +295,7 @@ def render_frames(
         source = (
             _with_passes(render, seen, number)
             if passes and seen
-            else Source(number, Path(), None, {}, {})
+            else FrameFile(number, Path(), None, {}, {})
         )
         output.write(result, source, told)
         tell(number, "done")
@@ -303,7 +303,7 @@ def render_frames(
     return skipped
 
 
-def _with_passes(render: Render, frame: Frame, number: int) -> Source:
+def _with_passes(render: Render, frame: Frame, number: int) -> FrameFile:
     """A frame's passes as layers that io/clip.py finds by their names."""
     motion = render.blur.motion(frame)
     assert frame.depth is not None and frame.normal is not None and frame.object_id is not None
@@ -315,4 +315,4 @@ def _with_passes(render: Render, frame: Frame, number: int) -> Source:
     width, height = frame.size
     window = (0, 0, width - 1, height - 1)
     part = exr.Part("", channels, {}, window, window)
-    return Source(number, Path(), exr.Exr(Path(), [part]), channels, {}, part=part)
+    return FrameFile(number, Path(), exr.Exr(Path(), [part]), channels, {}, part=part)

@@ -6,7 +6,7 @@ the same for all of them only while its arrays are the same and cannot be writte
 - `Clip` keeps the last three files read, and the frames made of them, by number;
 - `Residency` uploads the arrays of a locked frame once, and knows them again by identity;
 - a method may keep what it derived from a frame's views, by their `key` (see FrameViews);
-- `Images` keeps textures by name, so that the next frame's go into the same ones.
+- `TexturePool` keeps textures by name, so that the next frame's go into the same ones.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from . import gpu
 from .frame import Frame
 from .frame_views import TEXTURES, FrameViews, View
-from .gpu.textures import Images
+from .gpu.textures import TexturePool
 
 _PLACES = (" a", " b", " c")  # for a frame and its neighbours, by the end of their textures' names
 
@@ -48,7 +48,7 @@ class _ResidentFrame:
 class Residency:
     """Uploads frames, those that are locked once. `wanted`: what the method needs and uses."""
 
-    def __init__(self, images: Images, wanted: frozenset[str]):
+    def __init__(self, images: TexturePool, wanted: frozenset[str]):
         self._images, self._wanted = images, wanted
         self._resident: dict[str, _ResidentFrame] = {}
 

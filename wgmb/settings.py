@@ -3,8 +3,6 @@
 The command line, the viewer and the laboratory share them. The string under a field is its help.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import zlib
@@ -13,7 +11,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Literal, Self, TypeVar
 
-from . import shutter
 from .errors import InputError
 from .io import limits, vectors
 from .io.clip import Clip, Passes
@@ -23,6 +20,7 @@ from .methods.options import Option, options_of
 from .pipeline import Blur
 from .scene import builtin
 from .scene.scene import Scene
+from .shutter import CURVES, PHASES, Shutter, read_curve
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,14 +52,14 @@ class ShutterSettings:
 
     def curve_read(self) -> str | None:
         """The curve's name; of a file also its checksum, as a file may change."""
-        if self.curve is None or self.curve in shutter.CURVES:
+        if self.curve is None or self.curve in CURVES:
             return self.curve
         return f"{self.curve} (CRC-32 {zlib.crc32(Path(self.curve).read_bytes()):08x})"
 
-    def make(self) -> shutter.Shutter:
+    def make(self) -> Shutter:
         """The Shutter these options describe, once they are settled."""
         phase: str | float = self.phase
-        if phase not in shutter.PHASES:
+        if phase not in PHASES:
             try:
                 phase = float(phase)
             except ValueError:
@@ -70,12 +68,12 @@ class ShutterSettings:
                 ) from None
         curve = self.curve
         assert self.shutter is not None and curve is not None
-        if curve not in shutter.CURVES:
+        if curve not in CURVES:
             if not readable(Path(curve)):
-                known = ", ".join(shutter.CURVES)
+                known = ", ".join(CURVES)
                 raise InputError(f"curve must be one of {known}, or a CSV file; got {curve!r}")
-            curve = shutter.read_curve(curve)
-        return shutter.Shutter(self.shutter, phase, curve, self.rolling, self.rolling_duration)
+            curve = read_curve(curve)
+        return Shutter(self.shutter, phase, curve, self.rolling, self.rolling_duration)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,9 +113,9 @@ class InputSettings:
     max_mb: float = limits.MAX_MB
     "Megabytes that a picture file may unpack to (as 32-bit floats); a larger one is refused."
 
-    def open(self, pattern: str, keep: str | None = None, scale: str | None = None) -> Clip:
+    def open(self, pattern: str, holdout: str | None = None, scale: str | None = None) -> Clip:
         """The clip these options describe; InputError where one of its files must not be read."""
-        for name in (keep, scale, *self.also):
+        for name in (holdout, scale, *self.also):
             if name and Path(name).suffix and not is_pattern(name):
                 readable(Path(name))
         passes = Passes(
@@ -135,7 +133,7 @@ class InputSettings:
             camera=self.camera,
             object_layer=self.object_layer,
             object_motion=self.object_motion,
-            keep=keep,
+            holdout=holdout,
             scale=scale,
             also=self.also,
         )
@@ -192,7 +190,7 @@ class BlurSettings:
     "Taps, pictures or rays a pixel: 16, for fusion 8; auto: one a pixel of a streak, 64 at most."
     jitter: float = 0.0
     "0 to 1: trades bands for noise."
-    keep: str | None = None
+    holdout: str | None = None
     "Stays sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or an image file."
     scale: str | None = None
     "Multiplies the motion, per pixel: a LAYER or an image file."
@@ -206,7 +204,7 @@ class BlurSettings:
             suited = "volume"
         return replace(self, method=self.method or suited)
 
-    def make(self, shutter_: shutter.Shutter, adapter: str | None) -> Blur:
+    def make(self, shutter_: Shutter, adapter: str | None) -> Blur:
         """The Blur these options describe; an option its method does not have is an error."""
         own = {name: getattr(self, name) for name in METHOD_OPTIONS}
         given = {

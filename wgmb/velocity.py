@@ -19,7 +19,14 @@ class VelocityPass:
     def __init__(self, device: wgpu.GPUDevice, none: View, no_object: View):
         self._device, self._none, self._no_object = device, none, no_object
 
-    def encode(self, encoder, given: gpu.Given, frame: FrameViews, limited: bool, output: View):
+    def encode(
+        self,
+        encoder,
+        bindings: gpu.FrameBindings,
+        frame: FrameViews,
+        limited: bool,
+        output: View,
+    ):
         """Record `output` = to_prev, to_next [px] of every pixel."""
         paired = frame.motion is not None
         to_prev = frame.motion if paired else frame.to_prev
@@ -36,11 +43,11 @@ class VelocityPass:
             LIMITED=limited,
             ADDED=frame.object_motion,
         )
-        uniform, table = self._matrices(given.size, frame.camera)
+        uniform, table = self._matrices(bindings.size, frame.camera)
         kernel.run(
             encoder,
             "main",
-            given,
+            bindings,
             velocity=uniform,
             to_prev=to_prev or self._none,
             to_next=frame.to_next or self._none,

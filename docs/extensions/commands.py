@@ -11,7 +11,7 @@ from typing import Any
 from cyclopts import App
 from sphinx.application import Sphinx
 
-from wgmb.cli.app import app as wgmb_app
+from wgmb.cli.app import COMMANDS, make_app
 from wgmb.io.vectors import CONVENTIONS
 from wgmb.scene import builtin
 
@@ -22,6 +22,7 @@ _GROUPS = ("Parameters", "Input", "Compare", "Blur", "Shutter", "Perception", "O
 
 def reference() -> str:
     """Every command with its options, as Markdown."""
+    wgmb_app = make_app(*COMMANDS)
     names = [name for name in wgmb_app if not name.startswith("-")]
     return "\n".join(_command(name, wgmb_app[name]) for name in names)
 

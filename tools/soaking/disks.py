@@ -81,7 +81,7 @@ def refused_places(trial: Trial) -> Iterator[Line]:
         "a folder as output": ["blur", here / "shot.0001.exr", "-o", here / "folder.exr"],
         "a link to itself": ["blur", pattern, "-o", here / "loop" / "o.####.exr"],
         "a folder as input": ["blur", here / "folder.exr", *out],
-        "a folder as mask": ["blur", pattern, *out, "--keep", here / "folder.exr"],
+        "a folder as mask": ["blur", pattern, *out, "--holdout", here / "folder.exr"],
         "a folder as camera": ["blur", pattern, *out, "--camera", here / "folder.exr"],
         "a folder as curve": ["blur", pattern, *out, "--curve", here / "folder.exr"],
         "a folder as --config": ["blur", pattern, *out, "--config", here / "folder.exr"],

@@ -77,7 +77,7 @@ def _read_still(path: Path) -> str:
 
 def _read_masked(path: Path) -> str:
     """A picture with a Cryptomatte, one of whose objects is to stay sharp."""
-    clip = Clip(path, passes=Passes(keep="CryptoObject=hero"))
+    clip = Clip(path, passes=Passes(holdout="CryptoObject=hero"))
     frame = clip.frame(clip.source(clip.numbers[0]))
     return _digest(frame.arrays.values())
 

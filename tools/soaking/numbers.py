@@ -27,7 +27,7 @@ VALUES = {
     "-3.4e38": -3.4e38,
     "-1": -1.0,
 }
-INPUTS = ("color", "alpha", "motion", "depth", "normal", "keep", "scale")
+INPUTS = ("color", "alpha", "motion", "depth", "normal", "holdout", "scale")
 _PLACES = {
     "a pixel": np.s_[4, 5],
     "the corner": np.s_[-1, -1],
@@ -46,7 +46,7 @@ def _spoiled(size: tuple[int, int], what: list[tuple[str, str, str]]) -> Frame:
     plain = parts.frame(1, size)
     ones = np.ones(size[::-1], np.float32)
     arrays = {name: array.copy() for name, array in plain.arrays.items()}
-    arrays |= {"keep": ones * 0.5, "scale": ones.copy()}
+    arrays |= {"holdout": ones * 0.5, "scale": ones.copy()}
     for given, value, place in what:
         name = "color" if given == "alpha" else given
         at = _PLACES[place]

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wgmb import Blur, Frame, Render, Viewer, viewer
+from wgmb import Blur, Frame, Observer, Render, viewer
 from wgmb.scene import builtin
 from wgmb.viewer.window import frame as viewed
 
@@ -80,7 +80,7 @@ def _scene(scene: str, method: str) -> Callable[[], Step]:
 
 
 def _perceived() -> Step:
-    blur, eye, frames = Blur("tap", samples=_MANY), Viewer(24.0), neighbourly(range(4))
+    blur, eye, frames = Blur("tap", samples=_MANY), Observer(24.0), neighbourly(range(4))
 
     def step(number: int) -> np.ndarray:
         eye.look(blur(frames[number % len(frames)]))

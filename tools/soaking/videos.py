@@ -12,7 +12,7 @@ import av
 import numpy as np
 
 from wgmb import Output
-from wgmb.io.frame_file import Source
+from wgmb.io.frame_file import FrameFile
 
 from .processes import apart, use
 from .shots import contents, shot
@@ -44,7 +44,7 @@ def written(path: str, width: int, height: int, fps: str, count: int, noise: boo
     for number in range(count):
         if noise:
             picture = rng.random((height, width, 3), np.float32)
-        output.write(picture, Source(number, Path(), None, {}, {}))
+        output.write(picture, FrameFile(number, Path(), None, {}, {}))
         if number % 16 == 0:
             most = max(most, use().memory)
     output.close()

@@ -35,17 +35,24 @@ COMMANDS = {
 }
 """Every command, wgmb/cli/NAME.py, and the first line of its help."""
 
-app = cyclopts.App(
-    name="wgmb",
-    version=__version__,
-    help="GPU motion blur for rendered frames.\n\n"
-    "Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180",
-    result_action="return_value",
-    suppress_keyboard_interrupt=False,
-    default_parameter=Parameter(negative=()),
-)
-for _name, _help in COMMANDS.items():
-    app.command(f"wgmb.cli.{_name}:{_name}", name=_name, help=_help)
+
+def make_app(*whole: str) -> cyclopts.App:
+    """The program; commands in `whole` have all their help, the others their line of COMMANDS.
+
+    A command's own help is in its file, which the table of all commands is not to load.
+    """
+    app = cyclopts.App(
+        name="wgmb",
+        version=__version__,
+        help="GPU motion blur for rendered frames.\n\n"
+        "Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180",
+        result_action="return_value",
+        suppress_keyboard_interrupt=False,
+        default_parameter=Parameter(negative=()),
+    )
+    for name, line in COMMANDS.items():
+        app.command(f"wgmb.cli.{name}:{name}", name=name, help=None if name in whole else line)
+    return app
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -59,6 +66,7 @@ def main(arguments: list[str] | None = None) -> int:
         warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
         logging.getLogger().addHandler(logging.NullHandler())  # nor their logs
         _check_text(words)
+        app = make_app(*words)
         app.config = _config(words)
         result = app(words, exit_on_error=False, print_error=False)
         terminal.flush()

@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from .._version import __version__
-from ..batch import Report, blur_sequence
+from ..batch import BatchReport, blur_sequence
 from ..errors import InputError
 from ..io.frame_file import odd_sizes
 from ..io.output import Output
@@ -53,7 +53,7 @@ def blur(
         Print errors only.
     """
     when = when.resolved()
-    clip = given.open(pattern, look.keep, look.scale)
+    clip = given.open(pattern, look.holdout, look.scale)
     look = look.resolved(clip=clip)
     made = look.make(when.make(), adapter)
     settings = _settings(look, when, given) | {"samples": samples_of(made)} | output.looks
@@ -93,7 +93,7 @@ def _settings(look: BlurSettings, when: ShutterSettings, given: InputSettings) -
     return every
 
 
-def _conclude(clip, files, report: Report, took: str, quiet: bool, verbose: bool) -> int:
+def _conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose: bool) -> int:
     """Say what became of the run; return the exit code."""
     for number, why in sorted(report.failed.items()):
         note(f"wgmb: frame {number} failed: {why}")

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..io import layers, stills
 from ..io.atomic import write_file
 from ..io.clip import Clip
-from ..io.frame_file import Source
+from ..io.frame_file import FrameFile
 from ..io.frame_numbers import frame_list
 from ..io.output import refuse_inputs
 from ..pipeline import Blur
@@ -78,7 +78,7 @@ def describe(clip: Clip, output: Path | None = None) -> list[tuple[str, str]]:
     return lines + _about_motion(clip, source, output)
 
 
-def _about_motion(clip: Clip, source: Source, output: Path | None) -> list[tuple[str, str]]:
+def _about_motion(clip: Clip, source: FrameFile, output: Path | None) -> list[tuple[str, str]]:
     """What the frame's motion is like; drawn into `output`."""
     frame = clip.frame(source, picture=source.beside is not None)
     lines = []

@@ -37,6 +37,14 @@ def _with_help(settings: _Settings) -> _Settings:
 class BlurOptions(BlurSettings):
     """How to blur."""
 
+    holdout: Annotated[
+        str | None,
+        Parameter(
+            alias="--keep",
+            help="Stays sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or an image.",
+        ),
+    ] = None
+
     method: Annotated[
         str | None,
         Parameter(help=f"{', '.join(METHODS)}; by default gather where there is depth, else tap."),

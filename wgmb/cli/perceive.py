@@ -15,12 +15,12 @@ from .._version import __version__
 from ..cone import VIDEOS, Cone
 from ..errors import InputError
 from ..io.atomic import write_file
-from ..io.frame_file import Source
+from ..io.frame_file import FrameFile
 from ..io.frame_numbers import frame_numbers
 from ..io.output import Output
 from ..lab import charts
 from ..lab.shutter_study import best_shutter, compare, perception_charts
-from ..observer import Viewer
+from ..observer import Observer
 from ..pipeline import Blur
 from ..render import Render
 from ..scene import builtin
@@ -104,7 +104,7 @@ def perceive(
         numbers, rate = clip.numbers, float(output.rate)
         pictures = ((n, clip.source(n), [clip.source(n).rgba]) for n in numbers)
         inputs = clip.inputs
-    viewer = Viewer(rate, who.cone, device=adapter)
+    viewer = Observer(rate, who.cone, device=adapter)
     files = Output(
         output.output,
         settings={"wgmb": __version__} | plain(who) | {"input": pattern, "fps": output.fps},
@@ -154,7 +154,7 @@ def _nature(name: str, given: InputSettings, who: PerceptionSettings, fps: float
             end = number * steps
             done = max(done, end - before - 1)
             shown = (renderer.sharp(k / rate) for k in range(done + 1, end + 1))
-            yield number, Source(number, Path(), None, {}, {}), shown
+            yield number, FrameFile(number, Path(), None, {}, {}), shown
             done = end
 
     return numbers, pictures(), rate

@@ -58,8 +58,8 @@ def render(
     fps = float(output.rate)
     picture = what.make(scene)
     look, when = look.resolved(picture), when.resolved(picture, fps)
-    if look.keep or look.scale:
-        raise InputError("--keep and --scale are for files: wgmb render has no layers to name")
+    if look.holdout or look.scale:
+        raise InputError("--holdout and --scale are for files: wgmb render has no layers to name")
     if passes and not output.output.lower().endswith(".exr"):
         raise InputError(f"--passes need an .exr output, got {output.output}")
     if passes and output.layers == "picture":

@@ -11,11 +11,11 @@ from .device import (
     submit,
     texel,
 )
-from .kernels import Given, Kernel, kernel
+from .kernels import FrameBindings, Kernel, kernel
 
 __all__ = [
     "SOFTWARE",
-    "Given",
+    "FrameBindings",
     "Kernel",
     "adapters",
     "check_size",

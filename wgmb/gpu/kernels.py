@@ -13,7 +13,7 @@ from . import wgsl
 
 
 @dataclass(frozen=True)
-class Given:
+class FrameBindings:
     """What every pass of a frame is given: group 0 of its shader."""
 
     size: tuple[int, int]  # width, height [px]
@@ -30,7 +30,7 @@ class Kernel:
     def __init__(
         self,
         device: wgpu.GPUDevice,
-        source: wgsl.Source,
+        source: wgsl.WgslSource,
         constants: dict[str, float] | None = None,
     ):
         self.device, self.source = device, source
@@ -60,20 +60,28 @@ class Kernel:
             for name in source.entry_points()
         }
 
-    def run(self, encoder, entry: str, given: Given, groups: dict | None = None, /, **own) -> None:
-        """Record one dispatch over the image: group 0 from `given`, group 1 from `own`.
+    def run(
+        self,
+        encoder,
+        entry: str,
+        bindings: FrameBindings,
+        groups: dict | None = None,
+        /,
+        **resources,
+    ) -> None:
+        """Record one dispatch over the image: group 0 from `bindings`, group 1 from `resources`.
 
         `groups`: the part of a buffer that holds how many workgroups it takes instead.
         """
         wanted = {name for name, b in self.bindings.items() if b.group > 0}
-        if own.keys() != wanted:
-            raise ShaderError(f"{self.source.name} binds {sorted(wanted)}, got {sorted(own)}")
-        resources = given.resources | own
+        if resources.keys() != wanted:
+            raise ShaderError(f"{self.source.name} binds {sorted(wanted)}, got {sorted(resources)}")
+        every = bindings.resources | resources
         compute = encoder.begin_compute_pass(label=f"{self.source.name}:{entry}")
         compute.set_pipeline(self.pipelines[entry])
         for group, layout in zip(self.groups, self.layouts, strict=True):
             entries = [
-                {"binding": b.index, "resource": _resource(resources[name])}
+                {"binding": b.index, "resource": _resource(every[name])}
                 for name, b in self.bindings.items()
                 if b.group == group
             ]
@@ -83,7 +91,7 @@ class Kernel:
             compute.dispatch_workgroups_indirect(groups["buffer"], groups["offset"])
         else:
             compute.dispatch_workgroups(
-                *(-(-n // edge) for n, edge in zip(given.size, self.workgroup, strict=True))
+                *(-(-n // edge) for n, edge in zip(bindings.size, self.workgroup, strict=True))
             )
         compute.end()
 
@@ -107,18 +115,18 @@ def forget_kernels() -> None:
     _kernel.cache_clear()
 
 
-def _located(message: str, source: wgsl.Source) -> str:
+def _located(message: str, source: wgsl.WgslSource) -> str:
     """The compiler's message with lines of the joined text turned into file:line."""
     return re.sub(r"wgsl:(\d+):(\d+)", lambda m: f"{source.where(int(m[1]))}:{m[2]}", message)
 
 
-def _resource(given):
-    if isinstance(given, wgpu.GPUBuffer):
-        return {"buffer": given, "offset": 0, "size": given.size}
-    return given
+def _resource(resource):
+    if isinstance(resource, wgpu.GPUBuffer):
+        return {"buffer": resource, "offset": 0, "size": resource.size}
+    return resource
 
 
-def _layout_entry(b: wgsl.Binding, source: wgsl.Source) -> dict:
+def _layout_entry(b: wgsl.Binding, source: wgsl.WgslSource) -> dict:
     entry = {"binding": b.index, "visibility": wgpu.ShaderStage.COMPUTE}
     if b.space == "uniform":
         size = source.dtype(b.type).itemsize

@@ -23,7 +23,7 @@ def numpy_of(format: str) -> tuple[np.dtype, int]:
     return np.dtype(_NUMPY[format[len(letters) :]]), _CHANNELS[letters]
 
 
-class Scratch:
+class ScratchBuffer:
     """A storage buffer that is only remade when it has to grow."""
 
     def __init__(self, device: wgpu.GPUDevice):
@@ -46,7 +46,7 @@ class Scratch:
         return self._buffer
 
 
-class Images:
+class TexturePool:
     """Textures kept from frame to frame under a name, remade when size or format changes."""
 
     def __init__(self, device: wgpu.GPUDevice):

@@ -42,11 +42,11 @@ class _Clock:
         return seconds
 
 
-class Timing(_Clock):
+class TimestampClock(_Clock):
     """GPU time of every pass of one frame, by timestamp queries.
 
     Software adapters report times that are wrong after some commands; there, wall clock
-    around a submit is the only honest clock, and `Timing.usable` says so.
+    around a submit is the only honest clock, and `TimestampClock.usable` says so.
     """
 
     name, empty = "timestamps", 0.0
@@ -97,7 +97,7 @@ class Timing(_Clock):
 class _Stamped:
     """An encoder whose compute passes write their times."""
 
-    def __init__(self, clock: Timing, encoder):
+    def __init__(self, clock: TimestampClock, encoder):
         self._clock, self._encoder = clock, encoder
 
     def __getattr__(self, name: str):
@@ -176,12 +176,12 @@ class _Alone:
         self._clock.take(self._label, self._encoder)
 
 
-Clock = Timing | WallClock
+Clock = TimestampClock | WallClock
 
 
 def clock(device: wgpu.GPUDevice) -> Clock:
     """The clock that tells the passes of this device apart."""
-    return Timing(device) if Timing.usable(device) else WallClock(device)
+    return TimestampClock(device) if TimestampClock.usable(device) else WallClock(device)
 
 
 def medians(runs: list[dict[str, float]]) -> dict[str, float]:

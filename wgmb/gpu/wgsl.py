@@ -36,7 +36,7 @@ class Binding:
 
 
 @dataclass(frozen=True)
-class Source:
+class WgslSource:
     """One shader file followed by everything it includes, each file once."""
 
     text: str
@@ -76,17 +76,17 @@ class Source:
         """Names of the compute entry points."""
         return re.findall(r"@compute\s+@workgroup_size\([^)]*\)\s+fn (\w+)", self.text)
 
-    def with_texels(self, **formats: str) -> Source:
+    def with_texels(self, **formats: str) -> WgslSource:
         """The same shader with other texel formats in its aliases, as `Output="rgba16float"`."""
         text = self.text
         for alias, texel in formats.items():
             pattern = rf"^(alias {alias} = texture_storage_2d<)\w+"
             text = re.sub(pattern, rf"\g<1>{texel}", text, flags=re.M)
-        return Source(text, self.files)
+        return WgslSource(text, self.files)
 
 
 @cache
-def load(name: str) -> Source:
+def load(name: str) -> WgslSource:
     """Read `wgsl/<name>` and append what it includes.
 
     WGSL does not care about the order of declarations, so includes go to the end
@@ -104,7 +104,7 @@ def load(name: str) -> Source:
         body = path.read_text(encoding="utf-8")
         todo += [(i, current) for i in re.findall(r"^//#include (\S+)$", body, re.M)]
         text += body.rstrip("\n") + "\n"
-    return Source(text, tuple(files))
+    return WgslSource(text, tuple(files))
 
 
 @cache
@@ -132,7 +132,7 @@ def _array(item_kind: str, count: str, kind: str, text: str) -> tuple[np.dtype, 
     n = (
         count.rstrip("u")
         if count.rstrip("u").isdigit()
-        else Source(text, (("shader", 1),)).constant(count)
+        else WgslSource(text, (("shader", 1),)).constant(count)
     )
     return np.dtype((item, (int(n),))), align
 

@@ -18,7 +18,7 @@ from ..frame import Frame
 from . import layers, limits, stills, vectors
 from .camera_file import CameraFile
 from .cuts import is_cut, jumps, straightened
-from .frame_file import Source, about, read, size_text
+from .frame_file import FrameFile, about, read, size_text
 from .frame_numbers import (
     MOST_FRAMES,
     frame_list,
@@ -42,7 +42,7 @@ class Passes:
     along the view axis, "inverse" 1 / that (Nuke), "clip" z after projection. `camera`: a
     JSON file (see CameraFile) for motion where there are no vectors. `object_layer`: the
     index layer by which the camera file's objects are told apart. `object_motion`: vectors
-    leave the camera's motion out. `keep`, `scale`: a layer, `LAYER=VALUE`, or an image file
+    leave the camera's motion out. `holdout`, `scale`: a layer, `LAYER=VALUE`, or an image file
     or pattern. `also`: patterns of files that hold further layers of the same frames.
     """
 
@@ -54,7 +54,7 @@ class Passes:
     camera: Path | None = None
     object_layer: str | None = None
     object_motion: bool = False
-    keep: str | None = None
+    holdout: str | None = None
     scale: str | None = None
     also: tuple[str, ...] = ()
 
@@ -93,8 +93,8 @@ class Clip:
         self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
         self.cuts: set[int] = set()
         self.unread: set[int] = set()
-        self._kept: OrderedDict[int, Source] = OrderedDict()
-        self._ready: OrderedDict[int, tuple[Source, bool, Frame]] = OrderedDict()
+        self._kept: OrderedDict[int, FrameFile] = OrderedDict()
+        self._ready: OrderedDict[int, tuple[FrameFile, bool, Frame]] = OrderedDict()
         self._found: vectors.Finding | None = None
 
     def _numbers(self, frames: str | None, skip_missing: bool) -> list[int]:
@@ -144,7 +144,7 @@ class Clip:
     def files(self, number: int) -> list[Path]:
         """Every file that the result of frame `number` depends on."""
         passes = self.passes
-        masks = [m for m in (passes.keep, passes.scale) if m is not None and _is_file(m, number)]
+        masks = [m for m in (passes.holdout, passes.scale) if m is not None and _is_file(m, number)]
         patterns = (self.pattern, *passes.also, *masks)
         camera = [passes.camera] if passes.camera else []
         return [*(frame_path(p, number) for p in patterns), *camera]
@@ -172,7 +172,7 @@ class Clip:
             "vectors_mean": str(meaning) if meaning else None,
         }
 
-    def source(self, number: int) -> Source:
+    def source(self, number: int) -> FrameFile:
         """Frame `number` as stored; the last three are kept for their neighbours."""
         if number not in self._kept:
             while len(self._kept) > 2:
@@ -236,7 +236,7 @@ class Clip:
             if not wanted:
                 self.forget(number)
 
-    def with_neighbours(self, source: Source, normal: bool = True) -> Frame:
+    def with_neighbours(self, source: FrameFile, normal: bool = True) -> Frame:
         """`frame`, and the frames before and after as far as they can be read.
 
         Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
@@ -259,7 +259,7 @@ class Clip:
                 self.cuts.add(source.number if side == "prev" else source.number + 1)
         return frame.between(near.get("prev"), near.get("next"))
 
-    def _locked(self, source: Source, normal: bool) -> Frame:
+    def _locked(self, source: FrameFile, normal: bool) -> Frame:
         """`frame`, made once for the three frames that it is shown in."""
         made, with_normal, frame = self._ready.get(source.number, (None, None, None))
         if frame is None or made is not source or with_normal != normal:
@@ -270,7 +270,7 @@ class Clip:
             self._ready[source.number] = source, normal, frame
         return frame
 
-    def frame(self, source: Source, picture: bool = True, normal: bool = True) -> Frame:
+    def frame(self, source: FrameFile, picture: bool = True, normal: bool = True) -> Frame:
         """What a method is given of `source`; without `picture`, all but the colour (0); without
         `normal`, no normals.
 
@@ -283,7 +283,7 @@ class Clip:
                 frame = straightened(frame, side)
         return frame
 
-    def _frame(self, source: Source, picture: bool, normal: bool) -> Frame:
+    def _frame(self, source: FrameFile, picture: bool, normal: bool) -> Frame:
         meaning = self._decide().vectors
         with about(source.path):
             if meaning is None:  # where a layer was asked for, this says why there is none
@@ -308,13 +308,13 @@ class Clip:
                 normal=self._normal(source) if normal else None,
                 camera=reprojections,
                 object_id=ids,
-                keep=self._mask(source, self.passes.keep),
+                holdout=self._mask(source, self.passes.holdout),
                 scale=self._mask(source, self.passes.scale),
                 object_motion=self.passes.object_motion,
                 number=source.number,
             )
 
-    def _depth(self, source: Source) -> np.ndarray | None:
+    def _depth(self, source: FrameFile) -> np.ndarray | None:
         name = layers.find_depth(source.channels, self.passes.depth, source.beside)
         if name is None:
             return None
@@ -324,13 +324,13 @@ class Clip:
                 depth = np.where(depth > 0, 1 / depth, np.inf).astype(np.float32)
         return depth
 
-    def _normal(self, source: Source) -> np.ndarray | None:
+    def _normal(self, source: FrameFile) -> np.ndarray | None:
         names = layers.find_normal(source.channels, source.beside)
         if not names:
             return None
         return np.stack([source.channels[name] for name in names], 2, dtype=np.float32)
 
-    def _object_ids(self, source: Source) -> np.ndarray | None:
+    def _object_ids(self, source: FrameFile) -> np.ndarray | None:
         by_layer = layers.layers(source.channels, near=source.beside)
         name = self.passes.object_layer
         if name is None:
@@ -342,7 +342,7 @@ class Clip:
         with np.errstate(invalid="ignore"):
             return np.where(plane > 0, np.minimum(np.rint(plane), 2**31), 0).astype(np.uint32)
 
-    def _mask(self, source: Source, wanted: str | None) -> np.ndarray | None:
+    def _mask(self, source: FrameFile, wanted: str | None) -> np.ndarray | None:
         if wanted is None:
             return None
         if not _is_file(wanted, source.number):

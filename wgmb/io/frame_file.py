@@ -17,7 +17,7 @@ Window = tuple[int, int, int, int]  # left, top, right, bottom; the last pixels 
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class FrameFile:
     """One frame as it came from disk."""
 
     number: int
@@ -103,7 +103,7 @@ def about(path: Path):
 
 def read(
     paths: list[Path], number: int, wanted: str | None, max_mb: float = limits.MAX_MB
-) -> Source:
+) -> FrameFile:
     """One frame's files, their channels together; `wanted`: the picture's layer.
 
     `max_mb`: megabytes that each file may unpack to. `InputError` names the file that is missing,
@@ -134,7 +134,7 @@ def read(
                     f"{p}: layer {name} is {size_text(plane)}, {path.name} is {size_text(size)}"
                 )
             channels.setdefault(name, plane)
-    return Source(number, path, file, channels, attributes, wanted, onto if file else None)
+    return FrameFile(number, path, file, channels, attributes, wanted, onto if file else None)
 
 
 def _picture_part(read: exr.Exr, wanted: str | None) -> exr.Part:

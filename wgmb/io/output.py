@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from . import atomic, exr, record, stills, video
-from .frame_file import Source
+from .frame_file import FrameFile
 from .frame_numbers import frame_path, is_pattern
 
 
@@ -131,7 +131,7 @@ class Output:
     def write(
         self,
         result: np.ndarray,
-        source: Source,
+        source: FrameFile,
         confidence: Mapping[str, np.ndarray] | None = None,
         made_of: dict | None = None,
     ) -> None:
@@ -230,7 +230,7 @@ def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> No
 
 
 def _with_result(
-    source: Source,
+    source: FrameFile,
     result: np.ndarray,
     text: str,
     layers: Mapping[str, np.ndarray],

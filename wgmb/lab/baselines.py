@@ -12,7 +12,7 @@ import wgpu
 
 from .. import gpu
 from ..frame import Frame
-from ..gpu.textures import Images
+from ..gpu.textures import TexturePool
 from ..gpu.timing import alternate
 from ..pipeline import Blur
 from ..render import Render
@@ -34,7 +34,7 @@ def bench_torusphere(
     token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
     scene = builtin.make("torusphere", density="published")
     render = Render(scene, blur, size=(width, height), fps=60)
-    output = Images(device).texture("output", (width, height), blur.output)
+    output = TexturePool(device).texture("output", (width, height), blur.output)
     work: dict[float, list[float]] = {t: [] for t in ARTICLE}
     recording: dict[float, list[float]] = {t: [] for t in ARTICLE}
 

@@ -28,8 +28,8 @@ from ..errors import InputError
 from ..frame import Frame
 from ..frame_views import FrameViews
 from ..gpu import timing
-from ..gpu.textures import Images, numpy_of
-from ..gpu.timing import Timing
+from ..gpu.textures import TexturePool, numpy_of
+from ..gpu.timing import TimestampClock
 from ..io.atomic import write_file
 from ..pipeline import Blur
 from ..scene import builtin
@@ -94,7 +94,7 @@ class Bench:
     machine: dict[str, str]
     copy: float
     figures: list[Figure]
-    clock: str = Timing.name
+    clock: str = TimestampClock.name
     """What timed the passes: "timestamps" of the GPU, or "wall clock" around each alone."""
     empty: float = 0.0
     """Milliseconds of an empty submission, taken from every pass that wall clock timed."""
@@ -269,7 +269,7 @@ class _Timed:
 
     def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
         self.blur, self.clock, self._held = blur, clock, _held()
-        self.images = Images(blur.device)
+        self.images = TexturePool(blur.device)
         self.output = self.images.texture("output", size, blur.output)
         self.memory, self.runs, self.counts = 0, [], {}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..gpu.timing import Timing
+from ..gpu.timing import TimestampClock
 from .bench import Bench, Figure
 from .results import Plot, Report, Table
 
@@ -39,7 +39,7 @@ def _times(f: Figure, label: str) -> str:
 
 def _clocked(run: Bench) -> str:
     """How the passes were timed."""
-    if run.clock == Timing.name:
+    if run.clock == TimestampClock.name:
         return "Passes by the GPU's timestamps"
     return (
         "Passes by wall clock, each submitted by itself, less the "

@@ -17,7 +17,7 @@ import wgpu
 
 from ..errors import InputError
 from ..gpu import timing
-from ..gpu.textures import Images
+from ..gpu.textures import TexturePool
 from ..metrics import MEASURES, measure
 from ..pipeline import MOST_SAMPLES, Blur, most_samples
 from ..shutter import Shutter
@@ -37,7 +37,7 @@ class Laboratory:
         if rounds < 1:
             raise InputError(f"rounds must be 1 or more, got {rounds}")
         self.device, self.rounds, self.tell = device, rounds, tell or (lambda text: None)
-        self._images, self.clock = Images(device), timing.clock(device)
+        self._images, self.clock = TexturePool(device), timing.clock(device)
 
     def compare(
         self,

@@ -347,8 +347,8 @@ def _masked(frame: Frame) -> Frame:
     assert frame.object_id is not None
     height, width = frame.color.shape[:2]
     box = frame.object_id[int(0.72 * height), width // 2]
-    keep = (frame.object_id == box).astype(np.float32)
-    return replace(frame, keep=keep, prev=None, next=None)
+    holdout = (frame.object_id == box).astype(np.float32)
+    return replace(frame, holdout=holdout, prev=None, next=None)
 
 
 EXPERIMENTS: dict[str, Callable[[Laboratory, Report, tuple[int, int]], None]] = {

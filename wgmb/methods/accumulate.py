@@ -7,7 +7,7 @@ import wgpu
 
 from .. import gpu
 from ..errors import InputError
-from ..gpu.textures import Images, Scratch
+from ..gpu.textures import ScratchBuffer, TexturePool
 from .options import MethodOptions
 
 
@@ -28,7 +28,7 @@ class Accumulate:
 
     def __init__(self, device, options: MethodOptions, *, output="rgba32float"):
         self._device, self._output = device, output
-        self._sums, self._images = Scratch(device), Images(device)
+        self._sums, self._images = ScratchBuffer(device), TexturePool(device)
 
     def encode(self, encoder, inputs, output):
         """Record the pictures of `inputs.progress`; `output` is the mean of all so far."""
@@ -36,18 +36,18 @@ class Accumulate:
             raise InputError("accumulate exposes whole pictures: it cannot roll the shutter")
         kernel = gpu.kernel(self._device, "methods/accumulate.wgsl", {"Output": self._output})
         times = inputs.shutter.sample_times(inputs.samples)[spread(inputs.samples)]
-        width, height = inputs.given.size
+        width, height = inputs.bindings.size
         first, count = inputs.progress
         for i in range(first, first + count):
             data = np.zeros((), kernel.source.dtype("Progress"))
             data["done"] = i
             picture = inputs.scene.encode(
-                encoder, inputs.given, self._images, "accumulate", float(times[i])
+                encoder, inputs.bindings, self._images, "accumulate", float(times[i])
             )
             kernel.run(
                 encoder,
                 "main",
-                inputs.given,
+                inputs.bindings,
                 color=picture["color"].create_view(),
                 sums=self._sums.at_least(16 * width * height),
                 progress=self._device.create_buffer_with_data(

@@ -30,14 +30,14 @@ class PreparedFrame(FrameViews):
 class Inputs:
     """What a method may read while it records one frame."""
 
-    given: gpu.Given
+    bindings: gpu.FrameBindings
     samples: int
     number: int
     jitter: float
     shutter: Shutter
     frames: tuple[PreparedFrame, ...]
     """The frame itself, then those neighbours that there are; none for a scene."""
-    none: View
+    unbound: View
     """Bound where an input is not there."""
     linear: wgpu.GPUSampler
     even: bool

@@ -9,7 +9,7 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..gpu.textures import Scratch
+from ..gpu.textures import ScratchBuffer
 from .options import MethodOptions, Range
 
 TIMES = 4096  # equal shares of the exposure between which times are interpolated
@@ -38,7 +38,7 @@ class Distributed:
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
         self._device, self._output, self._seed = device, output, options.seed
-        self._sums = Scratch(device)
+        self._sums = ScratchBuffer(device)
         self._times: tuple[object, wgpu.GPUBuffer] | None = None
 
     def encode(self, encoder, inputs, output):
@@ -53,11 +53,14 @@ class Distributed:
         data["first"], data["count"] = inputs.progress
         data["seed"] = self._seed
         create = self._device.create_buffer_with_data
-        width, height = inputs.given.size
+        width, height = inputs.bindings.size
         kernel.run(
             encoder,
             "main",
-            replace(inputs.given, resources=inputs.given.resources | self._fine(inputs.shutter)),
+            replace(
+                inputs.bindings,
+                resources=inputs.bindings.resources | self._fine(inputs.shutter),
+            ),
             progress=create(label="progress", data=data, usage=wgpu.BufferUsage.UNIFORM),
             sums=self._sums.at_least(16 * width * height),
             output=output,

@@ -10,7 +10,7 @@ import wgpu
 
 from .. import gpu
 from ..camera import Camera, Reprojections
-from ..gpu.textures import Images
+from ..gpu.textures import TexturePool
 from .options import MethodOptions, Range
 
 
@@ -83,7 +83,7 @@ class Fusion:
         self._printed = options.weights == "published"
         self._tau = options.tau if options.tau is not None else 0.5 if self._printed else 1.0
         self._alphas = options.alpha_front, options.alpha_back
-        self._images = Images(device)
+        self._images = TexturePool(device)
 
     def encode(self, encoder, inputs, output):
         """Record the Gaussian's two passes, for weights too, and the fusion."""
@@ -108,7 +108,7 @@ class Fusion:
         kernel.run(
             encoder,
             "main",
-            inputs.given,
+            inputs.bindings,
             fusion=self._device.create_buffer_with_data(
                 label="fusion", data=data, usage=wgpu.BufferUsage.UNIFORM
             ),
@@ -116,11 +116,11 @@ class Fusion:
             soft=self._filtered(encoder, inputs, inputs.frame.color, "color"),
             motion=inputs.frame.motion,
             depth=inputs.frame.depth,
-            normal=inputs.frame.normal or inputs.none,
-            weight=inputs.frame.weight or inputs.none,
+            normal=inputs.frame.normal or inputs.unbound,
+            weight=inputs.frame.weight or inputs.unbound,
             soft_weight=self._filtered(encoder, inputs, inputs.frame.weight, "weight")
             if weighted
-            else inputs.none,
+            else inputs.unbound,
             linear=inputs.linear,
             output=output,
         )
@@ -136,11 +136,13 @@ class Fusion:
         """The image through the Gaussian, along rows and then along columns."""
         texel = gpu.texel(self._device, 4)
         for down in (False, True):
-            to = self._images.view(f"{name} {down}", inputs.given.size, texel)
+            to = self._images.view(f"{name} {down}", inputs.bindings.size, texel)
             kernel = gpu.kernel(
                 self._device, "methods/fusion_gaussian.wgsl", {"Output": texel}, DOWN=down
             )
-            kernel.run(encoder, "main", inputs.given, image=image, linear=inputs.linear, output=to)
+            kernel.run(
+                encoder, "main", inputs.bindings, image=image, linear=inputs.linear, output=to
+            )
             image = to
         return image
 

@@ -11,7 +11,7 @@ import wgpu
 from .. import gpu
 from ..camera import Camera, Reprojections
 from ..errors import InputError
-from ..gpu.textures import Scratch
+from ..gpu.textures import ScratchBuffer
 from ..velocity import viewport_of
 from .options import MethodOptions
 
@@ -78,10 +78,10 @@ class Reproject:
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
         self._device, self._output, self._options = device, output, options
-        self._nearest, self._winner = Scratch(device), Scratch(device)
-        self._hits, self._open = Scratch(device), Scratch(device)
-        self._means, self._counts = Scratch(device), Scratch(device)
-        self._carries, self._links, self._heads = (Scratch(device) for _ in range(3))
+        self._nearest, self._winner = ScratchBuffer(device), ScratchBuffer(device)
+        self._hits, self._open = ScratchBuffer(device), ScratchBuffer(device)
+        self._means, self._counts = ScratchBuffer(device), ScratchBuffer(device)
+        self._carries, self._links, self._heads = (ScratchBuffer(device) for _ in range(3))
 
     def encode(self, encoder, inputs, output):
         """Record three passes a source for several slices, or two for several steps."""
@@ -97,7 +97,7 @@ class Reproject:
             WEIGHTED=inputs.frame.weight is not None,
             COUNTS=self._options.show == "count",
         )
-        width, height = inputs.given.size
+        width, height = inputs.bindings.size
         pixels = width * height
         bits = int(kernel.source.constant("BLOCK_BITS"))
         blocks = ((width >> bits) + 1) * ((height >> bits) + 1)
@@ -126,14 +126,14 @@ class Reproject:
             kernel.run(
                 encoder,
                 entry,
-                inputs.given,
+                inputs.bindings,
                 chunk=self._device.create_buffer_with_data(
                     label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM
                 ),
                 color=frame.color,
                 motion=frame.motion,
                 depth=frame.depth,
-                weight=frame.weight or inputs.none,
+                weight=frame.weight or inputs.unbound,
                 **shared,
             )
 
@@ -173,7 +173,7 @@ class Reproject:
             NORMALS=normals,
             NEAREST_ONLY=self._options.depth_test,
         )
-        width, height = inputs.given.size
+        width, height = inputs.bindings.size
         bits = (width - 1).bit_length(), (width - 1).bit_length() + (height - 1).bit_length()
         rows = int(kernel.source.constant("ROWS"))
         most = max(
@@ -201,7 +201,7 @@ class Reproject:
             table["time"][: len(steps)] = steps
             if camera and pair:
                 seen = replace(camera, here=pair[0], prev=None, next=pair[1])
-                data["viewport"] = viewport_of(seen, inputs.given.size)
+                data["viewport"] = viewport_of(seen, inputs.bindings.size)
                 data["world_from_pixel"] = seen.world_from_pixel().T
                 data["eye"] = _eye(pair[0])
                 for row, share in zip(table, np.abs(steps), strict=False):
@@ -211,14 +211,14 @@ class Reproject:
             kernel.run(
                 encoder,
                 entry,
-                inputs.given,
+                inputs.bindings,
                 chunk=create(label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM),
                 steps=create(label="steps", data=table, usage=wgpu.BufferUsage.UNIFORM),
                 color=source.color,
                 motion=source.motion,
                 depth=source.depth,
-                normal=source.normal if self._options.facing and normals else inputs.none,
-                weight=source.weight or inputs.none,
+                normal=source.normal if self._options.facing and normals else inputs.unbound,
+                weight=source.weight or inputs.unbound,
                 **shared,
             )
 

@@ -59,10 +59,10 @@ class Tap:
         kernel.run(
             encoder,
             "main",
-            inputs.given,
+            inputs.bindings,
             color=inputs.frame.color,
             motion=inputs.frame.motion,
-            weight=inputs.frame.weight or inputs.none,
+            weight=inputs.frame.weight or inputs.unbound,
             linear=inputs.linear,
             output=output,
         )

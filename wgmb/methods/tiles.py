@@ -9,7 +9,7 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..gpu.textures import Images, Scratch
+from ..gpu.textures import ScratchBuffer, TexturePool
 from .options import MethodOptions
 
 LONGEST = (40, 9)  # blur to either side, and tile: so many pixels, or the height over this
@@ -50,8 +50,10 @@ class Tiles:
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
         self._device, self._output, self._options = device, output, options
-        self._images = Images(device)
-        self._row_max, self._tile_max, self._neighbor_max = (Scratch(device) for _ in range(3))
+        self._images = TexturePool(device)
+        self._row_max, self._tile_max, self._neighbor_max = (
+            ScratchBuffer(device) for _ in range(3)
+        )
 
     def encode(self, encoder, inputs, output):
         """Record three passes over the tiles between two over the picture."""
@@ -68,7 +70,7 @@ class Tiles:
         velocity = gpu.kernel(
             self._device, "methods/tiles_velocity.wgsl", HAS_DEPTH=inputs.frame.depth is not None
         )
-        width, height = inputs.given.size
+        width, height = inputs.bindings.size
         edge = max(LONGEST[0], height // LONGEST[1])
         count = -(-width // edge), -(-height // edge)
         data = np.zeros((), kernel.source.dtype("Tiles"))
@@ -80,9 +82,9 @@ class Tiles:
         velocity.run(
             encoder,
             "main",
-            inputs.given,
+            inputs.bindings,
             motion=inputs.frame.motion,
-            depth=inputs.frame.depth or inputs.none,
+            depth=inputs.frame.depth or inputs.unbound,
             velocity_depth=velocity_depth,
         )
         own = {
@@ -90,7 +92,7 @@ class Tiles:
             "color": inputs.frame.color,
             "motion": inputs.frame.motion,
             "velocity_depth": velocity_depth,
-            "weight": inputs.frame.weight or inputs.none,
+            "weight": inputs.frame.weight or inputs.unbound,
             "linear": inputs.linear,
             "row_max": self._row_max.at_least(16 * count[0] * height),
             "tile_max": self._tile_max.at_least(16 * count[0] * count[1]),
@@ -104,4 +106,4 @@ class Tiles:
             "main": (width, height),
         }
         for entry, grid in grids.items():
-            kernel.run(encoder, entry, replace(inputs.given, size=grid), **own)
+            kernel.run(encoder, entry, replace(inputs.bindings, size=grid), **own)

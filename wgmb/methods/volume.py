@@ -98,7 +98,7 @@ class Volume:
             kernel.run(
                 encoder,
                 "main",
-                replace(inputs.given, size=(groups[0] * edges[0], groups[1] * edges[1])),
+                replace(inputs.bindings, size=(groups[0] * edges[0], groups[1] * edges[1])),
                 tiles=self._storage("tiles", np.ascontiguousarray(at)),
                 **shared,
             )
@@ -125,7 +125,7 @@ class Volume:
         kernel.run(
             encoder,
             "main",
-            inputs.given,
+            inputs.bindings,
             figure=self._uniform("figure", data),
             tables=self._storage("tables", tables(shutter, [rotation])),
             output=output,

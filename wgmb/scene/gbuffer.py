@@ -11,7 +11,7 @@ from .. import gpu
 from ..camera import Camera, Reprojections
 from ..errors import InputError
 from ..gpu import wgsl
-from ..gpu.textures import Images
+from ..gpu.textures import TexturePool
 from .bodies import SHAPES
 from .scene import Scene
 
@@ -88,10 +88,19 @@ class SceneOnGpu:
             "bodies": buffer(
                 label="bodies", data=_bodies(scene, source), usage=wgpu.BufferUsage.STORAGE
             ),
-            "poses": Images(self.device).upload("poses", _poses(camera, places), "rgba32float"),
+            "poses": TexturePool(self.device).upload(
+                "poses", _poses(camera, places), "rgba32float"
+            ),
         }
 
-    def encode(self, encoder, given: gpu.Given, images: Images, name: str, time: float) -> dict:
+    def encode(
+        self,
+        encoder,
+        bindings: gpu.FrameBindings,
+        images: TexturePool,
+        name: str,
+        time: float,
+    ) -> dict:
         """Record the picture at `time` [frame intervals from this frame]; its textures."""
         rays, bodies = self.rays, len(self.scene.bodies)
         if self.loops * rays * rays > MOST_LOOPS:
@@ -110,7 +119,7 @@ class SceneOnGpu:
         }
         textures = {k: images.texture(f"{name} {k}", self.size, f) for k, f in formats.items()}
         views = {k: t.create_view() for k, t in textures.items()}
-        kernel.run(encoder, "main", given, view=buffer, **self.resources, **views)
+        kernel.run(encoder, "main", bindings, view=buffer, **self.resources, **views)
         return textures
 
     def reprojections(self, time: float = 0.0) -> Reprojections:
@@ -127,7 +136,7 @@ class SceneOnGpu:
         return Camera(clip @ view, view, bodies)
 
 
-def _bodies(scene: Scene, source: wgsl.Source) -> np.ndarray:
+def _bodies(scene: Scene, source: wgsl.WgslSource) -> np.ndarray:
     table = np.zeros(max(len(scene.bodies), 1), source.dtype("Body"))
     for i, body in enumerate(scene.bodies):
         row = table[i : i + 1]

@@ -16,7 +16,7 @@ import wgpu
 
 from .. import gpu
 from ..cone import Cone
-from ..gpu.timing import Timing
+from ..gpu.timing import TimestampClock
 from ..observer import WeightedSum
 from ..pipeline import Blur
 from .source import Subject
@@ -49,7 +49,7 @@ class Perceived:
         blur: Blur,
         rays: int,
         seconds: float,
-        timing: Timing | None,
+        timing: TimestampClock | None,
     ) -> int:
         """Draw frames that are missing, the newest first, for about `seconds`; how many are done.
 

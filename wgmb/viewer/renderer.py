@@ -15,8 +15,8 @@ import wgpu
 
 from .. import gpu
 from ..errors import InputError
-from ..gpu.textures import Images
-from ..gpu.timing import Timing
+from ..gpu.textures import TexturePool
+from ..gpu.timing import TimestampClock
 from ..methods import METHODS
 from ..pipeline import SAMPLES, Blur
 from ..settings import ShutterSettings
@@ -89,7 +89,7 @@ class Stage:
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self.pace = Pace(5 if software else 0)
         self.report = Report()
-        self._images, self._perceived = Images(device), Perceived(device)
+        self._images, self._perceived = TexturePool(device), Perceived(device)
         self._past: SceneSubject | None = None
         self._blurs: dict[tuple, Blur] = {}
         self._shown = {"first": Shown(), "second": Shown()}
@@ -97,7 +97,7 @@ class Stage:
         self._level, self._still_since, self._still = 0, 0.0, ()
         self._moved = False
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
-        self._timing = Timing(device) if Timing.usable(device) else None
+        self._timing = TimestampClock(device) if TimestampClock.usable(device) else None
 
     def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> Report:
         """Go on with what `state` shows in `area` [px] of the canvas, `now` [s].

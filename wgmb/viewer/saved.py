@@ -23,7 +23,7 @@ from ..settings import (
 from ..settings_toml import parse
 
 GROUPS = (BlurSettings, ShutterSettings, SceneSettings, OutputSettings, InputSettings)
-INPUTS = frozenset({*(f.name for f in fields(InputSettings)), "keep", "scale"})
+INPUTS = frozenset({*(f.name for f in fields(InputSettings)), "holdout", "scale"})
 """Options that say what frames on disk hold."""
 VIEW = (
     "frames", "frame", "look", "compare", "against", "wipe", "gain", "fastest", "middle",

@@ -10,7 +10,7 @@ import wgpu
 
 from .. import gpu
 from ..gpu import wgsl
-from ..gpu.textures import Images
+from ..gpu.textures import TexturePool
 from .state import State
 
 _WHEEL, _KEY_HEIGHT, _KEY_WIDTH, _MARGIN = 96, 8, 180, 16  # logical pixels
@@ -32,7 +32,7 @@ class Screen:
     """Composes images into `picture`, in display values, and paints that on a canvas."""
 
     def __init__(self, device: wgpu.GPUDevice, format: str):
-        self.device, self._images = device, Images(device)
+        self.device, self._images = device, TexturePool(device)
         self._none = self._images.view("none", (1, 1), "rgba32float")
         self._blit = self._blitter(format)
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
@@ -89,7 +89,7 @@ class Screen:
         kernel.run(
             encoder,
             "main",
-            gpu.Given(size, {"frame": frame}),
+            gpu.FrameBindings(size, {"frame": frame}),
             view=buffer(label="view", data=data, usage=uniform),
             first=first.texture.create_view() if first.texture else self._none,
             second=second.texture.create_view() if second.texture else self._none,

@@ -11,8 +11,8 @@ import wgpu
 
 from .. import gpu
 from ..frame import Frame
-from ..gpu.textures import Images
-from ..gpu.timing import Timing
+from ..gpu.textures import TexturePool
+from ..gpu.timing import TimestampClock
 from ..methods import METHODS
 from ..pipeline import Blur
 from ..render import Render
@@ -84,7 +84,9 @@ class SceneSubject:
         """The sharp picture and what lies under it, by name."""
         return self._render.passes(self._time, self._number)
 
-    def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Timing | None) -> int:
+    def draw(
+        self, blur: Blur, output: Texture, budget: Budget, timing: TimestampClock | None
+    ) -> int:
         """Draw with `blur`; samples done, which may be less than it has where it is slow."""
         view, (done, seconds) = output.create_view(), budget
         if "progress" in blur.method.uses:
@@ -99,9 +101,9 @@ class ClipSubject:
     """Frames on disk: their own size, their own moments, the methods they have passes for."""
 
     def __init__(self, device: wgpu.GPUDevice, state: State):
-        self._device, self._images = device, Images(device)
+        self._device, self._images = device, TexturePool(device)
         given: dict[str, Any] = dict(state.given)
-        masks = given.pop("keep", None), given.pop("scale", None)
+        masks = given.pop("holdout", None), given.pop("scale", None)
         self._clip = InputSettings(**given).open(state.source, *masks)
         self._frames: OrderedDict[int, Frame] = OrderedDict()
         self._sharp = Blur("tap", device=device)
@@ -174,7 +176,9 @@ class ClipSubject:
         rgba[..., : frame.color.shape[2]] = frame.color
         return rgba
 
-    def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Timing | None) -> int:
+    def draw(
+        self, blur: Blur, output: Texture, budget: Budget, timing: TimestampClock | None
+    ) -> int:
         """Draw with `blur`, all its samples."""
         encoder = self._device.create_command_encoder(label="blur")
         view = output.create_view()

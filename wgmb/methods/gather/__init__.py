@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from ...errors import InputError
-from ...gpu.textures import Images
+from ...gpu.textures import TexturePool
 from ..options import MethodOptions
 from .active_tiles import ActiveTiles
 from .layers import Layers
@@ -60,7 +60,7 @@ class Gather:
                 f"gather writes {_STORED} textures in a pass, this device allows "
                 f"{device.limits[limit]}: request it with required_limits={{{limit!r}: {_STORED}}}"
             )
-        images, confidence = Images(device), options.show == "confidence"
+        images, confidence = TexturePool(device), options.show == "confidence"
         self._tiles = ActiveTiles(device)
         self._layers = Layers(device, images, self._tiles)
         self._motions = TileMotions(device, images)
@@ -68,7 +68,7 @@ class Gather:
 
     def encode(self, encoder, inputs, output):
         """Record layers and tile motions of every frame, then the search."""
-        size, frames = inputs.given.size, inputs.frames
+        size, frames = inputs.bindings.size, inputs.frames
         slots = self._layers.slots(size, frames)
         worklists = self._tiles.encode(encoder, inputs)
         for i, (frame, slot) in enumerate(zip(frames, slots, strict=True)):

@@ -9,7 +9,7 @@ import wgpu
 
 from ... import gpu
 from ...gpu import wgsl
-from ...gpu.textures import Scratch
+from ...gpu.textures import ScratchBuffer
 
 
 def grid_of(size: tuple[int, int]) -> tuple[int, int]:
@@ -28,20 +28,20 @@ class ActiveTiles:
     """Worklists of cells, a cell being a few tiles side by side."""
 
     def __init__(self, device: wgpu.GPUDevice):
-        self._device, self._lists = device, Scratch(device)
+        self._device, self._lists = device, ScratchBuffer(device)
         self._everywhere: tuple[tuple[int, int], dict] | None = None
 
     def encode(self, encoder, inputs) -> dict[str, dict]:
         """Record which tiles are active; the worklists of active_tiles.wgsl, by name."""
         kernel = gpu.kernel(self._device, "methods/gather/active_tiles.wgsl")
-        grid = grid_of(inputs.given.size)
+        grid = grid_of(inputs.bindings.size)
         words = -(-(grid[0] * grid[1] + int(kernel.source.constant("CELLS_WORD"))) // 64) * 64
         size = 4 * words * int(kernel.source.constant("SECTIONS"))
         lists = self._lists.at_least(size)
         encoder.clear_buffer(lists)
         data = np.zeros((), kernel.source.dtype("SourceFrame"))
         data["words"] = words
-        tiles = replace(inputs.given, size=grid)
+        tiles = replace(inputs.bindings, size=grid)
         for frame in inputs.frames:
             data["offset"] = frame.offset
             own = {
@@ -51,7 +51,7 @@ class ActiveTiles:
             }
             kernel.run(encoder, "mark_active_tiles", tiles, **own)
         kernel.run(encoder, "find_distances", tiles, **own)
-        kernel.run(encoder, "build_worklists", replace(inputs.given, size=(grid[1], 1)), **own)
+        kernel.run(encoder, "build_worklists", replace(inputs.bindings, size=(grid[1], 1)), **own)
         return {
             name: {
                 "buffer": lists,

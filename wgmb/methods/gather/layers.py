@@ -7,7 +7,7 @@ from dataclasses import replace
 import wgpu
 
 from ... import gpu
-from ...gpu.textures import Images, Scratch
+from ...gpu.textures import ScratchBuffer, TexturePool
 from .active_tiles import ActiveTiles
 
 
@@ -22,9 +22,9 @@ class Layers:
     `textures`: "layer_colors" and "surfaces" have two layers a slot, "mattes" has one.
     """
 
-    def __init__(self, device: wgpu.GPUDevice, images: Images, tiles: ActiveTiles):
+    def __init__(self, device: wgpu.GPUDevice, images: TexturePool, tiles: ActiveTiles):
         self._device, self._images, self._tiles = device, images, tiles
-        self._edges, self._edge_groups, self._spare = (Scratch(device) for _ in range(3))
+        self._edges, self._edge_groups, self._spare = (ScratchBuffer(device) for _ in range(3))
         self._made: dict[int, tuple] = {}  # what the layers in a slot were made of
         self.textures: dict[str, wgpu.GPUTexture] = {}
 
@@ -71,7 +71,7 @@ class Layers:
 
     def _separate(self, encoder, inputs, frame, views, worklists):
         """Record the layers of a frame: where something moves near, or all if they are kept."""
-        size = inputs.given.size
+        size = inputs.bindings.size
         groups = {"buffer": self._edge_groups.at_least(16), "offset": 0, "size": 16}
         if frame.key is None:
             cells = {
@@ -101,13 +101,13 @@ class Layers:
             kernel.run(
                 encoder,
                 entry,
-                inputs.given if indirect else replace(inputs.given, size=(1, 1)),
+                inputs.bindings if indirect else replace(inputs.bindings, size=(1, 1)),
                 indirect,
                 worklist=worklist,
                 color=frame.color,
                 motion=frame.motion,
                 depth=frame.depth,
-                weight=frame.weight or inputs.none,
+                weight=frame.weight or inputs.unbound,
                 edge_flags=unbound if detecting else flags,
                 edge_flags_out=flags if detecting else unbound,
                 edges=edges,

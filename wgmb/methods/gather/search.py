@@ -8,7 +8,7 @@ import numpy as np
 import wgpu
 
 from ... import gpu
-from ...gpu.textures import Images
+from ...gpu.textures import TexturePool
 from .active_tiles import grid_of, uniform
 from .layers import layer_view
 
@@ -16,7 +16,9 @@ from .layers import layer_view
 class Search:
     """The passes that read layers and candidates and write the picture."""
 
-    def __init__(self, device: wgpu.GPUDevice, images: Images, *, confidence: bool, output: str):
+    def __init__(
+        self, device: wgpu.GPUDevice, images: TexturePool, *, confidence: bool, output: str
+    ):
         self._device, self._images = device, images
         self._confidence, self._output = confidence, output
 
@@ -41,7 +43,7 @@ class Search:
             int(classify.source.constant(n))
             for n in ("CELL_TILES", "TILE", "BLOCK", "TIMES_PER_WORD")
         )
-        across, down = grid_of(inputs.given.size)
+        across, down = grid_of(inputs.bindings.size)
         blocks = -(-across // wide) * wide * side // block, down * side // block
         words = self._images.texture(
             "single-layer mask", blocks, "r32uint", -(-inputs.samples // times) + 1
@@ -50,7 +52,7 @@ class Search:
         classify.run(
             encoder,
             "main",
-            replace(inputs.given, size=blocks),
+            replace(inputs.bindings, size=blocks),
             single_layer_mask=mask,
             active_cells=worklists["active"],
             **searched,
@@ -69,13 +71,13 @@ class Search:
             kernel.run(
                 encoder,
                 entry,
-                inputs.given,
+                inputs.bindings,
                 cells,
                 worklist=cells,
                 single_layer_mask=mask,
                 second_differences=differences,
                 own_color=inputs.frame.color,
-                own_weight=inputs.frame.weight or inputs.none,
+                own_weight=inputs.frame.weight or inputs.unbound,
                 linear=inputs.linear,
                 output=output,
                 **searched,
@@ -84,12 +86,12 @@ class Search:
 
     def _differences(self, encoder, inputs, surfaces, slot: int, cells) -> wgpu.GPUTextureView:
         """Record the second differences of the frame's own colours."""
-        differences = self._images.view("second differences", inputs.given.size, "rgba32uint")
+        differences = self._images.view("second differences", inputs.bindings.size, "rgba32uint")
         kernel = gpu.kernel(self._device, "methods/gather/cubic.wgsl")
         kernel.run(
             encoder,
             "main",
-            inputs.given,
+            inputs.bindings,
             cells,
             color=inputs.frame.color,
             front_surface=layer_view(surfaces, 2 * slot),

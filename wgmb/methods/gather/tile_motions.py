@@ -9,16 +9,16 @@ import wgpu
 
 from ... import gpu
 from ...gpu import wgsl
-from ...gpu.textures import Images, Scratch
+from ...gpu.textures import ScratchBuffer, TexturePool
 from .active_tiles import grid_of, uniform
 
 
 class TileMotions:
     """The candidate motions of every tile, from the clustered motions of the tiles around it."""
 
-    def __init__(self, device: wgpu.GPUDevice, images: Images):
+    def __init__(self, device: wgpu.GPUDevice, images: TexturePool):
         self._device, self._images = device, images
-        self._max_displacement = Scratch(device)
+        self._max_displacement = ScratchBuffer(device)
 
     def candidates(self, size, count: int) -> wgpu.GPUTextureView:
         """The candidates of all tiles in `count` frames."""
@@ -34,13 +34,13 @@ class TileMotions:
         data["offset"] = inputs.frames[index].offset
         data["first"] = index * int(kernel.source.constant("CANDIDATE_LAYERS"))
         source = uniform(self._device, "source", data)
-        grid = grid_of(inputs.given.size)
+        grid = grid_of(inputs.bindings.size)
         layers = int(kernel.source.constant("MOTION_LAYERS"))
         motions = self._images.texture("tile motions", grid, "rgba32float", layers)
         motions = motions.create_view(dimension="2d-array")
         no_motions = self._images.texture("no tile motions", (1, 1), "rgba32float")
         no_motions = no_motions.create_view(dimension="2d-array")
-        candidates = self.candidates(inputs.given.size, len(inputs.frames))
+        candidates = self.candidates(inputs.bindings.size, len(inputs.frames))
         side = int(kernel.source.constant("COARSE"))
         coarse = -(-grid[0] // side), -(-grid[1] // side)
         boxes = self._images.view("coarse boxes", coarse, "rgba32float")
@@ -50,14 +50,14 @@ class TileMotions:
             kernel.run(
                 encoder,
                 entry,
-                replace(inputs.given, size=coarse if entry == "coarsen" else grid),
+                replace(inputs.bindings, size=coarse if entry == "coarsen" else grid),
                 source=source,
                 front_surface=front_surface,
                 tile_motions=motions if reads else no_motions,
                 tile_motions_out=no_motions if reads else motions,
                 tile_candidates=candidates,
                 max_displacement=self._max_displacement.at_least(4),
-                coarse_boxes=boxes if last else inputs.none,
+                coarse_boxes=boxes if last else inputs.unbound,
                 coarse_boxes_out=no_boxes if last else boxes,
                 active_cells=worklists["active"],
                 static_cells=worklists["static"],
