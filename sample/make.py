@@ -7,7 +7,8 @@ import imageio.v3 as iio
 import numpy as np
 
 from wgmb.cli import app
-from wgmb.io import clip, stills
+from wgmb.color import to_display
+from wgmb.io import clip
 
 HERE = Path(__file__).parent
 OUT = HERE.parent / "out"
@@ -17,7 +18,7 @@ FRAMES = str(HERE / "crossing.####.exr")
 def picture(pattern: str) -> np.ndarray:
     """Frame 10 of a pattern of EXR files as display values."""
     source = clip.Clip(pattern, frames="10").source(10)
-    return stills.to_display(source.rgba[..., :3].astype(np.float32), 8)
+    return to_display(source.rgba[..., :3].astype(np.float32), 8)
 
 
 def main() -> int:

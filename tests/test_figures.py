@@ -7,8 +7,8 @@ import make_frames as make
 import wgmb
 from twins import figure as twin
 from wgmb import InputError, Shutter
+from wgmb.color import srgb
 from wgmb.cone import VIDEOS
-from wgmb.io import stills
 from wgmb.scene import builtin
 
 SIZE = (96, 54)
@@ -19,7 +19,7 @@ def rendered(name, size, shutter=0, time=0.0, **settings):
     render = wgmb.Render(
         builtin.make(name, **settings), wgmb.Blur("volume", shutter=shutter), size=size, fps=60
     )
-    return stills.srgb(render(time)[..., :3])
+    return srgb(render(time)[..., :3])
 
 
 SHUTTERS = [Shutter(360), Shutter(720, curve="cosine"), Shutter(540, "start", "trapezoid"),
@@ -77,7 +77,7 @@ def cone(video, speed, time):
     render = wgmb.Render(
         builtin.make("cone", video=video, time=time, speed=speed), wgmb.Blur("volume"), size=WIDE
     )
-    return stills.srgb(render(0.0)[..., :3])
+    return srgb(render(0.0)[..., :3])
 
 
 @pytest.mark.parametrize("video", ["none", "box", "trapezoid", "cosine"])

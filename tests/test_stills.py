@@ -13,6 +13,7 @@ from PIL import Image
 
 import make_frames as make
 from wgmb import InputError
+from wgmb.color import linear, srgb, to_display
 from wgmb.io import exr, record, stills
 from wgmb.io.frame_file import FrameFile
 from wgmb.io.output import Output
@@ -234,7 +235,7 @@ def test_integer_stills_come_back_within_half_a_step(tmp_path, suffix, bits, siz
     got = stills.read(save(tmp_path / f"a{suffix}", rgb, bits))
     assert got.shape == rgb.shape
     assert got.dtype == np.float32
-    step = np.abs(stills.srgb(got) - stills.srgb(rgb)).max()
+    step = np.abs(srgb(got) - srgb(rgb)).max()
     assert step <= 0.6 / (2**bits - 1) + (1e-3 if bits == 8 else 1e-6)
 
 
@@ -250,7 +251,7 @@ def test_alpha_is_straight_in_the_file_and_premultiplied_here(tmp_path, suffix, 
     if raw is not None:  # straight: the colour of what is half there is as bright as ever
         most = 2**bits - 1
         seen = rgba[..., 3] > 0.05
-        want = stills.srgb(make.picture(2)[..., :3])[seen]
+        want = srgb(make.picture(2)[..., :3])[seen]
         np.testing.assert_allclose(raw[..., :3][seen] / most, want, atol=0.02)
 
 
@@ -264,7 +265,7 @@ def test_png_of_16_bits_has_16(tmp_path):
 def test_jpeg_comes_back_within_its_loss(tmp_path, suffix):
     rgb = opaque()
     got = stills.read(save(tmp_path / f"a{suffix}", rgb))
-    assert np.abs(stills.srgb(got) - stills.srgb(rgb)).mean() < 0.02
+    assert np.abs(srgb(got) - srgb(rgb)).mean() < 0.02
     assert got.shape == rgb.shape
 
 
@@ -277,7 +278,7 @@ def test_float_tiff_is_linear_already(tmp_path, kind):
 
 @pytest.mark.parametrize("mode", ["1", "L", "LA", "P", "I;16", "RGB", "RGBA"])
 def test_png_of_every_mode_is_the_picture_it_shows(tmp_path, mode):
-    shown = Image.fromarray((stills.srgb(opaque()) * 255).astype("u1"))
+    shown = Image.fromarray((srgb(opaque()) * 255).astype("u1"))
     grey = np.asarray(shown)[..., 0]
     if mode == "I;16":
         image = Image.fromarray(grey.astype(np.uint16) * 257)
@@ -289,7 +290,7 @@ def test_png_of_every_mode_is_the_picture_it_shows(tmp_path, mode):
     want = np.asarray(
         image.convert("RGBA") if mode != "I;16" else Image.fromarray(grey).convert("RGBA")
     )
-    light = stills.linear(want[..., :3] / np.float32(255)) * (want[..., 3:] / np.float32(255))
+    light = linear(want[..., :3] / np.float32(255)) * (want[..., 3:] / np.float32(255))
     np.testing.assert_allclose(stills.read(tmp_path / "a.png")[..., :3], light, atol=2e-3)
 
 
@@ -301,20 +302,20 @@ def test_pictures_that_are_not_grey_or_rgb_are_refused(tmp_path, name):
 
 
 def test_a_tiff_of_palette_indices_is_refused_or_looked_up(tmp_path):
-    shown = Image.fromarray((stills.srgb(opaque()) * 255).astype("u1")).convert("P")
+    shown = Image.fromarray((srgb(opaque()) * 255).astype("u1")).convert("P")
     shown.save(tmp_path / "a.tif")
     try:
         got = stills.read(tmp_path / "a.tif")
     except InputError:
         return
     want = np.asarray(shown.convert("RGB")) / np.float32(255)
-    np.testing.assert_allclose(stills.srgb(got[..., :3]), want, atol=0.01)
+    np.testing.assert_allclose(srgb(got[..., :3]), want, atol=0.01)
 
 
 def test_light_and_display_values_undo_each_other():
     x = np.linspace(0, 1, 1001, dtype="f4")
-    np.testing.assert_allclose(stills.srgb(stills.linear(x)), x, atol=1e-6)
-    np.testing.assert_allclose(stills.linear(np.float32([0.04045, 0.5])), [0.0031308, 0.2140411],
+    np.testing.assert_allclose(srgb(linear(x)), x, atol=1e-6)
+    np.testing.assert_allclose(linear(np.float32([0.04045, 0.5])), [0.0031308, 0.2140411],
                                atol=1e-6)  # fmt: skip
 
 
@@ -322,7 +323,7 @@ def test_light_out_of_range_is_held_to_what_can_be_shown():
     rgb = np.array([[[np.inf, -np.inf, 9.0], [-1.0, 1e-9, 1.0]]], "f4")
     for bits in (8, 16):
         most = 2**bits - 1
-        np.testing.assert_array_equal(stills.to_display(rgb, bits),
+        np.testing.assert_array_equal(to_display(rgb, bits),
                                       [[[most, 0, most], [0, 0, most]]])  # fmt: skip
 
 
@@ -358,7 +359,7 @@ def test_videos_hold_every_frame_in_its_colours(tmp_path, suffix, size):
     even = size if suffix == ".gif" else tuple(s + s % 2 for s in size)
     for shown, rgba in zip(got, frames, strict=True):
         assert shown.shape[:2] == even
-        error = np.abs(shown[: size[0], : size[1]] / 255 - stills.srgb(rgba[..., :3]))
+        error = np.abs(shown[: size[0], : size[1]] / 255 - srgb(rgba[..., :3]))
         assert error.mean() < (0.05 if suffix == ".gif" else 0.02)
     if suffix != ".gif":
         assert any("wgmb" in v for v in metadata.values())

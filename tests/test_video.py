@@ -11,7 +11,7 @@ from PIL import Image
 
 import make_frames as make
 from wgmb import InputError
-from wgmb.io import stills
+from wgmb.color import to_display
 from wgmb.io.output import Output
 from wgmb.io.video import Video
 
@@ -84,7 +84,7 @@ def test_a_gif_has_colours_of_its_own_in_every_frame_and_dithers(tmp_path):
     with Image.open(tmp_path / "v.gif") as image:
         for n, rgb in enumerate(frames):
             image.seek(n)
-            shown, want = image.convert("RGB"), Image.fromarray(stills.to_display(rgb, 8))
+            shown, want = image.convert("RGB"), Image.fromarray(to_display(rgb, 8))
             assert len(shown.getcolors(1 << 16)) > 200
             flat = want.quantize(256, dither=Image.Dither.NONE).convert("RGB")
             assert apart(shown, want) < 0.7 * apart(flat, want)

@@ -11,9 +11,10 @@ import pytest
 
 from wgmb import Blur, Clip, DeviceError, InputError, Render, color, gpu, observer
 from wgmb.cli import app
+from wgmb.color import srgb
 from wgmb.cone import Cone
 from wgmb.gpu.timing import TimestampClock
-from wgmb.io import exr, stills
+from wgmb.io import exr
 from wgmb.methods import METHODS
 from wgmb.scene import builtin
 from wgmb.viewer import State, actions, controls, offscreen, renderer
@@ -154,7 +155,7 @@ def test_the_picture_is_what_render_writes(bare, method):
     got = bare.picture()
     render, moment = library(state, BARE)
     assert got.shape == (180, 320, 3)
-    assert np.abs(got - stills.srgb(render(*moment)[..., :3])).max() < 2e-3
+    assert np.abs(got - srgb(render(*moment)[..., :3])).max() < 2e-3
 
 
 def test_the_window_shows_the_picture_in_its_place(hand):
@@ -185,7 +186,7 @@ def test_every_scene_is_what_render_draws(small, name):
     state = small.viewer.state = replace(opened, method=method, frame=3.0)
     got = small.picture()
     render, moment = library(state)
-    want = stills.srgb(render(*moment)[..., :3])
+    want = srgb(render(*moment)[..., :3])
     assert got.std() > 0.01
     assert np.abs(got - want).max() < 2e-3
 
@@ -195,7 +196,7 @@ def test_exposure_and_tone(small, tone):
     state = small.viewer.state = replace(ALONE, exposure=1.5, tone=tone, look="sharp")
     want = library(state)[0].frame(0.0).color[..., :3] * 2**1.5
     want = want / (1 + want) if tone == "soft" else want
-    assert np.abs(small.picture() - stills.srgb(want)).max() < 2e-3
+    assert np.abs(small.picture() - srgb(want)).max() < 2e-3
 
 
 def test_velocity_has_the_colours_of_display(bare):
@@ -203,7 +204,7 @@ def test_velocity_has_the_colours_of_display(bare):
     shown = bare.picture()
     render, _ = library(state, BARE)
     motion = render.blur.motion(render.frame(0.0))[..., 2:]
-    want = stills.srgb(color.motion_colors(motion, PLAIN.fastest * 180))
+    want = srgb(color.motion_colors(motion, PLAIN.fastest * 180))
     apart = np.abs(shown - want).max(axis=2)
     wheel = slice(110, None), slice(240, None)
     assert apart[wheel].max() > 0.5  # the legend
@@ -239,12 +240,12 @@ def test_all_that_a_method_draws_is_what_render_draws(small, method):
         state = small.viewer.state = replace(ALONE, method=method, look=look)
         render, moment = library(state)
         if look == "sharp":
-            want = stills.srgb(render.frame(*moment).color[..., :3])
+            want = srgb(render.frame(*moment).color[..., :3])
         elif look == "perceived":
             numbers = range(1 - state.eye.held(state.fps), 1)
             want = seen([render(n / state.fps, n) for n in numbers], state.fps)
         else:
-            want = stills.srgb(render(*moment)[..., :3])
+            want = srgb(render(*moment)[..., :3])
         assert np.abs(small.picture() - want).max() < 4e-3, look
 
 
@@ -253,7 +254,7 @@ def seen(frames, fps, after=0.0):
     eye = observer.Observer(fps)
     for picture in frames:
         eye.look(picture)
-    return stills.srgb(np.clip(eye.sees(after)[..., :3], 0, 1))
+    return srgb(np.clip(eye.sees(after)[..., :3], 0, 1))
 
 
 def rendered(numbers, fps=24.0, rays=1, speed=1.0, **blur):
@@ -403,7 +404,7 @@ def test_the_torusphere_asks_for_its_method_and_shutter_and_is_turned(hand):
     assert (hand.state.method, hand.state.curve) == ("volume", "cosine")
     before = hand.picture()
     want = Render(builtin.make("torusphere"), Blur(**blur_of(hand.state)), size=BESIDE)(0.0)
-    assert np.abs(before - stills.srgb(want[..., :3])).max() < 2e-3
+    assert np.abs(before - srgb(want[..., :3])).max() < 2e-3
     hand.drag((80, 500), (144, 500))
     assert dict(hand.state.settings)["cam_x"] == pytest.approx(-1.0)
     assert np.abs(hand.picture() - before).mean() > 0.005
@@ -665,7 +666,7 @@ def test_the_reference_converges_and_is_measured(small, monkeypatch):
     truth = Render(
         render.scene, Blur("distributed", samples=found.samples), size=SMALL, rays=1
     )(at, 7)  # fmt: skip
-    apart = stills.srgb(render(at, 7)[..., :3]) - stills.srgb(truth[..., :3])
+    apart = srgb(render(at, 7)[..., :3]) - srgb(truth[..., :3])
     assert found.psnr == pytest.approx(-10 * np.log10(np.mean(apart.astype("f8") ** 2)), abs=0.01)
     if found.flip:
         assert 0 < found.flip.result(60) < 1
@@ -1034,7 +1035,7 @@ def test_frames_on_disk_are_perceived_too(reel):
     state = reel.state
     reel.viewer.state = replace(state, look="perceived", frame=11.0)
     reel.picture()
-    got = stills.srgb(np.clip(reel.viewer.stage.download()[..., :3], 0, 1))
+    got = srgb(np.clip(reel.viewer.stage.download()[..., :3], 0, 1))
     blur = Blur("tap", samples=4)
     assert np.abs(got - seen([blur(frame)[..., :3] for frame in Clip(SAMPLE)], 24.0)).max() < 4e-3
     reel.viewer.state = state
@@ -1075,7 +1076,7 @@ def test_a_picture_without_passes_is_shown_as_it_is(tmp_path, hand):
     hand.look()
     assert hand.state.look == "sharp"
     assert hand.viewer.stage.choices.looks(hand.state) == ["sharp"]
-    assert np.abs(stills.srgb(hand.viewer.stage.download()[..., :3]) - image / 255).max() < 0.01
+    assert np.abs(srgb(hand.viewer.stage.download()[..., :3]) - image / 255).max() < 0.01
 
 
 def test_a_method_that_needs_a_scene_gives_way_to_one_that_does_not(reel):

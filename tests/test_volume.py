@@ -11,8 +11,8 @@ import make_frames as make
 import wgmb
 from twins import volume as twin
 from wgmb import InputError, Scene, Shutter, gpu
+from wgmb.color import srgb
 from wgmb.gpu import wgsl
-from wgmb.io import stills
 from wgmb.methods import volume as method_file
 from wgmb.scene import builtin
 from wgmb.scene.density import overrides, tables
@@ -111,7 +111,7 @@ def densities(device):
         create = device.create_buffer_with_data
         usage = wgpu.BufferUsage
         buffer = create(data=at, usage=usage.STORAGE | usage.COPY_SRC)
-        given = wgmb.Blur("volume", device=device, shutter=shutter).given((len(p), 1))
+        given = wgmb.Blur("volume", device=device, shutter=shutter).frame_bindings((len(p), 1))
         encoder = device.create_command_encoder()
         kernel.run(
             encoder,
@@ -212,7 +212,7 @@ def test_the_torusphere_is_its_twin(time, cam_y, density):
     size = (96, 54)
     got = wgmb.Render(scene, wgmb.Blur("volume", shutter=shutter), fps=FPS, size=size)(time)
     want = twin.picture(scene, time, shutter, FPS, size)
-    apart = np.abs(stills.srgb(got[..., :3]) - want).max(axis=-1)
+    apart = np.abs(srgb(got[..., :3]) - want).max(axis=-1)
     assert (apart > 0.01).mean() < 0.005
     assert apart.mean() < 5e-4
 
@@ -279,7 +279,7 @@ def test_several_volumes_are_their_twin(curve):
     shutter = Shutter(360, curve=curve)
     got = wgmb.Render(several(), wgmb.Blur("volume", shutter=shutter), fps=24, size=(96, 54))(0.3)
     want = twin.picture(several(), 0.3, shutter, 24, (96, 54))
-    apart = np.abs(stills.srgb(got[..., :3]) - want).max(axis=-1)
+    apart = np.abs(srgb(got[..., :3]) - want).max(axis=-1)
     assert (apart > 0.01).mean() < 0.005
 
 

@@ -1,8 +1,47 @@
-"""Motion as a picture: direction as hue, speed as brightness, with a legend."""
+"""Colours: linear light and what a screen shows of it (sRGB), and motion as hue and brightness."""
 
 from __future__ import annotations
 
 import numpy as np
+
+
+def linear(display: np.ndarray) -> np.ndarray:
+    """sRGB display values 0..1 -> linear light (IEC 61966-2-1)."""
+    high = ((np.maximum(display, 0.04045) + 0.055) / 1.055) ** 2.4
+    return np.where(display <= 0.04045, display / 12.92, high).astype(np.float32)
+
+
+def srgb(light: np.ndarray) -> np.ndarray:
+    """Linear light -> sRGB display values, held to 0..1."""
+    light = np.clip(light, 0, 1)
+    high = 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(light <= 0.0031308, 12.92 * light, high).astype(np.float32)
+
+
+def to_display(rgba: np.ndarray, bits: int) -> np.ndarray:
+    """Linear premultiplied (height, width, 3 or 4) -> sRGB integers of 8 or 16 bits."""
+    rgb, alpha = rgba[..., :3], rgba[..., 3:]
+    if alpha.shape[2]:
+        rgb = np.divide(rgb, alpha, out=np.zeros_like(rgb), where=alpha > 0)
+    if bits == 8:
+        shown = _eight_bits()[rgb.astype(np.float16).view(np.uint16)]
+        covered = np.rint(np.clip(alpha, 0, 1) * 255).astype(np.uint8)
+    else:
+        shown = np.rint(srgb(rgb) * 65535).astype(np.uint16)
+        covered = np.rint(np.clip(alpha, 0, 1) * 65535).astype(np.uint16)
+    return np.concatenate([shown, covered], axis=2) if alpha.shape[2] else shown
+
+
+def _eight_bits() -> np.ndarray:
+    """sRGB of every f16 by its bits: a table instead of a power per pixel."""
+    if not _TABLE:
+        with np.errstate(all="ignore"):
+            halves = np.nan_to_num(np.arange(65536, dtype=np.uint16).view(np.float16).astype("f4"))
+        _TABLE.append(np.rint(srgb(halves) * 255).astype(np.uint8))
+    return _TABLE[0]
+
+
+_TABLE: list[np.ndarray] = []
 
 
 def motion_colors(motion: np.ndarray, fastest: float) -> np.ndarray:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .color import srgb
 from .errors import InputError
 
 TILE = 16  # [px] where `energy_error` adds light up
@@ -23,9 +24,7 @@ _LUMA = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709
 
 def display(picture: np.ndarray) -> np.ndarray:
     """(height, width, 3) float32, 0..1: sRGB encoded (IEC 61966-2-1), what is not finite is 0."""
-    light = np.clip(_linear(picture), 0, 1)
-    curved = 1.055 * light ** (1 / 2.4) - 0.055
-    return np.where(light <= 0.0031308, 12.92 * light, curved).astype(np.float32)
+    return srgb(_linear(picture))
 
 
 def psnr(picture: np.ndarray, truth: np.ndarray) -> float:

@@ -22,6 +22,7 @@ from PIL import Image
 import make_frames as make
 from wgmb import CameraFile, Clip, InputError, Passes, viewer
 from wgmb.cli import app
+from wgmb.color import to_display
 from wgmb.io import exr, stills
 from wgmb.viewer import State
 
@@ -160,7 +161,7 @@ def _still(bits: int, channels: int = 4) -> Callable[[Path], object]:
 
 def _pillow(mode: str, **options) -> Callable[[Path], object]:
     def write(path: Path) -> None:
-        shown = stills.to_display(make.picture(1)[..., :3], 8)
+        shown = to_display(make.picture(1)[..., :3], 8)
         Image.fromarray(shown).convert(mode).save(path, **options)
 
     return write

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..color import srgb
 from ..errors import InputError
 from ..frame import Frame
 from . import layers, limits, stills, vectors
@@ -353,7 +354,7 @@ class Clip:
             plane = layers.grey(channels).astype(np.float32)
         else:
             light = stills.read(file, max_mb=self._max_mb)
-            plane = stills.srgb(light[..., 0])  # grey values as painted
+            plane = srgb(light[..., 0])  # grey values as painted
         if plane.shape[::-1] != source.size:
             raise InputError(
                 f"{file} must be {size_text(source.size)} like the picture, is {size_text(plane)}"

@@ -17,9 +17,9 @@ from av.filter import Graph
 from av.video.reformatter import Colorspace
 from av.video.stream import VideoStream
 
+from ..color import to_display
 from ..errors import InputError
 from . import atomic
-from .stills import to_display
 
 SUFFIXES = (".mp4", ".mov", ".mkv", ".webm", ".gif")
 _CODECS = {  # suffix: container, codec, pixel format, options

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 
 import numpy as np
 
+from .results import Plot
+
 COLORS = ("#1f6fb4", "#d1495b", "#3a8f5c", "#8a5aa8", "#c77f1a", "#555555")
 WIDTH, HEIGHT = 640, 260  # of a chart with its margins [px]
-_LEFT, _RIGHT, _TOP, _BOTTOM = 64, 120, 38, 44
+_MARGINS = 64, 120, 38, 44  # left, right, top, bottom [px]
+_PLOT_WIDTH, _PLOT_HEIGHT, _PLOT_MARGINS = 380, 240, (46, 12, 10, 34)
 
 
 @dataclass(frozen=True)
@@ -43,49 +47,136 @@ def svg(*charts: Chart) -> str:
 def _chart(chart: Chart, colors: Mapping[str, str]) -> str:
     every_x = np.concatenate([x for x, _ in chart.lines.values()])
     every_y = np.concatenate([y for _, y in chart.lines.values()])
-    low_x, high_x = float(every_x.min()), float(every_x.max())
-    high_y = float(every_y.max()) * 1.08 or 1.0
-    right, bottom = WIDTH - _RIGHT, HEIGHT - _BOTTOM
-
-    def across(x):
-        return _LEFT + (x - low_x) / ((high_x - low_x) or 1) * (right - _LEFT)
-
-    def above(y):
-        return bottom - y / high_y * (bottom - _TOP)
-
-    drawn = [_text(_LEFT, 14, chart.title, weight="bold")]
-    for x in _ticks(low_x, high_x):
-        drawn.append(_line(across(x), bottom, across(x), _TOP, "#e4e4e4"))
-        drawn.append(_text(across(x), bottom + 16, f"{x:g}", "middle"))
-    for y in _ticks(0, high_y):
-        drawn.append(_line(_LEFT, above(y), right, above(y), "#e4e4e4"))
-        drawn.append(_text(_LEFT - 6, above(y) + 4, f"{y:g}", "end"))
-    drawn.append(_line(_LEFT, bottom, right, bottom, "#333"))
-    drawn.append(_text((_LEFT + right) / 2, HEIGHT - 10, chart.x, "middle"))
-    drawn.append(_text(4, _TOP - 4, chart.y))
+    low, high = float(every_x.min()), float(every_x.max())
+    top = float(every_y.max()) * 1.08 or 1.0
+    axes = _Axes(WIDTH, HEIGHT, _MARGINS, (low, high), (0.0, top))
+    x_ticks = [t for t in ticks(low, high) if low <= t <= high]
+    y_ticks = [t for t in ticks(0.0, top) if t <= top]
+    left, right, bottom = axes.left, axes.right, axes.bottom
+    drawn = [
+        _text(left, 14, chart.title, weight="bold"),
+        axes.grid(x_ticks, y_ticks, 'stroke="#e4e4e4"'),
+        _line(left, bottom, right, bottom, "#333"),
+        _text((left + right) / 2, HEIGHT - 10, chart.x, "middle"),
+        _text(4, axes.top - 4, chart.y),
+    ]
     strong = [label for label in chart.lines if label not in chart.faint]
     for label, (x, y) in chart.lines.items():
         shown = label in strong
         color = colors[label] if shown else "#bbbbbb"
-        way = " ".join(f"{across(a):.2f},{above(b):.2f}" for a, b in zip(x, y, strict=True))
+        points = " ".join(f"{axes.x(a):.2f},{axes.y(b):.2f}" for a, b in zip(x, y, strict=True))
         wide = 2 if shown else 1
         drawn.append(
-            f'<polyline points="{way}" fill="none" stroke="{color}" stroke-width="{wide}"/>'
+            f'<polyline points="{points}" fill="none" stroke="{color}" stroke-width="{wide}"/>'
         )
         if shown:
-            row = _TOP + 14 + 18 * strong.index(label)
+            row = axes.top + 14 + 18 * strong.index(label)
             drawn.append(_line(right + 10, row - 4, right + 26, row - 4, color, 2))
             drawn.append(_text(right + 31, row, label))
     return "".join(drawn)
 
 
-def _ticks(low: float, high: float) -> np.ndarray:
-    """Round numbers between the two, four to ten of them."""
-    rough = (high - low) / 5 or 1
-    scale = 10 ** np.floor(np.log10(rough))
-    step = scale * min((s for s in (1, 2, 5, 10) if s * scale >= rough * 0.8), default=10)
-    ticks = step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
-    return np.round(ticks, 10) + 0.0
+def plot_svg(plot: Plot, colors: Mapping[str, str]) -> str:
+    """A report's curves, in the colours by name, styled by the page they stand on."""
+    points = [p for curve in plot.curves.values() for p in curve if all(map(math.isfinite, p))]
+    if not points:
+        return ""
+    xs, ys = ([p[i] for p in points] for i in (0, 1))
+    x_ticks = log_ticks(min(xs), max(xs)) if plot.log else ticks(min(xs), max(xs))
+    floor = [plot.floor] if plot.floor is not None and math.isfinite(plot.floor) else []
+    y_ticks = ticks(min(ys + floor), max(ys + floor))
+    x_range = min(*x_ticks, *xs), max(*x_ticks, *xs)
+    y_range = y_ticks[0], y_ticks[-1]
+    axes = _Axes(_PLOT_WIDTH, _PLOT_HEIGHT, _PLOT_MARGINS, x_range, y_range, plot.log)
+    left, right = axes.left, axes.right
+
+    def place(x: float, y: float) -> tuple[float, float]:
+        return round(axes.x(x), 1), round(axes.y(y), 1)
+
+    parts = [
+        axes.grid(x_ticks, y_ticks, 'class="grid"'),
+        f'<text x="{right}" y="{_PLOT_HEIGHT - 4}" text-anchor="end">{escape(plot.x)}</text>'
+        f'<text x="{left}" y="{_PLOT_HEIGHT - 4}">{escape(plot.y)}</text>',
+    ]
+    for level in floor:
+        y = round(axes.y(level), 1)
+        parts.append(
+            f'<line class="floor" x1="{left}" x2="{right}" y1="{y}" y2="{y}">'
+            f"<title>noise floor of the truth: {level:.4g}</title></line>"
+            f'<text x="{left + 4}" y="{y + (-4 if y > axes.top + 16 else 13)}">noise floor</text>'
+        )
+    for name, curve in plot.curves.items():
+        at = [(*place(a, b), a, b) for a, b in sorted(curve) if math.isfinite(b)]
+        line = "M" + "L".join(f"{a},{b}" for a, b, *_ in at)
+        parts.append(f'<path d="{line}" style="stroke:{colors[name]}"/>')
+        parts += [
+            f'<circle cx="{a}" cy="{b}" r="3.5" style="fill:{colors[name]}">'
+            f"<title>{escape(name)}: {p:.4g} {escape(plot.x)}, {q:.4g}</title></circle>"
+            for a, b, p, q in at
+        ]
+    return (
+        f'<svg viewBox="0 0 {_PLOT_WIDTH} {_PLOT_HEIGHT}" role="img" '
+        f'aria-label="{escape(plot.title)}">{"".join(parts)}</svg>'
+    )
+
+
+class _Axes:
+    """Values to pixels: `margins` are left, right, top, bottom [px]; `log`: x is logarithmic."""
+
+    def __init__(self, width, height, margins, x_range, y_range, log: bool = False):
+        left, right, top, bottom = margins
+        self.left, self.right, self.top, self.bottom = left, width - right, top, height - bottom
+        self._x, self._y, self._along = x_range, y_range, math.log if log else float
+
+    def x(self, value: float) -> float:
+        """Pixels from the left."""
+        low, high = map(self._along, self._x)
+        share = (self._along(value) - low) / ((high - low) or 1)
+        return self.left + share * (self.right - self.left)
+
+    def y(self, value: float) -> float:
+        """Pixels from the top."""
+        low, high = self._y
+        return self.bottom - (value - low) / ((high - low) or 1) * (self.bottom - self.top)
+
+    def grid(self, x_ticks, y_ticks, look: str) -> str:
+        """A line and its number at every tick; `look`: attributes of the lines."""
+        across = "".join(
+            f'<line {look} x1="{self.left}" x2="{self.right}" y1="{self.y(t):.1f}" '
+            f'y2="{self.y(t):.1f}"/><text x="{self.left - 6}" y="{self.y(t) + 4:.1f}" '
+            f'text-anchor="end">{t:g}</text>'
+            for t in y_ticks
+        )
+        down = "".join(
+            f'<line {look} x1="{self.x(t):.1f}" x2="{self.x(t):.1f}" y1="{self.top}" '
+            f'y2="{self.bottom}"/><text x="{self.x(t):.1f}" y="{self.bottom + 15}" '
+            f'text-anchor="middle">{t:g}</text>'
+            for t in x_ticks
+        )
+        return across + down
+
+
+def ticks(low: float, high: float) -> list[float]:
+    """About five round numbers that hold the range."""
+    span = (high - low) or abs(high) or 1.0
+    rough = span / 4
+    power = 10 ** math.floor(math.log10(rough))
+    step = next(k * power for k in (1, 2, 2.5, 5, 10) if k * power >= rough * 0.999)
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return [round(k * step, 12) for k in range(first, max(last, first + 1) + 1)]
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Powers of two for small numbers of samples, else 1, 2 and 5 times powers of ten."""
+    low, high = max(low, 1e-9), max(high, low * 1.01)
+    if float(low).is_integer() and float(high).is_integer() and high <= 4096:
+        twos = [2.0**k for k in range(13) if low <= 2**k <= high]
+        if len(twos) >= 2:
+            return twos
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    every = [k * 10.0**d for d in decades for k in (1, 2, 5)]
+    inside = [t for t in every if low <= t <= high]
+    return inside if 2 <= len(inside) <= 8 else [t for t in inside if f"{t:e}"[0] == "1"] or [low]
 
 
 def _line(x1, y1, x2, y2, color: str, wide: int = 1) -> str:

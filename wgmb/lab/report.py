@@ -17,11 +17,11 @@ from PIL import Image
 from ..io.atomic import write_file
 from ..metrics import FLIP_GAIN, MEASURES, display, flip_colors
 from .cases import Case
+from .charts import plot_svg
 from .results import Entry, Plot, Report, Table
 
 _COLORS = 10  # in report.html
 _TEMPLATE = Path(__file__).with_name("report.html")
-_WIDTH, _HEIGHT, _LEFT, _RIGHT, _TOP, _BOTTOM = 380, 240, 46, 12, 10, 34  # of a plot
 
 
 def write(report: Report, path: Path) -> list[Path]:
@@ -341,87 +341,5 @@ def _plot(plot: Plot, colors: dict[str, str]) -> str:
     )
     return (
         f'<figure class="plot"><figcaption><b>{escape(plot.title)}</b></figcaption>'
-        f"{svg(plot, named)}<figcaption>{legend}</figcaption></figure>"
+        f"{plot_svg(plot, named)}<figcaption>{legend}</figcaption></figure>"
     )
-
-
-def svg(plot: Plot, colors: dict[str, str]) -> str:
-    """The curves as SVG, in the colours by name."""
-    points = [p for curve in plot.curves.values() for p in curve if all(map(math.isfinite, p))]
-    if not points:
-        return ""
-    xs, ys = ([p[i] for p in points] for i in (0, 1))
-    x_ticks = _log_ticks(min(xs), max(xs)) if plot.log else _ticks(min(xs), max(xs))
-    floor = [plot.floor] if plot.floor is not None and math.isfinite(plot.floor) else []
-    y_ticks = _ticks(min(ys + floor), max(ys + floor))
-    along = math.log if plot.log else float
-    low_x = along(min(*x_ticks, *xs))
-    high_x = along(max(*x_ticks, *xs))
-    low_y, high_y = y_ticks[0], y_ticks[-1]
-
-    def x(value: float) -> float:
-        share = (along(value) - low_x) / ((high_x - low_x) or 1)
-        return round(_LEFT + share * (_WIDTH - _LEFT - _RIGHT), 1)
-
-    def y(value: float) -> float:
-        share = (value - low_y) / ((high_y - low_y) or 1)
-        return round(_HEIGHT - _BOTTOM - share * (_HEIGHT - _TOP - _BOTTOM), 1)
-
-    bottom = _HEIGHT - _BOTTOM
-    parts = [
-        f'<line class="grid" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{y(t)}" y2="{y(t)}"/>'
-        f'<text x="{_LEFT - 6}" y="{y(t) + 4}" text-anchor="end">{t:g}</text>'
-        for t in y_ticks
-    ]
-    parts += [
-        f'<line class="grid" x1="{x(t)}" x2="{x(t)}" y1="{_TOP}" y2="{bottom}"/>'
-        f'<text x="{x(t)}" y="{bottom + 15}" text-anchor="middle">{t:g}</text>'
-        for t in x_ticks
-    ]
-    parts.append(
-        f'<text x="{_WIDTH - _RIGHT}" y="{_HEIGHT - 4}" text-anchor="end">{escape(plot.x)}</text>'
-        f'<text x="{_LEFT}" y="{_HEIGHT - 4}">{escape(plot.y)}</text>'
-    )
-    for level in floor:
-        above = y(level) > _TOP + 16
-        parts.append(
-            f'<line class="floor" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{y(level)}" '
-            f'y2="{y(level)}"><title>noise floor of the truth: {level:.4g}</title></line>'
-            f'<text x="{_LEFT + 4}" y="{y(level) + (-4 if above else 13)}">noise floor</text>'
-        )
-    for name, curve in plot.curves.items():
-        at = [(x(a), y(b), a, b) for a, b in sorted(curve) if math.isfinite(b)]
-        line = "M" + "L".join(f"{a},{b}" for a, b, *_ in at)
-        parts.append(f'<path d="{line}" style="stroke:{colors[name]}"/>')
-        parts += [
-            f'<circle cx="{a}" cy="{b}" r="3.5" style="fill:{colors[name]}">'
-            f"<title>{escape(name)}: {p:.4g} {escape(plot.x)}, {q:.4g}</title></circle>"
-            for a, b, p, q in at
-        ]
-    return (
-        f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{escape(plot.title)}">'
-        f"{''.join(parts)}</svg>"
-    )
-
-
-def _ticks(low: float, high: float) -> list[float]:
-    """About five round numbers that hold the range."""
-    span = (high - low) or abs(high) or 1.0
-    rough = span / 4
-    power = 10 ** math.floor(math.log10(rough))
-    step = next(k * power for k in (1, 2, 2.5, 5, 10) if k * power >= rough * 0.999)
-    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-    return [round(k * step, 12) for k in range(first, max(last, first + 1) + 1)]
-
-
-def _log_ticks(low: float, high: float) -> list[float]:
-    """Powers of two for small numbers of samples, else 1, 2 and 5 times powers of ten."""
-    low, high = max(low, 1e-9), max(high, low * 1.01)
-    if float(low).is_integer() and float(high).is_integer() and high <= 4096:
-        twos = [2.0**k for k in range(13) if low <= 2**k <= high]
-        if len(twos) >= 2:
-            return twos
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    every = [k * 10.0**d for d in decades for k in (1, 2, 5)]
-    inside = [t for t in every if low <= t <= high]
-    return inside if 2 <= len(inside) <= 8 else [t for t in inside if f"{t:e}"[0] == "1"] or [low]

@@ -12,6 +12,7 @@ import glfw
 import numpy as np
 from imgui_bundle import imgui
 
+from ..color import linear
 from ..errors import Error, InputError
 from ..io import exr, stills
 from ..io.atomic import temporary_name, write_file
@@ -67,7 +68,7 @@ class Actions:
 
     def _shown(self) -> np.ndarray:
         """The picture as it is on the screen, but in linear light, as files are written."""
-        return stills.linear(np.clip(self._screen.picture(), 0, 1))
+        return linear(np.clip(self._screen.picture(), 0, 1))
 
     def _screenshot(self, state: State) -> None:
         path, settings = _free(".png", ".exr"), state.toml()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..io import stills
+from ..color import srgb
 
 
 @dataclass
@@ -45,7 +45,7 @@ class Judge:
         least = min(2 * have.samples, total) if have else self.ENOUGH
         if done < least or (have and have.samples == done):
             return
-        got, want = (stills.srgb(picture[..., :3]) for picture in pictures())
+        got, want = (srgb(picture[..., :3]) for picture in pictures())
         error = float(np.mean((got.astype("f8") - want) ** 2))
         psnr = -10 * np.log10(max(error, 1e-10))
         known = importlib.util.find_spec("flip_evaluator") is not None
