@@ -132,8 +132,8 @@ def seeing(device):
     viewer, picture = Observer(24.0, device=device), np.ones((*SIZE[::-1], 3), "f4")
 
     def step():
-        viewer.look(picture)
-        viewer.sees()
+        viewer.present(picture)
+        viewer.perceived()
 
     return step
 

@@ -28,26 +28,26 @@ def pictures(count, channels=4, size=(20, 33)):
 @pytest.mark.parametrize("rate, count", [(24, 1), (24, 5), (60, 3), (60, 40), (250, 150)])
 @pytest.mark.parametrize("cone", [Cone(), Cone(120, 0.02), Cone(30, 0.1)])
 def test_a_viewer_is_its_twin(device, cone, rate, count):
-    viewer, shown = Observer(rate, cone, device=device), pictures(count)
+    observer, shown = Observer(rate, cone, device=device), pictures(count)
     for picture in shown:
-        viewer.look(picture)
+        observer.present(picture)
     for after in (0.0, 0.4 / rate):
         want = twin.perceived(shown, rate, after, cone.rate, cone.peak)
-        np.testing.assert_allclose(viewer.sees(after), want, atol=1e-3)  # pictures are kept as f16
+        np.testing.assert_allclose(observer.perceived(after), want, atol=1e-3)  # stored as f16
 
 
 def test_what_does_not_change_is_seen_as_it_is(device):
-    viewer, picture = Observer(60, device=device), pictures(1, 3)[0]
+    observer, picture = Observer(60, device=device), pictures(1, 3)[0]
     for _ in range(30):
-        viewer.look(picture)
-    np.testing.assert_allclose(viewer.sees()[..., :3], picture, atol=1e-3)
+        observer.present(picture)
+    np.testing.assert_allclose(observer.perceived()[..., :3], picture, atol=1e-3)
 
 
 def test_a_bad_pixel_leaves_its_neighbours_alone(device):
-    viewer, picture = Observer(60, device=device), pictures(1)[0]
+    observer, picture = Observer(60, device=device), pictures(1)[0]
     picture[3, 4] = np.nan
-    viewer.look(picture)
-    seen = viewer.sees()
+    observer.present(picture)
+    seen = observer.perceived()
     assert not seen[3, 4].any()
     picture[3, 4] = 0
     np.testing.assert_allclose(seen, picture, atol=1e-3)
@@ -95,8 +95,8 @@ def test_overlapping_windows_win_once_the_disk_moves_its_own_width_a_frame():
         (lambda: Cone(peak=-1), "peak"),
         (lambda: Observer(0), "rate"),
         (lambda: Observer(1e6), "too many"),
-        (lambda: Observer(60).sees(), "shown"),
-        (lambda: Observer(60).look(np.zeros((4, 4))), "picture"),
+        (lambda: Observer(60).perceived(), "shown"),
+        (lambda: Observer(60).present(np.zeros((4, 4))), "picture"),
         (lambda: difference(Shutter(0), -1, 60), "speed"),
         (lambda: difference(Shutter(0), 1, np.nan), "fps"),
     ],
@@ -107,10 +107,10 @@ def test_senseless_values_are_named(make_it, word):
 
 
 def test_pictures_of_two_sizes_are_refused(device):
-    viewer = Observer(60, device=device)
-    viewer.look(np.zeros((4, 4, 3), "f4"))
+    observer = Observer(60, device=device)
+    observer.present(np.zeros((4, 4, 3), "f4"))
     with pytest.raises(InputError, match="5 x 4"):
-        viewer.look(np.zeros((4, 5, 3), "f4"))
+        observer.present(np.zeros((4, 5, 3), "f4"))
 
 
 def test_a_sequence_is_perceived_frame_by_frame(tmp_path, capsys):

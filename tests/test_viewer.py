@@ -253,8 +253,8 @@ def seen(frames, fps, after=0.0):
     """What wgmb/observer.py makes of the frames, the first of which was always there."""
     eye = observer.Observer(fps)
     for picture in frames:
-        eye.look(picture)
-    return srgb(np.clip(eye.sees(after)[..., :3], 0, 1))
+        eye.present(picture)
+    return srgb(np.clip(eye.perceived(after)[..., :3], 0, 1))
 
 
 def rendered(numbers, fps=24.0, rays=1, speed=1.0, **blur):

@@ -1,7 +1,7 @@
-"""Blur a whole sequence: reading, the GPU and writing at the same time.
+"""Whole sequences: rendered frames through a Blur into files, and scenes into files.
 
-Three threads pass frames on. At most IN_FLIGHT of them are in memory, however long the
-sequence. A frame that fails is reported and passed over.
+Three threads read, blur and write at the same time and pass frames on. At most IN_FLIGHT of
+them are in memory, however long the sequence. A frame that fails is reported and passed over.
 """
 
 from __future__ import annotations
@@ -10,15 +10,18 @@ import queue
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from .errors import Error, GpuMemoryError, InputError
 from .frame import Frame
+from .io import exr
 from .io.clip import Clip
 from .io.frame_file import FrameFile
 from .io.output import Output
 from .pipeline import Blur
+from .render import Render
 
 
 @dataclass
@@ -95,125 +98,204 @@ def blur_sequence(
     full disk, a folder that is gone), or a video cannot go on, the run stops and `stopped`
     says why. Interrupted, nothing half written is left and the interruption goes on.
     """
-    report, stop, tell = BatchReport(), threading.Event(), progress or (lambda number, what: None)
-    hopeless = threading.Event()
-    to_blur, to_write = _Handover(stop), _Handover(stop)
-    neighbours = "neighbours" in blur.method.uses
-    prepare = clip.with_neighbours if neighbours else clip.frame
-    normal = "normal" in blur.method.uses
-    places = _Handover(stop)
-    for _ in range(IN_FLIGHT):
-        places.put(None)
-    crash: list[BaseException] = []
+    return _Pipeline(clip, blur, output, resume, confidence, progress).run()
 
-    def fail(number: int, error: BaseException) -> None:
-        places.put(None)
-        report.failed[number] = " ".join(str(error).split()) or type(error).__name__
-        tell(number, "failed")
 
-    def read() -> None:
-        for number in clip.numbers:
-            if hopeless.is_set():
-                break
-            places.get()
+class _Pipeline:
+    """Three stages, each in a thread of its own: read, blur (the caller's thread), write."""
+
+    def __init__(
+        self,
+        clip: Clip,
+        blur: Blur,
+        output: Output,
+        resume: bool,
+        confidence: bool,
+        progress: Progress | None,
+    ):
+        self.clip, self.blur, self.output = clip, blur, output
+        self.resume, self.confidence = resume, confidence
+        self.progress = progress or (lambda number, state: None)
+        self.report = BatchReport()
+        self.stop, self.hopeless = threading.Event(), threading.Event()
+        self.to_blur, self.to_write = _Handover(self.stop), _Handover(self.stop)
+        self.places = _Handover(self.stop)
+        for _ in range(IN_FLIGHT):
+            self.places.put(None)
+        self.crash: list[BaseException] = []
+
+    def run(self) -> BatchReport:
+        """Do all frames; an interruption or a fault of a thread is raised here."""
+        threads = [
+            threading.Thread(target=self._guarded, args=(stage,), name=stage.__name__, daemon=True)
+            for stage in (self.read, self.write)
+        ]
+        for thread in threads:
+            thread.start()
+        report = self.report
+        try:
+            while (job := self.to_blur.get()) is not None:
+                self.blur_one(job)
+                del job
+            self.to_write.put(None)
+            for thread in threads:
+                while thread.is_alive():  # a join without limit would hold back Ctrl-C
+                    thread.join(0.1)
+        except _StopError:
+            pass
+        finally:
+            broken = any(thread.is_alive() for thread in threads) or self.crash or not report.done
+            broken = broken or (self.output.is_video and report.stopped)
+            self.stop.set()
+            for thread in threads:
+                thread.join(0.5)
+            if broken:
+                self.output.abandon()
+        if self.crash:
+            raise self.crash[0]
+        if not broken:
             try:
-                made_of = clip.made_of(number, neighbours)
-                if resume and output.done(number, made_of):
-                    places.put(None)
-                    report.skipped.append(number)
-                    tell(number, "skipped")
-                    continue
-                source = clip.source(number)
-                frame = prepare(source, normal=normal)
-                if unread := sorted({number - 1, number + 1} & clip.unread):
-                    made_of["unread"] = unread  # so that --resume asks for them again
-                to_blur.put(_Job(source, frame, made_of))
-                del source, frame
-            except (Error, OSError, MemoryError) as error:
-                fail(number, error)
-            finally:
-                clip.forget(number - 1 if neighbours else number)
-        to_blur.put(None)
+                self.output.close()
+            except OSError as error:
+                report.stopped = str(error)
+        if self.output.is_video and report.stopped:  # it is not there at all
+            report.done.clear()
+        return report
 
-    def write() -> None:
+    def read(self) -> None:
+        """The first stage: files to frames."""
+        neighbours = "neighbours" in self.blur.method.uses
+        for number in self.clip.numbers:
+            if self.hopeless.is_set():
+                break
+            self.places.get()
+            try:
+                self._read_one(number, neighbours)
+            except (Error, OSError, MemoryError) as error:
+                self._fail(number, error)
+            finally:
+                self.clip.forget(number - 1 if neighbours else number)
+        self.to_blur.put(None)
+
+    def _read_one(self, number: int, neighbours: bool) -> None:
+        made_of = self.clip.made_of(number, neighbours)
+        if self.resume and self.output.done(number, made_of):
+            self.places.put(None)
+            self.report.skipped.append(number)
+            self.progress(number, "skipped")
+            return
+        source = self.clip.source(number)
+        prepare = self.clip.with_neighbours if neighbours else self.clip.frame
+        frame = prepare(source, normal="normal" in self.blur.method.uses)
+        if unread := sorted({number - 1, number + 1} & self.clip.unread):
+            made_of["unread"] = unread  # so that --resume asks for them again
+        self.to_blur.put(_Job(source, frame, made_of))
+
+    def blur_one(self, job: _Job) -> None:
+        """The second stage, for one frame."""
+        confidence: dict[str, np.ndarray] = {}
+        try:
+            if self.confidence:
+                picture, confidence = self.blur.with_confidence(job.frame)
+            else:
+                picture = self.blur(job.frame)
+        except (InputError, GpuMemoryError) as error:
+            self._fail(job.source.number, InputError(f"{job.source.path}: {error}"))
+            return
+        if job.frame.bad:
+            self.report.bad[job.source.number] = job.frame.bad
+        self.to_write.put(_Blurred(job.source, job.made_of, picture, confidence))
+
+    def write(self) -> None:
+        """The third stage: results to files."""
         reasons: list[str] = []
-        while (blurred := to_write.get()) is not None:
+        while (blurred := self.to_write.get()) is not None:
             number = blurred.source.number
-            if hopeless.is_set():
-                places.put(None)
+            if self.hopeless.is_set():
+                self.places.put(None)
                 continue
             try:
-                output.write(blurred.picture, blurred.source, blurred.confidence, blurred.made_of)
+                self.output.write(
+                    blurred.picture, blurred.source, blurred.confidence, blurred.made_of
+                )
             except (Error, OSError, MemoryError, RuntimeError) as error:
-                fail(number, error)
-                reasons.append(output.why_hopeless(error))
+                self._fail(number, error)
+                reasons.append(self.output.why_hopeless(error))
                 if reasons[-1] and (
-                    output.is_video or reasons[-HOPELESS:] == HOPELESS * reasons[-1:]
+                    self.output.is_video or reasons[-HOPELESS:] == HOPELESS * reasons[-1:]
                 ):
-                    report.stopped = reasons[-1]
-                    hopeless.set()
+                    self.report.stopped = reasons[-1]
+                    self.hopeless.set()
             else:
                 reasons.clear()
-                places.put(None)
-                report.done.append(number)
-                tell(number, "done")
+                self.places.put(None)
+                self.report.done.append(number)
+                self.progress(number, "done")
             del blurred
 
-    def guarded(work: Callable[[], None]) -> None:
+    def _fail(self, number: int, error: BaseException) -> None:
+        self.places.put(None)
+        self.report.failed[number] = " ".join(str(error).split()) or type(error).__name__
+        self.progress(number, "failed")
+
+    def _guarded(self, stage: Callable[[], None]) -> None:
         try:
-            work()
+            stage()
         except _StopError:
             pass
         except BaseException as error:  # a fault of ours: the main thread raises it
-            crash.append(error)
-            stop.set()
-
-    threads = [
-        threading.Thread(target=guarded, args=(work,), name=work.__name__, daemon=True)
-        for work in (read, write)
-    ]
-    for thread in threads:
-        thread.start()
-    try:
-        while (job := to_blur.get()) is not None:
-            _blur_one(blur, job, confidence, report, to_write, fail)
-            del job
-        to_write.put(None)
-        for thread in threads:
-            while thread.is_alive():  # a join without limit would hold back Ctrl-C
-                thread.join(0.1)
-    except _StopError:
-        pass
-    finally:
-        broken = any(thread.is_alive() for thread in threads) or crash or not report.done
-        broken = broken or (output.is_video and report.stopped)
-        stop.set()
-        for thread in threads:
-            thread.join(0.5)
-        if broken:
-            output.abandon()
-    if crash:
-        raise crash[0]
-    if not broken:
-        try:
-            output.close()
-        except OSError as error:
-            report.stopped = str(error)
-    if output.is_video and report.stopped:  # it is not there at all
-        report.done.clear()
-    return report
+            self.crash.append(error)
+            self.stop.set()
 
 
-def _blur_one(blur: Blur, job: _Job, confidence: bool, report: BatchReport, to_write, fail) -> None:
-    told: dict[str, np.ndarray] = {}
-    try:
+def render_frames(
+    render: Render,
+    moments: dict[int, float],
+    output: Output,
+    sharp: bool,
+    passes: bool,
+    confidence: bool,
+    resume: bool,
+    progress: Progress | None,
+) -> int:
+    """Render every moment into `output`; returns how many were there already (`resume`).
+
+    `sharp`: without blur. `passes`: EXR with all that `wgmb blur` can use. `confidence`: EXR
+    with how sure the method is.
+    """
+    progress, skipped = progress or (lambda number, state: None), 0
+    for number, time in moments.items():
+        if resume and output.done(number):
+            skipped += 1
+            progress(number, "skipped")
+            continue
+        seen = render.frame(time, number) if passes else None
+        planes = {}
         if confidence:
-            picture, told = blur.with_confidence(job.frame)
+            result, planes = render.with_confidence(time, number)
         else:
-            picture = blur(job.frame)
-    except (InputError, GpuMemoryError) as error:
-        fail(job.source.number, InputError(f"{job.source.path}: {error}"))
-        return
-    if job.frame.bad:
-        report.bad[job.source.number] = job.frame.bad
-    to_write.put(_Blurred(job.source, job.made_of, picture, told))
+            result = render.sharp(time) if sharp else render(time, number)
+        source = (
+            _with_passes(render, seen, number)
+            if passes and seen
+            else FrameFile(number, Path(), None, {}, {})
+        )
+        output.write(result, source, planes)
+        progress(number, "done")
+    output.close()
+    return skipped
+
+
+def _with_passes(render: Render, frame: Frame, number: int) -> FrameFile:
+    """A frame's passes as layers that io/clip.py finds by their names."""
+    motion = render.blur.motion(frame)
+    assert frame.depth is not None and frame.normal is not None and frame.object_id is not None
+    channels = {name: frame.color[..., i] for i, name in enumerate("RGBA")}
+    channels |= {"Z": frame.depth, "object_id.X": frame.object_id}
+    channels |= {f"normal.{c}": frame.normal[..., i] for i, c in enumerate("XYZ")}
+    names = ("to_prev.x", "to_prev.y", "to_next.x", "to_next.y")
+    channels |= {name: motion[..., i] for i, name in enumerate(names)}
+    width, height = frame.size
+    window = (0, 0, width - 1, height - 1)
+    part = exr.Part("", channels, {}, window, window)
+    return FrameFile(number, Path(), exr.Exr(Path(), [part]), channels, {}, part=part)

@@ -78,7 +78,7 @@ class Observer:
         self._size, self._shown = (0, 0), 0
         self._lock = threading.RLock()
 
-    def look(self, picture: np.ndarray) -> None:
+    def present(self, picture: np.ndarray) -> None:
         """Show one more: (height, width, 3 or 4), linear light."""
         if picture.ndim != 3 or picture.shape[2] not in (3, 4):
             raise InputError(f"a picture is (height, width, 3 or 4), got {picture.shape}")
@@ -94,7 +94,7 @@ class Observer:
             self._images.upload(f"ring {self._shown % self.held}", picture, "rgba16float")
             self._shown += 1
 
-    def sees(self, after: float = 0.0) -> np.ndarray:
+    def perceived(self, after: float = 0.0) -> np.ndarray:
         """(height, width, 4) float32: what is seen `after` [s] the middle of the last picture."""
         if not self._shown:
             raise InputError("nothing was shown yet")

@@ -7,7 +7,6 @@ import threading
 import time as clock
 from collections.abc import Callable
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import wgpu
@@ -18,9 +17,6 @@ from .frame import Frame
 from .frame_views import FrameViews
 from .gpu.textures import TexturePool
 from .gpu.timing import Clock
-from .io import exr
-from .io.frame_file import FrameFile
-from .io.output import Output
 from .pipeline import Blur
 from .scene.gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
 from .scene.scene import Scene
@@ -263,56 +259,3 @@ class Render:
 def _offsets(blur: Blur) -> tuple[int, ...]:
     """The frames that the method is given [frame intervals]."""
     return (0, -1, 1) if "neighbours" in blur.method.uses else (0,)
-
-
-def render_frames(
-    render: Render,
-    moments: dict[int, float],
-    output: Output,
-    sharp: bool,
-    passes: bool,
-    confidence: bool,
-    resume: bool,
-    progress: Callable[[int, str], None] | None,
-) -> int:
-    """Render every moment into `output`; returns how many were there already (`resume`).
-
-    `sharp`: without blur. `passes`: EXR with all that `wgmb blur` can use. `confidence`: EXR
-    with how sure the method is.
-    """
-    tell, skipped = progress or (lambda number, what: None), 0
-    for number, time in moments.items():
-        if resume and output.done(number):
-            skipped += 1
-            tell(number, "skipped")
-            continue
-        seen = render.frame(time, number) if passes else None
-        told = {}
-        if confidence:
-            result, told = render.with_confidence(time, number)
-        else:
-            result = render.sharp(time) if sharp else render(time, number)
-        source = (
-            _with_passes(render, seen, number)
-            if passes and seen
-            else FrameFile(number, Path(), None, {}, {})
-        )
-        output.write(result, source, told)
-        tell(number, "done")
-    output.close()
-    return skipped
-
-
-def _with_passes(render: Render, frame: Frame, number: int) -> FrameFile:
-    """A frame's passes as layers that io/clip.py finds by their names."""
-    motion = render.blur.motion(frame)
-    assert frame.depth is not None and frame.normal is not None and frame.object_id is not None
-    channels = {name: frame.color[..., i] for i, name in enumerate("RGBA")}
-    channels |= {"Z": frame.depth, "object_id.X": frame.object_id}
-    channels |= {f"normal.{c}": frame.normal[..., i] for i, c in enumerate("XYZ")}
-    names = ("to_prev.x", "to_prev.y", "to_next.x", "to_next.y")
-    channels |= {name: motion[..., i] for i, name in enumerate(names)}
-    width, height = frame.size
-    window = (0, 0, width - 1, height - 1)
-    part = exr.Part("", channels, {}, window, window)
-    return FrameFile(number, Path(), exr.Exr(Path(), [part]), channels, {}, part=part)

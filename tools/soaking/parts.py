@@ -83,8 +83,8 @@ def _perceived() -> Step:
     blur, eye, frames = Blur("tap", samples=_MANY), Observer(24.0), neighbourly(range(4))
 
     def step(number: int) -> np.ndarray:
-        eye.look(blur(frames[number % len(frames)]))
-        return eye.sees()
+        eye.present(blur(frames[number % len(frames)]))
+        return eye.perceived()
 
     return step
 

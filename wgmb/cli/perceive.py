@@ -104,7 +104,7 @@ def perceive(
         numbers, rate = clip.numbers, float(output.rate)
         pictures = ((n, clip.source(n), [clip.source(n).rgba]) for n in numbers)
         inputs = clip.inputs
-    viewer = Observer(rate, who.cone, device=adapter)
+    observer = Observer(rate, who.cone, device=adapter)
     files = Output(
         output.output,
         settings={"wgmb": __version__} | plain(who) | {"input": pattern, "fps": output.fps},
@@ -121,8 +121,8 @@ def perceive(
         try:
             for number, source, shown in pictures:
                 for picture in shown:
-                    viewer.look(picture)
-                files.write(viewer.sees()[..., : picture.shape[2]], source)
+                    observer.present(picture)
+                files.write(observer.perceived()[..., : picture.shape[2]], source)
                 tick(number, "done")
             files.close()
         except BaseException:

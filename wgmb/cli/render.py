@@ -9,9 +9,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from .._version import __version__
+from ..batch import render_frames
 from ..errors import InputError
 from ..io.output import Output
-from ..render import Render, render_frames
+from ..render import Render
 from ..settings import SceneSettings, plain, size_of
 from .blur import check_confidence, samples_of
 from .exit_codes import DONE
