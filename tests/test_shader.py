@@ -151,7 +151,7 @@ def test_what_is_not_supported_is_refused(kind, text):
 
 
 def test_a_missing_constant_is_named():
-    with pytest.raises(ShaderError, match="no constant NOPE in keep"):
+    with pytest.raises(ShaderError, match="no constant NOPE in holdout"):
         wgsl.load("holdout.wgsl").constant("NOPE")
 
 

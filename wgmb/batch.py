@@ -4,6 +4,8 @@ Three threads read, blur and write at the same time and pass frames on. At most 
 them are in memory, however long the sequence. A frame that fails is reported and passed over.
 """
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import queue
@@ -11,6 +13,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +44,7 @@ class _Job:
 
     source: FrameFile
     frame: Frame
-    made_of: dict
+    made_of: dict[str, Any]
 
 
 @dataclass
@@ -49,7 +52,7 @@ class _Blurred:
     """One frame, blurred and to be written."""
 
     source: FrameFile
-    made_of: dict
+    made_of: dict[str, Any]
     picture: np.ndarray
     confidence: dict[str, np.ndarray]
 
@@ -69,11 +72,11 @@ class _Handover:
     """A queue whose end notices a stop."""
 
     def __init__(self, stop: threading.Event):
-        self._queue: queue.SimpleQueue = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._stop = stop
         self.put = self._queue.put
 
-    def get(self):
+    def get(self) -> Any:
         while not self._stop.is_set():
             try:
                 return self._queue.get(timeout=0.05)

@@ -1,5 +1,7 @@
 """Cameras and rigid bodies from frame to frame: the matrices behind motion from depth."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import math
@@ -22,7 +24,7 @@ class Camera:
     bodies: dict[int, np.ndarray] = field(default_factory=dict)
     """`world_from_object` of every moving body, by object index."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name, matrix in (
             ("clip_from_world", self.clip_from_world),
             ("view_from_world", self.view_from_world),
@@ -78,7 +80,7 @@ class Reprojections:
     window: tuple[int, int, int, int] | None = None
     """Where the image lies in the whole picture: x, y, whole width, whole height [px]."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.prev is None and self.next is None:
             raise InputError("motion from a camera needs the camera of a neighbouring frame")
         if self.depth_kind not in ("planar", "clip"):
@@ -102,7 +104,9 @@ class Reprojections:
             table[k] = [self._reprojection(self.prev, k), self._reprojection(self.next, k)]
         return table
 
-    def displacement(self, size: tuple[int, int], x, y, depth, side: int) -> np.ndarray:
+    def displacement(
+        self, size: tuple[int, int], x: np.ndarray, y: np.ndarray, depth: np.ndarray, side: int
+    ) -> np.ndarray:
         """(n, 2) way of the world at pixels x, y [px] to the previous (side -1), next (1) frame.
 
         NaN where there is no such frame, or it is behind its camera; bodies count as the world.

@@ -4,6 +4,8 @@ Its answer to a flash, x seconds later, is W(x) = rate exp(shift - rate x) F(x),
 F(x) = exp(-exp(shift - rate x)) (Cusa 2022, after Howlett et al. 2017).
 """
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import math
@@ -30,7 +32,7 @@ class Cone:
     rate: float = 50.0
     peak: float = 0.05
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not (math.isfinite(self.rate) and 1 <= self.rate <= 10_000):
             raise InputError(f"rate must be 1 to 10000 per second, got {self.rate}")
         if not (math.isfinite(self.peak) and 0 <= self.peak <= 1):

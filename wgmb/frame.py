@@ -10,12 +10,15 @@ matrix   `clip_from_world`: destination first, so that products read as chains
 Foreign conventions are translated in io/vectors.py and io/camera_file.py, nowhere else.
 """
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, field, fields
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .camera import Reprojections
 from .errors import InputError
@@ -76,7 +79,7 @@ class Frame:
     are not finite stand still).
     """
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         color = _float_array("color", self.color)
         if color.ndim != 3 or color.shape[2] not in (3, 4) or 0 in color.shape:
             raise InputError(f"color must be (height, width, 3 or 4), got {color.shape}")
@@ -167,13 +170,13 @@ class Frame:
 PASSES = tuple(f.name for f in fields(Frame) if f.init and f.name != "color")
 
 
-def _array(name: str, given) -> np.ndarray:
+def _array(name: str, given: ArrayLike) -> np.ndarray:
     if isinstance(given, np.ma.MaskedArray):
         raise InputError(f"{name} must not be a masked array: fill it, with NaN for no value")
     return np.asarray(given)
 
 
-def _float_array(name: str, given) -> np.ndarray:
+def _float_array(name: str, given: ArrayLike) -> np.ndarray:
     array = _array(name, given)
     if array.dtype.kind != "f":
         hint = "; divide by its maximum and undo its gamma first" if name == "color" else ""

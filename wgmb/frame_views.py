@@ -1,5 +1,7 @@
 """One frame as textures: the GPU's twin of `Frame`, and what `Blur.encode` takes."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields

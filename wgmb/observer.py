@@ -1,5 +1,7 @@
 """An observer: what is perceived of pictures shown one after the other, on the GPU."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import threading

@@ -1,11 +1,15 @@
 """The whole flow in one place: arrays -> textures -> velocity -> one method -> array."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import threading
+from collections.abc import Collection
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -61,7 +65,7 @@ class Blur:
         max_blur: float | None = None,
         device: wgpu.GPUDevice | str | None = None,
         output: str = "rgba32float",
-        **options,
+        **options: Any,
     ):
         if method not in METHODS:
             raise InputError(f"unknown method {method!r}, one of {', '.join(METHODS)}")
@@ -220,7 +224,7 @@ class Blur:
 
     def _prepare(
         self,
-        encoder,
+        encoder: wgpu.GPUCommandEncoder,
         bindings: gpu.FrameBindings,
         frame: FrameViews,
         offset: int,
@@ -264,12 +268,20 @@ class Blur:
             progress=progress or (0, self.samples),
         )
 
-    def _record(self, encoder, inputs: Inputs, output: View, confidence: View | None = None):
+    def _record(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        inputs: Inputs,
+        output: View,
+        confidence: View | None = None,
+    ):
         self.method.encode(encoder, inputs, output)
         if confidence is not None and self.confidence:
             self._judge.encode(encoder, inputs, confidence)
 
-    def __call__(self, color: np.ndarray | Frame, to_next=None, **passes) -> np.ndarray:
+    def __call__(
+        self, color: np.ndarray | Frame, to_next: np.ndarray | None = None, **passes: Any
+    ) -> np.ndarray:
         """Blur one frame: a Frame, or a colour array and its passes (see Frame).
 
         Returns float32 of color's shape. `InputError` says what is missing or does not fit.
@@ -324,7 +336,7 @@ class Blur:
         bindings = self.frame_bindings(frame.size, number)
         self._velocity.encode(encoder, bindings, frame, self.max_blur is not None, output)
 
-    def upload(self, frame: Frame) -> dict:
+    def upload(self, frame: Frame) -> dict[str, Any]:
         """The frame's and its neighbours' arrays as textures: keywords of `encode`.
 
         They are kept: the next frame's go into the same textures.
@@ -349,7 +361,7 @@ class Blur:
                 self._residency.forget()
                 raise
 
-    def _views(self, frame: Frame) -> dict:
+    def _views(self, frame: Frame) -> dict[str, Any]:
         """The frame and the neighbours that the method takes, as keywords of `encode`."""
         around: dict[int, Frame] = {0: frame}
         if "neighbours" in self.method.uses:
@@ -360,8 +372,8 @@ class Blur:
         views = self._residency.views_of(around)
         return {"number": frame.number} | {names[offset]: one for offset, one in views.items()}
 
-    def _require(self, there, whose: str = "") -> None:
-        if missing := self.method.needs - there:
+    def _require(self, there: Collection[str], whose: str = "") -> None:
+        if missing := self.method.needs - set(there):
             what = ", ".join(whose + name for name in sorted(missing))
             raise InputError(f"method {self.method.name!r} needs {what}")
 
@@ -391,7 +403,7 @@ def blur(
     method: str | None = None,
     shutter: Shutter | float = 180,
     samples: int | str | None = None,
-    **more,
+    **more: Any,
 ) -> np.ndarray:
     """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.
 

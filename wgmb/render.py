@@ -1,5 +1,7 @@
 """A scene through a method: what `wgmb render` and the viewer call."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import math
@@ -7,6 +9,7 @@ import threading
 import time as clock
 from collections.abc import Callable
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -52,9 +55,9 @@ class Render:
         self._lock = threading.RLock()
         self._images = TexturePool(blur.device)
         self._token = blur.device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
-        self._moment: tuple = ()
+        self._moment: tuple[Any, ...] = ()
         self._spans: dict[tuple[float, float], SceneOnGpu] = {}
-        self._pictures: dict[int, dict] = {}
+        self._pictures: dict[int, dict[str, Any]] = {}
 
     def __call__(
         self, time: float, number: int = 0, progress: Progress | None = None

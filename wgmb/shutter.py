@@ -6,6 +6,8 @@ integrates to 1. This file is the only place where a curve is written: the GPU g
 times.
 """
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import csv
@@ -77,7 +79,7 @@ class Shutter:
     rolling: str | None = None
     rolling_duration: float = 1.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not (math.isfinite(self.degrees) and 0 <= self.degrees <= 36000):
             raise InputError(f"shutter must be 0 to 36000 degrees, got {self.degrees}")
         if isinstance(self.phase, str) and self.phase not in PHASES:

@@ -1,10 +1,13 @@
 """Cameras and rigid bodies from JSON."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +34,7 @@ class CameraFile:
         """The frames it speaks of."""
         return sorted(self._frames)
 
-    def around(self, number: int, **options) -> Reprojections:
+    def around(self, number: int, **options: Any) -> Reprojections:
         """The reprojections from frame `number` to its neighbours, which the file must have."""
         if number not in self._frames:
             raise InputError(f"{self.path}: no camera for frame {number}")
@@ -89,7 +92,7 @@ class CameraFile:
             raise InputError(f"{self.path}: frame {number:g}: {_first_line(error)}") from None
 
 
-def _read_json(path: Path) -> dict[float, dict]:
+def _read_json(path: Path) -> dict[float, dict[str, Any]]:
     try:
         if not path.is_file():
             raise InputError(f"{path}: no such file")
@@ -107,7 +110,7 @@ def _read_json(path: Path) -> dict[float, dict]:
     return numbered
 
 
-def _matrix(rows) -> np.ndarray:
+def _matrix(rows: Any) -> np.ndarray:
     try:
         array = np.array(rows, np.float64)
     except (ValueError, TypeError, OverflowError):
@@ -117,7 +120,7 @@ def _matrix(rows) -> np.ndarray:
     return array
 
 
-def _bodies(objects: dict) -> dict[int, np.ndarray]:
+def _bodies(objects: dict[str, Any]) -> dict[int, np.ndarray]:
     """World matrices by object index; parts that share an index must move as one."""
     bodies: dict[int, np.ndarray] = {}
     for name, given in objects.items():

@@ -3,6 +3,8 @@
 `Clip` reads frames, finds their layers, settles what the vectors mean and keeps neighbours.
 """
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import contextlib
@@ -10,6 +12,7 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +62,7 @@ class Passes:
     scale: str | None = None
     also: tuple[str, ...] = ()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.depth_kind not in DEPTHS:
             raise InputError(f"depth must be one of {', '.join(DEPTHS)}, got {self.depth_kind!r}")
         if not self.far > 0:
@@ -127,7 +130,7 @@ class Clip:
             raise InputError(f"{self.pattern}: none of the frames {frames} exist")
         return [n for n in wanted if n in found]
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Frame]:
         for number in self.numbers:
             yield self.frame(self.source(number))
 
@@ -156,7 +159,7 @@ class Clip:
         for number in self.on_disk:
             yield from self.files(number)
 
-    def made_of(self, number: int, neighbours: bool) -> dict:
+    def made_of(self, number: int, neighbours: bool) -> dict[str, Any]:
         """What the result of frame `number` depends on beside the settings, as JSON has it.
 
         Name, size [bytes] and time of change [ns] of every file, those of the frames before and

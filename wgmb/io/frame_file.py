@@ -1,11 +1,14 @@
 """One frame as it lies on disk: its files read, their layers together in one window."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +27,7 @@ class FrameFile:
     path: Path
     file: exr.Exr | None  # None: a still
     channels: dict[str, np.ndarray]  # of all its files, in the picture's data window
-    attributes: dict
+    attributes: dict[str, Any]
     wanted: str | None = None  # the picture's layer, if its name does not say so
     part: exr.Part | None = None  # of the file, that the picture is in
 
@@ -72,7 +75,7 @@ class FrameFile:
         return x - left, y - top, right - left + 1, bottom - top + 1
 
 
-def size_text(of) -> str:
+def size_text(of: np.ndarray | tuple[int, int]) -> str:
     """Width x height of a plane, or of a pair, for messages."""
     width, height = of if isinstance(of, tuple) else of.shape[::-1]
     return f"{width} x {height}"

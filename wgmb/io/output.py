@@ -1,5 +1,7 @@
 """Where results go: pictures or a video, each file complete under its name or not there."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import json
@@ -8,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +34,7 @@ class Output:
         self,
         pattern: str | Path,
         *,
-        settings: dict | None = None,
+        settings: dict[str, Any] | None = None,
         numbers: list[int],
         bits: int = 8,
         fps: Fraction = Fraction(24),
@@ -106,7 +109,7 @@ class Output:
         """The file that frame `number` goes to."""
         return self.pattern if self._video else frame_path(self.pattern, number)
 
-    def done(self, number: int, made_of: dict | None = None) -> bool:
+    def done(self, number: int, made_of: dict[str, Any] | None = None) -> bool:
         """Whether frame `number` is there: whole, with these settings, made of the same.
 
         `made_of`: what the frame depends on (see Clip.made_of). The file is read whole and
@@ -125,7 +128,7 @@ class Output:
             raise InputError(f"{path} exists and was not written by wgmb; --overwrite replaces it")
         return content is not None and content == self._expected(made_of)
 
-    def _expected(self, made_of: dict | None) -> dict:
+    def _expected(self, made_of: dict[str, Any] | None) -> dict[str, Any]:
         return json.loads(self.settings) | json.loads(json.dumps(made_of or {}))
 
     def write(
@@ -133,7 +136,7 @@ class Output:
         result: np.ndarray,
         source: FrameFile,
         confidence: Mapping[str, np.ndarray] | None = None,
-        made_of: dict | None = None,
+        made_of: dict[str, Any] | None = None,
     ) -> None:
         """Write one frame: into an EXR with all the other layers of `source`, if it is one.
 

@@ -4,6 +4,8 @@ Foreign conventions end here. A convention is what the numbers mean; `detect` fi
 whether they do, by warping the neighbouring frame with them.
 """
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
@@ -105,7 +107,7 @@ class Vectors:
     offset: float | None = None
     flip: str = ""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.convention not in ("auto", "none", *CONVENTIONS):
             known = ", ".join(("auto", *CONVENTIONS, "none"))
             raise InputError(f"vectors must be one of {known}, got {self.convention!r}")
@@ -228,11 +230,18 @@ class Finding:
     text: str  # for people
 
 
+_Pairs = list[tuple[np.ndarray, np.ndarray]]  # motion towards a neighbour, and its tones
 _LEFT = "the neighbouring frame differs by {:.0%} of what it differs unmoved"
 _ALTERNATIVES = tuple((flip, scale) for flip in ("", "y", "x", "xy") for scale in (1.0, 2.0, 0.5))
 
 
-def detect(color, motion: np.ndarray, prev_color, next_color, vectors: Vectors) -> Finding:
+def detect(
+    color: np.ndarray,
+    motion: np.ndarray,
+    prev_color: np.ndarray | None,
+    next_color: np.ndarray | None,
+    vectors: Vectors,
+) -> Finding:
     """Test `vectors`, which were read as `motion`, against the neighbouring frames' colour.
 
     color: (height, width, 3 or 4); neighbours alike, or None. Every alternative (flipped,
@@ -280,7 +289,7 @@ def _combine(a: str, b: str) -> str:
     return "".join(axis for axis in "xy" if (axis in a) != (axis in b))
 
 
-def _moving_pixels(pairs) -> np.ndarray:
+def _moving_pixels(pairs: _Pairs) -> np.ndarray:
     """Up to _PROBES pixels (y, x) that move in every given direction."""
     moving = np.ones(pairs[0][0].shape[:2], bool)
     with np.errstate(all="ignore"):
@@ -292,7 +301,7 @@ def _moving_pixels(pairs) -> np.ndarray:
     return at[chosen]
 
 
-def _difference(color, pairs, at, scale: float, flip: str) -> float:
+def _difference(color: np.ndarray, pairs: _Pairs, at: np.ndarray, scale: float, flip: str) -> float:
     """Mean difference, robust against what appears and disappears, of warped neighbours."""
     factor = np.array([-scale if axis in flip else scale for axis in "xy"])
     here = _tone(color[at[:, 0], at[:, 1], :3])

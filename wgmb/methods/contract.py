@@ -1,5 +1,7 @@
 """The contract between the pipeline and a method: what a method is, and what it may read."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -5,12 +5,14 @@ Each field is annotated with its type, its range where it is a number, and its h
     variant: Annotated[Literal["even", "published"], "even: ...; published: as printed."] = "even"
 """
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import math
 import typing
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
 from functools import cache
 from types import MappingProxyType, UnionType
 from typing import Any, Literal
@@ -74,7 +76,7 @@ class Option:
 class MethodOptions:
     """Base of every method's `Options`, and those of a method that has none."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for option in options_of(type(self)).values():
             option.check(getattr(self, option.name))
 
@@ -86,7 +88,7 @@ def options_of(options: type[MethodOptions]) -> Mapping[str, Option]:
     return MappingProxyType({f.name: _option(f, hints[f.name]) for f in fields(options)})
 
 
-def _option(field, hint) -> Option:
+def _option(field: Field[Any], hint: Any) -> Option:
     kind, *notes = typing.get_args(hint)
     if isinstance(kind, UnionType):  # ... | None
         kind = next(k for k in typing.get_args(kind) if k is not type(None))

@@ -68,7 +68,7 @@ class Reproject:
             Literal["point", "line"], "published: points, or lines between the steps"
         ] = "point"
 
-        def __post_init__(self):
+        def __post_init__(self) -> None:
             super().__post_init__()
             published = self.facing or self.depth_test or self.splat != "point"
             if self.variant != "published" and published:

@@ -5,12 +5,15 @@ cylinder (along z) or ring (about y) that `place(t)` puts into the world; patter
 wgsl/scene/pattern.wgsl. Every function of time takes an array of times.
 """
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 Color = tuple[float, float, float]
 Place = Callable[[np.ndarray], np.ndarray]  # times (n,) -> world_from_body (n, 4, 4)
@@ -18,12 +21,12 @@ SHAPES = ("sphere", "box", "cylinder", "ring")
 PATTERNS = ("PLAIN", "CHECKER", "STRIPES", "BRICKS", "DOTS", "GROUND")
 
 
-def times_of(t) -> np.ndarray:
+def times_of(t: ArrayLike) -> np.ndarray:
     """(n,) float64 of a number or an array."""
     return np.atleast_1d(np.asarray(t, np.float64))
 
 
-def translation(x, y, z, like) -> np.ndarray:
+def translation(x: ArrayLike, y: ArrayLike, z: ArrayLike, like: ArrayLike) -> np.ndarray:
     """(n, 4, 4) for numbers or arrays over the times `like`."""
     m = np.tile(np.eye(4), (len(times_of(like)), 1, 1))
     for row, value in enumerate((x, y, z)):
@@ -31,12 +34,12 @@ def translation(x, y, z, like) -> np.ndarray:
     return m
 
 
-def scaling(size, like) -> np.ndarray:
+def scaling(size: Iterable[float], like: ArrayLike) -> np.ndarray:
     """(n, 4, 4) of constant half extents."""
     return np.tile(np.diag([*size, 1.0]), (len(times_of(like)), 1, 1))
 
 
-def rotation(axis: str, angle, like) -> np.ndarray:
+def rotation(axis: str, angle: ArrayLike, like: ArrayLike) -> np.ndarray:
     """(n, 4, 4) about "x", "y" or "z" by radians, right-handed."""
     angle = np.broadcast_to(np.asarray(angle, np.float64), times_of(like).shape)
     i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
@@ -64,7 +67,7 @@ class Body:
     light: float = 0.0
     gloss: float = 0.0
 
-    def world_from_body(self, t) -> np.ndarray:
+    def world_from_body(self, t: ArrayLike) -> np.ndarray:
         """(n, 4, 4) at the times `t` [s]."""
         return self.path(times_of(t)) @ scaling(self.size, t)
 
@@ -74,7 +77,14 @@ def at(x: float, y: float, z: float, yaw: float = 0.0, pitch: float = 0.0) -> Pl
     return lambda t: translation(x, y, z, t) @ rotation("y", yaw, t) @ rotation("x", pitch, t)
 
 
-def moving(start, velocity, *, spin: float = 0.0, axis: str = "z", fall: float = 0.0) -> Place:
+def moving(
+    start: Iterable[float],
+    velocity: Iterable[float],
+    *,
+    spin: float = 0.0,
+    axis: str = "z",
+    fall: float = 0.0,
+) -> Place:
     """Along a line or, with `fall` [m/s^2], a parabola; spinning about `axis` [rad/s]."""
     (x, y, z), (u, v, w) = start, velocity
     return lambda t: (

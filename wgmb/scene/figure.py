@@ -37,7 +37,7 @@ class Figure:
     begin: float = 0.0
     shutter: Shutter | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 0 <= self.speed <= FASTEST:
             raise InputError(f"speed must be 0 to {FASTEST:g} rad/s, got {self.speed}")
 

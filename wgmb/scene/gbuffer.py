@@ -1,5 +1,7 @@
 """A scene on the GPU: its bodies, where they are over a span of time, and pictures of instants."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 from functools import cached_property
@@ -26,7 +28,7 @@ class SceneOnGpu:
 
     def __init__(
         self,
-        device,
+        device: wgpu.GPUDevice,
         scene: Scene,
         *,
         size: tuple[int, int],
@@ -95,12 +97,12 @@ class SceneOnGpu:
 
     def encode(
         self,
-        encoder,
+        encoder: wgpu.GPUCommandEncoder,
         bindings: gpu.FrameBindings,
         images: TexturePool,
         name: str,
         time: float,
-    ) -> dict:
+    ) -> dict[str, wgpu.GPUTexture]:
         """Record the picture at `time` [frame intervals from this frame]; its textures."""
         rays, bodies = self.rays, len(self.scene.bodies)
         if self.loops * rays * rays > MOST_LOOPS:

@@ -1,13 +1,16 @@
 """Scenes as data: rigid bodies, volumes, a camera and light, anywhere in time."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from .bodies import PATTERNS, SHAPES, Body, Color, rotation, times_of, translation
@@ -21,7 +24,7 @@ if TYPE_CHECKING:
 class Shot:
     """A camera over time: where it is and looks, and how wide [functions of seconds]."""
 
-    position: Callable[[np.ndarray], tuple]
+    position: Callable[[np.ndarray], tuple[ArrayLike, ArrayLike, ArrayLike]]
     yaw: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
     pitch: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
     roll: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
@@ -36,7 +39,7 @@ class Shot:
     pivot: float = 5.0
     """How far in front of the camera the pivot is [scene units]."""
 
-    def world_from_camera(self, t) -> np.ndarray:
+    def world_from_camera(self, t: ArrayLike) -> np.ndarray:
         """(n, 4, 4); the camera looks along -z, y up."""
         t = times_of(t)
         x, y, z = self.position(t)
@@ -52,7 +55,9 @@ class Shot:
         over = translation(0, 0, -self.pivot, t) @ rotation("x", -up, t)
         return round_ @ own @ over @ translation(*self.pan, self.pivot * self.dolly, t)
 
-    def clip_from_camera(self, t, aspect: float, near: float = 0.05, far: float = 1000.0):
+    def clip_from_camera(
+        self, t: ArrayLike, aspect: float, near: float = 0.05, far: float = 1000.0
+    ) -> np.ndarray:
         """(n, 4, 4) OpenGL projections."""
         zoom = np.broadcast_to(self.zoom(times_of(t)), times_of(t).shape)
         m = np.zeros((len(zoom), 4, 4))
@@ -93,7 +98,7 @@ class Scene:
     figure: Figure | None = None
     """A flat picture instead, for the method "volume"."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for body in self.bodies:
             if body.shape not in SHAPES:
                 raise InputError(f"shape must be one of {', '.join(SHAPES)}, got {body.shape!r}")
@@ -159,6 +164,6 @@ def _since(body: Body, time: float) -> Body:
     return replace(body, path=lambda t: body.path(t - time))
 
 
-def _all_finite(numbers) -> bool:
+def _all_finite(numbers: Iterable[Any]) -> bool:
     """As the GPU has them, with room for a product."""
     return all(abs(x) < 1e30 for x in numbers)

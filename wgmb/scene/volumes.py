@@ -1,5 +1,7 @@
 """Volumes whose blur has a closed form, and the stage they are shown on (Cusa 2022)."""
 
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
 from __future__ import annotations
 
 import math
@@ -30,7 +32,7 @@ class Orbit:
     opacity: float = 1.0
     facing: float | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _positive(self, "radius")
         if not (math.isfinite(self.orbit) and self.orbit >= 0):
             raise InputError(f"orbit must be 0 or more, got {self.orbit}")
@@ -74,7 +76,7 @@ class Torus:
     facing: float | None = None
     swell: float = 1.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _positive(self, "minor_radius")
         _positive(self, "major_radius")
         _positive(self, "swell")
@@ -138,7 +140,7 @@ class Stage:
     bound: float | None = None
     grain: int = 0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if len(self.grids) != 3 or not all(
             side > 0 and math.isfinite(side + light) for side, light in self.grids
         ):
