@@ -13,7 +13,7 @@ from wgmb.methods import METHODS
 from wgmb.observer import Observer
 from wgmb.scene import builtin
 from wgmb.viewer import State
-from wgmb.viewer.renderer import Stage
+from wgmb.viewer.renderer import Renderer
 
 MOST = 24  # KiB a frame
 WARM, COUNT, ROUNDS = 8, 12, 6  # frames, frames a round; tables that have to grow do so in some
@@ -115,7 +115,7 @@ def rendering(scene: str, method: str, **options):
 
 def staging(**state):
     def make(device):
-        stage, numbers = Stage(device), iter(range(10**6))
+        stage, numbers = Renderer(device), iter(range(10**6))
         shown = replace(State(rays=1, samples=4), **state)
 
         def step():

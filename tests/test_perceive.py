@@ -59,8 +59,8 @@ def test_a_flash_is_strongest_at_the_peak_and_all_of_it_is_seen_once(cone):
     weights = cone.weights(ages, 1e-5)
     assert ages[weights.argmax()] == pytest.approx(cone.peak, abs=1e-4)
     assert weights.sum() == pytest.approx(1, abs=1e-6)
-    assert cone.seen(cone.memory) == pytest.approx(1, abs=1.1e-4)
-    np.testing.assert_allclose(cone.answer(ages), weights / 1e-5, atol=1e-3 * cone.rate)
+    assert cone.step_response(cone.memory) == pytest.approx(1, abs=1.1e-4)
+    np.testing.assert_allclose(cone.impulse_response(ages), weights / 1e-5, atol=1e-3 * cone.rate)
 
 
 def test_the_shutter_of_an_eye_is_its_answer_to_the_past():
@@ -68,7 +68,7 @@ def test_the_shutter_of_an_eye_is_its_answer_to_the_past():
     shutter = cone.shutter(fps)
     assert shutter.span == pytest.approx((-cone.memory * fps, 0))
     ages = np.linspace(0.001, 0.2, 300)
-    want = cone.answer(ages) / fps  # per frame interval
+    want = cone.impulse_response(ages) / fps  # per frame interval
     np.testing.assert_allclose(shutter.weight(-ages * fps), want, atol=5e-3 * want.max())
 
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import wgmb
-from wgmb import Body, InputError, Scene, Shot, Shutter
+from wgmb import Body, CameraPath, InputError, Scene, Shutter
 from wgmb.methods.accumulate import spread
 from wgmb.render import Render
 from wgmb.scene import builtin
 from wgmb.scene.bodies import rotation, translation
 
-STILL = Shot(lambda t: (0 * t, 0 * t, 0 * t))
+STILL = CameraPath(lambda t: (0 * t, 0 * t, 0 * t))
 AWAY, THIN = 8.0, 1e-4  # distance to the flat bodies, half their thickness [m]
 FPS = 24.0
 CURVES = {
@@ -37,7 +37,7 @@ def metres(pixels, height):
 
 def flat(shape, half, path):
     """A scene of one glowing body; `half` are its half extents [m]."""
-    body = Body(shape, (*half, THIN), path, (1, 1, 1), light=1.0)
+    body = Body(shape, (*half, THIN), path, (1, 1, 1), emission=1.0)
     return Scene("flat", (body,), STILL, sun=(0, 0, 1, 0), sky=(0, 0, 0, 0), horizon=(0, 0, 0))
 
 

@@ -9,14 +9,14 @@ import pytest
 import make_frames as make
 import wgmb
 from twins import gbuffer as twin
-from wgmb import Body, InputError, Scene, Shot, gpu
+from wgmb import Body, CameraPath, InputError, Scene, gpu
 from wgmb.gpu.textures import TexturePool
 from wgmb.scene import builtin
 from wgmb.scene.bodies import SHAPES, at, rotation, translation
 from wgmb.scene.gbuffer import SceneOnGpu, _bounds, _halves
 
 SIZE = (96, 54)
-STILL = Shot(lambda t: (0 * t, 0 * t, 0 * t))
+STILL = CameraPath(lambda t: (0 * t, 0 * t, 0 * t))
 
 
 def plain(scene):
@@ -78,7 +78,9 @@ def test_patterns_are_their_twin_but_for_the_filter_at_their_edges(shape, patter
 
 
 def test_bricks_are_their_colour_with_mortar_between():
-    body = Body("box", (1, 1, 0.1), at(0, 0, -2), (1, 0, 0), (0, 0, 1), "BRICKS", (2, 2), light=1)
+    body = Body(
+        "box", (1, 1, 0.1), at(0, 0, -2), (1, 0, 0), (0, 0, 1), "BRICKS", (2, 2), emission=1
+    )
     dark = {"sun": (0, 0, 1, 0), "sky": (0, 0, 0, 0)}
     seen, _ = frame(Scene("wall", (body,), STILL, **dark), size=(200, 200), rays=2)
     inside = seen.color[30:170, 30:170]
@@ -130,7 +132,7 @@ def tumbling(seed, bodies=24):
             moved = translation(*(start[:, None] + way[:, None] * t * 24), t)
             return moved @ rotation("x", tilt, t) @ rotation(axis, spin * t * 24, t)
 
-        made.append(Body(shape, tuple(size), path, tuple(rng.random(3)), light=1.0))
+        made.append(Body(shape, tuple(size), path, tuple(rng.random(3)), emission=1.0))
     return Scene("tumbling", tuple(made), STILL, sun=(0, 0, 1, 0), sky=(0, 0, 0, 0))
 
 
@@ -179,7 +181,7 @@ def test_a_body_beyond_the_range_of_halves_is_seen():
     def path(t):
         return translation(0, 0, -2e5, t)
 
-    scene = Scene("far", (Body("box", (1e5, 1e5, 1.0), path, light=1.0),), STILL)
+    scene = Scene("far", (Body("box", (1e5, 1e5, 1.0), path, emission=1.0),), STILL)
     got = at_instant(scene, 0.0, 0.0, (-0.25, 0.25))
     want = twin.see(scene, SIZE, 0.0)
     assert (want["object_id"] > 0).mean() > 0.2

@@ -242,7 +242,7 @@ def test_all_that_a_method_draws_is_what_render_draws(small, method):
         if look == "sharp":
             want = srgb(render.frame(*moment).color[..., :3])
         elif look == "perceived":
-            numbers = range(1 - state.eye.held(state.fps), 1)
+            numbers = range(1 - state.eye.frames_needed(state.fps), 1)
             want = seen([render(n / state.fps, n) for n in numbers], state.fps)
         else:
             want = srgb(render(*moment)[..., :3])
@@ -295,7 +295,7 @@ def test_only_new_frames_are_drawn_while_it_plays(small, monkeypatch):
     monkeypatch.setattr(SceneSubject, "draw", draw)
     small.viewer.state = replace(ALONE, look="perceived", frame=4.0)
     small.picture()
-    held = Cone().held(24)
+    held = Cone().frames_needed(24)
     assert sorted(drawn) == list(range(5 - held, 5))
     drawn.clear()
     for key, number in (("ArrowRight", [5]), ("ArrowUp", []), ("ArrowRight", [6]), ("h", []),

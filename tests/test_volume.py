@@ -16,7 +16,7 @@ from wgmb.gpu import wgsl
 from wgmb.methods import volume as method_file
 from wgmb.scene import builtin
 from wgmb.scene.density import overrides, tables
-from wgmb.scene.volumes import Orbit, Stage, Torus
+from wgmb.scene.volumes import Backdrop, OrbitingSphere, Torus
 
 CURVES = ["box", "trapezoid", "triangle", "cosine", "gaussian"]
 SPEEDS = [0.0, 1.0, 30.0, 160.0, 400.0, 1e4]
@@ -25,14 +25,14 @@ ALLOWED = {"box": 1e-4, "cosine": 1e-4}  # the others go through tables: 1e-3
 
 
 def shots():
-    return builtin.make("torusphere").shot
+    return builtin.make("torusphere").camera
 
 
 def volumes(speed, rng):
     """A sphere and a torus, forwards or backwards, each turned anyhow."""
     a, b = rng.uniform(0, 6, 2)
     return (
-        Orbit(radius=0.2, orbit=0.5, speed=speed, phase=a),
+        OrbitingSphere(radius=0.2, orbit=0.5, speed=speed, phase=a),
         Torus(minor_radius=0.15, major_radius=0.4, speed=-speed, phase=b, centre=(0.1, 0.2, 0.0)),
     )
 
@@ -40,7 +40,7 @@ def volumes(speed, rng):
 def points(volume, rng, count=200):
     """In the box around all that it sweeps."""
     low, high = np.array(volume.centre) - volume.reach, np.array(volume.centre) + volume.reach
-    if isinstance(volume, Orbit):
+    if isinstance(volume, OrbitingSphere):
         low[1], high[1] = (volume.centre[1] + s * volume.radius for s in (-1, 1))
     return rng.uniform(low, high, (count, 3))
 
@@ -55,7 +55,7 @@ def within(volume, p, c, s):
     """Whether the points p are in the solid turned by angles of cosine `c` and sine `s`."""
     q = p - np.array(volume.centre)
     x, y, z = q[..., 0], q[..., 1], q[..., 2]
-    if isinstance(volume, Orbit):
+    if isinstance(volume, OrbitingSphere):
         apart = (x - volume.orbit * c) ** 2 + y**2 + (z + volume.orbit * s) ** 2
         return apart < volume.radius**2
     u, v = x * c + y * s, y * c - x * s
@@ -98,7 +98,7 @@ def densities(device):
             {
                 **overrides(shutter, [rotation]),
                 "EXACT": density == "exact",
-                "ORBITS": isinstance(volume, Orbit),
+                "ORBITS": isinstance(volume, OrbitingSphere),
                 "TORI": isinstance(volume, Torus),
             },
         )
@@ -169,7 +169,7 @@ def test_any_speed_is_safe_and_the_fastest_tends_to_the_share_of_the_circle(dens
         p = points(volume, rng)
         shutter = Shutter(720, curve=curve)
         r, _, third = twin.polar(volume, p)
-        if isinstance(volume, Orbit):
+        if isinstance(volume, OrbitingSphere):
             a = np.sqrt(np.maximum(volume.radius**2 - third**2, 0))
             share = twin.disk_half_angle(r, a, volume.orbit) / np.pi
         else:
@@ -267,8 +267,10 @@ def several():
         (),
         shots(),
         volumes=(
-            Orbit(radius=0.2, orbit=0.6, speed=30, color=(0.9, 0.2, 0.1)),
-            Orbit(radius=0.1, orbit=0.3, speed=-400, color=(0.1, 0.8, 0.2), centre=(0, 0.4, 0)),
+            OrbitingSphere(radius=0.2, orbit=0.6, speed=30, color=(0.9, 0.2, 0.1)),
+            OrbitingSphere(
+                radius=0.1, orbit=0.3, speed=-400, color=(0.1, 0.8, 0.2), centre=(0, 0.4, 0)
+            ),
             Torus(minor_radius=0.1, major_radius=0.4, speed=20, color=(0.2, 0.3, 0.9)),
         ),
     )
@@ -291,7 +293,7 @@ def test_solids_are_where_distributed_rays_meet_them():
     angle = 25 * 0.2
     there = still.object_id == 2  # body 1 is the ground
     y, x = np.nonzero(there)
-    eye = one.shot.world_from_camera(0.2)[0]
+    eye = one.camera.world_from_camera(0.2)[0]
     at = np.stack([(x + 0.5 - 32) / 36, (18 - y - 0.5) / 36, -np.ones(len(x))], axis=1)
     p = eye[:3, 3] + (still.depth[there][:, None] * at) @ eye[:3, :3].T
     c, s = math.cos(angle), math.sin(angle)
@@ -307,17 +309,17 @@ def test_solids_are_where_distributed_rays_meet_them():
 @pytest.mark.parametrize(
     "make_it, word",
     [
-        (lambda: Orbit(radius=-1, orbit=1), "radius"),
-        (lambda: Orbit(radius=1, orbit=-1), "orbit"),
-        (lambda: Orbit(radius=1, orbit=1, speed=math.nan), "speed"),
-        (lambda: Orbit(radius=1, orbit=1, phase=math.inf), "phase"),
-        (lambda: Orbit(radius=1, orbit=1, opacity=-1), "opacity"),
-        (lambda: Orbit(radius=1, orbit=1, color=(0, 0, math.nan)), "color"),
+        (lambda: OrbitingSphere(radius=-1, orbit=1), "radius"),
+        (lambda: OrbitingSphere(radius=1, orbit=-1), "orbit"),
+        (lambda: OrbitingSphere(radius=1, orbit=1, speed=math.nan), "speed"),
+        (lambda: OrbitingSphere(radius=1, orbit=1, phase=math.inf), "phase"),
+        (lambda: OrbitingSphere(radius=1, orbit=1, opacity=-1), "opacity"),
+        (lambda: OrbitingSphere(radius=1, orbit=1, color=(0, 0, math.nan)), "color"),
         (lambda: Torus(minor_radius=2, major_radius=1), "minor_radius"),
         (lambda: Torus(minor_radius=0, major_radius=1), "minor_radius"),
         (lambda: Torus(minor_radius=0.1, major_radius=math.nan), "major_radius"),
         (lambda: Torus(minor_radius=0.1, major_radius=1, speed=math.nan), "speed"),
-        (lambda: Stage(grids=((0.0, 1.0),) * 3), "grids"),
+        (lambda: Backdrop(grids=((0.0, 1.0),) * 3), "grids"),
         (lambda: Scene("x", (), shots(), density="dense"), "density"),
     ],
 )
@@ -345,7 +347,7 @@ def test_a_scene_without_volumes_is_refused():
 
 
 def test_too_many_volumes_are_refused():
-    many = Scene("many", (), shots(), volumes=(Orbit(radius=0.1, orbit=0.5),) * 17)
+    many = Scene("many", (), shots(), volumes=(OrbitingSphere(radius=0.1, orbit=0.5),) * 17)
     with pytest.raises(InputError, match="at most 16"):
         wgmb.Render(many, wgmb.Blur("volume"), size=(32, 18))(0.0)
 

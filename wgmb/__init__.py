@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .observer import Observer
     from .pipeline import Blur, blur
     from .render import Render
-    from .scene import Body, Scene, Shot
+    from .scene import Body, CameraPath, Scene
     from .shutter import Shutter
 
 __all__ = [
@@ -37,6 +37,7 @@ __all__ = [
     "Body",
     "Camera",
     "CameraFile",
+    "CameraPath",
     "Clip",
     "Cone",
     "DeviceError",
@@ -52,7 +53,6 @@ __all__ = [
     "Reprojections",
     "Scene",
     "ShaderError",
-    "Shot",
     "Shutter",
     "Vectors",
     "blur",
@@ -74,7 +74,7 @@ _PLACES = {
     "observer": ("Observer",),
     "pipeline": ("Blur", "blur"),
     "render": ("Render",),
-    "scene": ("Body", "Scene", "Shot"),
+    "scene": ("Body", "Scene", "CameraPath"),
     "shutter": ("Shutter",),
 }
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}

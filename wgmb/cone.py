@@ -48,7 +48,7 @@ class Cone:
         """Seconds after which less than 1e-4 of a flash is still to come."""
         return (self.shift + math.log(1e4)) / self.rate
 
-    def held(self, rate: float) -> int:
+    def frames_needed(self, rate: float) -> int:
         """How many pictures of `rate` a second one has to know, to tell what is seen."""
         if not (math.isfinite(rate) and rate > 0):
             raise InputError(f"rate must be over 0 pictures a second, got {rate}")
@@ -57,19 +57,19 @@ class Cone:
             raise InputError(f"{rate:g} pictures a second are too many: {MOST_HELD} are kept")
         return count
 
-    def answer(self, x: np.ndarray | float) -> np.ndarray:
+    def impulse_response(self, x: np.ndarray | float) -> np.ndarray:
         """W(x): the answer to a flash `x` seconds later, 1/s."""
         late = np.minimum(self.shift - self.rate * np.asarray(x, float), 80)
         return self.rate * np.exp(late - np.exp(late))
 
-    def seen(self, x: np.ndarray | float) -> np.ndarray:
+    def step_response(self, x: np.ndarray | float) -> np.ndarray:
         """F(x): share of the answer to a flash that has come `x` seconds later."""
         return np.exp(-np.exp(np.minimum(self.shift - self.rate * np.asarray(x, float), 80)))
 
     def weights(self, ages: np.ndarray, held: float) -> np.ndarray:
         """What pictures add that were shown for `held` [s], in the mean `ages` [s] ago."""
         ages = np.asarray(ages, float)
-        return self.seen(ages + held / 2) - self.seen(ages - held / 2)
+        return self.step_response(ages + held / 2) - self.step_response(ages - held / 2)
 
     def shares(self, count: int, rate: float, after: float = 0.0) -> np.ndarray:
         """(count,) of the last pictures, the newest first; the oldest stands for all before it.
@@ -82,4 +82,6 @@ class Cone:
 
     def shutter(self, fps: float) -> Shutter:
         """Sees a world without frames as this cell does at the frame's instant."""
-        return Shutter(360 * self.memory * fps, "end", lambda x: self.answer((1 - x) * self.memory))
+        return Shutter(
+            360 * self.memory * fps, "end", lambda x: self.impulse_response((1 - x) * self.memory)
+        )

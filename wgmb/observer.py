@@ -74,7 +74,7 @@ class Observer:
         device: wgpu.GPUDevice | str | None = None,
     ):
         self.rate, self.cone = rate, cone or Cone()
-        self.held = self.cone.held(rate)  # pictures in the ring
+        self.held = self.cone.frames_needed(rate)  # pictures in the ring
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         self._images, self._sum = TexturePool(self.device), WeightedSum(self.device)
         self._size, self._shown = (0, 0), 0

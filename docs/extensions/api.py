@@ -18,9 +18,9 @@ GROUPS = {
     ),
     "cameras": ("Camera", "Reprojections", "CameraFile"),
     "scenes": (
-        "Scene", "Body", "Shot", "Render", "scene.make", "scene.at", "scene.moving",
-        "scene.translation", "scene.rotation", "scene.scaling", "scene.Orbit", "scene.Torus",
-        "scene.Stage",
+        "Scene", "Body", "CameraPath", "Render", "scene.make", "scene.at", "scene.moving",
+        "scene.translation", "scene.rotation", "scene.scaling",
+        "scene.OrbitingSphere", "scene.Torus", "scene.Backdrop",
     ),
     "perception": ("Cone", "Observer", "Viewer"),
     "errors": ("Error", "InputError", "DeviceError", "GpuMemoryError", "ShaderError"),

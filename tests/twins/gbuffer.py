@@ -43,8 +43,8 @@ def rays(scene, size, seconds):
     """Origins and directions (height, width, 3) through the pixels' middles, 1 long in depth."""
     width, height = size
     y, x = np.mgrid[:height, :width] + 0.5
-    zoom = float(np.ravel(scene.shot.zoom(np.array([seconds])))[0])
-    camera = scene.shot.world_from_camera(seconds)[0]
+    zoom = float(np.ravel(scene.camera.zoom(np.array([seconds])))[0])
+    camera = scene.camera.world_from_camera(seconds)[0]
     right, up = (x - width / 2) / (height / 2) / zoom, (height / 2 - y) / (height / 2) / zoom
     direction = np.stack([right, up, -np.ones_like(right)], -1) @ camera[:3, :3].T
     return np.broadcast_to(camera[:3, 3], direction.shape), direction
@@ -149,8 +149,8 @@ def _radiance(scene, size, seconds, seen, origin, direction):
     color = sky
     for index, body in enumerate(scene.bodies):
         share = _share(body, seen)[..., None]
-        paint = (1 - share) * body.color + share * body.other
-        own = paint * (lit + around + body.light)[..., None] + (body.gloss * shine)[..., None]
+        paint = (1 - share) * body.color + share * body.second_color
+        own = paint * (lit + around + body.emission)[..., None] + (body.specular * shine)[..., None]
         color = np.where((seen.body == index)[..., None], own, color)
     return color
 
@@ -200,7 +200,7 @@ def _then(scene, seen, direction, seconds):
 
 def _pixels(scene, size, seconds, point):
     width, height = size
-    zoom = float(np.ravel(scene.shot.zoom(np.array([seconds])))[0])
-    seen = point @ np.linalg.inv(scene.shot.world_from_camera(seconds)[0]).T
+    zoom = float(np.ravel(scene.camera.zoom(np.array([seconds])))[0])
+    seen = point @ np.linalg.inv(scene.camera.world_from_camera(seconds)[0]).T
     flat = seen[..., :2] / -seen[..., 2:3] * zoom * (height / 2)
     return np.stack([width / 2 + flat[..., 0], height / 2 - flat[..., 1]], -1)

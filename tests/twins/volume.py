@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from wgmb.scene.volumes import Orbit
+from wgmb.scene.volumes import OrbitingSphere
 
 TURN = 2 * math.pi
 
@@ -60,7 +60,7 @@ def polar(volume, p, middle=0.0):
     """Radius, angle from the body `middle` seconds on, along its turning; third coordinate."""
     q = p - np.array(volume.centre)
     angle = volume.phase + volume.speed * middle
-    if isinstance(volume, Orbit):
+    if isinstance(volume, OrbitingSphere):
         u, v, third = q[..., 0], -q[..., 2], q[..., 1]
     else:
         u, v, third = q[..., 0], q[..., 1], q[..., 2]
@@ -74,7 +74,7 @@ def density(volume, p, shutter, fps, published=False):
     opens, closes = shutter.span
     swept = abs(volume.speed) * (closes - opens) / fps
     r, theta, third = polar(volume, p, (opens + closes) / 2 / fps)
-    if isinstance(volume, Orbit):
+    if isinstance(volume, OrbitingSphere):
         a = np.sqrt(np.maximum(volume.radius**2 - third**2, 0))
         return occupancy(shutter, theta, disk_half_angle(r, a, volume.orbit), swept, published)
     h = spiric_half_angle(r, third, volume.minor_radius, volume.major_radius)
@@ -87,7 +87,7 @@ def pseudo_distance(volume, p, shutter, fps):
     """Whose differences are the normals."""
     opens, closes = shutter.span
     speed = 30 * abs(volume.speed) * (closes - opens) / fps
-    if isinstance(volume, Orbit):
+    if isinstance(volume, OrbitingSphere):
         r, theta, third = polar(volume, p, (opens + closes) / 2 / fps)
         u = np.clip((speed - 30) / 10, 0, 1)
         k = 2 * speed * u * u * (3 - 2 * u)
@@ -145,11 +145,11 @@ def grid_line_integral(x, side):
 
 def picture(scene, time, shutter, fps, size):
     """(height, width, 3) display values: `scene` at `time` [s] through the method "volume"."""
-    volumes, stage = scene.instant(time)
+    volumes, backdrop = scene.instant(time)
     published = scene.density == "published"
     width, height = size
-    camera = scene.shot.world_from_camera(time)[0]
-    zoom = float(np.ravel(scene.shot.zoom(np.array([time])))[0])
+    camera = scene.camera.world_from_camera(time)[0]
+    zoom = float(np.ravel(scene.camera.zoom(np.array([time])))[0])
     eye, right, up, forward = camera[:3, 3], camera[:3, 0], camera[:3, 1], -camera[:3, 2]
 
     def ray(dx, dy):
@@ -161,12 +161,12 @@ def picture(scene, time, shutter, fps, size):
     def unit(v):
         return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
-    direction, light = unit(ray(0, 0)), unit(np.array(stage.light))
-    bound = stage.bound or max(math.dist((0, 0, 0), v.centre) + v.reach for v in volumes)
+    direction, light = unit(ray(0, 0)), unit(np.array(backdrop.light))
+    bound = backdrop.bound or max(math.dist((0, 0, 0), v.centre) + v.reach for v in volumes)
     columns = (np.arange(width) + 0.5) / width
-    flicker = np.sin(stage.strobe[0] + np.pi * smoothstep(0.4, 0.6, columns)) + 1
-    strobe = np.broadcast_to(1 - stage.strobe[1] * flicker, (height, width))
-    hashes = noise(width, height, stage.grain)
+    flicker = np.sin(backdrop.strobe[0] + np.pi * smoothstep(0.4, 0.6, columns)) + 1
+    strobe = np.broadcast_to(1 - backdrop.strobe[1] * flicker, (height, width))
+    hashes = noise(width, height, backdrop.grain)
 
     def cloud(p):
         each = [v.opacity * density(v, p, shutter, fps, published)[..., None] for v in volumes]
@@ -203,16 +203,16 @@ def picture(scene, time, shutter, fps, size):
     def ground(dx, dy):
         to = ray(dx, dy)
         with np.errstate(all="ignore"):
-            return eye + to * ((stage.ground - eye[1]) / to[..., 1:2])
+            return eye + to * ((backdrop.ground - eye[1]) / to[..., 1:2])
 
     down = direction[..., 1] < 0
     at = ground(0, 0)
     at = np.where(down[..., None], at, 0.0)
     footprint = np.maximum(*(np.abs(ground(*d) - at)[..., ::2] for d in ((1, 0), (0, 1))))
     footprint = np.where(down[..., None], np.maximum(footprint, 1e-6), 1.0)
-    tint = np.array(stage.tint)
+    tint = np.array(backdrop.tint)
     color = np.zeros((height, width, 3)) + tint
-    for side, weight in stage.grids:
+    for side, weight in backdrop.grids:
         covered = [grid_line_integral(at[..., ::2] + k * footprint, side) for k in (-0.5, 0.5)]
         covered = (covered[1] - covered[0]) / footprint
         color += (weight * (1 - 0.6 * covered).prod(-1))[..., None]

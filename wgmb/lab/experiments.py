@@ -16,7 +16,7 @@ from ..methods import METHODS
 from ..metrics import MEASURES, display
 from ..scene import builtin
 from ..scene.bodies import Body, moving
-from ..scene.scene import Scene, Shot
+from ..scene.scene import CameraPath, Scene
 from ..shutter import Shutter
 from .cases import Case, Contender, Staged, scene_case
 from .compare import Laboratory
@@ -334,7 +334,7 @@ def _chase(speed: float = 9.0) -> Scene:
                (0.72, 0.10, 0.07), (0.9, 0.85, 0.75), "CHECKER", (3, 3))  # fmt: skip
     ball = Body("sphere", (0.4, 0.4, 0.4), moving((1.3, 1.2, -2.2), (-4, 0, 0)),
                 (0.08, 0.45, 0.46), (0.9, 0.85, 0.75), "STRIPES", (12, 1))  # fmt: skip
-    shot = Shot(lambda t: (speed * t, 1.3, 2.2), pitch=lambda t: -0.07 + 0 * t)
+    shot = CameraPath(lambda t: (speed * t, 1.3, 2.2), pitch=lambda t: -0.07 + 0 * t)
     return replace(hall, name="chase", bodies=(*hall.bodies, box, ball), shot=shot)
 
 

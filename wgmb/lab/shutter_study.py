@@ -34,7 +34,9 @@ def difference(shutter: Shutter, speed: float, fps: float, cone: Cone | None = N
     for t in (np.arange(4) + 0.5) / 4 / fps:
         # The angle by which the disk has passed a place; up to 1 rad ahead is not yet passed.
         passed = (speed * t - theta + 1) % TURN - 1 + TURN * np.arange(passes)[:, None, None]
-        nature = cone.seen((passed + half) / speed) - cone.seen((passed - half) / speed)
+        nature = cone.step_response((passed + half) / speed) - cone.step_response(
+            (passed - half) / speed
+        )
         video = np.zeros((len(r), len(theta)))
         for k in range(1, -frames, -1):
             weight = cone.weights(t - k / fps, 1 / fps)

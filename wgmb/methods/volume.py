@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..gpu import wgsl
 from ..scene.density import TURN, Rotation, overrides, tables
 from ..scene.figure import RATE
-from ..scene.volumes import Orbit, Stage, Torus
+from ..scene.volumes import Backdrop, OrbitingSphere, Torus
 from ..shutter import Shutter
 from .options import MethodOptions
 
@@ -23,10 +23,11 @@ CLOUD, SHADOW = 1, 2  # what can be in a tile
 class Volume:
     """Motion-blurred density, integrated in closed form, as a cloud (Cusa 2022).
 
-    A scene's volumes (`Orbit`, `Torus`) on their stage; `samples` do not matter. How much of
-    the exposure a volume is at a place is a difference of the shutter's antiderivative. Scenes
-    choose the `density`: "exact" counts every revolution, at any speed, as a periodic sum in
-    closed form (box, cosine) or in a table; "published" counts each crossing once.
+    A scene's volumes (`OrbitingSphere`, `Torus`) before their backdrop; `samples` do not matter.
+    The share of the exposure that a volume spends at a place is a difference of the shutter's
+    antiderivative. Scenes choose the `density`: "exact" counts every revolution, at any speed, as
+    a periodic sum in closed form (box, cosine) or in a table; "published" counts each crossing
+    once.
 
     Strong: trails of any length and speed without noise or copies, at one price. Artefacts:
     surfaces look soft, normals are blended guesses, shadows are of the cloud.
@@ -58,7 +59,7 @@ class Volume:
 
     def _volumes(self, encoder, inputs, output):
         on_gpu, shutter = inputs.scene, inputs.shutter
-        volumes, stage = on_gpu.shown.instant(on_gpu.time)
+        volumes, backdrop = on_gpu.shown.instant(on_gpu.time)
         volumes = [v for v in volumes if v.opacity or v.facing]
         volumes.sort(key=lambda v: isinstance(v, Torus))
         exact = on_gpu.shown.density == "exact"
@@ -66,7 +67,7 @@ class Volume:
         constants = {
             **overrides(shutter, rotations),
             "EXACT": exact,
-            "ORBITS": sum(isinstance(v, Orbit) for v in volumes),
+            "ORBITS": sum(isinstance(v, OrbitingSphere) for v in volumes),
             "TORI": sum(isinstance(v, Torus) for v in volumes),
             "ROLLING": shutter.rolling is not None,
             "BLENDED": all(v.facing is not None for v in volumes),
@@ -74,7 +75,7 @@ class Volume:
         source = wgsl.load("methods/volume.wgsl")
         if len(volumes) > (most := source.constant("MOST_VOLUMES")):
             raise InputError(f"a scene has at most {most} volumes, got {len(volumes)}")
-        data = _uniforms(on_gpu, shutter, stage, volumes, rotations)
+        data = _uniforms(on_gpu, shutter, backdrop, volumes, rotations)
         shared = {
             "scene": self._uniform("volumes", data),
             "tables": self._storage("tables", tables(shutter, rotations)),
@@ -142,7 +143,7 @@ class Volume:
 
 def volume_row(
     row: np.ndarray,
-    v: Orbit | Torus,
+    v: OrbitingSphere | Torus,
     rotation: Rotation,
     middle_of: float,
     delay: tuple[float, float],
@@ -160,7 +161,7 @@ def volume_row(
     row["drift"] = [abs(v.speed) * d for d in delay]
     half = min((swept + np.abs(row["drift"]).sum()) / 2, math.pi / 2)
     middle, reach = np.array(v.centre), v.reach
-    if isinstance(v, Orbit):
+    if isinstance(v, OrbitingSphere):
         row["turn"] = c, -s, -side * s, -side * c
         row["small"], row["large"] = v.radius, v.orbit
         quick = 2 * speed * _smoothstep(30, 40, speed)
@@ -183,7 +184,9 @@ def _smoothstep(a: float, b: float, x: float) -> float:
     return u * u * (3 - 2 * u)
 
 
-def rotation_of(volume: Orbit | Torus, shutter: Shutter, fps: float, exact: bool) -> Rotation:
+def rotation_of(
+    volume: OrbitingSphere | Torus, shutter: Shutter, fps: float, exact: bool
+) -> Rotation:
     """Its rotation within the exposure; a torus has twofold symmetry, which "published" ignores."""
     opens, closes = shutter.span
     symmetry = 2 if exact and isinstance(volume, Torus) else 1
@@ -191,19 +194,23 @@ def rotation_of(volume: Orbit | Torus, shutter: Shutter, fps: float, exact: bool
 
 
 def _uniforms(
-    on_gpu, shutter: Shutter, stage: Stage, volumes: list[Orbit | Torus], rotations: list[Rotation]
+    on_gpu,
+    shutter: Shutter,
+    backdrop: Backdrop,
+    volumes: list[OrbitingSphere | Torus],
+    rotations: list[Rotation],
 ) -> np.ndarray:
     source = wgsl.load("methods/volume.wgsl")
     data = np.zeros((), source.dtype("Volumes"))
     width, height = on_gpu.size
-    camera = on_gpu.shown.shot.world_from_camera(on_gpu.time)[0]
-    zoom = float(np.ravel(on_gpu.shown.shot.zoom(np.array([on_gpu.time])))[0])
-    bound = stage.bound or max(math.dist((0, 0, 0), v.centre) + v.reach for v in volumes)
+    camera = on_gpu.shown.camera.world_from_camera(on_gpu.time)[0]
+    zoom = float(np.ravel(on_gpu.shown.camera.zoom(np.array([on_gpu.time])))[0])
+    bound = backdrop.bound or max(math.dist((0, 0, 0), v.centre) + v.reach for v in volumes)
     data["eye"] = (*camera[:3, 3], bound)
     data["right"][:3] = camera[:3, 0] * width / height / zoom
     data["up"][:3], data["forward"][:3] = camera[:3, 1] / zoom, -camera[:3, 2]
-    data["strobe"], data["grain"] = stage.strobe, stage.grain
-    stage.fill(data["stage"])
+    data["strobe"], data["grain"] = backdrop.strobe, backdrop.grain
+    backdrop.fill(data["backdrop"])
     middle_of = sum(shutter.span) / 2 / on_gpu.fps
     delay = shutter.delay[0] / on_gpu.fps, shutter.delay[1] / on_gpu.fps
     for i, (row, volume, rotation) in enumerate(
@@ -232,7 +239,7 @@ def tile_kinds(
     spread = np.linalg.norm(corner[0, 0] - corner[1, 1]) / 2 / length
     bounds, slabs = (data["volumes"][n][:count].astype(float) for n in ("bound", "slab"))
     seen = _meets(eye, middle / length[..., None], bounds, slabs, spread)
-    light, height = data["stage"]["light"][:3].astype(float), float(data["stage"]["tint"][3])
+    light, height = data["backdrop"]["light"][:3].astype(float), float(data["backdrop"]["tint"][3])
     drop = height - eye[1]
     down = corner[..., 1] * drop > 0
     along = drop / np.where(down, corner[..., 1], 1)

@@ -2,16 +2,16 @@
 
 from .bodies import Body, at, moving, rotation, scaling, translation
 from .builtin import SCENES, make
-from .scene import Scene, Shot
-from .volumes import Orbit, Stage, Torus
+from .scene import CameraPath, Scene
+from .volumes import Backdrop, OrbitingSphere, Torus
 
 __all__ = [
     "SCENES",
+    "Backdrop",
     "Body",
-    "Orbit",
+    "CameraPath",
+    "OrbitingSphere",
     "Scene",
-    "Shot",
-    "Stage",
     "Torus",
     "at",
     "make",

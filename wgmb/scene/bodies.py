@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 Color = tuple[float, float, float]
-Place = Callable[[np.ndarray], np.ndarray]  # times (n,) -> world_from_body (n, 4, 4)
+Pose = Callable[[np.ndarray], np.ndarray]  # times (n,) -> world_from_body (n, 4, 4)
 SHAPES = ("sphere", "box", "cylinder", "ring")
 PATTERNS = ("PLAIN", "CHECKER", "STRIPES", "BRICKS", "DOTS", "GROUND")
 
@@ -52,27 +52,27 @@ def rotation(axis: str, angle: ArrayLike, like: ArrayLike) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Body:
-    """One rigid thing; `path` gives its place without its size.
+    """One rigid thing; `pose` gives its place without its size.
 
     `size`: half extents; a ring's tube is as thick as it is high, 2 size[1].
     """
 
     shape: str
     size: tuple[float, float, float]
-    path: Place
+    pose: Pose
     color: Color = (0.7, 0.7, 0.7)
-    other: Color = (0.2, 0.2, 0.2)
+    second_color: Color = (0.2, 0.2, 0.2)
     pattern: str = "PLAIN"
     repeats: tuple[float, float] = (1.0, 1.0)
-    light: float = 0.0
-    gloss: float = 0.0
+    emission: float = 0.0
+    specular: float = 0.0
 
     def world_from_body(self, t: ArrayLike) -> np.ndarray:
         """(n, 4, 4) at the times `t` [s]."""
-        return self.path(times_of(t)) @ scaling(self.size, t)
+        return self.pose(times_of(t)) @ scaling(self.size, t)
 
 
-def at(x: float, y: float, z: float, yaw: float = 0.0, pitch: float = 0.0) -> Place:
+def at(x: float, y: float, z: float, yaw: float = 0.0, pitch: float = 0.0) -> Pose:
     """A place that does not move; yaw about y, then pitch about x [radians]."""
     return lambda t: translation(x, y, z, t) @ rotation("y", yaw, t) @ rotation("x", pitch, t)
 
@@ -84,7 +84,7 @@ def moving(
     spin: float = 0.0,
     axis: str = "z",
     fall: float = 0.0,
-) -> Place:
+) -> Pose:
     """Along a line or, with `fall` [m/s^2], a parabola; spinning about `axis` [rad/s]."""
     (x, y, z), (u, v, w) = start, velocity
     return lambda t: (

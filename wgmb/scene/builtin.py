@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from .bodies import Body, at, moving, rotation, translation
 from .figure_scenes import cone, disk, spiric
-from .scene import Scene, Shot
+from .scene import CameraPath, Scene
 from .torusphere import torusphere
 
 RED, ORANGE, YELLOW = (0.72, 0.10, 0.07), (0.85, 0.36, 0.08), (0.90, 0.72, 0.18)
@@ -27,7 +27,7 @@ TURN = 2 * math.pi
 
 def _ground(color=SAND, other=STONE) -> Body:
     return Body(
-        "box", (40, 0.5, 40), at(0, -0.5, 0), color, other, "CHECKER", (0.5, 0.5), gloss=0.1
+        "box", (40, 0.5, 40), at(0, -0.5, 0), color, other, "CHECKER", (0.5, 0.5), specular=0.1
     )
 
 
@@ -47,7 +47,7 @@ def _room() -> tuple[Body, ...]:
             TEAL,
             "STRIPES",
             (6, 1),
-            gloss=0.2,
+            specular=0.2,
         )
         for x in (-3.4, 3.4)
         for z in (-6.0, -3.2, -0.4)
@@ -63,7 +63,7 @@ def _room() -> tuple[Body, ...]:
         )
     ]
     balls = [
-        Body("sphere", (r, r, r), at(x, r, z), color, CREAM, pattern, repeats, gloss=0.5)
+        Body("sphere", (r, r, r), at(x, r, z), color, CREAM, pattern, repeats, specular=0.5)
         for x, z, r, color, pattern, repeats in (
             (-0.6, -3.7, 0.5, RED, "DOTS", (16, 16)),
             (1.1, -3.4, 0.38, TEAL, "STRIPES", (14, 1)),
@@ -76,13 +76,13 @@ def _room() -> tuple[Body, ...]:
 
 def translation_(speed: float = 2.4) -> Scene:
     """Taylor's translation: the camera moves sideways, `speed` [m/s]."""
-    shot = Shot(lambda t: (-0.05 + speed * t, 1.3, 2.2), pitch=lambda t: -0.07 + 0 * t)
+    shot = CameraPath(lambda t: (-0.05 + speed * t, 1.3, 2.2), pitch=lambda t: -0.07 + 0 * t)
     return Scene("translation", _room(), shot)
 
 
 def scaling_(dolly: float = 6.0, zoom: float = 0.0) -> Scene:
     """Taylor's scaling: the camera comes closer, `dolly` [m/s], or zooms, `zoom` [ln/s]."""
-    shot = Shot(
+    shot = CameraPath(
         lambda t: (0 * t, 1.3, 2.6 - dolly * t),
         pitch=lambda t: -0.07 + 0 * t,
         zoom=lambda t: 1.6 * np.exp(zoom * t),
@@ -92,7 +92,7 @@ def scaling_(dolly: float = 6.0, zoom: float = 0.0) -> Scene:
 
 def rotation_(roll: float = 1.5, yaw: float = 0.0) -> Scene:
     """Taylor's rotation: the camera rolls and turns, `roll` and `yaw` [rad/s]."""
-    shot = Shot(
+    shot = CameraPath(
         lambda t: (0 * t, 1.4, 2.4),
         yaw=lambda t: yaw * t,
         pitch=lambda t: -0.06 + 0 * t,
@@ -113,7 +113,7 @@ def crossing(speed: float = 1.0) -> Scene:
             CREAM,
             "CHECKER",
             (12, 12),
-            gloss=0.5,
+            specular=0.5,
         ),
         Body(
             "sphere",
@@ -123,7 +123,7 @@ def crossing(speed: float = 1.0) -> Scene:
             CREAM,
             "STRIPES",
             (12, 1),
-            gloss=0.5,
+            specular=0.5,
         ),
         Body(
             "box",
@@ -151,7 +151,7 @@ def crossing(speed: float = 1.0) -> Scene:
             CREAM,
             "STRIPES",
             (8, 1),
-            gloss=0.3,
+            specular=0.3,
         ),
     )
     still = (
@@ -172,8 +172,8 @@ def crossing(speed: float = 1.0) -> Scene:
     return Scene("crossing", (*movers, *still), _still_camera())
 
 
-def _still_camera() -> Shot:
-    return Shot(lambda t: (0 * t, 1.4, 2.6), pitch=lambda t: -0.04 + 0 * t)
+def _still_camera() -> CameraPath:
+    return CameraPath(lambda t: (0 * t, 1.4, 2.6), pitch=lambda t: -0.04 + 0 * t)
 
 
 def wheel(speed: float = 24.0, roll: float = 0.0) -> Scene:
@@ -204,7 +204,11 @@ def wheel(speed: float = 24.0, roll: float = 0.0) -> Scene:
             )
         bodies.append(
             Body(
-                "cylinder", (0.16, 0.16, 0.1), _around(hub, roll, turn, 0.0, 0.0), YELLOW, gloss=0.5
+                "cylinder",
+                (0.16, 0.16, 0.1),
+                _around(hub, roll, turn, 0.0, 0.0),
+                YELLOW,
+                specular=0.5,
             )
         )
     return Scene("wheel", tuple(bodies), _still_camera())
@@ -229,7 +233,7 @@ def fence(speed: float = 3.0, posts: int = 15) -> Scene:
     pickets = [Body("box", (0.028, 0.75, 0.02), at(float(x), 0.75, 0.9), CREAM) for x in xs]
     wide = float(abs(xs[0])) + 0.2
     rails = [Body("box", (wide, 0.03, 0.015), at(0, y, 0.86), WOOD) for y in (0.45, 1.2)]
-    shot = Shot(lambda t: (-0.06 + speed * t, 1.25, 2.4), pitch=lambda t: -0.06 + 0 * t)
+    shot = CameraPath(lambda t: (-0.06 + speed * t, 1.25, 2.4), pitch=lambda t: -0.06 + 0 * t)
     return Scene("fence", (*_room(), *pickets, *rails), shot)
 
 
@@ -244,7 +248,7 @@ def bounce(gravity: float = 60.0, speed: float = 5.0) -> Scene:
             CREAM,
             "DOTS",
             (14, 14),
-            gloss=0.5,
+            specular=0.5,
         )
         for x, y, z, r, vx, vy, s, color in (
             (-1.6, 1.0, -2.4, 0.4, 1.0, 1.1, -8, RED),
@@ -264,7 +268,7 @@ def hdr(light: float = 60.0, speed: float = 1.0) -> Scene:
         turn = (14.0 - 3 * k) * speed
         path = _around(hub, 0.0, turn, 1.1 * k, 0.55)
         size = 0.035 + 0.01 * (k % 3)
-        lamps.append(Body("sphere", (size, size, size), path, color, light=light))
+        lamps.append(Body("sphere", (size, size, size), path, color, emission=light))
     return Scene(
         "hdr",
         (*_room(), *lamps),

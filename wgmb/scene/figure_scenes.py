@@ -5,11 +5,11 @@ from __future__ import annotations
 from ..cone import VIDEOS
 from ..errors import InputError
 from .figure import RATE, Figure
-from .scene import Scene, Shot
+from .scene import CameraPath, Scene
 
 
 def _scene(name: str, figure: Figure) -> Scene:
-    still = Shot(lambda t: (0 * t, 0 * t, 1 + 0 * t))
+    still = CameraPath(lambda t: (0 * t, 0 * t, 1 + 0 * t))
     return Scene(name, (), still, figure=figure, exposure=(1 / RATE, "box"))
 
 

@@ -49,7 +49,7 @@ class SceneOnGpu:
         if n > (most := source.constant("MOST_BODIES")):
             raise InputError(f"a scene has at most {most} bodies, got {n}")
         self.rays, self.span = rays, span
-        self.constants = {"RINGS": rings > 0, "STAGED": scene.stage is not None}
+        self.constants = {"RINGS": rings > 0, "BACKDROP": scene.backdrop is not None}
 
     @cached_property
     def resources(self) -> dict[str, wgpu.GPUBuffer | wgpu.GPUTextureView]:
@@ -77,9 +77,9 @@ class SceneOnGpu:
         data["bodies"] = len(scene.bodies)
         shapes = [b.shape for b in scene.bodies]
         data["spheres"], data["boxes"], data["cylinders"] = map(shapes.count, SHAPES[:3])
-        if scene.stage is not None:
-            scene.stage.fill(data["stage"])
-        zoom = float(np.ravel(scene.shot.zoom(np.array([time])))[0])
+        if scene.backdrop is not None:
+            scene.backdrop.fill(data["backdrop"])
+        zoom = float(np.ravel(scene.camera.zoom(np.array([time])))[0])
         data["pixel"] = 2 / (zoom * size[1])
         data["rays"] = self.rays
         for bounds, place in zip(data["bounds"], places, strict=False):
@@ -131,7 +131,7 @@ class SceneOnGpu:
 
     def _camera(self, frames: float) -> Camera:
         t = self.time + frames / self.fps
-        shot = self.scene.shot
+        shot = self.scene.camera
         view = np.linalg.inv(shot.world_from_camera(t)[0])
         clip = shot.clip_from_camera(t, self.size[0] / self.size[1])[0]
         bodies = {i + 1: b.world_from_body(t)[0] for i, b in enumerate(self.scene.bodies)}
@@ -143,7 +143,10 @@ def _bodies(scene: Scene, source: wgsl.WgslSource) -> np.ndarray:
     for i, body in enumerate(scene.bodies):
         row = table[i : i + 1]
         row["size"] = (*body.size, 0)
-        row["color"], row["other"] = (*body.color, body.light), (*body.other, body.gloss)
+        row["color"], row["other"] = (
+            (*body.color, body.emission),
+            (*body.second_color, body.specular),
+        )
         row["repeats"], row["object"] = body.repeats, i + 1
         row["pattern"] = source.constant(body.pattern)
     return table
@@ -168,13 +171,13 @@ def _halves(low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 def _world_from_picture(scene: Scene, times: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """(rows, 4, 4) from -1..1, y up, and 1: the ray's direction; from the origin: its start."""
-    zoom = np.broadcast_to(scene.shot.zoom(times), times.shape)
+    zoom = np.broadcast_to(scene.camera.zoom(times), times.shape)
     if not ((zoom > 1 / MOST) & (zoom < MOST)).all():
         raise InputError(f"the camera's zoom must be over 0, got {zoom.min():g} to {zoom.max():g}")
     lens = np.zeros((len(times), 4, 4))
     lens[:, 0, 0], lens[:, 1, 1] = size[0] / size[1] / zoom, 1 / zoom
     lens[:, 2, 2], lens[:, 3, 3] = -1, 1  # looking along -z
-    return scene.shot.world_from_camera(times) @ lens
+    return scene.camera.world_from_camera(times) @ lens
 
 
 def _check_finite(camera: np.ndarray, places: list[np.ndarray]) -> None:

@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from .bodies import PATTERNS, SHAPES, Body, Color, rotation, times_of, translation
-from .volumes import Instant, Stage, Volume
+from .volumes import Backdrop, Instant, Volume
 
 if TYPE_CHECKING:
     from .figure import Figure
 
 
 @dataclass(frozen=True)
-class Shot:
+class CameraPath:
     """A camera over time: where it is and looks, and how wide [functions of seconds]."""
 
     position: Callable[[np.ndarray], tuple[ArrayLike, ArrayLike, ArrayLike]]
@@ -76,20 +76,20 @@ class Scene:
     """What is rendered.
 
     `volumes` are shown blurred by the method "volume", and as solid bodies by all others. A
-    function gives them and their stage around an instant [s], with `phase` the angle at it.
+    function gives them and their backdrop around an instant [s], with `phase` the angle at it.
     `density`: "exact" counts every revolution within the exposure, "published" one crossing.
     """
 
     name: str
     bodies: tuple[Body, ...]
-    shot: Shot
+    camera: CameraPath
     sun: tuple[float, float, float, float] = (0.45, 0.8, 0.5, 0.95)
     """Direction towards it (any length) and its strength."""
     sky: tuple[float, float, float, float] = (0.22, 0.42, 0.78, 0.32)
     """Colour straight up; strength of the light from all round."""
     horizon: Color = (0.62, 0.72, 0.82)
     volumes: tuple[Volume, ...] | Callable[[float], Instant] = ()
-    stage: Stage | None = None
+    backdrop: Backdrop | None = None
     density: str = "exact"
     exposure: tuple[float, str] | None = None
     """The shutter it is made for: seconds, curve."""
@@ -108,7 +108,7 @@ class Scene:
                 raise InputError(
                     f"pattern must be one of {', '.join(PATTERNS)}, got {body.pattern!r}"
                 )
-            looks = (*body.color, *body.other, *body.repeats, body.light, body.gloss)
+            looks = (*body.color, *body.second_color, *body.repeats, body.emission, body.specular)
             if not _all_finite(looks):
                 raise InputError(f"a {body.shape} needs colours and lights in f32, got {looks}")
         if not _all_finite((*self.sun, *self.sky, *self.horizon)) or not any(self.sun[:3]):
@@ -128,40 +128,40 @@ class Scene:
         return bool(self.volumes) or self.figure is not None
 
     def instant(self, time: float) -> Instant:
-        """Its volumes and their stage around `time` [s]; phases are the angles at it."""
+        """Its volumes and their backdrop around `time` [s]; phases are the angles at it."""
         if callable(self.volumes):
             return self.volumes(time)
         turned = tuple(
             replace(v, phase=math.fmod(v.phase + v.speed * time, 2 * math.pi)) for v in self.volumes
         )
-        return turned, self.stage or Stage()
+        return turned, self.backdrop or Backdrop()
 
     def solid(self, time: float) -> Scene:
         """The scene around `time` [s], its volumes turned into bodies.
 
         Of volumes that are blended into one another, the densest is there.
         """
-        volumes, stage = self.instant(time)
+        volumes, backdrop = self.instant(time)
         if not volumes:
             return self
         most = max((v.opacity for v in volumes if v.facing is not None), default=0.0)
         there = [v for v in volumes if v.facing is None or v.opacity == most]
         bodies = [_since(v.solid(), time) for v in there]
-        return replace(self, bodies=(*self.bodies, *bodies, stage.body()), stage=stage)
+        return replace(self, bodies=(*self.bodies, *bodies, backdrop.body()), backdrop=backdrop)
 
     def seen_from(
         self, orbit: tuple[float, float], pan: tuple[float, float], dolly: float
     ) -> Scene:
-        """The same scene, its camera moved as `Shot.orbit`, `pan` and `dolly` say."""
+        """The same scene, its camera moved as `CameraPath.orbit`, `pan` and `dolly` say."""
         values = (*orbit, *pan, dolly)
         if not _all_finite(values) or not 0 < dolly <= 1000:
             raise InputError(f"orbit, pan and dolly must be finite, dolly over 0, got {values}")
-        return replace(self, shot=replace(self.shot, orbit=orbit, pan=pan, dolly=dolly))
+        return replace(self, camera=replace(self.camera, orbit=orbit, pan=pan, dolly=dolly))
 
 
 def _since(body: Body, time: float) -> Body:
     """A body whose path counts from `time` [s]."""
-    return replace(body, path=lambda t: body.path(t - time))
+    return replace(body, pose=lambda t: body.pose(t - time))
 
 
 def _all_finite(numbers: Iterable[Any]) -> bool:

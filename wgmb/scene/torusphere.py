@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from ..errors import InputError
-from .scene import Scene, Shot
-from .volumes import Instant, Orbit, Stage, Torus
+from .scene import CameraPath, Scene
+from .volumes import Backdrop, Instant, OrbitingSphere, Torus
 
 TURN = 2 * math.pi
 BEGIN = 25.0  # seconds of the animation that have passed at iTime 0
@@ -48,7 +48,7 @@ def _turning(x: float) -> tuple[float, float]:
 
 
 def instant(time: float) -> Instant:
-    """Sphere, torus and stage at `time`."""
+    """Sphere, torus and backdrop at `time`."""
     x = remapped(time)
     sphere_phase, torus_phase = x % CYCLE, (x + HALF) % CYCLE
     (sphere_speed, sphere_angle), (torus_speed, torus_angle) = _turning(x), _turning(x + HALF)
@@ -56,7 +56,7 @@ def instant(time: float) -> Instant:
     major = size / (1 + KAPPA)
     u = min(max(sphere_phase - HALF, 0.0), 0.2) - 0.1
     torus_share, torus_facing = _blend(x), _blend(x + 0.06)
-    sphere = Orbit(
+    sphere = OrbitingSphere(
         radius=math.exp(-sphere_phase - HALF),
         orbit=(0.5 + 10 * u / (100 * u * u + 1)) * major,
         speed=sphere_speed,
@@ -74,7 +74,7 @@ def instant(time: float) -> Instant:
         swell=max(1.0, 8 * (torus_phase - 0.76)),
     )
     parts = [k / 3 for k in range(3)]
-    stage = Stage(
+    backdrop = Backdrop(
         grids=tuple(
             (7 * math.exp(-((x + ZOOM * p) % ZOOM)), (1 - math.cos(TURN * (p + x / ZOOM))) / 6)
             for p in parts
@@ -83,7 +83,7 @@ def instant(time: float) -> Instant:
         bound=math.exp(-min(torus_phase, 5 * (CYCLE - (x - HALF) % CYCLE))),
         grain=round(1e3 * time) % 2**32,
     )
-    return (sphere, torus), stage
+    return (sphere, torus), backdrop
 
 
 def torusphere(cam_x: float = 0.0, cam_y: float = 0.0, density: str = "exact") -> Scene:
@@ -96,7 +96,7 @@ def torusphere(cam_x: float = 0.0, cam_y: float = 0.0, density: str = "exact") -
 
     raised = 0.75 + cam_y
     x, y = DISTANCE * math.cos(raised), DISTANCE * math.sin(raised)
-    shot = Shot(
+    shot = CameraPath(
         lambda t: (x * np.sin(turn(t)), y + 0 * t, x * np.cos(turn(t))),
         yaw=turn,
         pitch=lambda t: -raised + 0 * t,

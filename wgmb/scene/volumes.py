@@ -1,4 +1,4 @@
-"""Volumes whose blur has a closed form, and the stage they are shown on (Cusa 2022)."""
+"""Volumes whose blur has a closed form, and the backdrop they are shown on (Cusa 2022)."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -14,7 +14,7 @@ from .bodies import Body, Color, at, rotation, translation
 
 
 @dataclass(frozen=True, kw_only=True)
-class Orbit:
+class OrbitingSphere:
     """A sphere of `radius` whose centre runs on a circle of radius `orbit` about an axis along y.
 
     `phase`: its angle at time 0 [rad], right-handed from +x. `speed`: [rad/s], any size and sign.
@@ -63,7 +63,8 @@ class Torus:
     """A torus whose ring lies in xz at angle 0 and that turns about z.
 
     `phase`: its angle at time 0 [rad], right-handed. `speed`: [rad/s], any size and sign.
-    `opacity`, `facing`: as for Orbit; `swell`: its normals are those of a torus so much smaller.
+    `opacity`, `facing`: as for OrbitingSphere; `swell`: its normals are those of a torus so much
+    smaller.
     """
 
     minor_radius: float
@@ -102,7 +103,7 @@ class Torus:
         )
 
 
-Volume = Orbit | Torus
+Volume = OrbitingSphere | Torus
 
 
 def _positive(volume: Volume, name: str) -> None:
@@ -123,7 +124,7 @@ def _check_volume(volume: Volume) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stage:
+class Backdrop:
     """What volumes are shown on: a ground with three grids of lines, a sky, a light.
 
     Colours are display values, as in the animation that this is from (Cusa 2022, torusphere).
@@ -154,10 +155,10 @@ class Stage:
         return Body("box", size, at(0, self.ground - 0.5, 0), self.tint, pattern="GROUND")
 
     def fill(self, row: np.ndarray) -> None:
-        """Write it into a `Stage` of wgsl/scene/stage.wgsl."""
+        """Write it into a `Backdrop` of wgsl/scene/backdrop.wgsl."""
         row["tint"] = (*self.tint, self.ground)
         row["light"][:3] = np.array(self.light) / np.linalg.norm(self.light)
         row["cells"][:3], row["weights"][:3] = zip(*self.grids, strict=True)
 
 
-Instant = tuple[tuple[Volume, ...], Stage]
+Instant = tuple[tuple[Volume, ...], Backdrop]

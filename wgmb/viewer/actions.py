@@ -18,7 +18,7 @@ from ..io import exr, stills
 from ..io.atomic import temporary_name, write_file
 from ..io.record import KEY
 from ..io.video import Video
-from .renderer import Stage
+from .renderer import Renderer
 from .screen import Screen
 from .state import State
 
@@ -26,7 +26,7 @@ from .state import State
 class Actions:
     """Does them, and knows what is still under way; what cannot be done is said."""
 
-    def __init__(self, canvas, stage: Stage, screen: Screen, say: Callable[[str], None]):
+    def __init__(self, canvas, stage: Renderer, screen: Screen, say: Callable[[str], None]):
         self._window = getattr(canvas, "_window", None)  # of glfw, where there is one
         self._canvas, self._stage, self._screen, self._say = canvas, stage, screen, say
         self._video: Video | None = None

@@ -59,7 +59,7 @@ class Perceived:
         alike = (replace(state.picture, frame=0.0), (width, height), rays, blur)
         if alike != self._alike:
             self._frames, self._alike = {}, alike
-        newest, count = math.floor(state.frame + 0.5), eye.held(state.fps)
+        newest, count = math.floor(state.frame + 0.5), eye.frames_needed(state.fps)
         numbers = range(newest, newest - count, -1)
         spare = [self._frames.pop(n).texture for n in [*self._frames] if n not in numbers]
         end = time.perf_counter() + seconds

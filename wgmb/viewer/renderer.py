@@ -80,7 +80,7 @@ class Report:
     changed: bool = False
 
 
-class Stage:
+class Renderer:
     """The textures of what is shown, and the passes that draw them."""
 
     def __init__(self, device: wgpu.GPUDevice):
@@ -224,7 +224,7 @@ class Stage:
         if name == "perceived" and (eye := state.eye):
             if state.is_scene:  # of its own, so that what else is drawn keeps its moment
                 subject = self._past = self._past or SceneSubject(self.device)
-            coming.total = eye.held(state.fps)
+            coming.total = eye.frames_needed(state.fps)
             coming.done = self._perceived.draw(
                 coming.texture, state, eye, subject, blur, rays, seconds, self._timing
             )

@@ -214,7 +214,7 @@ def _eye(ui: Widgets, state: State) -> State:
     state = ui.slide(state, "cone_rate", 20, 200, "%.0f / s", log=True, label="fading")
     state = ui.slide(state, "cone_peak", 0, 0.2, "%.3f s", label="delay")
     if state.eye:
-        ui.dim(f"of the last {state.eye.held(state.fps)} frames, {state.fps:g} a second")
+        ui.dim(f"of the last {state.eye.frames_needed(state.fps)} frames, {state.fps:g} a second")
     return state
 
 

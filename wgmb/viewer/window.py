@@ -20,7 +20,7 @@ from ..errors import DeviceError, InputError
 from . import controls
 from .actions import Actions
 from .panel import Info, Panel
-from .renderer import Stage
+from .renderer import Renderer
 from .screen import Screen, key_box
 from .state import COMPARE, State
 from .theme import style
@@ -57,7 +57,7 @@ class Viewer:
         format = self._context.get_preferred_format(self.device.adapter).removesuffix("-srgb")
         self._context.configure(device=self.device, format=format)
         self.stage, self.screen, self.panel = (
-            Stage(self.device),
+            Renderer(self.device),
             Screen(self.device, format),
             Panel(),
         )

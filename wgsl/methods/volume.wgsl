@@ -3,7 +3,7 @@
 //#include common/frame.wgsl
 //#include common/hash.wgsl
 //#include scene/density.wgsl
-//#include scene/stage.wgsl
+//#include scene/backdrop.wgsl
 
 @group(1) @binding(1) var<uniform> scene: Volumes;
 @group(1) @binding(2) var<storage, read> tiles: array<vec2u>;  // of the workgroups: their places in the image, in workgroups
@@ -40,7 +40,7 @@ struct Volumes {
     right: vec4f,       // axes of the view; right and up are as long as half the image at distance 1
     up: vec4f,
     forward: vec4f,
-    stage: Stage,
+    backdrop: Backdrop,
     strobe: vec2f,      // phase [rad], amount
     grain: u32,         // seed of the noise
     volumes: array<Volume, MOST_VOLUMES>,
@@ -81,23 +81,23 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local
     let x = (vec2f(id) + 0.5) / size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
     let ray = x.x * scene.right.xyz + x.y * scene.up.xyz + scene.forward.xyz;
     let direction = normalize(ray);
-    let light = scene.stage.light.xyz;
+    let light = scene.backdrop.light.xyz;
     let eye = scene.eye.xyz;
     let strobe = 1.0 - scene.strobe.y
         * (sin(scene.strobe.x + PI * smoothstep(0.4, 0.6, (f32(id.x) + 0.5) / size.x)) + 1.0);
     let noise = random2(id);
 
-    let drop = scene.stage.tint.w - eye.y;
-    var color = scene.stage.tint.rgb;
+    let drop = scene.backdrop.tint.w - eye.y;
+    var color = scene.backdrop.tint.rgb;
     let down = ray.y * drop > 0.0;
     let at = on_ground(ray, drop);
     var shadow = 0.0;
-    if SHADOW { shadow = shadow_at(vec3f(at.x, scene.stage.tint.w, at.y), light, strobe, noise.y, down); }
+    if SHADOW { shadow = shadow_at(vec3f(at.x, scene.backdrop.tint.w, at.y), light, strobe, noise.y, down); }
     let to_right = on_ground(ray + scene.right.xyz * (2.0 / size.x), drop);
     let to_up = on_ground(ray + scene.up.xyz * (2.0 / size.y), drop);
     let width = max(max(abs(to_right - at), abs(to_up - at)), vec2f(1e-6));
-    let ground = ground_color(scene.stage, at, width) * (1.0 - 0.7 * shadow);
-    color = haze(scene.stage, select(color, ground, down), direction.y);
+    let ground = ground_color(scene.backdrop, at, width) * (1.0 - 0.7 * shadow);
+    color = haze(scene.backdrop, select(color, ground, down), direction.y);
 
     if CLOUD {
         let seen = march(eye, direction, light, strobe, noise.x);

@@ -4,7 +4,7 @@
 //#include common/frame.wgsl
 //#include common/loops.wgsl
 //#include scene/density.wgsl
-//#include scene/stage.wgsl
+//#include scene/backdrop.wgsl
 
 @group(1) @binding(1) var<uniform> figure: Figure;
 @group(1) @binding(2) var output: Output;

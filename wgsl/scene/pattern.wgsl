@@ -7,7 +7,7 @@ const CHECKER: u32 = 1u;
 const STRIPES: u32 = 2u;
 const BRICKS: u32 = 3u;
 const DOTS: u32 = 4u;
-const GROUND: u32 = 5u;         // of a stage
+const GROUND: u32 = 5u;         // of a backdrop
 
 // How a pattern lies on a body.
 const FLAT: u32 = 0u;           // on its faces

@@ -3,7 +3,7 @@
 //#include common/frame.wgsl
 //#include common/loops.wgsl
 //#include scene/pattern.wgsl
-//#include scene/stage.wgsl
+//#include scene/backdrop.wgsl
 
 struct Body {
     size: vec4f,            // half extents [scene units]; w unused
@@ -33,7 +33,7 @@ struct Scene {
     pixel: f32,             // width of a pixel at distance 1 [scene units]
     rays: u32,              // antialiasing: rays per side of a pixel, this number squared in all
     cylinders: u32,
-    stage: Stage,           // where STAGED
+    backdrop: Backdrop,           // where BACKDROP
     bounds: array<vec4u, MOST_BODIES>,  // box around a body in all rows; x, y, z: its low and high end as two f16
 }
 
@@ -48,7 +48,7 @@ const RING_STEPS: u32 = 64u;        // of sphere tracing towards a ring's surfac
 const RING_CLOSE: f32 = 1e-4;       // distance from it that counts as a hit [scene units]
 
 override RINGS: bool = false;       // there are rings among the bodies
-override STAGED: bool = false;      // bodies are the solids of volumes on a stage, and lit as those are
+override BACKDROP: bool = false;      // bodies are the solids of volumes on a backdrop, and lit as those are
 
 const SHADE: f32 = 0.18;            // share of the sunlight that is left in a shadow
 
@@ -248,7 +248,7 @@ fn world_normal(hit: Hit, ray: Ray, now: Instant) -> vec3f {
 /// Radiance along the ray, towards its origin: sun with its shadow, ambient light, specular highlight, emission.
 fn radiance(hit: Hit, ray: Ray, now: Instant) -> vec3f {
     let view = normalize(ray.direction);
-    if STAGED { return staged(hit, ray, view, now); }
+    if BACKDROP { return staged(hit, ray, view, now); }
     if hit.depth >= BACKGROUND_DEPTH { return mix(scene.horizon.rgb, scene.sky.rgb, smoothstep(0.0, 0.6, view.y)); }
     let body = bodies[hit.body];
     let met = surface(hit, ray);
@@ -271,8 +271,8 @@ fn radiance(hit: Hit, ray: Ray, now: Instant) -> vec3f {
 
 /// The same for the solids of volumes, shaded as the method "volume" shades the volumes.
 fn staged(hit: Hit, ray: Ray, view: vec3f, now: Instant) -> vec3f {
-    let stage = scene.stage;
-    let light = stage.light.xyz;
+    let backdrop = scene.backdrop;
+    let light = backdrop.light.xyz;
     let there = hit.depth < BACKGROUND_DEPTH;
     let body = bodies[hit.body];
     let at = ray.origin + hit.depth * ray.direction;
@@ -282,8 +282,8 @@ fn staged(hit: Hit, ray: Ray, view: vec3f, now: Instant) -> vec3f {
     let away = normalize(view.xz + vec2f(0.0, 1e-9));
     let width = max(pixel * max(abs(away.yx), abs(away) / max(abs(view.y), 1e-3)), vec2f(1e-6));
     let blocked = nearest(Ray(at + 4.0 * CLOSE * n, light), now).depth < BACKGROUND_DEPTH;
-    var ground = ground_color(stage, at.xz, width) * select(1.0, 0.3, blocked);
-    ground = haze(stage, select(stage.tint.rgb, ground, is_ground), view.y);
+    var ground = ground_color(backdrop, at.xz, width) * select(1.0, 0.3, blocked);
+    ground = haze(backdrop, select(backdrop.tint.rgb, ground, is_ground), view.y);
     let color = material(body.color.rgb, n, light, view);
     return linear_from_srgb(select(ground, color, there && !is_ground));
 }
