@@ -1,6 +1,7 @@
 """Whatever is wrong with files, disks, devices or patience: an error that names it, and order."""
 
 import contextlib
+import errno
 import io
 import itertools
 import json
@@ -16,7 +17,7 @@ import pytest
 import tifffile
 
 import make_frames as make
-from wgmb import Blur, CameraFile, InputError
+from wgmb import Blur, CameraFile, Clip, InputError
 from wgmb.cli import app, terminal
 from wgmb.io import exr, stills
 
@@ -535,3 +536,19 @@ def test_an_interruption_that_python_lost_is_heard_at_the_next_frame(
     code = app.main(list(map(str, arguments(long_shot[0], tmp_path / "out", "-q"))))
     assert code == 130
     assert 0 < len(list((tmp_path / "out").glob("o.*.exr"))) < 10
+
+
+def test_a_file_that_the_system_refuses_is_named_before_the_reason(tmp_path, capsys, monkeypatch):
+    pattern = make.write_sequence(tmp_path, range(1, 4))
+    read = Clip.source
+
+    def refused(self, number):
+        if number == 2:
+            raise PermissionError(errno.EACCES, "Permission denied", "masks/m.0002.png")
+        return read(self, number)
+
+    monkeypatch.setattr(Clip, "source", refused)
+    out = tmp_path / "out" / "o.####.exr"
+    code, _, err = make.inside(capsys, "blur", pattern, "-o", out, "--method", "tap")
+    assert code == 1
+    assert "frame 2 failed: masks/m.0002.png: permission denied\n" in err

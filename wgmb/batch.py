@@ -238,7 +238,7 @@ class _Pipeline:
 
     def _fail(self, number: int, error: BaseException) -> None:
         self.places.put(None)
-        self.report.failed[number] = " ".join(str(error).split()) or type(error).__name__
+        self.report.failed[number] = _reason(error)
         self.progress(number, "failed")
 
     def _guarded(self, stage: Callable[[], None]) -> None:
@@ -249,6 +249,13 @@ class _Pipeline:
         except BaseException as error:  # a fault of ours: the main thread raises it
             self.crash.append(error)
             self.stop.set()
+
+
+def _reason(error: BaseException) -> str:
+    """The error in one line that names the file it is about."""
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.filename}: {error.strerror.lower()}"
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def render_frames(
