@@ -334,8 +334,8 @@ def _chase(speed: float = 9.0) -> Scene:
                (0.72, 0.10, 0.07), (0.9, 0.85, 0.75), "CHECKER", (3, 3))  # fmt: skip
     ball = Body("sphere", (0.4, 0.4, 0.4), moving((1.3, 1.2, -2.2), (-4, 0, 0)),
                 (0.08, 0.45, 0.46), (0.9, 0.85, 0.75), "STRIPES", (12, 1))  # fmt: skip
-    shot = CameraPath(lambda t: (speed * t, 1.3, 2.2), pitch=lambda t: -0.07 + 0 * t)
-    return replace(hall, name="chase", bodies=(*hall.bodies, box, ball), shot=shot)
+    camera = CameraPath(lambda t: (speed * t, 1.3, 2.2), pitch=lambda t: -0.07 + 0 * t)
+    return replace(hall, name="chase", bodies=(*hall.bodies, box, ball), camera=camera)
 
 
 def _camera_only(frame: Frame) -> Frame:
