@@ -35,7 +35,7 @@ class Gather:
     Strong: the closest to the truth. What is hidden appears, blur goes over silhouettes.
     Artefacts: shading is that of one frame; what all three frames hide is guessed from its
     surroundings; what comes from more than 256 px away by a sample's time may be missed; costs
-    10 to 26 times as much as taps.
+    7 to 26 times as much as taps.
     """
 
     name = "gather"
