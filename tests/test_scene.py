@@ -268,7 +268,11 @@ def test_what_is_no_body_is_refused():
             Scene("x", (Body("box", (1, bad, 1), at(0, 0, 0)),), STILL)
     with pytest.raises(InputError, match=r"PLAIN, CHECKER.*'MORTAR'"):
         Scene("x", (Body("box", (1, 1, 1), at(0, 0, 0), pattern="MORTAR"),), STILL)
-    for look in ({"light": 1e300}, {"color": (float("nan"), 0, 0)}, {"repeats": (1, float("inf"))}):
+    for look in (
+        {"emission": 1e300},
+        {"color": (float("nan"), 0, 0)},
+        {"repeats": (1, float("inf"))},
+    ):
         with pytest.raises(InputError, match="f32"):
             Scene("x", (Body("box", (1, 1, 1), at(0, 0, 0), **look),), STILL)
     for light in ({"sun": (0, 0, 0, 1)}, {"sky": (0, float("nan"), 0, 1)}):
