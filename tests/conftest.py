@@ -1,5 +1,6 @@
 """What the tests share: a device, pictures, a comparison that shows its failures, their order."""
 
+import json
 import os
 
 import imageio.v3 as iio
@@ -7,11 +8,14 @@ import numpy as np
 import pytest
 import wgpu
 
+import standard
 from wgmb import gpu
 
 np.seterr(all="raise", under="ignore")
 if "PYTEST_XDIST_WORKER" in os.environ:  # the workers have shared out the cores already
     os.environ["LP_NUM_THREADS"] = "1"
+
+standard.record()  # every kernel that a test makes; they are sent through Dawn in the end
 
 # Files that take longest are begun first, so that all workers end at about the same time.
 LONGEST = ("test_window", "test_viewer", "test_twins", "test_faults", "test_volume",
@@ -74,3 +78,32 @@ def _show(path, picture):
     if plane.shape[2] == 2:
         plane = np.dstack([plane, 0 * plane[..., :1]])
     iio.imwrite(path, (255 * np.clip(plane, 0, 1)).astype("u1").squeeze())
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node):
+    """A worker of xdist has ended: take over the kernels that it recorded."""
+    for key, row in json.loads(getattr(node, "workeroutput", {}).get("kernels", "[]")):
+        standard.recorded[json.dumps(key)] = row
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session):
+    """All kernels that were made keep to the standard; if not, the session has failed."""
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["kernels"] = json.dumps(list(standard.recorded.items()))
+        return
+    lines, failed = standard.verdict()
+    session.config.stash[_VERDICT] = lines
+    if failed:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+_VERDICT = pytest.StashKey[list[str]]()
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    if lines := config.stash.get(_VERDICT, []):
+        terminalreporter.section("kernels by the standard")
+        for line in lines:
+            terminalreporter.write_line(line)

@@ -187,7 +187,7 @@ def test_what_takes_too_long_is_left_out_and_said(device):
     run = bench.bench(device, [Contender("tap"), Contender("gather")], SIZES[::-1], (2,),
                       rounds=1, limit=1e-6, tell=said.append)  # fmt: skip
     assert [(f.method, f.size) for f in run.figures] == [("tap", SIZES[0]), ("gather", SIZES[0])]
-    assert [n.partition(" left out")[0] for n in run.notes] == [
+    assert [n.partition(" skipped")[0] for n in run.notes] == [
         "96 x 54, 2 samples: tap", "96 x 54, 2 samples: gather"
     ]  # fmt: skip
     assert set(run.notes) <= set(said)
@@ -200,14 +200,14 @@ def test_what_does_not_fit_into_memory_is_left_out(device, monkeypatch):
     monkeypatch.setattr(bench, "_memory", lambda: 2 * tap.memory)
     run = bench.bench(device, [Contender("tap")], SIZES, (2,), 1)
     assert [f.size for f in run.figures] == [SIZES[0]]
-    assert "left out: it would hold" in run.notes[0]
+    assert "skipped: it would hold" in run.notes[0]
 
 
 def test_a_size_that_no_texture_has_is_left_out(device):
     huge = 1 << 20, 4
     run = bench.bench(device, [Contender("tap")], [huge, SIZES[0]], (2,), 1)
     assert [f.size for f in run.figures] == [SIZES[0]]
-    assert "left out: image is 1048576 x 4" in run.notes[0]
+    assert "skipped: image is 1048576 x 4" in run.notes[0]
     with pytest.raises(InputError, match="1048576 x 4"):
         bench.bench(device, [Contender("tap")], [huge], (2,), 1)
 
@@ -233,7 +233,7 @@ def test_what_is_interrupted_has_what_was_measured(device, monkeypatch):
     monkeypatch.setattr(bench._Matrix, "measure", interrupt)
     run = bench.bench(device, [Contender("tap")], SIZES[:1], (2, 4, 8), 1)
     assert [f.samples for f in run.figures] == [2]
-    assert run.notes == ["interrupted: the rest is left out"]
+    assert run.notes == ["interrupted: the rest is skipped"]
     with pytest.raises(KeyboardInterrupt):
         bench.bench(device, [Contender("tap")], SIZES[:1], (4,), 1)
 

@@ -143,7 +143,7 @@ def test_what_cannot_take_part_is_left_out_and_said(device, case):
     lab, got = compare.Laboratory(device, rounds=1), Report("", "", {}, 4)
     lab.compare(got, case, [Contender("tap"), Contender("distributed")], (2,))
     assert {e.label for e in got.of("bar", kind="samples")} == {"tap"}
-    assert "distributed left out: needs a scene" in got.notes[0]
+    assert "distributed skipped: needs a scene" in got.notes[0]
     with pytest.raises(InputError, match="needs a scene"):
         lab.compare(got, case, [Contender("distributed")], (2,))
 
@@ -153,7 +153,7 @@ def test_a_scene_is_compared_with_every_method(device, staged):
     made = cases.scene_case("x", Shutter(360), Contender.parse("distributed:64"), staged,
                               device, lambda text: None)  # fmt: skip
     lab.compare(got, made, [Contender(m) for m in METHODS], (2,))
-    left_out = {m for m in METHODS if any(f" {m} left out" in n for n in got.notes)}
+    left_out = {m for m in METHODS if any(f" {m} skipped" in n for n in got.notes)}
     labels = {e.label for e in got.of("x", kind="samples")}
     assert labels == METHODS.keys() - left_out
     assert labels >= {"tap", "reproject", "accumulate", "distributed"}
@@ -353,7 +353,7 @@ def test_two_halves_of_a_true_picture_tell_its_noise(tmp_path, capsys):
         return cases.clip_case("x", Shutter(180), [shot], 2, truth, {})
 
     one, two = case(files[1]), case(files[0], files[2])
-    assert one.floor is None and "noise is not known" in one.about
+    assert one.floor is None and "noise is unknown" in one.about
     a, b = (case(files[i]).truth for i in (0, 2))
     np.testing.assert_allclose(two.truth, (a + b) / 2)
     wanted = [measure(p, (a + b) / 2)["psnr"] for p in (a, b)]

@@ -42,7 +42,7 @@ def test_a_wild_motion_spoils_no_channel(noise, value):
 
 def test_a_method_that_cannot_tell_names_those_that_can():
     frame = frame_of([crossing(SIZE, offset) for offset in (0, -1, 1)])
-    with pytest.raises(InputError, match="'tap' has no confidence; gather has"):
+    with pytest.raises(InputError, match="'tap' cannot report confidence; use gather"):
         wgmb.Blur("tap").with_confidence(frame)
 
 
@@ -65,8 +65,8 @@ def test_it_is_written_beside_the_picture(tmp_path, capsys, shot):
 def test_resuming_with_it_redoes_what_was_done_without(tmp_path, capsys, shot):
     words = ["blur", shot, "-o", tmp_path / "o.####.exr", "--resume"]
     make.inside(capsys, *words)
-    assert "were there" not in make.inside(capsys, *words, "--confidence")[2]
-    assert "3 were there" in make.inside(capsys, *words, "--confidence")[2]
+    assert "already done" not in make.inside(capsys, *words, "--confidence")[2]
+    assert "3 already done" in make.inside(capsys, *words, "--confidence")[2]
 
 
 def test_it_lies_in_the_part_that_the_picture_is_in(tmp_path):
@@ -94,10 +94,10 @@ def test_scenes_have_it_too(tmp_path, capsys):
 @pytest.mark.parametrize(
     "words, says",
     [("blur {} -o {}.png", "needs an .exr output"),
-     ("blur {} -o {}.exr --method tap", "gather has"),
+     ("blur {} -o {}.exr --method tap", "use gather"),
      ("render crossing -o {1}.png", "needs an .exr output"),
-     ("render crossing -o {1}.exr --method distributed", "gather has"),
-     ("render crossing -o {1}.exr --sharp", "without blur")],
+     ("render crossing -o {1}.exr --method distributed", "use gather"),
+     ("render crossing -o {1}.exr --sharp", "cannot be combined")],
 )  # fmt: skip
 def test_where_it_cannot_be_is_said_before_anything_is_done(tmp_path, capsys, shot, words, says):
     out = tmp_path / "out" / "o.####"
@@ -110,5 +110,5 @@ def test_where_it_cannot_be_is_said_before_anything_is_done(tmp_path, capsys, sh
 def test_a_still_has_no_room_for_it(tmp_path, shot):
     output = Output(tmp_path / "o.png", numbers=[1])
     clip = Clip(shot, frames="1")
-    with pytest.raises(InputError, match=r"room for confidence\.left"):
+    with pytest.raises(InputError, match=r"store confidence\.left"):
         output.write(make.picture(1), clip.source(1), {"left": np.zeros((48, 64), "f4")})

@@ -448,7 +448,7 @@ def test_the_limit_that_the_error_names_lets_the_file_in(tmp_path):
         exr.read(path, max_mb=0.05)
     exr.read(path, max_mb=1)
     (tmp_path / "a.png").write_bytes(stills.encode(make.picture(1), ".png", 8, "{}"))
-    with pytest.raises(InputError, match=r"a\.png: picture of 64 x 48.*--max-mb 1 "):
+    with pytest.raises(InputError, match=r"a\.png: image of 64 x 48.*--max-mb 1 "):
         stills.read(tmp_path / "a.png", max_mb=0.04)
     stills.read(tmp_path / "a.png", max_mb=1)
 
@@ -478,7 +478,7 @@ def test_the_command_line_raises_the_limit(tmp_path, capsys):
     for command in (("info", pattern), ("blur", pattern, "-o", tmp_path / "o.####.exr")):
         code, out, err = make.inside(capsys, *command, "--max-mb", 0.1)
         assert (code, out) != (0, "")
-        assert f"{tmp_path}/shot.0001.exr: picture of 64 x 48" in err
+        assert f"{tmp_path}/shot.0001.exr: image of 64 x 48" in err
         assert make.inside(capsys, *command, "--max-mb", 1)[0] == 0
 
 

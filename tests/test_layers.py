@@ -150,7 +150,7 @@ def test_blenders_cryptomatte_is_found_by_its_last_part():
 
 @pytest.mark.parametrize(
     ("wanted", "says"),
-    [("CryptoObject=cow", r"cow.*tree.*house"), ("CryptoObject", "which object"),
+    [("CryptoObject=cow", r"cow.*tree.*house"), ("CryptoObject", "choose an object"),
      ("IndexOB=x", "must be a number"), ("nope", r"nope.*IndexOB"), ("nope=3", r"nope.*IndexOB")],
 )  # fmt: skip
 def test_a_mask_that_cannot_be_made_is_refused_with_the_reason(wanted, says):

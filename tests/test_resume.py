@@ -150,7 +150,7 @@ def test_another_programs_file_fails_that_frame_and_stays(tmp_path, capsys, shot
     assert len(after) == 6
     code, _, err = run(capsys, shot, out, "--resume", "--overwrite")
     assert code == 0
-    assert "4 were there" in err
+    assert "4 already done" in err
 
 
 def test_a_file_that_appears_during_the_run_is_not_replaced(tmp_path, shot):

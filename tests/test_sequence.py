@@ -208,7 +208,7 @@ def test_a_missing_layer_is_refused_with_the_files_name_once(shot, passes):
     with pytest.raises(InputError) as error:
         list(Clip(shot, frames="2", passes=passes))
     assert str(error.value).count("shot.0002.exr") == 1
-    assert "there is" in str(error.value)
+    assert "available: " in str(error.value)
 
 
 # ---- cameras --------------------------------------------------------------------------------

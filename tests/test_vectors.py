@@ -106,7 +106,7 @@ def test_senseless_options_are_refused(wrong):
 
 def test_missing_vectors_are_refused_with_a_list_of_what_there_is():
     channels = make.frame(1, None)
-    with pytest.raises(InputError, match=r"forward.*backward.*there is"):
+    with pytest.raises(InputError, match=r"forward.*backward.*available"):
         vectors.read(channels, told("nuke"))
     with pytest.raises(InputError, match="nope"):
         vectors.read(channels, Vectors("plain", layer="nope"))

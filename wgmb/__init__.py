@@ -6,7 +6,7 @@ your own textures ─ FrameViews┤                   │
 Scene ── scene/gbuffer ───────┘                   │
 Shutter ── times of the samples ──────────────────┘
 
-`blur` is one frame at once, `Blur` the same kept for many frames or for your own encoder.
+`blur` blurs a single frame; `Blur` is compiled once, for many frames or your own encoder.
 """
 
 from ._version import __version__ as __version__
@@ -82,7 +82,7 @@ _PLACE = {name: place for place, names in _PLACES.items() for name in names}
 if not TYPE_CHECKING:  # a checker takes every name for known otherwise
 
     def __getattr__(name: str) -> object:
-        """Load what is asked for: importing wgmb itself costs nothing."""
+        """Load names on first use, so that importing wgmb itself is cheap."""
         from importlib import import_module
 
         if name in _PLACE:

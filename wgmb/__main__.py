@@ -1,4 +1,4 @@
-"""The `wgmb` command, also `python -m wgmb`: it hears Ctrl-C while the rest is being loaded."""
+"""The `wgmb` command, also `python -m wgmb`; handles Ctrl-C while modules are being loaded."""
 
 import os
 import signal

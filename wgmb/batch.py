@@ -1,7 +1,7 @@
 """Whole sequences: rendered frames through a Blur into files, and scenes into files.
 
-Three threads read, blur and write at the same time and pass frames on. At most IN_FLIGHT of
-them are in memory, however long the sequence. A frame that fails is reported and passed over.
+Three threads read, blur and write concurrently. At most IN_FLIGHT frames are in memory,
+however long the sequence. A failing frame is reported and skipped.
 """
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
@@ -29,7 +29,7 @@ from .render import Render
 
 @dataclass
 class BatchReport:
-    """What became of a run."""
+    """Result of a run."""
 
     done: list[int] = field(default_factory=list)
     skipped: list[int] = field(default_factory=list)  # already there (resume)
@@ -94,7 +94,7 @@ def blur_sequence(
     confidence: bool = False,
     progress: Progress | None = None,
 ) -> BatchReport:
-    """Blur every frame of `clip` into `output`; with `confidence`, as layers beside the picture.
+    """Blur every frame of `clip` into `output`; `confidence` adds confidence layers.
 
     Frames that cannot be read, blurred or written are in the report's `failed`, with the
     reason; the others are done. Where frame after frame cannot be written for the same reason (a

@@ -1,4 +1,4 @@
-"""Cameras and rigid bodies from frame to frame: the matrices behind motion from depth."""
+"""Cameras and rigid bodies over time: the matrices that turn depth into motion."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -20,7 +20,7 @@ class Camera:
 
     clip_from_world: np.ndarray
     view_from_world: np.ndarray | None = None
-    """Needed where the projection is orthographic; the camera looks along -z."""
+    """Required for orthographic projections; the camera looks along -z."""
     bodies: dict[int, np.ndarray] = field(default_factory=dict)
     """`world_from_object` of every moving body, by object index."""
 
@@ -36,7 +36,7 @@ class Camera:
             if array.shape != (4, 4) or not np.isfinite(array).all():
                 raise InputError(f"{name} must be a finite 4 x 4 matrix, got shape {array.shape}")
             if name.startswith("body") and not _invertible(array):
-                raise InputError(f"{name}: its matrix has no inverse")
+                raise InputError(f"{name} must be invertible")
         if any(not 0 < k < MOST_BODIES for k in self.bodies):
             raise InputError(f"object indices must be 1 to {MOST_BODIES - 1}")
 
@@ -46,7 +46,7 @@ class Camera:
         """
         own, others = self.view_from_world, other.view_from_world
         if own is None or others is None:
-            raise InputError("cameras are interpolated by their view_from_world")
+            raise InputError("interpolating cameras needs view_from_world in both")
         a, b = np.linalg.inv(own), np.linalg.inv(others)
         world_from_view = np.eye(4)
         world_from_view[:3, 3] = (1 - share) * a[:3, 3] + share * b[:3, 3]
@@ -57,13 +57,13 @@ class Camera:
 
     @property
     def orthographic(self) -> bool:
-        """Whether depth does not divide: the last row of the projection is constant."""
+        """True if there is no perspective divide: the projection's last row is constant."""
         return bool(np.abs(np.asarray(self.clip_from_world)[3, :3]).max() < 1e-12)
 
 
 @dataclass(frozen=True, eq=False)
 class Reprojections:
-    """Where points seen from one frame are in the previous and the next frame.
+    """Positions in the previous and the next frame of points visible in one frame.
 
     Rosado (2007, GPU Gems 3, chapter 27) goes depth -> world -> previous clip position per
     pixel. Both steps are linear in (ndc.x d, ndc.y d, d, 1), so they are multiplied here
@@ -76,9 +76,9 @@ class Reprojections:
     depth_kind: str = "planar"
     """"planar": distance along the view axis; "clip": z after projection, as in a depth buffer."""
     far: float = 1e9
-    """Planar depth from here on means that nothing is there (sky)."""
+    """Planar depth from which a pixel counts as empty (sky)."""
     window: tuple[int, int, int, int] | None = None
-    """Where the image lies in the whole picture: x, y, whole width, whole height [px]."""
+    """Offset of the image in the full image, and the full size: x, y, width, height [px]."""
 
     def __post_init__(self) -> None:
         if self.prev is None and self.next is None:
@@ -86,7 +86,7 @@ class Reprojections:
         if self.depth_kind not in ("planar", "clip"):
             raise InputError(f"depth must be planar or clip, got {self.depth_kind!r}")
         if not _invertible(np.asarray(self.here.clip_from_world, np.float64)):
-            raise InputError("clip_from_world has no inverse")
+            raise InputError("clip_from_world must be invertible")
         if not self.far > 0:
             raise InputError(f"far must be over 0, got {self.far}")
         self.world_from_pixel()  # refuses what is no camera

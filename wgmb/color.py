@@ -1,4 +1,4 @@
-"""Colours: linear light and what a screen shows of it (sRGB), and motion as hue and brightness."""
+"""Colours: linear light to and from sRGB, and motion as hue and brightness."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""A cone cell of the eye: how it weighs light over time.
+"""Impulse response of a cone cell of the eye.
 
-Its answer to a flash, x seconds later, is W(x) = rate exp(shift - rate x) F(x), whose integral is
+The response x seconds after a flash is W(x) = rate exp(shift - rate x) F(x); its integral is
 F(x) = exp(-exp(shift - rate x)) (Cusa 2022, after Howlett et al. 2017).
 """
 
@@ -27,7 +27,7 @@ VIDEOS = {  # what the article compares, each at the degrees where neighbours ad
 
 @dataclass(frozen=True)
 class Cone:
-    """A cone cell: its answer to a flash peaks `peak` [s] later and fades with `rate` [1/s]."""
+    """A cone cell; its impulse response peaks after `peak` [s] and decays with `rate` [1/s]."""
 
     rate: float = 50.0
     peak: float = 0.05
@@ -45,43 +45,44 @@ class Cone:
 
     @property
     def memory(self) -> float:
-        """Seconds after which less than 1e-4 of a flash is still to come."""
+        """Seconds after which less than 1e-4 of the response to a flash remains."""
         return (self.shift + math.log(1e4)) / self.rate
 
     def frames_needed(self, rate: float) -> int:
-        """How many pictures of `rate` a second one has to know, to tell what is seen."""
+        """Return how many past images contribute, at `rate` images per second."""
         if not (math.isfinite(rate) and rate > 0):
-            raise InputError(f"rate must be over 0 pictures a second, got {rate}")
+            raise InputError(f"rate must be over 0 images per second, got {rate}")
         count = math.ceil(self.memory * rate) + 2
         if count > MOST_HELD:
-            raise InputError(f"{rate:g} pictures a second are too many: {MOST_HELD} are kept")
+            raise InputError(f"{rate:g} images per second: too many to hold, at most {MOST_HELD}")
         return count
 
     def impulse_response(self, x: np.ndarray | float) -> np.ndarray:
-        """W(x): the answer to a flash `x` seconds later, 1/s."""
+        """Return W(x), the response `x` seconds after a flash, 1/s."""
         late = np.minimum(self.shift - self.rate * np.asarray(x, float), 80)
         return self.rate * np.exp(late - np.exp(late))
 
     def step_response(self, x: np.ndarray | float) -> np.ndarray:
-        """F(x): share of the answer to a flash that has come `x` seconds later."""
+        """Return F(x), the share of the response completed `x` seconds after a flash."""
         return np.exp(-np.exp(np.minimum(self.shift - self.rate * np.asarray(x, float), 80)))
 
     def weights(self, ages: np.ndarray, held: float) -> np.ndarray:
-        """What pictures add that were shown for `held` [s], in the mean `ages` [s] ago."""
+        """Return the weights of images shown for `held` [s], on average `ages` [s] ago."""
         ages = np.asarray(ages, float)
         return self.step_response(ages + held / 2) - self.step_response(ages - held / 2)
 
     def shares(self, count: int, rate: float, after: float = 0.0) -> np.ndarray:
-        """(count,) of the last pictures, the newest first; the oldest stands for all before it.
+        """Return the weights of the last images, newest first; the oldest includes all earlier.
 
-        `rate`: pictures a second, each held until the next. `after` [s] the newest one's middle.
+        `rate`: images per second, each held until the next. `after`: time since the middle of the
+        newest one [s].
         """
         weights = self.weights(after + np.arange(count) / rate, 1 / rate)
         weights[-1] += 1 - weights.sum()
         return weights
 
     def shutter(self, fps: float) -> Shutter:
-        """Sees a world without frames as this cell does at the frame's instant."""
+        """Return a shutter that integrates continuous time like this cell at the frame's time."""
         return Shutter(
             360 * self.memory * fps, "end", lambda x: self.impulse_response((1 - x) * self.memory)
         )

@@ -1,19 +1,19 @@
-"""What can go wrong, as exceptions.
+"""Exceptions raised by wgmb.
 
 Error
-├── InputError    your arrays, files or options do not fit (also a ValueError)
+├── InputError    invalid arrays, files or options (also a ValueError)
 ├── ShaderError   a WGSL file could not be read, compiled or bound; says file:line
 ├── DeviceError   no adapter, one that lacks a feature or a limit, or a device that was lost
-└── GpuMemoryError  too little memory on the GPU for one frame; the next one may do
+└── GpuMemoryError  not enough GPU memory for one frame; other frames may still fit
 """
 
 
 class Error(Exception):
-    """Everything wgmb raises on purpose; the text says what was expected and what came."""
+    """Base class of wgmb's errors; the message states what was expected and what was given."""
 
 
 class InputError(Error, ValueError):
-    """The caller's arrays, files or options do not fit."""
+    """Invalid arrays, files or options."""
 
 
 class ShaderError(Error):
@@ -21,8 +21,8 @@ class ShaderError(Error):
 
 
 class DeviceError(Error):
-    """No usable GPU adapter, or one that lacks a feature or a limit; or its device was lost."""
+    """No usable GPU adapter, a missing feature or limit, or a lost device."""
 
 
 class GpuMemoryError(Error):
-    """Too little memory on the GPU for one frame; smaller ones, and later ones, may do."""
+    """Not enough GPU memory for one frame; smaller or later frames may still fit."""

@@ -1,4 +1,4 @@
-"""One frame: its pixels, what moves where, and the conventions for all of it.
+"""One frame: colour, motion, depth, and the conventions for them.
 
 image    (height, width, channels) float, linear light, premultiplied alpha, row 0 on top
 motion   `to_next`, `to_prev`: displacement [px], x right, y down, to where this pixel's
@@ -38,7 +38,7 @@ _CHANNELS = {
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a method may be given; only `color` must be there.
+    """Input of a method. Only `color` is required.
 
     Arrays of floats are float16, float32 or float64; masked arrays are refused.
     """
@@ -52,19 +52,19 @@ class Frame:
     motion: np.ndarray | None = None
     """(height, width, 4) float [px]: to_prev and to_next side by side, instead of the two."""
     depth: np.ndarray | None = None
-    """(height, width) float [scene units], needed where motion comes from `camera`."""
+    """(height, width) float [scene units], required if motion comes from `camera`."""
     camera: Reprojections | None = None
-    """How the camera and the bodies move around this frame: motion from depth."""
+    """Camera and body motion around this frame; gives motion from depth."""
     object_id: np.ndarray | None = None
-    """(height, width) integer: which body of `camera` a pixel shows; 0 is the world."""
+    """(height, width) integer: index of each pixel's body in `camera`; 0 is the world."""
     normal: np.ndarray | None = None
-    """(height, width, 3) float: unit vectors in the world; 0 where nothing is."""
+    """(height, width, 3) float: unit vectors in world space; 0 for empty pixels."""
     holdout: np.ndarray | None = None
     """(height, width) float 0..1: 1 stays sharp and out of its neighbours' blur."""
     scale: np.ndarray | None = None
     """(height, width) float: multiplies the motion."""
     object_motion: bool = False
-    """`to_next`, `to_prev` leave the camera's motion out, so the two are added."""
+    """`to_next`, `to_prev` exclude the camera's motion, which is added."""
     prev: Frame | None = None
     """The frame before, for methods that use neighbours."""
     next: Frame | None = None
@@ -72,11 +72,11 @@ class Frame:
     number: int = 0
     """Frame number; varies the jitter."""
     bad: dict[str, int] = field(init=False, default_factory=dict)
-    """How many pixels of each input are not finite, or have no depth in front of the camera.
+    """Number of pixels per input that are not finite, or have no depth in front of the camera.
 
-    Colours beyond 1e30 count as infinite: sums of them would overflow. Bad colours weigh
-    nothing, bad motion stands still, bad depth is infinitely far (values of a depth buffer that
-    are not finite stand still).
+    Colours beyond 1e30 count as infinite: sums of them would overflow. Bad colours get no
+    weight, bad motion counts as zero, bad depth as infinitely far (in a depth buffer: as no
+    motion).
     """
 
     def __post_init__(self) -> None:
@@ -101,9 +101,9 @@ class Frame:
         if self.camera is not None and self.depth is None:
             raise InputError("motion from a camera needs depth")
         if self.object_id is not None and self.camera is None:
-            raise InputError("object_id needs the camera file that says how objects move")
+            raise InputError("object_id needs a camera, which holds the motion of the bodies")
         if self.motion is not None and not (self.to_next is None and self.to_prev is None):
-            raise InputError("motion stands instead of to_next and to_prev: give one or the other")
+            raise InputError("pass either motion or to_next/to_prev, not both")
         self._check_neighbours()
         brightest = wgsl.load("common/finite.wgsl").constant("BRIGHTEST")
         for name in ("color", "to_next", "to_prev", "motion", "scale", "holdout"):
@@ -124,17 +124,17 @@ class Frame:
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """Those that there are, by name."""
+        """Return the arrays that are set, by name."""
         given = {name: getattr(self, name) for name in ("color", *_CHANNELS, "object_id")}
         return {name: array for name, array in given.items() if array is not None}
 
     @property
     def is_locked(self) -> bool:
-        """Whether no array can be written to: it will look the same when it comes again."""
+        """True if all arrays are read-only; such frames are uploaded only once."""
         return not any(array.flags.writeable for array in self.arrays.values())
 
     def locked(self) -> Frame:
-        """The same pixels in arrays that cannot be written to."""
+        """Return the same frame with read-only arrays."""
         locked = copy(self)
         for name, array in self.arrays.items():
             view = array.view()
@@ -143,7 +143,7 @@ class Frame:
         return locked
 
     def between(self, prev: Frame | None, next: Frame | None) -> Frame:
-        """The same arrays, with these neighbours."""
+        """Return the same frame with these neighbours."""
         frame = copy(self)
         object.__setattr__(frame, "prev", prev)
         object.__setattr__(frame, "next", next)
@@ -157,7 +157,7 @@ class Frame:
 
     @property
     def has(self) -> frozenset[str]:
-        """What a method may ask for: "color", "motion", "depth"."""
+        """Available inputs, of "color", "motion" and "depth"."""
         there = {"color"}
         given = (self.to_next, self.to_prev, self.motion, self.camera)
         if any(source is not None for source in given):

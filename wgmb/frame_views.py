@@ -1,4 +1,4 @@
-"""One frame as textures: the GPU's twin of `Frame`, and what `Blur.encode` takes."""
+"""One frame as textures: the GPU counterpart of `Frame`, and the input of `Blur.encode`."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -42,9 +42,9 @@ class FrameViews:
     depth: View | None = field(default=None, metadata=_X_IF_USED)
     """Distance along the view axis [scene units] in x."""
     camera: Reprojections | None = None
-    """How the camera and the bodies move around this frame; needs `depth`."""
+    """Camera and body motion around this frame; needs `depth`."""
     object_id: View | None = field(default=None, metadata=_INDEX)
-    """Which body of `camera` a pixel shows; 0 is the world."""
+    """Index of each pixel's body in `camera`; 0 is the world."""
     normal: View | None = field(default=None, metadata=_XYZ_IF_USED)
     """Unit vectors in the world in x, y, z."""
     holdout: View | None = field(default=None, metadata=_X)
@@ -52,12 +52,12 @@ class FrameViews:
     scale: View | None = field(default=None, metadata=_X)
     """Multiplies the motion, in x."""
     object_motion: bool = False
-    """The vectors leave the camera's motion out, so the two are added."""
+    """The vectors exclude the camera's motion, which is added."""
     check: bool = False
-    """Give pixels that are not finite no weight, at the price of three small passes."""
+    """Ignore pixels that are not finite, at the cost of three small passes."""
     key: object | None = None
-    """Views with the same key hold the same pixels; what a method derived from them may be
-    reused. The commands that derived it must have been submitted."""
+    """Cache key: equal keys mean identical pixels, so that a method may reuse derived data.
+    The commands that computed them must have been submitted."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -66,12 +66,12 @@ class FrameViews:
 
     @property
     def has_vectors(self) -> bool:
-        """Whether there are vectors, with a camera or without."""
+        """True if motion vectors are set, with or without a camera."""
         return any(v is not None for v in (self.to_prev, self.to_next, self.motion))
 
     @property
     def has(self) -> frozenset[str]:
-        """What a method may ask for: "color", "motion", "depth"."""
+        """Available inputs, of "color", "motion" and "depth"."""
         there = {"color"}
         if self.has_vectors or self.camera is not None:
             there.add("motion")
@@ -81,7 +81,7 @@ class FrameViews:
 
     @property
     def has_plain_motion(self) -> bool:
-        """Whether `motion` is already all there is to know of the motion."""
+        """True if `motion` is used as it is, without camera or scale."""
         return self.motion is not None and self.camera is None and self.scale is None
 
     def check_fit(self, size: tuple[int, int], whose: str = "") -> None:

@@ -1,4 +1,4 @@
-"""Holdout: pixels that stay sharp are taken out before the method and put back after it."""
+"""Holdout: removes the pixels that stay sharp before the method, and restores them after it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How different are two pictures: judges of blur, each with what it looks at and in which units.
+"""Image difference metrics for blur, each with its unit.
 
 Every judge takes `picture` and `truth`, (height, width, 3 or 4) linear light of the same size,
 and returns one number. Alpha is left out: premultiplied colour is the picture over black.
@@ -137,7 +137,7 @@ def _pair(picture, truth, prepare) -> tuple[np.ndarray, np.ndarray]:
             raise InputError(f"{name} must be (height, width, 3 or 4), got {shape}")
     if shapes[0][:2] != shapes[1][:2]:
         (height, width), (high, wide) = shapes[0][:2], shapes[1][:2]
-        raise InputError(f"the picture is {width} x {height}, the truth {wide} x {high}")
+        raise InputError(f"image is {width} x {height}, the truth {wide} x {high}")
     return np.asarray(prepare(picture), np.float64), np.asarray(prepare(truth), np.float64)
 
 

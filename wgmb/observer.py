@@ -1,4 +1,4 @@
-"""An observer: what is perceived of pictures shown one after the other, on the GPU."""
+"""An observer: simulates the perception of successive images, on the GPU."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -20,7 +20,7 @@ EIGHT = 8  # pictures that one pass takes
 
 
 class WeightedSum:
-    """The sum of pictures on the GPU, each times a weight; a pixel that is not finite is 0."""
+    """Weighted sum of images on the GPU; pixels that are not finite count as 0."""
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._sums = device, ScratchBuffer(device)
@@ -60,10 +60,10 @@ class WeightedSum:
 
 
 class Observer:
-    """What is seen of pictures shown one after the other, on the GPU.
+    """Simulates the perception of successive images, on the GPU.
 
-    `rate`: pictures a second, each held until the next. Before the first one it was there too.
-    `device`: a wgpu device of yours, the name of an adapter, or None for the best.
+    `rate`: images per second, each held until the next. The first one counts as shown for ever.
+    `device`: your own wgpu device, the name of an adapter, or None for the best one.
     """
 
     def __init__(
@@ -83,11 +83,11 @@ class Observer:
     def present(self, picture: np.ndarray) -> None:
         """Show one more: (height, width, 3 or 4), linear light."""
         if picture.ndim != 3 or picture.shape[2] not in (3, 4):
-            raise InputError(f"a picture is (height, width, 3 or 4), got {picture.shape}")
+            raise InputError(f"picture must be (height, width, 3 or 4), got {picture.shape}")
         height, width, channels = picture.shape
         if self._shown and self._size != (width, height):
             raise InputError(
-                f"picture of {width} x {height} after those of {self._size[0]} x {self._size[1]}"
+                f"picture is {width} x {height}, earlier ones {self._size[0]} x {self._size[1]}"
             )
         if channels == 3:
             picture = np.concatenate([picture, np.ones_like(picture[..., :1])], axis=2)
@@ -99,7 +99,7 @@ class Observer:
     def perceived(self, after: float = 0.0) -> np.ndarray:
         """(height, width, 4) float32: what is seen `after` [s] the middle of the last picture."""
         if not self._shown:
-            raise InputError("nothing was shown yet")
+            raise InputError("no image has been shown yet")
         with self._lock, gpu.reported(self._size):
             count = min(self._shown, self.held)
             pictures = [

@@ -1,4 +1,4 @@
-"""The whole flow in one place: arrays -> textures -> velocity -> one method -> array."""
+"""The pipeline: arrays -> textures -> velocity -> one method -> array."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -38,21 +38,21 @@ OUTPUTS = ("rgba32float", "rgba16float")
 
 
 class Blur:
-    """A compiled method. Call it with arrays, or `encode` it into your own frame.
+    """A compiled blur method. Call it with arrays, or `encode` it into your own command encoder.
 
     `method`: a name in METHODS; its own options follow as keywords.
     `shutter`: degrees (180 is open for half a frame interval), or a Shutter.
-    `samples`: taps a pixel, 1 to 4096 (gather without a GPU: 512); 16, or what the method's
-    source says, by default; "auto" takes one a pixel of a streak, 64 at most (methods that
-    cannot tell pixels apart take 64).
-    `jitter`: 0 to 1, trades bands for noise: how far a tap may move within its share of time.
-    `max_blur`: longest streak [px]; None leaves it free.
-    `device`: a wgpu device of yours, the name of an adapter, or None for the best.
+    `samples`: taps per pixel, 1 to 4096 (gather without a GPU: 512); by default 16, or the
+    method's own default; "auto" uses one per pixel of blur length, at most 64 (methods with one
+    count for the whole image use 64).
+    `jitter`: 0 to 1, trades banding for noise: random shift of a tap within its share of time.
+    `max_blur`: maximum blur length [px]; None: unlimited.
+    `device`: your own wgpu device, the name of an adapter, or None for the best one.
     `output`: texel format of the result, rgba32float or rgba16float.
 
-    Several threads may call one Blur: they take turns, as its textures are shared. A Blur for each
-    thread lets them work at the same time. `encode` records and does not wait: whoever encodes
-    from several threads orders the submissions himself.
+    Several threads may call one Blur: they take turns, as its textures are shared. Use one Blur per
+    thread to work in parallel. `encode` records and does not wait: callers that encode from
+    several threads must order the submissions themselves.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Blur:
         **options: Any,
     ):
         if method not in METHODS:
-            raise InputError(f"unknown method {method!r}, one of {', '.join(METHODS)}")
+            raise InputError(f"unknown method {method!r}; available: {', '.join(METHODS)}")
         self.auto = samples == "auto" and getattr(METHODS[method], "adaptive", False)
         if samples is None:
             samples = getattr(METHODS[method], "samples", SAMPLES)
@@ -107,21 +107,21 @@ class Blur:
 
     @property
     def confidence(self) -> tuple[str, ...]:
-        """What `with_confidence` tells of every pixel; InputError where a method cannot tell."""
+        """Names of the `with_confidence` layers; InputError if the method has none."""
         if names := getattr(self.method, "confidence", ()):
             return names
         able = ", ".join(n for n, m in METHODS.items() if hasattr(m, "confidence"))
-        raise InputError(f"method {self.method.name!r} has no confidence; {able} has")
+        raise InputError(f"method {self.method.name!r} cannot report confidence; use {able}")
 
     @cached_property
     def _judge(self):
-        """The method once more, telling how sure it is."""
+        """The same method, compiled to report its confidence."""
         options = replace(self._options, show="confidence")
         return METHODS[self.method.name](self.device, options, output=self.output)
 
     @property
     def shutter(self) -> Shutter:
-        """When the shutter is open; may be set between frames, to degrees or a Shutter."""
+        """The current Shutter; can be set between frames, to degrees or a Shutter."""
         return self._shutter
 
     @shutter.setter
@@ -163,10 +163,10 @@ class Blur:
     ) -> None:
         """Record the passes into `encoder`; nothing is submitted or waited for.
 
-        The views are of your textures. `output`: a storage texture of the format that Blur was
-        made for. `prev`, `next`: the frames before and after, for methods that use neighbours;
-        they need what the frame itself needs. `confidence`: another texture like `output`, for
-        what `with_confidence` tells. `number`: the frame's, which varies the jitter.
+        The views refer to your own textures. `output`: a storage texture of this Blur's output
+        format. `prev`, `next`: the previous and the next frame, for methods that use neighbours,
+        with the same inputs as the frame. `confidence`: a texture like `output` for the channels
+        of `with_confidence`. `number`: frame number, which varies the jitter.
 
         `timing` takes the time of every pass: `timing.clock(device)`, whose WallClock runs the
         passes at once instead of recording them.
@@ -210,8 +210,8 @@ class Blur:
     ) -> None:
         """The same for the methods that need a scene instead of a frame.
 
-        They may be recorded bit by bit: `progress` is how many samples were done before, and
-        are to be done now.
+        Samples may be recorded in portions: `progress` is the number of samples done so far and
+        the number to add.
         """
         gpu.check_size(self.device, *scene.size)
         check_view("output", output, scene.size)
@@ -284,9 +284,9 @@ class Blur:
     ) -> np.ndarray:
         """Blur one frame: a Frame, or a colour array and its passes (see Frame).
 
-        Returns float32 of color's shape. `InputError` says what is missing or does not fit.
-        Frames whose arrays cannot be written to (Frame.locked) are uploaded once, even if they
-        come again as neighbours.
+        Returns float32 of color's shape. Raises InputError if inputs are missing or inconsistent.
+        Frames with read-only arrays (Frame.locked) are uploaded once, even if they are used
+        again as neighbours.
         """
         frame = color if isinstance(color, Frame) else Frame(color, to_next, **passes)
         self._require(frame.has)
@@ -298,10 +298,10 @@ class Blur:
         return picture[..., : frame.color.shape[2]].astype("f4", copy=False)
 
     def with_confidence(self, frame: Frame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """The blurred frame, and how sure the method is of every pixel, at twice the cost.
+        """Return the blurred frame and the confidence of every pixel, at twice the cost.
 
-        The second by the names in `confidence`, each (height, width) float32; what they mean
-        is said where the method says what it can `show`.
+        The confidence layers are (height, width) float32, by the names in `confidence`; their
+        meaning is documented with the method's `show`.
         """
         names = self.confidence
         self._require(frame.has)
@@ -320,7 +320,7 @@ class Blur:
     def motion(self, frame: Frame) -> np.ndarray:
         """The motion that methods follow: (height, width, 4) to_prev, to_next [px]."""
         if "motion" not in frame.has:
-            raise InputError("there is no motion: give to_next, to_prev, or depth and a camera")
+            raise InputError("no motion: pass to_next, to_prev, or depth and a camera")
         with self._working(frame.size):
             encoder = self.device.create_command_encoder(label="wgmb motion")
             motion = self._images.texture("motion", frame.size, "rgba32float")
@@ -337,9 +337,9 @@ class Blur:
         self._velocity.encode(encoder, bindings, frame, self.max_blur is not None, output)
 
     def upload(self, frame: Frame) -> dict[str, Any]:
-        """The frame's and its neighbours' arrays as textures: keywords of `encode`.
+        """Upload a frame and its neighbours; returns the keywords of `encode`.
 
-        They are kept: the next frame's go into the same textures.
+        The textures are reused by the next frame.
         """
         with self._working(frame.size):
             self._residency.forget()
@@ -353,7 +353,7 @@ class Blur:
 
     @contextmanager
     def _working(self, size: tuple[int, int]):
-        """One thread at a time; wgpu's errors become ours, and then all is uploaded again."""
+        """Admit one thread at a time; convert wgpu errors, after which all is uploaded again."""
         with self._lock, gpu.reported(size):
             try:
                 yield
@@ -378,7 +378,7 @@ class Blur:
             raise InputError(f"method {self.method.name!r} needs {what}")
 
     def frame_bindings(self, size: tuple[int, int], number: int = 0) -> gpu.FrameBindings:
-        """What every pass of a frame is given: frame, shutter, times of the samples."""
+        """Return the bindings shared by all passes: frame, shutter, times of the samples."""
         data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
         data["size"], data["samples"], data["jitter"] = size, self.samples, self.jitter
         data["index"] = number % 2**32
@@ -407,8 +407,8 @@ def blur(
 ) -> np.ndarray:
     """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.
 
-    `method`: a name in METHODS; None is gather where there is depth, else tap. `more` are the
-    passes of Frame (to_prev, depth, camera, keep, ...) and the options of Blur (jitter,
+    `method`: a name in METHODS; by default gather if depth is available, else tap. `more`: the
+    passes of Frame (to_prev, depth, camera, holdout, ...) and the options of Blur (jitter,
     max_blur, device, and those of the method).
     """
     passes = {name: more.pop(name) for name in PASSES if name in more}

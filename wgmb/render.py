@@ -1,4 +1,4 @@
-"""A scene through a method: what `wgmb render` and the viewer call."""
+"""Rendering of scenes with motion blur, for `wgmb render` and the viewer."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -30,10 +30,10 @@ Progress = Callable[[int, int], None]
 
 
 class Render:
-    """A scene and a Blur, kept for many pictures.
+    """Renders a scene with motion blur; keeps its GPU resources between images.
 
-    `size` (width, height) [px]; `fps`: frames per second, what the shutter's times refer to;
-    `rays`: antialiasing of the pictures that image methods start from, rays a pixel's side.
+    `size` (width, height) [px]; `fps`: frames per second, which define the frame interval;
+    `rays`: antialiasing of the sharp images for image methods, in rays per pixel side.
     Several threads may call one Render: they take turns.
     """
 
@@ -77,7 +77,7 @@ class Render:
     def with_confidence(
         self, time: float, number: int = 0
     ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """That frame, and how sure the method is of it; see Blur.with_confidence."""
+        """Return that frame and its confidence; see Blur.with_confidence."""
         names = self.blur.confidence
         with self._working():
             textures = [
@@ -103,9 +103,9 @@ class Render:
     ) -> None:
         """Draw that frame into a texture of yours, of `size` and the blur's `output` format.
 
-        `blur`: another one than the Render's own, of the same device. What several draw of
-        one moment starts from the same pictures. `confidence`: another such texture, for
-        methods of pictures that have one. `timing`: of the passes.
+        `blur`: used instead of the Render's own, on the same device. Blurs of the same time share
+        the sharp images. `confidence`: a texture like the output, for image methods with
+        confidence. `timing`: clock for the passes.
         """
         blur = blur or self.blur
         if "progress" in blur.method.uses:
@@ -144,7 +144,7 @@ class Render:
         progress: Progress | None = None,
         timing: Clock | None = None,
     ) -> int:
-        """Add samples to the `done` so far, for about `seconds`; how many there are now.
+        """Add samples to the `done` so far, for about `seconds`; returns the new total.
 
         For methods that need a scene. `output` holds the mean of all samples so far.
         """
@@ -174,7 +174,7 @@ class Render:
     def passes(
         self, time: float, number: int = 0, timing: Clock | None = None
     ) -> dict[str, wgpu.GPUTexture]:
-        """The sharp picture at `time` [s] and what lies under it, kept until the next moment.
+        """Return the sharp image, depth and motion at `time` [s]; valid until the next time.
 
         "color", "depth" [scene units], "normal", "object" (0: none), and "motion": to_prev,
         to_next [px].
@@ -235,7 +235,7 @@ class Render:
         )
 
     def on_gpu(self, time: float, blur: Blur | None = None) -> SceneOnGpu:
-        """The scene around `time` [s], as far as the blur looks."""
+        """Return the scene on the GPU for the time span that the blur reads around `time` [s]."""
         blur = blur or self.blur
         if not np.isfinite(time):
             raise InputError(f"time must be finite, got {time}")

@@ -1,7 +1,7 @@
-"""Residency: which frames' arrays are on the GPU, in which textures.
+"""Residency: keeps track of the frames on the GPU and their textures.
 
-Four caches keep what the frames of a sequence share. They rest on one another, and a frame is
-the same for all of them only while its arrays are the same and cannot be written to:
+Four caches hold the data shared by the frames of a sequence. They depend on one another; a frame
+counts as unchanged only while its arrays are the same objects and read-only:
 
 - `Clip` keeps the last three files read, and the frames made of them, by number;
 - `Residency` uploads the arrays of a locked frame once, and knows them again by identity;
@@ -34,7 +34,7 @@ class _ResidentFrame:
         self._rest = frame.camera, frame.object_motion
 
     def is_of(self, frame: Frame) -> bool:
-        """Whether these are the arrays of `frame`, and cannot have changed."""
+        """Return True if these are the arrays of `frame`, unchanged."""
         given = frame.arrays
         return (
             frame.is_locked
@@ -53,7 +53,7 @@ class Residency:
         self._resident: dict[str, _ResidentFrame] = {}
 
     def views_of(self, frames: Mapping[int, Frame]) -> dict[int, FrameViews]:
-        """The views of up to three frames, by the same keys; uploads those not yet resident."""
+        """Return the views of up to three frames by the same keys; uploads missing frames."""
         places = {key: self._place_of(frame) for key, frame in frames.items()}
         free = [place for place in _PLACES if place not in places.values()]
         views: dict[int, FrameViews] = {}

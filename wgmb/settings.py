@@ -1,4 +1,4 @@
-"""What a user can set, as plain values: one dataclass a group, each made into the library's words.
+"""User settings as plain values: one dataclass per group, convertible to library objects.
 
 The command line, the viewer and the laboratory share them. The string under a field is its help.
 """
@@ -25,21 +25,21 @@ from .shutter import CURVES, PHASES, Shutter, read_curve
 
 @dataclass(frozen=True, kw_only=True)
 class ShutterSettings:
-    """When the shutter is open."""
+    """Shutter angle, phase and curve."""
 
     shutter: float | None = None
-    "Degrees it is open: 360 is one frame interval, more is allowed. 180, or what a scene asks for."
+    "Shutter angle in degrees; 360 is one frame interval, may be more. Default: 180 or the scene's."
     phase: str = "centre"
-    "start (opens at the frame), centre, end (closes at it), or the middle's time in frames."
+    "start (opens at the frame), centre, end (closes at it), or the time of its middle in frames."
     curve: str | None = None
     "box (default), trapezoid, triangle, cosine, gaussian, or a CSV file of time, weight."
     rolling: Literal["up", "down", "left", "right"] | None = None
-    "Rolling shutter: the way the exposure runs over the picture."
+    "Rolling shutter: direction in which the exposure moves across the image."
     rolling_duration: float = 1.0
-    "Time from the first row or column to the last, in frame intervals."
+    "Rolling shutter: delay from the first row or column to the last, in frame intervals."
 
     def resolved(self, scene: Scene | None = None, fps: float = 24.0) -> Self:
-        """What was left open taken from the scene, or 180 degrees and a box."""
+        """Return a copy with unset fields taken from the scene, or 180 degrees and a box."""
         degrees, curve = 180.0, "box"
         if scene is not None and scene.exposure is not None:
             seconds, curve = scene.exposure
@@ -51,13 +51,13 @@ class ShutterSettings:
         )
 
     def curve_read(self) -> str | None:
-        """The curve's name; of a file also its checksum, as a file may change."""
+        """Return the curve's name, and for a file its checksum, as its contents may change."""
         if self.curve is None or self.curve in CURVES:
             return self.curve
         return f"{self.curve} (CRC-32 {zlib.crc32(Path(self.curve).read_bytes()):08x})"
 
     def make(self) -> Shutter:
-        """The Shutter these options describe, once they are settled."""
+        """Return the Shutter these settings describe; call `resolved` first."""
         phase: str | float = self.phase
         if phase not in PHASES:
             try:
@@ -78,43 +78,43 @@ class ShutterSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class InputSettings:
-    """Which frames and layers, and what they mean."""
+    """Input frames, layers and conventions."""
 
     frames: str | None = None
-    "Frames of the pattern, such as 1-100x2 or 1,3,5-8; all that exist by default."
+    "Frame numbers, such as 1-100x2 or 1,3,5-8; by default all existing frames."
     layer: str | None = None
-    "The picture's layer, where its name does not say so."
+    "Colour layer, if it cannot be found by name."
     vectors: str = "auto"
-    "What the motion vectors mean: auto, none, or a convention."
+    "Motion vector convention: auto (detected), none, or a name."
     vector_layer: str | None = None
-    "The vectors' layer, where its name does not say so."
+    "Motion vector layer, if it cannot be found by name."
     vector_scale: float = 1.0
-    "Multiplies the vectors."
+    "Factor applied to the motion vectors."
     vector_offset: float | None = None
-    "What stands for no motion, taken away first (vray, rsmb: 0.5)."
+    "Value that encodes zero motion, subtracted before scaling (vray, rsmb: 0.5)."
     vector_flip: Literal["x", "y", "xy"] | None = None
-    "Turns the vectors round along an axis."
+    "Reverses the motion vectors along an axis."
     object_motion: bool = False
-    "The vectors leave the camera's motion out: add it from --camera."
+    "The vectors hold object motion only; the camera's motion is added from --camera."
     camera: Path | None = None
-    "JSON with a camera for every frame: motion from depth where there are no vectors."
+    "JSON file with a camera per frame: gives motion from depth where vectors are missing."
     depth: str | None = None
-    "The depth layer, where its name does not say so."
+    "Depth layer, if it cannot be found by name."
     depth_kind: Literal["planar", "inverse", "clip"] = "planar"
-    "Distance along the view axis, 1 / that (Nuke), or z after projection."
+    "Depth convention: distance along the view axis, its inverse (Nuke), or z after projection."
     far: float = 1e9
-    "Depth from which on nothing is there (sky)."
+    "Depth from which a pixel counts as empty (sky)."
     object_layer: str | None = None
-    "Index layer that tells the camera file's objects apart."
+    "Object index layer that identifies the objects of the camera file."
     also: tuple[str, ...] = ()
-    "Pattern of files with further layers of the same frames; may be repeated."
+    "Pattern of files with additional layers of the same frames; may be repeated."
     skip_missing: bool = False
-    "Leave out frames that are not there instead of refusing."
+    "Skip missing frames instead of stopping with an error."
     max_mb: float = limits.MAX_MB
-    "Megabytes that a picture file may unpack to (as 32-bit floats); a larger one is refused."
+    "Largest allowed decoded size of an image file in megabytes (as 32-bit floats)."
 
     def open(self, pattern: str, holdout: str | None = None, scale: str | None = None) -> Clip:
-        """The clip these options describe; InputError where one of its files must not be read."""
+        """Return the Clip these settings describe; InputError if a file is not readable."""
         for name in (holdout, scale, *self.also):
             if name and Path(name).suffix and not is_pattern(name):
                 readable(Path(name))
@@ -156,7 +156,7 @@ def _method_options() -> dict[str, tuple[object, object, str]]:
 
 
 def _merged(options: list[tuple[str, Option]]) -> tuple[object, object, str]:
-    """One option for all methods that have one of this name: any of their choices."""
+    """Return one option for all methods that share its name, with the union of their choices."""
     kind: object = options[0][1].kind
     if choices := dict.fromkeys(choice for _, option in options for choice in option.choices):
         kind = Literal[tuple(choices)]
@@ -182,30 +182,30 @@ def _with_method_options(settings: _Class) -> _Class:
 @dataclass(frozen=True, kw_only=True)
 @_with_method_options
 class BlurSettings:
-    """How to blur; beside these, METHOD_OPTIONS."""
+    """Blur method and options; the fields of METHOD_OPTIONS are added."""
 
     method: str | None = None
-    "How; gather where there is depth, else tap, if it is not given."
+    "Blur method; by default gather if depth is available, else tap."
     samples: int | Literal["auto"] | None = None
-    "Taps, pictures or rays a pixel: 16, for fusion 8; auto: one a pixel of a streak, 64 at most."
+    "Taps, images or rays per pixel: 16 (fusion: 8); auto: 1 per pixel of blur length, at most 64."
     jitter: float = 0.0
-    "0 to 1: trades bands for noise."
+    "Jitter of the sample times, 0 to 1: trades banding for noise."
     holdout: str | None = None
-    "Stays sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or an image file."
+    "Pixels to keep sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or an image file."
     scale: str | None = None
-    "Multiplies the motion, per pixel: a LAYER or an image file."
+    "Motion scale per pixel: a LAYER or an image file."
     max_blur: float | None = None
-    "Longest streak in pixels."
+    "Maximum blur length in pixels."
 
     def resolved(self, scene: Scene | None = None, clip: Clip | None = None) -> Self:
-        """With a method that suits the scene or what the files hold, if it was left open."""
+        """Return a copy; an unset method is chosen by the scene or the passes in the files."""
         suited = "gather" if clip is None else default_method(clip.has)
         if scene is not None and scene.has_volumes:
             suited = "volume"
         return replace(self, method=self.method or suited)
 
     def make(self, shutter_: Shutter, adapter: str | None) -> Blur:
-        """The Blur these options describe; an option its method does not have is an error."""
+        """Return the Blur these settings describe; an option of another method is an error."""
         own = {name: getattr(self, name) for name in METHOD_OPTIONS}
         given = {
             name: value for name, value in own.items() if value is not None and value is not False
@@ -223,24 +223,24 @@ class BlurSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneSettings:
-    """Which moments of a scene, and how large."""
+    """Times, image size, parameters and camera of a scene."""
 
     time: float | None = None
-    "The one picture's time in seconds, where there are no --frames."
+    "Time of a single image in seconds, without --frames."
     frames: str | None = None
     "Frames such as 0-99; frame N is at N / fps seconds."
     size: str = "640x360"
     "Width x height in pixels."
     rays: int = 3
-    "Antialiasing of what image methods start from: rays a pixel's side, 1 to 8."
+    "Antialiasing of the sharp frames that image methods start from: rays per pixel side, 1 to 8."
     set: tuple[str, ...] = ()
-    "A parameter of the scene as NAME=VALUE; may be repeated."
+    "Scene parameter as NAME=VALUE; may be repeated."
     orbit: tuple[float, float] = (0.0, 0.0)
-    "Turn the camera round what it looks at: degrees to the right, and up."
+    "Orbits the camera around its pivot: degrees to the right, and up."
     pan: tuple[float, float] = (0.0, 0.0)
-    "Then move it to the right, and up [scene units]."
+    "Then moves the camera to the right, and up [scene units]."
     dolly: float = 1.0
-    "Times its distance to what it looks at."
+    "Scales the camera's distance to the pivot."
 
     def make(self, name: str) -> Scene:
         """The scene `name` with these parameters and this camera."""
@@ -279,26 +279,26 @@ def parameters_of(texts: tuple[str, ...]) -> dict[str, str]:
 
 @dataclass(frozen=True, kw_only=True)
 class OutputSettings:
-    """Where to."""
+    """Output files."""
 
     output: str
     "Pattern or file: .exr .png .jpg .tif, or a video .mp4 .mov .mkv .webm .gif."
     bits: int = 8
-    "Bits a sample of PNG and TIFF: 8 or 16."
+    "Bits per sample of PNG and TIFF: 8 or 16."
     fps: str = "24"
     "Frames per second of a video, such as 24 or 30000/1001."
     overwrite: bool = False
-    "Replace files that exist."
+    "Replace existing files."
     resume: bool = False
-    "Keep frames that are done; redo those whose settings or inputs differ."
+    "Keep finished frames; render those again whose settings or inputs have changed."
     layers: Literal["all", "picture"] = "all"
-    "EXR to EXR: all layers of the input beside the picture, or the picture only (faster)."
+    "EXR to EXR: copy all layers of the input, or write the picture only (faster)."
     compression: str = "zip"
-    "EXR: none, rle, zips, zip, piz; lossy: pxr24, b44, b44a, dwaa, dwab; same as the input's."
+    "EXR: none, rle, zips, zip, piz; lossy: pxr24, b44, b44a, dwaa, dwab; or same (as the input)."
 
     @property
     def looks(self) -> dict:
-        """What of these changes the files' content."""
+        """Return the settings that change the contents of the files."""
         return {"bits": self.bits, "layers": self.layers, "compression": self.compression}
 
     @property

@@ -17,7 +17,7 @@ def text_of(path: Path) -> str:
     if not readable(path):
         raise InputError(f"{path}: no such file")
     if path.stat().st_size > _MOST_BYTES:
-        raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, not read")
+        raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, too large for settings")
     try:
         return path.read_bytes().decode()
     except UnicodeDecodeError:
@@ -29,7 +29,7 @@ def parse(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise InputError("settings: too many lists or tables in each other") from None
+        raise InputError("settings: lists or tables are nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"settings: {error}") from None
     except ValueError:

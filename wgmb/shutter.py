@@ -1,4 +1,4 @@
-"""Shutter functions: how much each moment counts towards one frame.
+"""Shutter functions: the weight of each instant in a frame.
 
 Time is in frame intervals with 0 at the frame's own instant; 360 degrees are one
 interval, so a centred 180 degree shutter is open from -0.25 to 0.25. Every shutter
@@ -61,16 +61,16 @@ ROLLING = {"down": (0, 1), "up": (0, -1), "right": (1, 0), "left": (-1, 0)}
 
 @dataclass(frozen=True)
 class Shutter:
-    """When the shutter is open, and how far.
+    """Exposure of a frame: shutter angle, phase and curve.
 
-    `degrees`: open for this much of a turn, 360 = one frame interval; may exceed 360.
+    `degrees`: shutter angle, 360 = one frame interval; may exceed 360.
     `phase`: "start" opens at the frame's instant, "centre" is centred on it, "end" closes
     at it; a number is the time of the exposure's middle [frame intervals].
     `curve`: a name in CURVES, or a function of x in 0 (opens) to 1 (closes), at any scale,
     never negative.
-    `rolling`: "down", "up", "right", "left": the side that is exposed first is the one the
-    word moves away from; `rolling_duration` is the delay from first to last row or column
-    [frame intervals], the middle of the image keeping its time.
+    `rolling`: "down", "up", "right", "left", the direction in which the exposure moves ("down":
+    the top row is first); `rolling_duration`: delay from the first to the last row or column
+    [frame intervals]; the middle of the image is not delayed.
     """
 
     degrees: float = 180.0
@@ -97,7 +97,7 @@ class Shutter:
 
     @property
     def span(self) -> tuple[float, float]:
-        """When the shutter opens and closes [frame intervals]."""
+        """Times at which the shutter opens and closes [frame intervals]."""
         length = self.degrees / 360
         middle = PHASES[self.phase] * length if isinstance(self.phase, str) else self.phase
         return middle - length / 2, middle + length / 2
@@ -109,7 +109,7 @@ class Shutter:
         return x * self.rolling_duration, y * self.rolling_duration
 
     def integral(self, steps: int = 4096) -> tuple[np.ndarray, np.ndarray]:
-        """Times from open to close [frame intervals], and the share that has passed by each."""
+        """Return times from opening to closing [frame intervals] and the share exposed by each."""
         x = np.linspace(0, 1, steps + 1)
         curve = CURVES[self.curve] if isinstance(self.curve, str) else self.curve
         w = np.asarray(curve(x), np.float64) + np.zeros_like(x)
@@ -120,7 +120,7 @@ class Shutter:
         return opens + (closes - opens) * x, share / share[-1]
 
     def weight(self, times: np.ndarray) -> np.ndarray:
-        """How much each time [frame intervals] counts, per frame interval; 0 while closed."""
+        """Return the weight of each time [frame intervals], per frame interval; 0 while closed."""
         edges, integral = self.integral()
         if edges[0] == edges[-1]:
             raise InputError("a shutter of 0 degrees has no weights")
@@ -138,7 +138,7 @@ class Shutter:
         return np.sum([self.weight(times - n) for n in range(first, last + 1)], axis=0)
 
     def time(self, shares: np.ndarray) -> np.ndarray:
-        """When each share of the exposure (0..1) has passed [frame intervals]."""
+        """Return the times at which shares (0..1) of the exposure are reached [frame intervals]."""
         times, integral = self.integral()
         # A flat stretch (weight 0) is jumped over: only the ends of rising steps count.
         rises = np.diff(integral) > 0
@@ -159,8 +159,8 @@ class Shutter:
 def read_curve(path: str | Path) -> Weight:
     """A curve from a CSV file of `time, weight` rows, a header line allowed.
 
-    Times may be in any unit: the first row is where the shutter opens, the last where it
-    closes, and the shutter's degrees say how long that takes. Linear between the rows.
+    Times may be in any unit: the shutter opens at the first row and closes at the last; its
+    duration is given by the shutter's degrees. Linear between the rows.
     """
     try:
         with open(path, newline="", encoding="utf-8") as file:

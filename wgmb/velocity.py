@@ -1,4 +1,4 @@
-"""Motion of every pixel: vectors, or depth and matrices, or both -> one texture."""
+"""Motion of every pixel as one texture, from vectors, from depth and matrices, or both."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The command line: commands, and errors as one line and an exit code.
 
-A command's file is loaded when it is asked for.
+The module of a command is loaded on first use.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from .exit_codes import DONE, INTERRUPTED, NO_DEVICE, SOME_FAILED, USAGE
 COMMANDS = {
     "blur": "Blur rendered frames.",
     "render": "Render a built-in scene with motion blur.",
-    "view": "Look at a scene or at frames interactively.",
-    "info": "Say what a frame holds: layers, sizes, what its motion vectors mean, speeds.",
+    "view": "View a scene or frames interactively.",
+    "info": "Describe a frame: layers, sizes, motion vector convention, speeds.",
     "devices": "List the GPUs that --adapter (or WGMB_ADAPTER) can choose; * is the default.",
-    "compare": "Judge and time methods against a truth; write a page, and JSON and CSV beside it.",
-    "bench": "Time methods on this machine: median milliseconds a frame, transfers apart.",
-    "perceive": "Show frames as a viewer perceives them: each held for its time, the past fading.",
+    "compare": "Score and time methods against a ground truth; write an HTML, JSON and CSV report.",
+    "bench": "Time methods on this machine: median milliseconds per frame; transfers separately.",
+    "perceive": "Simulate what a viewer perceives: each frame is held, and earlier ones fade.",
     "shutter": "Draw a shutter: its curve, its integral, and the sum of neighbouring windows.",
 }
 """Every command, wgmb/cli/NAME.py, and the first line of its help."""
 
 
 def make_app(*whole: str) -> cyclopts.App:
-    """The program; commands in `whole` have all their help, the others their line of COMMANDS.
+    """Return the program; commands in `whole` have full help, the others their line of COMMANDS.
 
-    A command's own help is in its file, which the table of all commands is not to load.
+    Full help lies in a command's module, which `wgmb --help` must not load.
     """
     app = cyclopts.App(
         name="wgmb",
@@ -83,7 +83,7 @@ def main(arguments: list[str] | None = None) -> int:
             return _say_why(f"{error.filename}: {why}", USAGE)
         return _say_why(why, SOME_FAILED)
     except MemoryError:
-        return _say_why("there is not enough memory", SOME_FAILED)
+        return _say_why("not enough memory", SOME_FAILED)
     except KeyboardInterrupt:
         return _say_why("interrupted", INTERRUPTED)
 
@@ -99,7 +99,7 @@ def _check_text(words: list[str]) -> None:
 
 
 def _hint(words: list[str]) -> str:
-    """What may be meant where a file's name was taken for an option."""
+    """Return a hint if a file name was parsed as an option."""
     for word in words:
         if re.fullmatch(r"-[^=]*\.[A-Za-z]\w*", word):
             return f" For a file whose name begins with -, write ./{word}"
@@ -107,7 +107,7 @@ def _hint(words: list[str]) -> str:
 
 
 def _config(words: list[str]) -> tuple[Dict, ...]:
-    """The file named by --config; what stands on the command line wins over it."""
+    """Return the values of the --config file; options on the command line take precedence."""
     for i, word in enumerate(words if words[:1] != ["view"] else []):
         name, _, given = word.partition("=")
         if name == "--config" and (given or words[i + 1 :]):

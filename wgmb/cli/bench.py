@@ -1,4 +1,4 @@
-"""`wgmb bench`: how long methods take on this machine."""
+"""`wgmb bench`: time methods on this machine."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def bench(
     adapter: str | None = None,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
-    """Time methods on this machine: median milliseconds a frame, transfers apart.
+    """Time methods on this machine: median milliseconds per frame; transfers separately.
 
     Example: wgmb bench --methods tap,reproject --size 960x540 1920x1080 --samples 4,16,64
 
     Example: wgmb bench --methods all --size 960x540 1920x1080 3840x2160 --samples 4,16,64
 
-    Ctrl-C ends it with what was measured until then.
+    Ctrl-C stops early and reports the measurements so far.
 
     Parameters
     ----------
@@ -48,26 +48,26 @@ def bench(
         NAME[:OPTION=VALUE]..., separated by commas, or all; by default those that blur rendered
         frames. The others are timed on a built-in scene.
     samples
-        Numbers of samples, separated by commas.
+        Sample counts, separated by commas.
     size
-        Pictures to time it on; 1920x1080 by default.
+        Image sizes; 1920x1080 by default.
     rounds
-        How often everything is done.
+        Number of timing rounds.
     seconds
-        For a method at one size with one number of samples: where it would take longer it gets
-        fewer rounds, or is left out.
+        Time limit per method, size and sample count; runs expected to exceed it get fewer rounds
+        or are skipped and listed.
     output
-        A page with tables and plots, .html; JSON and CSV beside it.
+        Report with tables and plots, .html; JSON and CSV files are written next to it.
     save
-        Keep the figures, for --against.
+        Save the measurements, for use with --against.
     against
-        Compare with figures kept earlier.
+        Compare with measurements saved earlier.
     article
-        Instead, the torusphere (640x360: beside the article's own shader on two cores).
+        Time the torusphere instead (at 640x360 compared with the article's shader on two cores).
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     quiet
-        Do not say how far it is.
+        Hide the progress.
     """
     from ..lab import baselines, bench_report
     from ..lab.bench import Bench
@@ -86,16 +86,16 @@ def bench(
         contenders = [Contender.parse(text) for text in methods.split(",")]
     if wrong := [c for c in contenders if c.samples]:
         raise InputError(
-            f"bench takes samples from --samples, got {wrong[0].label}:{wrong[0].samples}"
+            f"set the number of samples with --samples, not {wrong[0].label}:{wrong[0].samples}"
         )
     labels = [c.label for c in contenders]
     if twice := [label for label in labels if labels.count(label) > 1]:
         raise InputError(f"methods must differ, got {twice[0]} twice")
     pages = pages_of(output) if output else []
     if save and save.resolve() in [page.resolve() for page in pages]:
-        raise InputError(f"{save} is written beside {output} already; save the figures elsewhere")
+        raise InputError(f"--save {save} is also written by --output {output}; rename one")
     if save and not save.parent.is_dir():
-        raise InputError(f"there is no folder {save.parent}")
+        raise InputError(f"no such folder: {save.parent}")
     counts = whole_numbers("samples", samples)
     before = Bench.load(against) if against else None
     run = measure(device, contenders, sizes, counts, rounds, seconds, teller(quiet))
@@ -119,11 +119,11 @@ def _tell_article(found: dict, width: int, height: int) -> None:
 
     out(f"{width} x {height}, torusphere, published density")
     for time_, (frame, recording, work) in found.items():
-        line = f"  iTime {time_:<6g}{frame:9.2f} ms a frame, {recording:.2f} of them recording, "
-        line += f"{work:.2f} ms of all cores"
+        line = f"  iTime {time_:<6g}{frame:9.2f} ms per frame, {recording:.2f} of it recording, "
+        line += f"{work:.2f} ms of CPU time on all cores"
         if (width, height) == (640, 360):
             ratios = frame / ARTICLE[time_], work / 2 / ARTICLE[time_]
-            line += "; to the article's shader {:.2f}, as work of two free cores {:.2f}".format(
+            line += "; {:.2f} times the article's shader, {:.2f} times with two free cores".format(
                 *ratios
             )
         out(line)

@@ -42,13 +42,13 @@ def blur(
     pattern
         Frames to blur: shot.####.exr, shot.%04d.exr, or one file.
     confidence
-        EXR, gather: with how sure the result is, as layers confidence.*; takes twice as long.
+        Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config
-        TOML file whose table [blur] holds options, as `wgmb view` saves it.
+        TOML file with options in its table [blur], as saved by `wgmb view`.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     verbose
-        Say which GPU, layers and settings are used.
+        Print the GPU, layers and settings in use.
     quiet
         Print errors only.
     """
@@ -94,7 +94,7 @@ def _settings(look: BlurSettings, when: ShutterSettings, given: InputSettings) -
 
 
 def _conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose: bool) -> int:
-    """Say what became of the run; return the exit code."""
+    """Print a summary of the run; return the exit code."""
     for number, why in sorted(report.failed.items()):
         note(f"wgmb: frame {number} failed: {why}")
     if report.stopped:
@@ -103,7 +103,7 @@ def _conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose:
     if not quiet:
         for number, bad in sorted(report.bad.items()):
             what = ", ".join(f"{n} in {name}" for name, n in bad.items())
-            note(f"frame {number}: pixels that are not finite were given no weight: {what}")
+            note(f"frame {number}: ignored pixels that are not finite: {what}")
         if verbose or "because" in clip.finding or "check them" in clip.finding:
             note(f"vectors: {clip.finding}")
         if clip.cuts:
@@ -111,14 +111,14 @@ def _conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose:
         if odd := odd_sizes({n: clip.sizes[n] for n in report.done}):
             note(odd)
         done = f"{len(report.done)} frames in {took} -> {files.pattern}"
-        note(done + (f", {len(report.skipped)} were there" if report.skipped else ""))
+        note(done + (f", {len(report.skipped)} already done" if report.skipped else ""))
     if report.failed:
         note(f"wgmb: {len(report.failed)} of {len(clip.numbers)} frames failed")
     return SOME_FAILED if report.failed or report.stopped else DONE
 
 
 def check_confidence(made: Blur, output: OutputSettings) -> None:
-    """InputError unless the method is sure of something and the output can hold it."""
+    """Raise InputError unless the method reports confidence and the output can store it."""
     layers = ", ".join(made.confidence)
     if not output.output.lower().endswith(".exr"):
         raise InputError(f"--confidence ({layers}) needs an .exr output, got {output.output}")

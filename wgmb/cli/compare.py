@@ -1,4 +1,4 @@
-"""`wgmb compare`: methods against a truth."""
+"""`wgmb compare`: score methods against a ground truth."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ from .pages import command_line, pages_of, teller, whole_numbers
 
 @dataclass(frozen=True, kw_only=True)
 class CompareSettings:
-    """Who is compared, and how."""
+    """Candidates and timing."""
 
     methods: str | None = None
     "NAME[:SAMPLES][:OPTION=VALUE]..., separated by commas; all by default."
     reference: str = "distributed:1024"
-    "What renders the truth of scenes."
+    "Method and samples that render the ground truth of scenes."
     samples: int = 16
-    "Of every method, where samples are equal."
+    "Samples per pixel of every method in the comparison at equal samples."
     ladder: str = "4,8,16,32,64"
-    "Numbers of samples for the curves."
+    "Sample counts for the error curves, separated by commas."
     budget: float | None = None
-    "Milliseconds where time is equal; by default those of the slowest method of pictures."
+    "Milliseconds per frame in the comparison at equal time; default: the slowest image method's."
     shutters: str | None = None
-    "Several in degrees, such as 90,180,360, instead of --shutter."
+    "Several shutter angles in degrees, such as 90,180,360, instead of --shutter."
     rounds: int = 3
-    "How often everything is timed; the least counts."
+    "Number of timing rounds; the fastest counts."
 
     def contenders(self) -> list[Contender]:
-        """Who takes part."""
+        """Return the candidates."""
         return [Contender.parse(text) for text in (self.methods or ",".join(METHODS)).split(",")]
 
     def steps(self) -> list[int]:
@@ -53,7 +53,7 @@ class CompareSettings:
         return whole_numbers("ladder", self.ladder)
 
     def budgets(self) -> Callable[[Report, Case], list[float]] | None:
-        """The times that everyone is to fit [s], if they are asked for."""
+        """Return a function that gives the time budgets [s], or None without --budget."""
         if self.budget is None:
             return None
         if not self.budget > 0:
@@ -62,7 +62,7 @@ class CompareSettings:
         return lambda report, case: [seconds]
 
     def exposures(self, when: ShutterSettings, scene: Scene | None = None) -> dict[str, Shutter]:
-        """The shutters, by what to call them; what is left open is the scene's."""
+        """Return the shutters by label; unset fields are taken from the scene."""
         settled = when.resolved(scene)
         try:
             degrees = [float(d) for d in (self.shutters or str(settled.shutter)).split(",")]
@@ -92,7 +92,7 @@ def compare(
     overwrite: bool = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
-    """Judge and time methods against a truth; write a page, and JSON and CSV beside it.
+    """Score and time methods against a ground truth; write an HTML, JSON and CSV report.
 
     Example: wgmb compare crossing fence:speed=5 --methods tap,reproject -o report.html
 
@@ -103,28 +103,28 @@ def compare(
     scene
         Built-in scenes, NAME[:SETTING=VALUE]...
     output
-        The page, .html.
+        Report file, .html; JSON and CSV files are written next to it.
     size
-        Of scenes' pictures.
+        Image size for scenes.
     time
-        Moment of the scenes in seconds.
+        Time of the scenes in seconds.
     rays
-        Antialiasing of scenes' sharp frames: rays a pixel's side.
+        Antialiasing of the scenes' sharp frames: rays per pixel side.
     truth
-        What the blurred frame should look like: a file, or two that were rendered with half the
-        samples and other seeds, whose mean it is: their difference tells how noisy it is.
+        Ground truth of the blurred frame: one file, or two rendered with half the samples and
+        different seeds; their mean is the truth, their difference gives its noise floor.
     inputs
         Rendered frames: a pattern, or the files of the frame before, this one and the next.
     frame
-        Number of the pattern's frame that the truth shows.
+        Frame number of the truth.
     peer
-        NAME=FILE: another program's picture of it; may be repeated.
+        NAME=FILE: the frame as blurred by another program; may be repeated.
     experiment
         Repeat a paper's experiment instead: taylor, chen or rosado.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     overwrite
-        Replace files that exist.
+        Replace existing files.
     quiet
         Print errors only.
     """
@@ -133,7 +133,7 @@ def compare(
         if file.exists() and not overwrite:
             raise InputError(f"{file} exists; --overwrite replaces it")
     if (truth is None) != (not inputs) or bool(scene) + bool(inputs) + bool(experiment) != 1:
-        raise InputError("give scenes, or --truth with --inputs, or --experiment")
+        raise InputError("pass either scenes, --truth with --inputs, or --experiment")
     device = gpu.open_device(adapter)
     tell = teller(quiet)
     lab = Laboratory(device, rounds=who.rounds, tell=tell)

@@ -1,4 +1,4 @@
-"""`wgmb devices`: the GPUs there are."""
+"""`wgmb devices`: list the available GPUs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`wgmb info`: what a frame holds, in lines for people; its motion as a picture."""
+"""`wgmb info`: a readable description of a frame, and its motion as an image."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ def info(
     output: Annotated[Path | None, Parameter(alias="-o")] = None,
     overwrite: bool = False,
 ) -> int:
-    """Say what a frame holds: layers, sizes, what its motion vectors mean, speeds.
+    """Describe a frame: layers, sizes, motion vector convention, speeds.
 
     Example: wgmb info 'shot.####.exr' --frames 10 -o motion.png
 
     Parameters
     ----------
     pattern
-        A file, or a pattern (its first frame is shown, neighbours test the vectors).
+        File or pattern; describes the first frame and tests its vectors against the neighbours.
     output
-        Draw the motion as a picture: hue is direction, brightness speed.
+        Draw the motion as an image: hue is direction, brightness is speed.
     overwrite
-        Replace that picture if it exists.
+        Replace an existing image.
     """
     clip = given.open(pattern)
     if output is not None and output.exists() and not overwrite:
@@ -55,9 +55,9 @@ def info(
 
 
 def describe(clip: Clip, output: Path | None = None) -> list[tuple[str, str]]:
-    """Name and text of every line about the clip's first frame; `output`: draw its motion."""
+    """Return (name, text) lines about the clip's first frame; `output`: draw its motion."""
     if output is not None and output.suffix.lower() not in stills.SUFFIXES:
-        raise InputError(f"output {output}: a picture, {', '.join(stills.SUFFIXES)}")
+        raise InputError(f"output {output}: must be an image, {', '.join(stills.SUFFIXES)}")
     if output is not None:
         refuse_inputs(output.parent, [output.name], [output], clip.inputs)
     source = clip.source(clip.numbers[0])
@@ -79,7 +79,7 @@ def describe(clip: Clip, output: Path | None = None) -> list[tuple[str, str]]:
 
 
 def _about_motion(clip: Clip, source: FrameFile, output: Path | None) -> list[tuple[str, str]]:
-    """What the frame's motion is like; drawn into `output`."""
+    """Return lines about the frame's motion, and draw it into `output`."""
     frame = clip.frame(source, picture=source.beside is not None)
     lines = []
     if frame.bad:
@@ -87,7 +87,7 @@ def _about_motion(clip: Clip, source: FrameFile, output: Path | None) -> list[tu
         lines.append(("bad", f"not finite or not in front of the camera: {', '.join(found)}"))
     if "motion" not in frame.has:
         if output:
-            raise InputError(f"{source.path}: no motion to draw: no vectors, no camera")
+            raise InputError(f"{source.path}: no motion to draw (neither vectors nor a camera)")
         return lines
     motion = Blur("tap").motion(frame)[..., 2:]
     speed = np.hypot(motion[..., 0], motion[..., 1])

@@ -1,4 +1,4 @@
-"""Settings as options: the groups that several commands share, with help from the registries."""
+"""Option groups shared by several commands, with help texts from the registries."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _Settings = TypeVar("_Settings", bound=type)
 
 
 def _with_help(settings: _Settings) -> _Settings:
-    """Give the options that only some methods have their help."""
+    """Add the help texts of method-specific options."""
     for name, (kind, default, text) in METHOD_OPTIONS.items():
         settings.__annotations__[name] = Annotated[kind, Parameter(help=f"{text}.")]
         setattr(settings, name, default)
@@ -35,47 +35,48 @@ def _with_help(settings: _Settings) -> _Settings:
 @dataclass(frozen=True, kw_only=True)
 @_with_help
 class BlurOptions(BlurSettings):
-    """How to blur."""
+    """Blur method and options."""
 
     holdout: Annotated[
         str | None,
         Parameter(
             alias="--keep",
-            help="Stays sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or an image.",
+            help="Pixels to keep sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) "
+            "or an image file.",
         ),
     ] = None
 
     method: Annotated[
         str | None,
-        Parameter(help=f"{', '.join(METHODS)}; by default gather where there is depth, else tap."),
+        Parameter(help=f"{', '.join(METHODS)}; default: gather if depth is available, else tap."),
     ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShutterOptions(ShutterSettings):
-    """When the shutter is open."""
+    """Shutter angle, phase and curve."""
 
     phase: Annotated[
         str,
         Parameter(
-            help=f"When it opens: {', '.join(PHASES)} of the interval at the frame's instant, "
-            "or the time of the exposure's middle in frame intervals."
+            help=f"Part of the exposure at the frame's time: {', '.join(PHASES)}; "
+            "or the time of its middle in frame intervals."
         ),
     ] = "centre"
     curve: Annotated[
         str | None,
-        Parameter(help=f"{', '.join(CURVES)}, or a CSV file of time, weight; box by default."),
+        Parameter(help=f"{', '.join(CURVES)}, or a CSV file of time, weight; default: box."),
     ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class InputOptions(InputSettings):
-    """Which frames and layers, and what they mean."""
+    """Input frames, layers and conventions."""
 
     vectors: Annotated[
         str,
         Parameter(
-            help="What the motion vectors mean: auto, none, or the convention of "
+            help="Motion vector convention: auto (detected), none, or that of "
             f"{', '.join(CONVENTIONS)}."
         ),
     ] = "auto"
@@ -83,7 +84,7 @@ class InputOptions(InputSettings):
 
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(OutputSettings):
-    """Where to."""
+    """Output files."""
 
     output: Annotated[
         str,
@@ -95,7 +96,7 @@ class OutputOptions(OutputSettings):
     ]
     compression: Annotated[
         str,
-        Parameter(help=f"Of an EXR: {', '.join(exr.COMPRESSIONS)}, or the same as the input's."),
+        Parameter(help=f"EXR compression: {', '.join(exr.COMPRESSIONS)}, or same (as the input)."),
     ] = "zip"
 
 
@@ -104,4 +105,4 @@ Moments = Annotated[SceneSettings, Parameter(name="*", group=Group("Input", sort
 Look = Annotated[BlurOptions, Parameter(name="*", group=Group("Blur", sort_key=2))]
 When = Annotated[ShutterOptions, Parameter(name="*", group=Group("Shutter", sort_key=3))]
 Target = Annotated[OutputOptions, Parameter(name="*", group=Group("Output", sort_key=5))]
-SceneName = Annotated[str, Parameter(help=f"{', '.join(builtin.SCENES)}.")]
+SceneName = Annotated[str, Parameter(help=f"Scene: {', '.join(builtin.SCENES)}.")]

@@ -1,4 +1,4 @@
-"""What `wgmb compare` and `wgmb bench` share: a page, and what is said meanwhile."""
+"""Report pages and progress messages of `wgmb compare` and `wgmb bench`."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ def whole_numbers(name: str, text: str) -> list[int]:
 
 
 def pages_of(output: Path) -> list[Path]:
-    """The page and what is written beside it; that it can be, before the work."""
+    """Return the page and the files next to it; InputError if they cannot be written."""
     if output.suffix != ".html":
         raise InputError(f"output must be a page such as report.html, got {output}")
     if not output.parent.is_dir():
-        raise InputError(f"there is no folder {output.parent}")
+        raise InputError(f"no such folder: {output.parent}")
     return [output.with_suffix(suffix) for suffix in (".html", ".json", ".csv")]
 
 
 def teller(quiet: bool) -> Tell:
-    """What says on stderr how far the work is, and hears Ctrl-C."""
+    """Return a function that prints progress on stderr and checks for Ctrl-C."""
 
     def tell(text: str) -> None:
         terminal.check()
@@ -41,5 +41,5 @@ def teller(quiet: bool) -> Tell:
 
 
 def command_line() -> str:
-    """What was typed, for the page."""
+    """Return the command line, for the page."""
     return shlex.join(["wgmb", *sys.argv[1:]])

@@ -1,4 +1,4 @@
-"""`wgmb perceive`: what a viewer sees of frames."""
+"""`wgmb perceive`: simulate what a viewer perceives."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ from .terminal import note, out, progress
 
 @dataclass(frozen=True, kw_only=True)
 class PerceptionSettings:
-    """Who looks, and at what."""
+    """Cone cell and scene."""
 
     cone_rate: float = 50.0
-    "How fast a cone cell's answer to a flash fades, 1/s."
+    "Decay rate of the cone cell's impulse response, 1/s."
     cone_peak: float = 0.05
-    "When it is strongest, seconds after the flash."
+    "Peak of the cone cell's impulse response, seconds after a flash."
     nature: float = 480.0
-    "Scenes: pictures a second that stand for a world without frames."
+    "Scenes: images per second that approximate continuous time."
     size: str = "640x360"
     "Scenes: width x height in pixels."
     set: tuple[str, ...] = ()
-    "Scenes: a parameter as NAME=VALUE; may be repeated."
+    "Scenes: parameter as NAME=VALUE; may be repeated."
 
     @property
     def cone(self) -> Cone:
@@ -65,9 +65,9 @@ def perceive(
     adapter: str | None = None,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
-    """Show frames as a viewer perceives them: each held for its time, the past fading.
+    """Simulate what a viewer perceives: each frame is held, and earlier ones fade.
 
-    A scene's name instead of files shows it without frames, at --nature pictures a second.
+    A scene name instead of files simulates continuous time, at --nature images per second.
 
     Example: wgmb perceive 'blurred.####.exr' -o 'seen.####.exr' --fps 60
 
@@ -78,9 +78,9 @@ def perceive(
     pattern
         Frames: shot.####.exr, shot.%04d.exr, or one file; or a scene of `wgmb render`.
     report
-        Draw how far perceived videos are from perceived nature, by shutter, against speed.
+        Plot the difference between perceived videos and perceived nature over speed, per shutter.
     speed
-        With --report: recommend a shutter at this speed of the report's disk, rad/s.
+        With --report: recommend a shutter for the report's disk at this speed, rad/s.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     quiet
@@ -88,14 +88,16 @@ def perceive(
     """
     if report:
         if pattern is not None:
-            raise InputError(f"--report draws its own disk, got {pattern!r} too")
+            raise InputError(f"--report takes no input, got {pattern!r}")
         return _report(output, who, speed, quiet)
     if pattern is None:
         raise InputError("perceive needs frames, a scene, or --report")
     if speed is not None:
-        raise InputError("--speed is for --report")
+        raise InputError("--speed needs --report")
     if output.resume:
-        raise InputError("--resume cannot be: every perceived frame depends on those before it")
+        raise InputError(
+            "--resume is not available for perceive: each frame depends on the previous ones"
+        )
     if pattern in builtin.SCENES:
         numbers, pictures, rate = _nature(pattern, given, who, float(output.rate), adapter)
         inputs = ()
@@ -136,7 +138,7 @@ def perceive(
 
 
 def _nature(name: str, given: InputSettings, who: PerceptionSettings, fps: float, adapter):
-    """A scene without frames: numbers, each frame's pictures since the one before, their rate."""
+    """Return frame numbers, the images between successive frames, and the rate of the images."""
     numbers = frame_numbers(given.frames or "0")
     steps = max(1, round(who.nature / fps))
     rate = fps * steps
@@ -165,7 +167,7 @@ def _report(
 ) -> int:
     fps, path = float(output.rate), Path(output.output)
     if path.suffix.lower() != ".svg":
-        raise InputError(f"output {path}: a report ends in .svg")
+        raise InputError(f"output {path}: the name of a report must end in .svg")
     if path.exists() and not output.overwrite:
         raise InputError(f"{path} exists; --overwrite replaces it")
     best = best_shutter(speed, fps, who.cone) if speed is not None else None
@@ -181,7 +183,8 @@ def _report(
         name, off = best
         degrees = VIDEOS[name].degrees
         out(
-            f"at {speed:g} rad/s and {fps:g} frames a second the disk moves {speed / fps:.2f} of "
-            f"its width a frame: --curve {name} --shutter {degrees:g} is nearest, {off:.4f}"
+            f"at {speed:g} rad/s and {fps:g} frames per second the disk moves {speed / fps:.2f} of "
+            f"its width per frame; the closest is --curve {name} --shutter {degrees:g} "
+            f"(difference {off:.4f})"
         )
     return 0

@@ -42,17 +42,17 @@ def render(
     Parameters
     ----------
     sharp
-        Without blur.
+        Render without blur.
     passes
-        EXR: with depth, motion, normal and object index, so that `wgmb blur` can take it on.
+        EXR: add layers for depth, motion, normal and object index, as input for `wgmb blur`.
     confidence
-        EXR, gather: with how sure the result is, as layers confidence.*; takes twice as long.
+        Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config
-        TOML file whose table [render] holds options, as `wgmb view` saves it.
+        TOML file with options in its table [render], as saved by `wgmb view`.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     verbose
-        Say which GPU and settings are used.
+        Print the GPU and settings in use.
     quiet
         Print errors only.
     """
@@ -60,14 +60,14 @@ def render(
     picture = what.make(scene)
     look, when = look.resolved(picture), when.resolved(picture, fps)
     if look.holdout or look.scale:
-        raise InputError("--holdout and --scale are for files: wgmb render has no layers to name")
+        raise InputError("--holdout and --scale need input files; use them with wgmb blur")
     if passes and not output.output.lower().endswith(".exr"):
-        raise InputError(f"--passes need an .exr output, got {output.output}")
+        raise InputError(f"--passes needs an .exr output, got {output.output}")
     if passes and output.layers == "picture":
-        raise InputError("--passes writes layers, --layers picture leaves them out: say one")
+        raise InputError("--passes cannot be combined with --layers picture")
     moments = what.moments(fps)
     if confidence and sharp:
-        raise InputError("--sharp is without blur: there is no --confidence to tell")
+        raise InputError("--confidence cannot be combined with --sharp")
     made = look.make(when.make(), adapter)
     renderer = Render(picture, made, size=size_of(what.size), fps=fps, rays=what.rays)
     settings = {"scene": scene, "sharp": sharp, "passes": passes} | output.looks
@@ -102,5 +102,5 @@ def render(
     if not quiet:
         seconds, made = time.perf_counter() - started, len(moments) - skipped
         done = f"{made} frames in {seconds:.1f} s -> {files.pattern}"
-        note(done + (f", {skipped} were there" if skipped else ""))
+        note(done + (f", {skipped} already done" if skipped else ""))
     return DONE

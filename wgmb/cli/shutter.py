@@ -1,4 +1,4 @@
-"""`wgmb shutter`: a shutter drawn."""
+"""`wgmb shutter`: draw a shutter."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def shutter(
 ) -> int:
     """Draw a shutter: its curve, its integral, and the sum of neighbouring windows.
 
-    Without --shutter, at the degrees at which its windows add up to 1, or 360.
+    Without --shutter, the angle is the one whose windows add up to 1, else 360 degrees.
 
     Example: wgmb shutter --curve cosine -o shutter.svg
 

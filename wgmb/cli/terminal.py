@@ -1,4 +1,4 @@
-"""What the commands say, what they show while they work, and how they are interrupted."""
+"""Output, progress bars and interruption of the commands."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def interrupt(*_) -> None:
 
 
 def hush(unraisable) -> None:
-    """For sys.unraisablehook: nothing of interruptions that were dropped; they are kept here."""
+    """Replace sys.unraisablehook: keep dropped interruptions instead of printing them."""
     if not (interrupted.is_set() and issubclass(unraisable.exc_type, KeyboardInterrupt)):
         sys.__unraisablehook__(unraisable)
 
 
 def check(*_) -> None:
-    """Interrupt now what should have been before."""
+    """Raise an interruption that was dropped earlier."""
     if interrupted.is_set():
         raise KeyboardInterrupt
 
@@ -45,19 +45,19 @@ def printable(text: str) -> str:
 
 
 def out(text: str) -> None:
-    """Print a line of results; OSError if nobody can take it."""
+    """Print a line of results; OSError if it cannot be written."""
     with _taken():
         sys.stdout.write(f"{printable(text)}\n")
 
 
 def note(text: str) -> None:
-    """Print a line for people on standard error; if nobody can take it, there is nobody to tell."""
+    """Print a message on standard error; failing to write it is ignored."""
     with contextlib.suppress(OSError):
         sys.stderr.write(f"{printable(text)}\n")
 
 
 def flush() -> None:
-    """Hand over what was printed; OSError if nobody can take it."""
+    """Flush standard output; OSError if it cannot be written."""
     with _taken():
         sys.stdout.flush()
 
@@ -71,7 +71,7 @@ def _taken():
 
 
 def own_streams() -> None:
-    """Move Python's output off descriptors 1 and 2, so that native chatter can be held back.
+    """Move Python's output off descriptors 1 and 2, so that output of native code can be muted.
 
     Descriptors that are closed are filled, as a file that is opened would get their numbers and
     with them the chatter; nothing can be printed there all the same.
@@ -105,7 +105,7 @@ def drop_streams() -> None:
 
 @contextlib.contextmanager
 def progress(frames: int, quiet: bool, doing: str = "blurring"):
-    """What to call after every frame: a bar with frames/s and time left where somebody watches."""
+    """Yield a function to call after every frame; on a terminal it drives a progress bar."""
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     if quiet or not say.is_terminal:
         yield check

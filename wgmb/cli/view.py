@@ -20,7 +20,7 @@ def view(
     window: str = "1280x720",
     adapter: str | None = None,
 ) -> int:
-    """Look at a scene or at frames interactively.
+    """View a scene or frames interactively.
 
     Example: wgmb view wheel
     Example: wgmb view 'shot.####.exr' --method reproject
@@ -28,11 +28,11 @@ def view(
     Parameters
     ----------
     what
-        A scene, a file or a pattern; crossing if there is no --config either.
+        Scene, file or pattern; by default the one in --config, else the scene crossing.
     config
-        TOML file that the viewer saved: begin as it says.
+        TOML file saved by the viewer: start with its settings.
     window
-        Width x height of the window.
+        Window size, WIDTHxHEIGHT.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     """

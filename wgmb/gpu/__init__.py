@@ -1,4 +1,4 @@
-"""The thin layer over wgpu: devices, kernels, textures, timing. It knows nothing of blur."""
+"""The thin layer over wgpu: devices, kernels, textures, timing. It is independent of blur."""
 
 from .device import (
     SOFTWARE,

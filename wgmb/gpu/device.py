@@ -57,7 +57,7 @@ def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
     if _is_opengl(matching[0]) and "opengl" not in name.lower():
         raise DeviceError(
             f"only OpenGL adapters found ({listing}); install a Vulkan driver "
-            "(Debian, Ubuntu: mesa-vulkan-drivers) or ask for it with --adapter opengl"
+            "(Debian, Ubuntu: mesa-vulkan-drivers) or select OpenGL with --adapter opengl"
         )
     return matching[0]
 
@@ -67,9 +67,9 @@ def _is_opengl(adapter: wgpu.GPUAdapter) -> bool:
 
 
 def open_device(name: str | None = None) -> wgpu.GPUDevice:
-    """A device of the chosen adapter with all it can do; the same one every time.
+    """Return the device of the chosen adapter with all its features, the same one every time.
 
-    A new one where the last one was lost.
+    If the last one was lost, a new one is opened.
     """
     claim()
     name = name or os.environ.get("WGMB_ADAPTER") or ""
@@ -93,14 +93,14 @@ def _device(name: str) -> wgpu.GPUDevice:
             required_limits={k: adapter.limits[k] for k in limits},
         )
     except (RuntimeError, wgpu.GPUError) as error:
-        raise DeviceError(f"{adapter.summary}: no device: {error}") from None
+        raise DeviceError(f"{adapter.summary}: cannot open the device: {error}") from None
 
 
 def check_size(device: wgpu.GPUDevice, width: int, height: int) -> None:
     """Refuse an image that the device cannot hold as one texture."""
     most = device.limits["max-texture-dimension-2d"]
     if not (0 < width <= most and 0 < height <= most):
-        raise InputError(f"image is {width} x {height}, the adapter takes 1 to {most} a side")
+        raise InputError(f"image is {width} x {height}, the adapter allows 1 to {most} per side")
 
 
 def texel(device: wgpu.GPUDevice, channels: int) -> str:
@@ -121,14 +121,14 @@ def claim() -> None:
     if _process not in (None, os.getpid()):
         raise DeviceError(
             "this process was forked from one that has a GPU device; GPU work needs a process "
-            'that is spawned, or forked before (multiprocessing.get_context("spawn"))'
+            'that is spawned (multiprocessing.get_context("spawn")), or forked earlier'
         )
     _process = os.getpid()
 
 
 @contextmanager
 def reported(size: tuple[int, int]):
-    """Turn what wgpu raises while it works on a picture of `size` into errors of ours.
+    """Convert wgpu errors raised while working on an image of `size` to wgmb errors.
 
     GpuMemoryError names the size. DeviceError: the device was lost; the next `open_device`
     makes a new one.

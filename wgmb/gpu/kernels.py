@@ -14,7 +14,7 @@ from . import wgsl
 
 @dataclass(frozen=True)
 class FrameBindings:
-    """What every pass of a frame is given: group 0 of its shader."""
+    """Bindings shared by all passes of a frame: group 0 of every shader."""
 
     size: tuple[int, int]  # width, height [px]
     resources: dict[str, wgpu.GPUBuffer]  # by binding name

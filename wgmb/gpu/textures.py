@@ -34,7 +34,7 @@ class ScratchBuffer:
         """The buffer, of `size` bytes or more; what is in it is undefined."""
         most = self._device.limits["max-storage-buffer-binding-size"]
         if size > most:
-            raise InputError(f"the picture needs a buffer of {size} bytes, the adapter has {most}")
+            raise InputError(f"the image needs a buffer of {size} bytes, the adapter allows {most}")
         if self._buffer is None or self._buffer.size < size:
             self._buffer = self._device.create_buffer(
                 label="scratch",

@@ -1,4 +1,4 @@
-"""How long GPU work takes: wall clock around a submit, and every pass by one of two clocks."""
+"""Timing of GPU work: wall clock around a submission, and every pass by one of two clocks."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class TimestampClock(_Clock):
 
     @staticmethod
     def usable(device: wgpu.GPUDevice) -> bool:
-        """Whether timestamps of this device can be believed."""
+        """Return True if timestamps of this device are reliable."""
         hardware = device.adapter_info["adapter_type"] != SOFTWARE
         return hardware and "timestamp-query" in device.features
 
@@ -69,7 +69,7 @@ class TimestampClock(_Clock):
         return _Stamped(self, encoder)
 
     def of(self, label: str) -> dict:
-        """What makes the pass called `label` write its times: arguments of begin_compute_pass."""
+        """Return arguments of begin_compute_pass that make the pass `label` write its times."""
         first = 2 * len(self.labels)
         if len(self.labels) >= self.MOST:
             return {}
@@ -124,7 +124,7 @@ class WallClock(_Clock):
         self.empty = self._run(device.create_command_encoder())
 
     def watch(self, encoder) -> Any:
-        """What takes the place of `encoder`: every command of it is submitted by itself."""
+        """Return a replacement for `encoder` that submits every command separately."""
         return _OneByOne(self)
 
     def take(self, label: str, encoder) -> None:

@@ -80,7 +80,7 @@ class WgslSource:
         """The same shader with other texel formats in its aliases, as `Output="rgba16float"`."""
         text = self.text
         for alias, texel in formats.items():
-            pattern = rf"^(alias {alias} = texture_storage_2d<)\w+"
+            pattern = rf"^(alias {alias} = texture_storage_2d(?:_array)?<)\w+"
             text = re.sub(pattern, rf"\g<1>{texel}", text, flags=re.M)
         return WgslSource(text, self.files)
 

@@ -1,1 +1,1 @@
-"""Files: pictures, videos, layers, sequences. Nothing here knows a GPU."""
+"""Files: images, videos, layers, sequences. Independent of the GPU."""

@@ -1,4 +1,4 @@
-"""Files that are whole under their names, or not there.
+"""Atomic file writes: a file is complete under its name, or does not exist.
 
 A file is written beside its name under a temporary one, which tells the host and the process
 that write it, and is then renamed. Several processes, on several hosts, may therefore write
@@ -109,7 +109,7 @@ def sweep(folder: Path, names: Collection[str]) -> None:
 
 
 def _is_left(path: Path, process: int) -> bool:
-    """Whether the process that wrote `path` has ended."""
+    """Return True if the process that wrote `path` has ended."""
     if process == os.getpid() or fcntl is None:
         return process != os.getpid()
     with contextlib.suppress(ProcessLookupError):

@@ -23,7 +23,7 @@ class CameraFile:
     `{"frames": {"10": {...}, ...}}`, each frame with either `clip_from_world`, or
     `camera_matrix_world` and `projection` (row-major lists, column vectors, OpenGL clip
     space, the camera looking along -z), and optionally `objects`: name -> `index` (as in the
-    object index pass) and `matrix_world`. Keys that are not needed are left alone.
+    object index pass) and `matrix_world`. Other keys are ignored.
     """
 
     def __init__(self, path: str | Path):
@@ -31,7 +31,7 @@ class CameraFile:
         self._frames = _read_json(self.path)
 
     def numbers(self) -> list[float]:
-        """The frames it speaks of."""
+        """Numbers of the frames in the file."""
         return sorted(self._frames)
 
     def around(self, number: int, **options: Any) -> Reprojections:
@@ -97,7 +97,7 @@ def _read_json(path: Path) -> dict[float, dict[str, Any]]:
         if not path.is_file():
             raise InputError(f"{path}: no such file")
         if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, not read")
+            raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, too large for a camera file")
         content = json.loads(path.read_bytes())
         frames = content["frames"]
         numbered = {float(k): v for k, v in frames.items()}

@@ -1,6 +1,6 @@
 """Frame sequences on disk: a pattern in, Frames out.
 
-`Clip` reads frames, finds their layers, settles what the vectors mean and keeps neighbours.
+`Clip` reads frames, finds their layers, detects the vector convention and caches neighbours.
 """
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
@@ -40,14 +40,14 @@ _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
 
 @dataclass(frozen=True)
 class Passes:
-    """Which layers of the files to use, and what they mean.
+    """Layers to read from the files, and their conventions.
 
-    `color`, `depth`: layer names where they are unusual. `depth_kind`: "planar" distance
-    along the view axis, "inverse" 1 / that (Nuke), "clip" z after projection. `camera`: a
-    JSON file (see CameraFile) for motion where there are no vectors. `object_layer`: the
-    index layer by which the camera file's objects are told apart. `object_motion`: vectors
-    leave the camera's motion out. `holdout`, `scale`: a layer, `LAYER=VALUE`, or an image file
-    or pattern. `also`: patterns of files that hold further layers of the same frames.
+    `color`, `depth`: names of layers that cannot be found automatically. `depth_kind`: "planar"
+    (distance along the view axis), "inverse" (its reciprocal, Nuke), or "clip" (z after
+    projection). `camera`: JSON file (see CameraFile) for motion where vectors are missing.
+    `object_layer`: index layer that identifies the camera file's objects. `object_motion`:
+    vectors exclude the camera's motion. `holdout`, `scale`: a layer, `LAYER=VALUE`, or an image
+    file or pattern. `also`: patterns of files with additional layers of the same frames.
     """
 
     color: str | None = None
@@ -70,12 +70,12 @@ class Passes:
 
 
 class Clip:
-    """A frame sequence, or one picture, being read.
+    """Reader of a frame sequence or a single image.
 
-    Iterating gives Frames. `numbers` are the frames asked for, `on_disk` all that there are.
-    `finding` says what the vectors were found to mean; `cuts` has the frames read so far that
-    come after a camera cut, `unread` the neighbours that could not be read, `sizes` how large
-    those read so far are.
+    Iterating gives Frames. `numbers` are the requested frames, `on_disk` all existing ones.
+    `finding` describes the detected vector convention. Of the frames read so far, `cuts` has
+    those after a camera cut, `unread` the neighbours that could not be read, and `sizes` the
+    sizes.
     """
 
     def __init__(
@@ -87,8 +87,8 @@ class Clip:
         skip_missing: bool = False,
         max_mb: float = limits.MAX_MB,
     ):
-        """`frames`: "1-100x2", "1,3,5-8"; all that exist by default, and none may be missing
-        between them unless `skip_missing`. `max_mb`: megabytes that a file may unpack to.
+        """`frames`: "1-100x2", "1,3,5-8"; by default all existing ones, without gaps unless
+        `skip_missing`. `max_mb`: largest decoded size of a file in megabytes.
         """
         self._max_mb = max_mb
         self.sizes: dict[int, tuple[int, int]] = {}
@@ -115,8 +115,8 @@ class Clip:
             return there
         if not frames and there[-1] - there[0] - len(there) >= MOST_FRAMES:
             raise InputError(
-                f"{self.pattern}: {len(there)} of the frames {there[0]} to {there[-1]} are there; "
-                "--skip-missing takes these, --frames chooses"
+                f"{self.pattern}: only {len(there)} of the frames {there[0]} to {there[-1]} exist; "
+                "use --skip-missing to accept gaps, or --frames to select"
             )
         wanted = frame_numbers(frames) if frames else list(range(there[0], there[-1] + 1))
         found = set(there)
@@ -124,7 +124,7 @@ class Clip:
         if missing and not skip_missing:
             raise InputError(
                 f"{self.pattern}: missing frames {frame_list(missing)}; "
-                "--skip-missing leaves them out"
+                "use --skip-missing to leave them out"
             )
         if not found & set(wanted):
             raise InputError(f"{self.pattern}: none of the frames {frames} exist")
@@ -136,9 +136,9 @@ class Clip:
 
     @property
     def has(self) -> frozenset[str]:
-        """What the first frame that can be read has for methods (see Frame.has).
+        """Inputs available in the first readable frame (see Frame.has).
 
-        Of all frames on disk, so that it does not depend on which of them are asked for.
+        All frames on disk are considered, so that the result is independent of `frames`.
         """
         for number in self.on_disk:
             with contextlib.suppress(InputError, OSError):  # its turn to fail comes
@@ -155,12 +155,12 @@ class Clip:
 
     @property
     def inputs(self) -> Iterator[Path]:
-        """Every file that may be read, whichever frames are asked for."""
+        """Iterate over all files that may be read, of all frames on disk."""
         for number in self.on_disk:
             yield from self.files(number)
 
     def made_of(self, number: int, neighbours: bool) -> dict[str, Any]:
-        """What the result of frame `number` depends on beside the settings, as JSON has it.
+        """Return the inputs of frame `number` apart from the settings, as values for JSON.
 
         Name, size [bytes] and time of change [ns] of every file, those of the frames before and
         after too if the method uses `neighbours`; and what the vectors were found to mean.
@@ -187,24 +187,24 @@ class Clip:
         return self._kept[number]
 
     def forget(self, number: int) -> None:
-        """Let go of a frame that nobody will ask for again."""
+        """Drop a frame from the cache."""
         self._kept.pop(number, None)
         self._ready.pop(number, None)
 
     @property
     def finding(self) -> str:
-        """What the vectors were found to mean, for people."""
+        """Readable description of the detected vector convention."""
         return self._decide().text
 
     def _decide(self) -> vectors.Finding:
-        """Settle, once for all frames, what the vectors mean.
+        """Determine the vector convention once for all frames.
 
-        By name, and tested on the first frame on disk, or the middle or last one where nothing
-        moves; so every run settles it alike, whichever frames it is asked for.
+        By name, then tested on the first frame on disk, or the middle or last one if nothing
+        moves there; so the result does not depend on the requested frames.
         """
         if self._found is None:
             wanted = self.passes.vectors
-            self._found = vectors.Finding(None, False, "none asked for")
+            self._found = vectors.Finding(None, False, "none requested")
             if wanted.convention != "none":
                 there = self.on_disk
                 tested = dict.fromkeys(there[i] for i in (0, len(there) // 2, -1))
@@ -275,8 +275,8 @@ class Clip:
         return frame
 
     def frame(self, source: FrameFile, picture: bool = True, normal: bool = True) -> Frame:
-        """What a method is given of `source`; without `picture`, all but the colour (0); without
-        `normal`, no normals.
+        """Return the Frame of `source`; without `picture`, its colour is 0; without `normal`, it
+        has no normals.
 
         Motion that leads across a camera cut is left out (see cuts.jumps).
         """
@@ -299,7 +299,7 @@ class Clip:
             if self._camera is not None:
                 if depth is None:
                     there = ", ".join(layers.layers(source.channels))
-                    raise InputError(f"motion from a camera needs a depth layer; there is {there}")
+                    raise InputError(f"motion from a camera needs depth; available layers: {there}")
                 kind = "clip" if self.passes.depth_kind == "clip" else "planar"
                 reprojections = self._camera.around(
                     source.number, depth_kind=kind, far=self.passes.far, window=source.window
@@ -360,7 +360,7 @@ class Clip:
             plane = srgb(light[..., 0])  # grey values as painted
         if plane.shape[::-1] != source.size:
             raise InputError(
-                f"{file} must be {size_text(source.size)} like the picture, is {size_text(plane)}"
+                f"{file} must be {size_text(source.size)} like the image, got {size_text(plane)}"
             )
         return plane
 

@@ -1,4 +1,4 @@
-"""Camera cuts: no motion leads across one, and the frame beyond it is of no use."""
+"""Camera cuts, detected from colour and motion; frames across a cut are never used."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FAR = 0.1  # of the picture's width
 
 
 def jumps(frame: Frame, side: int) -> bool:
-    """Whether the motion to the frame before (`side` -1) or after (1) is that of a camera cut.
+    """Return True if the motion to the previous (`side` -1) or next (1) frame indicates a cut.
 
     Half of the picture moves over a tenth of its width, and 8 times as far as to the other side.
     """
@@ -44,7 +44,7 @@ def straightened(frame: Frame, side: int) -> Frame:
 
 
 def is_cut(frame: Frame, near: Frame, side: int) -> bool:
-    """Whether a cut lies between `frame` and `near`, the frame before (`side` -1) or after (1).
+    """Return True if a cut lies between `frame` and its neighbour `near` on `side` (-1 or 1).
 
     2,000 pixels, each the mean of 3 x 3, are compared with where their motion puts them in
     `near`, and with places picked at random: across a cut the two differ alike.

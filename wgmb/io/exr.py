@@ -1,4 +1,4 @@
-"""EXR files: every part, channel and attribute in, the same out, and no fault passed over.
+"""EXR files: all parts, channels and attributes are read and written; damage is an error.
 
 The OpenEXR library answers a damaged file with a line on the terminal and fewer parts; here
 that is an error that names the file.
@@ -220,7 +220,7 @@ def _short_of_memory(heard: list[str], needed: int) -> bool:
 
 
 def _promised(path: Path, part) -> Part:
-    """What the header says the part holds, with empty arrays."""
+    """Return the part as declared by its header, with empty arrays."""
     header = part.header
     if header.get("type") in (OpenEXR.deepscanline, OpenEXR.deeptile):
         raise InputError(f"{path}: deep images are not supported")
@@ -228,11 +228,11 @@ def _promised(path: Path, part) -> Part:
     width, height = data[2] - data[0] + 1, data[3] - data[1] + 1
     if not (0 < width <= MOST_PIXELS_A_SIDE and 0 < height <= MOST_PIXELS_A_SIDE):
         raise InputError(
-            f"{path}: image of {width} x {height}; at most {MOST_PIXELS_A_SIDE} a side"
+            f"{path}: image of {width} x {height}; at most {MOST_PIXELS_A_SIDE} per side"
         )
     channels = {c.name: np.empty((0, 0), np.float32) for c in header["channels"]}
     if not channels:
-        raise InputError(f"{path}: a part without channels")
+        raise InputError(f"{path}: has a part without channels")
     attributes = {k: v for k, v in header.items() if k not in _WRITTEN_ANEW}
     name, compression = header.get("name", "") or "", header["compression"]
     return Part(name, channels, attributes, data, display, compression)

@@ -1,4 +1,4 @@
-"""One frame as it lies on disk: its files read, their layers together in one window."""
+"""One frame as stored on disk: the layers of all its files, in one data window."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -67,7 +67,7 @@ class FrameFile:
 
     @property
     def window(self) -> Window | None:
-        """Where the image lies in the whole picture: x, y, whole width, whole height [px]."""
+        """Offset of the image in the full image, and the full size: x, y, width, height [px]."""
         if self.part is None:
             return None
         left, top, right, bottom = self.part.display_window
@@ -82,7 +82,7 @@ def size_text(of: np.ndarray | tuple[int, int]) -> str:
 
 
 def odd_sizes(sizes: dict[int, tuple[int, int]]) -> str | None:
-    """Which frames are not as large as most, for people; None where all are alike."""
+    """Return a message about frames of an unusual size; None if all have the same size."""
     by_size: dict[tuple[int, int], list[int]] = {}
     for number in sorted(sizes):
         by_size.setdefault(sizes[number], []).append(number)
@@ -156,8 +156,8 @@ def _one_window(read: exr.Exr, onto: exr.Part) -> dict[str, np.ndarray]:
         if part.data_window != onto.data_window:
             if part.display_window != onto.display_window:
                 raise InputError(
-                    f"{read.path}: layer {full}, {size_text(plane)}, lies in another "
-                    f"display window than the picture, {size_text(onto.size)}"
+                    f"{read.path}: layer {full}, {size_text(plane)}, has a different "
+                    f"display window from the image, {size_text(onto.size)}"
                 )
             plane = _moved(plane, part.data_window, onto.data_window)
         channels[full] = plane
@@ -165,7 +165,7 @@ def _one_window(read: exr.Exr, onto: exr.Part) -> dict[str, np.ndarray]:
 
 
 def _moved(plane: np.ndarray, window: Window, onto: Window) -> np.ndarray:
-    """What `plane`, which covers `window`, has in `onto`."""
+    """Return the part of `plane`, which covers `window`, that lies in `onto`."""
     left, top = max(window[0], onto[0]), max(window[1], onto[1])
     right, bottom = min(window[2], onto[2]) + 1, min(window[3], onto[3]) + 1
     moved = np.zeros((onto[3] - onto[1] + 1, onto[2] - onto[0] + 1), plane.dtype)

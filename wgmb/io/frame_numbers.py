@@ -14,7 +14,7 @@ from fileseq.frameset import FrameSet
 from ..errors import InputError
 
 MOST_FRAMES = 1_000_000
-"""How many frames one run can be asked for."""
+"""Largest number of frames in one run."""
 _NUMBER = re.compile(r"[#@]+|%0*([0-9]{0,3})d|\$F0*([0-9]{0,3})")
 _RANGE = re.compile(r"(-?\d+)\s*-\s*(-?\d+)(?:\s*x\s*(\d+))?")
 
@@ -45,7 +45,7 @@ def _parsed(path: str | Path) -> _Pattern | None:
 
 
 def is_pattern(path: str | Path) -> bool:
-    """Whether a path stands for many frames."""
+    """Return True if a path is a pattern for several frames."""
     return _parsed(path) is not None
 
 
@@ -56,7 +56,7 @@ def frame_path(pattern: str | Path, number: int) -> Path:
 
 
 def readable(path: Path) -> bool:
-    """Whether the path is a file; InputError names one that must not be read."""
+    """Return True if the path is a file; InputError if it is not readable."""
     try:
         if not path.is_file():
             return False

@@ -64,7 +64,8 @@ def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
         named = [k for word in _COLOR for k in by_layer if stem(k) == word]
         if not named and len(by_layer) != 1:
             raise InputError(
-                f"which layer is the picture? say --layer; it has {', '.join(by_layer) or 'no RGB'}"
+                "cannot tell which layer is the colour; choose one with --layer: "
+                f"{', '.join(by_layer) or '(no RGB layer)'}"
             )
         chosen = named[0] if named else next(iter(by_layer))
     return by_layer[chosen]
@@ -108,7 +109,7 @@ def pick(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:
     alike = [k for k in by_layer if stem(k) == wanted.lower()]
     if len(alike) == 1:
         return alike[0]
-    raise InputError(f"no {what} {wanted!r}; there is {', '.join(map(repr, by_layer))}")
+    raise InputError(f"no {what} {wanted!r}; available: {', '.join(map(repr, by_layer))}")
 
 
 def one_channel(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:
@@ -146,7 +147,7 @@ def mask(channels: Channels, attributes: Mapping, wanted: str) -> np.ndarray:
         number = float(value)
     except ValueError:
         raise InputError(
-            f"layer {layer!r} is no Cryptomatte, so {value!r} must be a number"
+            f"layer {layer!r} is not a Cryptomatte, so {value!r} must be a number"
         ) from None
     return (np.abs(plane - number) < 0.5).astype(np.float32)
 
@@ -184,7 +185,7 @@ def _crypto_coverage(channels: Channels, crypto: Mapping[str, str], value: str) 
 
 def _crypto_id(crypto: Mapping[str, str], value: str) -> int:
     if not value:
-        raise InputError(f"Cryptomatte {crypto['name']!r}: say which object, as LAYER=NAME")
+        raise InputError(f"Cryptomatte {crypto['name']!r}: choose an object with LAYER=NAME")
     if re.fullmatch(r"0[xX][0-9a-fA-F]{1,8}", value):
         return int(value, 16)
     try:

@@ -1,4 +1,4 @@
-"""How much one picture file may unpack to: a small file can promise gigabytes."""
+"""Limit on the decoded size of an image file: a small file can declare gigabytes."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def check(path: Path, what: str, promised: int, stored: int, max_mb: float) -> N
     if promised <= most * 2**20:
         return
     needed = -(-promised * (_SHARE if thin else 1) // 2**20)
-    because = f", over {_TIMES} times its own size," if thin else ""
+    because = f" (over {_TIMES} times its own size)" if thin else ""
     raise InputError(
-        f"{path}: picture of {what} would unpack to {-(-promised // 2**20)} MB"
-        f"{because} where {most:g} are allowed; --max-mb {needed} allows it"
+        f"{path}: image of {what} would decode to {-(-promised // 2**20)} MB{because}, "
+        f"the limit is {most:g} MB; --max-mb {needed} allows it"
     )

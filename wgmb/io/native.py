@@ -23,7 +23,7 @@ _CHATTER = "Warning: Exception raised reading pixel data"
 
 
 class _Gate:
-    """Who is inside the library; shut while a thread forks or the process ends."""
+    """Tracks threads inside the library; closed while a thread forks or the process ends."""
 
     def __init__(self):
         self._changed = threading.Condition()
@@ -152,7 +152,7 @@ def _put_back(before, sieve: _Sieve) -> None:
 
 
 def _apart() -> bool:
-    """Whether Python's own streams live elsewhere than on descriptors 1 and 2."""
+    """Return True if Python's own streams do not use descriptors 1 and 2."""
     try:
         return sys.stdout.fileno() != 1 and sys.stderr.fileno() != 2
     except (OSError, ValueError, AttributeError):

@@ -1,4 +1,4 @@
-"""Where results go: pictures or a video, each file complete under its name or not there."""
+"""Output files: images or a video, each complete under its name or absent."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -21,7 +21,7 @@ from .frame_numbers import frame_path, is_pattern
 
 
 class Output:
-    """Where results go: a pattern of pictures, one picture, or a video.
+    """Output files: an image sequence, a single image, or a video.
 
     `settings`: written into the record of every file (see record.py), and compared when a run is
     resumed. `inputs`: the files that are read; an output that is one of them is refused, always.
@@ -60,7 +60,7 @@ class Output:
             raise InputError(f"bits must be 8 or 16 (JPEG: 8), got {bits}")
         is_video = suffix in video.SUFFIXES
         if is_video and resume:
-            raise InputError("--resume continues frame files; a video starts anew")
+            raise InputError("--resume is not available for videos, only for frame files")
         if not is_video and len(numbers) > 1 and not is_pattern(pattern):
             raise InputError(
                 f"output {pattern}: {len(numbers)} frames need a pattern such as out.####.exr"
@@ -70,12 +70,12 @@ class Output:
         refuse_inputs(self.pattern.parent, names, there, inputs)
         self._prepare_folder()
         if folders := [p for p in there if not p.is_file()]:
-            raise InputError(f"output {folders[0]}: is not a file")
+            raise InputError(f"output {folders[0]} exists and is not a file")
         if there and not (overwrite or resume):
             more = f" and {len(there) - 1} more" if len(there) > 1 else ""
             raise InputError(
                 f"{there[0]}{more} exists; --overwrite replaces it"
-                + ("" if is_video else ", --resume keeps what is done")
+                + ("" if is_video else ", --resume keeps finished frames")
             )
         atomic.sweep(self.pattern.parent, names)
         if is_video:
@@ -93,7 +93,7 @@ class Output:
 
     @property
     def is_video(self) -> bool:
-        """Whether all frames go into one file."""
+        """True if all frames go into one file."""
         return self._video is not None
 
     def why_hopeless(self, error: BaseException) -> str:
@@ -110,11 +110,10 @@ class Output:
         return self.pattern if self._video else frame_path(self.pattern, number)
 
     def done(self, number: int, made_of: dict[str, Any] | None = None) -> bool:
-        """Whether frame `number` is there: whole, with these settings, made of the same.
+        """Return True if frame `number` exists and is complete, with the same settings and inputs.
 
         `made_of`: what the frame depends on (see Clip.made_of). The file is read whole and
-        its checksum compared. Raises InputError where it is not ours to replace: another
-        program wrote it.
+        its checksum compared. Raises InputError if another program wrote it.
         """
         path = self.path(number)
         try:
@@ -148,7 +147,7 @@ class Output:
             return
         layers = {f"confidence.{name}": plane for name, plane in (confidence or {}).items()}
         if layers and self.pattern.suffix.lower() != ".exr":
-            raise InputError(f"{self.pattern}: only an .exr has room for {', '.join(layers)}")
+            raise InputError(f"{self.pattern}: only an .exr can store {', '.join(layers)}")
         if self._video is not None:
             self._video.add(result)
             return
@@ -162,7 +161,7 @@ class Output:
         if self._resume and self.done(source.number, made_of):
             return
         if not (self._resume or self._overwrite) and path.exists():
-            raise InputError(f"{path} was written by somebody else during this run")
+            raise InputError(f"{path} was written by another process during this run")
         self._under_way = atomic.temporary_name(path)
         atomic.write_file(path, *record.seal(data, text), temporary=self._under_way)
 
@@ -172,7 +171,7 @@ class Output:
             return
         try:
             if not self._overwrite and self.pattern.exists():
-                raise OSError("was written by somebody else during this run")
+                raise OSError("was written by another process during this run")
             self._video.close()
         except OSError as error:
             self.abandon()
@@ -229,7 +228,7 @@ def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> No
         raise InputError(f"layers must be all or picture, got {layers!r}")
     exr.check_compression(compression)
     if compression != "zip" and Path(pattern).suffix.lower() != ".exr":
-        raise InputError(f"compression {compression} is for an .exr output, got {pattern}")
+        raise InputError(f"compression {compression} needs an .exr output, got {pattern}")
 
 
 def _with_result(

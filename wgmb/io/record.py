@@ -54,7 +54,7 @@ def read(data: bytes) -> dict | None:
 
 
 def is_ours(data: bytes) -> bool:
-    """Whether a file, damaged or not, has the beginning of a record, or nothing at all in it."""
+    """Return True if a file, even a damaged one, begins a record, or is empty."""
     return _SEAL.search(data) is not None or not data.strip(b"\0")
 
 

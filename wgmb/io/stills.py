@@ -54,7 +54,7 @@ def read(path: str | Path, *, max_mb: float = limits.MAX_MB) -> np.ndarray:
         raise InputError(f"{path}: not enough memory for its pixels") from None
     except Exception as error:  # decoders raise whatever they like on damaged data
         lines = str(error).splitlines() or [type(error).__name__]
-        raise InputError(f"{path}: not a readable picture: {lines[0]}") from None
+        raise InputError(f"{path}: not a readable image: {lines[0]}") from None
 
 
 Allow = Callable[[int, int], None]
@@ -93,14 +93,14 @@ def _read_tiff(data: bytes, allow: Allow) -> np.ndarray:
     with tifffile.TiffFile(io.BytesIO(data)) as file:
         page = file.pages.first
         if len(file.pages) != 1:
-            raise ValueError(f"must be one picture, has {len(file.pages)} pages")
+            raise ValueError(f"must be a single image, has {len(file.pages)} pages")
         allow(page.imagewidth, page.imagelength)
         if page.photometric not in (tifffile.PHOTOMETRIC.RGB, tifffile.PHOTOMETRIC.MINISBLACK):
             raise ValueError(
                 f"must be grey or RGB, is {tifffile.PHOTOMETRIC(page.photometric).name}"
             )
         if sum(page.databytecounts) > len(data) or page.samplesperpixel > 4:
-            raise ValueError("damaged: more data promised than there is")
+            raise ValueError("damaged: the header declares more data than the file holds")
         return page.asarray()
 
 

@@ -19,7 +19,7 @@ from .layers import component, layers, pick, stem
 
 @dataclass(frozen=True)
 class Convention:
-    """What a program's vectors mean. `signs` turn them into displacements [px], y down."""
+    """A program's convention. `signs` turn its vectors into displacements [px], y down."""
 
     about: str
     stems: tuple[str, ...]  # last part of the layer's name, lower case
@@ -94,11 +94,11 @@ _CLEARLY = 0.75  # another reading must leave less than this share of the differ
 
 @dataclass(frozen=True)
 class Vectors:
-    """Which vectors to read, and what they mean.
+    """Vectors to read, and their convention.
 
-    `convention`: "auto", "none" or a name in CONVENTIONS. `layer` where its name is unusual.
-    `scale` multiplies, after `offset` (what stands for no motion) was taken away; `flip`
-    turns "x", "y" or "xy" round.
+    `convention`: "auto", "none" or a name in CONVENTIONS. `layer`: name of a layer that cannot be
+    found automatically. `offset`, the value that encodes zero motion, is subtracted first, then
+    `scale` multiplies; `flip` reverses "x", "y" or "xy".
     """
 
     convention: str = "auto"
@@ -180,7 +180,7 @@ def channels_of(
     if not found:
         raise InputError(
             f"no {vectors.convention} vectors ({' or '.join(convention.stems)}); "
-            f"there is {', '.join(map(repr, by_layer))}"
+            f"available: {', '.join(map(repr, by_layer))}"
         )
     result: dict[str, tuple[str, str]] = {}
     for side, members, (x, y) in found:
@@ -223,7 +223,7 @@ def read(
 
 @dataclass(frozen=True)
 class Finding:
-    """What warping the neighbouring frame said about a convention."""
+    """Result of testing a convention by warping the neighbouring frame."""
 
     vectors: Vectors | None  # the reading that explains the neighbour; None: there are none
     sure: bool  # something moves, and one reading is clearly better than standing still
@@ -231,7 +231,7 @@ class Finding:
 
 
 _Pairs = list[tuple[np.ndarray, np.ndarray]]  # motion towards a neighbour, and its tones
-_LEFT = "the neighbouring frame differs by {:.0%} of what it differs unmoved"
+_LEFT = "warping leaves {:.0%} of the difference to the neighbouring frame"
 _ALTERNATIVES = tuple((flip, scale) for flip in ("", "y", "x", "xy") for scale in (1.0, 2.0, 0.5))
 
 
@@ -260,7 +260,7 @@ def detect(
         )
     still = _difference(color, pairs, at, 0.0, "")
     if still == 0:
-        text = f"{vectors}, by name (what moves is alike in all frames, so it cannot be tested)"
+        text = f"{vectors}, by name (moving parts look the same in all frames: not testable)"
         return Finding(vectors, False, text)
     left = {
         (flip, scale): _difference(color, pairs, at, scale, flip) for flip, scale in _ALTERNATIVES
@@ -275,14 +275,14 @@ def detect(
     if left[best] > _CLEARLY * stated:
         best = ("", 1.0)
     if left[best] > _EXPLAINS * still:
-        text = f"{vectors}, by name; no reading of these vectors explains the neighbouring frame"
+        text = f"{vectors}, by name; no interpretation of them predicts the neighbouring frame"
         return Finding(vectors, False, text + ": check them")
     if best == ("", 1.0):
         return Finding(vectors, True, f"{vectors}, tested: {_LEFT.format(stated / still)}")
     flip, scale = best
     meant = replace(vectors, flip=_combine(vectors.flip, flip), scale=vectors.scale * scale)
     then, now = _LEFT.format(stated / still), f"{left[best] / still:.0%}"
-    return Finding(meant, True, f"{meant}, because with {vectors} {then}, so with {now}")
+    return Finding(meant, True, f"{meant}, because with {vectors} {then}, with this {now}")
 
 
 def _combine(a: str, b: str) -> str:

@@ -1,4 +1,4 @@
-"""MP4, MOV, MKV, WebM and GIF out: frames one by one, the file complete or not there."""
+"""Write MP4, MOV, MKV, WebM and GIF files frame by frame; complete or absent."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class Video:
 
     Alpha is dropped (the colour is premultiplied, so it lies over black). Codecs that share
     colour between pixels need even sizes: the last row or column is then repeated. A GIF has 256
-    colours a frame, dithered, and a clock of 1/100 s: its delays differ by a tick so that the
-    mean rate is right.
+    colours per frame, dithered, and delays in steps of 1/100 s, which vary by a step to keep
+    the mean frame rate.
     """
 
     def __init__(self, path: Path, temporary: Path, fps: Fraction, settings: str):
@@ -113,7 +113,7 @@ class Video:
             container.mux(stream.encode(None))
 
     def _tick(self, frame: int) -> int:
-        """When a frame of a GIF is shown, on its clock."""
+        """Return the time at which a frame of a GIF is shown, in its ticks."""
         return round(frame / (self.fps * _TICK))
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""What stands beside the methods in a benchmark: the tap blur in numba, the article's shader."""
+"""Baselines of the benchmark: the tap blur in numba, the article's shader."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""How fast the methods are: GPU work alone, transfers apart, beside the same filter in numba.
+"""Speed of the methods: GPU work without transfers, compared with the tap blur in numba.
 
-Figures of different days or machines say little; ratios of one run do. Candidates take
-turns, and medians are reported.
+Only ratios within one run are meaningful, not times from different days or machines.
+Candidates take turns, and medians are reported.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Figure:
     passes: dict[str, float] = field(default_factory=dict)
     """Every pass, by name; those of one name together."""
     counts: dict[str, int] = field(default_factory=dict)
-    """How many passes have that name."""
+    """Number of passes by name."""
     bytes: int = 0
     """Of all inputs and the output, each once: the least that must be moved."""
     numba: float | None = None
@@ -73,7 +73,7 @@ class Figure:
 
     @property
     def key(self) -> tuple:
-        """What another run's figure must share to be compared."""
+        """Key by which figures of two runs are matched."""
         return self.method, self.width, self.height, self.samples
 
     @property
@@ -95,11 +95,11 @@ class Bench:
     copy: float
     figures: list[Figure]
     clock: str = TimestampClock.name
-    """What timed the passes: "timestamps" of the GPU, or "wall clock" around each alone."""
+    """Clock of the passes: "timestamps" of the GPU, or "wall clock" around each one."""
     empty: float = 0.0
     """Milliseconds of an empty submission, taken from every pass that wall clock timed."""
     notes: list[str] = field(default_factory=list)
-    """What was left out, and why."""
+    """Skipped runs, with the reasons."""
 
     def save(self, path: Path) -> None:
         """As JSON, for `load`."""
@@ -107,7 +107,7 @@ class Bench:
 
     @classmethod
     def load(cls, path: Path) -> Bench:
-        """What `save` wrote; the error names the file."""
+        """Load a file written by `save`; errors name the file."""
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
             figures = [Figure(**f) for f in data["figures"]]
@@ -163,7 +163,7 @@ def bench(
     except KeyboardInterrupt:
         if not matrix.figures:
             raise
-        matrix.notes.append("interrupted: the rest is left out")
+        matrix.notes.append("interrupted: the rest is skipped")
     if not matrix.figures:
         raise InputError(matrix.notes[-1] if matrix.notes else "no methods to time")
     name, empty = matrix.clock.name, 1e3 * matrix.clock.empty
@@ -194,7 +194,7 @@ class _Matrix:
         self.tell(text)
 
     def seconds(self, size: tuple[int, int], samples: int) -> float:
-        """What all contenders will take, as far as figures tell."""
+        """Return the expected seconds of all contenders, from the figures so far."""
         runs = _HEAVY * (self.rounds + 1)
         each = (self._frame(c.label, size, samples) for c in self.contenders)
         return sum(min(runs * s, self.limit) for s in each if _HEAVY * s <= self.limit)
@@ -212,7 +212,7 @@ class _Matrix:
                 )
                 timed[name] = one = make(blur, self.clock)
             except (InputError, wgpu.GPUError) as error:
-                self.note(f"{_what(size, samples)}: {name} left out: {error}")
+                self.note(f"{_what(size, samples)}: {name} skipped: {error}")
                 continue
             for part in one.parts:
                 jobs[f"{name} {part}"] = getattr(one, part)
@@ -249,8 +249,8 @@ class _Matrix:
         known = [f for f in self.figures if f.method == name]
         wanted = min((f.memory * math.prod(size) / math.prod(f.size) for f in known), default=0)
         if wanted + held > (most := _MEMORY * _memory()):
-            raise InputError(f"it would hold {wanted / 2**30:.1f} GB beside {held / 2**30:.1f} GB "
-                             f"of the others, of {most / 2**30:.1f} GB")  # fmt: skip
+            raise InputError(f"it would hold {wanted / 2**30:.1f} GB, the others hold "
+                             f"{held / 2**30:.1f} GB of {most / 2**30:.1f} GB")  # fmt: skip
 
     def _frame(self, name: str, size: tuple[int, int], samples: int) -> float:
         """Seconds of a frame, in proportion to pixels and samples; 0 where nothing is known."""
@@ -299,7 +299,7 @@ class _Traced(_Timed):
             with contextlib.suppress(InputError):
                 self.work()
                 return
-        raise InputError(f"method {blur.method.name!r} draws none of the scenes it is timed on")
+        raise InputError(f"method {blur.method.name!r} cannot draw any of the benchmark scenes")
 
     def draw(self, encoder, clock):
         self._render.draw(self.output.create_view(), 0.0, timing=clock)
@@ -339,7 +339,7 @@ class _Filter(_Timed):
 
 
 def _held() -> int:
-    """What all textures and buffers of the process hold [bytes]."""
+    """Return the size of all textures and buffers of the process [bytes]."""
     counts = wgpu.diagnostics.object_counts  # pyright: ignore[reportAttributeAccessIssue]
     return counts.get_dict()["total"]["resource_mem"]
 
@@ -363,7 +363,7 @@ def _peak() -> int:
 
 
 def _bytes(views: dict, output: wgpu.GPUTexture) -> int:
-    """What all textures of `encode`'s inputs and the output hold."""
+    """Return the size of the textures of `encode`'s inputs and the output [bytes]."""
     every = [v for one in views.values() if isinstance(one, FrameViews) for v in vars(one).values()]
     read = [v.texture for v in every if isinstance(v, wgpu.GPUTextureView)]
     total = 0

@@ -1,4 +1,4 @@
-"""What bench.py measured, for people: text, tables, curves."""
+"""Report of bench.py's measurements: text, tables, curves."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def text(run: Bench) -> str:
         for name, milliseconds in rows:
             if milliseconds is not None:
                 each = 1e6 * milliseconds / pixels
-                lines.append(f"  {name:42}{milliseconds:9.2f} ms {each:8.1f} ns a pixel")
+                lines.append(f"  {name:42}{milliseconds:9.2f} ms {each:8.1f} ns per pixel")
         if f.numba:
             lines.append(f"  gpu / numba tap{f.gpu / f.numba:36.2f}")
         if f.bytes:
             share = f.bandwidth / run.copy
             lines.append(f"  at least{f.bandwidth:43.2f} GB/s {share:6.0%} of a copy")
-        lines.append(f"  holds{f.memory / 2**20:46.2f} MB {f.memory / pixels:8.1f} B a pixel")
+        lines.append(f"  holds{f.memory / 2**20:46.2f} MB {f.memory / pixels:8.1f} B per pixel")
     lines += run.notes
     return "\n".join(lines) + "\n"
 
@@ -38,11 +38,11 @@ def _times(f: Figure, label: str) -> str:
 
 
 def _clocked(run: Bench) -> str:
-    """How the passes were timed."""
+    """Return a description of the clock of the passes."""
     if run.clock == TimestampClock.name:
-        return "Passes by the GPU's timestamps"
+        return "Passes timed by the GPU's timestamps"
     return (
-        "Passes by wall clock, each submitted by itself, less the "
+        "Passes timed by wall clock, each submitted separately, minus the "
         f"{run.empty:.2f} ms of an empty submission"
     )
 
@@ -68,7 +68,7 @@ def against(run: Bench, before: Bench) -> Table:
 def report(run: Bench, command: str, before: Bench | None = None) -> Report:
     """The figures as tables and plots, for report.py."""
     made = Report("Speed of the methods", command, run.machine, 0)
-    columns = ["method", "size", "samples", "GPU [ms]", "ns a pixel", "/ numba tap"]
+    columns = ["method", "size", "samples", "GPU [ms]", "ns per pixel", "/ numba tap"]
     columns += ["upload [ms]", "readback [ms]", "call [ms]", "at least [GB/s]", "of a copy"]
     rows = []
     for f in run.figures:
@@ -78,9 +78,9 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
         rows.append([*_first(f), *map(_round, values), f.memory >> 20, f.peak >> 20])
     columns += ["holds [MB]", "peak of the process [MB]"]
     note = (
-        f"A copy moves {run.copy:.1f} GB/s. Bytes are those of inputs and output, each once. "
-        "A method holds textures and buffers, inputs and output too; the process's memory is its "
-        "largest so far, with all methods in it, sizes in this order."
+        f"A copy moves {run.copy:.1f} GB/s. Bytes count inputs and output, each once. "
+        "Memory of a method is that of its textures and buffers, including inputs and output; "
+        "memory of the process is the peak so far over all methods, in the order of the rows."
     )
     made.tables.append(Table("Every method", columns, rows, note))
     passes = [
@@ -109,8 +109,8 @@ def _curves(figures: Sequence[Figure]) -> list[Plot]:
             if f.samples == counts[len(counts) // 2]:
                 pixels = f.width * f.height
                 curves.setdefault(f.method, []).append((pixels / 1e6, 1e6 * f.gpu / pixels))
-        title = f"Time a pixel, {counts[len(counts) // 2]} samples"
-        plots.append(Plot(title, "megapixels", "ns a pixel", curves))
+        title = f"Time per pixel, {counts[len(counts) // 2]} samples"
+        plots.append(Plot(title, "megapixels", "ns per pixel", curves))
     if len(counts) > 1:
         _, width, height = sizes[len(sizes) // 2]
         curves = {}

@@ -1,4 +1,4 @@
-"""What is compared: cases, each a picture to be made, and contenders that make it."""
+"""Cases (an image with its ground truth) and contenders (the methods that compute it)."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Contender:
         """NAME[:SAMPLES][:OPTION=VALUE]...; the error says which method is unknown."""
         name, *more = text.split(":")
         if name not in METHODS:
-            raise InputError(f"unknown method {name!r}, one of {', '.join(METHODS)}")
+            raise InputError(f"unknown method {name!r}; available: {', '.join(METHODS)}")
         samples, options = None, []
         for part in more:
             key, equals, value = part.partition("=")
@@ -60,12 +60,12 @@ class Contender:
 
     @property
     def label(self) -> str:
-        """How tables call it."""
+        """Name in tables."""
         return self.name or ", ".join([self.method, *(f"{k} {v}" for k, v in self.options)])
 
     @property
     def needs_scene(self) -> bool:
-        """Whether it makes its picture from a scene instead of rendered frames."""
+        """True if the method renders a scene instead of blurring rendered frames."""
         return "scene" in METHODS[self.method].needs
 
     def blur(self, samples: int, shutter: Shutter, device) -> Blur:
@@ -83,7 +83,7 @@ def _option(method: str, name: str, text: str) -> Any:
         known[name].check(value)
     elif name not in ("jitter", "max_blur"):
         every = ", ".join((*known, "jitter", "max_blur"))
-        raise InputError(f"method {method!r} has no option {name}; it has {every}")
+        raise InputError(f"method {method!r} has no option {name}; available: {every}")
     elif not isinstance(value, (int, float)) or isinstance(value, bool):
         raise InputError(f"{name} must be a number, got {text!r}")
     return value
@@ -127,12 +127,12 @@ class Case:
     truth: np.ndarray
     """(height, width, 3 or 4) linear."""
     about: str
-    """What the truth is."""
+    """Description of the truth."""
     staged: Staged | None = None
     peers: dict[str, np.ndarray] = field(default_factory=dict)
     """Pictures of other programs, by name."""
     floor: dict[str, float] | None = None
-    """What every judge says of a perfect picture, if the truth's noise is known."""
+    """Score of a perfect image by each metric, if the truth's noise is known."""
 
 
 def scene_case(
@@ -153,7 +153,7 @@ def scene_case(
         for part in _halves(reference, samples) or [reference]
     ]
     took = time.perf_counter() - started
-    about = f"{reference.label}, {samples} samples a pixel, {took:.1f} s"
+    about = f"{reference.label}, {samples} samples per pixel, {took:.1f} s"
     case = Case(name, staged.frame(device), shutter, pictures[0], about, staged)
     return case if len(pictures) == 1 else _of_halves(case, pictures)
 
@@ -206,7 +206,7 @@ def clip_case(
     elif len(inputs) == 1:
         clip = open_clip(inputs[0])
         if number is None and len(clip.numbers) > 1:
-            raise InputError(f"{inputs[0]} has frames {frame_list(clip.numbers)}: choose --frame")
+            raise InputError(f"{inputs[0]} has frames {frame_list(clip.numbers)}: set --frame")
         wanted = clip.numbers[0] if number is None else number
         if wanted not in clip.numbers:
             raise InputError(f"{inputs[0]} has no frame {wanted}")
@@ -216,7 +216,7 @@ def clip_case(
     pictures = {k: _read(path) for k, path in peers.items()}
     truths = [_read(path) for path in truth]
     if len(truths) == 1:
-        about = f"{truth[0].name}; one picture, so that its noise is not known"
+        about = f"{truth[0].name}; a single image, so its noise is unknown"
         return Case(name, frame, shutter, truths[0], about, peers=pictures)
     about = f"mean of {truth[0].name} and {truth[1].name}"
     return _of_halves(Case(name, frame, shutter, truths[0], about, peers=pictures), truths)

@@ -1,4 +1,4 @@
-"""Methods x scenes x shutters against a truth: numbers, pictures, equal samples, equal time.
+"""Compare methods with a ground truth, over scenes and shutters, at equal samples and time.
 
 A Laboratory lets every contender make every case (cases.py) with several numbers of samples,
 judges (metrics.py) and times it; what it finds (results.py) is written as a page, JSON and CSV
@@ -31,7 +31,7 @@ _FARTHER = 8  # times the most samples that were timed, tried at once
 
 
 class Laboratory:
-    """What every experiment shares: the device, how often to time, who is told."""
+    """Shared setup of all experiments: device, number of timing rounds, progress messages."""
 
     def __init__(self, device: wgpu.GPUDevice, *, rounds: int = 3, tell: Tell | None = None):
         if rounds < 1:
@@ -89,7 +89,7 @@ class Laboratory:
                     raise InputError("needs a scene")
                 self.picture(case, c.blur(1, case.shutter, self.device), c)
             except InputError as error:
-                report.notes.append(f"{case.name}: {c.label} left out: {error}")
+                report.notes.append(f"{case.name}: {c.label} skipped: {error}")
             else:
                 able.append(c)
         if not able:
@@ -169,7 +169,7 @@ class Laboratory:
     def passes(
         self, case: Case, jobs: dict[Contender, Blur]
     ) -> dict[Contender, dict[str, tuple[int, float]]]:
-        """How often every pass of methods of pictures runs, and the median seconds of all of them.
+        """Return the count and the median seconds of every pass of the image methods.
 
         All take turns in `rounds` rounds, after one for warmth.
         """
@@ -195,7 +195,7 @@ class Laboratory:
         return least
 
     def frame_seconds(self, case: Case) -> float:
-        """What one sharp frame of the scene takes; every frame of a film is rendered once."""
+        """Return the seconds for one sharp frame of the scene; a film renders every frame once."""
         if case.staged is None:
             return 0.0
         one = Contender("accumulate")
@@ -232,7 +232,7 @@ def _guess(known: list[tuple[int, float]], budget: float, most: int = MOST_SAMPL
 
 
 def crossings(report: Report, case: Case, judge: str = "flip") -> Table | None:
-    """When methods that trace a scene become as good as each method of pictures.
+    """Return a table of the times at which scene methods match each image method.
 
     Read off the error-against-time curves; `judge` must be one for which less is better.
     """
@@ -259,7 +259,7 @@ def crossings(report: Report, case: Case, judge: str = "flip") -> Table | None:
         f"{case.name}: when tracing the scene becomes as good",
         columns,
         rows,
-        "Read off the curves; > is beyond the last point, < before the first.",
+        "Interpolated on the curves; > is beyond the last point, < before the first.",
     )
 
 

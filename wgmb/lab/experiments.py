@@ -1,4 +1,4 @@
-"""The papers' own experiments, repeated: does what they found hold here?
+"""The papers' own experiments, repeated to check their findings.
 
 Each takes a Laboratory, an empty Report and a picture size, and fills the report.
 """
@@ -36,12 +36,12 @@ def taylor(
     """Taylor's comparison: three camera moves, two budgets in ratio 1 : 5, reference 1,000 rays.
 
     The exposure is the interval between the previous frame and this one, as in the paper.
-    The small budget is the time of UNIT_RAYS = 8 rays a pixel: the paper gives 2 s on two
+    The small budget is the time of UNIT_RAYS = 8 rays per pixel; the paper gives 2 s on two
     threads of 2 GHz and no number of rays; a ray tracer of its day shaded one to two million
-    rays a second on these, 2 to 4 million in 2 s, 8 to 16 a pixel of a picture of 512 x 512;
+    rays per second on these, 2 to 4 million in 2 s, 8 to 16 per pixel of a 512 x 512 image;
     the smaller is in favour of reprojection. Sharp frames have one ray a pixel. What a ray
     costs differs from renderer to renderer, and these rays are well distributed, which his may
-    not have been; so the rays a pixel that are as good as reprojection at its best say more
+    not have been; so the rays per pixel that match reprojection at its best say more
     than the crossing points in time.
     """
     names = ("distributed", "accumulate", "reproject:variant=published", "reproject", "tap")
@@ -69,7 +69,7 @@ def taylor(
         Table("In a fixed time", ["scene", "judge", "budget [ms]", *labels], fixed),
         Table(
             "Where distributed becomes as good as reprojection as published at its best",
-            ["scene", "judge", "reprojection's best", "after [ms]", "rays a pixel as good",
+            ["scene", "judge", "reprojection's best", "after [ms]", "rays per pixel as good",
              "distributed's time for them [ms]"],
             worth,
             "Reprojection wins where a renderer needs longer for these rays than for one sharp "
@@ -95,7 +95,7 @@ def _budgets(report: Report, case: Case) -> list[float]:
 def _claims(
     report: Report, case: Case, judge: str, labels: list[str]
 ) -> tuple[list[str], list[list]]:
-    """What the paper found, here; and the numbers that it is read from."""
+    """Return the paper's findings as reproduced here, and the numbers behind them."""
     traced, blended, published, *_ = labels
     small, large = _budgets(report, case)
     shown = {(e.label, e.budget): e.measures[judge] for e in report.of(case.name, kind="time")}
@@ -145,14 +145,14 @@ def _holds(it: object) -> str:
 
 
 def chen(lab: Laboratory, report: Report, size: tuple[int, int], moments: int = 8) -> None:
-    """Chen's table 1 and figure 5: fusion against the tap blur it is compared with, 8 samples.
+    """Chen's table 1 and figure 5: fusion compared with the tap blur, 8 samples.
 
     Frame rates over a dive, of the blur alone, and its passes; quality of both against
     distributed:256; alpha from 0.02 to 0.10 against time and amount of blur. Amount of blur is the
-    share of the sharp picture's gradients that are gone; the truth's own stands beside it.
+    share of the sharp image's gradients that is lost; the truth's own value is given as well.
     """
     if "fusion" not in METHODS:
-        raise InputError(f"this experiment needs the method fusion; there is {', '.join(METHODS)}")
+        raise InputError(f"this experiment needs the method fusion; known: {', '.join(METHODS)}")
     report.samples = 8
     tap, fusion = (Contender(m, (("variant", "published"),)) for m in ("tap", "fusion"))
     printed = Contender("fusion", (("variant", "published"), ("weights", "published")))
@@ -231,7 +231,7 @@ def _by_pass(
             for label, times, s in [*parts, ("all", sum(t for _, t, _ in parts), total)]
         ]
     columns = ["method", "pass", "times", "median [ms]", "to the tap blur's"]
-    note = f"By {lab.clock.name}, each pass by itself. Sums leave out what lies between passes."
+    note = f"By {lab.clock.name}, each pass by itself. Sums exclude the time between passes."
     return Table("Table 1, pass by pass", columns, rows, note)
 
 
@@ -261,7 +261,7 @@ def _alphas(lab: Laboratory, report: Report, case: Case) -> None:
 
 
 def _facing(lab: Laboratory, report: Report, case: Case) -> None:
-    """What telling leading from trailing faces costs or saves."""
+    """Measure the cost or gain of separate weights for leading and trailing faces."""
     names = {"front 0.08, back 0.04": (0.08, 0.04), "all faces 0.04": (0.04, 0.04),
              "all faces 0.08": (0.08, 0.08)}  # fmt: skip
     contenders = [

@@ -198,7 +198,7 @@ def _card(index: int, case: Case, e: Entry) -> str:
     assert e.picture is not None
     name = escape(_name(e))
     images = f'<img src="{_uri(display(e.picture))}" alt="{name}">'
-    about = "what the others should be"
+    about = "reference for the other images"
     if e.measures:
         errors = flip_colors(e.picture, case.truth)
         images += f'<img src="{_uri(errors)}" alt="error of {name}">'
@@ -297,13 +297,13 @@ def _foot(report: Report) -> str:
     judges = "".join(f"<dt>{m.title}</dt><dd>{m.about}</dd>" for m in MEASURES.values())
     return (
         f"<h2>How to read this</h2>{notes}<dl>{judges}<dt>error maps</dt>"
-        f"<dd>{FLIP_GAIN:g} times FLIP of every pixel: black is alike, white very different</dd>"
-        "<dt>time</dt><dd>wall clock from recording to the end of the GPU's work, the least of "
-        "several rounds in turns; compare times of one page only</dd>"
-        "<dt>noise floor</dt><dd>what a perfect picture would get, as the truth has noise: each "
-        "of two independent halves of the truth against their mean</dd></dl>"
-        "<p class=soft>Figures were taken from floating point pictures; those on this page are "
-        "compressed. JSON and CSV lie beside it.</p>"
+        f"<dd>{FLIP_GAIN:g} times FLIP per pixel: black is identical, white very different</dd>"
+        "<dt>time</dt><dd>wall clock from recording to the end of the GPU's work, the minimum of "
+        "several rounds; only times on one page are comparable</dd>"
+        "<dt>noise floor</dt><dd>score of a perfect image, limited by noise in the truth: each of "
+        "two independent halves of the truth against their mean</dd></dl>"
+        "<p class=soft>Scores were computed from floating-point images; the images on this page "
+        "are compressed. JSON and CSV files are next to it.</p>"
     )
 
 

@@ -1,4 +1,4 @@
-"""What a run finds out: judged pictures, tables, curves; report.py writes them down."""
+"""Results of a run: scored images, tables, curves; report.py writes them."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class Entry:
     budget: float | None = None
     """Seconds it was to fit, of kind "time"."""
     traced: bool = False
-    """Whether its method makes pictures from a scene instead of rendered frames."""
+    """True if the method renders a scene instead of blurring rendered frames."""
     shown: bool = False
-    """Whether `picture` is to be seen on the page."""
+    """True if `picture` is shown on the page."""
     picture: np.ndarray | None = None
 
 
@@ -58,9 +58,9 @@ class Plot:
     y: str
     curves: dict[str, list[tuple[float, float]]]
     log: bool = True
-    """Whether x is logarithmic."""
+    """True for a logarithmic x axis."""
     floor: float | None = None
-    """What y is for a perfect picture, if the truth has noise."""
+    """The y value of a perfect image, if the truth has noise."""
 
 
 @dataclass
@@ -87,7 +87,7 @@ class Report:
 
 
 def machine(device: wgpu.GPUDevice) -> dict[str, str]:
-    """What the figures depend on, by name."""
+    """Return the machine and software versions behind the figures, by name."""
     return {
         "adapter": device.adapter.summary,
         "wgmb": __version__,

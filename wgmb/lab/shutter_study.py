@@ -1,4 +1,4 @@
-"""How far perceived videos are from perceived nature, by shutter (Cusa 2022)."""
+"""Difference between perceived videos and perceived nature, by shutter (Cusa 2022)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ TURN = 2 * math.pi
 
 
 def difference(shutter: Shutter, speed: float, fps: float, cone: Cone | None = None) -> float:
-    """How far a perceived video is from perceived nature: the article's claim as a number.
+    """Return the difference between a perceived video and perceived nature.
 
     A disk of radius 0.1 runs at `speed` [rad/s] on a circle of 0.2; `shutter` exposes its video of
-    `fps` frames a second. Frames and windows are centred alike. Mean absolute difference of 0..1
+    `fps` frames per second. Frames and windows are centred alike. Mean absolute difference of 0..1
     over the ring that the disk sweeps, at four times within a frame.
     """
     if not (math.isfinite(speed) and speed > 0):
@@ -68,7 +68,7 @@ def compare(fps: float, speeds: np.ndarray, cone: Cone | None = None) -> dict[st
 
 
 def best_shutter(speed: float, fps: float, cone: Cone | None = None) -> tuple[str, float]:
-    """Of VIDEOS, whose perceived video is nearest to nature at `speed` [rad/s], and how near."""
+    """Return the VIDEOS shutter closest to perceived nature at `speed` [rad/s] and its distance."""
     found = compare(fps, np.array([speed]), cone)
     name = min(found, key=lambda name: found[name][0])
     return name, found[name][0]
@@ -77,7 +77,7 @@ def best_shutter(speed: float, fps: float, cone: Cone | None = None) -> tuple[st
 def perception_charts(found, speeds: np.ndarray, fps: float) -> tuple[Chart, Chart]:
     """Differences by shutter (`perceive.compare`) against speed [rad/s], and the small ones."""
     lines = {name: (speeds, np.asarray(values)) for name, values in found.items()}
-    title = f"perceived video and perceived nature, {fps:g} frames a second"
+    title = f"perceived video and perceived nature, {fps:g} frames per second"
     axes = "speed [rad/s]", "difference"
     blurred = {name: line for name, line in lines.items() if name != "none"}
     return Chart(title, *axes, lines), Chart("with blur only", *axes, blurred)

@@ -1,4 +1,4 @@
-"""The methods. Each is one WGSL file and one small class; all are called alike."""
+"""The blur methods, each one WGSL file and one small class with a common interface."""
 
 from __future__ import annotations
 
@@ -18,5 +18,5 @@ METHODS: dict[str, type] = {m.name: m for m in _ALL}
 
 
 def default_method(has: Collection[str]) -> str:
-    """The method for frames that have colour and these inputs: gather where it can be, else tap."""
+    """Return the default method for these inputs: gather if they suffice, else tap."""
     return Gather.name if Gather.needs <= {"color", *has} else Tap.name

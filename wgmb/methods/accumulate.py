@@ -12,12 +12,12 @@ from .options import MethodOptions
 
 
 class Accumulate:
-    """The mean of `samples` pictures, at the middle of equal shares of the exposure.
+    """Average `samples` images, rendered at the middle of equal shares of the exposure.
 
     The accumulation buffer of Haeberli and Akeley (1990), for time alone.
 
-    Strong: right visibility and shading at every instant, no noise. Artefacts: with few
-    pictures, copies of what moves instead of a streak; each picture costs a whole render.
+    Strong: correct visibility and shading at every instant, no noise. Artefacts: with few
+    images, ghosts of moving objects instead of blur; each image costs a whole render.
     """
 
     name = "accumulate"
@@ -33,7 +33,7 @@ class Accumulate:
     def encode(self, encoder, inputs, output):
         """Record the pictures of `inputs.progress`; `output` is the mean of all so far."""
         if inputs.shutter.rolling:
-            raise InputError("accumulate exposes whole pictures: it cannot roll the shutter")
+            raise InputError("method 'accumulate' renders whole images and cannot roll the shutter")
         kernel = gpu.kernel(self._device, "methods/accumulate.wgsl", {"Output": self._output})
         times = inputs.shutter.sample_times(inputs.samples)[spread(inputs.samples)]
         width, height = inputs.bindings.size

@@ -1,4 +1,4 @@
-"""The contract between the pipeline and a method: what a method is, and what it may read."""
+"""The contract between the pipeline and a method: its interface and its inputs."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -23,14 +23,14 @@ class PreparedFrame(FrameViews):
     offset: int
     """-1, 0, 1: how far it is from the frame that is blurred [frame intervals]."""
     weight: View | None
-    """How much each pixel counts, 0..1; None: all alike. All frames have one, or none has."""
+    """Weight per pixel, 0..1; None: equal weights. Either all frames have one, or none."""
     by_camera: bool
     """The motion is the camera's alone: there are no vectors."""
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """What a method may read while it records one frame."""
+    """Inputs of a method while it records one frame."""
 
     bindings: gpu.FrameBindings
     samples: int
@@ -57,7 +57,7 @@ class Inputs:
 
 
 class Method(Protocol):
-    """What a method is: a name, the inputs it needs, and how it is recorded.
+    """Interface of a method: its name, its inputs, and the recording of its passes.
 
     It may also have `samples`, its own default number of them, and `adaptive`: it can take as
     many samples as each pixel's streak needs (AUTO of wgsl/common/shutter.wgsl); `confidence`,
@@ -70,8 +70,8 @@ class Method(Protocol):
     needs: frozenset[str]
     """Of "color", "motion", "depth", "scene"."""
     uses: frozenset[str]
-    """What it takes if it is there: "neighbours", "depth", "normal"; "progress": its samples may
-    be recorded bit by bit."""
+    """Optional inputs: "neighbours", "depth", "normal"; "progress": its samples may be recorded
+    in portions."""
 
     Options: type[MethodOptions]
     """Its own options; see options.py."""

@@ -18,9 +18,9 @@ TIMES = 4096  # equal shares of the exposure between which times are interpolate
 class Distributed:
     """Every ray has its own instant and place in the pixel (Cook, Porter, Carpenter 1984).
 
-    `samples` are rays a pixel. Times go through the shutter's inverse integral; time and
-    place come from one low-discrepancy sequence that is shifted by the pixel and the `seed`,
-    so more rays refine the same picture, and the same seed gives the same bits.
+    `samples` are rays per pixel. Times are mapped by the shutter's inverse integral; time and
+    position come from one low-discrepancy sequence, shifted by the pixel and the `seed`, so
+    that more rays refine the same image, and the same seed gives the same bits.
 
     Strong: converges to the truth for any motion, the only one that needs nothing but a
     scene. Artefacts: noise that falls with the number of rays, and takes the longest to fall.
@@ -32,9 +32,9 @@ class Distributed:
 
     @dataclass(frozen=True, kw_only=True)
     class Options(MethodOptions):
-        """Which noise."""
+        """Seed of the noise."""
 
-        seed: Annotated[int, Range(0, 2**32 - 1), "another seed is other noise"] = 0
+        seed: Annotated[int, Range(0, 2**32 - 1), "seed of the noise"] = 0
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
         self._device, self._output, self._seed = device, output, options.seed

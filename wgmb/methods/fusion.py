@@ -58,23 +58,23 @@ class Fusion:
 
     @dataclass(frozen=True, kw_only=True)
     class Options(MethodOptions):
-        """Where the samples stand, and what they weigh."""
+        """Sample positions and weights."""
 
         variant: Annotated[
             Literal["shutter", "published"],
-            "samples over the exposure, or from the previous position, whatever the shutter",
+            "samples over the exposure, or from the previous position, ignoring the shutter",
         ] = "shutter"
-        weights: Annotated[Literal["normalised", "published"], "with the sum 1, or as printed"] = (
+        weights: Annotated[Literal["normalised", "published"], "normalised to 1, or as printed"] = (
             "normalised"
         )
         alpha_front: Annotated[
-            float, Range(0, 1, above=True), "factor of faces that lead; more blurs them less"
+            float, Range(0, 1, above=True), "factor of leading faces; more blurs them less"
         ] = 0.08
         alpha_back: Annotated[float, Range(0, 1, above=True), "factor of all other faces"] = 0.04
         tau: Annotated[
             float | None,
             Range(0, 1, above=True),
-            "ratio of a sample's weight to that of the next newer one; 1, published: 0.5",
+            "ratio of a sample's weight to the next newer one's; default 1, published 0.5",
         ] = None
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
@@ -126,7 +126,7 @@ class Fusion:
         )
 
     def _shares(self, alpha: float, samples: int) -> tuple[float, float]:
-        """What the sharp colour counts, and all samples together."""
+        """Return the weights of the sharp colour and of all samples together."""
         if self._printed:
             return 1.0, alpha * (1 - self._tau**samples)
         trail = min(self._alphas) / alpha

@@ -1,4 +1,4 @@
-"""A method's own options: one frozen dataclass on the method, read by everybody who offers them.
+"""A method's own options: a frozen dataclass, read by the command line and the viewer.
 
 Each field is annotated with its type, its range where it is a number, and its help:
 
@@ -39,7 +39,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Option:
-    """One option: what it takes, what it is by default, and what it is for."""
+    """One option: its values, its default and its help."""
 
     name: str
     kind: type

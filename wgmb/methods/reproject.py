@@ -22,7 +22,7 @@ AT_ONCE = 64 << 20  # bytes of depths, or links: how many slices, or steps, are 
 class Reproject:
     """Every sample moves to its place at every time; the nearest one is seen.
 
-    Taylor's "Fast Motion Blur through Sample Reprojection" with what he names as future work:
+    Taylor's "Fast Motion Blur through Sample Reprojection" with the extensions the paper suggests:
     a depth test in every time slice, moving objects, the GPU. `samples` are time slices.
     Samples come from the frame itself; what they leave open is filled from the neighbouring
     frames, where there are any. Integer atomics alone decide what is seen: the same bits every run.
@@ -32,16 +32,16 @@ class Reproject:
     interpolated; where there are vectors, samples follow those. Colour is summed in fixed
     point of 64 bits: 0 to 262143 in steps of 1/16384, what is beyond is held to that range, and
     60,000 samples on one pixel in a few steps do not overflow; more are not all counted.
-    What he describes and leaves out is optional there. `facing`: a sample whose surface faces
+    Refinements named in the paper are optional there. `facing`: a sample whose surface faces
     away from the interpolated camera is dropped; needs cameras; the surface is that of the
     normals, or of the depth. `depth_test`: of the samples that a step puts on one pixel only
     the nearest counts, the least number among equals. `splat`: "line" draws every sample from
     its place at a step to that at the next, each pixel having its share of the step.
-    `show`: "count" gives the share of slices that reached a pixel (his figure 4).
+    `show`: "count" gives the share of slices that reached a pixel (the paper's figure 4).
 
-    Strong: blur goes over silhouettes, what is hidden appears, many samples cost little more
-    quality loss than few. Artefacts: copies where motion is fast against `samples`, edges up
-    to a pixel wide of their place, holes where no frame saw what is there.
+    Strong: blurs across silhouettes, reveals hidden surfaces, and many samples cost little more
+    than few. Artefacts: ghosts where motion is fast relative to `samples`, edges displaced by up
+    to a pixel, holes where no frame shows the surface.
     """
 
     name = "reproject"
@@ -50,20 +50,20 @@ class Reproject:
 
     @dataclass(frozen=True, kw_only=True)
     class Options(MethodOptions):
-        """The variant, and what the paper names and leaves out."""
+        """The variant, and the extensions the paper suggests."""
 
         variant: Annotated[
             Literal["slices", "published"],
-            "with a depth test in every time slice, or the paper's counting",
+            "depth test in every time slice, or the paper's sample counting",
         ] = "slices"
         show: Annotated[
             Literal["color", "count"],
-            "the blurred picture, or the share of slices that reached a pixel",
+            "the blurred image, or the share of slices that reached a pixel",
         ] = "color"
         facing: Annotated[
-            bool, "published: leave out what faces away from the interpolated camera"
+            bool, "published: drop surfaces facing away from the interpolated camera"
         ] = False
-        depth_test: Annotated[bool, "published: only the nearest of the samples on a pixel"] = False
+        depth_test: Annotated[bool, "published: keep only the nearest sample per pixel"] = False
         splat: Annotated[
             Literal["point", "line"], "published: points, or lines between the steps"
         ] = "point"
@@ -74,7 +74,7 @@ class Reproject:
             if self.variant != "published" and published:
                 raise InputError("facing, depth_test and splat need the variant 'published'")
             if self.depth_test and self.splat == "line":
-                raise InputError("a line is at many depths: depth_test needs splat 'point'")
+                raise InputError("depth_test needs splat 'point', as a line has no single depth")
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
         self._device, self._output, self._options = device, output, options

@@ -12,14 +12,14 @@ from .options import MethodOptions
 class Tap:
     """Average the colour along each pixel's own path (Rosado 2007, GPU Gems 3, ch. 27).
 
-    Taps stand where equal shares of the exposure have passed, on the path back in time.
+    Taps divide the exposure into equal shares along the path.
     `path`: "curved" goes through the pixel's places in the previous, this and the next
     frame; "straight" takes their mean velocity.
     `variant`: "published" is the chapter's own: velocity is half the difference between this
     and the previous position, equal taps go from the pixel along it, the shutter is ignored.
 
     Strong: the cheapest, smooth within a surface. Artefacts: blur stops at the silhouette of
-    what moves, what stands still in front of it bleeds into it, nothing appears behind it.
+    a moving object, still objects in front of it bleed into it, nothing is revealed behind it.
     """
 
     name = "tap"
@@ -29,7 +29,7 @@ class Tap:
 
     @dataclass(frozen=True, kw_only=True)
     class Options(MethodOptions):
-        """Which path taps follow, and the chapter's own variant."""
+        """Tap path and variant."""
 
         path: Annotated[
             Literal["curved", "straight"],
@@ -37,7 +37,7 @@ class Tap:
         ] = "curved"
         variant: Annotated[
             Literal["shutter", "published"],
-            "taps over the exposure, or as in the chapter, whatever the shutter",
+            "taps over the exposure, or as in the chapter, ignoring the shutter",
         ] = "shutter"
 
     def __init__(self, device, options: Options, *, output="rgba32float"):

@@ -1,4 +1,4 @@
-"""Reconstruction from one frame: taps that are weighted by what may be seen."""
+"""Reconstruction from one frame: taps weighted by visibility."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Tiles:
     """Taps along the fastest motion of the tiles around, and along the pixel's own.
 
     The filter of Guertin, McGuire and Nowrouzezahrai, "A Fast and Stable Feature-Aware Motion
-    Blur Filter" (2014): tile maximum, neighbour maximum, and three weights a tap by motion and
+    Blur Filter" (2014): tile maximum, neighbour maximum, and three weights per tap by motion and
     depth (after McGuire et al. 2012). Times are the shutter's, so that any curve and phase
     holds; a streak reaches at most a tile to either side: 40 px, or a ninth of the height.
     `variant`: "even" divides every weight by what it is under uniform motion, so that there a
@@ -28,7 +28,7 @@ class Tiles:
     the motion that each tile follows: hue is its direction, full brightness a whole tile.
 
     Strong: one frame is enough, fast, soft at silhouettes. Artefacts: where two motions meet
-    only one of them is followed, what was hidden is guessed from beside it.
+    only one of them is followed, hidden surfaces are guessed from neighbouring pixels.
     """
 
     name = "tiles"
@@ -38,14 +38,14 @@ class Tiles:
 
     @dataclass(frozen=True, kw_only=True)
     class Options(MethodOptions):
-        """How taps are weighted, and what is shown."""
+        """Tap weights and output."""
 
         variant: Annotated[
             Literal["even", "published"],
             "weights divided by those under uniform motion, or as printed",
         ] = "even"
         show: Annotated[
-            Literal["color", "tiles"], "the blurred picture, or the motion that each tile follows"
+            Literal["color", "tiles"], "the blurred image, or the motion followed by each tile"
         ] = "color"
 
     def __init__(self, device, options: Options, *, output="rgba32float"):

@@ -49,7 +49,7 @@ class Volume:
         if not shown.has_volumes:
             raise InputError(f"method 'volume' needs volumes, scene {shown.name!r} has none")
         if shown.bodies:
-            raise InputError("method 'volume' shows volumes only, the scene has rigid bodies too")
+            raise InputError("method 'volume' cannot draw the rigid bodies of this scene")
         if shown.figure is not None:
             if shutter.rolling:
                 raise InputError("a figure is exposed at once: it cannot roll the shutter")

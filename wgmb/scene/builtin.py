@@ -1,4 +1,4 @@
-"""The built-in scenes, one function each; its keywords are what `--set name=value` reaches.
+"""The built-in scenes, one function each; `--set name=value` sets its keyword arguments.
 
 Speeds are made for 24 frames per second and pictures about 640 pixels wide.
 """
@@ -298,12 +298,12 @@ SCENES: dict[str, Callable[..., Scene]] = {
 def make(name: str, /, **settings: float | str) -> Scene:
     """The built-in scene `name`; `InputError` names an unknown scene, setting or bad value."""
     if name not in SCENES:
-        raise InputError(f"unknown scene {name!r}, one of {', '.join(SCENES)}")
+        raise InputError(f"unknown scene {name!r}; available: {', '.join(SCENES)}")
     known = inspect.signature(SCENES[name]).parameters
     values = {}
     for key, text in settings.items():
         if key not in known:
-            raise InputError(f"scene {name!r} has no setting {key!r}; it has {', '.join(known)}")
+            raise InputError(f"scene {name!r} has no setting {key!r}, only {', '.join(known)}")
         kind = type(known[key].default)
         try:
             value = kind(text)

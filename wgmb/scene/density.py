@@ -28,12 +28,12 @@ class Rotation:
 
     @property
     def turns(self) -> float:
-        """How often one of the body's symmetric parts passes a place within the exposure."""
+        """Number of times a symmetric part of the body passes a point within the exposure."""
         return self.symmetry * self.angle / TURN
 
     @property
     def many(self) -> bool:
-        """Whether the closed form of all revolutions holds."""
+        """True if the closed form for all revolutions applies."""
         return self.turns > wgsl.load("scene/density.wgsl").constant("CLOSED_FROM")
 
     def fill(self, row: np.ndarray, index: int) -> None:

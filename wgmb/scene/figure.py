@@ -25,7 +25,7 @@ FASTEST = 1e4  # rad/s: beyond, nothing changes and a loop over passes is long
 class Figure:
     """One of KINDS. `small`, `large`: radii; `rotation`: clockwise at time 0 [rad].
 
-    `shutter`: of a kind that has its own, with RATE frames a second.
+    `shutter`: for kinds with a shutter of their own, at RATE frames per second.
     """
 
     kind: str

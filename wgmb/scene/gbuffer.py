@@ -53,7 +53,7 @@ class SceneOnGpu:
 
     @cached_property
     def resources(self) -> dict[str, wgpu.GPUBuffer | wgpu.GPUTextureView]:
-        """What it binds, made when the first kernel binds them."""
+        """Buffers and textures to bind, created on first use."""
         if self.scene.figure is not None:
             raise InputError(f"scene {self.scene.name!r} is flat: only method 'volume' draws it")
         scene, size, time, source = (
@@ -125,7 +125,7 @@ class SceneOnGpu:
         return textures
 
     def reprojections(self, time: float = 0.0) -> Reprojections:
-        """How everything moves around the instant `time` [frame intervals from this frame]."""
+        """Camera and body motion around `time` [frame intervals from this frame]."""
         prev, here, next_ = (self._camera(time + k) for k in (-1, 0, 1))
         return Reprojections(here, prev, next_)
 
@@ -184,7 +184,7 @@ def _check_finite(camera: np.ndarray, places: list[np.ndarray]) -> None:
     for i, matrix in enumerate([camera, *places]):
         name = f"body {i}" if i else "the camera"
         if not np.abs(matrix).max() < MOST:  # NaN is not
-            raise InputError(f"{name} must stay within {MOST:g} of the middle, all finite")
+            raise InputError(f"{name} must be finite and stay within {MOST:g} of the origin")
 
 
 def _poses(camera: np.ndarray, places: list[np.ndarray]) -> np.ndarray:

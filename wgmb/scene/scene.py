@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CameraPath:
-    """A camera over time: where it is and looks, and how wide [functions of seconds]."""
+    """A camera over time: position, target and zoom as functions of seconds."""
 
     position: Callable[[np.ndarray], tuple[ArrayLike, ArrayLike, ArrayLike]]
     yaw: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
@@ -31,13 +31,13 @@ class CameraPath:
     zoom: Callable[[np.ndarray], np.ndarray] = lambda t: 1.6 + 0 * t
     """Focal length in halves of the picture's height."""
     orbit: tuple[float, float] = (0.0, 0.0)
-    """Angles by which a viewer went round the pivot: to the right, and up [radians]."""
+    """Orbit of the camera around the pivot: to the right, and up [radians]."""
     pan: tuple[float, float] = (0.0, 0.0)
-    """How far a viewer then went to the right, and up [scene units]."""
+    """Camera movement after the orbit: to the right, and up [scene units]."""
     dolly: float = 1.0
-    """Times the distance to the pivot."""
+    """Scale of the camera's distance to the pivot."""
     pivot: float = 5.0
-    """How far in front of the camera the pivot is [scene units]."""
+    """Distance of the pivot in front of the camera [scene units]."""
 
     def world_from_camera(self, t: ArrayLike) -> np.ndarray:
         """(n, 4, 4); the camera looks along -z, y up."""
@@ -73,7 +73,7 @@ DENSITIES = ("exact", "published")
 
 @dataclass(frozen=True)
 class Scene:
-    """What is rendered.
+    """A scene to render: bodies, volumes, camera and light.
 
     `volumes` are shown blurred by the method "volume", and as solid bodies by all others. A
     function gives them and their backdrop around an instant [s], with `phase` the angle at it.
@@ -86,15 +86,15 @@ class Scene:
     sun: tuple[float, float, float, float] = (0.45, 0.8, 0.5, 0.95)
     """Direction towards it (any length) and its strength."""
     sky: tuple[float, float, float, float] = (0.22, 0.42, 0.78, 0.32)
-    """Colour straight up; strength of the light from all round."""
+    """Colour at the zenith; strength of the ambient light."""
     horizon: Color = (0.62, 0.72, 0.82)
     volumes: tuple[Volume, ...] | Callable[[float], Instant] = ()
     backdrop: Backdrop | None = None
     density: str = "exact"
     exposure: tuple[float, str] | None = None
-    """The shutter it is made for: seconds, curve."""
+    """Default shutter of the scene: seconds, curve."""
     loop: float | None = None
-    """After this time it begins anew [s]."""
+    """Duration after which the scene repeats [s]."""
     figure: Figure | None = None
     """A flat picture instead, for the method "volume"."""
 
@@ -110,10 +110,11 @@ class Scene:
                 )
             looks = (*body.color, *body.second_color, *body.repeats, body.emission, body.specular)
             if not _all_finite(looks):
-                raise InputError(f"a {body.shape} needs colours and lights in f32, got {looks}")
+                raise InputError(f"a {body.shape} needs colours and lights within f32, got {looks}")
         if not _all_finite((*self.sun, *self.sky, *self.horizon)) or not any(self.sun[:3]):
             raise InputError(
-                f"sun and sky must be finite and somewhere, got {self.sun}, {self.sky}"
+                "sun direction must not be zero; sun and sky must be finite, "
+                f"got {self.sun}, {self.sky}"
             )
         if self.density not in DENSITIES:
             raise InputError(f"density must be one of {', '.join(DENSITIES)}, got {self.density!r}")
@@ -124,7 +125,7 @@ class Scene:
 
     @property
     def has_volumes(self) -> bool:
-        """Whether the method "volume" has anything to show."""
+        """True if the method "volume" can draw the scene."""
         return bool(self.volumes) or self.figure is not None
 
     def instant(self, time: float) -> Instant:

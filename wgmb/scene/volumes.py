@@ -125,7 +125,7 @@ def _check_volume(volume: Volume) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Backdrop:
-    """What volumes are shown on: a ground with three grids of lines, a sky, a light.
+    """Surroundings of volumes: a ground with three grids of lines, a sky, a light.
 
     Colours are display values, as in the animation that this is from (Cusa 2022, torusphere).
     `grids`: side of the cells and brightness of each. `strobe`: phase [rad] and amount of a

@@ -2,13 +2,13 @@
 
 state      what the viewer is set to; as TOML (saved) and as a command line
 controls   mouse and keys: an event and a State make a State
-subject    a scene or frames on disk, drawn into textures; choices: what they allow
-stage      a State becomes one or two images, a bit at a time
-pace       how finely, while something moves
-perceived  the last frames as an eye has them; judge: how far from the reference
+source     a scene or frames on disk, drawn into textures; capabilities: what can be chosen
+renderer   a State becomes one or two images, in small steps
+adaptive   resolution and samples while something moves
+perception the last frames as perceived; quality: difference from the reference
 screen     images side by side or compared, with a key to their colours
-panel      the sliders: sections of widgets; words: those on the picture; theme: their looks
-window     events in, pictures out; a desktop window, or none; actions: files, videos, exports
+panel      the sliders: sections of widgets; overlay: text on the image; theme: colours, font
+window     events in, images out, on a desktop or offscreen; actions: files, videos, exports
 """
 
 from .state import State

@@ -1,4 +1,4 @@
-"""What a key or a button asks for beyond the picture: files, videos, exports, the whole screen."""
+"""Actions of keys and buttons: files, videos, exports, full screen."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .state import State
 
 
 class Actions:
-    """Does them, and knows what is still under way; what cannot be done is said."""
+    """Runs actions and tracks those in progress; failures are shown as messages."""
 
     def __init__(self, canvas, stage: Renderer, screen: Screen, say: Callable[[str], None]):
         self._window = getattr(canvas, "_window", None)  # of glfw, where there is one
@@ -36,7 +36,7 @@ class Actions:
 
     @property
     def recording(self) -> bool:
-        """Whether frames go into a video."""
+        """True while a video is being recorded."""
         return self._video is not None
 
     def do(self, action: str, what: str, state: State) -> State:
@@ -88,7 +88,7 @@ class Actions:
         self.close()
 
     def add_frame(self) -> None:
-        """What is shown goes into the video, if one is recorded."""
+        """Add the displayed image to the video, if one is being recorded."""
         if self._video is not None:
             self._video.add(self._shown())
 
@@ -114,7 +114,7 @@ class Actions:
             stderr=subprocess.PIPE,
             text=True,
         )
-        self.export, self.export_said = (child, output), f"making {output} ..."
+        self.export, self.export_said = (child, output), f"exporting {output} ..."
 
     def poll_export(self) -> None:
         """Notice that an export has ended, and how."""
@@ -122,7 +122,7 @@ class Actions:
             return
         (child, output), self.export = self.export, None
         said = (child.communicate()[1] or "").strip().splitlines()
-        self.export_said = f"made {output}" if child.returncode == 0 else " ".join(said[-1:])
+        self.export_said = f"exported {output}" if child.returncode == 0 else " ".join(said[-1:])
 
     def _fullscreen(self) -> None:
         window = self._window
@@ -145,7 +145,7 @@ def _free(*suffixes: str) -> Path:
         path = Path(f"wgmb-{number:03d}{suffixes[0]}")
         if not any(path.with_suffix(suffix).exists() for suffix in suffixes):
             return path
-    raise InputError("wgmb-001 to wgmb-9999 are all there")
+    raise InputError("no free file name: wgmb-001 to wgmb-9999 all exist")
 
 
 def _monitor_of(window: tuple[int, int, int, int]):

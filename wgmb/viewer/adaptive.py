@@ -1,4 +1,4 @@
-"""How finely a scene is drawn while something moves, so that the window stays quick."""
+"""Adaptive resolution and sample count, to keep the window responsive during motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ QUICK = 4  # the fewest samples while something moves
 
 
 class Pace:
-    """How finely to draw while something moves: the finest level that keeps to TARGET."""
+    """Level of detail during motion: the finest one that meets TARGET."""
 
     TARGET = 0.08  # seconds from one frame of the window to the next
     SCALES = (1.0, 1.0, 0.85, 0.72, 0.6, 0.5, 0.42, 0.36, 0.3, 0.25, 0.2)
@@ -20,11 +20,11 @@ class Pace:
         self._patience = 0
 
     def quality(self, level: int, rays: int) -> tuple[float, int]:
-        """Share of the full width, and rays a pixel's side."""
+        """Return the share of the full width, and the rays per pixel side."""
         return self.SCALES[level], rays if level == 0 else 1
 
     def samples(self, level: int, samples: int) -> int:
-        """How many of `samples` to take: QUICK at least, if there are as many."""
+        """Return the number of samples to take, at least QUICK if `samples` allows it."""
         return max(samples // self.FEWER[level], min(samples, QUICK))
 
     def observe(self, seconds: float, drawing: float, rays: int) -> None:

@@ -1,4 +1,4 @@
-"""What there is to choose from: subjects, methods and their options, looks, rivals."""
+"""Available choices: subjects, methods and their options, views, comparisons."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .state import LOOKS, REFERENCE, State
 
 
 class Choices:
-    """What the device and the scene, or the frames, allow."""
+    """Choices available with the device and the scene or frames."""
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device = device
@@ -40,12 +40,12 @@ class Choices:
         return {name: option for name, option in every.items() if option.default is not None}
 
     def shows(self, state: State) -> list[str]:
-        """What the method can show of its inner life instead of its result."""
+        """Return the diagnostic outputs of the method."""
         show = self.options(state.method).get("show")
         return [word for word in show.choices if word != show.default] if show else []
 
     def looks(self, state: State) -> list[str]:
-        """What can be looked at: also what the method shows of its inner life."""
+        """Return the available views, including the method's diagnostic outputs."""
         has, methods = self.subject(state).has(state), self.methods(state)
         blurred = state.method in methods
         can = {
@@ -68,7 +68,7 @@ class Choices:
         return "distributed" if "distributed" in self.methods(state) else None
 
     def rivals(self, state: State) -> list[str]:
-        """What the result can be compared with."""
+        """Return the images that the result can be compared with."""
         sharp = ["sharp"] if "sharp" in self.looks(state) else []
         reference = [REFERENCE] if self.reference(state) else []
         return [*sharp, *reference, *self.methods(state)]

@@ -25,15 +25,15 @@ _SUB = 0.1  # a step within a frame
 
 KEYS = {
     "space": "play or pause",
-    "left, right": "one frame back, on",
-    "up, down": "a tenth of a frame on, back",
+    "left, right": "one frame back, forward",
+    "up, down": "a tenth of a frame forward, back",
     "1 - 9": "method",
-    "c": "compare: next way",
-    "l": "look at: next",
+    "c": "next comparison",
+    "l": "next view",
     "tab": "panel",
     "r": "reset the view",
-    "s": "save picture, PNG and EXR",
-    "v": "record MP4, stop",
+    "s": "save image, PNG and EXR",
+    "v": "start or stop recording MP4",
     "f": "full screen",
     "h": "this help",
     "Esc": "quit",
@@ -41,14 +41,14 @@ KEYS = {
 MOUSE = {
     "left drag": "orbit (frames on disk: move)",
     "right or shift drag": "pan",
-    "wheel, two fingers": "nearer, farther",
-    "drag the line": "wipe",
+    "wheel, two fingers": "zoom in, out",
+    "drag the divider": "move the wipe",
 }
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things are on the window [logical px], and what there is to choose from."""
+    """Layout of the window [logical px], and the available choices."""
 
     area: Box
     place: Box
@@ -58,7 +58,7 @@ class Layout:
 
 
 def grip(state: State, layout: Layout, x: float, y: float, button: int, modifiers) -> str | None:
-    """What a press at x, y takes hold of: "wipe", "orbit", "pan", or nothing."""
+    """Return the drag that a press at x, y starts: "wipe", "orbit", "pan", or None."""
     if not _inside(layout.area, x, y):
         return None
     left, _, width, _ = layout.place
@@ -70,7 +70,7 @@ def grip(state: State, layout: Layout, x: float, y: float, button: int, modifier
 
 
 def drag(state: State, layout: Layout, held: str, dx: float, dy: float) -> State:
-    """What was taken hold of moves by dx, dy [logical px]."""
+    """Return the state after dragging by dx, dy [logical px]."""
     _, _, width, height = layout.place
     x, y = dx / max(width, 1), dy / max(height, 1)
     if held == "wipe":
@@ -150,7 +150,7 @@ def stepped(state: State, frames: float) -> State:
 
 
 def played(state: State, seconds: float) -> State:
-    """What is to be seen `seconds` later."""
+    """Return the state `seconds` later."""
     first, last = state.span
     moved = seconds * state.fps * state.speed
     return replace(state, frame=first + (state.frame + moved - first) % (last - first + 1))

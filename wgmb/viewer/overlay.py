@@ -1,4 +1,4 @@
-"""The words on the picture: what it shows, what its colours mean, what was done, help."""
+"""Text over the image: labels, colour key, messages, help."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _BEHIND = (0.05, 0.05, 0.06, 0.72)
 def name_images(
     state: State, labels: tuple[str, str], flicked: bool, x: float, y: float, width: float
 ) -> None:
-    """What is on either side, over an area `width` wide from `x`, `y` [logical px]."""
+    """Label the images in an area `width` wide from `x`, `y` [logical px]."""
     first, second = labels
     left, right = x + 12, x + width - 12
     if state.mode == "error":
@@ -50,7 +50,7 @@ def explain(state: State, box: Box, height: int) -> None:
 
 
 def tell(recording: str, message: str, area: Box) -> None:
-    """What goes on, and what was done."""
+    """Show the recording state and the message."""
     x, y, width, height = area
     if recording:
         tag(recording, x + width / 2, y + 12, middle=True, color=_RED)

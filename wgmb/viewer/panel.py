@@ -20,7 +20,7 @@ _HIGH, _TALL = 830.0, 1000.0  # windows so high show more opened, and all [logic
 
 @dataclass
 class Info:
-    """What the panel tells, and what there is to choose from."""
+    """Contents of the panel: status, measurements and available choices."""
 
     report: Report
     adapter: str
@@ -49,7 +49,7 @@ class Panel:
 
     @property
     def places(self) -> dict[str, Box]:
-        """Where the widgets of the last frame are, by name [logical px]."""
+        """Positions of the widgets in the last frame, by name [logical px]."""
         return self._ui.places
 
     def width(self, state: State, window: tuple[float, float]) -> float:
@@ -134,7 +134,7 @@ class Panel:
         imgui.same_line()
         if ui.button("Load settings", half):
             self.actions.append(("load", self._files["settings"]))
-        if ui.button("Picture (s)", half, "screenshot"):
+        if ui.button("Screenshot (s)", half, "screenshot"):
             self.actions.append(("screenshot", ""))
         imgui.same_line()
         if ui.button("Stop (v)" if info.recording else "Record (v)", half, "record"):

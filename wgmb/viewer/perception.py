@@ -1,4 +1,4 @@
-"""What an eye makes of the last frames: each drawn once, held for its duration, weighted.
+"""Perceived image of the last frames: each drawn once, held for its duration, weighted.
 
 Nothing depends on what was looked at before: the frames are those that a display would have
 shown up to the moment, all as they are set now. Frames and windows are centred alike: frame N

@@ -1,4 +1,4 @@
-"""How far the picture is from the reference, in numbers."""
+"""Difference between the image and the reference: PSNR and FLIP."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Judge:
         self._last: tuple[tuple, Measured] | None = None
 
     def found(self, key: tuple) -> Measured | None:
-        """What was measured last of the pictures that `key` stands for."""
+        """Return the latest measurement of the images identified by `key`."""
         return self._last[1] if self._last and self._last[0] == key else None
 
     def measure(

@@ -52,7 +52,7 @@ class Shown:
 
     @property
     def ready(self) -> bool:
-        """Whether nothing is left to do."""
+        """True if the image is complete."""
         return self.texture is not None and self.done >= self.total
 
     @property
@@ -63,7 +63,7 @@ class Shown:
 
 @dataclass
 class Report:
-    """What became of one update, for the panel."""
+    """Result of one update, for the panel."""
 
     full: tuple[int, int] = (0, 0)
     place: Box = (0, 0, 0, 0)
@@ -133,7 +133,7 @@ class Renderer:
         return report
 
     def images(self, flicked: bool) -> tuple[Image, Image]:
-        """What is on either side; `flicked`: the second one on both."""
+        """Return the images of both sides; `flicked`: the second one for both."""
         first, second = self._shown["first"].image, self._shown["second"].image
         return (second if flicked else first), second
 
@@ -215,7 +215,7 @@ class Renderer:
         if name in _PASSES and not (name == "sharp" and volumes):
             passes = subject.passes()
             if _PASSES[name] not in passes:
-                raise InputError(f"there is no {name} in these frames")
+                raise InputError(f"these frames have no {name}")
             coming.texture, coming.done = passes[_PASSES[name]], 1
             coming.kind = {"depth": "DEPTH", "velocity": "MOTION"}.get(name, "COLOR")
             return
@@ -256,7 +256,7 @@ class Renderer:
         elif name not in ("result", "perceived", state.method):
             options, method = {}, name
         if method not in (allowed := self.choices.methods(state)):
-            raise InputError(f"method {method!r} cannot be used here, only {', '.join(allowed)}")
+            raise InputError(f"method {method!r} is not available here; use {', '.join(allowed)}")
         if quick:
             count = samples if isinstance(samples, int) else SAMPLES
             traced = "progress" in METHODS[method].uses
@@ -281,7 +281,7 @@ class Renderer:
         return blur
 
     def _measure(self, first: Shown, last: Shown) -> Measured | None:
-        """How far the first image is from the reference, once both are worth it."""
+        """Return the difference between the first image and the reference, once both are ready."""
         key = (first.key, first.fine, last.key, last.fine)
         if first.kind == "COLOR" and first.ready:
             self.judge.measure(
@@ -302,5 +302,5 @@ def shutter_of(state: State) -> Shutter:
 
 
 def _coarser(a: tuple, b: tuple) -> bool:
-    """Whether a picture drawn as finely as `a` says has less in it than one of `b`."""
+    """Return True if an image of quality `a` is coarser than one of quality `b`."""
     return a[0][0] < b[0][0] or a[1] < b[1]

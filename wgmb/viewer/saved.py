@@ -29,7 +29,7 @@ VIEW = (
     "frames", "frame", "look", "compare", "against", "wipe", "gain", "fastest", "middle",
     "exposure", "tone", "cone_rate", "cone_peak", "zoom", "center", "playing", "speed", "panel",
 )  # fmt: skip
-"""What only the viewer knows, and the moment."""
+"""Options of the viewer alone, and the frame shown."""
 
 
 def toml(tables: dict[str, dict[str, object]]) -> str:
@@ -52,9 +52,9 @@ def tables(text: str) -> dict[str, dict]:
     """The tables of the text: [render] or [blur], and [view]; InputError if there are others."""
     found = parse(text)
     if unknown := found.keys() - {"render", "blur", "view"}:
-        raise InputError(f"settings have no table {', '.join(sorted(unknown))}")
+        raise InputError(f"settings: unknown table {', '.join(sorted(unknown))}")
     if ("render" in found) == ("blur" in found):
-        raise InputError("settings need one of the tables [render] and [blur]")
+        raise InputError("settings need either a table [render] or a table [blur]")
     if wrong := [name for name, table in found.items() if not isinstance(table, dict)]:
         raise InputError(f"settings: {wrong[0]} must be a table, [{wrong[0]}]")
     return found
@@ -69,7 +69,7 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
     pairs: dict[str, list] = {"settings": [], "options": [], "given": []}
     for name, value in given.items():
         if name not in allowed:
-            raise InputError(f"settings have no {name!r}")
+            raise InputError(f"settings: unknown name {name!r}")
         fit = typed(name, value, known[name])
         if name == "set":
             pairs["settings"] = [_setting(text) for text in fit]
@@ -80,7 +80,7 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
     hints = _hints(state)
     for name, value in view.items():
         if name not in VIEW:
-            raise InputError(f"settings: [view] has no {name!r}; it has {', '.join(VIEW)}")
+            raise InputError(f"settings: [view] has no {name!r}; available: {', '.join(VIEW)}")
         found[name] = typed(name, value, hints[name])
     return found | {name: tuple(some) for name, some in pairs.items()}
 

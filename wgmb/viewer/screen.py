@@ -21,7 +21,7 @@ Box = tuple[float, float, float, float]  # x, y, width, height [px]
 
 @dataclass(frozen=True)
 class Image:
-    """What is shown on either side."""
+    """An image on one side of the screen."""
 
     texture: wgpu.GPUTexture | None
     kind: str  # COLOR, DEPTH, MOTION
@@ -136,7 +136,7 @@ class Screen:
 
 
 def fit(shape: tuple[int, int], area: Box, state: State) -> Box:
-    """Where a picture of that shape goes: as large as the area allows, in its middle; zoomed."""
+    """Return the box of an image of that shape: fitted and centred in the area, then zoomed."""
     x, y, width, height = area
     scale = min(width / shape[0], height / shape[1]) * state.zoom
     w, h = shape[0] * scale, shape[1] * scale
@@ -146,7 +146,7 @@ def fit(shape: tuple[int, int], area: Box, state: State) -> Box:
 
 
 def key_box(state: State, kind: str, place: Box, area: Box, ratio: float) -> Box | None:
-    """Where the colours of the first image are explained [px]; None where they need no words."""
+    """Return the box of the first image's colour key [px], or None if it needs none."""
     if state.mode in ("split", "difference"):
         return None
     x, y, width, height = overlap(place, area)
@@ -166,7 +166,7 @@ def whole(place: Box) -> tuple[int, int]:
 
 
 def overlap(a: Box, b: Box) -> Box:
-    """What is in both."""
+    """Return the intersection of two boxes."""
     left, top = max(a[0], b[0]), max(a[1], b[1])
     right, bottom = min(a[0] + a[2], b[0] + b[2]), min(a[1] + a[3], b[1] + b[3])
     return left, top, max(right - left, 0), max(bottom - top, 0)

@@ -69,7 +69,7 @@ def _parameter(ui: Widgets, name: str, value, default):
 
 
 def animation(ui: Widgets, state: State, info: Info) -> State:
-    """Which frames there are, and how fast they go by."""
+    """Frames, frame rate and playback speed."""
     state = replace(state, frames=ui.text("frames", state.frames, frame_numbers))
     state = ui.slide(state, "fps", 1, 120, "%.0f", log=True)
     return ui.slide(state, "speed", 0.02, 4, "x %.2f", log=True)
@@ -96,7 +96,7 @@ def blur(ui: Widgets, state: State, info: Info) -> State:
         if changed:
             state = state.with_option(name, value if value != option.default else None)
     state = ui.slide(state, "jitter", 0, 1, "%.2f")
-    ui.label("longest")
+    ui.label("max blur")
     limited, on = state.max_blur is not None, state.max_blur or 40.0
     _, limit = imgui.checkbox("##limited", limited)
     ui.keep("limited")
@@ -128,7 +128,7 @@ def _samples(ui: Widgets, state: State) -> State:
 
 
 def shutter(ui: Widgets, state: State, info: Info) -> State:
-    """How long the shutter is open, and when."""
+    """Shutter angle, phase and curve."""
     ui.label("angle")
     changed, angle = imgui.slider_float("##shutter", state.shutter, 0, 720, "%.0f deg")
     ui.keep("shutter")
@@ -153,7 +153,7 @@ def shutter(ui: Widgets, state: State, info: Info) -> State:
     rolling = ui.combo("rolling", state.rolling or "off", ["off", *ROLLING])
     state = replace(state, rolling=None if rolling == "off" else rolling)
     if state.rolling:
-        state = ui.slide(state, "rolling_duration", 0, 2, "%.2f frames", label="over")
+        state = ui.slide(state, "rolling_duration", 0, 2, "%.2f frames", label="duration")
     _curve(ui, state)
     return state
 
@@ -191,12 +191,12 @@ def _curve(ui: Widgets, state: State) -> None:
 
 
 def view(ui: Widgets, state: State, info: Info) -> State:
-    """What is looked at, beside what, and how bright."""
+    """View, comparison and exposure."""
     state = replace(state, look=ui.combo("look at", state.look, info.looks))
     if state.look == "depth":
         state = ui.slide(state, "middle", 0.1, 100, "%.1f", log=True, label="middle grey")
     elif state.look == "velocity":
-        ui.label("full colour")
+        ui.label("max speed")
         height = max(info.report.full[1], 1)
         now = state.fastest * height
         changed, fast = imgui.slider_float("##fastest", now, 1, height, "%.0f px", LOG)
@@ -210,11 +210,11 @@ def view(ui: Widgets, state: State, info: Info) -> State:
 
 
 def _eye(ui: Widgets, state: State) -> State:
-    """Who perceives: the cone cell's answer to light."""
-    state = ui.slide(state, "cone_rate", 20, 200, "%.0f / s", log=True, label="fading")
-    state = ui.slide(state, "cone_peak", 0, 0.2, "%.3f s", label="delay")
+    """Parameters of the cone cell."""
+    state = ui.slide(state, "cone_rate", 20, 200, "%.0f / s", log=True, label="decay")
+    state = ui.slide(state, "cone_peak", 0, 0.2, "%.3f s", label="peak")
     if state.eye:
-        ui.dim(f"of the last {state.eye.frames_needed(state.fps)} frames, {state.fps:g} a second")
+        ui.dim(f"uses the last {state.eye.frames_needed(state.fps)} frames at {state.fps:g} fps")
     return state
 
 
@@ -239,11 +239,11 @@ def _gain(ui: Widgets, state: State) -> State:
 
 
 def _reference(info: Info) -> None:
-    """How far it has come, and how far the picture is from it."""
+    """Progress of the reference, and the image's difference from it."""
     done, total = info.report.reference
     imgui.progress_bar(done / total, (-1, 6), "")
     measured = info.report.measured
-    text = f"{done} rays a pixel"
+    text = f"{done} rays per pixel"
     if measured:
         text = f"PSNR {measured.psnr:.1f} dB"
         if measured.flip and measured.flip.done():

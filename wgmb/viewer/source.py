@@ -1,4 +1,4 @@
-"""What is looked at: a built-in scene, or frames on disk; drawn into textures on the GPU."""
+"""Subjects of the viewer: a built-in scene or frames on disk, drawn into GPU textures."""
 
 from __future__ import annotations
 

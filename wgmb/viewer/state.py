@@ -1,4 +1,4 @@
-"""All that the viewer is set to, in one frozen value; as TOML and as a command line.
+"""State of the viewer as one frozen value, with its TOML and command-line forms.
 
 `wgmb render --config` (scenes) and `wgmb blur --config` (frames on disk) read the same file.
 """
@@ -26,7 +26,7 @@ LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")
 TONES = ("clip", "soft")
 REFERENCE = "reference"
 DEFAULTS = {f.name: f.default for group in saved.GROUPS for f in fields(group)}
-"""What every option of the command line is when it is not given."""
+"""Defaults of the command line's options."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class State:
     settings: tuple[tuple[str, float | str], ...] = ()
     """The scene's parameters that differ from their defaults."""
     given: tuple[tuple[str, object], ...] = ()
-    """InputSettings, keep and scale of frames on disk that differ from their defaults."""
+    """InputSettings, holdout and scale of frames on disk that differ from their defaults."""
     orbit: tuple[float, float] = (0.0, 0.0)  # degrees to the right, up
     pan: tuple[float, float] = (0.0, 0.0)  # scene units to the right, up
     dolly: float = 1.0
@@ -81,17 +81,17 @@ class State:
 
     @property
     def is_scene(self) -> bool:
-        """Whether `source` is a built-in scene."""
+        """True if `source` is a built-in scene."""
         return self.source in builtin.SCENES
 
     @property
     def eye(self) -> Cone | None:
-        """Who perceives, if that is looked at."""
+        """The cone cell, if the view is of perceived images."""
         return Cone(self.cone_rate, self.cone_peak) if self.look == "perceived" else None
 
     @property
     def mode(self) -> str:
-        """How two images are compared: one of COMPARE, or "error", which has its own two."""
+        """Comparison of two images: one of COMPARE, or "error", which chooses both itself."""
         return "error" if self.look == "error" else self.compare
 
     @property
@@ -113,7 +113,7 @@ class State:
             frame_numbers.readable(Path(source)) or frame_numbers.is_pattern(source)
         ):
             known = ", ".join(builtin.SCENES)
-            raise InputError(f"no file or scene {source!r}; scenes: {known}")
+            raise InputError(f"no such file or scene: {source!r}; scenes: {known}")
         state = replace(self.unmoved(), source=source, settings=(), given=())
         before, after = self.suited(), state.suited()
         for name, value in after.items():  # what was as the last scene asks for follows the new one
@@ -174,7 +174,7 @@ class State:
             if name in said:
                 state = state.with_option(name, said[name])
         if state.method not in METHODS:
-            raise InputError(f"unknown method {state.method!r}, one of {', '.join(METHODS)}")
+            raise InputError(f"unknown method {state.method!r}; available: {', '.join(METHODS)}")
         return state.settled()
 
     # ---- what the command line is told ---------------------------------------------------
@@ -266,7 +266,7 @@ class State:
         if not isinstance(source, str):
             raise InputError("settings: [render] needs scene, [blur] needs pattern")
         if on_disk == (source in builtin.SCENES):
-            raise InputError(f"settings: {source!r} is {'a' if on_disk else 'no'} scene")
+            raise InputError(f"settings: {source!r} is {'' if on_disk else 'not '}a built-in scene")
         given.pop("time", None)
         state = State(source, **saved.values(given, tables.get("view", {}), State, on_disk=on_disk))
         Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them

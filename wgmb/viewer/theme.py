@@ -1,4 +1,4 @@
-"""How the panel looks: dark, flat, one accent, a font for reading (Dear ImGui)."""
+"""Style of the panel: dark, flat, one accent colour, a readable font (Dear ImGui)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the panel is made of: a word and what is set beside it (Dear ImGui)."""
+"""Widgets of the panel: a label and a control next to it (Dear ImGui)."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Widgets:
         imgui.text_disabled(text)
 
     def button(self, text: str, width: float, name: str = "") -> bool:
-        """Whether it was pressed."""
+        """Draw a button; returns True if it was pressed."""
         pressed = imgui.button(text, (width, 0))
         self.keep(name or text)
         return pressed
@@ -82,7 +82,7 @@ class Widgets:
         return replace(state, **{name: value}) if changed else state
 
     def number(self, name: str, value, default: bool | int | float) -> tuple[bool, object]:
-        """Whether a number of any kind was changed, and to what."""
+        """Draw a control for a number; returns whether it was changed, and its value."""
         self.label(name.replace("_", " "))
         if isinstance(default, bool):
             changed, value = imgui.checkbox(f"##{name}", bool(value))

@@ -37,7 +37,7 @@ _SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "char", "resize")
 
 
 class Viewer:
-    """A canvas, what it shows, and what its events do.
+    """The viewer on a canvas: state, event handling and drawing.
 
     `failed` holds the exception that ended it, if one did.
     """
@@ -211,7 +211,7 @@ class Viewer:
         choices, full = self.stage.choices, self.actions.recording
         possible = choices.possible(state)
         if possible.method != state.method:
-            self.say(f"method {state.method!r} cannot be used here")
+            self.say(f"method {state.method!r} is not available here")
         self.state = state = possible
         changes = state.picture != self._good.picture
         self._sliding = self.panel.active and (self._sliding or changes)
@@ -280,7 +280,7 @@ class Viewer:
         self.message = text, self.clock() + _MESSAGE
 
     def do(self, action: str, what: str = "") -> None:
-        """What a key or a button asks for."""
+        """Run the action of a key or a button."""
         self.state = self.actions.do(action, what, self.state)
 
 
@@ -302,7 +302,7 @@ def frame(viewer: Viewer) -> np.ndarray:
 
 
 def view(state: State, *, adapter: str | None = None, size: tuple[int, int] = (1280, 720)) -> None:
-    """Open a window and stay until it is closed; what went wrong in it is raised."""
+    """Open a window and return when it is closed; errors in it are raised."""
     device = gpu.open_device(adapter)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # GLFW's remarks; what it returns says the same

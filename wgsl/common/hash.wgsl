@@ -27,7 +27,7 @@ fn pcg3d(key: vec3u) -> vec3u {
 
 /// One multiplicative round for the points of a lattice: enough to give each brick a tone of its own.
 fn lattice_hash(point: vec2i) -> u32 {
-    let h = u32(point.x) * 0x9E3779B1u ^ u32(point.y) * 0x85EBCA77u;
+    let h = (u32(point.x) * 0x9E3779B1u) ^ (u32(point.y) * 0x85EBCA77u);
     return (h ^ (h >> 15u)) * 0x2C1B3C6Du;
 }
 

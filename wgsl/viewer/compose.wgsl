@@ -106,7 +106,7 @@ fn filtered(image: texture_2d<f32>, at: vec2f, size: vec2f) -> vec3f {
     let step = size / (view.place.zw * select(1.0, 0.5, COMPARE == SPLIT));
     var sum = vec3f(0.0);
     for (var i = 0u; i < TAPS * TAPS; i++) {
-        let shift = (vec2f(vec2u(i % TAPS, i / TAPS)) + 0.5) / f32(TAPS) - 0.5;
+        let shift = (vec2f(vec2u(i % max(TAPS, 1u), i / max(TAPS, 1u))) + 0.5) / f32(TAPS) - 0.5;
         sum += bilinear(image, at + shift * step, size);
     }
     return sum / f32(TAPS * TAPS);

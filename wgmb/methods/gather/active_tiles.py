@@ -1,4 +1,4 @@
-"""Which tiles are active: something moves in them or near them. The others are copied."""
+"""Active tiles: those with motion in or near them. The others are copied."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ def layer_view(texture: wgpu.GPUTexture, index: int) -> wgpu.GPUTextureView:
 class Layers:
     """The layers of up to three frames, each in a slot; frames with a `key` stay there.
 
-    `textures`: "layer_colors" and "surfaces" have two layers a slot, "mattes" has one.
+    `textures`: "layer_colors" and "surfaces" have two layers per slot, "mattes" has one.
     """
 
     def __init__(self, device: wgpu.GPUDevice, images: TexturePool, tiles: ActiveTiles):
@@ -29,7 +29,7 @@ class Layers:
         self.textures: dict[str, wgpu.GPUTexture] = {}
 
     def slots(self, size: tuple[int, int], frames) -> list[int]:
-        """Where the layers of the frames are, or are to be: what is there already stays."""
+        """Return the slots of the frames' layers; layers that are already present stay."""
         textures = self._textures(size, len(frames))
         if textures["layer_colors"] is not self.textures.get("layer_colors"):
             self._made = {}
@@ -39,20 +39,28 @@ class Layers:
         free = (slot for slot in range(textures["layer_colors"].size[2] // 2) if slot not in slots)
         return [next(free) if slot is None else slot for slot in slots]
 
-    def views(self, slot: int) -> dict[str, wgpu.GPUTextureView]:
+    def front_surface(self, slot: int) -> wgpu.GPUTextureView:
+        """The foreground's surfaces of the frame in a slot."""
+        return layer_view(self.textures["surfaces"], 2 * slot)
+
+    def _views(self, slot: int) -> dict[str, wgpu.GPUTextureView]:
         """The layers in a slot, by the names of their bindings."""
+
+        def both(texture: wgpu.GPUTexture) -> wgpu.GPUTextureView:
+            return texture.create_view(
+                dimension="2d-array", base_array_layer=2 * slot, array_layer_count=2
+            )
+
         return {
-            "front_color": layer_view(self.textures["layer_colors"], 2 * slot),
-            "back_color": layer_view(self.textures["layer_colors"], 2 * slot + 1),
-            "front_surface": layer_view(self.textures["surfaces"], 2 * slot),
-            "back_surface": layer_view(self.textures["surfaces"], 2 * slot + 1),
+            "colors": both(self.textures["layer_colors"]),
+            "surfaces": both(self.textures["surfaces"]),
             "matte": layer_view(self.textures["mattes"], slot),
         }
 
     def encode(self, encoder, inputs, frame, slot: int, worklists: dict[str, dict]) -> None:
         """Record the layers of a frame, unless its slot has them already."""
         if self._made.get(slot) != _contents(frame):
-            self._separate(encoder, inputs, frame, self.views(slot), worklists)
+            self._separate(encoder, inputs, frame, self._views(slot), worklists)
             self._made.pop(slot, None)
         if frame.key is not None:
             self._made[slot] = _contents(frame)

@@ -12,14 +12,12 @@
 @group(1) @binding(3) var weight: texture_2d<f32>;
 @group(1) @binding(4) var edge_flags: texture_2d<u32>;  // what `detect_edges` wrote: depth and flags
 @group(1) @binding(5) var edge_flags_out: Flags;
-@group(1) @binding(6) var front_color: Color;           // premultiplied by coverage too
-@group(1) @binding(7) var front_surface: Packed;        // see pack_surface()
-@group(1) @binding(8) var back_color: Color;
-@group(1) @binding(9) var back_surface: Packed;
-@group(1) @binding(10) var matte: Matte;                // front depth; back depth, 0 if there is none; coverage; weight
-@group(1) @binding(11) var<storage, read> worklist: WorkList;
-@group(1) @binding(12) var<storage, read_write> edges: EdgeList;
-@group(1) @binding(13) var<storage, read_write> edge_groups: array<u32>;    // workgroups of `separate_layers`, for an indirect dispatch
+@group(1) @binding(6) var colors: Color;                // FRONT, premultiplied by coverage too, and BACK
+@group(1) @binding(7) var surfaces: Packed;             // FRONT and BACK, see pack_surface()
+@group(1) @binding(8) var matte: Matte;                 // front depth; back depth, 0 if there is none; coverage; weight
+@group(1) @binding(9) var<storage, read> worklist: WorkList;
+@group(1) @binding(10) var<storage, read_write> edges: EdgeList;
+@group(1) @binding(11) var<storage, read_write> edge_groups: array<u32>;    // workgroups of `separate_layers`, for an indirect dispatch
 
 struct EdgeList {       // the edge pixels, which may show two surfaces
     count: atomic<u32>,
@@ -27,11 +25,14 @@ struct EdgeList {       // the edge pixels, which may show two surfaces
 }
 
 alias Flags = texture_storage_2d<r32uint, write>;
-alias Color = texture_storage_2d<rgba32float, write>;
-alias Packed = texture_storage_2d<rgba32uint, write>;
+alias Color = texture_storage_2d_array<rgba32float, write>;
+alias Packed = texture_storage_2d_array<rgba32uint, write>;
 alias Matte = texture_storage_2d<rgba32float, write>;
 
 override WEIGHTED: bool = false;    // read `weight`
+
+const FRONT: u32 = 0u;          // layers of an array
+const BACK: u32 = 1u;
 
 // Flags in the last two bits of a depth.
 const FLAGS: u32 = 3u;
@@ -118,9 +119,9 @@ fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(work
     }
     let trajectory = trajectory_from(textureLoad(motion, px, 0));
     let z = flagged_depth(here);
-    textureStore(front_color, px, textureLoad(color, px, 0));
-    textureStore(front_surface, px, pack_surface(trajectory, select(z, -z, near_edge), smooth_here));
-    textureStore(back_surface, px, pack_surface(trajectory, 0.0, false));
+    textureStore(colors, px, FRONT, textureLoad(color, px, 0));
+    textureStore(surfaces, px, FRONT, pack_surface(trajectory, select(z, -z, near_edge), smooth_here));
+    textureStore(surfaces, px, BACK, pack_surface(trajectory, 0.0, false));
     textureStore(matte, px, vec4f(z, 0.0, 1.0, counts));
     if is_edge(here) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
 }
@@ -260,10 +261,10 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
             }
         }
     }
-    textureStore(front_color, px, front);
-    textureStore(front_surface, px, pack_surface(trajectory_from(front_motion), -z, false));
-    if back_depth > 0.0 { textureStore(back_color, px, back); }     // else nobody reads it
-    textureStore(back_surface, px, pack_surface(trajectory_from(back_motion), max(back_depth, 0.0), back_seen));
+    textureStore(colors, px, FRONT, front);
+    textureStore(surfaces, px, FRONT, pack_surface(trajectory_from(front_motion), -z, false));
+    if back_depth > 0.0 { textureStore(colors, px, BACK, back); }     // else nobody reads it
+    textureStore(surfaces, px, BACK, pack_surface(trajectory_from(back_motion), max(back_depth, 0.0), back_seen));
     textureStore(matte, px, vec4f(z, back_depth, coverage, coverage * counts));
 }
 
@@ -275,6 +276,6 @@ fn copy_motion_only(@builtin(local_invocation_index) local: u32, @builtin(workgr
     if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
     let trajectory = trajectory_from(textureLoad(motion, px, 0));
     let z = flagged_depth(bitcast<u32>(depth_at(px)));
-    textureStore(front_surface, px, pack_surface(trajectory, z, false));
-    textureStore(back_surface, px, pack_surface(trajectory, 0.0, false));
+    textureStore(surfaces, px, FRONT, pack_surface(trajectory, z, false));
+    textureStore(surfaces, px, BACK, pack_surface(trajectory, 0.0, false));
 }

@@ -23,7 +23,7 @@ fn cells_of(size: vec2u) -> vec2u {
 }
 
 fn pack_cell(cell: vec2u) -> u32 {
-    return cell.x | cell.y << 16u;
+    return cell.x | (cell.y << 16u);
 }
 
 fn unpack_cell(word: u32) -> vec2u {
