@@ -70,7 +70,8 @@ def test_wrong_usage_is_one_line_and_2(capsys, arguments):
      "--samples 0", "--samples 100000", "--jitter 2", "--jitter nan", "--max-blur -1",
      "--max-blur nan", "--method nope", "--vectors maya", "--vector-scale inf",
      "--vector-offset nan",
-     "--far nan", "--bits 12", "--fps 0", "--fps nan", "--fps 1/0", "--frames x", "--frames 1-9",
+     "--far nan", "--bits 12", "--fps 0", "--fps nan", "--fps 1/0", "--fps 1e-400",
+     "--frames x", "--frames 1-9",
      "--camera nofile.json", "--rolling-duration nan --rolling up", "--path crooked",
      "--also no.####.exr --vectors x"],
 )  # fmt: skip

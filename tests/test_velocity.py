@@ -166,7 +166,7 @@ def test_object_motion_is_added_to_the_cameras():
 @pytest.mark.parametrize(
     "here, options, word",
     [
-        (Camera(np.zeros((4, 4))), {}, "inverse"),
+        (Camera(np.zeros((4, 4))), {}, "invertible"),
         (STILL, {"depth_kind": "round"}, "planar"),
         (STILL, {"far": float("nan")}, "far"),
     ],

@@ -308,15 +308,15 @@ class OutputSettings:
 
 
 def rate_of(text: str) -> Fraction:
-    """`24`, `23.976`, `30000/1001` -> frames per second, exactly; over 0, at most 1000."""
+    """`24`, `23.976`, `30000/1001` -> frames per second, exactly; 0.001 to 1000."""
     try:
         if re.search(r"e[+-]?[\d_]{4}", text, re.IGNORECASE):  # would be worked out in full
             raise ValueError
         fps = Fraction(text)
     except (ValueError, ZeroDivisionError):
         raise InputError(f"fps must be a number or a fraction, got {text!r}") from None
-    if not 0 < fps <= 1000:
-        raise InputError(f"fps must be over 0 and at most 1000, got {text}")
+    if not Fraction(1, 1000) <= fps <= 1000:
+        raise InputError(f"fps must be 0.001 to 1000, got {text}")
     return fps
 
 

@@ -74,7 +74,7 @@ def _scene(scene: str, method: str) -> Callable[[], Step]:
     def begin() -> Step:
         blur = Blur(method, samples=_MANY)
         render = Render(builtin.make(scene), blur, size=SIZE, rays=2)
-        return lambda number: render(number / 24, number)
+        return lambda number: render(number % 24 / 24, number)  # what suits a moment is compiled
 
     return begin
 

@@ -13,6 +13,7 @@ import resource
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -108,7 +109,10 @@ def apart(work: Callable, *given, **options) -> Ended:
     not come to its end.
     """
     name = f"{work.__module__}:{work.__qualname__}"
-    ended = run([sys.executable, "-m", __name__, name, json.dumps(given)], **options)
+    with tempfile.NamedTemporaryFile("w", suffix=".json") as file:  # arguments have a limit
+        json.dump(given, file)
+        file.flush()
+        ended = run([sys.executable, "-m", __name__, name, file.name], **options)
     said, _, value = ended.out.rpartition(_ENDS)
     value = json.loads(value) if value and ended.code == 0 else None
     return Ended(**{**vars(ended), "out": said, "value": value})
@@ -163,6 +167,6 @@ def growth(step: Callable[[int], object], warm: int = 40, count: int = 120) -> f
 if __name__ == "__main__":
     _module, _, _function = sys.argv[1].partition(":")
     _work = getattr(importlib.import_module(_module), _function)
-    _value = _work(*json.loads(sys.argv[2]))
+    _value = _work(*json.loads(Path(sys.argv[2]).read_text()))
     sys.stdout.write(_ENDS + json.dumps(_value))
     sys.stdout.flush()
