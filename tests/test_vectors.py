@@ -182,7 +182,7 @@ def test_on_still_frames_it_says_that_it_cannot_tell():
     wanted, found = detect("blender", velocity=(0.0, 0.0))
     assert not found.sure
     assert found.vectors == wanted
-    assert "not testable" in found.text
+    assert "cannot be tested" in found.text
 
 
 def test_on_a_picture_of_one_colour_it_says_that_it_cannot_tell():

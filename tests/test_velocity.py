@@ -117,6 +117,20 @@ def test_bodies_move_by_their_matrices_and_unknown_ones_with_the_world():
     assert not ahead[:, 40:].any()
 
 
+def test_indices_may_be_any_32_bit_numbers_and_there_may_be_many_bodies():
+    rng = np.random.default_rng(3)
+    drawn = rng.choice(2**32 - 2, SIZE[0] * SIZE[1], replace=False) + 1
+    drawn[:2] = 1, 2**32 - 1
+    known = drawn[: len(drawn) * 3 // 4]  # the others move with the world
+    ways = dict(zip(known.tolist(), rng.uniform(-0.5, 0.5, len(known)), strict=True))
+    here = camera((0, 0, 0), bodies={k: body(0, 0) for k in ways})
+    there = camera((0, 0, 0), bodies={k: body(way, 0) for k, way in ways.items()})
+    ids = rng.permutation(drawn).reshape(SIZE)
+    _, ahead = motion(6.0, here, None, there, ids)
+    want = [FOCAL * ways.get(k, 0.0) / 6 for k in ids.ravel().tolist()]
+    np.testing.assert_allclose(ahead[..., 0].ravel(), want, atol=1e-3)
+
+
 def test_a_cut_out_window_moves_like_its_part_of_the_whole():
     here, there = STILL, camera((0.1, 0.05, -0.4), roll=0.1)
     whole = motion(5.0, here, None, there)[1]

@@ -11,7 +11,8 @@ import numpy as np
 
 from .errors import InputError
 
-MOST_BODIES = 65536
+MOST_BODIES = 65535
+MAX_INDEX = 2**32 - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +38,10 @@ class Camera:
                 raise InputError(f"{name} must be a finite 4 x 4 matrix, got shape {array.shape}")
             if name.startswith("body") and not _invertible(array):
                 raise InputError(f"{name} must be invertible")
-        if any(not 0 < k < MOST_BODIES for k in self.bodies):
-            raise InputError(f"object indices must be 1 to {MOST_BODIES - 1}")
+        if any(not 0 < k <= MAX_INDEX for k in self.bodies):
+            raise InputError(f"object indices must be 1 to {MAX_INDEX}")
+        if len(self.bodies) > MOST_BODIES:
+            raise InputError(f"{len(self.bodies)} bodies; at most {MOST_BODIES}")
 
     def toward(self, other: Camera, share: float) -> Camera:
         """The camera on the way to another: position and projection linear, orientation turned
@@ -92,17 +95,21 @@ class Reprojections:
         self.world_from_pixel()  # refuses what is no camera
 
     def matrices(self) -> np.ndarray:
-        """(bodies, 2, 4, 4): clip position in the previous, the next frame from the pixel.
+        """(1 + bodies, 2, 4, 4): clip position in the previous, the next frame from the pixel.
 
-        Row 0 is the world, row k the body of index k. Where one neighbour is missing, its
-        matrix maps everything behind the camera, and the other one's motion goes on.
+        Row 0 is the world, the others are the bodies in the order of `indices`. Where one
+        neighbour is missing, its matrix maps everything behind the camera, and the other one's
+        motion goes on.
         """
-        ids = sorted(self.here.bodies)
-        table = np.empty((1 + max(ids, default=0), 2, 4, 4))
-        table[:] = [self._reprojection(self.prev, None), self._reprojection(self.next, None)]
-        for k in ids:
-            table[k] = [self._reprojection(self.prev, k), self._reprojection(self.next, k)]
-        return table
+        bodies = None, *(int(k) for k in self.indices[1:])
+        return np.array(
+            [[self._reprojection(self.prev, k), self._reprojection(self.next, k)] for k in bodies]
+        )
+
+    @property
+    def indices(self) -> np.ndarray:
+        """(1 + bodies,) uint32, ascending: 0 for the world, then the bodies' object indices."""
+        return np.array([0, *sorted(self.here.bodies)], np.uint32)
 
     def displacement(
         self, size: tuple[int, int], x: np.ndarray, y: np.ndarray, depth: np.ndarray, side: int

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, fields
 
 import wgpu
@@ -84,15 +85,16 @@ class FrameViews:
         """True if `motion` is used as it is, without camera or scale."""
         return self.motion is not None and self.camera is None and self.scale is None
 
-    def check_fit(self, size: tuple[int, int], whose: str = "") -> None:
-        """InputError unless every view is of `size` (width, height) and all fit together.
+    def check_fit(self, device: wgpu.GPUDevice, size: tuple[int, int], whose: str = "") -> None:
+        """InputError unless `device` can read every view, all are of `size` and fit together.
 
         `whose`: begins the names in the errors of a neighbouring frame.
         """
         for f in fields(self):
             view = getattr(self, f.name)
             if isinstance(view, View):
-                check_view(whose + f.name, view, size)
+                check_view(whose + f.name, view, device, size)
+                _check_readable(whose + f.name, view, f.metadata.get("format", "filterable"))
         if self.camera is not None and self.depth is None:
             raise InputError(f"{whose}camera: motion from a camera needs depth")
         if self.motion is not None and not (self.to_next is None and self.to_prev is None):
@@ -103,8 +105,54 @@ TEXTURES = {f.name: f.metadata for f in fields(FrameViews) if "format" in f.meta
 """The per-pixel inputs beside `color`: `format` and `if_used` by name."""
 
 
-def check_view(name: str, view: View, size: tuple[int, int]) -> None:
-    """InputError unless a view is of `size` (width, height) [px]."""
+def check_view(name: str, view: View, device: wgpu.GPUDevice, size: tuple[int, int]) -> None:
+    """InputError unless it is a plain 2D texture of `device`, of `size` (width, height) [px]."""
     if tuple(view.size[:2]) != tuple(size):
         width, height = view.size[:2]
         raise InputError(f"{name} is {width} x {height}, the image {size[0]} x {size[1]}")
+    texture = view.texture
+    if texture._device is not device:  # wgpu-py has no public way to ask
+        raise InputError(f"{name} belongs to another device than the Blur's")
+    if texture.sample_count != 1:
+        raise InputError(f"{name} has {texture.sample_count} samples per pixel: resolve it first")
+    if texture.dimension != "2d":
+        raise InputError(f"{name} must be a 2D texture, got {texture.dimension}")
+
+
+def check_output(name: str, view: View, format: str) -> None:
+    """InputError unless a shader can write `format` into the view."""
+    texture = view.texture
+    if texture.format != format:
+        raise InputError(f"{name} must be {format}, the Blur's output format; got {texture.format}")
+    if not texture.usage & wgpu.TextureUsage.STORAGE_BINDING:
+        raise InputError(f"{name} needs the usage STORAGE_BINDING")
+
+
+def _check_readable(name: str, view: View, like: str) -> None:
+    """InputError unless a shader can read the view where a texture `like` this is expected."""
+    format = view.texture.format
+    if not view.texture.usage & wgpu.TextureUsage.TEXTURE_BINDING:
+        raise InputError(f"{name} needs the usage TEXTURE_BINDING")
+    has, needs = _channels(format), 4 if like == "filterable" else _channels(like)
+    if like.endswith("uint"):
+        ok, wanted = format.endswith("uint"), "unsigned integers, such as r32uint"
+    elif like == "filterable":
+        ok = not (format.endswith(("uint", "sint")) or format.startswith(("depth", "stencil")))
+        needs, wanted = 3, "colours, such as rgba16float"
+        if ok and "32float" in format and "float32-filterable" not in view.texture._device.features:
+            raise InputError(
+                f"{name} is {format}, which this device cannot filter: use rgba16float, or request "
+                "the device with the feature float32-filterable"
+            )
+    else:
+        ok = not format.endswith(("uint", "sint")) and format != "stencil8"
+        wanted = f"{needs} float channel{'s' if needs > 1 else ''}, such as {like}"
+    if not ok or has < needs:
+        raise InputError(f"{name} must hold {wanted}; got {format}")
+
+
+def _channels(format: str) -> int:
+    """How many channels a texture format has for a shader."""
+    if format.startswith(("depth", "stencil")):
+        return 1
+    return len({*re.sub(r"(unorm|snorm|ufloat|float|uint|sint).*", "", format)} & {*"rgba"})

@@ -17,7 +17,7 @@ import wgpu
 from . import gpu
 from .errors import InputError
 from .frame import PASSES, Frame
-from .frame_views import FrameViews, View, check_view
+from .frame_views import FrameViews, View, check_output, check_view
 from .gpu import wgsl
 from .gpu.textures import TexturePool
 from .gpu.timing import Clock
@@ -163,8 +163,15 @@ class Blur:
     ) -> None:
         """Record the passes into `encoder`; nothing is submitted or waited for.
 
-        The views refer to your own textures. `output`: a storage texture of this Blur's output
-        format. `prev`, `next`: the previous and the next frame, for methods that use neighbours,
+        The views refer to your own textures on this Blur's device, with the usage TEXTURE_BINDING
+        and one sample per pixel; an InputError names the input that does not fit. Tried are
+        `color` as rgba8unorm, rgba8unorm-srgb, bgra8unorm-srgb, rgb10a2unorm, rg11b10ufloat,
+        rgba16float and rgba32float (with the feature float32-filterable); vectors as rg16float,
+        rg32float, rgba16float and rgba32float; `depth` as r16float, r32float and as the depth
+        buffers depth16unorm, depth24plus and depth32float (a view of the aspect "depth-only" where
+        there is a stencil); `object_id` as r8uint, r16uint, r32uint and rg32uint; masks also as
+        r8unorm. `output`: a texture of this Blur's output format with the usage STORAGE_BINDING.
+        `prev`, `next`: the previous and the next frame, for methods that use neighbours,
         with the same inputs as the frame. `confidence`: a texture like `output` for the channels
         of `with_confidence`. `number`: frame number, which varies the jitter.
 
@@ -178,9 +185,10 @@ class Blur:
             around |= {whose: (o, f) for whose, (o, f) in near.items() if f is not None}
         for name, view in (("output", output), ("confidence", confidence)):
             if view is not None:
-                check_view(name, view, size)
+                check_view(name, view, self.device, size)
+                check_output(name, view, self.output)
         for whose, (_, one) in around.items():
-            one.check_fit(size, whose)
+            one.check_fit(self.device, size, whose)
             self._require(one.has, whose)
         bindings = self.frame_bindings(size, number)
         encoder = timing.watch(encoder) if timing else encoder
@@ -214,7 +222,8 @@ class Blur:
         the number to add.
         """
         gpu.check_size(self.device, *scene.size)
-        check_view("output", output, scene.size)
+        check_view("output", output, self.device, scene.size)
+        check_output("output", output, self.output)
         self._require({"scene"})
         encoder = timing.watch(encoder) if timing else encoder
         bindings = self.frame_bindings(scene.size, number)
@@ -332,7 +341,9 @@ class Blur:
         self, encoder: wgpu.GPUCommandEncoder, frame: FrameViews, output: View, number: int = 0
     ) -> None:
         """Record to_prev and to_next [px] into `output`, rgba32float."""
-        frame.check_fit(output.size[:2])
+        frame.check_fit(self.device, output.size[:2])
+        check_view("output", output, self.device, frame.size)
+        check_output("output", output, "rgba32float")
         bindings = self.frame_bindings(frame.size, number)
         self._velocity.encode(encoder, bindings, frame, self.max_blur is not None, output)
 

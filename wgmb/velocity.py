@@ -43,7 +43,7 @@ class VelocityPass:
             LIMITED=limited,
             ADDED=frame.object_motion,
         )
-        uniform, table = self._matrices(bindings.size, frame.camera)
+        uniform, table, indices = self._matrices(bindings.size, frame.camera)
         kernel.run(
             encoder,
             "main",
@@ -55,6 +55,7 @@ class VelocityPass:
             object=frame.object_id or self._no_object,
             scale=frame.scale or self._none,
             reprojections=table,
+            indices=indices,
             motion=output,
         )
 
@@ -62,9 +63,10 @@ class VelocityPass:
         source = wgsl.load(FILE)
         data = np.zeros((), source.dtype("Velocity"))
         table = np.zeros(1, source.dtype("Reprojection"))
+        indices = np.zeros(1, np.uint32)
         if camera is not None:
             data["viewport"] = viewport_of(camera, size)
-            matrices = camera.matrices()
+            matrices, indices = camera.matrices(), camera.indices
             table = np.zeros(len(matrices), source.dtype("Reprojection"))
             data["bodies"] = len(matrices)
             # Row i of a matrix in numpy is column i in WGSL.
@@ -74,6 +76,7 @@ class VelocityPass:
         return (
             create(label="velocity", data=data, usage=wgpu.BufferUsage.UNIFORM),
             create(label="reprojections", data=table, usage=wgpu.BufferUsage.STORAGE),
+            create(label="indices", data=indices, usage=wgpu.BufferUsage.STORAGE),
         )
 
 

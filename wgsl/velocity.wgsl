@@ -19,11 +19,13 @@ struct Velocity {
 @group(1) @binding(1) var to_prev: texture_2d<f32>;     // displacement to the previous frame [px]; with PAIRED in zw to the next
 @group(1) @binding(2) var to_next: texture_2d<f32>;     // displacement to the next frame [px]
 @group(1) @binding(3) var depth: texture_2d<f32>;       // see Viewport.depth_kind
-@group(1) @binding(4) var object: texture_2d<u32>;      // row of `reprojections`; 0 and unknown ones: the world
+@group(1) @binding(4) var object: texture_2d<u32>;      // index of the body; 0 and unknown ones: the world
 @group(1) @binding(5) var scale: texture_2d<f32>;       // multiplies the motion
 @group(1) @binding(6) var<storage, read> reprojections: array<Reprojection>;
 @group(1) @binding(7) var motion: texture_storage_2d<rgba32float, write>;   // to_prev, to_next [px]
+@group(1) @binding(8) var<storage, read> indices: array<u32>;   // of the bodies in `reprojections`, ascending; 0 first
 
+const SEARCH_STEPS: u32 = 16u;      // as many bodies as 2 to this power
 const MAX_COMPONENT: f32 = 1e12;    // longer motion [px] is shortened to this before it is limited: its square is finite
 
 override PREV: bool = false;        // which inputs there are
@@ -65,8 +67,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 /// Displacements to where the matrices put the point at `px` in the previous and the next frame [px].
 fn camera_motion(px: vec2u, z: f32, nothing_there: bool) -> vec4f {
     var body = 0u;
-    if OBJECTS && !nothing_there { body = textureLoad(object, px, 0).x; }
-    if body >= velocity.bodies { body = 0u; }
+    if OBJECTS && !nothing_there { body = row_of(textureLoad(object, px, 0).x); }
     let viewport = velocity.viewport;
     let ndc = ndc_of(viewport, px);
     if nothing_there && viewport.depth_kind != PLANAR { return vec4f(0.0); }
@@ -81,6 +82,19 @@ fn camera_motion(px: vec2u, z: f32, nothing_there: bool) -> vec4f {
     if prev.w <= MIN_W { result = vec4f(-ahead, ahead); }
     if next.w <= MIN_W { result = vec4f(back, -back); }
     return select(vec4f(0.0), result, is_finite4(result));
+}
+
+/// The row of the body with this index; 0 for the world, and where no body has it.
+fn row_of(index: u32) -> u32 {
+    var low = 0u;
+    var high = velocity.bodies;
+    for (var i = 0u; i < SEARCH_STEPS; i++) {
+        let middle = (low + high) / 2u;
+        let above = indices[middle] <= index;
+        low = select(low, middle, above);
+        high = select(middle, high, above);
+    }
+    return select(0u, low, indices[low] == index);
 }
 
 /// The motion scaled so that its blur over the exposure is at most frame.max_blur long.

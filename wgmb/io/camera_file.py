@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..camera import MOST_BODIES, Camera, Reprojections
+from ..camera import MAX_INDEX, Camera, Reprojections
 from ..errors import InputError
 
 _MOST_BYTES = 256 << 20
@@ -125,8 +125,8 @@ def _bodies(objects: dict[str, Any]) -> dict[int, np.ndarray]:
     bodies: dict[int, np.ndarray] = {}
     for name, given in objects.items():
         index = given["index"]
-        if not isinstance(index, int) or not 0 <= index < MOST_BODIES:
-            raise InputError(f"object {name}: index must be 0 to {MOST_BODIES - 1}, got {index!r}")
+        if not isinstance(index, int) or not 0 <= index <= MAX_INDEX:
+            raise InputError(f"object {name}: index must be 0 to {MAX_INDEX}, got {index!r}")
         if index > 0:  # 0 is what everything has that nobody numbered
             bodies.setdefault(index, _matrix(given["matrix_world"]))
     return bodies

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ..camera import MAX_INDEX
 from ..color import srgb
 from ..errors import InputError
 from ..frame import Frame
@@ -344,7 +345,8 @@ class Clip:
             name = named[0]
         plane = source.channels[layers.one_channel(by_layer, name, "object index layer")]
         with np.errstate(invalid="ignore"):
-            return np.where(plane > 0, np.minimum(np.rint(plane), 2**31), 0).astype(np.uint32)
+            index = np.rint(plane.astype(np.float64))
+            return np.where(index > 0, np.minimum(index, MAX_INDEX), 0).astype(np.uint32)
 
     def _mask(self, source: FrameFile, wanted: str | None) -> np.ndarray | None:
         if wanted is None:
