@@ -14,7 +14,7 @@ import wgmb
 GROUPS = {
     "blurring": ("blur", "Blur", "Frame", "FrameViews", "Shutter", "METHODS"),
     "sequences": (
-        "Clip", "Passes", "Vectors", "Output", "blur_sequence", "Report", "BatchReport",
+        "Clip", "Passes", "Vectors", "Output", "blur_sequence", "BatchReport",
     ),
     "cameras": ("Camera", "Reprojections", "CameraFile"),
     "scenes": (
@@ -22,7 +22,7 @@ GROUPS = {
         "scene.translation", "scene.rotation", "scene.scaling",
         "scene.OrbitingSphere", "scene.Torus", "scene.Backdrop",
     ),
-    "perception": ("Cone", "Observer", "Viewer"),
+    "perception": ("Cone", "Observer"),
     "errors": ("Error", "InputError", "DeviceError", "GpuMemoryError", "ShaderError"),
 }  # fmt: skip
 
@@ -39,10 +39,7 @@ def entries(group: str) -> str:
     """The autodoc directives of a group."""
     blocks = []
     for name in GROUPS[group]:
-        try:
-            found = _find(name)
-        except AttributeError:
-            continue
+        found = _find(name)
         if inspect.isclass(found):
             lines = [f".. autoclass:: wgmb.{name}", "   :members:"]
             if "__call__" in vars(found):

@@ -1,4 +1,4 @@
-"""Rooms: imports point one way, third parties stay at home, Python and WGSL have the same stems."""
+"""Imports point one way, third parties stay at home, Python and WGSL have the same stems."""
 
 import ast
 import re
