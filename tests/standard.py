@@ -11,6 +11,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
+from standard_words import groups_of
+
 from wgmb.gpu import kernels
 
 HERE = Path(__file__).parent / "dawn"
@@ -51,30 +53,13 @@ def record() -> None:
 
 def described(source, constants: dict) -> dict:
     """A kernel as compile.mjs takes it: wgpu-py's layouts in the words of the standard."""
-    bindings = source.bindings()
-    count = 1 + max((b.group for b in bindings), default=-1)
-    groups = [
-        [_standard(kernels._layout_entry(b, source)) for b in bindings if b.group == group]
-        for group in range(count)
-    ]
     return {
         "name": source.name,
         "files": source.files,
         "text": source.text,
-        "groups": groups,
+        "groups": groups_of(source),
         "entryPoints": source.entry_points(),
         "constants": {name: float(value) for name, value in constants.items()},
-    }
-
-
-def _standard(entry: dict) -> dict:
-    def camel(name: str) -> str:
-        first, *rest = name.split("_")
-        return first + "".join(word.capitalize() for word in rest)
-
-    return {
-        camel(key): _standard(value) if isinstance(value, dict) else value
-        for key, value in entry.items()
     }
 
 
