@@ -100,7 +100,7 @@ def test_image_methods_do_with_what_the_standard_guarantees(
     assert np.abs(got - want).mean() < 3e-4
 
 
-@pytest.mark.parametrize("method", SCENES)
+@pytest.mark.parametrize("method", [*SCENES, *IMAGES])
 def test_scenes_do_with_what_the_standard_guarantees(
     method, device, filtering_device, plain_device
 ):

@@ -33,7 +33,7 @@ class Kernel:
         source: wgsl.WgslSource,
         constants: dict[str, float] | None = None,
     ):
-        self.device, self.source = device, source
+        self.device, self.source, self.constants = device, source, constants or {}
         self.bindings = {b.name: b for b in source.bindings()}
         self.workgroup = int(source.constant("WG_X")), int(source.constant("WG_Y"))
         try:

@@ -85,6 +85,11 @@ class WgslSource:
         return WgslSource(text, self.files)
 
 
+def texel_aliases(text: str) -> dict[str, str]:
+    """The texel format of every alias of a storage texture, by the alias."""
+    return dict(re.findall(r"^alias (\w+) = texture_storage_2d(?:_array)?<(\w+)", text, re.M))
+
+
 @cache
 def load(name: str) -> WgslSource:
     """Read `wgsl/<name>` and append what it includes.

@@ -107,14 +107,15 @@ class SceneOnGpu:
         rays, bodies = self.rays, len(self.scene.bodies)
         if self.loops * rays * rays > MOST_LOOPS:
             raise InputError(f"{bodies} bodies are too many for {rays} x {rays} rays")
-        kernel = gpu.kernel(self.device, "scene/gbuffer.wgsl", None, **self.constants)
+        color = gpu.texel(self.device, 4)
+        kernel = gpu.kernel(self.device, "scene/gbuffer.wgsl", {"Color": color}, **self.constants)
         view = np.zeros((), kernel.source.dtype("View"))
         view["time"] = time
         buffer = self.device.create_buffer_with_data(
             label="view", data=view, usage=wgpu.BufferUsage.UNIFORM
         )
         formats = {
-            "color": "rgba32float",
+            "color": color,
             "depth": "r32float",
             "normal": "rgba32float",
             "object": "r32uint",

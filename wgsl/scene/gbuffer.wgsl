@@ -3,10 +3,12 @@
 //#include scene/trace.wgsl
 
 @group(1) @binding(3) var<uniform> view: View;
-@group(1) @binding(4) var color: texture_storage_2d<rgba32float, write>;    // linear
+@group(1) @binding(4) var color: Color;                                     // linear
 @group(1) @binding(5) var depth: texture_storage_2d<r32float, write>;       // along the view axis
 @group(1) @binding(6) var normal: texture_storage_2d<rgba32float, write>;   // in the world
 @group(1) @binding(7) var object: texture_storage_2d<r32uint, write>;
+
+alias Color = texture_storage_2d<rgba32float, write>;
 
 struct View {
     time: f32,      // of the image, in the time of the rows of poses [frame intervals]
