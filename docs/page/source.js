@@ -1,0 +1,41 @@
+// The very WGSL that draws the page, to unfold.
+
+const KINDS = /(\/\/.*)|\b(fn|let|var|const|struct|override|alias|return|if|else|for|loop|while|break|continue|switch|case|default|true|false)\b|\b(0x[\da-fA-F]+u?|\d+\.?\d*(?:e-?\d+)?[ufi]?)\b/g;
+
+function coloured(text) {
+  const safe = text.replace(/&/g, '&amp;').replace(/</g, '&lt;');
+  return safe.replace(KINDS, (all, comment, word) => `<span class="${comment ? 'c' : word ? 'k' : 'n'}">${all}</span>`);
+}
+
+/** {file: its own text} of shaders, which hold what they include, in the order they are met. */
+export function filesOf(shaders, names) {
+  const found = new Map();
+  for (const name of names) {
+    const { text, files } = shaders[name], lines = text.split('\n');
+    files.forEach(([file, first], i) => {
+      const end = files[i + 1]?.[1] ?? lines.length;
+      if (!found.has(file)) found.set(file, lines.slice(first - 1, end - 1).join('\n').trimEnd());
+    });
+  }
+  return found;
+}
+
+const count = (texts) => [...texts].reduce((sum, text) => sum + text.split('\n').length, 0);
+
+/** Fill the section. */
+export function showSource(shaders, lead, place) {
+  const volume = filesOf(shaders, ['methods/volume.wgsl']), all = filesOf(shaders, Object.keys(shaders));
+  const number = (n) => n.toLocaleString('en');
+  lead.textContent = `The picture at the top is drawn by ${number(count(volume.values()))} lines of WGSL, the whole page by `
+    + `${number(count(all.values()))}. The renderer runs the same text, byte for byte: nothing was ported for this page.`;
+  const ordered = [...volume.keys(), ...[...all.keys()].filter((name) => !volume.has(name))];
+  place.replaceChildren(...ordered.map((name) => {
+    const text = all.get(name), details = document.createElement('details'), summary = document.createElement('summary');
+    const size = document.createElement('span'), code = document.createElement('pre');
+    size.textContent = `${text.split('\n').length} lines`;
+    summary.append(`wgsl/${name}`, size);
+    details.append(summary, code);
+    details.addEventListener('toggle', () => { code.innerHTML ||= coloured(text); }, { once: true });
+    return details;
+  }));
+}
