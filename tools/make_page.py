@@ -16,6 +16,7 @@ import json
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import page_export
 import page_recording
@@ -28,7 +29,7 @@ MAIN = "main.js"
 MOST = 2_000_000
 """Bytes of the page, at most."""
 
-BEGIN, SECONDS, FADE, FPS = 12.0, 9, 1.0, 24
+BEGIN, SECONDS, FADE, FPS = 16.5, 9, 1.0, 24
 """Of the video: where it begins, how long it is, and how long its end fades into its beginning."""
 CAMERA = {"cam_x": 0.3, "cam_y": -0.2}
 UNPACKED = """export async function unpacked(name) {
@@ -42,10 +43,9 @@ UNPACKED = """export async function unpacked(name) {
 def page() -> str:
     """The text of the page."""
     media = {path.stem: data_url(path) for path in sorted(MEDIA.iterdir())}
-    packed = {
-        "exported": pack(page_export.exported()),
-        "recordings": pack(page_recording.recordings()),
-    }
+    recordings = page_recording.recordings()
+    shaders = sorted({*page_export.page_files(), *_replayed(recordings)})
+    packed = {"exported": pack(page_export.exported(*shaders)), "recordings": pack(recordings)}
     made = {
         "packed.js": (
             f"const PACKED = {json.dumps(packed)};\n"
@@ -59,6 +59,12 @@ def page() -> str:
         "BEFORE": media["before"],
         "AFTER": media["after"],
     })  # fmt: skip
+
+
+def _replayed(recordings: dict[str, Any]) -> set[str]:
+    """The shaders that recordings run."""
+    runs = [recordings["once"], *recordings["choices"].values()]
+    return {row["kernel"]["file"] for run in runs for row in run["passes"] if "kernel" in row}
 
 
 def filled(text: str, places: dict[str, str]) -> str:
@@ -173,7 +179,7 @@ def _write_video(frames: list) -> None:
         stream = file.add_stream("libx264", rate=FPS)
         stream.height, stream.width = frames[0].shape[:2]
         stream.pix_fmt = "yuv420p"
-        stream.options = {"crf": "29", "preset": "veryslow", "threads": "1", "tune": "film"}
+        stream.options = {"crf": "25", "preset": "veryslow", "threads": "1", "tune": "film"}
         for frame in frames:
             file.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
         file.mux(stream.encode(None))

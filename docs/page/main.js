@@ -132,12 +132,12 @@ const onFrame = (t) => Math.round(t * state.fps) / state.fps;
 function blurSample() {
   if (!view.gpu || root.dataset.mode !== 'live' || !view.seenSample) return;
   view.sample ??= new Sample(view.gpu, $('sample'), view.recordings, { native: fixed !== null });
-  return view.sample.draw(state).catch(failed);
+  return view.sample.draw(state).catch((error) => tell(error.message)); // the images stay
 }
 
 /** For tests: until everything that was asked for is on the canvases. */
 async function settled() {
-  while (view.dirty || view.stage?.flying || view.sample?.running || quiet) await new Promise(requestAnimationFrame);
+  while (view.stage && (view.dirty || view.stage.flying || view.sample?.running || quiet)) await new Promise(requestAnimationFrame);
 }
 
 const style = {};

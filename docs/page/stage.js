@@ -29,12 +29,12 @@ export class Stage {
     return this.flying < 2;
   }
 
-  /** Draw a state. `still`: at full resolution, if that takes no more than a second. */
+  /** Draw a state. `still`: at full resolution, if that takes two seconds at most. */
   async draw(state, still = false) {
     let size = this.#size(SCALES[this.step]);
     if (still && !this.fixed) {
       const full = this.#size(1);
-      if (this.cost * full[0] * full[1] < 1000) size = full;
+      if (this.cost * full[0] * full[1] < 2000) size = full;
     }
     const [width, height] = size;
     const shutter = shutterOf({ curve: state.curve, degrees: state.deg, phase: 'centre' });
