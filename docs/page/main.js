@@ -135,9 +135,10 @@ function blurSample() {
   return view.sample.draw(state).catch((error) => tell(error.message)); // the images stay
 }
 
-/** For tests: until everything that was asked for is on the canvases. */
+/** For tests: until everything that was asked for, and is in sight, is on the canvases. */
 async function settled() {
-  while (view.stage && (view.dirty || view.stage.flying || view.sample?.running || quiet)) await new Promise(requestAnimationFrame);
+  const busy = () => view.stage && (view.stage.flying || view.sample?.running || (view.seen && (view.dirty || quiet)));
+  do await new Promise(requestAnimationFrame); while (busy());
 }
 
 const style = {};
@@ -163,10 +164,17 @@ function command() {
   view.commanded = performance.now();
   const shutter = shutterOf({ curve: state.curve, degrees: state.deg });
   const round = (x) => Number(x.toFixed(4));
-  $('command').textContent = commandLine({
+  const [width, height] = view.stage?.size() ?? [1280, 720];
+  say($('command'), commandLine({
     time: round(state.t), camera: [round(state.x), round(state.y)], shutter, density: state.density, fps: state.fps,
-    width: fixed?.[0] ?? 1280, height: fixed?.[1] ?? 720,
-  });
+    width, height,
+  }));
+}
+
+/** Show a command whose options are not broken. */
+function say(place, line) {
+  const parts = line.split(/ (?=-)/).map((text) => Object.assign(document.createElement('span'), { textContent: text }));
+  place.replaceChildren(...parts.flatMap((one, i) => (i ? [' ', one] : [one])));
 }
 
 const part = (range) => range.style.setProperty('--part', `${100 * (range.value - range.min) / (range.max - range.min)}%`);
@@ -189,11 +197,11 @@ function update(remember = false) {
   if (view.gpu) {
     $('verdict').innerHTML = verdict(shutterOf({ curve: state.curve, degrees: state.deg }), state.deg);
     const { recordings } = view;
-    $('command2').textContent = commandLine({
+    say($('command2'), commandLine({
       scene: recordings.scene, time: recordings.time, width: recordings.size[0], height: recordings.size[1],
       rays: recordings.rays ?? 2, fps: 24, method: state.method, samples: state.samples,
       shutter: shutterOf({ curve: state.curve2, degrees: state.deg2 }),
-    });
+    }));
     showTime();
     command();
   }

@@ -17,7 +17,8 @@ export class Stage {
     this.cost = 0; // milliseconds of the last frame per pixel
   }
 
-  #size(scale) {
+  /** Pixels at a scale of the screen's own. */
+  size(scale = 1) {
     if (this.fixed) return this.fixed;
     const ratio = Math.min(devicePixelRatio || 1, 2) * scale;
     const { clientWidth, clientHeight } = this.canvas;
@@ -31,9 +32,9 @@ export class Stage {
 
   /** Draw a state. `still`: at full resolution, if that takes two seconds at most. */
   async draw(state, still = false) {
-    let size = this.#size(SCALES[this.step]);
+    let size = this.size(SCALES[this.step]);
     if (still && !this.fixed) {
-      const full = this.#size(1);
+      const full = this.size();
       if (this.cost * full[0] * full[1] < 2000) size = full;
     }
     const [width, height] = size;
