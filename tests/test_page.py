@@ -126,13 +126,7 @@ SAMPLE = [  # method, degrees, curve, samples
 
 def test_the_sample_frame_is_that_of_python(visit, tmp_path):
     files = [tmp_path / f"{i}.png" for i in range(len(SAMPLE))]
-    look = {"do": "evaluate", "script": "document.getElementById('wipe').scrollIntoView()"}
-    drawn = {
-        "do": "evaluate",
-        "script": "new Promise(r => { const i = setInterval(() => document.querySelector("
-        "'#sample.drawn') && (clearInterval(i), r()), 50); })",
-    }
-    steps = [look, drawn]
+    steps = []
     for file, (method, degrees, curve, samples) in zip(files, SAMPLE, strict=True):
         said = state(method=method, deg2=degrees, curve2=curve, samples=samples, line=0)
         steps += [go(said), *picture("#sample", file)]
@@ -165,18 +159,29 @@ STEPS = [  # what a hand does, and what of the state it changes
 ]
 
 
-def test_hands_change_the_state_and_the_address(visit):
+def test_hands_change_the_state_the_picture_and_the_address(visit, tmp_path):
     note = {"do": "evaluate", "script": "({...wgmb.state})"}
-    steps = [note]
-    for act, _ in STEPS:
-        steps += [act, note]
+    canvas = ["#torusphere" if names & {*"xyt", "deg", "curve", "fps", "density"} else "#sample"
+              for _, names in STEPS]  # fmt: skip
+    files = [tmp_path / f"{i}.png" for i in range(len(STEPS))]
+    begin = {of: tmp_path / f"{of[1:]}.png" for of in ("#torusphere", "#sample")}
+    steps = [note, *picture("#torusphere", begin["#torusphere"])]
+    for (act, names), of, file in zip(STEPS, canvas, files, strict=True):
+        if names == {"method"}:
+            steps += picture(of, begin[of])
+        steps += [act, note, *picture(of, file)]
     wait = {"do": "evaluate", "script": "new Promise(r => setTimeout(r, 500))"}
-    (seen,) = visit({"hash": "still=1&t=20", "steps": [*steps, wait]})
+    (seen,) = visit({"hash": "still=1&t=20&size=320x180", "steps": [*steps, wait]})
     states = [s for s in seen["results"] if isinstance(s, dict) and "curve2" in s]
     assert len(states) == len(STEPS) + 1
     for (act, names), before, after in zip(STEPS, states[:-1], states[1:], strict=True):
         assert {n for n in before if before[n] != after[n]} == names, act
-    said = dict(re.findall(r"([\w]+)=([^&]+)", seen["address"]))
+    shown = {of: iio.imread(file) for of, file in begin.items()}
+    for (act, _), of, file in zip(STEPS, canvas, files, strict=True):
+        now = iio.imread(file)
+        assert (now != shown[of]).any(), act
+        shown[of] = now
+    said = dict(re.findall(r"(\w+)=([^&]+)", seen["address"]))
     assert said["method"] == "tap" and said["density"] == "published" and said["deg2"] == "720"
 
 
@@ -226,8 +231,13 @@ def test_without_webgpu_there_is_a_recording(visit):
 
 
 def test_phones_and_desks(visit):
-    for seen in visit({"phone": True, "width": 390, "height": 844}, {"width": 1280}):
-        assert seen["mode"] == "live"
+    tap = {"do": "tap", "of": "#wipe", "at": [0.25, 0.3]}
+    line = {"do": "evaluate", "script": "wgmb.state.line"}
+    phone, desk = visit(
+        {"phone": True, "width": 390, "height": 844, "steps": [tap, line]}, {"width": 1280}
+    )
+    assert phone["mode"] == desk["mode"] == "live"
+    assert phone["results"][1] == pytest.approx(0.25, abs=0.02)
 
 
 def test_the_page_is_made_the_same_every_time(page):

@@ -6,6 +6,7 @@
 //   {do: 'picture', of, file}          a canvas, pixel by pixel, at its own size
 //   {do: 'evaluate', script}           its value is the step's result
 //   {do: 'drag', of, from, to} {do: 'wheel', of, dx, dy} {do: 'key', name} {do: 'click', of} {do: 'fill', of, value}
+//   {do: 'tap', of, at}                with a finger
 import { chromium } from 'playwright-core';
 
 const FLAGS = [
@@ -30,7 +31,10 @@ const DO = {
     await page.screenshot({ path: file, fullPage: full });
   },
   async picture(page, { of, file }) {
-    const size = await page.evaluate((of_) => {
+    const size = await page.evaluate(async (of_) => {
+      document.querySelector(of_).parentElement.scrollIntoView();
+      while (!document.querySelector(`${of_}.drawn`)) await new Promise(requestAnimationFrame);
+      await window.wgmb.settled();
       const canvas = document.querySelector(of_), { width, height } = canvas;
       canvas.dataset.style = canvas.getAttribute('style') ?? '';
       canvas.style.cssText = `position: fixed; left: 0; top: 0; z-index: 99; width: ${width}px; height: ${height}px`;
@@ -56,6 +60,9 @@ const DO = {
     await page.mouse.move(...await middle(page, { of }));
     await page.mouse.wheel(dx, dy);
     await page.waitForTimeout(100);
+  },
+  async tap(page, { of, at }) {
+    await page.touchscreen.tap(...await middle(page, { of, at }));
   },
   key: (page, { name }) => page.keyboard.press(name),
   async click(page, { of }) {
@@ -86,7 +93,7 @@ async function visited(browser, url, visit) {
   const ready = Date.now() - began;
   for (const step of steps) {
     results.push((await DO[step.do](page, step)) ?? null);
-    if (step.do !== 'evaluate' && !visit.loose) await page.evaluate(() => window.wgmb.settled());
+    if (step.do !== 'evaluate') await page.evaluate(() => window.wgmb.settled());
   }
   const seen = await page.evaluate(() => {
     const root = document.documentElement;
