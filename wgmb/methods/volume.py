@@ -158,8 +158,8 @@ def volume_row(
     speed = 30 * swept  # at the exposure that the pseudo distances were made for
     row["centre"], row["color"], row["opacity"] = v.centre, v.color, v.opacity
     row["normal_weight"] = 1 if v.facing is None else v.facing
-    row["drift"] = [abs(v.speed) * d for d in delay]
-    half = min((swept + np.abs(row["drift"]).sum()) / 2, math.pi / 2)
+    row["drift"] = drift = [abs(v.speed) * d for d in delay]
+    half = min((swept + sum(map(abs, drift))) / 2, math.pi / 2)
     middle, reach = np.array(v.centre), v.reach
     if isinstance(v, OrbitingSphere):
         row["turn"] = c, -s, -side * s, -side * c
