@@ -26,7 +26,7 @@ from wgmb.scene.volumes import Backdrop, Torus
 FRAGMENT = 2  # GPUShaderStage
 PATTERNS = (
     "methods/volume.wgsl", "methods/tap.wgsl", "methods/tiles*.wgsl", "methods/gather/*.wgsl",
-    "velocity.wgsl", "holdout.wgsl", "viewer/compose.wgsl", "viewer/blit.wgsl",
+    "velocity.wgsl", "holdout.wgsl", "scene/gbuffer.wgsl", "viewer/compose.wgsl", "viewer/blit.wgsl",
 )  # fmt: skip
 """The shaders of the page; of these, files without an entry point come with those that have one."""
 
