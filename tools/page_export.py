@@ -26,7 +26,8 @@ from wgmb.scene.volumes import Backdrop, Torus
 FRAGMENT = 2  # GPUShaderStage
 PATTERNS = (
     "methods/volume.wgsl", "methods/tap.wgsl", "methods/tiles*.wgsl", "methods/gather/*.wgsl",
-    "velocity.wgsl", "holdout.wgsl", "scene/gbuffer.wgsl", "viewer/compose.wgsl", "viewer/blit.wgsl",
+    "velocity.wgsl", "holdout.wgsl", "scene/gbuffer.wgsl",
+    "viewer/compose.wgsl", "viewer/blit.wgsl",
 )  # fmt: skip
 """The shaders of the page; of these, files without an entry point come with those that have one."""
 
@@ -100,7 +101,8 @@ def _layout(dtype: np.dtype) -> dict[str, Any]:
     """
     size = {"size": dtype.itemsize}
     if dtype.fields is not None:
-        rows = {n: {"offset": f[1]} | _layout(f[0]) for n, f in dtype.fields.items()}
+        known = {n: f for n, f in dtype.fields.items() if f[0].base.fields or f[0].base.kind != "V"}
+        rows = {n: {"offset": f[1]} | _layout(f[0]) for n, f in known.items()}
         return size | {"fields": rows}
     if dtype.base.fields is not None:
         return size | {"array": list(dtype.shape), "of": _layout(dtype.base)}
