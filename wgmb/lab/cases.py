@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..frame import Frame
 from ..io.clip import Clip
 from ..io.frame_numbers import frame_list
@@ -46,7 +46,8 @@ class Candidate:
         """NAME[:SAMPLES][:OPTION=VALUE]...; the error says which method is unknown."""
         name, *more = text.split(":")
         if name not in METHODS:
-            raise InputError(f"unknown method {name!r}; available: {', '.join(METHODS)}")
+            known = f"available: {', '.join(METHODS)}{did_you_mean(name, METHODS)}"
+            raise InputError(f"unknown method {name!r}; {known}")
         samples, options = None, []
         for part in more:
             key, equals, value = part.partition("=")
