@@ -88,7 +88,7 @@ def _structs(source: wgsl.WgslSource) -> dict[str, Any]:
         if binding.space and name in known:
             try:
                 found[name] = _layout(source.dtype(name))
-            except ShaderError:  # of unknown length: JavaScript does not fill it
+            except ShaderError:  # of unknown length, or arrays within arrays: JavaScript fills none
                 continue
     return found
 
@@ -106,6 +106,8 @@ def _layout(dtype: np.dtype) -> dict[str, Any]:
     if dtype.base.fields is not None:
         return size | {"array": list(dtype.shape), "of": _layout(dtype.base)}
     words = {"f": "f32", "i": "i32", "u": "u32"}
+    if dtype.base.kind not in words:
+        raise ShaderError(f"no layout for {dtype}")
     return size | {"type": words[dtype.base.kind], "shape": list(dtype.shape)}
 
 

@@ -341,9 +341,9 @@ function allTiles(width, height, [edgeX, edgeY]) {
 // ---- wgmb/cli ----------------------------------------------------------------------------
 
 /// The command that makes this very picture, as a line for a shell: `wgmb blur` where the state has an `input`, else
-/// `wgmb render torusphere`. The state's names are those of the functions above; `output` is a file name.
+/// `wgmb render` of its `scene`, the torusphere by default. The state's names are those of the functions above; `output` is a file name.
 export function commandLine(state) {
-  const { shutter: { curve, degrees, phase }, width, height, input, frames } = state;
+  const { shutter: { curve, degrees, phase }, width, height, input, frames, scene = 'torusphere' } = state;
   const words = ['wgmb'], option = (name, value) => words.push(`--${name}`, `${value}`);
   if (input) {
     words.push('blur', input, '-o', state.output ?? 'blurred.png');
@@ -353,10 +353,13 @@ export function commandLine(state) {
     if (state.jitter) option('jitter', state.jitter);
     if (typeof state.maxBlur === 'number') option('max-blur', state.maxBlur);
   } else {
-    words.push('render', 'torusphere', '-o', state.output ?? 'torusphere.png', `--time=${state.time}`);
+    words.push('render', scene, '-o', state.output ?? `${scene}.png`, `--time=${state.time}`);
     option('size', `${width}x${height}`);
+    if (state.rays) option('rays', state.rays);
     option('fps', state.fps);
-    state.camera.forEach((angle, i) => { if (angle) option('set', `cam_${'xy'[i]}=${angle}`); });
+    if (state.method) option('method', state.method);
+    if (state.samples !== undefined) option('samples', state.samples);
+    state.camera?.forEach((angle, i) => { if (angle) option('set', `cam_${'xy'[i]}=${angle}`); });
     if (state.density && state.density !== 'exact') option('set', `density=${state.density}`);
   }
   option('shutter', degrees);
