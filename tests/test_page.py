@@ -9,25 +9,21 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import imageio.v3 as iio
 import numpy as np
 import pytest
 
+import make_page
 import standard
 from wgmb import Blur, Render, Shutter
 from wgmb.color import to_display
 from wgmb.scene import make
 
 HERE = Path(__file__).parent
-TOOLS = HERE.parent / "tools"
 SIZE = 640, 360
 LEAST, MOST = 55, 2  # dB, and 255ths
-
-sys.path.insert(0, str(TOOLS))
-import make_page  # noqa: E402
 
 
 def why_not() -> str:
@@ -83,6 +79,11 @@ def state(**said) -> str:
     return "&".join(f"{k}={v}" for k, v in {"still": 1, "size": size, **said}.items())
 
 
+def go(said: str) -> dict:
+    """Another address in the same window."""
+    return {"do": "evaluate", "script": f"location.hash = {said!r}; wgmb.settled()"}
+
+
 def check(file: Path, want: np.ndarray) -> None:
     got, want = iio.imread(file)[..., :3].astype(float), to_display(want[..., :3], 8).astype(float)
     assert got.shape == want.shape
@@ -103,13 +104,11 @@ TORUSPHERE = [  # time, camera, degrees, curve, frames per second, density
 
 def test_the_torusphere_is_that_of_python(visit, tmp_path):
     files = [tmp_path / f"{i}.png" for i in range(len(TORUSPHERE))]
-    visit(*(
-        {
-            "hash": state(t=t, x=x, y=y, deg=degrees, curve=curve, fps=fps, density=density),
-            "steps": picture("#torusphere", file),
-        }
-        for file, (t, (x, y), degrees, curve, fps, density) in zip(files, TORUSPHERE, strict=True)
-    ))  # fmt: skip
+    steps = []
+    for file, (t, (x, y), degrees, curve, fps, density) in zip(files, TORUSPHERE, strict=True):
+        said = state(t=t, x=x, y=y, deg=degrees, curve=curve, fps=fps, density=density)
+        steps += [go(said), *picture("#torusphere", file)]
+    visit({"hash": state(), "steps": steps})
     for file, (t, (x, y), degrees, curve, fps, density) in zip(files, TORUSPHERE, strict=True):
         scene = make("torusphere", cam_x=x, cam_y=y, density=density)
         blur = Blur("volume", shutter=Shutter(degrees, curve=curve))
@@ -134,13 +133,11 @@ def test_the_sample_frame_is_that_of_python(visit, tmp_path):
         "script": "new Promise(r => { const i = setInterval(() => document.querySelector("
         "'#sample.drawn') && (clearInterval(i), r()), 50); })",
     }
-    visit(*(
-        {
-            "hash": state(method=method, deg2=degrees, curve2=curve, samples=samples, line=0),
-            "steps": [look, drawn, *picture("#sample", file)],
-        }
-        for file, (method, degrees, curve, samples) in zip(files, SAMPLE, strict=True)
-    ))  # fmt: skip
+    steps = [look, drawn]
+    for file, (method, degrees, curve, samples) in zip(files, SAMPLE, strict=True):
+        said = state(method=method, deg2=degrees, curve2=curve, samples=samples, line=0)
+        steps += [go(said), *picture("#sample", file)]
+    visit({"hash": state(method="tap"), "steps": steps})
     recording = make_page.page_recording
     for file, (method, degrees, curve, samples) in zip(files, SAMPLE, strict=True):
         blur = Blur(method, shutter=Shutter(degrees, curve=curve), samples=samples)
@@ -155,6 +152,7 @@ STEPS = [  # what a hand does, and what of the state it changes
     ({"do": "drag", "of": "#strip", "from": [0.6, 0.5], "to": [0.3, 0.5]}, {"t"}),
     ({"do": "click", "of": "#forward"}, {"t"}),
     ({"do": "key", "name": "ArrowLeft"}, {"t"}),
+    ({"do": "key", "name": "Shift+ArrowUp"}, {"y"}),
     ({"do": "key", "name": "]"}, {"deg"}),
     ({"do": "key", "name": "c"}, {"curve"}),
     ({"do": "key", "name": "f"}, {"fps"}),

@@ -7,9 +7,9 @@ import subprocess
 from types import SimpleNamespace
 
 import numpy as np
-import page_export
 import pytest
 
+import page_export
 import standard
 from wgmb import gpu, scene
 from wgmb.cli import app

@@ -257,6 +257,19 @@ function onDrag(element, moved, began = () => {}) {
   for (const name of ['pointerup', 'pointercancel', 'lostpointercapture']) element.addEventListener(name, () => { from = null; });
 }
 
+const wheel = { owner: null, time: -Infinity };
+addEventListener('wheel', ({ target, timeStamp }) => {
+  if (timeStamp - wheel.time > 300) wheel.owner = target;
+  wheel.time = timeStamp;
+}, { capture: true, passive: true });
+
+/** Call `turned` for the wheel above `element`, but not where it scrolls past: the wheel must begin there. */
+function onWheel(element, turned) {
+  element.addEventListener('wheel', (event) => {
+    if (element.contains(wheel.owner)) turned(event);
+  }, { passive: false });
+}
+
 function turn(dx, dy) {
   change({ x: state.x - dx, y: within('y', state.y + dy) });
 }
@@ -268,18 +281,11 @@ function listenToCanvas() {
     turn(dx * 3 / canvas.clientWidth, dy * 2 / canvas.clientHeight);
   });
   // Up and down scrolls the page; to the sides, or with Shift, the wheel turns the scene.
-  canvas.addEventListener('wheel', (event) => {
+  onWheel(canvas, (event) => {
     const dx = event.shiftKey && !event.deltaX ? event.deltaY : event.deltaX;
     if (Math.abs(dx) <= Math.abs(event.shiftKey ? 0 : event.deltaY)) return;
     event.preventDefault();
     turn(-dx / 400, 0);
-  }, { passive: false });
-  canvas.addEventListener('keydown', (event) => {
-    const way = { ArrowLeft: [0.08, 0], ArrowRight: [-0.08, 0], ArrowUp: [0, -0.05], ArrowDown: [0, 0.05] }[event.key];
-    if (!way || !event.shiftKey) return;
-    event.preventDefault();
-    event.stopPropagation();
-    turn(...way);
   });
 }
 
@@ -291,11 +297,11 @@ function listen() {
   $('degrees').oninput = () => change({ deg: Number($('degrees').value) });
   $('degrees2').oninput = () => change({ deg2: Number($('degrees2').value) });
   for (const [id, name] of [['degrees', 'deg'], ['degrees2', 'deg2']]) {
-    $(id).parentElement.addEventListener('wheel', (event) => {
+    onWheel($(id).parentElement, (event) => {
       if (Math.abs(event.deltaY) < Math.abs(event.deltaX)) return;
       event.preventDefault();
       change({ [name]: within(name, state[name] - Math.sign(event.deltaY) * 12) });
-    }, { passive: false });
+    });
   }
   document.addEventListener('change', ({ target }) => {
     if (target.type === 'radio') change(parsed(`${target.name}=${target.value}`));
@@ -308,10 +314,10 @@ function listen() {
     exact = state.t;
     change({ still: 1 });
   });
-  $('strip').addEventListener('wheel', (event) => {
+  onWheel($('strip'), (event) => {
     event.preventDefault();
     step(Math.sign(event.deltaY + event.deltaX));
-  }, { passive: false });
+  });
 
   const toLine = (event) => {
     const { left, width } = $('wipe').getBoundingClientRect();
@@ -335,7 +341,7 @@ function listen() {
   addEventListener('keydown', key);
   addEventListener('keyup', (event) => { if (event.key.toLowerCase() === 'e') flip(false); });
   addEventListener('blur', () => flip(false));
-  addEventListener('hashchange', () => change(parsed(location.hash)));
+  addEventListener('hashchange', () => change({ ...DEFAULTS, ...parsed(location.hash) }));
   const again = () => {
     readStyle();
     view.dirty = true;
@@ -359,7 +365,7 @@ function flip(on) {
 function key(event) {
   if (event.ctrlKey || event.metaKey || event.altKey || root.dataset.mode !== 'live') return;
   const { target } = event, name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-  const typing = target.matches?.('input, summary, button');
+  const own = { ' ': 'input, summary, button', ArrowLeft: 'input, pre', ArrowRight: 'input, pre' }[name];
   const acts = {
     ' ': () => change({ still: 1 - state.still }),
     ArrowLeft: () => step(-1),
@@ -370,7 +376,11 @@ function key(event) {
     f: () => change({ fps: after('fps', state.fps) }),
     e: () => flip(true),
   };
-  if (!acts[name] || (typing && (name === ' ' || name.startsWith('Arrow')))) return;
+  if (event.shiftKey) {
+    const turns = { ArrowLeft: [0.08, 0], ArrowRight: [-0.08, 0], ArrowUp: [0, -0.05], ArrowDown: [0, 0.05] };
+    for (const [way, by] of Object.entries(turns)) acts[way] = () => turn(...by);
+  }
+  if (!acts[name] || (own && target.matches?.(own))) return;
   event.preventDefault();
   acts[name]();
 }
