@@ -18,7 +18,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # the workers have shared out the cores
 standard.record()  # every kernel that a test makes; they are sent through Dawn in the end
 
 # Files that take longest are begun first, so that all workers end at about the same time.
-LONGEST = ("test_window", "test_viewer", "test_twins", "test_faults", "test_volume",
+LONGEST = ("test_page", "test_window", "test_viewer", "test_twins", "test_faults", "test_volume",
            "test_experiments", "test_reference", "test_perceive")  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from wgmb.cli import app
 from wgmb.errors import InputError
 from wgmb.gpu import timing
 from wgmb.lab import bench, bench_report, report
-from wgmb.lab.cases import Contender
+from wgmb.lab.cases import Candidate
 from wgmb.methods import METHODS
 
 SIZES = ((64, 36), (96, 54))
@@ -19,7 +19,7 @@ SIZES = ((64, 36), (96, 54))
 
 @pytest.fixture(scope="module")
 def run(device):
-    return bench.bench(device, [Contender(m) for m in METHODS], SIZES, (2, 4), rounds=1)
+    return bench.bench(device, [Candidate(m) for m in METHODS], SIZES, (2, 4), rounds=1)
 
 
 def test_every_method_has_a_figure_for_every_size_and_number(run):
@@ -158,7 +158,7 @@ def test_every_method_has_its_passes(run):
 @pytest.mark.parametrize("usable", [True, False])
 def test_both_clocks_tell_the_same_passes(device, monkeypatch, usable):
     monkeypatch.setattr(bench.TimestampClock, "usable", staticmethod(lambda device: usable))
-    several = [Contender(m) for m in ("tap", "tiles", "gather", "accumulate")]
+    several = [Candidate(m) for m in ("tap", "tiles", "gather", "accumulate")]
     run = bench.bench(device, several, SIZES[:1], (3,), 1)
     assert run.clock == ("timestamps" if usable else "wall clock")
     assert run.clock.split()[-1] in bench_report.report(run, "").tables[1].note
@@ -184,7 +184,7 @@ def test_a_method_holds_its_pictures_and_what_it_needs_besides(run):
 
 def test_what_takes_too_long_is_left_out_and_said(device):
     said = []
-    run = bench.bench(device, [Contender("tap"), Contender("gather")], SIZES[::-1], (2,),
+    run = bench.bench(device, [Candidate("tap"), Candidate("gather")], SIZES[::-1], (2,),
                       rounds=1, limit=1e-6, tell=said.append)  # fmt: skip
     assert [(f.method, f.size) for f in run.figures] == [("tap", SIZES[0]), ("gather", SIZES[0])]
     assert [n.partition(" skipped")[0] for n in run.notes] == [
@@ -196,25 +196,25 @@ def test_what_takes_too_long_is_left_out_and_said(device):
 
 
 def test_what_does_not_fit_into_memory_is_left_out(device, monkeypatch):
-    tap = bench.bench(device, [Contender("tap")], SIZES[:1], (2,), 1).figures[0]
+    tap = bench.bench(device, [Candidate("tap")], SIZES[:1], (2,), 1).figures[0]
     monkeypatch.setattr(bench, "_memory", lambda: 2 * tap.memory)
-    run = bench.bench(device, [Contender("tap")], SIZES, (2,), 1)
+    run = bench.bench(device, [Candidate("tap")], SIZES, (2,), 1)
     assert [f.size for f in run.figures] == [SIZES[0]]
     assert "skipped: it would hold" in run.notes[0]
 
 
 def test_a_size_that_no_texture_has_is_left_out(device):
     huge = 1 << 20, 4
-    run = bench.bench(device, [Contender("tap")], [huge, SIZES[0]], (2,), 1)
+    run = bench.bench(device, [Candidate("tap")], [huge, SIZES[0]], (2,), 1)
     assert [f.size for f in run.figures] == [SIZES[0]]
     assert "skipped: image is 1048576 x 4" in run.notes[0]
     with pytest.raises(InputError, match="1048576 x 4"):
-        bench.bench(device, [Contender("tap")], [huge], (2,), 1)
+        bench.bench(device, [Candidate("tap")], [huge], (2,), 1)
 
 
 def test_the_time_to_come_is_told(device):
     said = []
-    bench.bench(device, [Contender("tap")], SIZES, (2, 4), 1, tell=said.append)
+    bench.bench(device, [Candidate("tap")], SIZES, (2, 4), 1, tell=said.append)
     assert [text.partition(":")[0] for text in said] == [
         "64 x 36, 2 samples (1 of 4)", "64 x 36, 4 samples (2 of 4)",
         "96 x 54, 2 samples (3 of 4)", "96 x 54, 4 samples (4 of 4)",
@@ -231,11 +231,11 @@ def test_what_is_interrupted_has_what_was_measured(device, monkeypatch):
         measure(matrix, size, samples)
 
     monkeypatch.setattr(bench._Matrix, "measure", interrupt)
-    run = bench.bench(device, [Contender("tap")], SIZES[:1], (2, 4, 8), 1)
+    run = bench.bench(device, [Candidate("tap")], SIZES[:1], (2, 4, 8), 1)
     assert [f.samples for f in run.figures] == [2]
     assert run.notes == ["interrupted: the rest is skipped"]
     with pytest.raises(KeyboardInterrupt):
-        bench.bench(device, [Contender("tap")], SIZES[:1], (4,), 1)
+        bench.bench(device, [Candidate("tap")], SIZES[:1], (4,), 1)
 
 
 def test_ctrl_c_writes_what_there_is_and_ends_with_130(tmp_path, capsys, monkeypatch):

@@ -15,9 +15,9 @@ import make_frames as make
 from wgmb import METHODS, Frame, Shutter
 from wgmb.errors import InputError
 from wgmb.lab import cases, charts, compare, report, results
-from wgmb.lab.cases import Case, Contender
+from wgmb.lab.cases import Candidate, Case
 from wgmb.lab.results import Entry, Report, Table
-from wgmb.metrics import MEASURES, measure
+from wgmb.metrics import METRICS, measure
 
 SIZE = (48, 32)
 
@@ -43,14 +43,14 @@ def case(device):
 def found(device, case):
     lab = compare.Laboratory(device, rounds=1)
     got = Report("Bars & <boxes>", "wgmb compare bar", results.machine(device), 8)
-    lab.compare(got, case, [Contender("tap"), Contender("reproject")], (2, 4))
+    lab.compare(got, case, [Candidate("tap"), Candidate("reproject")], (2, 4))
     got.tables.append(Table("More", ["what", "figure"], [["a < b", 1.5], ["c", None]]))
     return got
 
 
 @pytest.fixture(scope="module")
-def staged(device):
-    return cases.Staged(cases.make_scene("crossing:speed=3")[1], size=SIZE, rays=1)
+def scene_frame(device):
+    return cases.SceneFrame(cases.make_scene("crossing:speed=3")[1], size=SIZE, rays=1)
 
 
 @pytest.mark.parametrize(
@@ -60,21 +60,21 @@ def staged(device):
      ("distributed:seed=3", "distributed, seed 3", None)],
 )  # fmt: skip
 def test_a_contender_is_read_from_text(text, label, samples):
-    got = Contender.parse(text)
+    got = Candidate.parse(text)
     assert (got.label, got.samples) == (label, samples)
 
 
 @pytest.mark.parametrize("text", ["", "smear", "tap:x", "tap:16:"])
 def test_a_contender_that_is_none_is_refused(text):
     with pytest.raises(InputError):
-        Contender.parse(text)
+        Candidate.parse(text)
 
 
 def test_options_reach_the_method(device):
     with pytest.raises(InputError, match="path must be"):
-        Contender.parse("tap:path=crooked").blur(4, Shutter(180), device)
+        Candidate.parse("tap:path=crooked").blur(4, Shutter(180), device)
     with pytest.raises(InputError, match="no option wings"):
-        Contender.parse("tap:wings=2").blur(4, Shutter(180), device)
+        Candidate.parse("tap:wings=2").blur(4, Shutter(180), device)
 
 
 def test_a_scene_is_read_with_its_settings():
@@ -88,7 +88,7 @@ def test_a_scene_is_read_with_its_settings():
 
 def test_every_entry_has_every_measure_and_its_time(found, case):
     for entry in found.entries:
-        assert list(entry.measures) == list(MEASURES)
+        assert list(entry.measures) == list(METRICS)
         assert (entry.seconds is None) == (entry.kind in ("sharp", "peer"))
         assert entry.seconds is None or entry.seconds > 0
     assert [e.samples for e in found.of("bar", label="tap", kind="samples")] == [2, 4, 8]
@@ -134,25 +134,25 @@ def test_one_time_that_was_disturbed_does_not_mislead():
 
 def test_own_samples_hold_at_equal_samples_only(device, case):
     lab, got = compare.Laboratory(device, rounds=1), Report("", "", {}, 4)
-    lab.compare(got, case, [Contender.parse("tap:3")], (2,), budgets=lambda *_: [])
+    lab.compare(got, case, [Candidate.parse("tap:3")], (2,), budgets=lambda *_: [])
     assert [e.samples for e in got.of("bar", label="tap")] == [2, 3]
     assert got.of("bar", kind="time") == []
 
 
 def test_what_cannot_take_part_is_left_out_and_said(device, case):
     lab, got = compare.Laboratory(device, rounds=1), Report("", "", {}, 4)
-    lab.compare(got, case, [Contender("tap"), Contender("distributed")], (2,))
+    lab.compare(got, case, [Candidate("tap"), Candidate("distributed")], (2,))
     assert {e.label for e in got.of("bar", kind="samples")} == {"tap"}
     assert "distributed skipped: needs a scene" in got.notes[0]
     with pytest.raises(InputError, match="needs a scene"):
-        lab.compare(got, case, [Contender("distributed")], (2,))
+        lab.compare(got, case, [Candidate("distributed")], (2,))
 
 
-def test_a_scene_is_compared_with_every_method(device, staged):
+def test_a_scene_is_compared_with_every_method(device, scene_frame):
     lab, got = compare.Laboratory(device, rounds=1), Report("", "", {}, 4)
-    made = cases.scene_case("x", Shutter(360), Contender.parse("distributed:64"), staged,
+    made = cases.scene_case("x", Shutter(360), Candidate.parse("distributed:64"), scene_frame,
                               device, lambda text: None)  # fmt: skip
-    lab.compare(got, made, [Contender(m) for m in METHODS], (2,))
+    lab.compare(got, made, [Candidate(m) for m in METHODS], (2,))
     left_out = {m for m in METHODS if any(f" {m} skipped" in n for n in got.notes)}
     labels = {e.label for e in got.of("x", kind="samples")}
     assert labels == METHODS.keys() - left_out
@@ -164,14 +164,14 @@ def test_a_scene_is_compared_with_every_method(device, staged):
     assert len(table.rows[0]) == len(table.columns)
 
 
-def test_the_floor_is_what_a_perfect_picture_gets(device, staged):
+def test_the_floor_is_what_a_perfect_picture_gets(device, scene_frame):
     """A picture with far less noise and rays of its own stands where the floor says."""
     shutter, tell = Shutter(180), lambda text: None
-    few, more = (cases.scene_case("x", shutter, Contender.parse(f"distributed:{n}"), staged,
+    few, more = (cases.scene_case("x", shutter, Candidate.parse(f"distributed:{n}"), scene_frame,
                                     device, tell) for n in (32, 64))  # fmt: skip
-    much = Contender.parse("distributed:1024:seed=9")
-    clean = cases.scene_case("x", shutter, much, staged, device, tell).truth
-    assert list(few.floor) == list(MEASURES)
+    much = Candidate.parse("distributed:1024:seed=9")
+    clean = cases.scene_case("x", shutter, much, scene_frame, device, tell).truth
+    assert list(few.floor) == list(METRICS)
     for case in (few, more):
         perfect = measure(clean, case.truth)
         assert case.floor["psnr"] == pytest.approx(
@@ -183,19 +183,19 @@ def test_the_floor_is_what_a_perfect_picture_gets(device, staged):
 
 def test_halves_share_no_rays_with_each_other_or_with_who_is_judged():
     for text, seeds in (("distributed:64", {1, 2}), ("distributed:64:seed=1", {3, 4})):
-        halves = cases._halves(Contender.parse(text), 64)
+        halves = cases._halves(Candidate.parse(text), 64)
         assert {dict(h.options)["seed"] for h in halves} == seeds
         assert [h.samples for h in halves] == [32, 32]
-    assert [h.samples for h in cases._halves(Contender("distributed"), 3)] == [2, 1]
-    assert cases._halves(Contender("distributed"), 1) == []
-    assert cases._halves(Contender("accumulate"), 64) == []  # has no noise
+    assert [h.samples for h in cases._halves(Candidate("distributed"), 3)] == [2, 1]
+    assert cases._halves(Candidate("distributed"), 1) == []
+    assert cases._halves(Candidate("accumulate"), 64) == []  # has no noise
 
 
-def test_the_floor_stands_in_table_files_and_plots(device, staged, tmp_path):
+def test_the_floor_stands_in_table_files_and_plots(device, scene_frame, tmp_path):
     lab, got = compare.Laboratory(device, rounds=1), Report("", "", {}, 4)
-    case = cases.scene_case("x", Shutter(180), Contender.parse("distributed:32"), staged, device,
-                              lab.tell)  # fmt: skip
-    lab.compare(got, case, [Contender("tap")], (2,), budgets=lambda *_: [])
+    reference = Candidate.parse("distributed:32")
+    case = cases.scene_case("x", Shutter(180), reference, scene_frame, device, lab.tell)
+    lab.compare(got, case, [Candidate("tap")], (2,), budgets=lambda *_: [])
     page, figures, table = report.write(got, tmp_path / "r.html")
     text, data = page.read_text(), json.loads(figures.read_text())
     assert data["cases"][0]["floor"] == case.floor
@@ -215,9 +215,9 @@ def test_the_line_of_the_floor_lies_where_it_belongs():
     assert "floor" not in charts.plot_svg(replace(plot, floor=None), {"a": "red"})
 
 
-def test_a_reference_must_trace_the_scene(device, staged):
+def test_a_reference_must_trace_the_scene(device, scene_frame):
     with pytest.raises(InputError, match="reference must be"):
-        cases.scene_case("x", Shutter(180), Contender("tap"), staged, device, print)
+        cases.scene_case("x", Shutter(180), Candidate("tap"), scene_frame, device, print)
 
 
 def test_crossings_are_read_off_the_curves():

@@ -8,7 +8,9 @@ import pytest
 import wgmb
 from images import camera
 from make_frames import HEIGHT, WIDTH, frame, inside, projection, write_exr, write_sequence
-from wgmb import Camera, Clip, Reprojections
+from wgmb import Camera, Clip, InputError, Reprojections
+from wgmb.cli import app
+from wgmb.io import stills
 from wgmb.io.cuts import is_cut, jumps
 
 
@@ -112,3 +114,32 @@ def test_displacement_is_what_the_gpu_finds(kind, orthographic):
     for side, begin in ((-1, 0), (1, 2)):
         got = around.displacement((30, 20), x, y, depth[y, x], side)
         np.testing.assert_allclose(got, want[y, x, begin : begin + 2], atol=2e-3)
+
+
+def test_cuts_that_are_known_are_kept_to_though_nothing_shows_them(tmp_path):
+    clip = Clip(write_sequence(tmp_path, range(1, 5)), cuts="3")
+    assert [neighbours(clip, n) for n in clip.numbers] == [
+        (False, True), (True, False), (False, True), (True, False),
+    ]  # fmt: skip
+    assert clip.cuts == {3}
+    before, after = clip.frame(clip.source(2)).motion, clip.frame(clip.source(3)).motion
+    np.testing.assert_array_equal(before[..., 2:], -before[..., :2])
+    np.testing.assert_array_equal(after[..., :2], -after[..., 2:])
+
+
+@pytest.mark.parametrize("method", ["tap", "gather"])
+def test_a_shot_of_one_frame_stays_sharp(tmp_path, method):
+    pattern = write_sequence(tmp_path, range(1, 4))
+    out = tmp_path / "out.####.png"
+    line = ("blur", pattern, "-o", out, "--method", method, "--cuts", "2,3", "--bits", "16")
+    assert app.main([str(word) for word in line]) == 0
+    clip = Clip(pattern, cuts="2-3")
+    got = stills.read(tmp_path / "out.0002.png")
+    np.testing.assert_allclose(got, clip.source(2).rgba, atol=2e-4)
+    assert np.abs(stills.read(tmp_path / "out.0001.png") - clip.source(1).rgba).max() > 0.02
+
+
+@pytest.mark.parametrize("cuts", ["x", "1-", "0.5"])
+def test_senseless_cuts_are_refused(tmp_path, cuts):
+    with pytest.raises(InputError, match="frames"):
+        Clip(write_sequence(tmp_path, [1, 2]), cuts=cuts)

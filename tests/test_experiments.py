@@ -12,7 +12,7 @@ from wgmb.errors import InputError
 from wgmb.lab import compare, experiments, report, results
 from wgmb.lab.cases import Case
 from wgmb.lab.results import Entry, Report
-from wgmb.metrics import MEASURES
+from wgmb.metrics import METRICS
 
 ROOT = Path(__file__).parent.parent
 
@@ -53,14 +53,14 @@ def test_taylor_has_two_budgets_and_his_findings(taylor):
     assert len(fixed.rows) == 4
 
 
-@pytest.mark.parametrize("judge", ["flip", "psnr"])
-def test_taylors_verdicts_are_those_of_the_figures(taylor, judge):
+@pytest.mark.parametrize("metric", ["flip", "psnr"])
+def test_taylors_verdicts_are_those_of_the_figures(taylor, metric):
     """Which way they go depends on how quick the machine is; that they are true does not."""
 
     def error(name, budget):
         (entry,) = taylor.of("rotation", label=name, kind="time", budget=budget)
-        value = entry.measures[judge]
-        return value if judge == "flip" else np.sqrt(10 ** (-value / 10))
+        value = entry.measures[metric]
+        return value if metric == "flip" else np.sqrt(10 ** (-value / 10))
 
     published, distributed = "reproject, variant published", "distributed"
     small, large = sorted({e.budget for e in taylor.of("rotation", kind="time")})
@@ -70,7 +70,7 @@ def test_taylors_verdicts_are_those_of_the_figures(taylor, judge):
         1 - error(published, large) / error(published, small) < 0.1,
         error(distributed, large) < error(published, large),
     ]
-    (said,) = (r[2:] for r in taylor.tables[0].rows if r[1] == MEASURES[judge].title)
+    (said,) = (r[2:] for r in taylor.tables[0].rows if r[1] == METRICS[metric].title)
     assert said == ["holds" if it else "does not hold" for it in want]
 
 

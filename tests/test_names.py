@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import make_frames as make
-from wgmb import Clip, InputError
+from wgmb import Blur, Clip, InputError, Shutter, Vectors, scene
 from wgmb.cli import app
+from wgmb.io import exr
 from wgmb.io import frame_numbers as numbering
 from wgmb.io.frame_numbers import frame_numbers, frame_path
 from wgmb.viewer.state import State
@@ -159,3 +160,25 @@ def test_a_name_that_is_no_text_is_one_line(capsys):
     code, out, err = make.inside(capsys, "blur", name, "-o", "o.####.exr")
     assert (code, out) == (2, "")
     assert err == "wgmb: \\xff\\xfe.####.exr: not UTF-8; please rename the file or folder\n"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "meant"),
+    [
+        (lambda: Blur("gahter"), "gather"),
+        (lambda: scene.make("cros"), "crossing"),
+        (lambda: scene.make("wheel", sped=2), "speed"),
+        (lambda: Blur("tap", path="curvd"), "curved"),
+        (lambda: Shutter(curve="cosin"), "cosine"),
+        (lambda: Vectors("nuk"), "nuke"),
+        (lambda: exr.check_compression("zipp"), "zip"),
+    ],
+)
+def test_a_word_that_is_nearly_right_is_recognised(wrong, meant):
+    with pytest.raises(InputError, match=f"; did you mean '{meant}'\\?$"):
+        wrong()
+
+
+def test_a_word_that_is_like_none_is_given_no_other():
+    with pytest.raises(InputError, match=r"'xyz'; available: .*distributed$"):
+        Blur("xyz")

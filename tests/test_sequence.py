@@ -40,13 +40,20 @@ def test_a_name_without_pattern_stands_for_itself():
 
 @pytest.mark.parametrize(
     ("text", "numbers"),
-    [("1-10x3", [1, 4, 7, 10]), ("1,3,5-8", [1, 3, 5, 6, 7, 8]), ("7", [7]), ("3-1", [3, 2, 1])],
+    [
+        ("1-10x3", [1, 4, 7, 10]),
+        ("1,3,5-8", [1, 3, 5, 6, 7, 8]),
+        ("7", [7]),
+        ("3-1", [3, 2, 1]),
+        ("1-10:3", [1, 4, 7, 10]),
+        ("-5--1:2,4", [-5, -3, -1, 4]),
+    ],
 )
 def test_frame_ranges_are_understood(text, numbers):
     assert frame_numbers.frame_numbers(text) == numbers
 
 
-@pytest.mark.parametrize("text", ["a-b", "1-", "1-5x0", "one"])
+@pytest.mark.parametrize("text", ["a-b", "1-", "1-5x0", "1-5:0", "one"])
 def test_senseless_frame_ranges_are_refused_by_name(text):
     with pytest.raises(InputError, match="frames"):
         frame_numbers.frame_numbers(text)

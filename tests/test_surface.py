@@ -35,7 +35,7 @@ def surface() -> str:
     exported |= {f"scene.{name}": getattr(wgmb.scene, name) for name in wgmb.scene.__all__}
     for name, found in sorted(exported.items()):
         if not callable(found):
-            lines.append(f"{name}: {', '.join(found)}")
+            lines.append(f"{name}: {', '.join(sorted(found))}")
             continue
         lines.append(_signature(name, found))
         if not inspect.isclass(found) or issubclass(found, Exception):

@@ -9,16 +9,18 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 
+import make_frames as make
 from wgmb import Blur, Clip, DeviceError, InputError, Render, color, gpu, observer
 from wgmb.cli import app
 from wgmb.color import srgb
 from wgmb.cone import Cone
 from wgmb.gpu.timing import TimestampClock
 from wgmb.io import exr
-from wgmb.methods import METHODS
+from wgmb.methods import METHODS, default_method
 from wgmb.scene import builtin
 from wgmb.viewer import State, actions, controls, offscreen, renderer
 from wgmb.viewer.adaptive import Pace
+from wgmb.viewer.capabilities import Choices
 from wgmb.viewer.renderer import shutter_of
 from wgmb.viewer.screen import key_box
 from wgmb.viewer.source import SceneSubject
@@ -1116,3 +1118,34 @@ def test_between_frames_on_disk_no_stale_picture_is_seen(reel, look):
             picture = reel.picture()
         pictures.append(picture)
     assert np.array_equal(*pictures)
+
+
+def opened_by(monkeypatch, *words):
+    """The state with which `wgmb view` opens its window."""
+    from wgmb import viewer
+
+    opened = []
+    monkeypatch.setattr(viewer, "view", lambda state, **_: opened.append(state))
+    assert app.main(["view", *map(str, words)]) == 0
+    return opened[0]
+
+
+def test_the_viewer_opens_playing(monkeypatch, tmp_path):
+    assert opened_by(monkeypatch, "wheel").playing
+    (tmp_path / "still.toml").write_text(State(playing=False).toml())
+    assert not opened_by(monkeypatch, "--config", tmp_path / "still.toml").playing
+
+
+@pytest.mark.parametrize("with_depth", [True, False])
+def test_frames_on_disk_open_with_the_method_that_wgmb_blur_takes(
+    monkeypatch, tmp_path, device, with_depth
+):
+    for n in range(1, 4):
+        channels = make.frame(n, "blender")
+        if not with_depth:
+            channels = {name: c for name, c in channels.items() if "Depth" not in name}
+        make.write_exr(tmp_path / f"s.{n}.exr", channels)
+    pattern = tmp_path / "s.#.exr"
+    shown = Choices(device).possible(opened_by(monkeypatch, pattern)).method
+    assert shown == default_method(Clip(pattern).has)
+    assert shown == ("gather" if with_depth else "tap")

@@ -114,6 +114,11 @@ class Desk:
                 return now
         raise AssertionError("nothing was shown")
 
+    def plays(self):
+        """Wait until the picture moves by itself."""
+        first = next(shown for shown in self.grabs() if picture_of(shown).std() > 5)
+        assert self.shows_other_than(first)
+
     def shows_other_than(self, old):
         """Whether the picture becomes another one than this."""
         old = picture_of(old)
@@ -166,6 +171,8 @@ def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     words = [ROOT / "app.py", "--window", "{}x{}".format(*SIZE), "--samples", "4"]
     it = desk(*map(str, words))
     it.wait_for_window()
+    it.plays()
+    it.do("key", "space")
     first = it.settled()
 
     it.drag((150, 360), (300, 380))

@@ -25,7 +25,7 @@ COLUMNS = (SHARP, PEER, *(f"{name} {samples}" for name, samples in METHODS), NOI
 
 
 def main(folders: list[Path]) -> None:
-    """Judge every scene at every shutter, and write the page."""
+    """Metric every scene at every shutter, and write the page."""
     device = gpu.open_device()
     blurs = {f"{name} {n}": Blur(name, samples=n, device=device) for name, n in METHODS}
     lines, sections = [["scene", *COLUMNS], ["---"] * (len(COLUMNS) + 1)], []

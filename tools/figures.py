@@ -13,7 +13,7 @@ from PIL import Image
 from pictures import IMAGES, enlarged, grid, levels, save
 from wgmb import Blur, Clip, Passes, Render, Shutter, Vectors
 from wgmb.cli import app
-from wgmb.lab.cases import Staged
+from wgmb.lab.cases import SceneFrame
 from wgmb.metrics import display
 from wgmb.scene import builtin
 
@@ -30,12 +30,12 @@ def sample(**passes):
 
 def methods() -> None:
     """The same place of a scene by every method that takes rendered frames."""
-    staged = Staged(builtin.make("crossing", speed=3), size=SIZE, rays=4)
-    frame = staged.frame(Blur("tap").device)
+    scene_frame = SceneFrame(builtin.make("crossing", speed=3), size=SIZE, rays=4)
+    frame = scene_frame.frame(Blur("tap").device)
     sheet = {"sharp": frame.color}
     sheet |= {name: Blur(name)(frame) for name in ("tap", "tiles", "fusion", "reproject", "gather")}
-    sheet["accumulate, 16"] = staged.render(Blur("accumulate"))(0.0)
-    sheet["reference"] = staged.render(Blur("distributed", samples=REFERENCE))(0.0)
+    sheet["accumulate, 16"] = scene_frame.render(Blur("accumulate"))(0.0)
+    sheet["reference"] = scene_frame.render(Blur("distributed", samples=REFERENCE))(0.0)
     window = (180, 75), (130, 110)
     shown = {k: enlarged(levels(display(p)), *window, 2) for k, p in sheet.items()}
     save(grid(shown, 4), "methods.jpg")

@@ -17,10 +17,10 @@ import numpy as np
 from PIL import Image
 
 from wgmb import METHODS, gpu
-from wgmb.lab.cases import Contender, Staged, make_scene, scene_case
+from wgmb.lab.cases import Candidate, SceneFrame, make_scene, scene_case
 from wgmb.lab.compare import Laboratory
 from wgmb.lab.results import Entry, Report, machine
-from wgmb.metrics import FLIP_GAIN, MEASURES, display, flip_colors
+from wgmb.metrics import FLIP_GAIN, METRICS, display, flip_colors
 from wgmb.settings import ShutterSettings
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -31,20 +31,20 @@ REFERENCE, SAMPLES, RAYS = "distributed:512", 16, 4
 
 
 def main() -> None:
-    """Render, judge, and write gallery.md with its pictures."""
+    """Render, judge and write gallery.md with its pictures."""
     device = gpu.open_device()
     lab = Laboratory(device, tell=lambda text: print(text, file=sys.stderr))
     found = Report("Gallery", "python tools/gallery.py", machine(device), SAMPLES)
-    contenders = [Contender(name) for name in METHODS]
+    candidates = [Candidate(name) for name in METHODS]
     for text, time in SCENES.items():
         name, scene = make_scene(text)
-        exposure, staged = (
+        exposure, scene_frame = (
             ShutterSettings().resolved(scene).make(),
-            Staged(scene, time, SIZE, rays=RAYS),
+            SceneFrame(scene, time, SIZE, rays=RAYS),
         )
-        case = scene_case(name, exposure, Contender.parse(REFERENCE), staged, device, lab.tell)
+        case = scene_case(name, exposure, Candidate.parse(REFERENCE), scene_frame, device, lab.tell)
         # Image methods have nothing to start from where there are volumes alone.
-        able = contenders if scene.bodies else [c for c in contenders if c.needs_scene]
+        able = candidates if scene.bodies else [c for c in candidates if c.needs_scene]
         lab.compare(found, case, able, (SAMPLES,), budgets=lambda *_: [])
     (DOCS / "images" / "gallery").mkdir(parents=True, exist_ok=True)
     (DOCS / "laboratory" / "gallery.md").write_text(_page(found), encoding="utf-8")
@@ -88,7 +88,7 @@ def _table(found: Report) -> str:
     for label in ("sharp", *METHODS):
         row, first = [f"`{label}`"], None
         for case in found.cases:
-            entries = [e for e in found.of(case.name, label=label) if case.staged.scene.bodies
+            entries = [e for e in found.of(case.name, label=label) if case.scene_frame.scene.bodies
                        or e.kind != "sharp"]  # fmt: skip
             row.append(f"{entries[0].measures['flip']:.4f}" if entries else "")
             first = first or next(iter(entries), None)
@@ -126,7 +126,7 @@ def _section(found: Report, name: str) -> str:
     Image.fromarray(levels).save(picture, quality=82, optimize=True)
     first, strong, artefacts = _words(METHODS[name])
     figures = ", ".join(
-        f"{m.title} {entries[0].measures[k]:.{m.digits}f}" for k, m in MEASURES.items()
+        f"{m.title} {entries[0].measures[k]:.{m.digits}f}" for k, m in METRICS.items()
     )
     return (
         f"## {name}\n\n{first}\n\n- Strong: {strong}\n- Artefacts: {artefacts}\n"

@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import re
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,8 @@ from wgmb.scene.volumes import Backdrop, Torus
 FRAGMENT = 2  # GPUShaderStage
 PATTERNS = (
     "methods/volume.wgsl", "methods/tap.wgsl", "methods/tiles*.wgsl", "methods/gather/*.wgsl",
-    "velocity.wgsl", "holdout.wgsl", "viewer/compose.wgsl", "viewer/blit.wgsl",
+    "velocity.wgsl", "holdout.wgsl", "scene/gbuffer.wgsl",
+    "viewer/compose.wgsl", "viewer/blit.wgsl",
 )  # fmt: skip
 """The shaders of the page; of these, files without an entry point come with those that have one."""
 
@@ -100,7 +100,8 @@ def _layout(dtype: np.dtype) -> dict[str, Any]:
     """
     size = {"size": dtype.itemsize}
     if dtype.fields is not None:
-        rows = {n: {"offset": f[1]} | _layout(f[0]) for n, f in dtype.fields.items()}
+        known = {n: f for n, f in dtype.fields.items() if f[0].base.fields or f[0].base.kind != "V"}
+        rows = {n: {"offset": f[1]} | _layout(f[0]) for n, f in known.items()}
         return size | {"fields": rows}
     if dtype.base.fields is not None:
         return size | {"array": list(dtype.shape), "of": _layout(dtype.base)}
@@ -124,15 +125,14 @@ def constants() -> dict[str, Any]:
     volume, occupancy = wgsl.load("methods/volume.wgsl"), wgsl.load("scene/density.wgsl")
     own = ("BEGIN", "KAPPA", "CYCLE", "HALF", "WHIRL", "ZOOM", "DISTANCE", "EXPOSURE")
     scene = torusphere.torusphere()
-    backdrop = {f.name: f.default for f in fields(Backdrop)}
     return {
         **{name: getattr(torusphere, name) for name in own},
         "LOOP": scene.loop,
         "CURVE": scene.exposure[1] if scene.exposure else "box",
-        "COLOR": list(next(f.default for f in fields(Torus) if f.name == "color")),
-        "TINT": list(backdrop["tint"]),
-        "GROUND": backdrop["ground"],
-        "LIGHT": list(backdrop["light"]),
+        "COLOR": list(Torus.color),
+        "TINT": list(Backdrop.tint),
+        "GROUND": Backdrop.ground,
+        "LIGHT": list(Backdrop.light),
         "CURVES": list(shutter.CURVES),
         "PHASES": shutter.PHASES,
         "OVERLAPS": shutter.OVERLAPS,
@@ -149,7 +149,7 @@ def constants() -> dict[str, Any]:
 
 def main() -> None:
     """Write the JSON to the standard output."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description="Export what the page needs, as JSON.")
     parser.add_argument("shader", nargs="*", help="file of wgsl/; by default those of the page")
     print(json.dumps(exported(*parser.parse_args().shader), allow_nan=False))
 

@@ -7,6 +7,10 @@ Error
 └── GpuMemoryError  not enough GPU memory for one frame; other frames may still fit
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 
 class Error(Exception):
     """Base class of wgmb's errors; the message states what was expected and what was given."""
@@ -26,3 +30,11 @@ class DeviceError(Error):
 
 class GpuMemoryError(Error):
     """Not enough GPU memory for one frame; smaller or later frames may still fit."""
+
+
+def did_you_mean(word: object, known: Iterable[str]) -> str:
+    """The end of a message about a word that is not among the `known` ones, if one is close."""
+    from difflib import get_close_matches  # only when something is wrong
+
+    close = get_close_matches(str(word), [str(k) for k in known], n=1)
+    return f"; did you mean {close[0]!r}?" if close else ""

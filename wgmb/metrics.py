@@ -1,6 +1,6 @@
 """Image difference metrics for blur, each with its unit.
 
-Every judge takes `picture` and `truth`, (height, width, 3 or 4) linear light of the same size,
+Every metric takes `picture` and `truth`, (height, width, 3 or 4) linear light of the same size,
 and returns one number. Alpha is left out: premultiplied colour is the picture over black.
 "Display" is what a screen shows: held to 0..1 and sRGB encoded.
 """
@@ -97,33 +97,33 @@ def edge_error(picture: np.ndarray, truth: np.ndarray) -> float:
 
 
 @dataclass(frozen=True)
-class Measure:
-    """A judge and how to read it."""
+class Metric:
+    """A metric and how to read it."""
 
     name: str
     title: str
     about: str
-    judge: Callable[[np.ndarray, np.ndarray], float]
+    compute: Callable[[np.ndarray, np.ndarray], float]
     digits: int
     more_is_better: bool = False
 
 
-MEASURES: dict[str, Measure] = {
+METRICS: dict[str, Metric] = {
     m.name: m
     for m in (
-        Measure("flip", "FLIP", "seen difference, 0 to 1", flip, 4),
-        Measure("psnr", "PSNR", "dB on the display", psnr, 2, True),
-        Measure("psnr_linear", "PSNR linear", "dB of linear light", psnr_linear, 2, True),
-        Measure("ssim", "SSIM", "structure, 1 is the same", ssim, 4, True),
-        Measure("energy", "Energy error", "light in the wrong place, share", energy_error, 4),
-        Measure("edges", "Edge error", "gradients that differ, share", edge_error, 3),
+        Metric("flip", "FLIP", "seen difference, 0 to 1", flip, 4),
+        Metric("psnr", "PSNR", "dB on the display", psnr, 2, True),
+        Metric("psnr_linear", "PSNR linear", "dB of linear light", psnr_linear, 2, True),
+        Metric("ssim", "SSIM", "structure, 1 is the same", ssim, 4, True),
+        Metric("energy", "Energy error", "light in the wrong place, share", energy_error, 4),
+        Metric("edges", "Edge error", "gradients that differ, share", edge_error, 3),
     )
 }
 
 
 def measure(picture: np.ndarray, truth: np.ndarray) -> dict[str, float]:
-    """Every judge's number by its name in MEASURES."""
-    return {name: m.judge(picture, truth) for name, m in MEASURES.items()}
+    """Every metric's number by its name in METRICS."""
+    return {name: m.compute(picture, truth) for name, m in METRICS.items()}
 
 
 def _linear(picture: np.ndarray) -> np.ndarray:

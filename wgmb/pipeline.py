@@ -15,7 +15,7 @@ import numpy as np
 import wgpu
 
 from . import gpu
-from .errors import InputError
+from .errors import InputError, did_you_mean
 from .frame import PASSES, Frame
 from .frame_views import FrameViews, View, check_output, check_view
 from .gpu import wgsl
@@ -68,7 +68,8 @@ class Blur:
         **options: Any,
     ):
         if method not in METHODS:
-            raise InputError(f"unknown method {method!r}; available: {', '.join(METHODS)}")
+            known = f"available: {', '.join(METHODS)}{did_you_mean(method, METHODS)}"
+            raise InputError(f"unknown method {method!r}; {known}")
         self.auto = samples == "auto" and getattr(METHODS[method], "adaptive", False)
         if samples is None:
             samples = getattr(METHODS[method], "samples", SAMPLES)

@@ -108,6 +108,8 @@ class InputSettings:
     "Object index layer that identifies the objects of the camera file."
     also: tuple[str, ...] = ()
     "Pattern of files with additional layers of the same frames; may be repeated."
+    cuts: str | None = None
+    "Frames that begin a new shot, such as 101,155, in addition to the detected cuts."
     skip_missing: bool = False
     "Skip missing frames instead of stopping with an error."
     max_mb: float = limits.MAX_MB
@@ -142,6 +144,7 @@ class InputSettings:
             frames=self.frames,
             passes=passes,
             skip_missing=self.skip_missing,
+            cuts=self.cuts,
             max_mb=self.max_mb,
         )
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import InputError
+from .errors import InputError, did_you_mean
 
 Weight = Callable[[np.ndarray], np.ndarray]
 
@@ -87,7 +87,8 @@ class Shutter:
         if not isinstance(self.phase, str) and not abs(self.phase) <= 100:
             raise InputError(f"phase must be within 100 frame intervals, got {self.phase}")
         if isinstance(self.curve, str) and self.curve not in CURVES:
-            raise InputError(f"curve must be one of {', '.join(CURVES)}, got {self.curve!r}")
+            known = f"{', '.join(CURVES)}, got {self.curve!r}{did_you_mean(self.curve, CURVES)}"
+            raise InputError(f"curve must be one of {known}")
         if self.rolling is not None and self.rolling not in ROLLING:
             raise InputError(f"rolling must be one of {', '.join(ROLLING)}, got {self.rolling!r}")
         if not (math.isfinite(self.rolling_duration) and 0 <= self.rolling_duration <= 100):

@@ -57,7 +57,7 @@ export class Replay {
 
   #buffer({ label, size, data }) {
     const { UNIFORM, STORAGE, INDIRECT, COPY_DST } = GPUBufferUsage;
-    const usage = (data && size <= 65536 ? UNIFORM : INDIRECT) | STORAGE | COPY_DST;
+    const usage = UNIFORM | STORAGE | INDIRECT | COPY_DST;
     const buffer = this.device.createBuffer({ label, size: Math.ceil(size / 16) * 16, usage });
     if (data) this.device.queue.writeBuffer(buffer, 0, padded(bytesOf(data)));
     return buffer;

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from .. import gpu
 from ..errors import InputError
-from ..lab.cases import Contender
+from ..lab.cases import Candidate
 from ..lab.report import write
 from ..methods import METHODS
 from ..pipeline import Blur
@@ -79,16 +79,16 @@ def bench(
         for width, height in sizes:
             _tell_article(baselines.bench_torusphere(blur, width, height, rounds), width, height)
         return 0
-    contenders = [Contender(name) for name in METHODS]
+    candidates = [Candidate(name) for name in METHODS]
     if methods is None:
-        contenders = [c for c in contenders if not c.needs_scene]
+        candidates = [c for c in candidates if not c.needs_scene]
     elif methods != "all":
-        contenders = [Contender.parse(text) for text in methods.split(",")]
-    if wrong := [c for c in contenders if c.samples]:
+        candidates = [Candidate.parse(text) for text in methods.split(",")]
+    if wrong := [c for c in candidates if c.samples]:
         raise InputError(
             f"set the number of samples with --samples, not {wrong[0].label}:{wrong[0].samples}"
         )
-    labels = [c.label for c in contenders]
+    labels = [c.label for c in candidates]
     if twice := [label for label in labels if labels.count(label) > 1]:
         raise InputError(f"methods must differ, got {twice[0]} twice")
     pages = pages_of(output) if output else []
@@ -98,7 +98,7 @@ def bench(
         raise InputError(f"no such folder: {save.parent}")
     counts = whole_numbers("samples", samples)
     before = Bench.load(against) if against else None
-    run = measure(device, contenders, sizes, counts, rounds, seconds, teller(quiet))
+    run = measure(device, candidates, sizes, counts, rounds, seconds, teller(quiet))
     if save:
         run.save(save)
     for line in bench_report.text(run).splitlines():

@@ -12,7 +12,7 @@ from cyclopts import Group, Parameter
 
 from .. import gpu
 from ..errors import InputError
-from ..lab.cases import Case, Contender, Staged, clip_case, make_scene, scene_case
+from ..lab.cases import Candidate, Case, SceneFrame, clip_case, make_scene, scene_case
 from ..lab.compare import Laboratory, crossings
 from ..lab.experiments import EXPERIMENTS
 from ..lab.report import write
@@ -44,9 +44,9 @@ class CompareSettings:
     rounds: int = 3
     "Number of timing rounds; the fastest counts."
 
-    def contenders(self) -> list[Contender]:
+    def candidates(self) -> list[Candidate]:
         """Return the candidates."""
-        return [Contender.parse(text) for text in (self.methods or ",".join(METHODS)).split(",")]
+        return [Candidate.parse(text) for text in (self.methods or ",".join(METHODS)).split(",")]
 
     def steps(self) -> list[int]:
         """Numbers of samples."""
@@ -138,7 +138,7 @@ def compare(
     tell = teller(quiet)
     lab = Laboratory(device, rounds=who.rounds, tell=tell)
     report = Report("", command_line(), machine(device), who.samples)
-    wanted, contenders = size_of(size), who.contenders()
+    wanted, candidates = size_of(size), who.candidates()
     steps, budgets = who.steps(), who.budgets()
     if experiment:
         if experiment not in EXPERIMENTS:
@@ -149,20 +149,20 @@ def compare(
         write(report, output)
         tell(f"-> {output}")
         return 0
-    reference = Contender.parse(who.reference)
+    reference = Candidate.parse(who.reference)
     baselines = {name: Path(file) for name, _, file in (p.partition("=") for p in peer)}
     cases: list[Callable[[], Case]] = []
     for name, made in map(make_scene, scene):
-        staged = Staged(made, time, wanted, rays=rays)
+        scene_frame = SceneFrame(made, time, wanted, rays=rays)
         for degrees, shutter in who.exposures(when, made).items():
             cases.append(partial(scene_case, f"{name}, {degrees}", shutter, reference,
-                                 staged, device, tell))  # fmt: skip
+                                 scene_frame, device, tell))  # fmt: skip
     if truth is not None and inputs:
         name = truth[0].parent.name or truth[0].stem
         for degrees, shutter in who.exposures(when).items():
             cases.append(partial(clip_case, f"{name}, {degrees}", shutter, inputs, frame,
                                  truth, baselines, given.open))  # fmt: skip
-    able = contenders if who.methods or scene else [c for c in contenders if not c.needs_scene]
+    able = candidates if who.methods or scene else [c for c in candidates if not c.needs_scene]
     for make in cases:
         case = make()
         lab.compare(report, case, able, steps, budgets)

@@ -43,7 +43,7 @@ def view(
             f"the viewer cannot be loaded: {error}; on Debian, Ubuntu: "
             "apt-get install libx11-6 libxext6"
         ) from None
-    state = viewer.State()
+    state = viewer.State(playing=True)  # what moves is the point
     if config is not None:
         state = viewer.State.read(config)
     if what is not None:

@@ -22,7 +22,7 @@ from ..errors import InputError
 from ..frame import Frame
 from . import layers, limits, stills, vectors
 from .camera_file import CameraFile
-from .cuts import is_cut, jumps, straightened
+from .cuts import is_cut, jumps, still, straightened
 from .frame_file import FrameFile, about, read, size_text
 from .frame_numbers import (
     MOST_FRAMES,
@@ -86,11 +86,14 @@ class Clip:
         frames: str | None = None,
         passes: Passes | None = None,
         skip_missing: bool = False,
+        cuts: str | None = None,
         max_mb: float = limits.MAX_MB,
     ):
         """`frames`: "1-100x2", "1,3,5-8"; by default all existing ones, without gaps unless
-        `skip_missing`. `max_mb`: largest decoded size of a file in megabytes.
+        `skip_missing`. `cuts`: frames that begin a new shot, in the same form, beside those that
+        are detected. `max_mb`: largest decoded size of a file in megabytes.
         """
+        self._known_cuts = frozenset(frame_numbers(cuts) if cuts else ())
         self._max_mb = max_mb
         self.sizes: dict[int, tuple[int, int]] = {}
         self.pattern, self.passes = str(pattern), passes or Passes()
@@ -224,7 +227,10 @@ class Clip:
         if wanted.convention != "auto":
             return vectors.Finding(named, True, str(named))
         motion = vectors.read(source.channels, named, source.beside)
-        prev, next_ = self._neighbour(number - 1), self._neighbour(number + 1)
+        prev, next_ = (
+            None if self._is_known_cut(number, side) else self._neighbour(number + side)
+            for side in (-1, 1)
+        )
         if source.beside is None:
             return vectors.Finding(named, False, f"{named}, by name (no picture to test it on)")
         return vectors.detect(source.rgba, motion, prev, next_, named)
@@ -250,6 +256,8 @@ class Clip:
         near = {}
         for side, number in (("prev", source.number - 1), ("next", source.number + 1)):
             path = frame_path(self.pattern, number)
+            if self._is_known_cut(source.number, number - source.number):
+                continue
             if is_pattern(self.pattern) and path.is_file():
                 try:
                     other = self.source(number)
@@ -282,11 +290,18 @@ class Clip:
         Motion that leads across a camera cut is left out (see cuts.jumps).
         """
         frame = self._frame(source, picture, normal)
+        if all(self._is_known_cut(source.number, side) for side in (-1, 1)):
+            self.cuts |= {source.number, source.number + 1}
+            return still(frame)
         for side in (-1, 1):
-            if jumps(frame, side):
+            if self._is_known_cut(source.number, side) or jumps(frame, side):
                 self.cuts.add(source.number + (side > 0))
                 frame = straightened(frame, side)
         return frame
+
+    def _is_known_cut(self, number: int, side: int) -> bool:
+        """True if the user said that a cut lies between a frame and its neighbour on `side`."""
+        return number + (side > 0) in self._known_cuts
 
     def _frame(self, source: FrameFile, picture: bool, normal: bool) -> Frame:
         meaning = self._decide().vectors

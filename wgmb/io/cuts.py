@@ -43,6 +43,12 @@ def straightened(frame: Frame, side: int) -> Frame:
     return replace(frame, motion=motion, camera=camera)
 
 
+def still(frame: Frame) -> Frame:
+    """The frame without motion: cuts lie on both of its sides."""
+    motion = np.zeros((*frame.color.shape[:2], 4), np.float32) if "motion" in frame.has else None
+    return replace(frame, motion=motion, camera=None, object_id=None, object_motion=False)
+
+
 def is_cut(frame: Frame, near: Frame, side: int) -> bool:
     """Return True if a cut lies between `frame` and its neighbour `near` on `side` (-1 or 1).
 

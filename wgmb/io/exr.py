@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from . import limits
 from .limits import MOST_PIXELS_A_SIDE
 from .native import hushed, inside
@@ -136,7 +136,8 @@ def check_compression(name: str) -> None:
     """InputError unless `name` is in COMPRESSIONS, or "same": as the file that was read."""
     if name not in (*COMPRESSIONS, _SAME):
         known = ", ".join((*COMPRESSIONS, _SAME))
-        raise InputError(f"compression must be one of {known}, got {name!r}")
+        hint = did_you_mean(name, (*COMPRESSIONS, _SAME))
+        raise InputError(f"compression must be one of {known}, got {name!r}{hint}")
 
 
 def encode(exr: Exr, compression: str = "zip") -> bytes:

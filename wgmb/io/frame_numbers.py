@@ -16,6 +16,7 @@ from ..errors import InputError
 MOST_FRAMES = 1_000_000
 """Largest number of frames in one run."""
 _NUMBER = re.compile(r"[#@]+|%0*([0-9]{0,3})d|\$F0*([0-9]{0,3})")
+_COLON = re.compile(r"(-?\d+)\s*-\s*(-?\d+)\s*:\s*(\d+)")
 _RANGE = re.compile(r"(-?\d+)\s*-\s*(-?\d+)(?:\s*x\s*(\d+))?")
 
 
@@ -84,10 +85,12 @@ def numbers_on_disk(pattern: str | Path) -> list[int]:
 
 
 def frame_numbers(text: str) -> list[int]:
-    """The numbers that `1-100x2` or `1,3,5-8` stands for, in that order; MOST_FRAMES of them
-    at most.
+    """The numbers that `1-100x2`, `1-100:2` or `1,3,5-8` stands for, in that order.
+
+    At most MOST_FRAMES. A colon is the step of OpenJD's ranges.
     """
     asked = f"frames {text if len(text) < 60 else f'{text[:60]}...'!r}"
+    text = _COLON.sub(r"\1-\2x\3", text)
     try:
         ranges = [(int(a), int(b), int(step or 1)) for a, b, step in _RANGE.findall(text)]
         count = sum(abs(b - a) // max(step, 1) + 1 for a, b, step in ranges)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from .layers import component, layers, pick, stem
 
 
@@ -110,7 +110,8 @@ class Vectors:
     def __post_init__(self) -> None:
         if self.convention not in ("auto", "none", *CONVENTIONS):
             known = ", ".join(("auto", *CONVENTIONS, "none"))
-            raise InputError(f"vectors must be one of {known}, got {self.convention!r}")
+            hint = did_you_mean(self.convention, known.split(", "))
+            raise InputError(f"vectors must be one of {known}, got {self.convention!r}{hint}")
         if self.flip not in ("", "x", "y", "xy"):
             raise InputError(f"vector flip must be x, y or xy, got {self.flip!r}")
         if not np.isfinite(self.scale) or not np.isfinite(self.offset or 0.0):

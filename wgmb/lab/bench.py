@@ -35,7 +35,7 @@ from ..pipeline import Blur
 from ..scene import builtin
 from ..shutter import Shutter
 from .baselines import numba_tap
-from .cases import Contender, Staged, Tell
+from .cases import Candidate, SceneFrame, Tell
 from .results import machine
 
 MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
@@ -130,14 +130,14 @@ def synthetic_frame(width: int, height: int) -> Frame:
 
 def bench(
     device: wgpu.GPUDevice,
-    contenders: Iterable[Contender],
+    candidates: Iterable[Candidate],
     sizes: Iterable[tuple[int, int]] = ((1920, 1080),),
     samples: Iterable[int] = (16,),
     rounds: int = 9,
     limit: float = math.inf,
     tell: Tell = lambda text: None,
 ) -> Bench:
-    """Time every contender at every size with every number of samples.
+    """Time every candidate at every size with every number of samples.
 
     `limit`: seconds for one of them at one size and number. It gets fewer rounds where they
     would take longer, and is left out, which `notes` say, where three frames would, going by
@@ -148,7 +148,7 @@ def bench(
         raise InputError(f"rounds must be 1 or more, got {rounds}")
     if not limit > 0:
         raise InputError(f"seconds must be over 0, got {limit}")
-    matrix = _Matrix(device, list(contenders), rounds, limit, tell)
+    matrix = _Matrix(device, list(candidates), rounds, limit, tell)
     groups = list(itertools.product(sorted(sizes, key=math.prod), sorted(samples)))
     pace = 1.0  # what a group took in proportion to what was told
     try:
@@ -181,10 +181,10 @@ def _about(seconds: float) -> str:
 
 
 class _Matrix:
-    """Figures of contenders at growing sizes, each telling what the next will take."""
+    """Figures of candidates at growing sizes, each telling what the next will take."""
 
-    def __init__(self, device, contenders, rounds: int, limit: float, tell: Tell):
-        self.device, self.contenders, self.rounds, self.limit = device, contenders, rounds, limit
+    def __init__(self, device, candidates, rounds: int, limit: float, tell: Tell):
+        self.device, self.candidates, self.rounds, self.limit = device, candidates, rounds, limit
         self.tell, self.clock = tell, timing.clock(device)
         self.figures: list[Figure] = []
         self.notes: list[str] = []
@@ -194,16 +194,16 @@ class _Matrix:
         self.tell(text)
 
     def seconds(self, size: tuple[int, int], samples: int) -> float:
-        """Return the expected seconds of all contenders, from the figures so far."""
+        """Return the expected seconds of all candidates, from the figures so far."""
         runs = _HEAVY * (self.rounds + 1)
-        each = (self._frame(c.label, size, samples) for c in self.contenders)
+        each = (self._frame(c.label, size, samples) for c in self.candidates)
         return sum(min(runs * s, self.limit) for s in each if _HEAVY * s <= self.limit)
 
     def measure(self, size: tuple[int, int], samples: int) -> None:
-        """All contenders that fit, in turns, and the numba peer with them."""
+        """All candidates that fit, in turns, and the numba peer with them."""
         gc.collect()  # what the last figures held
         frame, jobs, timed = synthetic_frame(*size), {}, {}
-        for c in self.contenders:
+        for c in self.candidates:
             blur, name = c.blur(samples, Shutter(180), self.device), c.label
             try:
                 self._check(name, size, samples, sum(t.memory for t in timed.values()))
@@ -295,7 +295,7 @@ class _Traced(_Timed):
     def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
         super().__init__(blur, clock, size)
         for name in ("crossing", "torusphere"):
-            self._render = Staged(builtin.make(name), size=size).render(blur)
+            self._render = SceneFrame(builtin.make(name), size=size).render(blur)
             with contextlib.suppress(InputError):
                 self.work()
                 return

@@ -1,4 +1,4 @@
-"""Cases (an image with its ground truth) and contenders (the methods that compute it)."""
+"""Cases (an image with its ground truth) and candidates (the methods that compute it)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..frame import Frame
 from ..io.clip import Clip
 from ..io.frame_numbers import frame_list
@@ -28,7 +28,7 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Contender:
+class Candidate:
     """A method with options as the command line writes it: `tap`, `reproject:variant=published`.
 
     `samples`: its own number at equal samples, `tap:32`; None takes everyone's. `name`: what
@@ -42,11 +42,12 @@ class Contender:
     given: Callable[[Frame], Frame] = lambda frame: frame
 
     @classmethod
-    def parse(cls, text: str) -> Contender:
+    def parse(cls, text: str) -> Candidate:
         """NAME[:SAMPLES][:OPTION=VALUE]...; the error says which method is unknown."""
         name, *more = text.split(":")
         if name not in METHODS:
-            raise InputError(f"unknown method {name!r}; available: {', '.join(METHODS)}")
+            known = f"available: {', '.join(METHODS)}{did_you_mean(name, METHODS)}"
+            raise InputError(f"unknown method {name!r}; {known}")
         samples, options = None, []
         for part in more:
             key, equals, value = part.partition("=")
@@ -97,7 +98,7 @@ def _value(text: str) -> Any:
 
 
 @dataclass(frozen=True)
-class Staged:
+class SceneFrame:
     """A scene at one moment, for the methods that need one."""
 
     scene: Scene
@@ -128,7 +129,7 @@ class Case:
     """(height, width, 3 or 4) linear."""
     about: str
     """Description of the truth."""
-    staged: Staged | None = None
+    scene_frame: SceneFrame | None = None
     peers: dict[str, np.ndarray] = field(default_factory=dict)
     """Pictures of other programs, by name."""
     floor: dict[str, float] | None = None
@@ -136,7 +137,7 @@ class Case:
 
 
 def scene_case(
-    name: str, shutter: Shutter, reference: Contender, staged: Staged, device, tell: Tell
+    name: str, shutter: Shutter, reference: Candidate, scene_frame: SceneFrame, device, tell: Tell
 ) -> Case:
     """A case whose truth is rendered by `reference`, such as distributed:1024.
 
@@ -149,23 +150,23 @@ def scene_case(
     tell(f"{name}: reference, {reference.label} {samples}")
     started = time.perf_counter()
     pictures = [
-        staged.render(part.blur(part.samples or samples, shutter, device))(staged.time)
+        scene_frame.render(part.blur(part.samples or samples, shutter, device))(scene_frame.time)
         for part in _halves(reference, samples) or [reference]
     ]
     took = time.perf_counter() - started
     about = f"{reference.label}, {samples} samples per pixel, {took:.1f} s"
-    case = Case(name, staged.frame(device), shutter, pictures[0], about, staged)
+    case = Case(name, scene_frame.frame(device), shutter, pictures[0], about, scene_frame)
     return case if len(pictures) == 1 else _of_halves(case, pictures)
 
 
-def _halves(reference: Contender, samples: int) -> list[Contender]:
+def _halves(reference: Candidate, samples: int) -> list[Candidate]:
     """The reference as two with half the samples; none where it has no noise, or one sample."""
     known = options_of(METHODS[reference.method].Options)
     if "seed" not in known or samples < 2:
         return []
     options = dict(reference.options)
     seed = options.get("seed", known["seed"].default)
-    # Neither has the seed of a contender that nobody gave one, which would share its rays.
+    # Neither has the seed of a candidate that nobody gave one, which would share its rays.
     return [
         replace(reference, options=tuple((options | {"seed": s}).items()), samples=n)
         for s, n in ((2 * seed + 1, samples - samples // 2), (2 * seed + 2, samples // 2))

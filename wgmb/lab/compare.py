@@ -1,6 +1,6 @@
 """Compare methods with a ground truth, over scenes and shutters, at equal samples and time.
 
-A Laboratory lets every contender make every case (cases.py) with several numbers of samples,
+A Laboratory lets every candidate make every case (cases.py) with several numbers of samples,
 judges (metrics.py) and times it; what it finds (results.py) is written as a page, JSON and CSV
 by report.py.
 """
@@ -18,10 +18,10 @@ import wgpu
 from ..errors import InputError
 from ..gpu import timing
 from ..gpu.textures import TexturePool
-from ..metrics import MEASURES, measure
+from ..metrics import METRICS, measure
 from ..pipeline import MOST_SAMPLES, Blur, most_samples
 from ..shutter import Shutter
-from .cases import Case, Contender, Tell
+from .cases import Candidate, Case, Tell
 from .results import Entry, Report, Table
 
 LADDER = (4, 8, 16, 32, 64)
@@ -43,7 +43,7 @@ class Laboratory:
         self,
         report: Report,
         case: Case,
-        contenders: Iterable[Contender],
+        candidates: Iterable[Candidate],
         ladder: Iterable[int] = LADDER,
         budgets: Callable[[Report, Case], list[float]] | None = None,
     ) -> None:
@@ -60,13 +60,13 @@ class Laboratory:
                     Entry(case.name, label, kind, found, shown=True, picture=picture)
                 )
         if case.floor is not None:
-            found = ", ".join(f"{MEASURES[m].title} {case.floor[m]:.{MEASURES[m].digits}f}"
+            found = ", ".join(f"{METRICS[m].title} {case.floor[m]:.{METRICS[m].digits}f}"
                               for m in ("flip", "psnr"))  # fmt: skip
             self.tell(f"{case.name}: noise floor of the truth: {found}")
             report.entries.append(Entry(case.name, "noise floor", "floor", case.floor))
-        able = self._able(report, case, contenders)
+        able = self._able(report, case, candidates)
         frame_seconds = self.frame_seconds(case)
-        known: dict[Contender, list[tuple[int, float]]] = {c: [] for c in able}
+        known: dict[Candidate, list[tuple[int, float]]] = {c: [] for c in able}
         for samples in sorted({*ladder, report.samples}):
             equal = samples == report.samples
             jobs = {c: c.samples or samples if equal else samples for c in able}
@@ -80,12 +80,12 @@ class Laboratory:
                 case, jobs, "time", frame_seconds, shown=True, budget=budget
             )
 
-    def _able(self, report: Report, case: Case, contenders) -> list[Contender]:
+    def _able(self, report: Report, case: Case, candidates) -> list[Candidate]:
         """Those that can make this case; the report says why others cannot."""
         able = []
-        for c in contenders:
+        for c in candidates:
             try:
-                if c.needs_scene and case.staged is None:
+                if c.needs_scene and case.scene_frame is None:
                     raise InputError("needs a scene")
                 self.picture(case, c.blur(1, case.shutter, self.device), c)
             except InputError as error:
@@ -99,14 +99,14 @@ class Laboratory:
     def _judge(
         self,
         case: Case,
-        jobs: dict[Contender, int],
+        jobs: dict[Candidate, int],
         kind: str,
         frame_seconds: float,
         *,
         shown: bool,
         budget: float | None = None,
     ) -> list[Entry]:
-        """Every contender's picture with its number of samples, judged, and timed in turns."""
+        """Every candidate's picture with its number of samples, judged, and timed in turns."""
         found, timed = [], []
         for c, samples in jobs.items():
             self.tell(f"{case.name}: {c.label}, {samples} samples")
@@ -125,7 +125,7 @@ class Laboratory:
             for entry, s, f in zip(found, seconds, frames, strict=True)
         ]
 
-    def _fitting(self, case: Case, c: Contender, known, budget: float, frame_seconds: float) -> int:
+    def _fitting(self, case: Case, c: Candidate, known, budget: float, frame_seconds: float) -> int:
         """The samples that take about `budget` seconds: guessed, tried, and corrected twice."""
         known, most = list(known), most_samples(c.method, self.device)
         for _ in range(3):
@@ -138,18 +138,18 @@ class Laboratory:
             known.append((samples, seconds))
         return samples
 
-    def picture(self, case: Case, blur: Blur, contender: Contender) -> np.ndarray:
+    def picture(self, case: Case, blur: Blur, candidate: Candidate) -> np.ndarray:
         """The case through a method: (height, width, 3 or 4) linear."""
         if "scene" in blur.method.needs:
-            assert case.staged is not None
-            return case.staged.render(blur)(case.staged.time)
-        return blur(contender.given(case.frame))
+            assert case.scene_frame is not None
+            return case.scene_frame.render(blur)(case.scene_frame.time)
+        return blur(candidate.given(case.frame))
 
-    def timer(self, case: Case, blur: Blur, contender: Contender) -> Callable[[], float]:
+    def timer(self, case: Case, blur: Blur, candidate: Candidate) -> Callable[[], float]:
         """A function that does the case's work once and returns its seconds."""
         if "scene" in blur.method.needs:
-            assert case.staged is not None
-            render, moment = case.staged.render(blur), case.staged.time
+            assert case.scene_frame is not None
+            render, moment = case.scene_frame.render(blur), case.scene_frame.time
 
             def draw() -> float:
                 started = time.perf_counter()
@@ -157,18 +157,18 @@ class Laboratory:
                 return time.perf_counter() - started
 
             return draw
-        record = self._recorder(case, blur, contender)
+        record = self._recorder(case, blur, candidate)
         return lambda: timing.work(blur.device, record)
 
-    def _recorder(self, case: Case, blur: Blur, contender: Contender) -> Callable[..., None]:
+    def _recorder(self, case: Case, blur: Blur, candidate: Candidate) -> Callable[..., None]:
         """A function that records the blur of the case's frame, which is uploaded now."""
-        views = blur.upload(contender.given(case.frame))
+        views = blur.upload(candidate.given(case.frame))
         output = self._images.view("timed", case.frame.size, blur.output)
         return partial(blur.encode, output=output, **views)
 
     def passes(
-        self, case: Case, jobs: dict[Contender, Blur]
-    ) -> dict[Contender, dict[str, tuple[int, float]]]:
+        self, case: Case, jobs: dict[Candidate, Blur]
+    ) -> dict[Candidate, dict[str, tuple[int, float]]]:
         """Return the count and the median seconds of every pass of the image methods.
 
         All take turns in `rounds` rounds, after one for warmth.
@@ -196,9 +196,9 @@ class Laboratory:
 
     def frame_seconds(self, case: Case) -> float:
         """Return the seconds for one sharp frame of the scene; a film renders every frame once."""
-        if case.staged is None:
+        if case.scene_frame is None:
             return 0.0
-        one = Contender("accumulate")
+        one = Candidate("accumulate")
         blur = one.blur(1, Shutter(0), self.device)
         timer = self.timer(case, blur, one)
         timer()  # compiles
@@ -231,15 +231,15 @@ def _guess(known: list[tuple[int, float]], budget: float, most: int = MOST_SAMPL
     return int(np.clip(round(wanted), 1, most))
 
 
-def crossings(report: Report, case: Case, judge: str = "flip") -> Table | None:
+def crossings(report: Report, case: Case, metric: str = "flip") -> Table | None:
     """Return a table of the times at which scene methods match each image method.
 
-    Read off the error-against-time curves; `judge` must be one for which less is better.
+    Read off the error-against-time curves; `metric` must be one for which less is better.
     """
     curves: dict[str, list[tuple[float, float]]] = {}
     tracing = []
     for e in report.of(case.name, kind="samples"):
-        curves.setdefault(e.label, []).append((e.seconds or 0.0, e.measures[judge]))
+        curves.setdefault(e.label, []).append((e.seconds or 0.0, e.measures[metric]))
         if e.traced and e.label not in tracing:
             tracing.append(e.label)
     others = [k for k in curves if k not in tracing]
@@ -252,7 +252,7 @@ def crossings(report: Report, case: Case, judge: str = "flip") -> Table | None:
         for other in tracing:
             row += _reaches(sorted(curves[other]), error, seconds)
         rows.append(row)
-    columns = ["method", "its best after [ms]", MEASURES[judge].title]
+    columns = ["method", "its best after [ms]", METRICS[metric].title]
     for other in tracing:
         columns += [f"{other} as good after [ms]", "times as long"]
     return Table(

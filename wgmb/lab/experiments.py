@@ -13,12 +13,12 @@ import numpy as np
 from ..errors import InputError
 from ..frame import Frame
 from ..methods import METHODS
-from ..metrics import MEASURES, display
+from ..metrics import METRICS, display
 from ..scene import builtin
 from ..scene.bodies import Body, moving
 from ..scene.scene import CameraPath, Scene
 from ..shutter import Shutter
-from .cases import Case, Contender, Staged, scene_case
+from .cases import Candidate, Case, SceneFrame, scene_case
 from .compare import Laboratory
 from .results import Plot, Report, Table
 
@@ -45,31 +45,31 @@ def taylor(
     than the crossing points in time.
     """
     names = ("distributed", "accumulate", "reproject:variant=published", "reproject", "tap")
-    contenders = [Contender.parse(name) for name in names]
+    candidates = [Candidate.parse(name) for name in names]
     claims, fixed, worth = [], [], []
     for name in moves:
-        staged = Staged(builtin.make(name), size=size, rays=1)
-        reference = Contender("distributed", (("seed", 1),), 1000)
-        case = scene_case(name, Shutter(360, "end"), reference, staged, lab.device, lab.tell)
-        lab.compare(report, case, contenders, (1, 2, 4, UNIT_RAYS, 16, 5 * UNIT_RAYS), _budgets)
-        for judge in ("flip", "psnr"):
-            said, rows = _claims(report, case, judge, [c.label for c in contenders])
-            claims.append([name, MEASURES[judge].title, *said])
+        scene_frame = SceneFrame(builtin.make(name), size=size, rays=1)
+        reference = Candidate("distributed", (("seed", 1),), 1000)
+        case = scene_case(name, Shutter(360, "end"), reference, scene_frame, lab.device, lab.tell)
+        lab.compare(report, case, candidates, (1, 2, 4, UNIT_RAYS, 16, 5 * UNIT_RAYS), _budgets)
+        for metric in ("flip", "psnr"):
+            said, rows = _claims(report, case, metric, [c.label for c in candidates])
+            claims.append([name, METRICS[metric].title, *said])
             fixed += rows
-            worth += _worth(report, case, judge)
-    labels = [c.label for c in contenders]
+            worth += _worth(report, case, metric)
+    labels = [c.label for c in candidates]
     report.tables += [
         Table(
             "Taylor's findings",
-            ["scene", "judge", "small budget: better than distributed", "than frame blending",
+            ["scene", "metric", "small budget: better than distributed", "than frame blending",
              "five times the time gains under 10 %", "large budget: distributed is better"],
             claims,
             "Of reprojection as published.",
         ),
-        Table("In a fixed time", ["scene", "judge", "budget [ms]", *labels], fixed),
+        Table("In a fixed time", ["scene", "metric", "budget [ms]", *labels], fixed),
         Table(
             "Where distributed becomes as good as reprojection as published at its best",
-            ["scene", "judge", "reprojection's best", "after [ms]", "rays per pixel as good",
+            ["scene", "metric", "reprojection's best", "after [ms]", "rays per pixel as good",
              "distributed's time for them [ms]"],
             worth,
             "Reprojection wins where a renderer needs longer for these rays than for one sharp "
@@ -93,14 +93,14 @@ def _budgets(report: Report, case: Case) -> list[float]:
 
 
 def _claims(
-    report: Report, case: Case, judge: str, labels: list[str]
+    report: Report, case: Case, metric: str, labels: list[str]
 ) -> tuple[list[str], list[list]]:
     """Return the paper's findings as reproduced here, and the numbers behind them."""
     traced, blended, published, *_ = labels
     small, large = _budgets(report, case)
-    shown = {(e.label, e.budget): e.measures[judge] for e in report.of(case.name, kind="time")}
-    error = {key: _error(judge, value) for key, value in shown.items()}
-    title, digits = MEASURES[judge].title, MEASURES[judge].digits
+    shown = {(e.label, e.budget): e.measures[metric] for e in report.of(case.name, kind="time")}
+    error = {key: _error(metric, value) for key, value in shown.items()}
+    title, digits = METRICS[metric].title, METRICS[metric].digits
     rows = [
         [case.name, title, round(1e3 * b, 1), *(round(shown[k, b], digits) for k in labels)]
         for b in (small, large)
@@ -113,28 +113,28 @@ def _claims(
     ], rows
 
 
-def _error(judge: str, value: float) -> float:
+def _error(metric: str, value: float) -> float:
     """Something of which less is better, in proportion: of PSNR, the root of the mean square."""
-    return 10 ** (-value / 20) if judge.startswith("psnr") else value
+    return 10 ** (-value / 20) if metric.startswith("psnr") else value
 
 
-def _worth(report: Report, case: Case, judge: str) -> list[list]:
+def _worth(report: Report, case: Case, metric: str) -> list[list]:
     traced = report.of(case.name, kind="samples", label="distributed")
     rays, times, errors = np.array(
-        [(e.samples or 0, e.seconds or 0.0, _error(judge, e.measures[judge])) for e in traced]
+        [(e.samples or 0, e.seconds or 0.0, _error(metric, e.measures[metric])) for e in traced]
     ).T
     published = report.of(case.name, label="reproject, variant published")
-    least = min(_error(judge, e.measures[judge]) for e in published)
-    near = [e for e in published if _error(judge, e.measures[judge]) < 1.02 * least]
+    least = min(_error(metric, e.measures[metric]) for e in published)
+    near = [e for e in published if _error(metric, e.measures[metric]) < 1.02 * least]
     best = min(near, key=lambda e: e.seconds or 0.0)
-    limit, m = _error(judge, best.measures[judge]), MEASURES[judge]
+    limit, m = _error(metric, best.measures[metric]), METRICS[metric]
     falling = -np.log(np.minimum.accumulate(errors))
     # Errors and times follow powers of the number of rays: straight lines in logarithms.
     enough = np.exp(np.interp(-np.log(limit), falling, np.log(rays)))
     seconds = np.exp(np.interp(np.log(enough), np.log(rays), np.log(times)))
     beyond = limit < np.exp(-falling[-1])
     return [
-        [case.name, m.title, round(best.measures[judge], m.digits),
+        [case.name, m.title, round(best.measures[metric], m.digits),
          round(1e3 * (best.seconds or 0.0), 1), f"> {rays[-1]:g}" if beyond else round(enough, 1),
          round(1e3 * seconds, 1)]
     ]  # fmt: skip
@@ -154,16 +154,16 @@ def chen(lab: Laboratory, report: Report, size: tuple[int, int], moments: int = 
     if "fusion" not in METHODS:
         raise InputError(f"this experiment needs the method fusion; known: {', '.join(METHODS)}")
     report.samples = 8
-    tap, fusion = (Contender(m, (("variant", "published"),)) for m in ("tap", "fusion"))
-    printed = Contender("fusion", (("variant", "published"), ("weights", "published")))
-    both = [tap, fusion, printed, Contender("tap"), Contender("fusion")]
+    tap, fusion = (Candidate(m, (("variant", "published"),)) for m in ("tap", "fusion"))
+    printed = Candidate("fusion", (("variant", "published"), ("weights", "published")))
+    both = [tap, fusion, printed, Candidate("tap"), Candidate("fusion")]
     dive, shutter = builtin.make("scaling"), Shutter(180)
     seconds: dict[str, list[float]] = {c.label: [] for c in both}
     passes: dict[tuple[str, str], list[tuple[int, float]]] = {}
     for k in range(moments):
-        staged = Staged(dive, time=k / 24, size=size)
-        frame = staged.frame(lab.device)
-        case = Case("dive", frame, shutter, frame.color, "", staged)
+        scene_frame = SceneFrame(dive, time=k / 24, size=size)
+        frame = scene_frame.frame(lab.device)
+        case = Case("dive", frame, shutter, frame.color, "", scene_frame)
         lab.tell(f"dive, moment {k + 1} of {moments}")
         blurs = {c: c.blur(8, shutter, lab.device) for c in both}
         for c, found in lab.passes(case, blurs).items():  # compiles
@@ -191,19 +191,19 @@ def chen(lab: Laboratory, report: Report, size: tuple[int, int], moments: int = 
     report.tables.append(_by_pass(lab, passes, tap.label))
     quality: list[list] = []
     for name in ("scaling", "crossing"):
-        staged = Staged(builtin.make(name), size=size)
-        reference = Contender("distributed", (("seed", 1),), 256)
-        case = scene_case(name, shutter, reference, staged, lab.device, lab.tell)
+        scene_frame = SceneFrame(builtin.make(name), size=size)
+        reference = Candidate("distributed", (("seed", 1),), 256)
+        case = scene_case(name, shutter, reference, scene_frame, lab.device, lab.tell)
         lab.compare(report, case, both, (4, 8, 16))
         judged = [e for e in report.of(case.name) if e.kind in ("sharp", "floor") or
                   (e.kind, e.samples) == ("samples", report.samples)]  # fmt: skip
         quality += [
-            [name, e.label, *(round(e.measures[m], MEASURES[m].digits) for m in MEASURES)]
+            [name, e.label, *(round(e.measures[m], METRICS[m].digits) for m in METRICS)]
             for e in judged
         ]
         _facing(lab, report, case)
         _alphas(lab, report, case)
-    columns = ["scene", "method", *(m.title for m in MEASURES.values())]
+    columns = ["scene", "method", *(m.title for m in METRICS.values())]
     report.tables.insert(2, Table("Quality at 8 samples", columns, quality))
     report.notes.append(_about(chen))
 
@@ -240,15 +240,15 @@ def _alphas(lab: Laboratory, report: Report, case: Case) -> None:
     curves: dict[str, list[tuple[float, float]]] = {}
     rows = []
     for weights in ("normalised", "published"):
-        contenders = [
-            Contender("fusion", (("weights", weights), ("alpha_back", alpha))) for alpha in ALPHAS
+        candidates = [
+            Candidate("fusion", (("weights", weights), ("alpha_back", alpha))) for alpha in ALPHAS
         ]
-        blurs = [c.blur(8, case.shutter, lab.device) for c in contenders]
-        pictures = [lab.picture(case, b, c) for b, c in zip(blurs, contenders, strict=True)]
-        times = lab.least([lab.timer(case, b, c) for b, c in zip(blurs, contenders, strict=True)])
+        blurs = [c.blur(8, case.shutter, lab.device) for c in candidates]
+        pictures = [lab.picture(case, b, c) for b, c in zip(blurs, candidates, strict=True)]
+        times = lab.least([lab.timer(case, b, c) for b, c in zip(blurs, candidates, strict=True)])
         for alpha, picture, s in zip(ALPHAS, pictures, times, strict=True):
             amount = _gone(picture, case)
-            error = MEASURES["flip"].judge(picture, case.truth)
+            error = METRICS["flip"].compute(picture, case.truth)
             rows.append([weights, f"{alpha:g} / 0.08", round(1e3 * s, 2), round(amount, 3),
                          round(error, 4)])  # fmt: skip
             curves.setdefault(f"amount of blur, {weights}", []).append((alpha, amount))
@@ -264,22 +264,22 @@ def _facing(lab: Laboratory, report: Report, case: Case) -> None:
     """Measure the cost or gain of separate weights for leading and trailing faces."""
     names = {"front 0.08, back 0.04": (0.08, 0.04), "all faces 0.04": (0.04, 0.04),
              "all faces 0.08": (0.08, 0.08)}  # fmt: skip
-    contenders = [
-        Contender("fusion", (("alpha_front", a), ("alpha_back", b)), name=name)
+    candidates = [
+        Candidate("fusion", (("alpha_front", a), ("alpha_back", b)), name=name)
         for name, (a, b) in names.items()
     ]
-    blurs = [c.blur(8, case.shutter, lab.device) for c in contenders]
-    pictures = [lab.picture(case, b, c) for b, c in zip(blurs, contenders, strict=True)]
-    times = lab.least([lab.timer(case, b, c) for b, c in zip(blurs, contenders, strict=True)])
-    passes = lab.passes(case, dict(zip(contenders, blurs, strict=True)))
+    blurs = [c.blur(8, case.shutter, lab.device) for c in candidates]
+    pictures = [lab.picture(case, b, c) for b, c in zip(blurs, candidates, strict=True)]
+    times = lab.least([lab.timer(case, b, c) for b, c in zip(blurs, candidates, strict=True)])
+    passes = lab.passes(case, dict(zip(candidates, blurs, strict=True)))
     rows = [
         [c.label, round(1e3 * s, 2), round(_gone(p, case), 3),
-         *(round(MEASURES[m].judge(p, case.truth), 4) for m in ("flip", "psnr")),
+         *(round(METRICS[m].compute(p, case.truth), 4) for m in ("flip", "psnr")),
          *(round(1e3 * t, 2) for _, t in passes[c].values())]
-        for c, p, s in zip(contenders, pictures, times, strict=True)
+        for c, p, s in zip(candidates, pictures, times, strict=True)
     ]  # fmt: skip
     columns = ["alpha", "time [ms]", "amount of blur", "FLIP", "PSNR"]
-    columns += [f"{label} [ms]" for label in passes[contenders[0]]]
+    columns += [f"{label} [ms]" for label in passes[candidates[0]]]
     report.tables.append(Table(f"{case.name}: front and back told apart", columns, rows))
 
 
@@ -300,18 +300,18 @@ def rosado(lab: Laboratory, report: Report, size: tuple[int, int]) -> None:
     motion blurs the box, which should stay sharp; the chapter masks it; a velocity buffer
     knows that it stands still in the picture.
     """
-    staged = Staged(_chase(), size=size)
-    reference = Contender("distributed", (("seed", 1),), 256)
-    case = scene_case("chase", Shutter(180), reference, staged, lab.device, lab.tell)
-    contenders = [
-        Contender("tap", name="camera only", given=_camera_only),
-        Contender("tap", name="camera only, mask", given=lambda f: _camera_only(_masked(f))),
-        Contender("tap", name="velocity buffer"),
-        Contender("tap", name="velocity buffer, mask", given=_masked),
+    scene_frame = SceneFrame(_chase(), size=size)
+    reference = Candidate("distributed", (("seed", 1),), 256)
+    case = scene_case("chase", Shutter(180), reference, scene_frame, lab.device, lab.tell)
+    candidates = [
+        Candidate("tap", name="camera only", given=_camera_only),
+        Candidate("tap", name="camera only, mask", given=lambda f: _camera_only(_masked(f))),
+        Candidate("tap", name="velocity buffer"),
+        Candidate("tap", name="velocity buffer, mask", given=_masked),
     ]
-    lab.compare(report, case, contenders, TAPS)
+    lab.compare(report, case, candidates, TAPS)
     rows, curves = [], {}
-    for c in contenders:
+    for c in candidates:
         entries = report.of(case.name, kind="samples", label=c.label)
         points = [(e.samples or 0, 1e3 * ((e.seconds or 0.0) - e.frame_seconds)) for e in entries]
         taps, times = np.array(points, float).T

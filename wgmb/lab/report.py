@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from ..io.atomic import write_file
-from ..metrics import FLIP_GAIN, MEASURES, display, flip_colors
+from ..metrics import FLIP_GAIN, METRICS, display, flip_colors
 from .cases import Case
 from .charts import plot_svg
 from .results import Entry, Plot, Report, Table
@@ -128,9 +128,9 @@ def _means(report: Report, colors) -> str:
         if e.shown and e.kind != "time":
             by_label.setdefault(e.label, []).append(e)
     everywhere = {k: v for k, v in by_label.items() if len(v) == len(report.cases)}
-    columns = ["method", *(m.title for m in MEASURES.values())]
+    columns = ["method", *(m.title for m in METRICS.values())]
     rows = [
-        [label, *(float(np.mean([e.measures[name] for e in found])) for name in MEASURES)]
+        [label, *(float(np.mean([e.measures[name] for e in found])) for name in METRICS)]
         for label, found in everywhere.items()
     ]
     note = f"Mean of {len(report.cases)} cases, {report.samples} samples each; best in green."
@@ -153,7 +153,7 @@ def _case(report: Report, index: int, case: Case, colors) -> str:
         parts.append(_cards(index, case, [e for e in timed if e.budget == budget]))
     parts.append("<h3>Figures</h3>")
     parts.append(_figures(report.of(case.name), colors))
-    if case.staged is not None:
+    if case.scene_frame is not None:
         parts.append(
             "<p class=soft>Times of methods that take rendered frames include rendering one.</p>"
         )
@@ -223,7 +223,7 @@ def _uri(shown: np.ndarray) -> str:
 def _figures(entries: list[Entry], colors) -> str:
     framed = any(e.frame_seconds for e in entries)
     columns = ["method", "samples", "time [ms]", *["without frame [ms]"][: int(framed)]]
-    columns += [m.title for m in MEASURES.values()]
+    columns += [m.title for m in METRICS.values()]
     rows, floor = [], None
     for e in entries:
         times: list[float | None] = [None, None]
@@ -240,7 +240,7 @@ def _table(table: Table, colors) -> str:
 
 
 def _grid(columns, rows, colors, judged: int | None = None, floor=None) -> str:
-    """A sortable table; from column `judged` on stand the MEASURES, the best of each marked.
+    """A sortable table; from column `judged` on stand the METRICS, the best of each marked.
 
     The row `floor` takes no part in that.
     """
@@ -250,11 +250,11 @@ def _grid(columns, rows, colors, judged: int | None = None, floor=None) -> str:
     best: dict[int, float] = {}
     ranked = [row for row in rows if row is not floor]
     if judged is not None and len(ranked) > 1:
-        for i, m in enumerate(MEASURES.values(), judged):
+        for i, m in enumerate(METRICS.values(), judged):
             best[i] = (max if m.more_is_better else min)(row[i] for row in ranked)
     digits = {i: _digits(row[i] for row in rows) for i in range(len(columns))}
     if judged is not None:
-        digits |= {i: m.digits for i, m in enumerate(MEASURES.values(), judged)}
+        digits |= {i: m.digits for i, m in enumerate(METRICS.values(), judged)}
     lines = []
     for row in rows:
         cells = []
@@ -294,9 +294,9 @@ def _foot(report: Report) -> str:
     notes = "".join(f"<p>{escape(n)}</p>" for n in report.notes)
     if not report.cases:
         return notes and f"<h2>Notes</h2>{notes}"
-    judges = "".join(f"<dt>{m.title}</dt><dd>{m.about}</dd>" for m in MEASURES.values())
+    metrics = "".join(f"<dt>{m.title}</dt><dd>{m.about}</dd>" for m in METRICS.values())
     return (
-        f"<h2>How to read this</h2>{notes}<dl>{judges}<dt>error maps</dt>"
+        f"<h2>How to read this</h2>{notes}<dl>{metrics}<dt>error maps</dt>"
         f"<dd>{FLIP_GAIN:g} times FLIP per pixel: black is identical, white very different</dd>"
         "<dt>time</dt><dd>wall clock from recording to the end of the GPU's work, the minimum of "
         "several rounds; only times on one page are comparable</dd>"
@@ -312,18 +312,18 @@ def _foot(report: Report) -> str:
 
 def _curves(entries: list[Entry], floor: dict[str, float]) -> list[Plot]:
     plots = []
-    for judge in ("flip", "psnr"):
-        m = MEASURES[judge]
-        unit = " [dB]" if judge == "psnr" else ""
+    for metric in ("flip", "psnr"):
+        m = METRICS[metric]
+        unit = " [dB]" if metric == "psnr" else ""
         for title, x, key in (("time", "ms", lambda e: 1e3 * (e.seconds or 0)),
                               ("samples", "samples", lambda e: e.samples)):  # fmt: skip
             curves: dict[str, list[tuple[float, float]]] = {}
             for e in entries:
-                curves.setdefault(e.label, []).append((key(e), e.measures[judge]))
+                curves.setdefault(e.label, []).append((key(e), e.measures[metric]))
             better = "higher is better" if m.more_is_better else "lower is better"
             plots.append(
                 Plot(f"{m.title} against {title}", x, f"{m.title}{unit}, {better}", curves,
-                     floor=floor.get(judge))
+                     floor=floor.get(metric))
             )  # fmt: skip
     return plots
 

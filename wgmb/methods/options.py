@@ -17,7 +17,7 @@ from functools import cache
 from types import MappingProxyType, UnionType
 from typing import Any, Literal
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,8 @@ class Option:
         if self.choices:
             if value not in self.choices:
                 known = ", ".join(self.choices)
-                raise InputError(f"{self.name} must be one of {known}, got {value!r}")
+                hint = did_you_mean(value, self.choices)
+                raise InputError(f"{self.name} must be one of {known}, got {value!r}{hint}")
             return
         if self.kind is bool or isinstance(value, bool):
             if not (self.kind is bool and isinstance(value, bool)):

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from .bodies import Body, at, moving, rotation, translation
 from .figure_scenes import cone, disk, spiric
 from .scene import CameraPath, Scene
@@ -298,12 +298,14 @@ SCENES: dict[str, Callable[..., Scene]] = {
 def make(name: str, /, **settings: float | str) -> Scene:
     """The built-in scene `name`; `InputError` names an unknown scene, setting or bad value."""
     if name not in SCENES:
-        raise InputError(f"unknown scene {name!r}; available: {', '.join(SCENES)}")
+        known = f"available: {', '.join(SCENES)}{did_you_mean(name, SCENES)}"
+        raise InputError(f"unknown scene {name!r}; {known}")
     known = inspect.signature(SCENES[name]).parameters
     values = {}
     for key, text in settings.items():
         if key not in known:
-            raise InputError(f"scene {name!r} has no setting {key!r}, only {', '.join(known)}")
+            there = f"only {', '.join(known)}{did_you_mean(key, known)}"
+            raise InputError(f"scene {name!r} has no setting {key!r}, {there}")
         kind = type(known[key].default)
         try:
             value = kind(text)

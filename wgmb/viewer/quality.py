@@ -21,7 +21,7 @@ class Measured:
     flip: Future | None = None
 
 
-class Judge:
+class Quality:
     """Measures anew whenever the reference has twice the samples."""
 
     ENOUGH = 64  # samples of the reference before it is worth measuring against

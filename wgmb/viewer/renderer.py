@@ -24,7 +24,7 @@ from ..shutter import Shutter
 from .adaptive import QUICK, Pace
 from .capabilities import Choices
 from .perception import Perceived
-from .quality import Judge, Measured
+from .quality import Measured, Quality
 from .screen import Box, Image, fit, whole
 from .source import SceneSubject, Subject
 from .state import REFERENCE, State
@@ -85,7 +85,7 @@ class Renderer:
 
     def __init__(self, device: wgpu.GPUDevice):
         self.device = device
-        self.choices, self.judge = Choices(device), Judge()
+        self.choices, self.quality = Choices(device), Quality()
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self.pace = Pace(5 if software else 0)
         self.report = Report()
@@ -284,10 +284,10 @@ class Renderer:
         """Return the difference between the first image and the reference, once both are ready."""
         key = (first.key, first.fine, last.key, last.fine)
         if first.kind == "COLOR" and first.ready:
-            self.judge.measure(
+            self.quality.measure(
                 key, last.done, last.total, lambda: [self.download(s) for s in (first, last)]
             )
-        return self.judge.found(key)
+        return self.quality.found(key)
 
 
 def shutter_of(state: State) -> Shutter:

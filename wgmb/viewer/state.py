@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..cone import Cone
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..io import frame_numbers
 from ..io.frame_file import about
 from ..methods import METHODS
@@ -174,7 +174,8 @@ class State:
             if name in said:
                 state = state.with_option(name, said[name])
         if state.method not in METHODS:
-            raise InputError(f"unknown method {state.method!r}; available: {', '.join(METHODS)}")
+            known = f"available: {', '.join(METHODS)}{did_you_mean(state.method, METHODS)}"
+            raise InputError(f"unknown method {state.method!r}; {known}")
         return state.settled()
 
     # ---- what the command line is told ---------------------------------------------------
