@@ -29,7 +29,7 @@ MAIN = "main.js"
 MOST = 2_000_000
 """Bytes of the page, at most."""
 
-BEGIN, SECONDS, FADE, FPS = 16.5, 9, 1.0, 24
+BEGIN, SECONDS, FADE, FPS = 17.0, 9, 1.0, 24
 """Of the video: where it begins, how long it is, and how long its end fades into its beginning."""
 CAMERA = {"cam_x": 0.3, "cam_y": -0.2}
 UNPACKED = """export async function unpacked(name) {

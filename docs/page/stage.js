@@ -4,7 +4,8 @@ import { Buffers, Panel, TEXEL } from './panel.js';
 import { groupZero, shutterOf, volumeKernel } from './uniforms.js';
 
 const SCALES = [1, 3 / 4, 1 / 2, 1 / 3, 1 / 4];
-const LIMIT = 1000 / 30; // milliseconds that a frame may take
+const LIMIT = 1000 / 30; // milliseconds that a frame may take while it moves
+const LONGEST = 2000; // and while nothing moves
 
 export class Stage {
   /** `fixed`: [width, height] for tests; without, the resolution follows the canvas and its speed. */
@@ -30,13 +31,15 @@ export class Stage {
     return this.flying < 2;
   }
 
-  /** Draw a state. `still`: at full resolution, if that takes two seconds at most. */
+  /** Draw a state. `still`: at the best resolution that LONGEST allows. */
   async draw(state, still = false) {
-    let size = this.size(SCALES[this.step]);
+    let step = this.step;
     if (still && !this.fixed) {
-      const full = this.size();
-      if (this.cost * full[0] * full[1] < 2000) size = full;
+      const fits = (scale) => this.size(scale).reduce((x, y) => x * y) * this.cost < LONGEST;
+      step = Math.min(step, Math.max(0, SCALES.findIndex(fits)));
     }
+    this.isFull = step === 0 || this.fixed !== null;
+    const size = this.size(SCALES[step]);
     const [width, height] = size;
     const shutter = shutterOf({ curve: state.curve, degrees: state.deg, phase: 'centre' });
     const { constants, scene, tables, tiles, groups } = volumeKernel({

@@ -1,7 +1,7 @@
 // What a visitor can change, as it stands in the page's address: #t=12&deg=720&curve=cosine...
 
 export const DEFAULTS = {
-  t: 16.5, x: 0.3, y: -0.2, deg: 720, curve: 'cosine', fps: 24, density: 'exact', still: 0,
+  t: 17, x: 0.3, y: -0.2, deg: 720, curve: 'cosine', fps: 24, density: 'exact', still: 0,
   method: 'gather', samples: 16, deg2: 360, curve2: 'box', line: 0.5,
 };
 const CURVES = ['box', 'cosine', 'trapezoid'];
