@@ -51,9 +51,13 @@ def _exposed(shutter: Shutter, theta, half, speed: float) -> np.ndarray:
     if shutter.degrees == 0:
         return (np.abs(theta) < half).astype(float)
     times, integral = shutter.integral()
+    widest = np.max(half)
     reach = math.ceil(max(map(abs, shutter.span)) * speed / TURN) + 1
     total = np.zeros(np.broadcast_shapes(np.shape(theta), np.shape(half)))
     for edge in theta + TURN * np.arange(-reach, reach + 1)[:, None]:
+        begin, end = (edge.min() - widest) / speed, (edge.max() + widest) / speed
+        if end < times[0] or begin > times[-1]:  # it passes there at other times
+            continue
         after, before = ((edge + side * half) / speed for side in (1, -1))
         total += np.interp(after, times, integral) - np.interp(before, times, integral)
     return total
