@@ -50,7 +50,7 @@ def found(device, case):
 
 @pytest.fixture(scope="module")
 def scene_frame(device):
-    return cases.SceneFrame(cases.make_scene("crossing:speed=3")[1], size=SIZE, rays=1)
+    return cases.SceneFrame(cases.make_scene("crossing:speed=3")[1], size=SIZE, antialias=1)
 
 
 @pytest.mark.parametrize(

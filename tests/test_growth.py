@@ -116,7 +116,7 @@ def rendering(scene: str, method: str, **options):
 def staging(**state):
     def make(device):
         stage, numbers = Renderer(device), iter(range(10**6))
-        shown = replace(State(rays=1, samples=4), **state)
+        shown = replace(State(antialias=1, samples=4), **state)
 
         def step():
             number = next(numbers)

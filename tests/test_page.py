@@ -138,7 +138,7 @@ def test_the_sample_frame_is_that_of_python(visit, tmp_path):
     for file, (method, degrees, curve, samples) in zip(files, SAMPLE, strict=True):
         blur = Blur(method, shutter=Shutter(degrees, curve=curve), samples=samples)
         scene = make(recording.SCENE)
-        check(file, Render(scene, blur, size=SIZE, rays=recording.RAYS)(recording.TIME))
+        check(file, Render(scene, blur, size=SIZE, antialias=recording.RAYS)(recording.TIME))
 
 
 STEPS = [  # what a hand does, and what of the state it changes

@@ -94,7 +94,9 @@ def kernel(shown: scene.Scene, shutter: Shutter, time: float, fps: float, size, 
 
     monkeypatch.setattr(volume, "tile_kinds", every_tile)
     monkeypatch.setattr(volume.gpu, "kernel", remembered)
-    on_gpu = SceneOnGpu(Recorder(), shown, size=size, time=time, fps=fps, span=shutter.span, rays=1)
+    on_gpu = SceneOnGpu(
+        Recorder(), shown, size=size, time=time, fps=fps, span=shutter.span, antialias=1
+    )
     inputs = SimpleNamespace(scene=on_gpu, shutter=shutter, bindings=gpu.FrameBindings(size, {}))
     volume.Volume(Recorder(), volume.Volume.Options()).encode(None, inputs, None)
     monkeypatch.undo()

@@ -41,7 +41,7 @@ MAKING = re.findall(r"(?:^|`)(wgmb [a-z]+ [^`\n]*-o [^`\n]*)", TEXT, re.M)
 SMALL = "64x36"
 SHORTER = {"--samples": "2", "--size": SMALL}
 OPTIONS = {  # what makes a command short, whatever the README says of it
-    "render": f"--size {SMALL} --rays 1",
+    "render": f"--size {SMALL} --antialias 1",
     "perceive": f"--size {SMALL} --cone-rate 400 --cone-peak 0.005",
     "compare": f"--size {SMALL} --reference distributed:8 --samples 2 --ladder 2 --rounds 1",
     "bench": "--rounds 1",

@@ -41,9 +41,11 @@ def flat(shape, half, path):
     return Scene("flat", (body,), STILL, sun=(0, 0, 1, 0), sky=(0, 0, 0, 0), horizon=(0, 0, 0))
 
 
-def rendered(scene, size, shutter, samples=RAYS, method="distributed", rays=3, **options):
+def rendered(scene, size, shutter, samples=RAYS, method="distributed", antialias=3, **options):
     blur = wgmb.Blur(method, samples=samples, shutter=shutter, **options)
-    return wgmb.Render(scene, blur, size=size, fps=FPS, rays=rays)(0.0)[..., 0].astype(float)
+    return wgmb.Render(scene, blur, size=size, fps=FPS, antialias=antialias)(0.0)[..., 0].astype(
+        float
+    )
 
 
 def passed(shutter, times):
@@ -195,7 +197,7 @@ def test_more_rays_refine_the_same_picture():
 @pytest.mark.parametrize("method", ["distributed", "accumulate"])
 def test_bit_by_bit_is_the_same_as_at_once(method):
     blur = wgmb.Blur(method, samples=24, shutter=Shutter(270, "start", "triangle"))
-    render = wgmb.Render(builtin.make("crossing"), blur, size=(40, 23), rays=1)
+    render = wgmb.Render(builtin.make("crossing"), blur, size=(40, 23), antialias=1)
     on_gpu = render.on_gpu(0.1)
     pictures = []
     for bits in ([(0, 24)], [(0, 7), (7, 1), (8, 16)]):
@@ -223,7 +225,7 @@ def test_accumulate_is_wrong_by_half_a_picture_at_most(curve):
     size, shutter = (96, 4), Shutter(360, "start", CURVES[curve])
     want = edge_covers(shutter, size)
     for pictures in (16, 64, 256):
-        got = rendered(edge(size), size, shutter, pictures, "accumulate", rays=4)
+        got = rendered(edge(size), size, shutter, pictures, "accumulate", antialias=4)
         assert np.abs(got - want).max() < 0.5 / pictures
         assert np.abs(got - want).max() > 0.02 / pictures
 
@@ -234,7 +236,7 @@ def test_accumulate_approaches_distributed_until_its_antialiasing_is_what_is_lef
     truth = rendered(scene, size, shutter)
 
     def wrong(*arguments):
-        return np.sqrt(((rendered(scene, size, *arguments, rays=4) - truth) ** 2).mean())
+        return np.sqrt(((rendered(scene, size, *arguments, antialias=4) - truth) ** 2).mean())
 
     sharp = wrong(Shutter(0), 1, "accumulate")
     few, some, many = (wrong(shutter, n, "accumulate") for n in (4, 16, 64))

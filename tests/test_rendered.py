@@ -28,10 +28,10 @@ BUILT_IN = {"zoom": "scaling", "yaw": "rotation"}
 
 
 @cache
-def rendered(name, method, samples, shutter=LATE, rays=3, size=SIZE, **options):
+def rendered(name, method, samples, shutter=LATE, antialias=3, size=SIZE, **options):
     scene = builtin.make(BUILT_IN.get(name, name), **SETTINGS[name])
     blur = wgmb.Blur(method, samples=samples, shutter=shutter, **options)
-    return wgmb.Render(scene, blur, size=size, rays=rays)(0.0)[..., :3].astype(float)
+    return wgmb.Render(scene, blur, size=size, antialias=antialias)(0.0)[..., :3].astype(float)
 
 
 def reference(name):
@@ -92,10 +92,10 @@ def test_few_rays_do_more_when_they_are_reprojected(name):
     of one ray 32.5, 33.8, or one of four. More rays turn it round: 27 distributed have 42.5, 41.8.
     """
     truth = reference(name)
-    reprojected = psnr(rendered(name, "reproject", 32, rays=2), truth)
+    reprojected = psnr(rendered(name, "reproject", 32, antialias=2), truth)
     assert reprojected > psnr(rendered(name, "distributed", 4), truth) + 2
-    assert reprojected > psnr(rendered(name, "accumulate", 4, rays=1), truth) + 0.8
-    assert reprojected > psnr(rendered(name, "accumulate", 1, rays=2), truth) + 2
+    assert reprojected > psnr(rendered(name, "accumulate", 4, antialias=1), truth) + 0.8
+    assert reprojected > psnr(rendered(name, "accumulate", 1, antialias=2), truth) + 2
     assert reprojected < psnr(rendered(name, "distributed", 27), truth)
 
 

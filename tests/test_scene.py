@@ -23,8 +23,8 @@ def plain(scene):
     return replace(scene, bodies=tuple(replace(b, pattern="PLAIN") for b in scene.bodies))
 
 
-def frame(scene, seconds=0.0, size=SIZE, rays=1):
-    render = wgmb.Render(scene, wgmb.Blur("tap"), size=size, rays=rays)
+def frame(scene, seconds=0.0, size=SIZE, antialias=1):
+    render = wgmb.Render(scene, wgmb.Blur("tap"), size=size, antialias=antialias)
     seen = render.frame(seconds)
     return seen, render.blur.motion(seen)
 
@@ -82,7 +82,7 @@ def test_bricks_are_their_colour_with_mortar_between():
         "box", (1, 1, 0.1), at(0, 0, -2), (1, 0, 0), (0, 0, 1), "BRICKS", (2, 2), emission=1
     )
     dark = {"sun": (0, 0, 1, 0), "sky": (0, 0, 0, 0)}
-    seen, _ = frame(Scene("wall", (body,), STILL, **dark), size=(200, 200), rays=2)
+    seen, _ = frame(Scene("wall", (body,), STILL, **dark), size=(200, 200), antialias=2)
     inside = seen.color[30:170, 30:170]
     mortar = inside[..., 2].mean()
     assert mortar == pytest.approx(1 - 0.92 * 0.96, abs=0.02)
@@ -95,7 +95,7 @@ def at_instant(scene, seconds, moment, span):
     """What SceneOnGpu draws at `moment` [frame intervals] from the frame at `seconds`."""
     blur = wgmb.Blur("tap")
     images = TexturePool(blur.device)
-    on_gpu = SceneOnGpu(blur.device, scene, size=SIZE, time=seconds, fps=24, span=span, rays=1)
+    on_gpu = SceneOnGpu(blur.device, scene, size=SIZE, time=seconds, fps=24, span=span, antialias=1)
     encoder = blur.device.create_command_encoder()
     textures = on_gpu.encode(encoder, blur.frame_bindings(SIZE), images, "instant", moment)
     gpu.submit(blur.device, encoder)
@@ -191,7 +191,7 @@ def test_a_body_beyond_the_range_of_halves_is_seen():
 def test_every_scene_is_finite_and_something_is_to_be_seen():
     for name in OF_BODIES:
         for seconds in (-1.0, 0.0, 0.4, 3.0):
-            render = wgmb.Render(builtin.make(name), wgmb.Blur("tap"), size=(64, 36), rays=2)
+            render = wgmb.Render(builtin.make(name), wgmb.Blur("tap"), size=(64, 36), antialias=2)
             picture = render(seconds)
             assert np.isfinite(picture).all(), (name, seconds)
             assert picture.min() >= 0
@@ -255,9 +255,9 @@ def test_1024_bodies_are_drawn_and_more_are_refused():
     with pytest.raises(InputError, match="at most 1024 bodies, got 1025"):
         frame(crowd(1025), size=(33, 33))
     with pytest.raises(InputError, match="1024 bodies are too many for 3 x 3 rays"):
-        frame(crowd(1024), size=(33, 33), rays=3)
+        frame(crowd(1024), size=(33, 33), antialias=3)
     blur = wgmb.Blur("distributed", samples=4)  # whose rays are its samples
-    assert wgmb.Render(crowd(1024), blur, size=(33, 33), rays=8)(0.0)[16, 16, 1] > 0
+    assert wgmb.Render(crowd(1024), blur, size=(33, 33), antialias=8)(0.0)[16, 16, 1] > 0
 
 
 def test_what_is_no_body_is_refused():
@@ -292,7 +292,9 @@ def test_what_leaves_the_numbers_is_refused(name, settings, who, method):
         wgmb.Render(builtin.make(name, **settings), wgmb.Blur(method), size=(32, 18))(0.1)
 
 
-@pytest.mark.parametrize("options", [{"fps": 0}, {"fps": float("nan")}, {"rays": 0}, {"rays": 9}])
+@pytest.mark.parametrize(
+    "options", [{"fps": 0}, {"fps": float("nan")}, {"antialias": 0}, {"antialias": 9}]
+)
 def test_what_is_no_rendering_is_refused(options):
     name, value = next(iter(options.items()))
     with pytest.raises(InputError, match=f"{name} must be .*{value}"):
@@ -305,7 +307,7 @@ def test_antialiasing_is_the_mean_of_rays():
     """n x n rays of a picture are the middles of the pixels of one n times as large."""
     scene = builtin.make("crossing")
     size = (48, 27)
-    got = frame(plain(scene), 0.0, size, rays=3)[0].color
-    fine = frame(plain(scene), 0.0, (144, 81), rays=1)[0].color
+    got = frame(plain(scene), 0.0, size, antialias=3)[0].color
+    fine = frame(plain(scene), 0.0, (144, 81), antialias=1)[0].color
     want = fine.reshape(27, 3, 48, 3, 4).mean(axis=(1, 3))
     np.testing.assert_allclose(got, want, atol=2e-3)

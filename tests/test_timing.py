@@ -25,7 +25,7 @@ def drawn(blur, clock):
     encoder = blur.device.create_command_encoder()
     if "scene" in blur.method.needs:
         name = "torusphere" if blur.method.name == "volume" else "crossing"
-        render = Render(builtin.make(name), blur, size=SIZE, rays=1)
+        render = Render(builtin.make(name), blur, size=SIZE, antialias=1)
         render.draw(output.create_view(), 0.0, timing=clock)
     else:
         frame = Frame(**{**vars_of(FRAME), "prev": FRAME, "next": FRAME})

@@ -30,7 +30,7 @@ from wgmb.viewer.window import frame
 SIZE = 512, 1010  # tall enough for the whole panel; the picture is 256 x 144
 BESIDE = 256, 144
 BARE, SMALL = (320, 180), (160, 90)  # of the picture alone, for what needs no panel
-PLAIN = State(method="tap", rays=1, samples=4)
+PLAIN = State(method="tap", antialias=1, samples=4)
 ALONE = replace(PLAIN, panel=False)
 SAMPLE = str(Path(__file__).parent.parent / "sample" / "crossing.####.exr")
 
@@ -147,7 +147,7 @@ def library(state, size=SMALL):
     shows = {} if state.look in LOOKS else {"show": state.look}
     blur = Blur(state.method, samples=state.samples, shutter=shutter_of(state), **shows)
     scene = builtin.make(state.source, **dict(state.settings))
-    render = Render(scene, blur, size=size, rays=state.rays, fps=state.fps)
+    render = Render(scene, blur, size=size, antialias=state.antialias, fps=state.fps)
     return render, (state.frame / state.fps, int(state.frame))
 
 
@@ -259,9 +259,11 @@ def seen(frames, fps, after=0.0):
     return srgb(np.clip(eye.perceived(after)[..., :3], 0, 1))
 
 
-def rendered(numbers, fps=24.0, rays=1, speed=1.0, **blur):
+def rendered(numbers, fps=24.0, antialias=1, speed=1.0, **blur):
     how = Blur(**{"method": "tap", "samples": 4, **blur})
-    render = Render(builtin.make("crossing", speed=speed), how, size=SMALL, rays=rays, fps=fps)
+    render = Render(
+        builtin.make("crossing", speed=speed), how, size=SMALL, antialias=antialias, fps=fps
+    )
     return [render(n / fps, n) for n in numbers]
 
 
@@ -335,7 +337,7 @@ def test_the_reference_of_what_is_perceived_is_perceived_nature(small):
     nature = small.viewer.screen.picture()
     assert small.viewer.stage.report.labels == ("tap, perceived", "nature, perceived")
     assert small.viewer.stage.report.measured.psnr > 20
-    sharp = {"rays": 3, "shutter": 0, "speed": 4.0}
+    sharp = {"antialias": 3, "shutter": 0, "speed": 4.0}
     want = seen(rendered(range(20 - 60, 21), 120.0, **sharp), 120.0)
     video = seen(rendered(range(-8, 5), 24.0, **sharp), 24.0)
     apart = [np.abs(a - want)[:, 3:].mean() for a in (nature, video)]
@@ -664,9 +666,9 @@ def test_the_reference_converges_and_is_measured(small, monkeypatch):
         if (found := small.viewer.stage.report.measured) and found.samples >= 128:
             break
     assert rays == sorted(rays) and len(set(rays)) > 3
-    render = Render(builtin.make("crossing"), Blur("tap", samples=4), size=SMALL, rays=1)
+    render = Render(builtin.make("crossing"), Blur("tap", samples=4), size=SMALL, antialias=1)
     truth = Render(
-        render.scene, Blur("distributed", samples=found.samples), size=SMALL, rays=1
+        render.scene, Blur("distributed", samples=found.samples), size=SMALL, antialias=1
     )(at, 7)  # fmt: skip
     apart = srgb(render(at, 7)[..., :3]) - srgb(truth[..., :3])
     assert found.psnr == pytest.approx(-10 * np.log10(np.mean(apart.astype("f8") ** 2)), abs=0.01)
@@ -849,7 +851,7 @@ MANY = State(
     dolly=0.8,
     frame=3.5,
     size="256x144",
-    rays=1,
+    antialias=1,
     fps=30.0,
     method="reproject",
     samples=5,
@@ -898,7 +900,7 @@ def test_settings_come_back_as_they_were_saved(state):
         ("render = 3", "render"),
         ("a = " + 5000 * "[", "lists"),
         ("a = " + 5000 * "9", "digits"),
-        (f'[render]\nscene = "crossing"\nrays = 0x{5000 * "f"}', "rays"),
+        (f'[render]\nscene = "crossing"\nantialias = 0x{5000 * "f"}', "antialias"),
         ('[render]\nscene = "crossing"\nmax_blur = "far"', "max_blur"),
         ('[render]\nscene = "crossing"\nrolling = 3', "rolling"),
         ('[render]\nscene = "crossing"\npath = [1]', "path"),
@@ -994,7 +996,7 @@ def test_screenshot_and_recording(hand, tmp_path, monkeypatch):
     hand.press("s")
     assert np.abs(iio.imread("wgmb-001.png") / 255 - shown).max() < 0.01
     whole = exr.read(Path("wgmb-001.exr")).parts[0]
-    want = Render(builtin.make("crossing"), Blur("tap", samples=4), size=BESIDE, rays=1)(0.0)
+    want = Render(builtin.make("crossing"), Blur("tap", samples=4), size=BESIDE, antialias=1)(0.0)
     assert np.abs(whole.channels["R"].astype("f4") - want[..., 0]).max() < 2e-3
     hand.press("v")
     for _ in range(3):
@@ -1022,7 +1024,7 @@ def test_export_runs_the_command_line(hand, tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def reel():
-    return Hand(replace(PLAIN, rays=1).opened(SAMPLE))
+    return Hand(replace(PLAIN, antialias=1).opened(SAMPLE))
 
 
 def test_frames_on_disk_are_blurred_as_the_library_does(reel):

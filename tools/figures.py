@@ -30,7 +30,7 @@ def sample(**passes):
 
 def methods() -> None:
     """The same place of a scene by every method that takes rendered frames."""
-    scene_frame = SceneFrame(builtin.make("crossing", speed=3), size=SIZE, rays=4)
+    scene_frame = SceneFrame(builtin.make("crossing", speed=3), size=SIZE, antialias=4)
     frame = scene_frame.frame(Blur("tap").device)
     sheet = {"sharp": frame.color}
     sheet |= {name: Blur(name)(frame) for name in ("tap", "tiles", "fusion", "reproject", "gather")}

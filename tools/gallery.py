@@ -40,7 +40,7 @@ def main() -> None:
         name, scene = make_scene(text)
         exposure, scene_frame = (
             ShutterSettings().resolved(scene).make(),
-            SceneFrame(scene, time, SIZE, rays=RAYS),
+            SceneFrame(scene, time, SIZE, antialias=RAYS),
         )
         case = scene_case(name, exposure, Candidate.parse(REFERENCE), scene_frame, device, lab.tell)
         # Image methods have nothing to start from where there are volumes alone.

@@ -86,7 +86,7 @@ def sample() -> None:
 
 def rendered(name: str, **settings: float) -> Frame:
     """The first frame of a built-in scene, with its neighbours."""
-    render = Render(builtin.make(name, **settings), Blur("tap"), size=SIZE, rays=4)
+    render = Render(builtin.make(name, **settings), Blur("tap"), size=SIZE, antialias=4)
     before, here, after = (render.frame(k / 24, k + 1) for k in (-1, 0, 1))
     return here.between(before, after)
 

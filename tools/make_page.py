@@ -160,7 +160,7 @@ def make_media() -> None:
     size, time = page_recording.SIZE, page_recording.TIME
     for name, degrees in (("before", 0), ("after", 360)):
         blur = Blur("gather", shutter=Shutter(degrees), samples=32)
-        render = Render(make(page_recording.SCENE), blur, size=size, rays=page_recording.RAYS)
+        render = Render(make(page_recording.SCENE), blur, size=size, antialias=page_recording.RAYS)
         _write_jpg(name, to_display(render(time)[..., :3].astype(np.float32), 8), 85)
 
 

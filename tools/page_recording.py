@@ -174,7 +174,7 @@ class Session:
         self.device, self.once = device, Recorder()
         with self.once.listening(device):
             blur = Blur("gather", device=device, output=OUTPUT)
-            self.render = Render(make(SCENE), blur, size=SIZE, rays=RAYS)
+            self.render = Render(make(SCENE), blur, size=SIZE, antialias=RAYS)
             for offset in (0, -1, 1):
                 self.render._see(TIME, 0, offset, blur)
             self.input = self.once.texture(self.render._pictures[0]["color"])

@@ -33,7 +33,7 @@ class Render:
     """Renders a scene with motion blur; keeps its GPU resources between images.
 
     `size` (width, height) [px]; `fps`: frames per second, which define the frame interval;
-    `rays`: antialiasing of the sharp images for image methods, in rays per pixel side.
+    `antialias`: antialiasing of the sharp images for image methods, in rays per pixel side.
     Several threads may call one Render: they take turns.
     """
 
@@ -44,14 +44,20 @@ class Render:
         *,
         size: tuple[int, int] = (640, 360),
         fps: float = 24.0,
-        rays: int = 3,
+        antialias: int = 3,
     ):
         gpu.check_size(blur.device, *size)
         if not 0 < fps <= 100_000:
             raise InputError(f"fps must be over 0 and at most 100000, got {fps}")
-        if not 1 <= rays <= MOST_RAYS:
-            raise InputError(f"rays must be 1 to {MOST_RAYS}, got {rays}")
-        self.scene, self.blur, self.size, self.fps, self.rays = scene, blur, size, fps, rays
+        if not 1 <= antialias <= MOST_RAYS:
+            raise InputError(f"antialias must be 1 to {MOST_RAYS}, got {antialias}")
+        self.scene, self.blur, self.size, self.fps, self.antialias = (
+            scene,
+            blur,
+            size,
+            fps,
+            antialias,
+        )
         self._lock = threading.RLock()
         self._images = TexturePool(blur.device)
         self._token = blur.device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
@@ -239,7 +245,7 @@ class Render:
         blur = blur or self.blur
         if not np.isfinite(time):
             raise InputError(f"time must be finite, got {time}")
-        moment = (time, id(self.scene), self.size, self.fps, self.rays)
+        moment = (time, id(self.scene), self.size, self.fps, self.antialias)
         if moment != self._moment:
             self._moment, self._spans, self._pictures = moment, {}, {}
         opens, closes = blur.shutter.span
@@ -254,7 +260,7 @@ class Render:
                 time=time,
                 fps=self.fps,
                 span=span,
-                rays=self.rays,
+                antialias=self.antialias,
             )
         return self._spans[span]
 

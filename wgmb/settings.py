@@ -234,7 +234,7 @@ class SceneSettings:
     "Frames such as 0-99; frame N is at N / fps seconds."
     size: str = "640x360"
     "Width x height in pixels."
-    rays: int = 3
+    antialias: int = 3
     "Antialiasing of the sharp frames that image methods start from: rays per pixel side, 1 to 8."
     set: tuple[str, ...] = ()
     "Scene parameter as NAME=VALUE; may be repeated."

@@ -355,7 +355,7 @@ export function commandLine(state) {
   } else {
     words.push('render', scene, '-o', state.output ?? `${scene}.png`, `--time=${state.time}`);
     option('size', `${width}x${height}`);
-    if (state.rays) option('rays', state.rays);
+    if (state.antialias) option('antialias', state.antialias);
     option('fps', state.fps);
     if (state.method) option('method', state.method);
     if (state.samples !== undefined) option('samples', state.samples);

@@ -112,7 +112,7 @@ def words(trial: Trial) -> Iterator[Line]:
     (place / "view.toml").write_text('view = 3\n[render]\nscene = "crossing"\n')
     (place / "latin.toml").write_bytes(b'[render]\nscene = "cross\xefng"\n')
     out = ["-o", place / "out" / "o.png"]
-    video = ["render", "crossing", "--size", "64x36", "--frames", "0-3", "--rays", "1", "-o"]
+    video = ["render", "crossing", "--size", "64x36", "--frames", "0-3", "--antialias", "1", "-o"]
     cases = [
         *(["view", "--config", place / f"{n}.toml"] for n in ("deep", "long", "number", "view",
                                                              "latin")),

@@ -73,7 +73,7 @@ def _confidence() -> Step:
 def _scene(scene: str, method: str) -> Callable[[], Step]:
     def begin() -> Step:
         blur = Blur(method, samples=_MANY)
-        render = Render(builtin.make(scene), blur, size=SIZE, rays=2)
+        render = Render(builtin.make(scene), blur, size=SIZE, antialias=2)
         return lambda number: render(number % 24 / 24, number)  # what suits a moment is compiled
 
     return begin
@@ -94,7 +94,7 @@ def _viewer(method: str, **state) -> Callable[[], Step]:
 
     def begin() -> Step:
         now = [0.0]
-        shown = viewer.State(method=method, samples=_MANY, playing=True, rays=1, **state)
+        shown = viewer.State(method=method, samples=_MANY, playing=True, antialias=1, **state)
         window = viewer.offscreen(shown, (480, 270), clock=lambda: now[0])
 
         def step(number: int) -> np.ndarray:

@@ -82,7 +82,7 @@ def compare(
     given: Given = InputOptions(),
     size: str = "480x270",
     time: float = 0.0,
-    rays: int = 3,
+    antialias: int = 3,
     truth: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
     inputs: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     frame: int | None = None,
@@ -108,7 +108,7 @@ def compare(
         Image size for scenes.
     time
         Time of the scenes in seconds.
-    rays
+    antialias
         Antialiasing of the scenes' sharp frames: rays per pixel side.
     truth
         Ground truth of the blurred frame: one file, or two rendered with half the samples and
@@ -153,7 +153,7 @@ def compare(
     baselines = {name: Path(file) for name, _, file in (p.partition("=") for p in peer)}
     cases: list[Callable[[], Case]] = []
     for name, made in map(make_scene, scene):
-        scene_frame = SceneFrame(made, time, wanted, rays=rays)
+        scene_frame = SceneFrame(made, time, wanted, antialias=antialias)
         for degrees, shutter in who.exposures(when, made).items():
             cases.append(partial(scene_case, f"{name}, {degrees}", shutter, reference,
                                  scene_frame, device, tell))  # fmt: skip

@@ -69,7 +69,7 @@ def render(
     if confidence and sharp:
         raise InputError("--confidence cannot be combined with --sharp")
     made = look.make(when.make(), adapter)
-    renderer = Render(picture, made, size=size_of(what.size), fps=fps, rays=what.rays)
+    renderer = Render(picture, made, size=size_of(what.size), fps=fps, antialias=what.antialias)
     settings = {"scene": scene, "sharp": sharp, "passes": passes} | output.looks
     settings |= plain(look) | plain(when) | plain(what) | {"wgmb": __version__, "fps": fps}
     settings["samples"], settings["curve"] = samples_of(made), when.curve_read()

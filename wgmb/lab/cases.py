@@ -105,11 +105,11 @@ class SceneFrame:
     time: float = 0.0
     size: tuple[int, int] = (480, 270)
     fps: float = 24.0
-    rays: int = 3
+    antialias: int = 3
 
     def render(self, blur: Blur) -> Render:
         """The scene through a method."""
-        return Render(self.scene, blur, size=self.size, fps=self.fps, rays=self.rays)
+        return Render(self.scene, blur, size=self.size, fps=self.fps, antialias=self.antialias)
 
     def frame(self, device) -> Frame:
         """The sharp frame with its neighbours, as image methods are given it from files."""

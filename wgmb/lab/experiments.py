@@ -48,7 +48,7 @@ def taylor(
     candidates = [Candidate.parse(name) for name in names]
     claims, fixed, worth = [], [], []
     for name in moves:
-        scene_frame = SceneFrame(builtin.make(name), size=size, rays=1)
+        scene_frame = SceneFrame(builtin.make(name), size=size, antialias=1)
         reference = Candidate("distributed", (("seed", 1),), 1000)
         case = scene_case(name, Shutter(360, "end"), reference, scene_frame, lab.device, lab.tell)
         lab.compare(report, case, candidates, (1, 2, 4, UNIT_RAYS, 16, 5 * UNIT_RAYS), _budgets)

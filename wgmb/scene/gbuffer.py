@@ -35,7 +35,7 @@ class SceneOnGpu:
         time: float,
         fps: float,
         span: tuple[float, float],
-        rays: int,
+        antialias: int,
     ):
         """`time` of the frame [s]; `span` of interest around it [frame intervals]."""
         self.device, self.size, self.time, self.fps = device, size, time, fps
@@ -48,7 +48,7 @@ class SceneOnGpu:
         self.loops = 4 * n + n // 16 + 4 + 2 * rings * int(source.constant("RING_STEPS"))
         if n > (most := source.constant("MOST_BODIES")):
             raise InputError(f"a scene has at most {most} bodies, got {n}")
-        self.rays, self.span = rays, span
+        self.antialias, self.span = antialias, span
         self.constants = {"RINGS": rings > 0, "BACKDROP": scene.backdrop is not None}
 
     @cached_property
@@ -81,7 +81,7 @@ class SceneOnGpu:
             scene.backdrop.fill(data["backdrop"])
         zoom = float(np.ravel(scene.camera.zoom(np.array([time])))[0])
         data["pixel"] = 2 / (zoom * size[1])
-        data["rays"] = self.rays
+        data["rays"] = self.antialias
         for bounds, place in zip(data["bounds"], places, strict=False):
             bounds[:3] = _halves(*_bounds(place))
         buffer = self.device.create_buffer_with_data
@@ -104,9 +104,9 @@ class SceneOnGpu:
         time: float,
     ) -> dict[str, wgpu.GPUTexture]:
         """Record the picture at `time` [frame intervals from this frame]; its textures."""
-        rays, bodies = self.rays, len(self.scene.bodies)
-        if self.loops * rays * rays > MOST_LOOPS:
-            raise InputError(f"{bodies} bodies are too many for {rays} x {rays} rays")
+        antialias, bodies = self.antialias, len(self.scene.bodies)
+        if self.loops * antialias * antialias > MOST_LOOPS:
+            raise InputError(f"{bodies} bodies are too many for {antialias} x {antialias} rays")
         color = gpu.texel(self.device, 4)
         kernel = gpu.kernel(self.device, "scene/gbuffer.wgsl", {"Color": color}, **self.constants)
         view = np.zeros((), kernel.source.dtype("View"))

@@ -19,15 +19,15 @@ class Pace:
         self._took: deque[tuple[float, float]] = deque(maxlen=3)
         self._patience = 0
 
-    def quality(self, level: int, rays: int) -> tuple[float, int]:
+    def quality(self, level: int, antialias: int) -> tuple[float, int]:
         """Return the share of the full width, and the rays per pixel side."""
-        return self.SCALES[level], rays if level == 0 else 1
+        return self.SCALES[level], antialias if level == 0 else 1
 
     def samples(self, level: int, samples: int) -> int:
         """Return the number of samples to take, at least QUICK if `samples` allows it."""
         return max(samples // self.FEWER[level], min(samples, QUICK))
 
-    def observe(self, seconds: float, drawing: float, rays: int) -> None:
+    def observe(self, seconds: float, drawing: float, antialias: int) -> None:
         """A moving frame took so long, `drawing` of it for what depends on the level."""
         self._took.append((seconds, drawing))
         if len(self._took) < 3:
@@ -36,7 +36,7 @@ class Pace:
         rest, drew = max(middle[0] - middle[1], 0.0), middle[1]
 
         def predicted(level: int) -> float:
-            return rest + drew * self._cost(level, rays) / self._cost(self.level, rays)
+            return rest + drew * self._cost(level, antialias) / self._cost(self.level, antialias)
 
         last = len(self.SCALES) - 1
         if middle[0] > 1.1 * self.TARGET and self.level < last:
@@ -53,6 +53,6 @@ class Pace:
         self.level, self._patience = level, 0
         self._took.clear()
 
-    def _cost(self, level: int, rays: int) -> float:
-        scale, rays = self.quality(level, rays)
-        return scale * scale * (rays * rays + 1)
+    def _cost(self, level: int, antialias: int) -> float:
+        scale, antialias = self.quality(level, antialias)
+        return scale * scale * (antialias * antialias + 1)

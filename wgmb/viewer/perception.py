@@ -47,7 +47,7 @@ class Perceived:
         eye: Cone,
         subject: Subject,
         blur: Blur,
-        rays: int,
+        antialias: int,
         seconds: float,
         timing: TimestampClock | None,
     ) -> int:
@@ -56,7 +56,7 @@ class Perceived:
         `output`, rgba32float, is what is seen; the oldest frame stands for those before it.
         """
         width, height, _ = output.size
-        alike = (replace(state.picture, frame=0.0), (width, height), rays, blur)
+        alike = (replace(state.picture, frame=0.0), (width, height), antialias, blur)
         if alike != self._alike:
             self._frames, self._alike = {}, alike
         newest, count = math.floor(state.frame + 0.5), eye.frames_needed(state.fps)
@@ -74,12 +74,12 @@ class Perceived:
             left = end - time.perf_counter()
             if left <= 0 and number != newest:
                 break
-            subject.look_at(replace(state, frame=float(number)), (width, height), rays)
+            subject.look_at(replace(state, frame=float(number)), (width, height), antialias)
             held.done = subject.draw(blur, held.texture, (held.done, max(left, 0)), timing)
             self._device.queue.read_buffer(self._token)  # waits
             if held.done < blur.samples:
                 break
-        subject.look_at(state, (width, height), rays)
+        subject.look_at(state, (width, height), antialias)
         drawn = {n: held.texture for n in numbers if (held := self._frames.get(n)) and held.done}
         weights = dict.fromkeys(drawn, 0.0)
         after = (state.frame - newest) / state.fps

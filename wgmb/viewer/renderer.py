@@ -108,14 +108,14 @@ class Renderer:
         subject = self.choices.subject(state)
         shape = subject.size(state)
         place = fit(shape, area, state)
-        size, rays = self._quality(state, shape, place, now, moving, full)
+        size, antialias = self._quality(state, shape, place, now, moving, full)
         report = Report(shape if not state.is_scene else whole(place), place, area, moving)
         quick = moving and not full
         names = self._wanted(state)
         if "perceived" not in names:
             self._perceived.forget()
         for slot, name in zip(("first", "second"), names, strict=False):
-            self._advance(slot, name, state, subject, size, rays, quick, full, report)
+            self._advance(slot, name, state, subject, size, antialias, quick, full, report)
         slots = ("first", "second")[: len(names)]
         first, last = self._shown["first"], self._shown[slots[-1]]
         assert first.texture is not None
@@ -144,13 +144,13 @@ class Renderer:
         encoder = self.device.create_command_encoder(label="download")
         return self._images.download(encoder, shown.texture)
 
-    def finished(self, seconds: float, rays: int) -> None:
+    def finished(self, seconds: float, antialias: int) -> None:
         """The window's frame took so long; moving frames set the pace."""
         if not self.report.moving:
             self._moved = False
         elif self.report.changed:
             if self._moved:  # the first one may have had shaders to compile
-                self.pace.observe(seconds, self.report.seconds["draw"], rays)
+                self.pace.observe(seconds, self.report.seconds["draw"], antialias)
             self._moved = True
 
     def _quality(self, state, shape, place, now, moving, full) -> tuple[tuple[int, int], int]:
@@ -169,9 +169,9 @@ class Renderer:
             self._level = 1
         elif self._level == 1 and now - self._still_since > _SETTLE:
             self._level = 0
-        scale, rays = self.pace.quality(self._level, state.rays)
+        scale, antialias = self.pace.quality(self._level, state.antialias)
         width, height = whole(place)
-        return (max(round(width * scale), 1), max(round(height * scale), 1)), rays
+        return (max(round(width * scale), 1), max(round(height * scale), 1)), antialias
 
     def _wanted(self, state: State) -> list[str]:
         """One or two names: of a look, a method or the reference."""
@@ -180,13 +180,13 @@ class Renderer:
         return [state.look] if state.mode == "off" else [state.look, state.against]
 
     def _advance(
-        self, slot, name, state, subject, size, rays, quick: bool, full: bool, report: Report
+        self, slot, name, state, subject, size, antialias, quick: bool, full: bool, report: Report
     ) -> None:
         """Draw some of `name`; it is shown once it is no coarser than what it replaces."""
         shown, coming = self._shown[slot], self._coming[slot]
         eye = state.eye if name in ("perceived", REFERENCE) else None
         key = (name, state.picture, eye, state.frame if name == "perceived" else None)
-        fine = (size, rays, self._level if quick else None)
+        fine = (size, antialias, self._level if quick else None)
         if (coming.key, coming.fine) != (key, fine):
             if self._level and shown.key == key and not _coarser(shown.fine, fine):
                 return
@@ -197,7 +197,7 @@ class Renderer:
             return
         started = time.perf_counter()
         seconds = float("inf") if full else _QUICK_STEP if quick else _STEP
-        subject.look_at(state, size, rays)
+        subject.look_at(state, size, antialias)
         self._draw(coming, slot, name, state, subject, seconds, quick)
         if self._timing:
             report.passes |= self._timing.read()
@@ -210,7 +210,7 @@ class Renderer:
     def _draw(
         self, coming, slot, name, state, subject: Subject, seconds: float, quick: bool
     ) -> None:
-        size, rays, _ = coming.fine
+        size, antialias, _ = coming.fine
         volumes = state.is_scene and "volume" in self.choices.methods(state)
         if name in _PASSES and not (name == "sharp" and volumes):
             passes = subject.passes()
@@ -226,7 +226,7 @@ class Renderer:
                 subject = self._past = self._past or SceneSubject(self.device)
             coming.total = eye.frames_needed(state.fps)
             coming.done = self._perceived.draw(
-                coming.texture, state, eye, subject, blur, rays, seconds, self._timing
+                coming.texture, state, eye, subject, blur, antialias, seconds, self._timing
             )
             return
         budget = coming.done, float("inf") if quick else seconds

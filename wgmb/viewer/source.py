@@ -62,10 +62,10 @@ class SceneSubject:
         """Width and height that give the picture its shape [px]."""
         return size_of(state.size)
 
-    def look_at(self, state: State, size: tuple[int, int], rays: int) -> None:
+    def look_at(self, state: State, size: tuple[int, int], antialias: int) -> None:
         """What the next draws are of."""
         self._render.scene = self._scene(state)
-        self._render.size, self._render.rays, self._render.fps = size, rays, state.fps
+        self._render.size, self._render.antialias, self._render.fps = size, antialias, state.fps
         self._time, self._number = state.frame / state.fps, int(state.frame // 1)
 
     def _scene(self, state: State) -> Scene:
@@ -128,7 +128,7 @@ class ClipSubject:
         """Width and height of the frames [px]."""
         return self._frame().size
 
-    def look_at(self, state: State, size: tuple[int, int], rays: int) -> None:
+    def look_at(self, state: State, size: tuple[int, int], antialias: int) -> None:
         """What the next draws are of."""
         numbers = self._clip.numbers
         self._number = min(numbers, key=lambda n: abs(n - state.frame))

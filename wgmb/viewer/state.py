@@ -45,7 +45,7 @@ class State:
     frames: str = "0-11"
     frame: float = 0.0  # the moment [frame intervals]
     size: str = "1280x720"
-    rays: int = 2
+    antialias: int = 2
     fps: float = 24.0
 
     method: str = "gather"
@@ -201,7 +201,7 @@ class State:
             "scene": self.source,
             "set": self.set_arguments(),
             "size": self.size,
-            "rays": self.rays,
+            "antialias": self.antialias,
             "orbit": list(self.orbit),
             "pan": list(self.pan),
             "dolly": self.dolly,
