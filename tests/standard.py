@@ -73,7 +73,7 @@ def why_not() -> str:
 
 
 def is_required() -> bool:
-    """Whether it must not be skipped."""
+    """True if a missing Dawn is a failure."""
     return os.environ.get("WGMB_DAWN") == "required"
 
 
@@ -87,7 +87,7 @@ def node_path() -> str | None:
 
 
 def verdict() -> tuple[list[str], bool]:
-    """What is to be said of all recorded kernels, and whether something is wrong."""
+    """Lines about all recorded kernels, and True if something is wrong."""
     if not recorded:
         return [], False
     if reason := why_not():
@@ -98,7 +98,7 @@ def verdict() -> tuple[list[str], bool]:
 
 
 def compiled(rows: list[dict]) -> dict:
-    """What Dawn says of the kernels: `messages` is empty where all is well."""
+    """The answer of Dawn about the kernels; its `messages` are empty where all is well."""
     node = node_path()
     assert node is not None
     done = subprocess.run(

@@ -70,7 +70,7 @@ class Recorder:
 
 
 def group_zero(state: dict) -> dict[str, bytes]:
-    """What Blur binds for every pass."""
+    """The buffers that Blur binds for every pass."""
     blur = object.__new__(Blur)
     blur.device, blur.auto = Recorder(), False
     blur.samples, blur.jitter, blur.max_blur = state["samples"], state["jitter"], state["maxBlur"]
@@ -118,7 +118,7 @@ def kernel_of(state: dict, monkeypatch):
 
 @pytest.fixture(scope="module")
 def answers():
-    """What JavaScript makes of the states."""
+    """The bytes that JavaScript makes of the states."""
     if (node := standard.node_path()) is None:
         if standard.is_required():
             pytest.fail("node is missing")

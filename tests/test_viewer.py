@@ -252,7 +252,7 @@ def test_all_that_a_method_draws_is_what_render_draws(small, method):
 
 
 def seen(frames, fps, after=0.0):
-    """What wgmb/observer.py makes of the frames, the first of which was always there."""
+    """The frames as wgmb/observer.py perceives them; the first was always there."""
     eye = observer.Observer(fps)
     for picture in frames:
         eye.present(picture)

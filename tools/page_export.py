@@ -1,4 +1,4 @@
-"""What the page takes from Python: shaders with their layouts, and constants, as JSON.
+"""Export to JSON what the page takes from Python: shaders with their layouts, and constants.
 
     python tools/page_export.py [SHADER ...] > exported.json
 

@@ -34,7 +34,7 @@ OUTPUT = "rgba16float"
 
 
 class Recorder:
-    """What is made and dispatched while it is `listening`; resources by number and by whom.
+    """Everything created and dispatched while it is `listening`; resources have numbers.
 
     `before`: an earlier recorder whose textures and buffers may be used; they are named there.
     """
@@ -134,7 +134,7 @@ class Recorder:
         return self._numbers[id(resource)]
 
     def recording(self) -> dict[str, Any]:
-        """What replay.js takes."""
+        """The recording as replay.js takes it."""
         return {"passes": self.passes, "buffers": self.buffers, "textures": self.textures}
 
 
@@ -206,7 +206,7 @@ def group_zero(recording: dict[str, Any]) -> dict[str, int]:
 
 
 def differences(one: dict[str, Any], other: dict[str, Any]) -> list[str]:
-    """What two recordings differ in beside the contents of the buffers of group 0."""
+    """Differences of two recordings, without the contents of the buffers of group 0."""
     filled = group_zero(one).values()
     found = [name for name in one if name != "buffers" and one[name] != other[name]]
     for i, (a, b) in enumerate(zip(one["buffers"], other["buffers"], strict=True)):
@@ -232,7 +232,14 @@ def recordings() -> dict[str, Any]:
                     raise RuntimeError(f"{method}, {curve}: degrees change {', '.join(found)}")
                 choices[f"{method} {curve} {samples}"] = one | {"groupZero": group_zero(one)}
     once = session.once.recording() | {"input": session.input}
-    return {"size": list(SIZE), "scene": SCENE, "time": TIME, "once": once, "choices": choices}
+    return {
+        "size": list(SIZE),
+        "scene": SCENE,
+        "time": TIME,
+        "antialias": RAYS,
+        "once": once,
+        "choices": choices,
+    }
 
 
 if __name__ == "__main__":

@@ -152,7 +152,7 @@ def _check_readable(name: str, view: View, like: str) -> None:
 
 
 def _channels(format: str) -> int:
-    """How many channels a texture format has for a shader."""
+    """The number of channels that a texture format has for a shader."""
     if format.startswith(("depth", "stencil")):
         return 1
     return len({*re.sub(r"(unorm|snorm|ufloat|float|uint|sint).*", "", format)} & {*"rgba"})

@@ -6,6 +6,7 @@ The command line, the viewer and the laboratory share them. The string under a f
 import math
 import re
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -15,6 +16,7 @@ from .errors import InputError
 from .io import limits, vectors
 from .io.clip import Clip, Passes
 from .io.frame_numbers import frame_numbers, is_pattern, readable
+from .io.output import Output
 from .methods import METHODS, default_method
 from .methods.options import Option, options_of
 from .pipeline import Blur
@@ -303,6 +305,21 @@ class OutputSettings:
     def looks(self) -> dict:
         """Return the settings that change the contents of the files."""
         return {"bits": self.bits, "layers": self.layers, "compression": self.compression}
+
+    def make(self, settings: dict, numbers: list[int], inputs: Iterable[Path] = ()) -> Output:
+        """The Output for frames of these `numbers`; see there for `settings` and `inputs`."""
+        return Output(
+            self.output,
+            settings=settings,
+            numbers=numbers,
+            bits=self.bits,
+            fps=self.rate,
+            inputs=inputs,
+            overwrite=self.overwrite,
+            resume=self.resume,
+            layers=self.layers,
+            compression=self.compression,
+        )
 
     @property
     def rate(self) -> Fraction:

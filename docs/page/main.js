@@ -202,7 +202,7 @@ function update(remember = false) {
     const { recordings } = view;
     say($('command2'), commandLine({
       scene: recordings.scene, time: recordings.time, width: recordings.size[0], height: recordings.size[1],
-      antialias: recordings.antialias ?? 2, fps: 24, method: state.method, samples: state.samples,
+      antialias: recordings.antialias, fps: 24, method: state.method, samples: state.samples,
       shutter: shutterOf({ curve: state.curve2, degrees: state.deg2 }),
     }));
     showTime();

@@ -12,7 +12,6 @@ from .._version import __version__
 from ..batch import BatchReport, blur_sequence
 from ..errors import InputError
 from ..io.frame_file import odd_sizes
-from ..io.output import Output
 from ..pipeline import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
 from .exit_codes import DONE, SOME_FAILED
@@ -61,18 +60,7 @@ def blur(
     if confidence:
         check_confidence(made, output)
         settings["confidence"] = True
-    files = Output(
-        output.output,
-        settings=settings,
-        numbers=clip.numbers,
-        bits=output.bits,
-        fps=output.rate,
-        inputs=clip.inputs,
-        overwrite=output.overwrite,
-        resume=output.resume,
-        layers=output.layers,
-        compression=output.compression,
-    )
+    files = output.make(settings, clip.numbers, clip.inputs)
     if verbose:
         note(f"adapter: {made.device.adapter.summary}")
         note(f"settings: {files.settings}")

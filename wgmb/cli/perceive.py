@@ -17,7 +17,6 @@ from ..errors import InputError
 from ..io.atomic import write_file
 from ..io.frame_file import FrameFile
 from ..io.frame_numbers import frame_numbers
-from ..io.output import Output
 from ..lab import charts
 from ..lab.shutter_study import best_shutter, compare, perception_charts
 from ..observer import Observer
@@ -107,17 +106,8 @@ def perceive(
         pictures = ((n, clip.source(n), [clip.source(n).rgba]) for n in numbers)
         inputs = clip.inputs
     observer = Observer(rate, who.cone, device=adapter)
-    files = Output(
-        output.output,
-        settings={"wgmb": __version__} | plain(who) | {"input": pattern, "fps": output.fps},
-        numbers=numbers,
-        bits=output.bits,
-        fps=output.rate,
-        inputs=inputs,
-        overwrite=output.overwrite,
-        layers=output.layers,
-        compression=output.compression,
-    )
+    settings = {"wgmb": __version__} | plain(who) | {"input": pattern, "fps": output.fps}
+    files = output.make(settings, numbers, inputs)
     started = time.perf_counter()
     with progress(len(numbers), quiet, "perceiving") as tick:
         try:

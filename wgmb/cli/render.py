@@ -11,7 +11,6 @@ from cyclopts import Parameter
 from .._version import __version__
 from ..batch import render_frames
 from ..errors import InputError
-from ..io.output import Output
 from ..render import Render
 from ..settings import SceneSettings, plain, size_of
 from .blur import check_confidence, samples_of
@@ -76,17 +75,7 @@ def render(
     if confidence:
         check_confidence(made, output)
         settings["confidence"] = True
-    files = Output(
-        output.output,
-        settings=settings,
-        numbers=list(moments),
-        bits=output.bits,
-        fps=output.rate,
-        overwrite=output.overwrite,
-        resume=output.resume,
-        layers=output.layers,
-        compression=output.compression,
-    )
+    files = output.make(settings, list(moments))
     if verbose:
         note(f"adapter: {renderer.blur.device.adapter.summary}")
         note(f"settings: {files.settings}")

@@ -125,5 +125,5 @@ class Layers:
 
 
 def _contents(frame) -> tuple[object, bool]:
-    """What the layers of a frame are made of: its pixels, with weights or without."""
+    """The cache key of a frame's layers: its pixels, with weights or without."""
     return frame.key, frame.weight is not None
