@@ -36,6 +36,7 @@ class BatchReport:
     failed: dict[int, str] = field(default_factory=dict)
     stopped: str = ""  # why the rest was not tried, or there is no video
     bad: dict[int, dict[str, int]] = field(default_factory=dict)  # pixels not finite, by input
+    absent: list[str] = field(default_factory=list)  # masks that no frame has; see Clip.absent
 
 
 @dataclass
@@ -100,7 +101,14 @@ def blur_sequence(
     reason; the others are done. Where frame after frame cannot be written for the same reason (a
     full disk, a folder that is gone), or a video cannot go on, the run stops and `stopped`
     says why. Interrupted, nothing half written is left and the interruption goes on.
+    InputError, before any frame is blurred, where a mask names an object that no Cryptomatte
+    has. What has no name is known at the end: `absent`, if every frame was read.
     """
+    try:
+        clip.check_names()
+    except BaseException:
+        output.abandon()
+        raise
     return _Pipeline(clip, blur, output, resume, confidence, progress).run()
 
 
@@ -163,6 +171,8 @@ class _Pipeline:
                 report.stopped = str(error)
         if self.output.is_video and report.stopped:  # it is not there at all
             report.done.clear()
+        if len(report.done) == len(self.clip.numbers):
+            report.absent = self.clip.absent
         return report
 
     def read(self) -> None:

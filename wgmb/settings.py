@@ -16,6 +16,7 @@ from .errors import InputError
 from .io import limits, vectors
 from .io.clip import Clip, Passes
 from .io.frame_numbers import frame_numbers, is_pattern, readable
+from .io.masks import is_file, with_amount
 from .io.output import Output
 from .methods import METHODS, default_method
 from .methods.options import Option, options_of
@@ -117,10 +118,16 @@ class InputSettings:
     max_mb: float = limits.MAX_MB
     "Largest allowed decoded size of an image file in megabytes (as 32-bit floats)."
 
-    def open(self, pattern: str, holdout: str | None = None, scale: str | None = None) -> Clip:
-        """Return the Clip these settings describe; InputError if a file is not readable."""
-        for name in (holdout, scale, *self.also):
-            if name and Path(name).suffix and not is_pattern(name):
+    def open(
+        self, pattern: str, holdout: tuple[str, ...] = (), scale: tuple[str, ...] = ()
+    ) -> Clip:
+        """Return the Clip these settings describe.
+
+        InputError if a file is not readable, or a mask names what no Cryptomatte has.
+        """
+        files = [name for name in (*holdout, *(with_amount(s)[0] for s in scale)) if is_file(name)]
+        for name in (*files, *self.also):
+            if Path(name).suffix and not is_pattern(name):
                 readable(Path(name))
         passes = Passes(
             color=self.layer,
@@ -141,7 +148,7 @@ class InputSettings:
             scale=scale,
             also=self.also,
         )
-        return Clip(
+        clip = Clip(
             pattern,
             frames=self.frames,
             passes=passes,
@@ -149,6 +156,8 @@ class InputSettings:
             cuts=self.cuts,
             max_mb=self.max_mb,
         )
+        clip.check_names()
+        return clip
 
 
 def _method_options() -> dict[str, tuple[object, object, str]]:
@@ -195,10 +204,10 @@ class BlurSettings:
     "Taps, images or rays per pixel: 16 (fusion: 8); auto: 1 per pixel of blur length, at most 64."
     jitter: float = 0.0
     "Jitter of the sample times, 0 to 1: trades banding for noise."
-    holdout: str | None = None
+    holdout: tuple[str, ...] = ()
     "Pixels to keep sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or an image file."
-    scale: str | None = None
-    "Motion scale per pixel: a LAYER or an image file."
+    scale: tuple[str, ...] = ()
+    "Motion scale: a LAYER or image file that multiplies it, or LAYER=VALUE:AMOUNT for an object."
     max_blur: float | None = None
     "Maximum blur length in pixels."
 

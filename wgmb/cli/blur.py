@@ -88,6 +88,8 @@ def _conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose:
     if report.stopped:
         rest = len(clip.numbers) - len(report.done) - len(report.skipped) - len(report.failed)
         note(f"wgmb: stopped: {report.stopped}; {rest} other frames were not written")
+    for mask in report.absent:
+        note(f"wgmb: {mask} is in no frame, so it changed nothing")
     if not quiet:
         for number, bad in sorted(report.bad.items()):
             what = ", ".join(f"{n} in {name}" for name, n in bad.items())
@@ -102,7 +104,7 @@ def _conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose:
         note(done + (f", {len(report.skipped)} already done" if report.skipped else ""))
     if report.failed:
         note(f"wgmb: {len(report.failed)} of {len(clip.numbers)} frames failed")
-    return SOME_FAILED if report.failed or report.stopped else DONE
+    return SOME_FAILED if report.failed or report.stopped or report.absent else DONE
 
 
 def check_confidence(made: Blur, output: OutputSettings) -> None:

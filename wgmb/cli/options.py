@@ -38,13 +38,21 @@ class BlurOptions(BlurSettings):
     """Blur method and options."""
 
     holdout: Annotated[
-        str | None,
+        tuple[str, ...],
         Parameter(
             alias="--keep",
-            help="Pixels to keep sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) "
-            "or an image file.",
+            help="Pixels to keep sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte; "
+            "names may have wildcards) or an image file; may be repeated.",
         ),
-    ] = None
+    ] = ()
+
+    scale: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="Scale of the motion: a LAYER or image file that multiplies it, or "
+            "LAYER=VALUE:AMOUNT for the pixels of an object; may be repeated.",
+        ),
+    ] = ()
 
     method: Annotated[
         str | None,

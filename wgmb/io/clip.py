@@ -17,13 +17,12 @@ from typing import Any
 import numpy as np
 
 from ..camera import MAX_INDEX
-from ..color import srgb
 from ..errors import InputError
 from ..frame import Frame
-from . import layers, limits, stills, vectors
+from . import layers, limits, vectors
 from .camera_file import CameraFile
 from .cuts import is_cut, jumps, still, straightened
-from .frame_file import FrameFile, about, read, size_text
+from .frame_file import FrameFile, about, read
 from .frame_numbers import (
     MOST_FRAMES,
     frame_list,
@@ -34,6 +33,7 @@ from .frame_numbers import (
     numbers_on_disk,
     readable,
 )
+from .masks import Masks
 
 DEPTHS = ("planar", "inverse", "clip")
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
@@ -47,8 +47,11 @@ class Passes:
     (distance along the view axis), "inverse" (its reciprocal, Nuke), or "clip" (z after
     projection). `camera`: JSON file (see CameraFile) for motion where vectors are missing.
     `object_layer`: index layer that identifies the camera file's objects. `object_motion`:
-    vectors exclude the camera's motion. `holdout`, `scale`: a layer, `LAYER=VALUE`, or an image
-    file or pattern. `also`: patterns of files with additional layers of the same frames.
+    vectors exclude the camera's motion. `holdout`, `scale`: masks, each a layer, `LAYER=VALUE`,
+    or an image file or pattern; VALUE is an index, or a name (with wildcards) or id of a
+    Cryptomatte. Held out is what any of the masks has. The scales multiply; `MASK:AMOUNT`
+    stands for 1 + (AMOUNT - 1) * mask. `also`: patterns of files with additional layers of the
+    same frames.
     """
 
     color: str | None = None
@@ -59,11 +62,14 @@ class Passes:
     camera: Path | None = None
     object_layer: str | None = None
     object_motion: bool = False
-    holdout: str | None = None
-    scale: str | None = None
+    holdout: str | tuple[str, ...] = ()
+    scale: str | tuple[str, ...] = ()
     also: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        for name in ("holdout", "scale"):
+            given = getattr(self, name)
+            object.__setattr__(self, name, (given,) if isinstance(given, str) else tuple(given))
         if self.depth_kind not in DEPTHS:
             raise InputError(f"depth must be one of {', '.join(DEPTHS)}, got {self.depth_kind!r}")
         if not self.far > 0:
@@ -75,8 +81,8 @@ class Clip:
 
     Iterating gives Frames. `numbers` are the requested frames, `on_disk` all existing ones.
     `finding` describes the detected vector convention. Of the frames read so far, `cuts` has
-    those after a camera cut, `unread` the neighbours that could not be read, and `sizes` the
-    sizes.
+    those after a camera cut, `unread` the neighbours that could not be read, `sizes` the sizes,
+    and `absent` the masks by index or id (`IndexOB=4`, `CryptoObject=0x...`) that none of them has.
     """
 
     def __init__(
@@ -101,6 +107,10 @@ class Clip:
         self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
         self.cuts: set[int] = set()
         self.unread: set[int] = set()
+        patterns = (self.pattern, *self.passes.also)
+        self._masks = Masks(
+            tuple(self.passes.holdout), tuple(self.passes.scale), patterns, self.numbers, max_mb
+        )
         self._kept: OrderedDict[int, FrameFile] = OrderedDict()
         self._ready: OrderedDict[int, tuple[FrameFile, bool, Frame]] = OrderedDict()
         self._found: vectors.Finding | None = None
@@ -152,10 +162,9 @@ class Clip:
     def files(self, number: int) -> list[Path]:
         """Every file that the result of frame `number` depends on."""
         passes = self.passes
-        masks = [m for m in (passes.holdout, passes.scale) if m is not None and _is_file(m, number)]
-        patterns = (self.pattern, *passes.also, *masks)
+        paths = [frame_path(p, number) for p in (self.pattern, *passes.also)]
         camera = [passes.camera] if passes.camera else []
-        return [*(frame_path(p, number) for p in patterns), *camera]
+        return [*paths, *self._masks.files(number), *camera]
 
     @property
     def inputs(self) -> Iterator[Path]:
@@ -173,7 +182,8 @@ class Clip:
         if neighbours and is_pattern(self.pattern):
             near = (number - 1, number + 1)
             around += [n for n in near if frame_path(self.pattern, n).is_file()]
-        files = dict.fromkeys(path for n in around for path in self.files(n))
+        paths = (p for n in around for p in (*self.files(n), *self._masks.manifests(n)))
+        files = dict.fromkeys(paths)
         meaning = self._decide().vectors
         return {
             "files": [[path.name, *_size_and_time(path)] for path in files],
@@ -328,8 +338,8 @@ class Clip:
                 normal=self._normal(source) if normal else None,
                 camera=reprojections,
                 object_id=ids,
-                holdout=self._mask(source, self.passes.holdout),
-                scale=self._mask(source, self.passes.scale),
+                holdout=self._masks.holdout(source),
+                scale=self._masks.scale(source),
                 object_motion=self.passes.object_motion,
                 number=source.number,
             )
@@ -363,23 +373,17 @@ class Clip:
             index = np.rint(plane.astype(np.float64))
             return np.where(index > 0, np.minimum(index, MAX_INDEX), 0).astype(np.uint32)
 
-    def _mask(self, source: FrameFile, wanted: str | None) -> np.ndarray | None:
-        if wanted is None:
-            return None
-        if not _is_file(wanted, source.number):
-            return layers.mask(source.channels, source.attributes, wanted)
-        file = frame_path(wanted, source.number)
-        if file.suffix.lower() == ".exr":
-            channels = read([file], source.number, None, self._max_mb).channels
-            plane = layers.grey(channels).astype(np.float32)
-        else:
-            light = stills.read(file, max_mb=self._max_mb)
-            plane = srgb(light[..., 0])  # grey values as painted
-        if plane.shape[::-1] != source.size:
-            raise InputError(
-                f"{file} must be {size_text(source.size)} like the image, got {size_text(plane)}"
-            )
-        return plane
+    @property
+    def absent(self) -> list[str]:
+        """Masks by index or id that no frame read so far has."""
+        return self._masks.absent
+
+    def check_names(self) -> None:
+        """InputError where a mask names an object that no frame's Cryptomatte has.
+
+        The headers of the frames are searched once, up to the first that has the name.
+        """
+        self._masks.check_names()
 
 
 def _size_and_time(path: Path) -> tuple[int, int]:
@@ -389,7 +393,3 @@ def _size_and_time(path: Path) -> tuple[int, int]:
     except OSError:
         return -1, -1
     return found.st_size, found.st_mtime_ns
-
-
-def _is_file(mask: str, number: int) -> bool:
-    return frame_path(mask, number).suffix.lower() in (".exr", *stills.SUFFIXES)

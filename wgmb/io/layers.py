@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
-import struct
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -124,83 +121,3 @@ def grey(channels: Channels) -> np.ndarray:
         if name in channels:
             return channels[name]
     return channels[next(iter(layers(channels).values()))[0]]
-
-
-# ---- masks ----------------------------------------------------------------------------------
-
-
-def mask(channels: Channels, attributes: Mapping, wanted: str) -> np.ndarray:
-    """A mask 0..1 from `LAYER` or `LAYER=VALUE`.
-
-    A grey layer is the mask itself. With a number for VALUE, the pixels of the layer that
-    hold it (object or material index). Where LAYER is a Cryptomatte, VALUE is an object's
-    name in its manifest or its id as 0x and eight digits, and the mask its coverage.
-    """
-    layer, _, value = wanted.partition("=")
-    crypto = _cryptomatte(attributes, layer)
-    if crypto is not None:
-        return _crypto_coverage(channels, crypto, value)
-    plane = np.asarray(channels[one_channel(layers(channels), layer, "layer")], np.float32)
-    if not value:
-        return np.clip(plane, 0, 1)
-    try:
-        number = float(value)
-    except ValueError:
-        raise InputError(
-            f"layer {layer!r} is not a Cryptomatte, so {value!r} must be a number"
-        ) from None
-    return (np.abs(plane - number) < 0.5).astype(np.float32)
-
-
-def _cryptomatte(attributes: Mapping, layer: str) -> dict[str, str] | None:
-    """The `cryptomatte/<key>/...` attributes of the Cryptomatte called `layer`."""
-    found: dict[str, dict[str, str]] = {}
-    for name, value in attributes.items():
-        m = re.fullmatch(r"cryptomatte/([^/]+)/(\w+)", name)
-        if m and isinstance(value, str):  # of another type it may not even be readable
-            found.setdefault(m[1], {})[m[2]] = value
-    for crypto in found.values():
-        name = crypto.get("name")
-        if name and (layer in (name, stem(name)) or stem(name) == layer.lower()):
-            return crypto
-    return None
-
-
-def _crypto_coverage(channels: Channels, crypto: Mapping[str, str], value: str) -> np.ndarray:
-    """Coverage of one id (Cryptomatte specification 1.2): pairs of id and coverage, by rank."""
-    name = crypto["name"]
-    wanted = np.uint32(_crypto_id(crypto, value))
-    ranks = {
-        k: v for k, v in layers(channels).items() if re.fullmatch(re.escape(name) + r"\d\d", k)
-    }
-    if not ranks:
-        raise InputError(f"Cryptomatte {name!r} has no layers {name}00, {name}01, ...")
-    total = np.zeros(next(iter(channels.values())).shape, np.float32)
-    for members in ranks.values():
-        for id_, coverage in zip(members[0::2], members[1::2], strict=False):
-            ids = np.ascontiguousarray(channels[id_], np.float32).view(np.uint32)
-            total += np.where(ids == wanted, np.asarray(channels[coverage], np.float32), 0)
-    return np.clip(total, 0, 1)
-
-
-def _crypto_id(crypto: Mapping[str, str], value: str) -> int:
-    if not value:
-        raise InputError(f"Cryptomatte {crypto['name']!r}: choose an object with LAYER=NAME")
-    if re.fullmatch(r"0[xX][0-9a-fA-F]{1,8}", value):
-        return int(value, 16)
-    try:
-        manifest = json.loads(crypto.get("manifest") or "{}")
-    except (ValueError, RecursionError):
-        manifest = {}
-    if not isinstance(manifest, dict) or value not in manifest:
-        known = (
-            ", ".join(list(manifest)[:8] if isinstance(manifest, dict) else ())
-            or "nothing; give the id as 0x and eight digits"
-        )
-        raise InputError(
-            f"Cryptomatte {crypto['name']!r} has no {value!r}; its manifest has {known}"
-        )
-    try:
-        return struct.unpack(">I", bytes.fromhex(manifest[value]))[0]
-    except (ValueError, struct.error, TypeError):
-        raise InputError(f"Cryptomatte {crypto['name']!r}: bad id for {value!r}") from None

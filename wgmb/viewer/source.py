@@ -103,7 +103,7 @@ class ClipSubject:
     def __init__(self, device: wgpu.GPUDevice, state: State):
         self._device, self._images = device, TexturePool(device)
         given: dict[str, Any] = dict(state.given)
-        masks = given.pop("holdout", None), given.pop("scale", None)
+        masks = given.pop("holdout", ()), given.pop("scale", ())
         self._clip = InputSettings(**given).open(state.source, *masks)
         self._frames: OrderedDict[int, Frame] = OrderedDict()
         self._sharp = Blur("tap", device=device)

@@ -229,7 +229,7 @@ class State:
             if plain == (list(default) if isinstance(default, tuple) else default):
                 continue
             flag = "--" + name.replace("_", "-")
-            repeated = name in ("set", "also")
+            repeated = name in ("set", "also", "holdout", "scale")
             if repeated:
                 for item in value:  # pyright: ignore[reportGeneralTypeIssues]
                     words += _said(flag, str(item))
