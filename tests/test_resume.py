@@ -369,14 +369,14 @@ def test_only_what_dead_processes_of_this_host_left_of_our_names_is_swept(tmp_pa
 def test_a_run_whose_folder_is_gone_stops(tmp_path, capsys, monkeypatch):
     pattern = make.write_sequence(tmp_path, range(1, 21))
     out = tmp_path / "out"
-    write = Output.write
+    write = Output.write_views
 
-    def removed_at_4(self, result, source, *more):
-        if source.number == 4:
+    def removed_at_4(self, results, *more):
+        if results[0].source.number == 4:
             shutil.rmtree(out)
-        write(self, result, source, *more)
+        write(self, results, *more)
 
-    monkeypatch.setattr(Output, "write", removed_at_4)
+    monkeypatch.setattr(Output, "write_views", removed_at_4)
     code, _, err = run(capsys, pattern, out, "--method", "tap")
     assert code == 1
     said, why = err.splitlines(), "No such file or directory"

@@ -14,7 +14,7 @@ from PIL import Image
 import make_frames as make
 from wgmb import InputError
 from wgmb.color import linear, srgb, to_display
-from wgmb.io import exr, record, stills
+from wgmb.io import exr, frame_file, record, stills
 from wgmb.io.frame_file import FrameFile
 from wgmb.io.output import Output
 
@@ -191,8 +191,7 @@ def test_a_result_replaces_the_picture_only(tmp_path):
     channels = many_channels() | {"A": np.ones((48, 64), "f4")}
     path = make.write_exr(tmp_path / "a.exr", channels, {"owner": "me"}, data=(-3, 4, 60, 51),
                           display=(0, 0, 59, 59))  # fmt: skip
-    file = exr.read(path)
-    source = FrameFile(1, path, file, file.channels(), {}, part=file.parts[0])
+    (source,) = frame_file.read([path], 1, None)
     result = make.picture(9)
     out = Output(tmp_path / "o.exr", settings={"shutter": 180}, numbers=[1])
     out.write(result, source)

@@ -15,14 +15,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from .errors import Error, GpuMemoryError, InputError
 from .frame import Frame
 from .io import exr
 from .io.clip import Clip
 from .io.frame_file import FrameFile
-from .io.output import Output
+from .io.frame_numbers import has_view
+from .io.output import Output, Result
 from .pipeline import Blur
 from .render import Render
 
@@ -41,10 +40,10 @@ class BatchReport:
 
 @dataclass
 class _Job:
-    """One frame, read and to be blurred."""
+    """One frame, read and to be blurred: every view of it."""
 
-    source: FrameFile
-    frame: Frame
+    number: int
+    views: list[tuple[FrameFile, Frame]]
     made_of: dict[str, Any]
 
 
@@ -52,13 +51,12 @@ class _Job:
 class _Blurred:
     """One frame, blurred and to be written."""
 
-    source: FrameFile
+    number: int
+    views: list[Result]
     made_of: dict[str, Any]
-    picture: np.ndarray
-    confidence: dict[str, np.ndarray]
 
 
-IN_FLIGHT = 3  # frames: one being read, one on the GPU, one being written
+IN_FLIGHT = 3  # frames, with all their views: one being read, one on the GPU, one being written
 HOPELESS = 3  # frames one after the other that cannot be written for the same reason
 
 Progress = Callable[[int, str], None]
@@ -97,6 +95,9 @@ def blur_sequence(
 ) -> BatchReport:
     """Blur every frame of `clip` into `output`; `confidence` adds confidence layers.
 
+    Of stereo frames every view is blurred, or the one that the clip was opened for; an output that
+    holds one picture gets the default view.
+
     Frames that cannot be read, blurred or written are in the report's `failed`, with the
     reason; the others are done. Where frame after frame cannot be written for the same reason (a
     full disk, a folder that is gone), or a video cannot go on, the run stops and `stopped`
@@ -105,11 +106,22 @@ def blur_sequence(
     has. What has no name is known at the end: `absent`, if every frame was read.
     """
     try:
+        _check_names_of_views(clip, output)
         clip.check_names()
     except BaseException:
         output.abandon()
         raise
     return _Pipeline(clip, blur, output, resume, confidence, progress).run()
+
+
+def _check_names_of_views(clip: Clip, output: Output) -> None:
+    """InputError where views in a file each would go into one."""
+    apart = has_view(clip.pattern) and len(clip.chosen) > 1
+    if apart and output.takes_views and not has_view(output.pattern):
+        raise InputError(
+            f"output {output.pattern}: the frames have a file for each view, so %V must be in its "
+            "name too"
+        )
 
 
 class _Pipeline:
@@ -197,40 +209,50 @@ class _Pipeline:
             self.report.skipped.append(number)
             self.progress(number, "skipped")
             return
-        source = self.clip.source(number)
+        sources = self.clip.sources(number)
+        if not self.output.takes_views:
+            del sources[1:]
         prepare = self.clip.with_neighbours if neighbours else self.clip.frame
-        frame = prepare(source, normal="normal" in self.blur.method.uses)
+        normal = "normal" in self.blur.method.uses
+        views = []
+        for source in sources:
+            try:
+                views.append((source, prepare(source, normal=normal)))
+            except InputError as error:
+                raise _of_view(error, source, sources) from None
         if unread := sorted({number - 1, number + 1} & self.clip.unread):
             made_of["unread"] = unread  # so that --resume asks for them again
-        self.to_blur.put(_Job(source, frame, made_of))
+        self.to_blur.put(_Job(number, views, made_of))
 
     def blur_one(self, job: _Job) -> None:
         """The second stage, for one frame."""
-        confidence: dict[str, np.ndarray] = {}
-        try:
-            if self.confidence:
-                picture, confidence = self.blur.with_confidence(job.frame)
-            else:
-                picture = self.blur(job.frame)
-        except (InputError, GpuMemoryError) as error:
-            self._fail(job.source.number, InputError(f"{job.source.path}: {error}"))
-            return
-        if job.frame.bad:
-            self.report.bad[job.source.number] = job.frame.bad
-        self.to_write.put(_Blurred(job.source, job.made_of, picture, confidence))
+        results: list[Result] = []
+        for source, frame in job.views:
+            try:
+                results.append(self._blurred(source, frame))
+            except (InputError, GpuMemoryError) as error:
+                self._fail(job.number, _of_view(error, source, [other for other, _ in job.views]))
+                return
+            for name, count in frame.bad.items():
+                bad = self.report.bad.setdefault(job.number, {})
+                bad[name] = bad.get(name, 0) + count
+        self.to_write.put(_Blurred(job.number, results, job.made_of))
+
+    def _blurred(self, source: FrameFile, frame: Frame) -> Result:
+        if self.confidence:
+            return Result(source, *self.blur.with_confidence(frame))
+        return Result(source, self.blur(frame))
 
     def write(self) -> None:
         """The third stage: results to files."""
         reasons: list[str] = []
         while (blurred := self.to_write.get()) is not None:
-            number = blurred.source.number
+            number = blurred.number
             if self.hopeless.is_set():
                 self.places.put(None)
                 continue
             try:
-                self.output.write(
-                    blurred.picture, blurred.source, blurred.confidence, blurred.made_of
-                )
+                self.output.write_views(blurred.views, blurred.made_of)
             except (Error, OSError, MemoryError, RuntimeError) as error:
                 self._fail(number, error)
                 reasons.append(self.output.why_hopeless(error))
@@ -259,6 +281,13 @@ class _Pipeline:
         except BaseException as error:  # a fault of ours: the main thread raises it
             self.crash.append(error)
             self.stop.set()
+
+
+def _of_view(error: Error, source: FrameFile, sources: list[FrameFile]) -> InputError:
+    """The error with the name of the file, and of the views that may do better."""
+    text = str(error) if source.name in str(error) else f"{source.name}: {error}"
+    others = [other.view for other in sources if other.view not in (None, source.view)]
+    return InputError(text + (f"; choose a view: {', '.join(map(str, others))}" if others else ""))
 
 
 def _reason(error: BaseException) -> str:
@@ -318,4 +347,5 @@ def _with_passes(render: Render, frame: Frame, number: int) -> FrameFile:
     width, height = frame.size
     window = (0, 0, width - 1, height - 1)
     part = exr.Part("", channels, {}, window, window)
-    return FrameFile(number, Path(), exr.Exr(Path(), [part]), channels, {}, part=part)
+    file, origin = exr.Exr(Path(), [part]), {name: (part, name) for name in channels}
+    return FrameFile(number, Path(), file, channels, {}, part=part, origin=origin)

@@ -6,7 +6,7 @@ The command line, the viewer and the laboratory share them. The string under a f
 import math
 import re
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -113,6 +113,8 @@ class InputSettings:
     "Pattern of files with additional layers of the same frames; may be repeated."
     cuts: str | None = None
     "Frames that begin a new shot, such as 101,155, in addition to the detected cuts."
+    view: str | None = None
+    "The only view of stereo frames to use, such as left; by default all are blurred."
     skip_missing: bool = False
     "Skip missing frames instead of stopping with an error."
     max_mb: float = limits.MAX_MB
@@ -154,6 +156,7 @@ class InputSettings:
             passes=passes,
             skip_missing=self.skip_missing,
             cuts=self.cuts,
+            view=self.view,
             max_mb=self.max_mb,
         )
         clip.check_names()
@@ -315,8 +318,14 @@ class OutputSettings:
         """Return the settings that change the contents of the files."""
         return {"bits": self.bits, "layers": self.layers, "compression": self.compression}
 
-    def make(self, settings: dict, numbers: list[int], inputs: Iterable[Path] = ()) -> Output:
-        """The Output for frames of these `numbers`; see there for `settings` and `inputs`."""
+    def make(
+        self,
+        settings: dict,
+        numbers: list[int],
+        inputs: Iterable[Path] = (),
+        views: Sequence[str] = (),
+    ) -> Output:
+        """The Output for frames of these `numbers`; see there for the others."""
         return Output(
             self.output,
             settings=settings,
@@ -328,6 +337,7 @@ class OutputSettings:
             resume=self.resume,
             layers=self.layers,
             compression=self.compression,
+            views=views,
         )
 
     @property

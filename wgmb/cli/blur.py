@@ -12,6 +12,7 @@ from .._version import __version__
 from ..batch import BatchReport, blur_sequence
 from ..errors import InputError
 from ..io.frame_file import odd_sizes
+from ..io.frame_numbers import frame_list
 from ..pipeline import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
 from .exit_codes import DONE, SOME_FAILED
@@ -60,7 +61,7 @@ def blur(
     if confidence:
         check_confidence(made, output)
         settings["confidence"] = True
-    files = output.make(settings, clip.numbers, clip.inputs)
+    files = output.make(settings, clip.numbers, clip.inputs, clip.chosen)
     if verbose:
         note(f"adapter: {made.device.adapter.summary}")
         note(f"settings: {files.settings}")
@@ -96,6 +97,11 @@ def _conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose:
             note(f"frame {number}: ignored pixels that are not finite: {what}")
         if verbose or "because" in clip.finding or "check them" in clip.finding:
             note(f"vectors: {clip.finding}")
+        for text, numbers in clip.notes.items():
+            if told := sorted(set(numbers) & set(report.done)):
+                note(
+                    text if len(told) == len(report.done) else f"frames {frame_list(told)}: {text}"
+                )
         if clip.cuts:
             note(f"camera cut before frame {', '.join(map(str, sorted(clip.cuts)))}")
         if odd := odd_sizes({n: clip.sizes[n] for n in report.done}):

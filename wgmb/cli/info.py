@@ -68,6 +68,8 @@ def describe(clip: Clip, output: Path | None = None) -> list[tuple[str, str]]:
     for part in source.file.parts if source.file else ():
         if part.data_window != part.display_window:
             lines.append(("window", f"data {part.data_window} in display {part.display_window}"))
+    if clip.views:
+        lines.append(("views", _views_text(clip, source)))
     for layer, members in layers.layers(source.channels).items():
         kinds = [f"{layers.component(m).upper()} {source.channels[m].dtype}" for m in members]
         lines.append(("layer", f"{layer or '(picture)'}: {', '.join(kinds)}"))
@@ -76,6 +78,15 @@ def describe(clip: Clip, output: Path | None = None) -> list[tuple[str, str]]:
     lines.append(("depth", depth or "none"))
     lines.append(("vectors", clip.finding))
     return lines + _about_motion(clip, source, output)
+
+
+def _views_text(clip: Clip, source: FrameFile) -> str:
+    """Return the names of the views, and of the layers that are in none."""
+    first, *others = clip.views
+    text = ", ".join((f"{first} (default)", *others))
+    if source.shared:
+        text += f"; in no view: {', '.join(layers.layers(source.shared))}"
+    return text if source.view == first else f"{text}; here: {source.view}"
 
 
 def _about_motion(clip: Clip, source: FrameFile, output: Path | None) -> list[tuple[str, str]]:

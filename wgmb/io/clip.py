@@ -11,15 +11,16 @@ import contextlib
 from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..camera import MAX_INDEX
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..frame import Frame
-from . import layers, limits, vectors
+from . import exr, layers, limits, vectors, views
 from .camera_file import CameraFile
 from .cuts import is_cut, jumps, still, straightened
 from .frame_file import FrameFile, about, read
@@ -28,10 +29,13 @@ from .frame_numbers import (
     frame_list,
     frame_numbers,
     frame_path,
+    has_view,
+    in_view,
     is_pattern,
     number_in,
     numbers_on_disk,
     readable,
+    views_on_disk,
 )
 from .masks import Masks
 
@@ -51,7 +55,7 @@ class Passes:
     or an image file or pattern; VALUE is an index, or a name (with wildcards) or id of a
     Cryptomatte. Held out is what any of the masks has. The scales multiply; `MASK:AMOUNT`
     stands for 1 + (AMOUNT - 1) * mask. `also`: patterns of files with additional layers of the
-    same frames.
+    same frames. In the names of files, %V stands for the view (see Clip.views).
     """
 
     color: str | None = None
@@ -81,8 +85,12 @@ class Clip:
 
     Iterating gives Frames. `numbers` are the requested frames, `on_disk` all existing ones.
     `finding` describes the detected vector convention. Of the frames read so far, `cuts` has
-    those after a camera cut, `unread` the neighbours that could not be read, `sizes` the sizes,
-    and `absent` the masks by index or id (`IndexOB=4`, `CryptoObject=0x...`) that none of them has.
+    those after a camera cut, `unread` the neighbours that could not be read, `sizes` the
+    sizes, `notes` lines that a user should know, each with its frames, and `absent` the masks by
+    index or id (`IndexOB=4`, `CryptoObject=0x...`) that none of them has.
+
+    Stereo frames have `views`. Each view has its own picture, vectors, depth and masks; cuts and
+    what the vectors mean are settled on the default view.
     """
 
     def __init__(
@@ -93,38 +101,57 @@ class Clip:
         passes: Passes | None = None,
         skip_missing: bool = False,
         cuts: str | None = None,
+        view: str | None = None,
         max_mb: float = limits.MAX_MB,
     ):
         """`frames`: "1-100x2", "1,3,5-8"; by default all existing ones, without gaps unless
         `skip_missing`. `cuts`: frames that begin a new shot, in the same form, beside those that
-        are detected. `max_mb`: largest decoded size of a file in megabytes.
+        are detected. `view`: the only view to blur; by default all. `max_mb`: largest decoded
+        size of a file in megabytes. In `pattern`, %V stands for the view: one file a view.
         """
         self._known_cuts = frozenset(frame_numbers(cuts) if cuts else ())
         self._max_mb = max_mb
         self.sizes: dict[int, tuple[int, int]] = {}
         self.pattern, self.passes = str(pattern), passes or Passes()
+        self._named = views_on_disk(pattern) if has_view(pattern) else ()
+        self._leading = str(in_view(pattern, self._named[0] if self._named else None))
         self.numbers = self._numbers(frames, skip_missing)
-        self._camera = CameraFile(self.passes.camera) if self.passes.camera else None
+        self.view = view
+        if view is not None and view not in self.views:
+            raise InputError(f"{self.pattern}: no view {view!r}; {self._those_there}")
+        self._cameras = self._open_cameras()
         self.cuts: set[int] = set()
         self.unread: set[int] = set()
-        patterns = (self.pattern, *self.passes.also)
-        self._masks = Masks(
-            tuple(self.passes.holdout), tuple(self.passes.scale), patterns, self.numbers, max_mb
+        patterns = tuple(
+            str(path) for p in (self.pattern, *self.passes.also) for path in self._of_views(p)
         )
-        self._kept: OrderedDict[int, FrameFile] = OrderedDict()
-        self._ready: OrderedDict[int, tuple[FrameFile, bool, Frame]] = OrderedDict()
+        self._masks = Masks(
+            tuple(self.passes.holdout),
+            tuple(self.passes.scale),
+            patterns,
+            self.numbers,
+            max_mb,
+            self._of_views,
+        )
+        self.notes: dict[str, list[int]] = {}
+        self._kept: OrderedDict[int, tuple[FrameFile, ...]] = OrderedDict()
+        self._ready: OrderedDict[tuple[int, str | None], tuple[FrameFile, bool, Frame]] = (
+            OrderedDict()
+        )
         self._found: vectors.Finding | None = None
+        self._jumps: dict[int, list[int]] = {}
+        self._cuts_to: dict[tuple[int, int], bool] = {}
 
     def _numbers(self, frames: str | None, skip_missing: bool) -> list[int]:
-        if not is_pattern(self.pattern):
-            path = Path(self.pattern)
+        if not is_pattern(self._leading):
+            path = Path(self._leading)
             if not readable(path):
                 raise InputError(f"{path}: no such file")
             if frames is not None:
                 raise InputError(f"--frames needs a pattern such as shot.####.exr, got {path.name}")
             self.on_disk = [number_in(path)]
             return self.on_disk
-        self.on_disk = there = numbers_on_disk(self.pattern)
+        self.on_disk = there = numbers_on_disk(self._leading)
         if not frames and skip_missing:
             return there
         if not frames and there[-1] - there[0] - len(there) >= MOST_FRAMES:
@@ -148,6 +175,52 @@ class Clip:
         for number in self.numbers:
             yield self.frame(self.source(number))
 
+    @cached_property
+    def views(self) -> tuple[str, ...]:
+        """Names of the views of the first readable frame, the default one first; none if its
+        files do not name any.
+        """
+        if self._named:
+            return self._named
+        for number in self.on_disk:
+            path = self._path(number)
+            if path.suffix.lower() != ".exr":
+                return ()
+            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                file = exr.read(path, header_only=True)
+                return tuple(v for v, places in views.by_view(file).items() if v and places)
+        return ()
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """Names of the views to blur: all, or the one chosen."""
+        return self.views if self.view is None else (self.view,)
+
+    @property
+    def _those_there(self) -> str:
+        if not self.views:
+            return "its frames do not name any"
+        hint = did_you_mean(self.view, self.views)
+        return f"there are {', '.join(self.views)}{hint}"
+
+    def _path(self, number: int) -> Path:
+        """The file of frame `number`; of its default view, if there is one for each."""
+        return frame_path(self._leading, number)
+
+    def _open_cameras(self) -> dict[str | None, CameraFile]:
+        """The camera file of every view to blur."""
+        path = self.passes.camera
+        if path is None:
+            return {}
+        if has_view(path) and self.views:
+            return {view: CameraFile(in_view(path, view)) for view in self.views}
+        if len(self.views) > 1 and self.view is None:
+            raise InputError(
+                f"{path}: is the camera of one view, {self.pattern} has "
+                f"{', '.join(self.views)}; %V in its name stands for the view"
+            )
+        return dict.fromkeys((None, *self.views), CameraFile(path))
+
     @property
     def has(self) -> frozenset[str]:
         """Inputs available in the first readable frame (see Frame.has).
@@ -162,9 +235,14 @@ class Clip:
     def files(self, number: int) -> list[Path]:
         """Every file that the result of frame `number` depends on."""
         passes = self.passes
-        paths = [frame_path(p, number) for p in (self.pattern, *passes.also)]
-        camera = [passes.camera] if passes.camera else []
+        patterns = (self.pattern, *passes.also)
+        paths = [frame_path(p, number) for pattern in patterns for p in self._of_views(pattern)]
+        camera = self._of_views(passes.camera) if passes.camera else ()
         return [*paths, *self._masks.files(number), *camera]
+
+    def _of_views(self, pattern: str | Path) -> list[Path]:
+        """The pattern, once for each view if %V in it stands for them."""
+        return [in_view(pattern, v) for v in (self.views if has_view(pattern) else (None,))]
 
     @property
     def inputs(self) -> Iterator[Path]:
@@ -179,9 +257,9 @@ class Clip:
         after too if the method uses `neighbours`; and what the vectors were found to mean.
         """
         around = [number]
-        if neighbours and is_pattern(self.pattern):
+        if neighbours and is_pattern(self._leading):
             near = (number - 1, number + 1)
-            around += [n for n in near if frame_path(self.pattern, n).is_file()]
+            around += [n for n in near if self._path(n).is_file()]
         paths = (p for n in around for p in (*self.files(n), *self._masks.manifests(n)))
         files = dict.fromkeys(paths)
         meaning = self._decide().vectors
@@ -190,20 +268,57 @@ class Clip:
             "vectors_mean": str(meaning) if meaning else None,
         }
 
-    def source(self, number: int) -> FrameFile:
-        """Frame `number` as stored; the last three are kept for their neighbours."""
+    def source(self, number: int, view: str | None = None) -> FrameFile:
+        """Frame `number` as stored: `view`, or by default the one chosen, or the default one."""
+        found = self._all(number)
+        wanted = view or self.view or (self.views[0] if self.views else None)
+        if wanted is None:
+            return found[0]
+        return self._find(number, wanted)
+
+    def sources(self, number: int) -> list[FrameFile]:
+        """The views of frame `number` that are to be blurred, the default one first.
+
+        All that have a picture, or the one chosen.
+        """
+        if self.view is not None:
+            return [self.source(number)]
+        found = self._all(number)
+        return [s for s in found if s.beside is not None] or [found[0]]
+
+    def _find(self, number: int, view: str | None) -> FrameFile:
+        """A view of a frame by its name."""
+        found = {source.view: source for source in self._all(number)}
+        if view not in found:
+            there = ", ".join(name for name in found if name) or "none"
+            raise InputError(f"{self._path(number)}: no view {view!r}; its views: {there}")
+        return found[view]
+
+    def _leader(self, number: int) -> FrameFile:
+        """The view on which is settled what all views of a frame share: the default one."""
+        found = self._all(number)
+        return next((s for s in found if s.beside is not None), found[0])
+
+    def _all(self, number: int) -> tuple[FrameFile, ...]:
+        """All views of frame `number`; those of the last three are kept for their neighbours."""
         if number not in self._kept:
             while len(self._kept) > 2:
                 self._kept.popitem(last=False)
             paths = [frame_path(p, number) for p in (self.pattern, *self.passes.also)]
-            self._kept[number] = source = read(paths, number, self.passes.color, self._max_mb)
-            self.sizes[number] = source.whole
+            found = read(paths, number, self.passes.color, self._max_mb, self._named)
+            if self.views:  # the first frame says which is the default
+                found = tuple(sorted(found, key=lambda source: source.view != self.views[0]))
+            self._kept[number] = found
+            self.sizes[number] = found[0].whole
+            for note in dict.fromkeys(note for source in found for note in source.notes):
+                self.notes.setdefault(note, []).append(number)
         return self._kept[number]
 
     def forget(self, number: int) -> None:
         """Drop a frame from the cache."""
         self._kept.pop(number, None)
-        self._ready.pop(number, None)
+        for key in [key for key in self._ready if key[0] == number]:
+            del self._ready[key]
 
     @property
     def finding(self) -> str:
@@ -230,27 +345,33 @@ class Clip:
         return self._found
 
     def _test(self, number: int, wanted: vectors.Vectors) -> vectors.Finding:
-        source = self.source(number)
-        named = vectors.named(source.channels, wanted, source.beside)
+        first = self._leader(number)
+        named = None
+        for source in dict.fromkeys((first, *self._all(number))):
+            named = vectors.named(source.channels, wanted, source.beside)
+            if named is not None:
+                break
         if named is None:
             return vectors.Finding(None, False, "no vector layer found")
         if wanted.convention != "auto":
             return vectors.Finding(named, True, str(named))
         motion = vectors.read(source.channels, named, source.beside)
         prev, next_ = (
-            None if self._is_known_cut(number, side) else self._neighbour(number + side)
+            None
+            if self._is_known_cut(number, side)
+            else self._neighbour(number + side, source.view)
             for side in (-1, 1)
         )
         if source.beside is None:
             return vectors.Finding(named, False, f"{named}, by name (no picture to test it on)")
         return vectors.detect(source.rgba, motion, prev, next_, named)
 
-    def _neighbour(self, number: int) -> np.ndarray | None:
-        if not is_pattern(self.pattern) or not frame_path(self.pattern, number).is_file():
+    def _neighbour(self, number: int, view: str | None) -> np.ndarray | None:
+        if not is_pattern(self._leading) or not self._path(number).is_file():
             return None
         wanted = number in self.numbers
         try:
-            return self.source(number).rgba
+            return self._find(number, view).rgba
         except (InputError, OSError):
             return None
         finally:
@@ -258,39 +379,57 @@ class Clip:
                 self.forget(number)
 
     def with_neighbours(self, source: FrameFile, normal: bool = True) -> Frame:
-        """`frame`, and the frames before and after as far as they can be read.
+        """`frame`, and the same view of the frames before and after as far as they can be read.
 
         Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
         Blur, once, though it is shown in three.
         """
-        near = {}
-        for side, number in (("prev", source.number - 1), ("next", source.number + 1)):
-            path = frame_path(self.pattern, number)
-            if self._is_known_cut(source.number, number - source.number):
+        near: dict[int, Frame] = {}
+        for side in (-1, 1):
+            number = source.number + side
+            if self._is_known_cut(source.number, side):
                 continue
-            if is_pattern(self.pattern) and path.is_file():
+            if is_pattern(self._leading) and self._path(number).is_file():
                 try:
-                    other = self.source(number)
+                    other = self._find(number, source.view)
                     if other.size == source.size:
                         near[side] = self._locked(other, normal)
                 except (InputError, OSError):  # its turn to fail comes
                     self.unread.add(number)
         frame = self._locked(source, normal)
         for side in list(near):
-            if is_cut(frame, near[side], -1 if side == "prev" else 1):
+            if self._is_cut(source, frame, near[side], side, normal):
                 del near[side]
-                self.cuts.add(source.number if side == "prev" else source.number + 1)
-        return frame.between(near.get("prev"), near.get("next"))
+                self.cuts.add(source.number + (side > 0))
+        return frame.between(near.get(-1), near.get(1))
+
+    def _is_cut(
+        self, source: FrameFile, frame: Frame, near: Frame, side: int, normal: bool
+    ) -> bool:
+        """Whether a cut lies between `frame` and `near`, as is settled on the default view."""
+        if source.view is None:
+            return is_cut(frame, near, side)
+        key = source.number, side
+        if key not in self._cuts_to:
+            leader = self._leader(source.number)
+            if leader.view != source.view:
+                with contextlib.suppress(InputError, OSError):  # then this view decides
+                    other = self._find(source.number + side, leader.view)
+                    if other.size == leader.size:
+                        frame, near = self._locked(leader, normal), self._locked(other, normal)
+            self._cuts_to[key] = is_cut(frame, near, side)
+        return self._cuts_to[key]
 
     def _locked(self, source: FrameFile, normal: bool) -> Frame:
         """`frame`, made once for the three frames that it is shown in."""
-        made, with_normal, frame = self._ready.get(source.number, (None, None, None))
+        key = source.number, source.view
+        made, with_normal, frame = self._ready.get(key, (None, None, None))
         if frame is None or made is not source or with_normal != normal:
-            self._ready.pop(source.number, None)
-            while len(self._ready) > 2:
+            self._ready.pop(key, None)
+            while len(self._ready) >= 3 * max(len(self.views), 1):
                 self._ready.popitem(last=False)
             frame = self.frame(source, normal=normal).locked()
-            self._ready[source.number] = source, normal, frame
+            self._ready[key] = source, normal, frame
         return frame
 
     def frame(self, source: FrameFile, picture: bool = True, normal: bool = True) -> Frame:
@@ -303,11 +442,27 @@ class Clip:
         if all(self._is_known_cut(source.number, side) for side in (-1, 1)):
             self.cuts |= {source.number, source.number + 1}
             return still(frame)
-        for side in (-1, 1):
-            if self._is_known_cut(source.number, side) or jumps(frame, side):
-                self.cuts.add(source.number + (side > 0))
-                frame = straightened(frame, side)
+        for side in self._sides_cut(source, frame):
+            self.cuts.add(source.number + (side > 0))
+            frame = straightened(frame, side)
         return frame
+
+    def _sides_cut(self, source: FrameFile, frame: Frame) -> list[int]:
+        """Sides of a frame on which its motion leads across a cut, by that of the default view."""
+        number = source.number
+        if source.view is not None and source.view != self._leader(number).view:
+            with contextlib.suppress(InputError):  # then this view decides
+                if number not in self._jumps:
+                    self.frame(self._leader(number), picture=False, normal=False)
+                return self._jumps[number]
+        sides: list[int] = []
+        for side in (-1, 1):
+            if self._is_known_cut(number, side) or jumps(frame, side):
+                sides.append(side)
+                frame = straightened(frame, side)
+        if source.view is not None:
+            self._jumps[number] = sides
+        return sides
 
     def _is_known_cut(self, number: int, side: int) -> bool:
         """True if the user said that a cut lies between a frame and its neighbour on `side`."""
@@ -315,19 +470,19 @@ class Clip:
 
     def _frame(self, source: FrameFile, picture: bool, normal: bool) -> Frame:
         meaning = self._decide().vectors
-        with about(source.path):
+        with about(source.name):
             if meaning is None:  # where a layer was asked for, this says why there is none
                 meaning = vectors.named(source.channels, self.passes.vectors, source.beside)
             motion = reprojections = ids = None
             depth = self._depth(source)
             if meaning is not None:
                 motion = vectors.read(source.channels, meaning, source.beside)
-            if self._camera is not None:
+            if (camera := self._cameras.get(source.view)) is not None:
                 if depth is None:
                     there = ", ".join(layers.layers(source.channels))
                     raise InputError(f"motion from a camera needs depth; available layers: {there}")
                 kind = "clip" if self.passes.depth_kind == "clip" else "planar"
-                reprojections = self._camera.around(
+                reprojections = camera.around(
                     source.number, depth_kind=kind, far=self.passes.far, window=source.window
                 )
                 ids = self._object_ids(source) if reprojections.here.bodies else None

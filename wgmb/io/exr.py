@@ -75,15 +75,11 @@ class Exr:
 
     def channels(self) -> dict[str, np.ndarray]:
         """Every channel by its full name; in a multi-part file the part's name leads."""
-        return {full: part.channels[name] for full, part, name in self.places()}
-
-    def places(self) -> list[tuple[str, Part, str]]:
-        """Full name, part and name within the part of every channel."""
-        found = []
+        found = {}
         for part in self.parts:
-            for name in part.channels:
+            for name, plane in part.channels.items():
                 leads = len(self.parts) > 1 and part.name and not name.startswith(part.name + ".")
-                found.append((f"{part.name}.{name}" if leads else name, part, name))
+                found[f"{part.name}.{name}" if leads else name] = plane
         return found
 
 

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,29 +14,39 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from . import exr, layers, limits, stills
-from .frame_numbers import frame_range
+from . import exr, layers, limits, stills, views
+from .frame_numbers import frame_range, has_view, in_view
 
 Window = tuple[int, int, int, int]  # left, top, right, bottom; the last pixels belong to it
 
 
 @dataclass(frozen=True, eq=False)
 class FrameFile:
-    """One frame as it came from disk."""
+    """One frame as it came from disk: one view of it, if its file names views."""
 
     number: int
     path: Path
-    file: exr.Exr | None  # None: a still
+    file: exr.Exr | None  # None: a still. All views of a file share it.
     channels: dict[str, np.ndarray]  # of all its files, in the picture's data window
     attributes: dict[str, Any]
     wanted: str | None = None  # the picture's layer, if its name does not say so
     part: exr.Part | None = None  # of the file, that the picture is in
+    view: str | None = None  # channels have their names without it
+    origin: views.Places = field(default_factory=dict)  # of the channels that are in `file`
+    shared: frozenset[str] = frozenset()  # names of channels in no view
+    notes: tuple[str, ...] = ()  # what a user should know about it
+
+    @property
+    def name(self) -> str:
+        """The file, and the view if it has one, for messages."""
+        return str(self.path) if self.view is None else f"{self.path}: view {self.view}"
 
     @cached_property
     def color(self) -> list[str]:
         """Names of the picture's channels, 3 or 4."""
-        with about(self.path):
-            return layers.find_color(self.channels, self.wanted)
+        with about(self.name):
+            own = [name for name in self.channels if name not in self.shared]
+            return layers.find_color(own, self.wanted)
 
     @property
     def beside(self) -> str | None:
@@ -94,69 +105,185 @@ def odd_sizes(sizes: dict[int, tuple[int, int]]) -> str | None:
 
 
 @contextlib.contextmanager
-def about(path: Path):
+def about(name: str | Path):
     """Name the file in errors that do not."""
     try:
         yield
     except InputError as error:
-        if str(path) in str(error):
+        if str(name) in str(error):
             raise
-        raise InputError(f"{path}: {error}") from None
+        raise InputError(f"{name}: {error}") from None
 
 
 def read(
-    paths: list[Path], number: int, wanted: str | None, max_mb: float = limits.MAX_MB
-) -> FrameFile:
-    """One frame's files, their channels together; `wanted`: the picture's layer.
+    paths: list[Path],
+    number: int,
+    wanted: str | None,
+    max_mb: float = limits.MAX_MB,
+    named: Sequence[str] = (),
+) -> tuple[FrameFile, ...]:
+    """Every view of a frame, the default one first; the channels of its files together.
 
-    `max_mb`: megabytes that each file may unpack to. `InputError` names the file that is missing,
-    damaged, too large, or of another size.
+    `wanted`: the picture's layer. `max_mb`: megabytes that each file may unpack to. `named`: the
+    views, if %V stands for them in the first path; else that file tells them. In the other paths
+    %V stands for them too; of a file without %V and without views, they are the default view's.
+    `InputError` names the file that is missing, damaged, too large, or of another size.
     """
-    path, channels, attributes = paths[0], {}, {}
-    file: exr.Exr | None = None
+    files = _Files(max_mb)
+    first = files.content(in_view(paths[0], named[0] if named else None))
+    full = tuple(view for view in first.named if first.views[view])
+    there = tuple(named) or full or (None,)
+    found = []
+    for view in there:
+        contents = [
+            (files.content(in_view(path, view)), has_view(path) and view is not None)
+            for path in paths
+        ]
+        chosen = [(c, c.chosen(view, there[0], whole)) for c, whole in contents]
+        found.append(_together(chosen, number, wanted, view))
+    empty = () if named else tuple(v for v in first.named if not first.views[v])
+    return _noted(tuple(found), empty)
+
+
+@dataclass
+class _Content:
+    """What one file holds: channels by view."""
+
+    path: Path
+    file: exr.Exr | None  # None: a still
+    planes: dict[str, np.ndarray]  # of a still
+    views: dict[str | None, views.Places]
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        return tuple(view for view in self.views if view is not None)
+
+    def chosen(self, view: str | None, default: str | None, whole: bool) -> list[str | None]:
+        """Keys in `views` of what belongs to a frame's `view`; `whole`: all of the file does."""
+        if whole and len(self.named) > 1:
+            raise InputError(
+                f"{self.path}: has the views {', '.join(self.named)}; write its name without %V"
+            )
+        if view is None or whole:
+            own = self.named[:1]
+        elif self.named:
+            own = (view,)
+        elif view == default:
+            own = ()
+        else:
+            return []
+        return [*(v for v in own if v in self.views), None]
+
+
+class _Files:
+    """The files of one frame, each read once."""
+
+    def __init__(self, max_mb: float):
+        self._max_mb = max_mb
+        self._read: dict[Path, _Content] = {}
+
+    def content(self, path: Path) -> _Content:
+        """What the file holds."""
+        if path not in self._read:
+            self._read[path] = self._content(path)
+        return self._read[path]
+
+    def _content(self, path: Path) -> _Content:
+        if path.suffix.lower() == ".exr":
+            file = exr.read(path, max_mb=self._max_mb)
+            return _Content(path, file, {}, views.by_view(file))
+        if path.suffix.lower() in stills.SUFFIXES:
+            rgba = stills.read(path, max_mb=self._max_mb)
+            planes = {c: rgba[..., i] for i, c in enumerate("RGBA"[: rgba.shape[2]])}
+            return _Content(path, None, planes, {})
+        known = ", ".join((".exr", *stills.SUFFIXES))
+        raise InputError(f"{path}: cannot read this kind of file; frames may be {known}")
+
+
+def _together(
+    contents: list[tuple[_Content, list[str | None]]],
+    number: int,
+    wanted: str | None,
+    view: str | None,
+) -> FrameFile:
+    """One view of a frame: of each of its files what is under the given keys."""
+    main = contents[0][0]
+    channels: dict[str, np.ndarray] = {}
+    attributes: dict[str, Any] = {}
+    origin: views.Places = {}
+    shared: set[str] = set()
     onto: exr.Part | None = None
     size: tuple[int, int] | None = None
-    for p in paths:
-        if p.suffix.lower() == ".exr":
-            content = exr.read(p, max_mb=max_mb)
-            onto = onto or _picture_part(content, wanted)
-            file = content if p == path else file
-            more = _one_window(content, onto)
-            for part in reversed(content.parts):
+    for content, keys in contents:
+        if not keys:
+            continue
+        more = content.planes
+        if content.file is not None:
+            own = {k: v for key in keys[:-1] for k, v in content.views[key].items()}
+            others = content.views.get(None, {})
+            onto = onto or _picture_part(content.file, own or others, wanted)
+            places = own | {name: at for name, at in others.items() if name not in own}
+            more = _one_window(content.file.path, places, onto)
+            if content is main:
+                origin, shared = (
+                    places,
+                    (set(others) - set(own) if view is not None and len(keys) > 1 else set()),
+                )
+            of_view = {id(part) for part, _ in own.values()}
+            ranked = sorted(content.file.parts, key=lambda part: id(part) not in of_view)
+            for part in reversed(ranked):
                 attributes = {**part.attributes, **attributes}
-        elif p.suffix.lower() in stills.SUFFIXES:
-            rgba = stills.read(p, max_mb=max_mb)
-            more = {c: rgba[..., i] for i, c in enumerate("RGBA"[: rgba.shape[2]])}
-        else:
-            known = ", ".join((".exr", *stills.SUFFIXES))
-            raise InputError(f"{p}: cannot read this kind of file; frames may be {known}")
         for name, plane in more.items():
             size = size or plane.shape[::-1]
             if plane.shape[::-1] != size:
                 raise InputError(
-                    f"{p}: layer {name} is {size_text(plane)}, {path.name} is {size_text(size)}"
+                    f"{content.path}: layer {name} is {size_text(plane)}, "
+                    f"{main.path.name} is {size_text(size)}"
                 )
             channels.setdefault(name, plane)
-    return FrameFile(number, path, file, channels, attributes, wanted, onto if file else None)
+    return FrameFile(
+        number,
+        main.path,
+        main.file,
+        channels,
+        attributes,
+        wanted,
+        onto if main.file else None,
+        view,
+        origin,
+        frozenset(shared),
+    )
 
 
-def _picture_part(read: exr.Exr, wanted: str | None) -> exr.Part:
+def _noted(found: tuple[FrameFile, ...], empty: Sequence[str]) -> tuple[FrameFile, ...]:
+    """The views of a frame with notes on those that have no picture, where others have one."""
+    if all(f.beside is None for f in found):
+        return found
+    text = "view {} has no picture and is left as it is".format
+    noted = [
+        f if f.beside is not None else replace(f, notes=(*f.notes, text(f.view))) for f in found
+    ]
+    if empty:
+        noted[0] = replace(noted[0], notes=(*noted[0].notes, *map(text, empty)))
+    return tuple(noted)
+
+
+def _picture_part(file: exr.Exr, places: views.Places, wanted: str | None) -> exr.Part:
     """The part that the picture is in; the first one where none is found."""
-    places = {full: part for full, part, _ in read.places()}
     with contextlib.suppress(InputError):
-        return places[layers.find_color(places, wanted)[0]]
-    return read.parts[0]
+        return places[layers.find_color(places, wanted)[0]][0]
+    return next((part for part, _ in places.values()), file.parts[0])
 
 
-def _one_window(read: exr.Exr, onto: exr.Part) -> dict[str, np.ndarray]:
-    """All channels in the data window of the part `onto`; 0 where they have none."""
+def _one_window(path: Path, places: views.Places, onto: exr.Part) -> dict[str, np.ndarray]:
+    """The channels in the data window of the part `onto`; 0 where they have none."""
     channels = {}
-    for full, part, name in read.places():
+    for full, (part, name) in places.items():
         plane = part.channels[name]
         if part.data_window != onto.data_window:
             if part.display_window != onto.display_window:
                 raise InputError(
-                    f"{read.path}: layer {full}, {size_text(plane)}, has a different "
+                    f"{path}: layer {full}, {size_text(plane)}, has a different "
                     f"display window from the image, {size_text(onto.size)}"
                 )
             plane = _moved(plane, part.data_window, onto.data_window)

@@ -1,4 +1,4 @@
-"""Frame numbers and file names: `shot.####.exr`, `shot.%04d.exr`, `$F4`; `1-100x2`."""
+"""Frame numbers and file names: `shot.####.exr`, `shot.%04d.exr`, `$F4`; `1-100x2`; `%V`."""
 
 from __future__ import annotations
 
@@ -54,6 +54,42 @@ def frame_path(pattern: str | Path, number: int) -> Path:
     """The file of frame `number`; a path that is no pattern stands for itself."""
     parsed = _parsed(pattern)
     return Path(pattern) if parsed is None else parsed.folder / parsed.name(number)
+
+
+def has_view(path: str | Path) -> bool:
+    """Return True if %V stands for the name of a view in a path."""
+    return "%V" in str(path)
+
+
+def in_view(path: str | Path, view: str | None) -> Path:
+    """The path or pattern with the name of `view` for %V; unchanged if there is no view."""
+    return Path(path) if view is None else Path(str(path).replace("%V", view))
+
+
+def views_on_disk(pattern: str | Path) -> tuple[str, ...]:
+    """The names for %V in a path or pattern for which there are files, in alphabetical order."""
+    parts = Path(pattern).parts
+    at = next(i for i, part in enumerate(parts) if "%V" in part)
+    folder, part, last = Path(*parts[:at]), parts[at], at == len(parts) - 1
+    places = list(_NUMBER.finditer(part)) if last else []
+    begin, end = (part[: places[-1].start()], part[places[-1].end() :]) if places else (part, "")
+    expression = re.escape(begin) + ("-?[0-9]+" if places else "") + re.escape(end)
+    expression = expression.replace("%V", r"(?P<view>[^.\s]+?)", 1).replace("%V", "(?P=view)")
+    try:
+        matches = [m for m in map(re.compile(expression).fullmatch, os.listdir(folder)) if m]
+    except OSError as error:
+        raise InputError(f"{folder}: {(error.strerror or str(error)).lower()}") from None
+    return tuple(sorted(v for v in {m["view"] for m in matches} if _is_there(in_view(pattern, v))))
+
+
+def _is_there(pattern: Path) -> bool:
+    """Return True if there is a file of this path or pattern."""
+    if not is_pattern(pattern):
+        return pattern.is_file()
+    try:
+        return bool(numbers_on_disk(pattern))
+    except InputError:
+        return False
 
 
 def readable(path: Path) -> bool:

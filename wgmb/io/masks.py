@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from ..color import srgb
 from ..errors import InputError
 from . import cryptomatte, exr, stills
 from .frame_file import FrameFile, read, size_text
-from .frame_numbers import frame_path
+from .frame_numbers import frame_path, in_view
 from .layers import Channels, grey, layers, one_channel
 
 _AMOUNT = re.compile(r"(.+):([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
@@ -30,6 +30,7 @@ class Masks:
     patterns: Sequence[str]  # of the frames' files
     numbers: Sequence[int]
     max_mb: float
+    of_views: Callable[[str], list[Path]]  # a pattern, for each of the views that %V stands for
     _met: dict[str, bool] = field(default_factory=dict)  # masks by number: if a frame has them
     _missing: dict[str, InputError | None] = field(default_factory=dict)  # why, by mask
 
@@ -54,7 +55,8 @@ class Masks:
 
     def files(self, number: int) -> list[Path]:
         """The image files among the masks of frame `number`."""
-        return [frame_path(mask, number) for mask in self.every if is_file(mask, number)]
+        masks = [mask for mask in self.every if is_file(mask, number)]
+        return [frame_path(one, number) for mask in masks for one in self.of_views(mask)]
 
     def manifests(self, number: int) -> list[Path]:
         """The files beside frame `number` that hold the manifests which its masks need."""
@@ -117,7 +119,7 @@ class Masks:
 
     def _plane(self, source: FrameFile, mask: str) -> np.ndarray:
         if is_file(mask, source.number):
-            return self._of_file(source, frame_path(mask, source.number))
+            return self._of_file(source, frame_path(in_view(mask, source.view), source.number))
         folders = self._folders(source.number)
         try:
             plane = of_layer(source.channels, source.attributes, mask, folders)
@@ -131,8 +133,9 @@ class Masks:
 
     def _of_file(self, source: FrameFile, file: Path) -> np.ndarray:
         if file.suffix.lower() == ".exr":
-            channels = read([file], source.number, None, self.max_mb).channels
-            plane = grey(channels).astype(np.float32)
+            found = read([file], source.number, None, self.max_mb)
+            same = [one for one in found if one.view == source.view]
+            plane = grey((same or found)[0].channels).astype(np.float32)
         else:
             light = stills.read(file, max_mb=self.max_mb)
             plane = srgb(light[..., 0])  # grey values as painted

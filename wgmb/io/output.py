@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,18 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from . import atomic, exr, record, stills, video
+from . import atomic, exr, record, stills, video, views
 from .frame_file import FrameFile
-from .frame_numbers import frame_path, is_pattern
+from .frame_numbers import frame_path, has_view, in_view, is_pattern
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """One view of a frame, to be written."""
+
+    source: FrameFile
+    picture: np.ndarray
+    confidence: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 class Output:
@@ -27,7 +36,8 @@ class Output:
     resumed. `inputs`: the files that are read; an output that is one of them is refused, always.
     `overwrite` replaces any file that exists, `resume` only what wgmb wrote and is not done.
     `layers`: "all" that an EXR input holds go into the EXR output, or those of the "picture"
-    only. `compression` of EXR: a name in exr.COMPRESSIONS, or "same" as the input's.
+    only. `compression` of EXR: a name in exr.COMPRESSIONS, or "same" as the input's. `views`: the
+    names of views that %V in the pattern stands for, which makes a file or video of each.
     """
 
     def __init__(
@@ -43,13 +53,17 @@ class Output:
         resume: bool = False,
         layers: str = "all",
         compression: str = "zip",
+        views: Sequence[str] = (),
     ):
         _check_exr_options(pattern, layers, compression)
+        if has_view(pattern) and not views:
+            raise InputError(f"output {pattern}: %V stands for a view, but the frames have none")
         self._layers, self._compression = layers, compression
         self.pattern, self.bits, self.numbers = Path(pattern), bits, numbers
         self.settings = json.dumps(settings or {}, sort_keys=True)
         suffix = self.pattern.suffix.lower()
-        self._video: video.Video | None = None
+        self._views = tuple(views) if has_view(pattern) else (None,)
+        self._videos: dict[str | None, video.Video] = {}
         self._overwrite, self._resume = overwrite, resume
         self._abandoned = False
         self._under_way: Path | None = None
@@ -65,49 +79,64 @@ class Output:
             raise InputError(
                 f"output {pattern}: {len(numbers)} frames need a pattern such as out.####.exr"
             )
-        names = [self.pattern.name] if is_video else [self.path(n).name for n in numbers]
-        there = _that_exist(self.pattern.parent, names)
-        refuse_inputs(self.pattern.parent, names, there, inputs)
-        self._prepare_folder()
+        is_output = self._check_names(list(inputs), is_video)
+        for path in is_output:
+            atomic.sweep(path, is_output[path])
+        if is_video:
+            for view in self._views:
+                path = in_view(self.pattern, view)
+                temporary = atomic.temporary_name(path)
+                self._videos[view] = video.Video(path, temporary, fps, self.settings)
+
+    def _check_names(self, inputs: list[Path], is_video: bool) -> dict[Path, list[str]]:
+        """Make the folders; return the names of the outputs in each.
+
+        InputError where an output is an input, or exists and is not to be replaced.
+        """
+        names: dict[Path, list[str]] = {}
+        for pattern in (in_view(self.pattern, view) for view in self._views):
+            paths = [pattern] if is_video else [frame_path(pattern, n) for n in self.numbers]
+            names.setdefault(pattern.parent, []).extend(path.name for path in paths)
+        there: list[Path] = []
+        for folder in names:
+            existing = _that_exist(folder, names[folder])
+            refuse_inputs(folder, names[folder], existing, inputs)
+            there += existing
+        for folder in names:
+            _prepare(folder)
         if folders := [p for p in there if not p.is_file()]:
             raise InputError(f"output {folders[0]} exists and is not a file")
-        if there and not (overwrite or resume):
+        if there and not (self._overwrite or self._resume):
             more = f" and {len(there) - 1} more" if len(there) > 1 else ""
             raise InputError(
                 f"{there[0]}{more} exists; --overwrite replaces it"
                 + ("" if is_video else ", --resume keeps finished frames")
             )
-        atomic.sweep(self.pattern.parent, names)
-        if is_video:
-            temporary = atomic.temporary_name(self.pattern)
-            self._video = video.Video(self.pattern, temporary, fps, self.settings)
-
-    def _prepare_folder(self) -> None:
-        folder = self.pattern.parent
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"output folder {folder}: {error.strerror}") from None
-        if not os.access(folder, os.W_OK | os.X_OK):
-            raise InputError(f"output folder {folder}: not writable")
+        return names
 
     @property
     def is_video(self) -> bool:
         """True if all frames go into one file."""
-        return self._video is not None
+        return bool(self._videos)
+
+    @property
+    def takes_views(self) -> bool:
+        """True if it holds more than one view of a frame."""
+        return self.pattern.suffix.lower() == ".exr" or has_view(self.pattern)
 
     def why_hopeless(self, error: BaseException) -> str:
         """The reason, if an error in writing one frame will meet the next ones too, else ""."""
         if not isinstance(error, OSError):
             return ""
-        if self._video is not None:
+        if self._videos:
             return str(error)
         what = os.strerror(error.errno) if error.errno else type(error).__name__
         return f"{self.pattern.parent}: {what}"
 
-    def path(self, number: int) -> Path:
-        """The file that frame `number` goes to."""
-        return self.pattern if self._video else frame_path(self.pattern, number)
+    def path(self, number: int, view: str | None = None) -> Path:
+        """The file that frame `number` goes to; its `view` where %V makes a file of each."""
+        pattern = in_view(self.pattern, view)
+        return pattern if self._videos else frame_path(pattern, number)
 
     def done(self, number: int, made_of: dict[str, Any] | None = None) -> bool:
         """Return True if frame `number` exists and is complete, with the same settings and inputs.
@@ -115,7 +144,9 @@ class Output:
         `made_of`: what the frame depends on (see Clip.made_of). The file is read whole and
         its checksum compared. Raises InputError if another program wrote it.
         """
-        path = self.path(number)
+        return all(self._is_done(self.path(number, view), made_of) for view in self._views)
+
+    def _is_done(self, path: Path, made_of: dict[str, Any] | None) -> bool:
         try:
             data = path.read_bytes()
         except FileNotFoundError:
@@ -137,28 +168,47 @@ class Output:
         confidence: Mapping[str, np.ndarray] | None = None,
         made_of: dict[str, Any] | None = None,
     ) -> None:
-        """Write one frame: into an EXR with all the other layers of `source`, if it is one.
+        """Write one frame, or one view of it; see `write_views`."""
+        self.write_views([Result(source, result, confidence or {})], made_of)
 
-        `confidence`: from Blur.with_confidence, becomes channels `confidence.NAME` of an EXR.
+    def write_views(self, results: Sequence[Result], made_of: dict[str, Any] | None = None) -> None:
+        """Write one frame: into an EXR with all other layers and views of its file, if it is one.
+
+        Other files hold the first view, and with %V in their names there is one for each.
+        Confidence, from Blur.with_confidence, becomes channels `confidence.NAME` of an EXR.
         `made_of`: what the frame depends on (see Clip.made_of), for its record. Where runs
         are resumed, a frame that another process has finished meanwhile is left as it is.
         """
         if self._abandoned:
             return
-        layers = {f"confidence.{name}": plane for name, plane in (confidence or {}).items()}
-        if layers and self.pattern.suffix.lower() != ".exr":
-            raise InputError(f"{self.pattern}: only an .exr can store {', '.join(layers)}")
-        if self._video is not None:
-            self._video.add(result)
+        told = {f"confidence.{name}": None for result in results for name in result.confidence}
+        if told and self.pattern.suffix.lower() != ".exr":
+            raise InputError(f"{self.pattern}: only an .exr can store {', '.join(told)}")
+        if self._views == (None,):
+            self._write(None, results, made_of)
             return
-        path = self.path(source.number)
+        by_name = {result.source.view: result for result in results}
+        if lacking := [view for view in self._views if view not in by_name]:
+            raise InputError(f"{results[0].source.path}: no picture of view {lacking[0]}")
+        for view in self._views:
+            self._write(view, [by_name[view]], made_of)
+
+    def _write(
+        self, view: str | None, results: Sequence[Result], made_of: dict[str, Any] | None
+    ) -> None:
+        """Write the file of `view`, or of all."""
+        first = results[0]
+        if self._videos:
+            self._videos[view].add(first.picture)
+            return
+        path = self.path(first.source.number, view)
         text = record.blank(self._expected(made_of))
         if path.suffix.lower() == ".exr":
-            content = _with_result(source, result, text, layers, self._layers == "picture")
+            content = _with_results(results, view, text, self._layers == "picture")
             data = exr.encode(content, self._compression)
         else:
-            data = stills.encode(result, path.suffix, self.bits, text)
-        if self._resume and self.done(source.number, made_of):
+            data = stills.encode(first.picture, path.suffix, self.bits, text)
+        if self._resume and self._is_done(path, made_of):
             return
         if not (self._resume or self._overwrite) and path.exists():
             raise InputError(f"{path} was written by another process during this run")
@@ -167,23 +217,31 @@ class Output:
 
     def close(self) -> None:
         """Finish a video (OSError if it cannot be); pictures are finished one by one."""
-        if self._video is None:
-            return
-        try:
-            if not self._overwrite and self.pattern.exists():
-                raise OSError("was written by another process during this run")
-            self._video.close()
-        except OSError as error:
-            self.abandon()
-            raise atomic.about(self.pattern, error) from None
+        for one in self._videos.values():
+            try:
+                if not self._overwrite and one.path.exists():
+                    raise OSError("was written by another process during this run")
+                one.close()
+            except OSError as error:
+                self.abandon()
+                raise atomic.about(one.path, error) from None
 
     def abandon(self) -> None:
         """After an interruption or an error: leave no unfinished file."""
         self._abandoned = True
-        if self._video is not None:
-            self._video.abandon()
-        elif self._under_way is not None:
+        for one in self._videos.values():
+            one.abandon()
+        if self._under_way is not None:
             self._under_way.unlink(missing_ok=True)
+
+
+def _prepare(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"output folder {folder}: {error.strerror}") from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"output folder {folder}: not writable")
 
 
 def _that_exist(folder: Path, names: Iterable[str]) -> list[Path]:
@@ -231,42 +289,63 @@ def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> No
         raise InputError(f"compression {compression} needs an .exr output, got {pattern}")
 
 
-def _with_result(
-    source: FrameFile,
-    result: np.ndarray,
-    text: str,
-    layers: Mapping[str, np.ndarray],
-    only_picture: bool,
+def _with_results(
+    results: Sequence[Result], view: str | None, text: str, only_picture: bool
 ) -> exr.Exr:
-    """The source's file with the picture replaced, layers and the record's text added.
+    """The source's file with its pictures replaced, confidence and the record's text added.
 
-    `only_picture`: without all other layers, and without what describes Cryptomattes.
+    `view`: without what belongs to other views. `only_picture`: without all other layers, and
+    without what describes Cryptomattes.
     """
-    more = {name: exr.to_half(plane) for name, plane in layers.items()}
+    source = results[0].source
     if source.file is None:
-        made = exr.new(result, {record.KEY: text})
-        made.parts[0].channels |= more
+        made = exr.new(results[0].picture, {record.KEY: text})
+        made.parts[0].channels |= _told(results[0], made.parts[0])
         return made
-    new = {name: result[..., i] for i, name in enumerate(source.color)}
     parts = [
         replace(p, channels=dict(p.channels), attributes=dict(p.attributes))
         for p in source.file.parts
     ]
     twins = dict(zip(map(id, source.file.parts), parts, strict=True))
-    home = twins[id(source.part)]
-    for full, part, name in source.file.places():
-        if full in new:
-            kind = part.channels[name].dtype
-            half = kind == np.float16
-            twins[id(part)].channels[name] = (
-                exr.to_half(new[full]) if half else new[full].astype(kind)
-            )
-        elif only_picture:
-            del twins[id(part)].channels[name]
-    home.channels |= more
+    new: set[tuple[int, str]] = set()
+    for result in results:
+        home = result.source.part
+        assert home is not None
+        for i, full in enumerate(result.source.color):
+            part, name = result.source.origin.get(full, (home, full))
+            kind = result.source.channels[full].dtype
+            plane = result.picture[..., i]
+            plane = exr.to_half(plane) if kind == np.float16 else plane.astype(kind)
+            twins[id(part)].channels[name] = plane
+            new.add((id(twins[id(part)]), name))
     if only_picture:
-        for name in [n for n in home.attributes if n.startswith("cryptomatte/")]:
-            del home.attributes[name]
-        parts = [home]
+        _keep(parts, new)
+        for part in parts:
+            for name in [n for n in part.attributes if n.startswith("cryptomatte/")]:
+                del part.attributes[name]
+    elif view is not None:
+        _keep(parts, {(id(twins[id(part)]), name) for part, name in source.origin.values()} | new)
+    for result in results:
+        home = twins[id(result.source.part)]
+        home.channels |= _told(result, home)
+    if view is not None:
+        for part in parts:
+            views.leave_only(part, view)
+    parts = [part for part in parts if part.channels]
     parts[0].attributes[record.KEY] = text
     return exr.Exr(source.path, parts)
+
+
+def _told(result: Result, part: exr.Part) -> dict[str, np.ndarray]:
+    """Confidence as channels of `part`."""
+    view = result.source.view or ""
+    return {
+        views.joined("confidence", view, name, part): exr.to_half(plane)
+        for name, plane in result.confidence.items()
+    }
+
+
+def _keep(parts: list[exr.Part], wanted: set[tuple[int, str]]) -> None:
+    """Drop all other channels; `wanted`: ids of parts, and names in them."""
+    for part in parts:
+        part.channels = {k: v for k, v in part.channels.items() if (id(part), k) in wanted}
