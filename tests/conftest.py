@@ -15,6 +15,7 @@ np.seterr(all="raise", under="ignore")
 if "PYTEST_XDIST_WORKER" in os.environ:  # the workers have shared out the cores already
     os.environ["LP_NUM_THREADS"] = "1"
 
+os.environ.pop("OCIO", None)  # a config of whoever runs the tests
 standard.record()  # every kernel that a test makes; they are sent through Dawn in the end
 
 # Files that take longest are begun first, so that all workers end at about the same time.

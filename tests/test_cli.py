@@ -34,6 +34,7 @@ def test_the_table_of_commands_loads_none_of_them():
     )
     loaded = {name.partition(".")[0] for name in done.stdout.splitlines()[-1].split()}
     assert not loaded & {"wgpu", "numpy", "OpenEXR", "av", "tifffile", "PIL", "imgui_bundle"}
+    assert "PyOpenColorIO" not in loaded
 
 
 @pytest.mark.parametrize("command", [[], ["blur"], ["info"], ["devices"]])

@@ -14,7 +14,8 @@ PACKAGE, SHADERS = ROOT / "wgmb", ROOT / "wgsl"
 # A room imports only from lines above its own, and from itself.
 LAYERS = [
     {"_version", "errors", "color"},
-    {"gpu", "shutter", "camera", "metrics"},
+    {"primaries"},
+    {"gpu", "shutter", "camera", "metrics", "display"},
     {"frame", "cone"},
     {"frame_views"},
     {"velocity", "holdout"},
@@ -22,7 +23,7 @@ LAYERS = [
     {"methods"},
     {"residency"},
     {"pipeline"},
-    {"render", "settings"},
+    {"render", "settings", "color_settings"},
     {"batch", "settings_toml"},
     {"lab", "viewer"},  # never each other
     {"cli"},  # may start the viewer
@@ -41,6 +42,7 @@ HOMES = {
     "imageio": {"io"},
     "PIL": {"io", "lab"},
     "fileseq": {"io"},
+    "PyOpenColorIO": {"display"},
     "cyclopts": {"cli"},
     "rich": {"cli"},
     "imgui_bundle": {"viewer"},

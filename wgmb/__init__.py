@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .batch import BatchReport, blur_sequence
     from .camera import Camera, Reprojections
     from .cone import Cone
+    from .display import ColorConfig, ColorSpace, Display
     from .errors import DeviceError, Error, GpuMemoryError, InputError, ShaderError
     from .frame import Frame
     from .frame_views import FrameViews
@@ -39,8 +40,11 @@ __all__ = [
     "CameraFile",
     "CameraPath",
     "Clip",
+    "ColorConfig",
+    "ColorSpace",
     "Cone",
     "DeviceError",
+    "Display",
     "Error",
     "Frame",
     "FrameViews",
@@ -63,6 +67,7 @@ _PLACES = {
     "batch": ("BatchReport", "blur_sequence"),
     "camera": ("Camera", "Reprojections"),
     "cone": ("Cone",),
+    "display": ("ColorConfig", "ColorSpace", "Display"),
     "errors": ("DeviceError", "Error", "GpuMemoryError", "InputError", "ShaderError"),
     "frame": ("Frame",),
     "frame_views": ("FrameViews",),

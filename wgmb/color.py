@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 
@@ -18,9 +20,20 @@ def srgb(light: np.ndarray) -> np.ndarray:
     return np.where(light <= 0.0031308, 12.92 * light, high).astype(np.float32)
 
 
-def to_display(rgba: np.ndarray, bits: int) -> np.ndarray:
-    """Linear premultiplied (height, width, 3 or 4) -> sRGB integers of 8 or 16 bits."""
-    rgb, alpha = rgba[..., :3], rgba[..., 3:]
+class ToDisplay(Protocol):
+    """How pictures become integers for people to look at: `to_display`, or a Display's."""
+
+    def __call__(self, rgba: np.ndarray, bits: int, over_black: bool = False) -> np.ndarray:
+        """See `to_display`."""
+        ...
+
+
+def to_display(rgba: np.ndarray, bits: int, over_black: bool = False) -> np.ndarray:
+    """Linear premultiplied (height, width, 3 or 4) -> sRGB integers of 8 or 16 bits.
+
+    Alpha stays, unassociated; `over_black` drops it, for formats without.
+    """
+    rgb, alpha = rgba[..., :3], rgba[..., 3 : 3 if over_black else None]
     if alpha.shape[2]:
         rgb = np.divide(rgb, alpha, out=np.zeros_like(rgb), where=alpha > 0)
     if bits == 8:

@@ -12,6 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Literal, Self, TypeVar
 
+from .display import ColorSpace, Display
 from .errors import InputError
 from .io import limits, vectors
 from .io.clip import Clip, Passes
@@ -121,9 +122,13 @@ class InputSettings:
     "Largest allowed decoded size of an image file in megabytes (as 32-bit floats)."
 
     def open(
-        self, pattern: str, holdout: tuple[str, ...] = (), scale: tuple[str, ...] = ()
+        self,
+        pattern: str,
+        holdout: tuple[str, ...] = (),
+        scale: tuple[str, ...] = (),
+        space: ColorSpace | None = None,
     ) -> Clip:
-        """Return the Clip these settings describe.
+        """Return the Clip these settings describe; `space` of its pictures (ColorSettings.space).
 
         InputError if a file is not readable, or a mask names what no Cryptomatte has.
         """
@@ -157,6 +162,7 @@ class InputSettings:
             skip_missing=self.skip_missing,
             cuts=self.cuts,
             view=self.view,
+            space=space,
             max_mb=self.max_mb,
         )
         clip.check_names()
@@ -314,6 +320,11 @@ class OutputSettings:
     "EXR: none, rle, zips, zip, piz; lossy: pxr24, b44, b44a, dwaa, dwab; or same (as the input)."
 
     @property
+    def is_exr(self) -> bool:
+        """True if the output keeps linear light, instead of showing it to people."""
+        return self.output.lower().endswith(".exr")
+
+    @property
     def looks(self) -> dict:
         """Return the settings that change the contents of the files."""
         return {"bits": self.bits, "layers": self.layers, "compression": self.compression}
@@ -324,6 +335,7 @@ class OutputSettings:
         numbers: list[int],
         inputs: Iterable[Path] = (),
         views: Sequence[str] = (),
+        display: Display | None = None,
     ) -> Output:
         """The Output for frames of these `numbers`; see there for the others."""
         return Output(
@@ -338,6 +350,7 @@ class OutputSettings:
             layers=self.layers,
             compression=self.compression,
             views=views,
+            display=display,
         )
 
     @property

@@ -16,6 +16,7 @@ GROUPS = {
     "sequences": (
         "Clip", "Passes", "Vectors", "Output", "blur_sequence", "BatchReport",
     ),
+    "colours": ("ColorConfig", "ColorSpace", "Display"),
     "cameras": ("Camera", "Reprojections", "CameraFile"),
     "scenes": (
         "Scene", "Body", "CameraPath", "Render", "scene.make", "scene.at", "scene.moving",

@@ -17,7 +17,7 @@ from wgmb.scene import builtin
 
 _KINDS = {bool: "", int: "N", float: "X", str: "TEXT", Path: "PATH"}
 _TITLES = {"Parameters": "General"}
-_GROUPS = ("Parameters", "Input", "Compare", "Blur", "Shutter", "Perception", "Output")
+_GROUPS = ("Parameters", "Input", "Compare", "Blur", "Shutter", "Perception", "Colour", "Output")
 
 
 def reference() -> str:

@@ -10,13 +10,14 @@ from cyclopts import Parameter
 
 from .._version import __version__
 from ..batch import BatchReport, blur_sequence
+from ..color_settings import ColorSettings, color_record
 from ..errors import InputError
 from ..io.frame_file import odd_sizes
 from ..io.frame_numbers import frame_list
 from ..pipeline import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
 from .exit_codes import DONE, SOME_FAILED
-from .options import BlurOptions, Given, InputOptions, Look, ShutterOptions, Target, When
+from .options import BlurOptions, Colors, Given, InputOptions, Look, ShutterOptions, Target, When
 from .terminal import note, progress
 
 
@@ -26,6 +27,7 @@ def blur(
     look: Look = BlurOptions(),
     when: When = ShutterOptions(),
     given: Given = InputOptions(),
+    color: Colors = ColorSettings(),
     *,
     confidence: bool = False,
     config: Path | None = None,
@@ -53,15 +55,20 @@ def blur(
         Print errors only.
     """
     when = when.resolved()
-    clip = given.open(pattern, look.holdout, look.scale)
+    shown = color.open(needed=not output.is_exr)
+    space = color.space(shown)
+    clip = given.open(pattern, look.holdout, look.scale, space)
     look = look.resolved(clip=clip)
     made = look.make(when.make(), adapter)
     settings = _settings(look, when, given) | {"samples": samples_of(made)} | output.looks
     settings["curve"] = when.curve_read()
+    settings |= color_record(shown, output.output, space, pattern)
     if confidence:
         check_confidence(made, output)
         settings["confidence"] = True
-    files = output.make(settings, clip.numbers, clip.inputs, clip.chosen)
+    files = output.make(settings, clip.numbers, clip.inputs, clip.chosen, shown)
+    if color.remark and not (quiet or output.is_exr):
+        note(color.remark)
     if verbose:
         note(f"adapter: {made.device.adapter.summary}")
         note(f"settings: {files.settings}")
@@ -116,7 +123,7 @@ def _conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose:
 def check_confidence(made: Blur, output: OutputSettings) -> None:
     """Raise InputError unless the method reports confidence and the output can store it."""
     layers = ", ".join(made.confidence)
-    if not output.output.lower().endswith(".exr"):
+    if not output.is_exr:
         raise InputError(f"--confidence ({layers}) needs an .exr output, got {output.output}")
 
 

@@ -9,17 +9,20 @@ import numpy as np
 from cyclopts import Parameter
 
 from ..color import motion_picture
+from ..color_settings import ColorSettings
+from ..display import Display
 from ..errors import InputError
 from ..io import layers, stills
 from ..io.atomic import write_file
 from ..io.clip import Clip
 from ..io.frame_file import FrameFile
 from ..io.frame_numbers import frame_list
+from ..io.input_space import space_of
 from ..io.output import refuse_inputs
 from ..pipeline import Blur
 from .exit_codes import DONE
-from .options import Given, InputOptions
-from .terminal import out
+from .options import Colors, Given, InputOptions
+from .terminal import note, out
 
 _MUCH = 0.25  # of the width: a 99th percentile of speed above it is worth a warning
 
@@ -28,6 +31,7 @@ def info(
     pattern: str,
     /,
     given: Given = InputOptions(),
+    color: Colors = ColorSettings(),
     *,
     output: Annotated[Path | None, Parameter(alias="-o")] = None,
     overwrite: bool = False,
@@ -45,17 +49,25 @@ def info(
     overwrite
         Replace an existing image.
     """
-    clip = given.open(pattern)
+    shown = color.open()
+    clip = given.open(pattern, space=color.space(shown))
+    if color.remark:
+        note(color.remark)
     if output is not None and output.exists() and not overwrite:
         raise InputError(f"{output} exists; --overwrite replaces it")
-    lines = describe(clip, output)
+    lines = describe(clip, output, shown)
     for name, text in lines:
         out(f"{name:10}{text}")
     return DONE
 
 
-def describe(clip: Clip, output: Path | None = None) -> list[tuple[str, str]]:
-    """Return (name, text) lines about the clip's first frame; `output`: draw its motion."""
+def describe(
+    clip: Clip, output: Path | None = None, shown: Display | None = None
+) -> list[tuple[str, str]]:
+    """Return (name, text) lines about the clip's first frame; `output`: draw its motion.
+
+    `shown`: say what its colours are in that config, and how they would be shown.
+    """
     if output is not None and output.suffix.lower() not in stills.SUFFIXES:
         raise InputError(f"output {output}: must be an image, {', '.join(stills.SUFFIXES)}")
     if output is not None:
@@ -74,6 +86,10 @@ def describe(clip: Clip, output: Path | None = None) -> list[tuple[str, str]]:
         kinds = [f"{layers.component(m).upper()} {source.channels[m].dtype}" for m in members]
         lines.append(("layer", f"{layer or '(picture)'}: {', '.join(kinds)}"))
     lines.append(("picture", ", ".join(source.color) if source.beside else "none found"))
+    if shown is not None:
+        space = space_of(source, shown.config)
+        text = space.text + ("" if space.is_linear else ", not linear: --from makes it so")
+        lines.append(("colour", f"{text}; shown on {shown.display}, {shown.view}"))
     depth = layers.find_depth(source.channels, clip.passes.depth, source.beside)
     lines.append(("depth", depth or "none"))
     lines.append(("vectors", clip.finding))

@@ -7,6 +7,7 @@ from typing import Annotated, TypeVar
 
 from cyclopts import Group, Parameter
 
+from ..color_settings import ColorSettings, DisplaySettings
 from ..io import exr, stills, video
 from ..io.vectors import CONVENTIONS
 from ..methods import METHODS
@@ -112,5 +113,7 @@ Given = Annotated[InputOptions, Parameter(name="*", group=Group("Input", sort_ke
 Moments = Annotated[SceneSettings, Parameter(name="*", group=Group("Input", sort_key=1))]
 Look = Annotated[BlurOptions, Parameter(name="*", group=Group("Blur", sort_key=2))]
 When = Annotated[ShutterOptions, Parameter(name="*", group=Group("Shutter", sort_key=3))]
+Colors = Annotated[ColorSettings, Parameter(name="*", group=Group("Colour", sort_key=4))]
+Shown = Annotated[DisplaySettings, Parameter(name="*", group=Group("Colour", sort_key=4))]
 Target = Annotated[OutputOptions, Parameter(name="*", group=Group("Output", sort_key=5))]
 SceneName = Annotated[str, Parameter(help=f"Scene: {', '.join(builtin.SCENES)}.")]

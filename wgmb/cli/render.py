@@ -10,12 +10,13 @@ from cyclopts import Parameter
 
 from .._version import __version__
 from ..batch import render_frames
+from ..color_settings import DisplaySettings, color_record
 from ..errors import InputError
 from ..render import Render
 from ..settings import SceneSettings, plain, size_of
 from .blur import check_confidence, samples_of
 from .exit_codes import DONE
-from .options import BlurOptions, Look, Moments, SceneName, ShutterOptions, Target, When
+from .options import BlurOptions, Look, Moments, SceneName, Shown, ShutterOptions, Target, When
 from .terminal import note, progress
 
 
@@ -25,6 +26,7 @@ def render(
     what: Moments = SceneSettings(),
     look: Look = BlurOptions(),
     when: When = ShutterOptions(),
+    color: Shown = DisplaySettings(),
     *,
     sharp: bool = False,
     passes: bool = False,
@@ -60,7 +62,7 @@ def render(
     look, when = look.resolved(picture), when.resolved(picture, fps)
     if look.holdout or look.scale:
         raise InputError("--holdout and --scale need input files; use them with wgmb blur")
-    if passes and not output.output.lower().endswith(".exr"):
+    if passes and not output.is_exr:
         raise InputError(f"--passes needs an .exr output, got {output.output}")
     if passes and output.layers == "picture":
         raise InputError("--passes cannot be combined with --layers picture")
@@ -75,7 +77,11 @@ def render(
     if confidence:
         check_confidence(made, output)
         settings["confidence"] = True
-    files = output.make(settings, list(moments))
+    shown = color.open(needed=not output.is_exr)
+    settings |= color_record(shown, output.output)
+    files = output.make(settings, list(moments), display=shown)
+    if color.remark and not (quiet or output.is_exr):
+        note(color.remark)
     if verbose:
         note(f"adapter: {renderer.blur.device.adapter.summary}")
         note(f"settings: {files.settings}")

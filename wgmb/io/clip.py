@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..camera import MAX_INDEX
+from ..display import ColorSpace
 from ..errors import InputError, did_you_mean
 from ..frame import Frame
 from . import exr, layers, limits, vectors, views
@@ -37,6 +38,7 @@ from .frame_numbers import (
     readable,
     views_on_disk,
 )
+from .input_space import in_space
 from .masks import Masks
 
 DEPTHS = ("planar", "inverse", "clip")
@@ -102,13 +104,16 @@ class Clip:
         skip_missing: bool = False,
         cuts: str | None = None,
         view: str | None = None,
+        space: ColorSpace | None = None,
         max_mb: float = limits.MAX_MB,
     ):
         """`frames`: "1-100x2", "1,3,5-8"; by default all existing ones, without gaps unless
         `skip_missing`. `cuts`: frames that begin a new shot, in the same form, beside those that
-        are detected. `view`: the only view to blur; by default all. `max_mb`: largest decoded
-        size of a file in megabytes. In `pattern`, %V stands for the view: one file a view.
+        are detected. `view`: the only view to blur; by default all. `space`: colour space of the
+        pictures, instead of what their files say; what is not linear is made so. `max_mb`: largest
+        decoded size of a file in megabytes. In `pattern`, %V stands for the view: one file a view.
         """
+        self._space = space
         self._known_cuts = frozenset(frame_numbers(cuts) if cuts else ())
         self._max_mb = max_mb
         self.sizes: dict[int, tuple[int, int]] = {}
@@ -305,7 +310,9 @@ class Clip:
             while len(self._kept) > 2:
                 self._kept.popitem(last=False)
             paths = [frame_path(p, number) for p in (self.pattern, *self.passes.also)]
-            found = read(paths, number, self.passes.color, self._max_mb, self._named)
+            found = read(paths, number, self.passes.color, self._max_mb, self._named, self._space)
+            if self._space is not None:
+                found = tuple(in_space(source, self._space) for source in found)
             if self.views:  # the first frame says which is the default
                 found = tuple(sorted(found, key=lambda source: source.view != self.views[0]))
             self._kept[number] = found

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..display import ColorSpace
 from ..errors import InputError
 from . import exr, layers, limits, stills, views
 from .frame_numbers import frame_range, has_view, in_view
@@ -34,6 +35,8 @@ class FrameFile:
     view: str | None = None  # channels have their names without it
     origin: views.Places = field(default_factory=dict)  # of the channels that are in `file`
     shared: frozenset[str] = frozenset()  # names of channels in no view
+    space: ColorSpace | None = None  # of the picture, where it is not for attributes to say
+    made_linear: bool = False  # the picture is not as it is stored, but in `space`
     notes: tuple[str, ...] = ()  # what a user should know about it
 
     @property
@@ -121,23 +124,25 @@ def read(
     wanted: str | None,
     max_mb: float = limits.MAX_MB,
     named: Sequence[str] = (),
+    space: ColorSpace | None = None,
 ) -> tuple[FrameFile, ...]:
     """Every view of a frame, the default one first; the channels of its files together.
 
     `wanted`: the picture's layer. `max_mb`: megabytes that each file may unpack to. `named`: the
     views, if %V stands for them in the first path; else that file tells them. In the other paths
     %V stands for them too; of a file without %V and without views, they are the default view's.
+    `space`: of the samples of a still (stills.read) that is the first path.
     `InputError` names the file that is missing, damaged, too large, or of another size.
     """
     files = _Files(max_mb)
-    first = files.content(in_view(paths[0], named[0] if named else None))
+    first = files.content(in_view(paths[0], named[0] if named else None), space)
     full = tuple(view for view in first.named if first.views[view])
     there = tuple(named) or full or (None,)
     found = []
     for view in there:
         contents = [
-            (files.content(in_view(path, view)), has_view(path) and view is not None)
-            for path in paths
+            (files.content(in_view(path, view), which), has_view(path) and view is not None)
+            for path, which in zip(paths, (space, *(None for _ in paths[1:])), strict=True)
         ]
         chosen = [(c, c.chosen(view, there[0], whole)) for c, whole in contents]
         found.append(_together(chosen, number, wanted, view))
@@ -182,18 +187,18 @@ class _Files:
         self._max_mb = max_mb
         self._read: dict[Path, _Content] = {}
 
-    def content(self, path: Path) -> _Content:
-        """What the file holds."""
+    def content(self, path: Path, space: ColorSpace | None) -> _Content:
+        """What the file holds; `space`: of a still."""
         if path not in self._read:
-            self._read[path] = self._content(path)
+            self._read[path] = self._content(path, space)
         return self._read[path]
 
-    def _content(self, path: Path) -> _Content:
+    def _content(self, path: Path, space: ColorSpace | None) -> _Content:
         if path.suffix.lower() == ".exr":
             file = exr.read(path, max_mb=self._max_mb)
             return _Content(path, file, {}, views.by_view(file))
         if path.suffix.lower() in stills.SUFFIXES:
-            rgba = stills.read(path, max_mb=self._max_mb)
+            rgba = stills.read(path, max_mb=self._max_mb, space=space)
             planes = {c: rgba[..., i] for i, c in enumerate("RGBA"[: rgba.shape[2]])}
             return _Content(path, None, planes, {})
         known = ", ".join((".exr", *stills.SUFFIXES))

@@ -14,10 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from ..color import ToDisplay, to_display
+from ..display import Display
 from ..errors import InputError
 from . import atomic, exr, record, stills, video, views
-from .frame_file import FrameFile
+from .frame_file import FrameFile, about
 from .frame_numbers import frame_path, has_view, in_view, is_pattern
+from .input_space import chromaticities, relabelled, space_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +41,7 @@ class Output:
     `layers`: "all" that an EXR input holds go into the EXR output, or those of the "picture"
     only. `compression` of EXR: a name in exr.COMPRESSIONS, or "same" as the input's. `views`: the
     names of views that %V in the pattern stands for, which makes a file or video of each.
+    `display`: how PNG, JPEG, TIFF and videos show the light; sRGB by default.
     """
 
     def __init__(
@@ -54,11 +58,12 @@ class Output:
         layers: str = "all",
         compression: str = "zip",
         views: Sequence[str] = (),
+        display: Display | None = None,
     ):
         _check_exr_options(pattern, layers, compression)
         if has_view(pattern) and not views:
             raise InputError(f"output {pattern}: %V stands for a view, but the frames have none")
-        self._layers, self._compression = layers, compression
+        self._layers, self._compression, self._display = layers, compression, display
         self.pattern, self.bits, self.numbers = Path(pattern), bits, numbers
         self.settings = json.dumps(settings or {}, sort_keys=True)
         suffix = self.pattern.suffix.lower()
@@ -86,7 +91,8 @@ class Output:
             for view in self._views:
                 path = in_view(self.pattern, view)
                 temporary = atomic.temporary_name(path)
-                self._videos[view] = video.Video(path, temporary, fps, self.settings)
+                names = display.names if display else video.SRGB
+                self._videos[view] = video.Video(path, temporary, fps, self.settings, names)
 
     def _check_names(self, inputs: list[Path], is_video: bool) -> dict[Path, list[str]]:
         """Make the folders; return the names of the outputs in each.
@@ -199,7 +205,7 @@ class Output:
         """Write the file of `view`, or of all."""
         first = results[0]
         if self._videos:
-            self._videos[view].add(first.picture)
+            self._videos[view].add(first.picture, self._shown(first))
             return
         path = self.path(first.source.number, view)
         text = record.blank(self._expected(made_of))
@@ -207,13 +213,20 @@ class Output:
             content = _with_results(results, view, text, self._layers == "picture")
             data = exr.encode(content, self._compression)
         else:
-            data = stills.encode(first.picture, path.suffix, self.bits, text)
+            data = stills.encode(first.picture, path.suffix, self.bits, text, self._shown(first))
         if self._resume and self._is_done(path, made_of):
             return
         if not (self._resume or self._overwrite) and path.exists():
             raise InputError(f"{path} was written by another process during this run")
         self._under_way = atomic.temporary_name(path)
         atomic.write_file(path, *record.seal(data, text), temporary=self._under_way)
+
+    def _shown(self, result: Result) -> ToDisplay:
+        """How the picture becomes display values."""
+        if self._display is None:
+            return to_display
+        with about(result.source.name):
+            return self._display.of(space_of(result.source, self._display.config))
 
     def close(self) -> None:
         """Finish a video (OSError if it cannot be); pictures are finished one by one."""
@@ -299,7 +312,7 @@ def _with_results(
     """
     source = results[0].source
     if source.file is None:
-        made = exr.new(results[0].picture, {record.KEY: text})
+        made = exr.new(results[0].picture, chromaticities(source.space) | {record.KEY: text})
         made.parts[0].channels |= _told(results[0], made.parts[0])
         return made
     parts = [
@@ -309,8 +322,10 @@ def _with_results(
     twins = dict(zip(map(id, source.file.parts), parts, strict=True))
     new: set[tuple[int, str]] = set()
     for result in results:
-        home = result.source.part
+        home, space = result.source.part, result.source.space
         assert home is not None
+        if space is not None and result.source.made_linear:
+            twins[id(home)].attributes = relabelled(twins[id(home)].attributes, space)
         for i, full in enumerate(result.source.color):
             part, name = result.source.origin.get(full, (home, full))
             kind = result.source.channels[full].dtype

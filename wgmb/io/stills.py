@@ -21,7 +21,8 @@ import tifffile
 from av.container import InputContainer
 from PIL import JpegImagePlugin
 
-from ..color import linear, to_display
+from ..color import ToDisplay, linear, to_display
+from ..display import ColorSpace
 from ..errors import InputError
 from . import limits
 from .record import KEY
@@ -30,11 +31,15 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 _AFTER_HEADER = 33  # bytes of a PNG's signature and IHDR
 
 
-def read(path: str | Path, *, max_mb: float = limits.MAX_MB) -> np.ndarray:
+def read(
+    path: str | Path, *, max_mb: float = limits.MAX_MB, space: ColorSpace | None = None
+) -> np.ndarray:
     """(height, width, 3 or 4) float32, linear, premultiplied.
 
-    `max_mb`: megabytes that it may unpack to. `InputError` names the file where it is missing,
-    damaged, cut off, no picture or beyond that limit, and where memory is short.
+    `max_mb`: megabytes that it may unpack to. `space`: of the samples, instead of sRGB or, of
+    floats, linear light; what comes back is in `space.config.scene_linear`. `InputError`
+    names the file where it is missing, damaged, cut off, no picture or beyond that limit, and
+    where memory is short.
     """
     path = Path(path)
     if not path.is_file():
@@ -47,7 +52,7 @@ def read(path: str | Path, *, max_mb: float = limits.MAX_MB) -> np.ndarray:
         limits.check(path, f"{width} x {height}", unpacked, path.stat().st_size, max_mb)
 
     try:
-        return _to_linear(_READERS[path.suffix.lower()](path.read_bytes(), allow))
+        return _to_linear(_READERS[path.suffix.lower()](path.read_bytes(), allow), space)
     except InputError:
         raise
     except MemoryError:
@@ -113,7 +118,7 @@ _READERS = {
 }
 
 
-def _to_linear(samples: np.ndarray) -> np.ndarray:
+def _to_linear(samples: np.ndarray, space: ColorSpace | None) -> np.ndarray:
     if samples.ndim == 2:
         samples = samples[..., None]
     if samples.ndim != 3 or 0 in samples.shape or samples.shape[2] not in (1, 2, 3, 4):
@@ -121,23 +126,28 @@ def _to_linear(samples: np.ndarray) -> np.ndarray:
     if samples.shape[2] < 3:  # grey, grey and alpha
         samples = np.concatenate([samples[..., :1]] * 3 + [samples[..., 1:]], axis=2)
     if samples.dtype.kind == "f":
-        return samples.astype(np.float32)
+        return samples.astype(np.float32) if space is None else space.linear(samples)
     if samples.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"samples must be 8 or 16 bit or float, got {samples.dtype}")
     most = np.iinfo(samples.dtype).max
-    table = linear(np.arange(most + 1, dtype=np.float32) / np.float32(most))
-    light = table[samples[..., :3]]
+    table = np.arange(most + 1, dtype=np.float32) / np.float32(most)
+    if space is None:
+        light = linear(table)[samples[..., :3]]
+    else:
+        light = space.linear(table[samples[..., :3]])
     if samples.shape[2] == 3:
         return light
     alpha = samples[..., 3:] / np.float32(most)
     return np.concatenate([light * alpha, alpha], axis=2)
 
 
-def encode(rgba: np.ndarray, suffix: str, bits: int, text: str) -> bytes:
+def encode(
+    rgba: np.ndarray, suffix: str, bits: int, text: str, shown: ToDisplay = to_display
+) -> bytes:
     """The bytes of a still of (height, width, 3 or 4) linear light, with the record's text."""
     suffix = suffix.lower()
     if suffix in (".jpg", ".jpeg"):
-        samples = to_display(rgba[..., :3], 8)
+        samples = shown(rgba, 8, over_black=True)
         return iio.imwrite(
             "<bytes>",
             samples,
@@ -146,7 +156,7 @@ def encode(rgba: np.ndarray, suffix: str, bits: int, text: str) -> bytes:
             subsampling=0,
             comment=text.encode(),
         )
-    samples = to_display(rgba, bits)
+    samples = shown(rgba, bits)
     if suffix == ".png":
         return _with_text(_png(samples), text)
     stream = io.BytesIO()

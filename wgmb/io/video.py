@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import cast
@@ -17,7 +17,7 @@ from av.filter import Graph
 from av.video.reformatter import Colorspace
 from av.video.stream import VideoStream
 
-from ..color import to_display
+from ..color import ToDisplay, to_display
 from ..errors import InputError
 from . import atomic
 
@@ -29,7 +29,18 @@ _CODECS = {  # suffix: container, codec, pixel format, options
     ".webm": ("webm", "libvpx-vp9", "yuv420p", {"crf": "24", "b": "0"}),
     ".gif": ("gif", "gif", "pal8", {}),
 }
-_BT709, _SRGB = 1, 13  # colour primaries and matrix, transfer (ITU-T H.273)
+_BT709, _SRGB, _UNKNOWN = 1, 13, 2  # as primaries, matrix or transfer (ITU-T H.273)
+SRGB = frozenset({"srgb_rec709_display"})
+_DISPLAYS = {  # primaries and transfer of displays, by the names that configs give them
+    "srgb_rec709_display": (_BT709, _SRGB), "srgb_display": (_BT709, _SRGB),
+    "g22_rec709_display": (_BT709, 4),
+    "g24_rec709_display": (_BT709, 1), "rec1886_rec709_display": (_BT709, 1),
+    "g24_rec2020_display": (9, 14), "rec1886_rec2020_display": (9, 14),
+    "srgb_p3d65_display": (12, _SRGB), "displayp3_display": (12, _SRGB),
+    "pq_rec2020_display": (9, 16), "rec2100_pq_display": (9, 16),
+    "pq_p3d65_display": (12, 16), "st2084_p3d65_display": (12, 16),
+    "hlg_rec2020_display": (9, 18), "rec2100_hlg_display": (9, 18),
+}  # fmt: skip
 _FINEST = 1_001_000  # denominator of a rate: FFmpeg counts in 32 bits
 _TICK = Fraction(1, 100)  # of a GIF's clock [s]
 _RATES = Fraction(1, 1000), Fraction(1000)
@@ -42,10 +53,17 @@ class Video:
     Alpha is dropped (the colour is premultiplied, so it lies over black). Codecs that share
     colour between pixels need even sizes: the last row or column is then repeated. A GIF has 256
     colours per frame, dithered, and delays in steps of 1/100 s, which vary by a step to keep
-    the mean frame rate.
+    the mean frame rate. `display`: names of the display's colour space, for the tags.
     """
 
-    def __init__(self, path: Path, temporary: Path, fps: Fraction, settings: str):
+    def __init__(
+        self,
+        path: Path,
+        temporary: Path,
+        fps: Fraction,
+        settings: str,
+        display: Collection[str] = SRGB,
+    ):
         self.path, self.temporary, self.settings = path, temporary, settings
         self._is_gif = path.suffix.lower() == ".gif"
         least, most = _GIF_RATES if self._is_gif else _RATES
@@ -59,11 +77,13 @@ class Video:
         self._palettes: Graph | None = None
         self._lock: int | None = None
         self._frames = 0
+        known = [_DISPLAYS[name] for name in sorted(display) if name in _DISPLAYS]
+        self._tags = known[0] if known else (_UNKNOWN, _UNKNOWN)
         self._size: tuple[int, ...] = ()
 
-    def add(self, rgba: np.ndarray) -> None:
+    def add(self, rgba: np.ndarray, convert: ToDisplay = to_display) -> None:
         """Append one frame of linear light, (height, width, 3 or 4); OSError if it cannot be."""
-        shown = to_display(rgba[..., :3], 8)
+        shown = convert(rgba, 8, over_black=True)
         self._size = self._size or shown.shape
         if shown.shape != self._size:
             raise InputError(
@@ -91,7 +111,8 @@ class Video:
             context.time_base = _TICK
             self._palettes = _palettes(width, height)
         else:
-            context.color_primaries, context.color_trc, context.colorspace = _BT709, _SRGB, _BT709
+            context.color_primaries, context.color_trc = self._tags
+            context.colorspace = _BT709
         return container, stream
 
     def _encode(self, frame: av.VideoFrame | None) -> None:

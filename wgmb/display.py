@@ -1,0 +1,372 @@
+"""OpenColorIO: what a picture's numbers mean, and how they are shown on a display.
+
+The package is optional (`pip install wgmb[ocio]`) and loaded when a ColorConfig is made.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .color import ToDisplay
+from .errors import InputError, did_you_mean
+from .primaries import AP0, AP1, REC709, conversion, of_matrix
+
+_BUILT_IN = {"builtin": "ocio://default", "studio": "ocio://studio-config-latest"}
+_BLENDER = "*/datafiles/colormanagement/config.ocio"
+_NAMED_BY = "colorInteropID", "oiio:ColorSpace", "colorspace"
+_INTERCHANGE = {  # of configs without the role: spaces whose primaries their names tell
+    "lin_ap0_scene": AP0, "lin_ap0": AP0, "ACES2065-1": AP0, "ACES - ACES2065-1": AP0,
+    "lin_ap1_scene": AP1, "lin_ap1": AP1, "ACEScg": AP1, "ACES - ACEScg": AP1,
+    "lin_rec709_scene": REC709, "lin_rec709": REC709, "Linear Rec.709 (sRGB)": REC709,
+    "Linear Rec.709": REC709, "Utility - Linear - sRGB": REC709,
+}  # fmt: skip
+_MOST = 65504.0  # brighter than any display: largest half float
+_THREADS = min(os.cpu_count() or 1, 8)
+
+
+def installed() -> bool:
+    """True if OpenColorIO can be loaded."""
+    try:
+        import PyOpenColorIO  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+@dataclass(frozen=True)
+class ColorSpace:
+    """What the numbers of a picture mean, in the words of a config.
+
+    `name` is a space of the config. Where `matrix` is given (9 numbers, row by row), RGB must be
+    multiplied by it first. `why` says how the space was found.
+    """
+
+    config: ColorConfig = field(compare=False, repr=False)
+    name: str
+    why: str = field(compare=False)
+    matrix: tuple[float, ...] | None = None
+
+    @cached_property
+    def is_linear(self) -> bool:
+        """True if the numbers are scene-linear light, or no colours at all (data)."""
+        return self.matrix is not None or self.config.is_linear(self.name)
+
+    @property
+    def text(self) -> str:
+        """The space in words."""
+        words = {"default": "linear Rec.709", "acesImageContainerFlag": "ACES2065-1"}
+        name = self.name if self.matrix is None else words.get(self.why, "linear RGB")
+        return f"{name} (by {self.why})"
+
+    def check_linear(self) -> None:
+        """InputError unless the numbers are linear."""
+        if not self.is_linear:
+            raise InputError(
+                f"{self.why} is {self.name!r}, which is not linear, and only linear light can be "
+                f"blurred; --from '{self.name}' makes it linear first, another --from overrides it"
+            )
+
+    def linear(self, rgba: np.ndarray) -> np.ndarray:
+        """RGB, or premultiplied RGBA, in this space -> in `config.scene_linear`; new float32."""
+        rgb, alpha = rgba[..., :3], rgba[..., 3:].astype(np.float32, copy=False)
+        if self.is_linear or not alpha.shape[2]:
+            return np.concatenate([self.config.linearised(rgb, self.name), alpha], axis=2)
+        with np.errstate(over="ignore", invalid="ignore"):
+            straight = np.divide(rgb, alpha, out=np.zeros(rgb.shape, "f4"), where=alpha > 0)
+            light = self.config.linearised(straight, self.name) * alpha
+        return np.concatenate([light, alpha], axis=2)
+
+
+class ColorConfig:
+    """An OpenColorIO config: its spaces, displays and views.
+
+    `config`: "builtin" (OpenColorIO's default, ACES), "studio" (the same with cameras' spaces),
+    "blender" (of the module bpy, or of the program), `ocio://NAME`, or a file. InputError
+    where there is none, or OpenColorIO is not installed.
+    """
+
+    def __init__(self, config: str | Path):
+        try:
+            import PyOpenColorIO
+        except ImportError:
+            raise InputError(
+                "OpenColorIO is not installed: pip install wgmb[ocio], or --ocio off"
+            ) from None
+        self._ocio: Any = PyOpenColorIO
+        place = _BUILT_IN.get(str(config)) or str(config)
+        if place == "blender":
+            place = str(_blenders_config())
+        with self._said(str(config)):
+            self._config: Any = self._ocio.Config.CreateFromFile(place)
+        self.name: str = self._config.getName() or Path(place).name
+        """For messages and records."""
+        self.version: str = self._config.getCacheID().partition(":")[0]
+        """Changes with the contents of the config."""
+
+    def space(self, name: str) -> ColorSpace:
+        """The space of that name, alias or role; InputError lists the names there are."""
+        found = self._config.getColorSpace(name)
+        if found is None:
+            known = list(self._config.getColorSpaceNames())
+            every = [*known, *map(str.lower, known), *self._config.getRoleNames()]
+            every += [a for n in known for a in self._config.getColorSpace(n).getAliases()]
+            raise InputError(
+                f"unknown colour space {name!r} in {self.name}; available: {', '.join(known)}"
+                f"{did_you_mean(name, every)}"
+            )
+        return ColorSpace(self, found.getName(), "--from")
+
+    def space_of(self, attributes: Mapping[str, Any]) -> ColorSpace:
+        """The space of a picture with these attributes, of an EXR's part.
+
+        In this order: `colorInteropID`, `oiio:ColorSpace` or `colorspace` where the config has
+        a space of that name or alias (not: role); `acesImageContainerFlag` of 1 is ACES2065-1
+        (SMPTE ST 2065-4); `chromaticities`; else linear Rec.709, which is what an EXR means that
+        says nothing.
+        """
+        for key in _NAMED_BY:
+            value = attributes.get(key)
+            found = self._config.getColorSpace(value) if isinstance(value, str) and value else None
+            names = [found.getName(), *found.getAliases()] if found else []
+            if found and str(value).casefold() in map(str.casefold, names):
+                return ColorSpace(self, found.getName(), key)
+        if attributes.get("acesImageContainerFlag") == 1:
+            return self._by_primaries(AP0, "acesImageContainerFlag")
+        if (given := attributes.get("chromaticities")) is not None:
+            return self._by_primaries(tuple(np.ravel(given).tolist()), "chromaticities")
+        return self._by_primaries(REC709, "default")
+
+    @cached_property
+    def scene_linear(self) -> ColorSpace:
+        """The space of the role scene_linear, which pictures in other spaces are blurred in."""
+        if not self._config.hasRole("scene_linear"):
+            raise InputError(f"{self.name} has no role scene_linear to make pictures linear in")
+        name = self._config.getColorSpace("scene_linear").getName()
+        return ColorSpace(self, name, "the role scene_linear")
+
+    def chromaticities(self, space: ColorSpace) -> tuple[float, ...] | None:
+        """What an EXR in that linear space says of its primaries; None if nobody knows."""
+        if self._interchange is None:
+            return None
+        onto, primaries = self._interchange
+        columns = np.eye(3, dtype=np.float32)[None]
+        with self._said(f"{space.name} in {self.name}"):
+            moved = self._lossless(self._config.getProcessor(space.name, onto))
+            moved.applyRGB(columns)
+        matrix = conversion(primaries, AP0) @ columns[0].T.astype(np.float64)
+        return of_matrix(matrix)
+
+    def is_linear(self, name: str) -> bool:
+        """True if the space of that name holds scene-linear light or data."""
+        scene = self._ocio.REFERENCE_SPACE_SCENE
+        with self._said(f"{name} in {self.name}"):
+            data = self._config.getColorSpace(name).isData()
+            return data or self._config.isColorSpaceLinear(name, scene)
+
+    def linearised(self, rgb: np.ndarray, name: str) -> np.ndarray:
+        """RGB (height, width, 3) in the space of that name -> `scene_linear`; new float32."""
+        with self._said(f"{name} in {self.name}"):
+            processor = self._config.getProcessor(name, self.scene_linear.name)
+            return _applied(self._lossless(processor), np.array(rgb, np.float32, order="C"))
+
+    def display(
+        self, display: str | None = None, view: str | None = None, look: str | None = None
+    ) -> Display:
+        """How the config shows pictures; what is None is the config's default.
+
+        `look`: instead of the view's own looks. InputError lists the names there are.
+        """
+        config = self._config
+        display = str(display or config.getDefaultDisplay())
+        displays = list(config.getDisplaysAll())
+        if (found := _same(display, displays)) is None:
+            raise InputError(
+                f"unknown display {display!r} in {self.name}; available: {', '.join(displays)}"
+                f"{did_you_mean(display, displays)}"
+            )
+        views = list(config.getViews(found))
+        view = str(view or config.getDefaultView(found))
+        if not config.hasView(found, view):
+            raise InputError(
+                f"unknown view {view!r} of display {found!r} in {self.name}; "
+                f"available: {', '.join(views)}{did_you_mean(view, views)}"
+            )
+        looks = list(config.getLookNames())
+        for name in (part.strip(" +-") for part in (look or "").replace("|", ",").split(",")):
+            if name and _same(name, looks) is None:
+                raise InputError(
+                    f"unknown look {name!r} in {self.name}; available: {', '.join(looks)}"
+                    f"{did_you_mean(name, looks)}"
+                )
+        return Display(self, found, _same(view, views) or view, look)
+
+    def processor(self, space: ColorSpace, display: str, view: str, look: str | None) -> Any:
+        """OpenColorIO's processor from a space to a display and view."""
+        ocio, pipeline = self._ocio, self._ocio.LegacyViewingPipeline()
+        pipeline.setDisplayViewTransform(
+            ocio.DisplayViewTransform(src=space.name, display=display, view=view)
+        )
+        if look is not None:
+            pipeline.setLooksOverrideEnabled(True)
+            pipeline.setLooksOverride(look)
+        with self._said(f"{display}, {view} in {self.name}"):
+            shown = pipeline.getProcessor(self._config)
+            if space.matrix is None:
+                return shown
+            rows = np.eye(4)
+            rows[:3, :3] = np.reshape(space.matrix, (3, 3))
+            first = ocio.MatrixTransform(rows.ravel().tolist())
+            every = ocio.GroupTransform([first, *shown.createGroupTransform()])
+            return self._config.getProcessor(every)
+
+    def names_of(self, display: str, view: str) -> set[str]:
+        """Every name of the colour space that a view makes, in lower case."""
+        name = self._config.getDisplayViewColorSpaceName(display, view)
+        found = self._config.getColorSpace(display if name.startswith("<") else name)
+        if found is None:
+            return set()
+        interop = found.getInteropID() if hasattr(found, "getInteropID") else ""
+        names = found.getName(), interop, *found.getAliases()
+        return {name.casefold() for name in names if name}
+
+    @cached_property
+    def _interchange(self) -> tuple[str, tuple[float, ...]] | None:
+        """A linear space of the config whose primaries are known, and these."""
+        if self._config.hasRole("aces_interchange"):
+            return self._config.getColorSpace("aces_interchange").getName(), AP0
+        for name, primaries in _INTERCHANGE.items():
+            if found := self._config.getColorSpace(name):
+                return found.getName(), primaries
+        return None
+
+    def _by_primaries(self, primaries: tuple[float, ...], why: str) -> ColorSpace:
+        if self._interchange is None:
+            raise InputError(
+                f"{self.name} has no role aces_interchange, nor a space whose name tells its "
+                f"primaries (ACEScg, lin_rec709, ...), to tell what a picture means by {why}; "
+                "name its space with --from"
+            )
+        name, known = self._interchange
+        matrix = conversion(primaries, known)
+        return ColorSpace(self, name, why, tuple(matrix.ravel().tolist()))
+
+    def _lossless(self, processor: Any) -> Any:
+        return processor.getOptimizedCPUProcessor(self._ocio.OPTIMIZATION_LOSSLESS)
+
+    @contextlib.contextmanager
+    def _said(self, about: str) -> Iterator[None]:
+        """OpenColorIO's errors as one line of ours; it prints nothing meanwhile."""
+        ocio = self._ocio
+        level = ocio.GetLoggingLevel()
+        ocio.SetLoggingLevel(ocio.LOGGING_LEVEL_NONE)
+        try:
+            yield
+        except (ocio.Exception, ocio.ExceptionMissingFile) as error:
+            raise InputError(f"{about}: {' '.join(str(error).split())}") from None
+        finally:
+            ocio.SetLoggingLevel(level)
+
+
+class Display:
+    """A display and a view of a config: pictures as they look there (ColorConfig.display)."""
+
+    def __init__(self, config: ColorConfig, display: str, view: str, look: str | None):
+        self.config, self.display, self.view, self.look = config, display, view, look
+        self._processors: dict[ColorSpace, Any] = {}
+
+    @property
+    def settings(self) -> dict[str, str | None]:
+        """What it is, for the record of a file."""
+        config = f"{self.config.name} ({self.config.version})"
+        return {"ocio": config, "display": self.display, "view_transform": self.view,
+                "look": self.look}  # fmt: skip
+
+    @cached_property
+    def names(self) -> set[str]:
+        """Every name of the colour space that the view makes, in lower case."""
+        return self.config.names_of(self.display, self.view)
+
+    def of(self, space: ColorSpace) -> ToDisplay:
+        """What `color.to_display` is for sRGB, for linear premultiplied pictures in `space`."""
+        space.check_linear()
+        return partial(self._to_display, space)
+
+    def shown(self, rgba: np.ndarray, space: ColorSpace, over_black: bool = False) -> np.ndarray:
+        """Linear premultiplied (height, width, 3 or 4) -> RGB on the display, 0..1; float32.
+
+        The colour is unassociated for the transform, and stays so unless it is to lie
+        `over_black`. Where alpha is 0, it is light that is added: it has a colour over black only.
+        """
+        rgb, alpha = rgba[..., :3], rgba[..., 3:].astype(np.float32, copy=False)
+        if not alpha.shape[2]:
+            return self._transformed(rgb, space)
+        covered = alpha > 0
+        with np.errstate(over="ignore", invalid="ignore"):
+            straight = np.divide(rgb, alpha, out=rgb.astype(np.float32), where=covered)
+        colors = self._transformed(straight, space)
+        if not over_black:
+            return np.where(covered, colors, np.float32(0))
+        added = np.any(rgb != 0, axis=2, keepdims=True)
+        return colors * np.where(covered, np.clip(alpha, 0, 1), added).astype(np.float32)
+
+    def _transformed(self, rgb: np.ndarray, space: ColorSpace) -> np.ndarray:
+        if space not in self._processors:
+            look = self.config.processor(space, self.display, self.view, self.look)
+            self._processors[space] = look.getDefaultCPUProcessor()
+        light = np.nan_to_num(
+            rgb.astype(np.float32), copy=False, nan=0, posinf=_MOST, neginf=-_MOST
+        )
+        light = np.clip(light, -_MOST, _MOST, out=np.ascontiguousarray(light))
+        shown = np.nan_to_num(_applied(self._processors[space], light), copy=False)
+        return np.clip(shown, 0, 1, out=shown)
+
+    def _to_display(
+        self, space: ColorSpace, rgba: np.ndarray, bits: int, over_black: bool = False
+    ) -> np.ndarray:
+        most, kind = (255, np.uint8) if bits == 8 else (65535, np.uint16)
+        samples = np.rint(self.shown(rgba, space, over_black) * most).astype(kind)
+        if over_black or rgba.shape[2] == 3:
+            return samples
+        covered = np.rint(np.clip(rgba[..., 3:], 0, 1).astype(np.float32) * most).astype(kind)
+        return np.concatenate([samples, covered], axis=2)
+
+
+def _applied(processor: Any, rgb: np.ndarray) -> np.ndarray:
+    """Apply a processor in place, to bands of rows at a time; each goes without Python's lock."""
+    bands = [band for band in np.array_split(rgb, _THREADS) if len(band)]
+    if rgb.size < 1 << 16 or len(bands) == 1:
+        processor.applyRGB(rgb)
+        return rgb
+    with ThreadPoolExecutor(len(bands)) as pool:
+        list(pool.map(processor.applyRGB, bands))
+    return rgb
+
+
+def _same(name: str, known: list[str]) -> str | None:
+    """The name as the config writes it, which does not tell capital letters from small ones."""
+    return next((k for k in known if k.casefold() == name.casefold()), None)
+
+
+def _blenders_config() -> Path:
+    """The newest config of the module bpy, or of the program `blender`."""
+    spec, program = find_spec("bpy"), shutil.which("blender")
+    folders = list(spec.submodule_search_locations or ()) if spec else []
+    folders += [Path(program).resolve().parent] if program else []
+    found = [file for folder in folders for file in sorted(Path(folder).glob(_BLENDER))]
+    if not found:
+        raise InputError(
+            "--ocio blender: neither the module bpy nor the program blender is here; name the "
+            "file datafiles/colormanagement/config.ocio in Blender's folder instead"
+        )
+    return found[-1]
