@@ -121,6 +121,22 @@ def test_a_convention_that_was_found_wrong_is_said_without_asking(tmp_path, caps
     assert "flip x" in err
 
 
+def test_vectors_that_are_0_everywhere_are_said_without_asking(tmp_path, capsys):
+    for n in (1, 2):
+        channels = make.frame(n, "nuke")
+        for name in ("forward.u", "forward.v", "backward.u", "backward.v"):
+            channels[name] *= 0
+        make.write_exr(tmp_path / f"s.{n:04d}.exr", channels)
+    code, out, _ = make.inside(capsys, "info", tmp_path / "s.####.exr")
+    assert code == 0
+    assert "own motion blur" in out
+    line = ("blur", tmp_path / "s.####.exr", "-o", tmp_path / "o.####.exr")
+    code, _, err = make.inside(capsys, *line)
+    assert code == 0
+    assert "own motion blur" in err
+    assert "own motion blur" not in make.inside(capsys, *line, "--overwrite", "-q")[2]
+
+
 def test_settings_are_written_into_every_frame(tmp_path, capsys, shot):
     make.inside(capsys, "blur", shot, "-o", tmp_path / "o.####.exr", "--shutter", 90, "--holdout",
                 "ViewLayer.Depth=3")  # fmt: skip
@@ -182,6 +198,17 @@ def test_info_warns_of_motion_beyond_belief(tmp_path, capsys):
         tmp_path / "a.exr", make.frame(1, None) | make.written("nuke", to_prev, to_next)
     )
     assert "quarter of the width" in make.inside(capsys, "info", path)[1]
+
+
+def test_the_command_takes_the_mask_and_says_which(tmp_path, capsys):
+    channels = make.frame(1, "nuke") | {"known.Y": np.zeros((make.HEIGHT, make.WIDTH), "f4")}
+    channels["MV_Alpha.R"] = np.ones((make.HEIGHT, make.WIDTH), "f4")
+    path = make.write_exr(tmp_path / "a.exr", channels)
+    _, out, _ = make.inside(capsys, "info", path)
+    assert "vectors are used where MV_Alpha.R is 1" in out
+    _, out, _ = make.inside(capsys, "info", path, "--vector-mask", "known")
+    assert "vectors are used where known.Y is 1" in out
+    assert "the fastest is 0.0" in out
 
 
 def test_info_draws_the_motion(tmp_path, capsys, shot):

@@ -540,14 +540,14 @@ def test_an_interruption_that_python_lost_is_heard_at_the_next_frame(
 
 def test_a_file_that_the_system_refuses_is_named_before_the_reason(tmp_path, capsys, monkeypatch):
     pattern = make.write_sequence(tmp_path, range(1, 4))
-    read = Clip.source
+    read = Clip.sources
 
     def refused(self, number):
         if number == 2:
             raise PermissionError(errno.EACCES, "Permission denied", "masks/m.0002.png")
         return read(self, number)
 
-    monkeypatch.setattr(Clip, "source", refused)
+    monkeypatch.setattr(Clip, "sources", refused)
     out = tmp_path / "out" / "o.####.exr"
     code, _, err = make.inside(capsys, "blur", pattern, "-o", out, "--method", "tap")
     assert code == 1

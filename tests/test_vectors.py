@@ -1,7 +1,5 @@
 """One motion, written in every program's convention, is read as the same displacements."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -118,118 +116,61 @@ def test_none_reads_no_vectors():
     assert vectors.named(make.frame(1, "nuke"), Vectors("none")) is None
 
 
-# ---- detection ------------------------------------------------------------------------------
+# ---- where vectors are valid ----------------------------------------------------------------
 
-
-def detect(convention, n=5, velocity=make.VELOCITY, wrong=None, sides=("prev", "next"), **given):
-    """What is found of vectors that were read as `given` says, after `wrong` damaged them."""
-    to_prev, to_next = make.motion(n, velocity)
-    if wrong is not None:
-        to_prev, to_next = wrong(to_prev), wrong(to_next)
-    wanted = told(convention, **given)
-    motion = vectors.read(make.written(convention, to_prev, to_next), wanted)
-    near = {s: make.picture(n + d, velocity) for s, d in (("prev", -1), ("next", 1)) if s in sides}
-    found = vectors.detect(make.picture(n, velocity), motion, near.get("prev"), near.get("next"),
-                           wanted)  # fmt: skip
-    return wanted, found
-
-
-WRONGS = {
-    "x": (lambda v: v * np.array([-1, 1], "f4"), {"flip": "x"}),
-    "y": (lambda v: v * np.array([1, -1], "f4"), {"flip": "y"}),
-    "xy": (lambda v: -v, {"flip": "xy"}),
-    "half": (lambda v: v / 2, {"scale": 2.0}),
-    "double": (lambda v: v * 2, {"scale": 0.5}),
+MASKED = {  # channel that holds the mask, and what to say
+    "MV_Alpha": {},
+    "MV_Alpha.A": {},
+    "ViewLayer.mv_alpha.R": {},
+    "known.X": {"mask": "known"},
+    "odd.R": {"mask": "odd.R"},
 }
 
 
-@pytest.mark.parametrize("sides", [("prev", "next"), ("prev",), ("next",)])
-@pytest.mark.parametrize("convention", [*BOTH, *ONE])
-def test_right_vectors_are_found_right(convention, sides):
-    wanted, found = detect(convention, sides=sides)
-    assert found.sure
-    assert found.vectors == wanted
-    assert "tested" in found.text
+def masked(name: str, values: np.ndarray, convention="plain", **more) -> np.ndarray:
+    channels = make.written(convention, *moving()) | {name: values.astype("f4")}
+    return vectors.read(channels, told(convention, **more))
 
 
-@pytest.mark.parametrize("sides", [("prev", "next"), ("prev",)])
-@pytest.mark.parametrize("convention", ["blender", "nuke", "arnold", "vray"])
-@pytest.mark.parametrize("wrong", WRONGS)
-def test_wrong_vectors_are_found_out_and_it_is_said(wrong, convention, sides):
-    damage, cure = WRONGS[wrong]
-    wanted, found = detect(convention, wrong=damage, sides=sides)
-    assert found.sure
-    assert found.vectors == replace(wanted, **cure)
-    assert "because" in found.text
-    assert all(str(v if k == "flip" else f"{v:g}") in found.text for k, v in cure.items())
+@pytest.mark.parametrize("name", MASKED)
+def test_where_vectors_are_not_valid_nothing_moves(name):
+    mask = np.random.default_rng(1).integers(0, 2, (make.HEIGHT, make.WIDTH))
+    got = masked(name, mask, **MASKED[name])
+    np.testing.assert_array_equal(got, side_by_side(moving()) * mask[..., None])
 
 
-def test_a_cure_undoes_what_the_user_said_wrongly():
-    for wrong in ({"flip": "y"}, {"flip": "xy"}, {"scale": 2.0}):
-        _, found = detect("nuke", **wrong)
-        assert found.sure
-        assert found.vectors == told("nuke")
+def test_the_alpha_of_rsmbs_vectors_is_their_mask():
+    mask = np.random.default_rng(2).integers(0, 2, (make.HEIGHT, make.WIDTH))
+    channels = make.written("rsmb", *moving())
+    black = {k: (v * mask).astype("f4") for k, v in channels.items()}  # would be a long streak
+    got = vectors.read(black | {"rsmb.A": mask.astype("f4")}, told("rsmb"))
+    np.testing.assert_allclose(got[..., 2:], moving()[1] * mask[..., None], atol=1e-4)
+    other = make.written("vray", *moving()) | {"velocity.A": mask.astype("f4")}
+    assert vectors.mask_of(other, told("vray")) is None  # only rsmb's says so
 
 
-@pytest.mark.parametrize("velocity", [(5.0, 0.0), (0.0, 5.0)])
-def test_along_one_axis_no_flip_of_the_other_is_invented(velocity):
-    wanted, found = detect("nuke", velocity=velocity)
-    assert found.sure
-    assert found.vectors == wanted
+def test_an_edge_moves_as_what_is_valid_beside_it():
+    mask = np.zeros((make.HEIGHT, make.WIDTH))
+    mask[10:20, 10:20] = 1
+    mask[10:20, 20] = 0.4
+    mask[30, 30] = 0.5  # nothing valid beside it
+    got, motion = masked("MV_Alpha", mask), side_by_side(moving())
+    np.testing.assert_array_equal(got[10:20, 20], motion[10:20, 19])
+    assert not got[30, 30].any()
+    assert not got[:, 21:].any()
 
 
-def test_on_still_frames_it_says_that_it_cannot_tell():
-    wanted, found = detect("blender", velocity=(0.0, 0.0))
-    assert not found.sure
-    assert found.vectors == wanted
-    assert "cannot be tested" in found.text
+def test_a_mask_may_be_left_out_and_an_empty_one_is():
+    zero = np.zeros((make.HEIGHT, make.WIDTH))
+    motion = side_by_side(moving())
+    np.testing.assert_array_equal(masked("MV_Alpha", zero), motion)  # nobody filled it
+    np.testing.assert_array_equal(masked("MV_Alpha", 1 + zero), motion)
+    zero[5] = 1
+    np.testing.assert_array_equal(masked("MV_Alpha", zero, mask="none"), motion)
+    assert not masked("known.X", 0 * zero, mask="known").any()  # this one was asked for
 
 
-def test_on_a_picture_of_one_colour_it_says_that_it_cannot_tell():
-    flat = np.full((make.HEIGHT, make.WIDTH, 4), 0.5, "f4")
-    motion = np.full((make.HEIGHT, make.WIDTH, 4), 3.0, "f4")
-    found = vectors.detect(flat, motion, flat, flat, told("plain"))
-    assert not found.sure
-    assert found.vectors == told("plain")
-    assert "not testable" in found.text
-
-
-def test_on_a_single_frame_it_says_that_it_cannot_tell():
-    wanted, found = detect("blender", sides=())
-    assert not found.sure
-    assert found.vectors == wanted
-    assert "no neighbouring frame" in found.text
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_vectors_of_noise_are_not_believed(seed):
-    rng = np.random.default_rng(seed)
-    motion = moving(seed)
-    pictures = [rng.random((make.HEIGHT, make.WIDTH, 4)).astype("f4") for _ in range(3)]
-    found = vectors.detect(
-        pictures[1], side_by_side(motion), pictures[0], pictures[2], told("plain")
-    )
-    assert not found.sure
-    assert found.vectors == told("plain")
-    assert "check them" in found.text
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_random_vectors_of_a_real_motion_are_not_believed(seed):
-    pictures = [make.picture(n) for n in (4, 5, 6)]
-    found = vectors.detect(
-        pictures[1], side_by_side(moving(seed)), pictures[0], pictures[2], told("plain")
-    )
-    assert not found.sure
-    assert found.vectors == told("plain")
-
-
-def test_bad_vectors_and_pixels_do_not_stop_the_test():
-    to_prev, to_next = make.motion(5)
-    to_prev[::5, ::7], to_next[::6, ::5] = np.nan, np.inf
-    pictures = [make.picture(n) for n in (4, 5, 6)]
-    pictures[1][::9], pictures[2][::8] = np.nan, np.inf
-    found = vectors.detect(
-        pictures[1], side_by_side((to_prev, to_next)), pictures[0], pictures[2], told("plain")
-    )
-    assert found.vectors == told("plain")
+def test_a_mask_that_is_not_there_is_refused_with_a_list_of_what_there_is():
+    channels = make.written("plain", *moving())
+    with pytest.raises(InputError, match=r"no vector mask layer 'nope'.*to_next.*to_prev"):
+        vectors.read(channels, told("plain", mask="nope"))

@@ -98,6 +98,8 @@ class InputSettings:
     "Value that encodes zero motion, subtracted before scaling (vray, rsmb: 0.5)."
     vector_flip: Literal["x", "y", "xy"] | None = None
     "Reverses the motion vectors along an axis."
+    vector_mask: str | None = None
+    "Layer that is 1 where the vectors are valid, or none; default: MV_Alpha, or rsmb's alpha."
     object_motion: bool = False
     "The vectors hold object motion only; the camera's motion is added from --camera."
     camera: Path | None = None
@@ -144,6 +146,7 @@ class InputSettings:
                 self.vector_scale,
                 self.vector_offset,
                 self.vector_flip or "",
+                self.vector_mask,
             ),
             depth=self.depth,
             depth_kind=self.depth_kind,

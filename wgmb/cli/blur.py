@@ -102,7 +102,7 @@ def _conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose:
         for number, bad in sorted(report.bad.items()):
             what = ", ".join(f"{n} in {name}" for name, n in bad.items())
             note(f"frame {number}: ignored pixels that are not finite: {what}")
-        if verbose or "because" in clip.finding or "check them" in clip.finding:
+        if verbose or clip.is_finding_notable:
             note(f"vectors: {clip.finding}")
         for text, numbers in clip.notes.items():
             if told := sorted(set(numbers) & set(report.done)):

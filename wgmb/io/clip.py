@@ -21,7 +21,7 @@ from ..camera import MAX_INDEX
 from ..display import ColorSpace
 from ..errors import InputError, did_you_mean
 from ..frame import Frame
-from . import exr, layers, limits, vectors, views
+from . import detect, exr, layers, limits, vectors, views
 from .camera_file import CameraFile
 from .cuts import is_cut, jumps, still, straightened
 from .frame_file import FrameFile, about, read
@@ -143,7 +143,7 @@ class Clip:
         self._ready: OrderedDict[tuple[int, str | None], tuple[FrameFile, bool, Frame]] = (
             OrderedDict()
         )
-        self._found: vectors.Finding | None = None
+        self._found: detect.Finding | None = None
         self._jumps: dict[int, list[int]] = {}
         self._cuts_to: dict[tuple[int, int], bool] = {}
 
@@ -332,46 +332,69 @@ class Clip:
         """Readable description of the detected vector convention."""
         return self._decide().text
 
-    def _decide(self) -> vectors.Finding:
+    @property
+    def is_finding_notable(self) -> bool:
+        """True if the vectors do not mean what their names say, or should be checked."""
+        return self._decide().notable
+
+    def vector_mask(self, source: FrameFile) -> str | None:
+        """The channel of a frame that is 1 where its vectors are valid, if there is one."""
+        meaning = self._decide().vectors
+        with contextlib.suppress(InputError):  # its turn to fail comes
+            return vectors.mask_of(source.channels, meaning, source.beside) if meaning else None
+        return None
+
+    def _decide(self) -> detect.Finding:
         """Determine the vector convention once for all frames.
 
-        By name, then tested on the first frame on disk, or the middle or last one if nothing
-        moves there; so the result does not depend on the requested frames.
+        By name, then tested on the first frame on disk; unless that shows what the name says, on
+        the middle and the last one together with it. So the result does not depend on the
+        requested frames.
         """
         if self._found is None:
-            wanted = self.passes.vectors
-            self._found = vectors.Finding(None, False, "none requested")
-            if wanted.convention != "none":
-                there = self.on_disk
-                tested = dict.fromkeys(there[i] for i in (0, len(there) // 2, -1))
-                for number in tested:
-                    with contextlib.suppress(InputError, OSError):  # its turn to fail comes
-                        self._found = self._test(number, wanted)
-                    if self._found.sure or wanted.convention != "auto":
-                        break
+            self._found = self._find_out()
         return self._found
 
-    def _test(self, number: int, wanted: vectors.Vectors) -> vectors.Finding:
+    def _find_out(self) -> detect.Finding:
+        wanted, there = self.passes.vectors, self.on_disk
+        if wanted.convention == "none":
+            return detect.Finding(None, False, "none requested")
+        found = detect.Finding(None, False, "no vector layer found")
+        evidence: list[detect.Evidence] = []
+        for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
+            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                source, named = self._named_vectors(number, wanted)
+                if named is None:
+                    continue
+                if wanted.convention != "auto":
+                    return detect.Finding(named, True, str(named))
+                evidence.append(self._evidence(source, named))
+                found = detect.decide(named, evidence)
+                if found.sure and found.vectors == named:
+                    break
+        return found
+
+    def _named_vectors(
+        self, number: int, wanted: vectors.Vectors
+    ) -> tuple[FrameFile, vectors.Vectors | None]:
+        """The vectors that the layers' names speak for, in the first view that has any."""
         first = self._leader(number)
-        named = None
         for source in dict.fromkeys((first, *self._all(number))):
-            named = vectors.named(source.channels, wanted, source.beside)
-            if named is not None:
-                break
-        if named is None:
-            return vectors.Finding(None, False, "no vector layer found")
-        if wanted.convention != "auto":
-            return vectors.Finding(named, True, str(named))
-        motion = vectors.read(source.channels, named, source.beside)
+            if named := vectors.named(source.channels, wanted, source.beside):
+                return source, named
+        return first, None
+
+    def _evidence(self, source: FrameFile, named: vectors.Vectors) -> detect.Evidence:
+        if source.beside is None:
+            return detect.Evidence(doubt="no picture to test it on")
         prev, next_ = (
             None
-            if self._is_known_cut(number, side)
-            else self._neighbour(number + side, source.view)
+            if self._is_known_cut(source.number, side)
+            else self._neighbour(source.number + side, source.view)
             for side in (-1, 1)
         )
-        if source.beside is None:
-            return vectors.Finding(named, False, f"{named}, by name (no picture to test it on)")
-        return vectors.detect(source.rgba, motion, prev, next_, named)
+        motion = vectors.read(source.channels, named, source.beside)
+        return detect.gathered(source.rgba, motion, prev, next_)
 
     def _neighbour(self, number: int, view: str | None) -> np.ndarray | None:
         if not is_pattern(self._leading) or not self._path(number).is_file():

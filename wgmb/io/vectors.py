@@ -1,7 +1,7 @@
 """Motion vectors as programs write them -> to_prev, to_next in pixels, y down.
 
-Foreign conventions end here. A convention is what the numbers mean; `detect` finds out
-whether they do, by warping the neighbouring frame with them.
+Foreign conventions end here. A convention is what the numbers mean; detect.py finds out whether
+they do.
 """
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from .layers import component, layers, pick, stem
+from .layers import component, layers, one_channel, pick, stem
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,9 @@ CONVENTIONS: dict[str, Convention] = {
     ),
 }
 _BACKWARD = ("backward", "to_prev")
-_MOVING = 1.0  # [px] slower pixels say nothing about a convention
-_BRIGHT = 1e4  # light beyond this is all the same
-_PROBES = 20_000  # pixels compared
-_EXPLAINS = 0.9  # what a right reading leaves at most of the unmoved difference
-_CLEARLY = 0.75  # another reading must leave less than this share of the difference
+_VALID = ("mv_alpha", "mvalpha")  # layers or channels, after RE:Vision Effects' MV_Alpha
+_FULL = 0.999  # of the mask: vectors are valid
+_AROUND = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,8 @@ class Vectors:
 
     `convention`: "auto", "none" or a name in CONVENTIONS. `layer`: name of a layer that cannot be
     found automatically. `offset`, the value that encodes zero motion, is subtracted first, then
-    `scale` multiplies; `flip` reverses "x", "y" or "xy".
+    `scale` multiplies; `flip` reverses "x", "y" or "xy". `mask`: layer that is 1 where the vectors
+    are valid, or "none"; by default one called MV_Alpha, or the alpha of rsmb's vectors.
     """
 
     convention: str = "auto"
@@ -106,6 +105,7 @@ class Vectors:
     scale: float = 1.0
     offset: float | None = None
     flip: str = ""
+    mask: str | None = None
 
     def __post_init__(self) -> None:
         if self.convention not in ("auto", "none", *CONVENTIONS):
@@ -121,6 +121,7 @@ class Vectors:
         more = [f"scale {self.scale:g}"] if self.scale != 1 else []
         more += [f"offset {self.offset:g}"] if self.offset is not None else []
         more += [f"flip {self.flip}"] if self.flip else []
+        more += [f"mask {self.mask}"] if self.mask else []
         return " ".join((self.convention, *more))
 
 
@@ -196,7 +197,9 @@ def read(
 ) -> np.ndarray:
     """(height, width, 4) float32: to_prev and to_next [px] of a frame's channels.
 
-    Where one side is not there it is the other's opposite: a straight path.
+    Where one side is not there it is the other's opposite: a straight path. Where the vectors'
+    mask is not 1 they are not valid, and the motion is 0; where it is between 0 and 1, at the
+    edge of something, it is that of a valid pixel beside it, if there is one.
     """
     convention = CONVENTIONS[vectors.convention]
     sides = channels_of(channels, vectors, near)
@@ -216,117 +219,44 @@ def read(
             plane *= factor[axis]
         if len(sides) == 1:
             np.negative(motion[..., begin : begin + 2], out=motion[..., other : other + 2])
+    if mask := mask_of(channels, vectors, near):
+        _mask_out(motion, channels[mask], vectors.mask is not None)
     return motion
 
 
-# ---- what the numbers really mean -----------------------------------------------------------
+def mask_of(names: Iterable[str], vectors: Vectors, near: str | None = None) -> str | None:
+    """The channel that is 1 where the vectors are valid, if there is one."""
+    if vectors.mask == "none":
+        return None
+    by_layer = layers(names, near)
+    if vectors.mask is not None:
+        return one_channel(by_layer, vectors.mask, "vector mask layer")
+    for layer, members in by_layer.items():
+        if stem(layer) in _VALID:
+            return members[0]
+        for member in members:
+            if component(member) in _VALID:
+                return member
+    if vectors.convention != "rsmb":
+        return None
+    sides = channels_of(names, vectors, near)
+    beside = by_layer[next(iter(sides.values()))[0].rpartition(".")[0]]
+    return next((m for m in beside if component(m) in ("a", "alpha")), None)
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Result of testing a convention by warping the neighbouring frame."""
+def _mask_out(motion: np.ndarray, mask: np.ndarray, is_asked_for: bool) -> None:
+    """Set the motion to 0 where the mask is not full.
 
-    vectors: Vectors | None  # the reading that explains the neighbour; None: there are none
-    sure: bool  # something moves, and one reading is clearly better than standing still
-    text: str  # for people
-
-
-_Pairs = list[tuple[np.ndarray, np.ndarray]]  # motion towards a neighbour, and its tones
-_LEFT = "warping leaves {:.0%} of the difference to the neighbouring frame"
-_ALTERNATIVES = tuple((flip, scale) for flip in ("", "y", "x", "xy") for scale in (1.0, 2.0, 0.5))
-
-
-def detect(
-    color: np.ndarray,
-    motion: np.ndarray,
-    prev_color: np.ndarray | None,
-    next_color: np.ndarray | None,
-    vectors: Vectors,
-) -> Finding:
-    """Test `vectors`, which were read as `motion`, against the neighbouring frames' colour.
-
-    color: (height, width, 3 or 4); neighbours alike, or None. Every alternative (flipped,
-    twice, half) warps the neighbours; the one that leaves the least difference is meant.
+    A mask that nobody asked for, and that is full nowhere, was not filled, and says nothing.
     """
-    sides = ((motion[..., :2], prev_color), (motion[..., 2:], next_color))
-    pairs = [
-        (m, _tone(c[..., :3])) for m, c in sides if c is not None and c.shape[:2] == color.shape[:2]
-    ]
-    if not pairs:
-        return Finding(vectors, False, f"{vectors}, by name (no neighbouring frame to test it on)")
-    at = _moving_pixels(pairs)
-    if len(at) < 16:
-        return Finding(
-            vectors, False, f"{vectors}, by name (nothing moves, so it cannot be tested)"
-        )
-    still = _difference(color, pairs, at, 0.0, "")
-    if still == 0:
-        text = f"{vectors}, by name (moving parts look the same in all frames: not testable)"
-        return Finding(vectors, False, text)
-    left = {
-        (flip, scale): _difference(color, pairs, at, scale, flip) for flip, scale in _ALTERNATIVES
-    }
-    least = min(left.values())
-    # Of readings that do as well (nothing moves along y, say) the plainest.
-    best = min(
-        (k for k, d in left.items() if d <= 1.02 * least),
-        key=lambda k: (len(_combine(vectors.flip, k[0])), k != ("", 1.0), left[k]),
-    )
-    stated = left["", 1.0]
-    if left[best] > _CLEARLY * stated:
-        best = ("", 1.0)
-    if left[best] > _EXPLAINS * still:
-        text = f"{vectors}, by name; no interpretation of them predicts the neighbouring frame"
-        return Finding(vectors, False, text + ": check them")
-    if best == ("", 1.0):
-        return Finding(vectors, True, f"{vectors}, tested: {_LEFT.format(stated / still)}")
-    flip, scale = best
-    meant = replace(vectors, flip=_combine(vectors.flip, flip), scale=vectors.scale * scale)
-    then, now = _LEFT.format(stated / still), f"{left[best] / still:.0%}"
-    return Finding(meant, True, f"{meant}, because with {vectors} {then}, with this {now}")
-
-
-def _combine(a: str, b: str) -> str:
-    return "".join(axis for axis in "xy" if (axis in a) != (axis in b))
-
-
-def _moving_pixels(pairs: _Pairs) -> np.ndarray:
-    """Up to _PROBES pixels (y, x) that move in every given direction."""
-    moving = np.ones(pairs[0][0].shape[:2], bool)
-    with np.errstate(all="ignore"):
-        for motion, _ in pairs:
-            speed = np.hypot(motion[..., 0], motion[..., 1])
-            moving &= (speed > _MOVING) & np.isfinite(speed)
-    at = np.argwhere(moving)
-    chosen = np.random.default_rng(0).permutation(len(at))[:_PROBES]
-    return at[chosen]
-
-
-def _difference(color: np.ndarray, pairs: _Pairs, at: np.ndarray, scale: float, flip: str) -> float:
-    """Mean difference, robust against what appears and disappears, of warped neighbours."""
-    factor = np.array([-scale if axis in flip else scale for axis in "xy"])
-    here = _tone(color[at[:, 0], at[:, 1], :3])
-    total = 0.0
-    for motion, neighbour in pairs:
-        where = at[:, ::-1] + motion[at[:, 0], at[:, 1]] * factor
-        there = _bilinear(neighbour, where)
-        total += float(np.minimum(np.abs(there - here).sum(axis=1), 0.3).mean())
-    return total / len(pairs)
-
-
-def _tone(color: np.ndarray) -> np.ndarray:
-    """Held to 0..1 without hard limit, so that one highlight does not decide."""
-    light = np.clip(np.nan_to_num(color.astype(np.float32)), 0, _BRIGHT)
-    return light / (1 + light)
-
-
-def _bilinear(image: np.ndarray, where: np.ndarray) -> np.ndarray:
-    height, width = image.shape[:2]
-    x = np.clip(where[:, 0], 0, width - 1.001)
-    y = np.clip(where[:, 1], 0, height - 1.001)
-    left, top = x.astype(int), y.astype(int)
-    right, below = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    u, v = (x - left)[:, None], (y - top)[:, None]
-    upper = (1 - u) * image[top, left] + u * image[top, right]
-    lower = (1 - u) * image[below, left] + u * image[below, right]
-    return (1 - v) * upper + v * lower
+    known = mask >= _FULL
+    if known.all() or not (is_asked_for or known.any()):
+        return
+    height, width = mask.shape
+    motion[~known] = 0
+    y, x = np.nonzero(~known & (mask > 0))
+    for down, right in _AROUND:
+        near = np.clip(y + down, 0, height - 1), np.clip(x + right, 0, width - 1)
+        has = known[near]
+        motion[y[has], x[has]] = motion[near[0][has], near[1][has]]
+        y, x = y[~has], x[~has]
