@@ -17,7 +17,7 @@ LAYERS = [
     {"primaries"},
     {"gpu", "shutter", "camera", "metrics", "display"},
     {"frame", "cone"},
-    {"frame_views"},
+    {"frame_views", "reach"},
     {"velocity", "holdout"},
     {"io", "scene", "observer"},
     {"methods"},

@@ -22,6 +22,7 @@ from .io.clip import Clip
 from .io.frame_file import FrameFile
 from .io.frame_numbers import has_view
 from .io.output import Output, Result
+from .io.windows import Placement
 from .pipeline import Blur
 from .render import Render
 
@@ -43,7 +44,7 @@ class _Job:
     """One frame, read and to be blurred: every view of it."""
 
     number: int
-    views: list[tuple[FrameFile, Frame]]
+    views: list[tuple[FrameFile, Frame, Placement]]
     made_of: dict[str, Any]
 
 
@@ -212,12 +213,12 @@ class _Pipeline:
         sources = self.clip.sources(number)
         if not self.output.takes_views:
             del sources[1:]
-        prepare = self.clip.with_neighbours if neighbours else self.clip.frame
         normal = "normal" in self.blur.method.uses
         views = []
         for source in sources:
             try:
-                views.append((source, prepare(source, normal=normal)))
+                made = self.clip.placed(source, self.blur.reach, neighbours, normal)
+                views.append((source, *made))
             except InputError as error:
                 raise _of_view(error, source, sources) from None
         if unread := sorted({number - 1, number + 1} & self.clip.unread):
@@ -227,21 +228,21 @@ class _Pipeline:
     def blur_one(self, job: _Job) -> None:
         """The second stage, for one frame."""
         results: list[Result] = []
-        for source, frame in job.views:
+        for source, frame, placement in job.views:
             try:
-                results.append(self._blurred(source, frame))
+                results.append(self._blurred(source, frame, placement))
             except (InputError, GpuMemoryError) as error:
-                self._fail(job.number, _of_view(error, source, [other for other, _ in job.views]))
+                self._fail(job.number, _of_view(error, source, [view[0] for view in job.views]))
                 return
             for name, count in frame.bad.items():
                 bad = self.report.bad.setdefault(job.number, {})
                 bad[name] = bad.get(name, 0) + count
         self.to_write.put(_Blurred(job.number, results, job.made_of))
 
-    def _blurred(self, source: FrameFile, frame: Frame) -> Result:
+    def _blurred(self, source: FrameFile, frame: Frame, placement: Placement) -> Result:
         if self.confidence:
-            return Result(source, *self.blur.with_confidence(frame))
-        return Result(source, self.blur(frame))
+            return Result(source, *self.blur.with_confidence(frame), placement)
+        return Result(source, self.blur(frame), placement=placement)
 
     def write(self) -> None:
         """The third stage: results to files."""

@@ -13,6 +13,10 @@ from .errors import InputError
 
 MOST_BODIES = 65535
 MAX_INDEX = 2**32 - 1
+Window = tuple[int, int, int, int]
+"""Where an image lies in the display window: x, y of its first pixel; then the display window's
+width and height [px].
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +84,8 @@ class Reprojections:
     """"planar": distance along the view axis; "clip": z after projection, as in a depth buffer."""
     far: float = 1e9
     """Planar depth from which a pixel counts as empty (sky)."""
-    window: tuple[int, int, int, int] | None = None
-    """Offset of the image in the full image, and the full size: x, y, width, height [px]."""
+    window: Window | None = None
+    """As in Frame.window."""
 
     def __post_init__(self) -> None:
         if self.prev is None and self.next is None:
@@ -112,11 +116,18 @@ class Reprojections:
         return np.array([0, *sorted(self.here.bodies)], np.uint32)
 
     def displacement(
-        self, size: tuple[int, int], x: np.ndarray, y: np.ndarray, depth: np.ndarray, side: int
+        self,
+        size: tuple[int, int],
+        x: np.ndarray,
+        y: np.ndarray,
+        depth: np.ndarray,
+        side: int,
+        bodies: np.ndarray | None = None,
     ) -> np.ndarray:
-        """(n, 2) way of the world at pixels x, y [px] to the previous (side -1), next (1) frame.
+        """(n, 2) way of what is at pixels x, y [px] to the previous (side -1), next (1) frame.
 
-        NaN where there is no such frame, or it is behind its camera; bodies count as the world.
+        `bodies`: (n,) object index of each, 0 for the world. NaN where there is no such frame, or
+        it is behind its camera.
         """
         left, top, width, height = self.window or (0, 0, *size)
         scale = np.array([width / 2, -height / 2])
@@ -128,7 +139,12 @@ class Reprojections:
             nothing = ~np.isfinite(z) | (z >= self.far) | (z <= 0)
             inverse = np.where(nothing, 0.0, 1 / z)
             pixel = np.hstack([ndc, one, inverse] if planar else [ndc, z, one])
-            clip = pixel @ self._reprojection(self.prev if side < 0 else self.next, None).T
+            there = self.prev if side < 0 else self.next
+            clip = pixel @ self._reprojection(there, None).T
+            moving = () if bodies is None else np.intersect1d(bodies, self.indices[1:])
+            for body in moving:
+                of_body = (bodies == body) & ~nothing[:, 0]
+                clip[of_body] = pixel[of_body] @ self._reprojection(there, int(body)).T
             way = (clip[:, :2] / clip[:, 3:] - ndc) * scale
         return np.where(clip[:, 3:] > 0, way, np.nan)
 
@@ -154,6 +170,15 @@ class Reprojections:
         if not _invertible(pixel_from_world):
             raise InputError("clip_from_world is not the projection of a camera")
         return np.linalg.inv(pixel_from_world)
+
+
+def window_of(window: Window | None, camera: Reprojections | None) -> Window | None:
+    """The window of a frame, which may have been given with its camera only."""
+    if camera is None or camera.window is None or camera.window == window:
+        return window
+    if window is not None:
+        raise InputError(f"the camera's window is {camera.window}, the frame's {window}")
+    return camera.window
 
 
 def _power(turn: np.ndarray, share: float) -> np.ndarray:

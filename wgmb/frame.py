@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .camera import Reprojections
+from .camera import Reprojections, Window, window_of
 from .errors import InputError
 from .gpu import wgsl
 
@@ -53,6 +53,10 @@ class Frame:
     """(height, width, 4) float [px]: to_prev and to_next side by side, instead of the two."""
     depth: np.ndarray | None = None
     """(height, width) float [scene units], required if motion comes from `camera`."""
+    window: Window | None = None
+    """Where the image lies in the display window, of which it may hold a part, or more: x, y of
+    its first pixel, and the display window's width and height [px]. None: the camera's, or the
+    image is all of it."""
     camera: Reprojections | None = None
     """Camera and body motion around this frame; gives motion from depth."""
     object_id: np.ndarray | None = None
@@ -100,6 +104,7 @@ class Frame:
             object.__setattr__(self, "object_id", ids)
         if self.camera is not None and self.depth is None:
             raise InputError("motion from a camera needs depth")
+        object.__setattr__(self, "window", window_of(self.window, self.camera))
         if self.object_id is not None and self.camera is None:
             raise InputError("object_id needs a camera, which holds the motion of the bodies")
         if self.motion is not None and not (self.to_next is None and self.to_prev is None):
@@ -119,8 +124,14 @@ class Frame:
 
     def _check_neighbours(self) -> None:
         for name, neighbour in (("prev", self.prev), ("next", self.next)):
-            if neighbour is not None and neighbour.size != self.size:
+            if neighbour is None:
+                continue
+            if neighbour.size != self.size:
                 raise InputError(f"{name} must be {self.size} like the frame, got {neighbour.size}")
+            whole = (0, 0, *self.size)
+            if (neighbour.window or whole) != (self.window or whole):
+                wanted = f"{self.window or whole} like the frame's"
+                raise InputError(f"{name}'s window must be {wanted}, got {neighbour.window}")
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, fields
 
 import wgpu
 
-from .camera import Reprojections
+from .camera import Reprojections, Window, window_of
 from .errors import InputError
 
 View = wgpu.GPUTextureView
@@ -42,6 +42,8 @@ class FrameViews:
     """`to_prev` and `to_next` in one texture, instead of the two; saves a pass."""
     depth: View | None = field(default=None, metadata=_X_IF_USED)
     """Distance along the view axis [scene units] in x."""
+    window: Window | None = None
+    """As in Frame.window."""
     camera: Reprojections | None = None
     """Camera and body motion around this frame; needs `depth`."""
     object_id: View | None = field(default=None, metadata=_INDEX)
@@ -64,6 +66,9 @@ class FrameViews:
     def size(self) -> tuple[int, int]:
         """Width and height [px]."""
         return self.color.size[0], self.color.size[1]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "window", window_of(self.window, self.camera))
 
     @property
     def has_vectors(self) -> bool:

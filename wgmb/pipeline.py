@@ -15,6 +15,7 @@ import numpy as np
 import wgpu
 
 from . import gpu
+from .camera import Window
 from .errors import InputError, did_you_mean
 from .frame import PASSES, Frame
 from .frame_views import FrameViews, View, check_output, check_view
@@ -25,6 +26,7 @@ from .holdout import HoldoutPass
 from .methods import METHODS, default_method
 from .methods.contract import Inputs, PreparedFrame
 from .methods.options import options_of
+from .reach import Reach
 from .residency import Residency
 from .scene.gbuffer import SceneOnGpu
 from .shutter import Shutter
@@ -121,6 +123,22 @@ class Blur:
         return METHODS[self.method.name](self.device, options, output=self.output)
 
     @property
+    def reach(self) -> Reach:
+        """How far it carries what moves, for frames that hold a part of their picture; see
+        Clip.with_neighbours.
+        """
+        opens, closes = self._shutter.span
+        late = sum(map(abs, self._shutter.delay))  # twice that of the display window's edges
+        method = type(self.method)
+        return Reach(
+            (opens - late, closes + late),
+            (opens, closes),
+            getattr(method, "spread", "along"),
+            self.max_blur,
+            getattr(method, "margin", lambda height: 0),
+        )
+
+    @property
     def shutter(self) -> Shutter:
         """The current Shutter; can be set between frames, to degrees or a Shutter."""
         return self._shutter
@@ -191,7 +209,7 @@ class Blur:
         for whose, (_, one) in around.items():
             one.check_fit(self.device, size, whose)
             self._require(one.has, whose)
-        bindings = self.frame_bindings(size, number)
+        bindings = self.frame_bindings(size, number, frame.window)
         encoder = timing.watch(encoder) if timing else encoder
         masked = any(one.holdout is not None or one.check for _, one in around.values())
         frames = tuple(
@@ -345,7 +363,7 @@ class Blur:
         frame.check_fit(self.device, output.size[:2])
         check_view("output", output, self.device, frame.size)
         check_output("output", output, "rgba32float")
-        bindings = self.frame_bindings(frame.size, number)
+        bindings = self.frame_bindings(frame.size, number, frame.window)
         self._velocity.encode(encoder, bindings, frame, self.max_blur is not None, output)
 
     def upload(self, frame: Frame) -> dict[str, Any]:
@@ -389,16 +407,20 @@ class Blur:
             what = ", ".join(whose + name for name in sorted(missing))
             raise InputError(f"method {self.method.name!r} needs {what}")
 
-    def frame_bindings(self, size: tuple[int, int], number: int = 0) -> gpu.FrameBindings:
+    def frame_bindings(
+        self, size: tuple[int, int], number: int = 0, window: Window | None = None
+    ) -> gpu.FrameBindings:
         """Return the bindings shared by all passes: frame, shutter, times of the samples."""
+        window = window or (0, 0, *size)
         data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
         data["size"], data["samples"], data["jitter"] = size, self.samples, self.jitter
         data["index"] = number % 2**32
+        data["origin"], data["display"] = window[:2], window[2:]
         data["max_blur"] = np.inf if self.max_blur is None else self.max_blur
         frame = self.device.create_buffer_with_data(
             label="frame", data=data, usage=wgpu.BufferUsage.UNIFORM
         )
-        return gpu.FrameBindings(size, {"frame": frame, **self._group0})
+        return gpu.FrameBindings(size, {"frame": frame, **self._group0}, window)
 
 
 def most_samples(method: str, device: wgpu.GPUDevice) -> int:

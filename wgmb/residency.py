@@ -31,7 +31,7 @@ class _ResidentFrame:
     def __init__(self, frame: Frame, views: FrameViews):
         self.views = views
         self._arrays = {name: weakref.ref(array) for name, array in frame.arrays.items()}
-        self._rest = frame.camera, frame.object_motion
+        self._rest = frame.camera, frame.object_motion, frame.window
 
     def is_of(self, frame: Frame) -> bool:
         """Return True if these are the arrays of `frame`, unchanged."""
@@ -41,7 +41,7 @@ class _ResidentFrame:
             and given.keys() == self._arrays.keys()
             and all(self._arrays[name]() is array for name, array in given.items())
             and frame.camera is self._rest[0]
-            and frame.object_motion == self._rest[1]
+            and (frame.object_motion, frame.window) == self._rest[1:]
         )
 
 
@@ -92,6 +92,7 @@ class Residency:
                 views[name] = self._images.upload(name + place, array, texture["format"])
         return FrameViews(
             color=self._images.upload("color" + place, color, four),
+            window=frame.window,
             camera=frame.camera,
             object_motion=frame.object_motion,
             check=bool(frame.bad.keys() - {"depth"}),

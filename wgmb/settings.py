@@ -114,6 +114,8 @@ class InputSettings:
     "Object index layer that identifies the objects of the camera file."
     also: tuple[str, ...] = ()
     "Pattern of files with additional layers of the same frames; may be repeated."
+    outside: Literal["auto", "nothing", "edge"] = "auto"
+    "Beyond a data window that ends within the image: nothing, or edge (unknown: its edge goes on)."
     cuts: str | None = None
     "Frames that begin a new shot, such as 101,155, in addition to the detected cuts."
     view: str | None = None
@@ -157,6 +159,7 @@ class InputSettings:
             holdout=holdout,
             scale=scale,
             also=self.also,
+            outside=self.outside,
         )
         clip = Clip(
             pattern,
@@ -321,6 +324,8 @@ class OutputSettings:
     "EXR to EXR: copy all layers of the input, or write the picture only (faster)."
     compression: str = "zip"
     "EXR: none, rle, zips, zip, piz; lossy: pxr24, b44, b44a, dwaa, dwab; or same (as the input)."
+    window: Literal["grow", "keep"] = "grow"
+    "EXR: the data window grows with the streaks, or keeps the input's size."
 
     @property
     def is_exr(self) -> bool:
@@ -330,7 +335,8 @@ class OutputSettings:
     @property
     def looks(self) -> dict:
         """Return the settings that change the contents of the files."""
-        return {"bits": self.bits, "layers": self.layers, "compression": self.compression}
+        shown = ("bits", "layers", "compression", "window")
+        return {name: getattr(self, name) for name in shown}
 
     def make(
         self,
@@ -354,6 +360,7 @@ class OutputSettings:
             compression=self.compression,
             views=views,
             display=display,
+            window=self.window,
         )
 
     @property

@@ -132,7 +132,10 @@ export function groupZero({ width, height, samples = K.SAMPLES, shutter, number 
   const [opens, closes] = shutter.span, index = modulo(number, 2 ** 32);
   const file = 'methods/tap.wgsl';      // any that binds all three
   return {
-    frame: packed(file, 'Frame', { size: [width, height], index, samples, jitter, max_blur: maxBlur ?? Infinity }),
+    frame: packed(file, 'Frame', {
+      size: [width, height], index, samples, jitter, max_blur: maxBlur ?? Infinity,
+      origin: [0, 0], display: [width, height],
+    }),
     shutter: packed(file, 'Shutter', { span: shutter.span, rolling: [0, 0], step: (closes - opens) / samples }),
     strata: bytesOf(shutter.strata(samples)),
   };

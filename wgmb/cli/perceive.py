@@ -15,8 +15,11 @@ from .._version import __version__
 from ..cone import VIDEOS, Cone
 from ..errors import InputError
 from ..io.atomic import write_file
-from ..io.frame_file import FrameFile
+from ..io.clip import Clip
+from ..io.frame_file import FrameFile, size_text
 from ..io.frame_numbers import frame_numbers
+from ..io.output import Result
+from ..io.windows import Placement, laid, union
 from ..lab import charts
 from ..lab.shutter_study import best_shutter, compare, perception_charts
 from ..observer import Observer
@@ -103,7 +106,7 @@ def perceive(
     else:
         clip = given.open(pattern)
         numbers, rate = clip.numbers, float(output.rate)
-        pictures = ((n, clip.source(n), [clip.source(n).rgba]) for n in numbers)
+        pictures = _shown(clip)
         inputs = clip.inputs
     observer = Observer(rate, who.cone, device=adapter)
     settings = {"wgmb": __version__} | plain(who) | {"input": pattern, "fps": output.fps}
@@ -111,10 +114,11 @@ def perceive(
     started = time.perf_counter()
     with progress(len(numbers), quiet, "perceiving") as tick:
         try:
-            for number, source, shown in pictures:
+            for number, source, shown, placement in pictures:
                 for picture in shown:
                     observer.present(picture)
-                files.write(observer.perceived()[..., : picture.shape[2]], source)
+                seen = observer.perceived()[..., : picture.shape[2]]
+                files.write_views([Result(source, seen, placement=placement)])
                 tick(number, "done")
             files.close()
         except BaseException:
@@ -125,6 +129,21 @@ def perceive(
         done = f"{len(numbers)} frames in {seconds:.1f} s -> {files.pattern}"
         note(done)
     return 0
+
+
+def _shown(clip: Clip):
+    """Every frame on one canvas: the display window, and the overscan of the first one."""
+    first = clip.source(clip.numbers[0])
+    canvas = union([first.display_window, first.data_window])
+    for number in clip.numbers:
+        source = clip.source(number)
+        if source.display_window != first.display_window:
+            raise InputError(
+                f"{source.path} is {size_text(source.whole)}, {first.path.name} "
+                f"{size_text(first.whole)}"
+            )
+        picture = laid(source.rgba, source.data_window, canvas)
+        yield number, source, [picture], Placement(canvas, canvas)
 
 
 def _nature(name: str, given: InputSettings, who: PerceptionSettings, fps: float, adapter):
@@ -146,7 +165,7 @@ def _nature(name: str, given: InputSettings, who: PerceptionSettings, fps: float
             end = number * steps
             done = max(done, end - before - 1)
             shown = (renderer.sharp(k / rate) for k in range(done + 1, end + 1))
-            yield number, FrameFile(number, Path(), None, {}, {}), shown
+            yield number, FrameFile(number, Path(), None, {}, {}), shown, None
             done = end
 
     return numbers, pictures(), rate

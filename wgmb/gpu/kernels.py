@@ -18,6 +18,7 @@ class FrameBindings:
 
     size: tuple[int, int]  # width, height [px]
     resources: dict[str, wgpu.GPUBuffer]  # by binding name
+    window: tuple[int, int, int, int] = (0, 0, 0, 0)  # x, y in the display window, its size [px]
 
 
 class Kernel:

@@ -21,9 +21,9 @@ from ..camera import MAX_INDEX
 from ..display import ColorSpace
 from ..errors import InputError, did_you_mean
 from ..frame import Frame
+from ..reach import Reach
 from . import detect, exr, layers, limits, vectors, views
 from .camera_file import CameraFile
-from .cuts import is_cut, jumps, still, straightened
 from .frame_file import FrameFile, about, read
 from .frame_numbers import (
     MOST_FRAMES,
@@ -40,6 +40,8 @@ from .frame_numbers import (
 )
 from .input_space import in_space
 from .masks import Masks
+from .neighbours import Neighbours
+from .windows import Placement, Window, laid, union
 
 DEPTHS = ("planar", "inverse", "clip")
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
@@ -57,7 +59,9 @@ class Passes:
     or an image file or pattern; VALUE is an index, or a name (with wildcards) or id of a
     Cryptomatte. Held out is what any of the masks has. The scales multiply; `MASK:AMOUNT`
     stands for 1 + (AMOUNT - 1) * mask. `also`: patterns of files with additional layers of the
-    same frames. In the names of files, %V stands for the view (see Clip.views).
+    same frames. In the names of files, %V stands for the view (see Clip.views). `outside`: what
+    lies beyond a data window that ends within the display window: "nothing", "edge" (unknown: the
+    pixels at its edge stand for it) or "auto" (unknown if it cuts through the picture).
     """
 
     color: str | None = None
@@ -71,6 +75,7 @@ class Passes:
     holdout: str | tuple[str, ...] = ()
     scale: str | tuple[str, ...] = ()
     also: tuple[str, ...] = ()
+    outside: str = "auto"
 
     def __post_init__(self) -> None:
         for name in ("holdout", "scale"):
@@ -114,7 +119,7 @@ class Clip:
         decoded size of a file in megabytes. In `pattern`, %V stands for the view: one file a view.
         """
         self._space = space
-        self._known_cuts = frozenset(frame_numbers(cuts) if cuts else ())
+        known = frozenset(frame_numbers(cuts) if cuts else ())
         self._max_mb = max_mb
         self.sizes: dict[int, tuple[int, int]] = {}
         self.pattern, self.passes = str(pattern), passes or Passes()
@@ -125,7 +130,7 @@ class Clip:
         if view is not None and view not in self.views:
             raise InputError(f"{self.pattern}: no view {view!r}; {self._those_there}")
         self._cameras = self._open_cameras()
-        self.cuts: set[int] = set()
+        self._around = Neighbours(self, known, self.passes.outside)
         self.unread: set[int] = set()
         patterns = tuple(
             str(path) for p in (self.pattern, *self.passes.also) for path in self._of_views(p)
@@ -140,12 +145,7 @@ class Clip:
         )
         self.notes: dict[str, list[int]] = {}
         self._kept: OrderedDict[int, tuple[FrameFile, ...]] = OrderedDict()
-        self._ready: OrderedDict[tuple[int, str | None], tuple[FrameFile, bool, Frame]] = (
-            OrderedDict()
-        )
         self._found: detect.Finding | None = None
-        self._jumps: dict[int, list[int]] = {}
-        self._cuts_to: dict[tuple[int, int], bool] = {}
 
     def _numbers(self, frames: str | None, skip_missing: bool) -> list[int]:
         if not is_pattern(self._leading):
@@ -299,7 +299,7 @@ class Clip:
             raise InputError(f"{self._path(number)}: no view {view!r}; its views: {there}")
         return found[view]
 
-    def _leader(self, number: int) -> FrameFile:
+    def leader(self, number: int) -> FrameFile:
         """The view on which is settled what all views of a frame share: the default one."""
         found = self._all(number)
         return next((s for s in found if s.beside is not None), found[0])
@@ -324,8 +324,7 @@ class Clip:
     def forget(self, number: int) -> None:
         """Drop a frame from the cache."""
         self._kept.pop(number, None)
-        for key in [key for key in self._ready if key[0] == number]:
-            del self._ready[key]
+        self._around.forget(number)
 
     @property
     def finding(self) -> str:
@@ -378,7 +377,7 @@ class Clip:
         self, number: int, wanted: vectors.Vectors
     ) -> tuple[FrameFile, vectors.Vectors | None]:
         """The vectors that the layers' names speak for, in the first view that has any."""
-        first = self._leader(number)
+        first = self.leader(number)
         for source in dict.fromkeys((first, *self._all(number))):
             if named := vectors.named(source.channels, wanted, source.beside):
                 return source, named
@@ -387,80 +386,65 @@ class Clip:
     def _evidence(self, source: FrameFile, named: vectors.Vectors) -> detect.Evidence:
         if source.beside is None:
             return detect.Evidence(doubt="no picture to test it on")
-        prev, next_ = (
-            None
-            if self._is_known_cut(source.number, side)
-            else self._neighbour(source.number + side, source.view)
-            for side in (-1, 1)
-        )
         motion = vectors.read(source.channels, named, source.beside)
-        return detect.gathered(source.rgba, motion, prev, next_)
+        near = [self._probe(source, side) for side in (-1, 1)]
+        onto = union([source.data_window, *(window for _, window in filter(None, near))])
+        color, motion = (laid(a, source.data_window, onto) for a in (source.rgba, motion))
+        prev, next_ = (one and laid(*one, onto) for one in near)
+        return detect.gathered(color, motion, prev, next_)
 
-    def _neighbour(self, number: int, view: str | None) -> np.ndarray | None:
-        if not is_pattern(self._leading) or not self._path(number).is_file():
+    def _probe(self, source: FrameFile, side: int) -> tuple[np.ndarray, Window] | None:
+        """The picture of a neighbour and its data window, to test vectors on."""
+        number = source.number + side
+        if not self._has_neighbour(source.number, side):
             return None
-        wanted = number in self.numbers
         try:
-            return self._find(number, view).rgba
+            other = self._find(number, source.view)
+            same = other.display_window == source.display_window
+            return (other.rgba, other.data_window) if same else None
         except (InputError, OSError):
             return None
         finally:
-            if not wanted:
+            if number not in self.numbers:
                 self.forget(number)
 
-    def with_neighbours(self, source: FrameFile, normal: bool = True) -> Frame:
+    def _has_neighbour(self, number: int, side: int) -> bool:
+        if not is_pattern(self._leading) or self._around.is_known_cut(number, side):
+            return False
+        return self._path(number + side).is_file()
+
+    def neighbour(self, source: FrameFile, side: int) -> FrameFile | None:
+        """The same view of the frame before (`side` -1) or after (1).
+
+        None beyond a known cut, where there is no such file, and where it cannot be read.
+        """
+        number = source.number + side
+        if not self._has_neighbour(source.number, side):
+            return None
+        try:
+            return self._find(number, source.view)
+        except (InputError, OSError):  # its turn to fail comes
+            self.unread.add(number)
+            return None
+
+    def with_neighbours(
+        self, source: FrameFile, normal: bool = True, reach: Reach | None = None
+    ) -> Frame:
         """`frame`, and the same view of the frames before and after as far as they can be read.
 
+        Frames whose files hold parts of the picture (data windows) come on one canvas, in
+        Frame.window; `reach`, the Blur's, makes room there for streaks that lead out of them.
         Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
         Blur, once, though it is shown in three.
         """
-        near: dict[int, Frame] = {}
-        for side in (-1, 1):
-            number = source.number + side
-            if self._is_known_cut(source.number, side):
-                continue
-            if is_pattern(self._leading) and self._path(number).is_file():
-                try:
-                    other = self._find(number, source.view)
-                    if other.size == source.size:
-                        near[side] = self._locked(other, normal)
-                except (InputError, OSError):  # its turn to fail comes
-                    self.unread.add(number)
-        frame = self._locked(source, normal)
-        for side in list(near):
-            if self._is_cut(source, frame, near[side], side, normal):
-                del near[side]
-                self.cuts.add(source.number + (side > 0))
-        return frame.between(near.get(-1), near.get(1))
+        return self._around.between(source, normal, reach)[0]
 
-    def _is_cut(
-        self, source: FrameFile, frame: Frame, near: Frame, side: int, normal: bool
-    ) -> bool:
-        """Whether a cut lies between `frame` and `near`, as is settled on the default view."""
-        if source.view is None:
-            return is_cut(frame, near, side)
-        key = source.number, side
-        if key not in self._cuts_to:
-            leader = self._leader(source.number)
-            if leader.view != source.view:
-                with contextlib.suppress(InputError, OSError):  # then this view decides
-                    other = self._find(source.number + side, leader.view)
-                    if other.size == leader.size:
-                        frame, near = self._locked(leader, normal), self._locked(other, normal)
-            self._cuts_to[key] = is_cut(frame, near, side)
-        return self._cuts_to[key]
-
-    def _locked(self, source: FrameFile, normal: bool) -> Frame:
-        """`frame`, made once for the three frames that it is shown in."""
-        key = source.number, source.view
-        made, with_normal, frame = self._ready.get(key, (None, None, None))
-        if frame is None or made is not source or with_normal != normal:
-            self._ready.pop(key, None)
-            while len(self._ready) >= 3 * max(len(self.views), 1):
-                self._ready.popitem(last=False)
-            frame = self.frame(source, normal=normal).locked()
-            self._ready[key] = source, normal, frame
-        return frame
+    def placed(
+        self, source: FrameFile, reach: Reach, neighbours: bool, normal: bool = True
+    ) -> tuple[Frame, Placement]:
+        """What a Blur of this `reach` takes: with_neighbours, or `frame`; and where that lies."""
+        made = self._around.between if neighbours else self._around.alone
+        return made(source, normal, reach)
 
     def frame(self, source: FrameFile, picture: bool = True, normal: bool = True) -> Frame:
         """Return the Frame of `source`; without `picture`, its colour is 0; without `normal`, it
@@ -468,37 +452,15 @@ class Clip:
 
         Motion that leads across a camera cut is left out (see cuts.jumps).
         """
-        frame = self._frame(source, picture, normal)
-        if all(self._is_known_cut(source.number, side) for side in (-1, 1)):
-            self.cuts |= {source.number, source.number + 1}
-            return still(frame)
-        for side in self._sides_cut(source, frame):
-            self.cuts.add(source.number + (side > 0))
-            frame = straightened(frame, side)
-        return frame
+        return self._around.frame(source, picture, normal)
 
-    def _sides_cut(self, source: FrameFile, frame: Frame) -> list[int]:
-        """Sides of a frame on which its motion leads across a cut, by that of the default view."""
-        number = source.number
-        if source.view is not None and source.view != self._leader(number).view:
-            with contextlib.suppress(InputError):  # then this view decides
-                if number not in self._jumps:
-                    self.frame(self._leader(number), picture=False, normal=False)
-                return self._jumps[number]
-        sides: list[int] = []
-        for side in (-1, 1):
-            if self._is_known_cut(number, side) or jumps(frame, side):
-                sides.append(side)
-                frame = straightened(frame, side)
-        if source.view is not None:
-            self._jumps[number] = sides
-        return sides
+    @property
+    def cuts(self) -> set[int]:
+        """Frames after a camera cut, of those read so far."""
+        return self._around.cuts
 
-    def _is_known_cut(self, number: int, side: int) -> bool:
-        """True if the user said that a cut lies between a frame and its neighbour on `side`."""
-        return number + (side > 0) in self._known_cuts
-
-    def _frame(self, source: FrameFile, picture: bool, normal: bool) -> Frame:
+    def passes_of(self, source: FrameFile, picture: bool, normal: bool) -> Frame:
+        """The Frame of `source` as its layers have it; see `frame`."""
         meaning = self._decide().vectors
         with about(source.name):
             if meaning is None:  # where a layer was asked for, this says why there is none
@@ -521,6 +483,7 @@ class Clip:
                 motion=motion,
                 depth=depth,
                 normal=self._normal(source) if normal else None,
+                window=source.window,
                 camera=reprojections,
                 object_id=ids,
                 holdout=self._masks.holdout(source),

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..frame import Frame
+from ..reach import displacement
 
 _PROBES = 2000  # pixels looked at
 _CUT = (
@@ -23,11 +24,9 @@ def jumps(frame: Frame, side: int) -> bool:
 
     Half of the picture moves over a tenth of its width, and 8 times as far as to the other side.
     """
-    width, height = frame.size
-    rng = np.random.default_rng(0)
-    at = rng.integers(0, width, _PROBES), rng.integers(0, height, _PROBES)
+    x, y, width, _ = _probes(frame, np.random.default_rng(0))
     with np.errstate(all="ignore"):
-        here, other = (np.median(np.hypot(*_way(frame, s, *at).T)) for s in (side, -side))
+        here, other = (np.median(np.hypot(*_way(frame, s, x, y).T)) for s in (side, -side))
     return bool(here > max(_FAR * width, _JUMP * other))
 
 
@@ -53,48 +52,50 @@ def is_cut(frame: Frame, near: Frame, side: int) -> bool:
     """Return True if a cut lies between `frame` and its neighbour `near` on `side` (-1 or 1).
 
     2,000 pixels, each the mean of 3 x 3, are compared with where their motion puts them in
-    `near`, and with places picked at random: across a cut the two differ alike.
+    `near`, and with places picked at random: across a cut the two differ alike. The images may
+    be different parts of one display window; outside them is nothing.
     """
-    width, height = frame.size
     rng = np.random.default_rng(0)
-    x, y = rng.integers(0, width, _PROBES), rng.integers(0, height, _PROBES)
+    x, y, width, height = _probes(frame, rng)
+    first, other = (np.array((one.window or (0, 0))[:2]) for one in (frame, near))
     with np.errstate(all="ignore"):
         where = np.stack([x, y], axis=1) + _way(frame, side, x, y)
-        inside = ((where >= 0) & (where <= (width - 1, height - 1))).all(axis=1)
+        at = where + first
+        inside = ((at >= 0) & (at <= (width - 1, height - 1))).all(axis=1)
     if inside.mean() < _INSIDE:
         return True
-    there = np.rint(where[inside]).astype(int)
+    there = np.rint(where[inside]).astype(int) + first - other
     here = _tones(frame.color, x[inside], y[inside])
     follows = _difference(here, _tones(near.color, *there.T))
     unrelated = _difference(here, _tones(near.color, *rng.permutation(there).T))
     return bool(follows > _CUT * unrelated)
 
 
+def _probes(frame: Frame, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, int, int]:
+    """Pixels x, y picked at random from the display window, and its width and height [px].
+
+    They are counted from the image's first pixel; where the image has none, nothing is there.
+    """
+    left, top, width, height = frame.window or (0, 0, *frame.size)
+    x, y = rng.integers(0, width, _PROBES), rng.integers(0, height, _PROBES)
+    return x - left, y - top, width, height
+
+
 def _way(frame: Frame, side: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(n, 2) displacement [px] to the neighbouring frame; infinite behind its camera."""
+    """(n, 2) way [px] of pixels x, y to a neighbouring frame; 0 outside the image."""
+    there = _within(frame.color, x, y)
     way = np.zeros((len(x), 2))
-    if frame.motion is not None:
-        way = frame.motion[y, x, :2] if side < 0 else frame.motion[y, x, 2:]
-    elif frame.to_next is not None or frame.to_prev is not None:
-        own, other = (frame.to_prev, frame.to_next)[::-side]
-        way = own[y, x] if own is not None else -other[y, x]  # pyright: ignore
-    elif frame.camera is not None:
-        return _by_camera(frame, side, x, y)
-    way = np.where(np.isfinite(way), way, 0.0)
-    return way + _by_camera(frame, side, x, y) if frame.object_motion else way
+    way[there] = displacement(frame, side, x[there], y[there])
+    return way
 
 
-def _by_camera(frame: Frame, side: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    if frame.camera is None or frame.depth is None:
-        return np.zeros((len(x), 2))
-    there = frame.camera.prev if side < 0 else frame.camera.next
-    sign = 1 if there is not None else -1  # a path goes on as on its other side
-    way = frame.camera.displacement(frame.size, x, y, frame.depth[y, x], sign * side)
-    return np.where(np.isfinite(way), sign * way, np.inf)
+def _within(color: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    height, width = color.shape[:2]
+    return (x >= 0) & (x < width) & (y >= 0) & (y < height)
 
 
 def _tones(color: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(n, 3) means of 3 x 3 pixels, held below 1 so that no highlight decides."""
+    """(n, 3) means of 3 x 3 pixels, held below 1 so that no highlight decides; 0 outside."""
     height, width = color.shape[:2]
     total = np.zeros((len(x), 3))
     for dy in (-1, 0, 1):
@@ -102,7 +103,7 @@ def _tones(color: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
             at = np.clip(y + dy, 0, height - 1), np.clip(x + dx, 0, width - 1)
             light = np.clip(np.nan_to_num(color[at][:, :3].astype(np.float64)), 0, 1e6)
             total += light / (1 + light)
-    return total / 9
+    return np.where(_within(color, x, y)[:, None], total / 9, 0.0)
 
 
 def _difference(a: np.ndarray, b: np.ndarray) -> float:

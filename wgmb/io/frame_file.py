@@ -17,8 +17,7 @@ from ..display import ColorSpace
 from ..errors import InputError
 from . import exr, layers, limits, stills, views
 from .frame_numbers import frame_range, has_view, in_view
-
-Window = tuple[int, int, int, int]  # left, top, right, bottom; the last pixels belong to it
+from .windows import Window, laid
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +62,18 @@ class FrameFile:
         """Width and height [px]."""
         height, width = next(iter(self.channels.values())).shape
         return width, height
+
+    @property
+    def data_window(self) -> Window:
+        """The window that the picture fills."""
+        if self.part is not None:
+            return self.part.data_window
+        return 0, 0, self.size[0] - 1, self.size[1] - 1
+
+    @property
+    def display_window(self) -> Window:
+        """The window of the whole picture, of which the data window may be a part, or more."""
+        return self.part.display_window if self.part is not None else self.data_window
 
     @property
     def whole(self) -> tuple[int, int]:
@@ -291,18 +302,6 @@ def _one_window(path: Path, places: views.Places, onto: exr.Part) -> dict[str, n
                     f"{path}: layer {full}, {size_text(plane)}, has a different "
                     f"display window from the image, {size_text(onto.size)}"
                 )
-            plane = _moved(plane, part.data_window, onto.data_window)
+            plane = laid(plane, part.data_window, onto.data_window)
         channels[full] = plane
     return channels
-
-
-def _moved(plane: np.ndarray, window: Window, onto: Window) -> np.ndarray:
-    """Return the part of `plane`, which covers `window`, that lies in `onto`."""
-    left, top = max(window[0], onto[0]), max(window[1], onto[1])
-    right, bottom = min(window[2], onto[2]) + 1, min(window[3], onto[3]) + 1
-    moved = np.zeros((onto[3] - onto[1] + 1, onto[2] - onto[0] + 1), plane.dtype)
-    if left < right and top < bottom:
-        moved[top - onto[1] : bottom - onto[1], left - onto[0] : right - onto[0]] = plane[
-            top - window[1] : bottom - window[1], left - window[0] : right - window[0]
-        ]
-    return moved

@@ -17,6 +17,7 @@ from . import cryptomatte, exr, stills
 from .frame_file import FrameFile, read, size_text
 from .frame_numbers import frame_path, in_view
 from .layers import Channels, grey, layers, one_channel
+from .windows import laid
 
 _AMOUNT = re.compile(r"(.+):([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
@@ -132,16 +133,21 @@ class Masks:
         return plane
 
     def _of_file(self, source: FrameFile, file: Path) -> np.ndarray:
+        window, display = source.data_window, source.display_window
         if file.suffix.lower() == ".exr":
             found = read([file], source.number, None, self.max_mb)
-            same = [one for one in found if one.view == source.view]
-            plane = grey((same or found)[0].channels).astype(np.float32)
+            mask = next((one for one in found if one.view == source.view), found[0])
+            plane = grey(mask.channels).astype(np.float32)
+            if mask.display_window == display:
+                return laid(plane, mask.data_window, window)
         else:
             light = stills.read(file, max_mb=self.max_mb)
             plane = srgb(light[..., 0])  # grey values as painted
+        if plane.shape[::-1] == source.whole:
+            return laid(plane, display, window)
         if plane.shape[::-1] != source.size:
             raise InputError(
-                f"{file} must be {size_text(source.size)} like the image, got {size_text(plane)}"
+                f"{file} must be {size_text(source.whole)} like the image, got {size_text(plane)}"
             )
         return plane
 

@@ -21,6 +21,7 @@ from . import atomic, exr, record, stills, video, views
 from .frame_file import FrameFile, about
 from .frame_numbers import frame_path, has_view, in_view, is_pattern
 from .input_space import chromaticities, relabelled, space_of
+from .windows import Placement, Window, laid, result_window, union
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,33 @@ class Result:
     source: FrameFile
     picture: np.ndarray
     confidence: Mapping[str, np.ndarray] = field(default_factory=dict)
+    placement: Placement | None = None  # None: it fills the source's data window
+
+    @property
+    def canvas(self) -> Window:
+        """The window that the picture fills."""
+        if self.placement is not None:
+            return self.placement.canvas
+        if self.source.part is not None:
+            return self.source.part.data_window
+        return 0, 0, self.picture.shape[1] - 1, self.picture.shape[0] - 1
+
+    @property
+    def window(self) -> Window:
+        """The source's data window, and as much more as the picture takes."""
+        if self.placement is None or self.canvas == self.source.data_window:
+            return self.canvas
+        return result_window(self.picture, self.placement, self.source.data_window)
+
+    @property
+    def displayed(self) -> np.ndarray:
+        """The picture in the display window."""
+        if self.placement is None:
+            return self.picture
+        return laid(self.picture, self.canvas, self.source.display_window)
+
+
+WINDOWS = ("grow", "keep")
 
 
 class Output:
@@ -41,7 +69,9 @@ class Output:
     `layers`: "all" that an EXR input holds go into the EXR output, or those of the "picture"
     only. `compression` of EXR: a name in exr.COMPRESSIONS, or "same" as the input's. `views`: the
     names of views that %V in the pattern stands for, which makes a file or video of each.
-    `display`: how PNG, JPEG, TIFF and videos show the light; sRGB by default.
+    `display`: how PNG, JPEG, TIFF and videos show the light; sRGB by default. `window`: the data
+    window of an EXR may "grow" with streaks that lead out of it, or "keep" its size; stills and
+    videos hold the display window.
     """
 
     def __init__(
@@ -59,11 +89,15 @@ class Output:
         compression: str = "zip",
         views: Sequence[str] = (),
         display: Display | None = None,
+        window: str = "grow",
     ):
         _check_exr_options(pattern, layers, compression)
         if has_view(pattern) and not views:
             raise InputError(f"output {pattern}: %V stands for a view, but the frames have none")
+        if window not in WINDOWS:
+            raise InputError(f"window must be one of {', '.join(WINDOWS)}, got {window!r}")
         self._layers, self._compression, self._display = layers, compression, display
+        self._grows = window == "grow"
         self.pattern, self.bits, self.numbers = Path(pattern), bits, numbers
         self.settings = json.dumps(settings or {}, sort_keys=True)
         suffix = self.pattern.suffix.lower()
@@ -205,15 +239,16 @@ class Output:
         """Write the file of `view`, or of all."""
         first = results[0]
         if self._videos:
-            self._videos[view].add(first.picture, self._shown(first))
+            self._videos[view].add(first.displayed, self._shown(first))
             return
         path = self.path(first.source.number, view)
         text = record.blank(self._expected(made_of))
         if path.suffix.lower() == ".exr":
-            content = _with_results(results, view, text, self._layers == "picture")
+            only_picture = self._layers == "picture"
+            content = _with_results(results, view, text, only_picture, self._grows)
             data = exr.encode(content, self._compression)
         else:
-            data = stills.encode(first.picture, path.suffix, self.bits, text, self._shown(first))
+            data = stills.encode(first.displayed, path.suffix, self.bits, text, self._shown(first))
         if self._resume and self._is_done(path, made_of):
             return
         if not (self._resume or self._overwrite) and path.exists():
@@ -303,22 +338,20 @@ def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> No
 
 
 def _with_results(
-    results: Sequence[Result], view: str | None, text: str, only_picture: bool
+    results: Sequence[Result], view: str | None, text: str, only_picture: bool, grows: bool
 ) -> exr.Exr:
     """The source's file with its pictures replaced, confidence and the record's text added.
 
     `view`: without what belongs to other views. `only_picture`: without all other layers, and
-    without what describes Cryptomattes.
+    without what describes Cryptomattes. `grows`: parts with a picture have a data window that
+    holds it.
     """
     source = results[0].source
     if source.file is None:
         made = exr.new(results[0].picture, chromaticities(source.space) | {record.KEY: text})
         made.parts[0].channels |= _told(results[0], made.parts[0])
         return made
-    parts = [
-        replace(p, channels=dict(p.channels), attributes=dict(p.attributes))
-        for p in source.file.parts
-    ]
+    parts = [_twin(part, results if grows else ()) for part in source.file.parts]
     twins = dict(zip(map(id, source.file.parts), parts, strict=True))
     new: set[tuple[int, str]] = set()
     for result in results:
@@ -327,9 +360,9 @@ def _with_results(
         if space is not None and result.source.made_linear:
             twins[id(home)].attributes = relabelled(twins[id(home)].attributes, space)
         for i, full in enumerate(result.source.color):
-            part, name = result.source.origin.get(full, (home, full))
+            part, name = _place(result.source, full)
             kind = result.source.channels[full].dtype
-            plane = result.picture[..., i]
+            plane = laid(result.picture[..., i], result.canvas, twins[id(part)].data_window)
             plane = exr.to_half(plane) if kind == np.float16 else plane.astype(kind)
             twins[id(part)].channels[name] = plane
             new.add((id(twins[id(part)]), name))
@@ -351,11 +384,31 @@ def _with_results(
     return exr.Exr(source.path, parts)
 
 
+def _place(source: FrameFile, channel: str) -> tuple[exr.Part, str]:
+    """The part that a channel of the picture is in, and its name there."""
+    assert source.part is not None
+    return source.origin.get(channel, (source.part, channel))
+
+
+def _twin(part: exr.Part, results: Sequence[Result]) -> exr.Part:
+    """A copy of `part` whose window holds the pictures that are in it."""
+    windows = [
+        result.window
+        for result in results
+        if any(_place(result.source, name)[0] is part for name in result.source.color)
+    ]
+    onto = union([part.data_window, *windows])
+    channels = {k: laid(plane, part.data_window, onto) for k, plane in part.channels.items()}
+    return replace(part, channels=channels, attributes=dict(part.attributes), data_window=onto)
+
+
 def _told(result: Result, part: exr.Part) -> dict[str, np.ndarray]:
     """Confidence as channels of `part`."""
     view = result.source.view or ""
     return {
-        views.joined("confidence", view, name, part): exr.to_half(plane)
+        views.joined("confidence", view, name, part): exr.to_half(
+            laid(plane, result.canvas, part.data_window)
+        )
         for name, plane in result.confidence.items()
     }
 

@@ -15,10 +15,12 @@ from ..errors import InputError, did_you_mean
 from ..frame import Frame
 from ..io.clip import Clip
 from ..io.frame_numbers import frame_list
+from ..io.windows import laid, union
 from ..methods import METHODS
 from ..methods.options import options_of
 from ..metrics import measure
 from ..pipeline import Blur
+from ..reach import EVERYWHERE
 from ..render import Render
 from ..scene import builtin
 from ..scene.scene import Scene
@@ -201,7 +203,8 @@ def clip_case(
         raise InputError(f"truth must be one file or two halves of it, got {len(truth)}")
     if len(inputs) == 3:
         before, here, after = (
-            clip.frame(clip.source(clip.numbers[0])) for clip in map(open_clip, inputs)
+            clip.with_neighbours(clip.source(clip.numbers[0]), reach=EVERYWHERE)
+            for clip in map(open_clip, inputs)
         )
         frame = replace(here, prev=before, next=after)
     elif len(inputs) == 1:
@@ -211,7 +214,7 @@ def clip_case(
         wanted = clip.numbers[0] if number is None else number
         if wanted not in clip.numbers:
             raise InputError(f"{inputs[0]} has no frame {wanted}")
-        frame = clip.with_neighbours(clip.source(wanted))
+        frame = clip.with_neighbours(clip.source(wanted), reach=EVERYWHERE)
     else:
         raise InputError(f"inputs must be a pattern, one file or three, got {len(inputs)}")
     pictures = {k: _read(path) for k, path in peers.items()}
@@ -225,7 +228,8 @@ def clip_case(
 
 def _read(path: Path) -> np.ndarray:
     clip = Clip(path)
-    return clip.source(clip.numbers[0]).rgba
+    source = clip.source(clip.numbers[0])
+    return laid(source.rgba, source.data_window, union([source.data_window, source.display_window]))
 
 
 def make_scene(text: str) -> tuple[str, Scene]:

@@ -62,7 +62,9 @@ class Method(Protocol):
     It may also have `samples`, its own default number of them, and `adaptive`: it can take as
     many samples as each pixel's streak needs (AUTO of wgsl/common/shutter.wgsl); `confidence`,
     what the four channels of its `show="confidence"` are called; `most_in_software`: the most
-    samples it takes without a GPU, if not as many as with one.
+    samples it takes without a GPU, if not as many as with one. Of how far it carries what moves
+    (see reach.py): `spread`, by default "along"; `margin(height)`: pixels that it looks at beyond
+    that, in pictures of this height [px].
     """
 
     name: str

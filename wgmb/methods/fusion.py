@@ -11,6 +11,7 @@ import wgpu
 from .. import gpu
 from ..camera import Camera, Reprojections
 from ..gpu.textures import TexturePool
+from ..reach import Spread
 from .options import MethodOptions, Range
 
 
@@ -54,6 +55,7 @@ class Fusion:
     name = "fusion"
     needs = frozenset({"color", "motion", "depth"})
     uses = frozenset({"normal"})
+    spread: Spread = "nowhere"
     samples = 8
 
     @dataclass(frozen=True, kw_only=True)

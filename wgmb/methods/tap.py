@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from .. import gpu
+from ..reach import Spread
 from .options import MethodOptions
 
 
@@ -25,6 +26,7 @@ class Tap:
     name = "tap"
     needs = frozenset({"color", "motion"})
     uses: frozenset[str] = frozenset()
+    spread: Spread = "nowhere"
     adaptive = True
 
     @dataclass(frozen=True, kw_only=True)

@@ -10,9 +10,15 @@ import wgpu
 
 from .. import gpu
 from ..gpu.textures import ScratchBuffer, TexturePool
+from ..reach import Spread
 from .options import MethodOptions
 
 LONGEST = (40, 9)  # blur to either side, and tile: so many pixels, or the height over this
+
+
+def edge_of(height: int) -> int:
+    """Edge of a tile [px] in pictures of this height [px]."""
+    return max(LONGEST[0], height // LONGEST[1])
 
 
 class Tiles:
@@ -34,6 +40,7 @@ class Tiles:
     name = "tiles"
     needs = frozenset({"color", "motion"})
     uses = frozenset({"depth"})
+    spread: Spread = "around"
     adaptive = True
 
     @dataclass(frozen=True, kw_only=True)
@@ -55,6 +62,11 @@ class Tiles:
             ScratchBuffer(device) for _ in range(3)
         )
 
+    @staticmethod
+    def margin(height: int) -> int:
+        """A tile is looked up as far as a quarter of its edge away, so that no seams show."""
+        return -(-edge_of(height) // 4)
+
     def encode(self, encoder, inputs, output):
         """Record three passes over the tiles between two over the picture."""
         kernel = gpu.kernel(
@@ -71,10 +83,12 @@ class Tiles:
             self._device, "methods/tiles_velocity.wgsl", HAS_DEPTH=inputs.frame.depth is not None
         )
         width, height = inputs.bindings.size
-        edge = max(LONGEST[0], height // LONGEST[1])
-        count = -(-width // edge), -(-height // edge)
+        left, top, _, display_height = inputs.bindings.window
+        edge = edge_of(display_height)
+        first = left // edge, top // edge
+        count = -(-(left + width) // edge) - first[0], -(-(top + height) // edge) - first[1]
         data = np.zeros((), kernel.source.dtype("Tiles"))
-        data["count"], data["edge"] = count, edge
+        data["count"], data["first"], data["edge"] = count, first, edge
         tiles = self._device.create_buffer_with_data(
             label="tiles", data=data, usage=wgpu.BufferUsage.UNIFORM
         )

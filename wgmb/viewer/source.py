@@ -15,6 +15,7 @@ from ..gpu.textures import TexturePool
 from ..gpu.timing import TimestampClock
 from ..methods import METHODS
 from ..pipeline import Blur
+from ..reach import EVERYWHERE
 from ..render import Render
 from ..scene import builtin
 from ..scene.scene import Scene
@@ -136,7 +137,8 @@ class ClipSubject:
     def _frame(self) -> Frame:
         number = self._number
         if number not in self._frames:
-            frame = self._clip.with_neighbours(self._clip.source(number))
+            source = self._clip.source(number)
+            frame = self._clip.with_neighbours(source, reach=EVERYWHERE)
             least, most = _FRAMES_KEPT
             kept = min(max(_MEMORY // (3 * _bytes(frame)), least), most)  # with its neighbours
             while len(self._frames) >= kept:

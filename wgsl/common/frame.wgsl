@@ -7,6 +7,8 @@ struct Frame {
     samples: u32,       // taps, or time samples, per pixel
     jitter: f32,        // 0: the middle of every stratum, 1: anywhere in it
     max_blur: f32,      // greatest blur length [px per exposure]
+    origin: vec2i,      // of this image in the display window: the whole image, of which it may hold a part [px]
+    display: vec2u,     // size of the display window [px]
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -25,7 +25,9 @@ const MIN_SAMPLES: u32 = 2u;        // of a pixel that moves, if ADAPTIVE
 /// When a frame `offset` intervals away is exposed anywhere in the image: first and last time after
 /// that frame's own instant [frame intervals].
 fn exposure_window(offset: f32) -> vec2f {
-    let late = 0.5 * (abs(shutter.rolling.x) + abs(shutter.rolling.y));
+    let first = vec2f(frame.origin) / vec2f(frame.display) - 0.5;
+    let last = vec2f(frame.origin + vec2i(frame.size)) / vec2f(frame.display) - 0.5;
+    let late = dot(abs(shutter.rolling), max(vec2f(0.5), max(-first, last)));
     return shutter.span + vec2f(-late, late) - offset;
 }
 
@@ -39,7 +41,7 @@ struct SampleTimes {        // what the sample times of a pixel have in common, 
 
 /// For the pixel at `x` [px]; its samples are moved by `shift` within their strata.
 fn shutter_times(x: vec2f, shift: f32) -> SampleTimes {
-    let delay = dot(shutter.rolling, x / vec2f(frame.size) - 0.5);
+    let delay = dot(shutter.rolling, (x + vec2f(frame.origin)) / vec2f(frame.display) - 0.5);
     let first = shutter.span.x + (0.5 + shift) * shutter.step + delay;
     return SampleTimes(frame.samples, first, shutter.step, shift, delay);
 }

@@ -50,7 +50,7 @@ fn splat_depths(@builtin(global_invocation_id) id: vec3u) {
     if chunk.source > 0u {
         let count = turns_of(chunk.count, id.x);
         for (var k = 0u; k < count; k++) {
-            let to = clamp(floor(position(sample, k)) + 1.0, vec2f(0.0), vec2f(frame.size));
+            let to = clamp(floor(position(sample, k)) - vec2f(frame.origin) + 1.0, vec2f(0.0), vec2f(frame.size));
             slices &= atomicLoad(&open[block_of(vec2u(to))]) | ~(1u << k);
         }
     }
@@ -151,7 +151,7 @@ fn block_of(px: vec2u) -> u32 {
 }
 
 struct Sample {
-    x: vec2f,           // [px], centres of pixels are integers
+    x: vec2f,           // in the display window [px], centres of pixels are integers
     trajectory: Trajectory,
     depth: f32,
     times: SampleTimes,
@@ -162,7 +162,7 @@ fn sample_at(px: vec2u) -> Sample {
     let z = valid_depth(textureLoad(depth, px, 0).x);
     var slices = (1u << chunk.count) - 1u;
     if WEIGHTED { slices = select(0u, slices, textureLoad(weight, px, 0).x > 0.0); }
-    return Sample(vec2f(px), trajectory_from(textureLoad(motion, px, 0)), z, times_at(px), slices);
+    return Sample(vec2f(vec2i(px) + frame.origin), trajectory_from(textureLoad(motion, px, 0)), z, times_at(px), slices);
 }
 
 /// Sample times of the source's pixel at `px`, in the source frame's own time.
@@ -178,7 +178,7 @@ fn displacement_in(trajectory: Trajectory, times: SampleTimes, k: u32) -> vec2f 
     return displacement(trajectory, shutter_time(times, chunk.first + k));
 }
 
-/// Position of a sample in slice `k` of the chunk [px].
+/// Position of a sample in slice `k` of the chunk, in the display window [px].
 fn position(sample: Sample, k: u32) -> vec2f {
     return sample.x + displacement_in(sample.trajectory, sample.times, k);
 }
@@ -188,10 +188,11 @@ struct Landing {
     key: u32,           // the nearer, the greater; 0: outside
 }
 
-/// Of a sample at `x` in slice `k`, on pixel `i` of the four around it.
+/// Of a sample at `x` of the display window in slice `k`, on pixel `i` of the four around it.
 fn landing(sample: Sample, k: u32, x: vec2f, i: u32) -> Landing {
-    let to = floor(x) + vec2f(vec2u(i & 1u, i >> 1u));
-    let off = abs(to - x);
+    let absolute = floor(x) + vec2f(vec2u(i & 1u, i >> 1u));
+    let off = abs(absolute - x);
+    let to = absolute - vec2f(frame.origin);
     let size = vec2f(frame.size);
     if !(all(to >= vec2f(0.0)) && all(to < size) && all(off < vec2f(1.0))) { return Landing(0u, 0u); }
     // The bits of positive floats are in the order of the floats. Samples of a neighbouring frame come after all

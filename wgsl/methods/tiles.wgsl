@@ -9,6 +9,7 @@
 
 struct Tiles {
     count: vec2u,       // tiles across, down
+    first: vec2i,       // the first one's column and row in the display window
     edge: u32,          // of a tile [px]; no blur extends farther to either side
     unused: u32,
 }
@@ -38,9 +39,9 @@ const MIN_EXTENT: f32 = 0.5;        // shorter ones [px] are taken to be as long
 fn find_row_max(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= tiles.count.x || id.y >= frame.size.y { return; }
     var greatest = -1.0;
-    var found = id.x * tiles.edge;
-    let end = min((id.x + 1u) * tiles.edge, frame.size.x);
-    let nonsense = 4.0 * f32(frame.size.x + frame.size.y);  // a single bad vector must not rule its tile
+    var found = begin_of(vec2u(id.x, 0u)).x;
+    let end = begin_of(vec2u(id.x + 1u, 0u)).x;
+    let nonsense = 4.0 * f32(frame.display.x + frame.display.y);    // a single bad vector must not rule its tile
     for (var x = found; x < end; x++) {
         let extent = textureLoad(velocity_depth, vec2u(x, id.y), 0).z;
         if extent > greatest && extent < nonsense {
@@ -58,8 +59,8 @@ fn find_tile_max(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= tiles.count) { return; }
     var greatest = -1.0;
     var found = vec4f(0.0);
-    let end = min((id.y + 1u) * tiles.edge, frame.size.y);
-    for (var y = id.y * tiles.edge; y < end; y++) {
+    let end = begin_of(id.xy + 1u).y;
+    for (var y = begin_of(id.xy).y; y < end; y++) {
         let candidate = row_max[y * tiles.count.x + id.x];
         let delay = delay_at(vec2f(centre_of(id.xy).x, f32(y) + 0.5));
         let extent = length(blur_extent(trajectory_from(candidate), delay));
@@ -100,7 +101,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let x = vec2f(id.xy) + 0.5;
     let noise = pixel_noise(id.xy);
     if TILES {
-        let tile = id.xy / tiles.edge;
+        let tile = vec2u((vec2i(id.xy) + frame.origin - begin_of_first()) / i32(tiles.edge));
         let followed = neighbor_max[tile.y * tiles.count.x + tile.x];
         let extent = blur_extent(trajectory_from(followed), delay_at(centre_of(tile)));
         textureStore(output, id.xy, vec4f(wheel_color(extent, f32(tiles.edge)), 1.0));
@@ -167,8 +168,19 @@ fn delay_at(x: vec2f) -> f32 {
     return shutter_times(x, 0.0).delay;
 }
 
+/// Where the first tile begins, in the display window [px].
+fn begin_of_first() -> vec2i {
+    return tiles.first * i32(tiles.edge);
+}
+
+/// The first pixel of a tile, or of what there is of it in the image.
+fn begin_of(tile: vec2u) -> vec2u {
+    let begin = begin_of_first() + vec2i(tile * tiles.edge) - frame.origin;
+    return vec2u(clamp(begin, vec2i(0), vec2i(frame.size)));
+}
+
 fn centre_of(tile: vec2u) -> vec2f {
-    return (vec2f(tile) + 0.5) * f32(tiles.edge);
+    return (vec2f(vec2i(tile) + tiles.first) + 0.5) * f32(tiles.edge) - vec2f(frame.origin);
 }
 
 /// The trajectory scaled so that its extent is at most `limit` [px].
@@ -180,8 +192,8 @@ fn limited(trajectory: Trajectory, delay: f32, limit: f32) -> Trajectory {
 /// Index of a tile, jittered by up to a quarter of an edge to either side so that no seams show.
 fn tile_at(x: vec2f, noise: f32) -> u32 {
     let other_noise = fract(noise * 8.0 + 0.5);
-    let at = x / f32(tiles.edge) + 0.5 * (vec2f(noise, other_noise) - 0.5);
-    let tile = clamp(vec2i(floor(at)), vec2i(0), vec2i(tiles.count) - 1);
+    let at = (x + vec2f(frame.origin)) / f32(tiles.edge) + 0.5 * (vec2f(noise, other_noise) - 0.5);
+    let tile = clamp(vec2i(floor(at)) - tiles.first, vec2i(0), vec2i(tiles.count) - 1);
     return u32(tile.y) * tiles.count.x + u32(tile.x);
 }
 

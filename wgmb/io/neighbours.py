@@ -1,0 +1,266 @@
+"""Frames among their neighbours: camera cuts left out, different data windows on one canvas."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import contextlib
+from collections import OrderedDict
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from ..frame import Frame
+from ..reach import Reach
+from .cuts import is_cut, jumps, still, straightened
+from .frame_file import FrameFile
+from .windows import (
+    OUTSIDE,
+    Placement,
+    Sides,
+    Window,
+    allowed,
+    canvas,
+    common,
+    covered,
+    moved_by,
+    placed,
+    union,
+    unknown,
+)
+
+if TYPE_CHECKING:
+    from .clip import Clip
+
+_SIDES = "left", "top", "right", "bottom"
+
+
+class Neighbours:
+    """The frames of a clip as a blur takes them.
+
+    `known_cuts`: frames that begin a new shot. `outside`: what lies beyond a data window, in
+    OUTSIDE. `cuts`: those found so far, and those known.
+    """
+
+    def __init__(self, clip: Clip, known_cuts: frozenset[int], outside: str):
+        if outside not in OUTSIDE:
+            raise InputError(f"outside must be one of {', '.join(OUTSIDE)}, got {outside!r}")
+        self._clip, self._known_cuts, self._outside = clip, known_cuts, outside
+        self.cuts: set[int] = set()
+        self._alone: OrderedDict[tuple[int, str | None], tuple[FrameFile, bool, Frame]] = (
+            OrderedDict()
+        )
+        self._placed: OrderedDict[tuple[int, str | None], tuple[Frame, Window, Frame]] = (
+            OrderedDict()
+        )
+        self._jumps: dict[int, list[int]] = {}
+        self._cuts_to: dict[tuple[int, int], bool] = {}
+
+    def forget(self, number: int) -> None:
+        """Drop what was made of a frame."""
+        for kept in (self._alone, self._placed):
+            for key in [key for key in kept if key[0] == number]:
+                del kept[key]
+
+    # ---- frames ----------------------------------------------------------------------------
+
+    def frame(self, source: FrameFile, picture: bool = True, normal: bool = True) -> Frame:
+        """The Frame of `source` in its own window, without motion that leads across a cut."""
+        frame = self._clip.passes_of(source, picture, normal)
+        if all(self.is_known_cut(source.number, side) for side in (-1, 1)):
+            self.cuts |= {source.number, source.number + 1}
+            return still(frame)
+        for side in self._sides_cut(source, frame):
+            self.cuts.add(source.number + (side > 0))
+            frame = straightened(frame, side)
+        return frame
+
+    def alone(
+        self, source: FrameFile, normal: bool, reach: Reach | None
+    ) -> tuple[Frame, Placement]:
+        """The frame by itself, on a canvas with room for `reach`."""
+        frame = self.frame(source, normal=normal)
+        onto = self._canvas({0: (source, frame)}, reach)
+        frame = placed(frame, source.data_window, onto, self._edges(source, onto))
+        return frame, Placement(onto, self._bounds(source))
+
+    def between(
+        self, source: FrameFile, normal: bool, reach: Reach | None
+    ) -> tuple[Frame, Placement]:
+        """The frame with those before and after it, on a canvas with room for `reach`.
+
+        Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
+        Blur, once, though it is shown in three.
+        """
+        frames = {0: (source, self._locked(source, normal))}
+        for side in (-1, 1):
+            other = self._clip.neighbour(source, side)
+            if other is None or other.display_window != source.display_window:
+                continue
+            try:
+                near = self._locked(other, normal)
+            except InputError:  # its turn to fail comes
+                self._clip.unread.add(other.number)
+                continue
+            if self._is_cut(source, frames[0][1], near, side, normal):
+                self.cuts.add(source.number + (side > 0))
+            else:
+                frames[side] = other, near
+        onto = self._canvas(frames, reach)
+        made = {side: self._on(onto, *one) for side, one in frames.items()}
+        frame = made[0].between(made.get(-1), made.get(1))
+        return frame, Placement(onto, self._bounds(source))
+
+    def _locked(self, source: FrameFile, normal: bool) -> Frame:
+        """`frame`, made once for the three frames that it is shown in."""
+        key = source.number, source.view
+        made, with_normal, frame = self._alone.get(key, (None, None, None))
+        if frame is None or made is not source or with_normal != normal:
+            self._alone.pop(key, None)
+            self._make_room(self._alone)
+            frame = self.frame(source, normal=normal).locked()
+            self._alone[key] = source, normal, frame
+        return frame
+
+    def _on(self, onto: Window, source: FrameFile, frame: Frame) -> Frame:
+        """`frame` on a canvas, made once while the canvas stays the same."""
+        if source.data_window == onto:
+            return frame
+        key = source.number, source.view
+        made, then, result = self._placed.get(key, (None, None, None))
+        if result is None or made is not frame or then != onto:
+            self._placed.pop(key, None)
+            self._make_room(self._placed)
+            edges = self._edges(source, onto)
+            result = placed(frame, source.data_window, onto, edges).locked()
+            self._placed[key] = frame, onto, result
+        return result
+
+    def _make_room(self, kept: OrderedDict[tuple[int, str | None], Any]) -> None:
+        while len(kept) >= 3 * max(len(self._clip.views), 1):
+            kept.popitem(last=False)
+
+    # ---- cuts ------------------------------------------------------------------------------
+
+    def is_known_cut(self, number: int, side: int) -> bool:
+        """True if the user said that a cut lies between a frame and its neighbour on `side`."""
+        return number + (side > 0) in self._known_cuts
+
+    def _sides_cut(self, source: FrameFile, frame: Frame) -> list[int]:
+        """Sides of a frame on which its motion leads across a cut, by that of the default view."""
+        number = source.number
+        if source.view is not None and source.view != self._clip.leader(number).view:
+            with contextlib.suppress(InputError):  # then this view decides
+                if number not in self._jumps:
+                    self.frame(self._clip.leader(number), picture=False, normal=False)
+                return self._jumps[number]
+        sides: list[int] = []
+        for side in (-1, 1):
+            if self.is_known_cut(number, side) or jumps(frame, side):
+                sides.append(side)
+                frame = straightened(frame, side)
+        if source.view is not None:
+            self._jumps[number] = sides
+        return sides
+
+    def _is_cut(
+        self, source: FrameFile, frame: Frame, near: Frame, side: int, normal: bool
+    ) -> bool:
+        """Whether a cut lies between `frame` and `near`, as is settled on the default view."""
+        if source.view is None:
+            return is_cut(frame, near, side)
+        key = source.number, side
+        if key not in self._cuts_to:
+            leader = self._clip.leader(source.number)
+            if leader.view != source.view:
+                with contextlib.suppress(InputError, OSError):  # then this view decides
+                    other = self._clip.neighbour(leader, side)
+                    if other is not None and other.display_window == leader.display_window:
+                        frame, near = self._locked(leader, normal), self._locked(other, normal)
+            self._cuts_to[key] = is_cut(frame, near, side)
+        return self._cuts_to[key]
+
+    # ---- data windows ----------------------------------------------------------------------
+
+    def _canvas(self, frames: Mapping[int, tuple[FrameFile, Frame]], reach: Reach | None) -> Window:
+        """The window that the frames, by their offset, are placed on for a blur of this `reach`.
+
+        It depends on them alone, so that parts of a sequence give the same pictures as the whole.
+        """
+        source, _ = frames[0]
+        display, windows = source.display_window, [file.data_window for file, _ in frames.values()]
+        held = union(windows)
+        if reach is None or held == display == source.data_window:
+            return held
+        limit = allowed(windows, display, self._cut_through)
+        if held == limit or reach.spread == "everywhere":
+            return limit
+        needed: list[Window] = []
+        for offset, (file, frame) in frames.items():
+            if (box := reach.box(frame, offset)) is not None:
+                needed += [file.data_window, moved_by(box, file.data_window[:2])]
+        if not needed:
+            return source.data_window
+        within = common(union(needed), limit)
+        try:
+            return canvas(within or limit, limit, windows, display)
+        except InputError as error:
+            raise InputError(f"{source.path}: {error}") from None
+
+    def _edges(self, source: FrameFile, onto: Window) -> Sides:
+        """The sides of a frame beyond which its edge stands for what is unknown there."""
+        if onto == source.data_window:
+            return False, False, False, False
+        return unknown(source.data_window, source.display_window, self._cut_through)
+
+    def _bounds(self, source: FrameFile) -> Window:
+        """The largest window of the frame's result: it does not grow into the unknown."""
+        own, display = source.data_window, source.display_window
+        if own == display:
+            return own
+        far = 1 << 31
+        left, top, right, bottom = (
+            end if known else (-far, -far, far, far)[i]
+            for i, (end, known) in enumerate(
+                zip(own, unknown(own, display, self._cut_through), strict=True)
+            )
+        )
+        return left, top, right, bottom
+
+    @cached_property
+    def _cut_through(self) -> Sides:
+        """The sides at which data windows cut through the picture.
+
+        The first, the middle and the last frame on disk tell, so that the result is independent
+        of `frames`: such a side lies in the same place in all of them, and is covered.
+        """
+        if self._outside != "auto":
+            edge = self._outside == "edge"
+            return edge, edge, edge, edge
+        there = self._clip.on_disk
+        places: list[set[int]] = [set(), set(), set(), set()]
+        closed = [True] * 4
+        for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
+            try:
+                source = self._clip.leader(number)
+                rgba = source.rgba
+            except (InputError, OSError):  # its turn to fail comes
+                continue
+            if not rgba.any():
+                continue
+            sides = zip(source.data_window, source.display_window, covered(rgba), strict=True)
+            for i, (end, border, full) in enumerate(sides):
+                places[i].add(end)
+                closed[i] &= full and end != border
+        left, top, right, bottom = (
+            full and len(ends) == 1 for full, ends in zip(closed, places, strict=True)
+        )
+        if any(found := (left, top, right, bottom)):
+            where = ", ".join(name for name, cut in zip(_SIDES, found, strict=True) if cut)
+            text = (
+                f"the picture goes on beyond the data window ({where}): what lies there is taken "
+                "as unknown; --outside nothing takes it as empty"
+            )
+            self._clip.notes.setdefault(text, []).append(there[0])
+        return found
