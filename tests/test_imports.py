@@ -17,7 +17,7 @@ LAYERS = [
     {"primaries"},
     {"gpu", "shutter", "camera", "metrics", "display"},
     {"frame", "cone"},
-    {"frame_views", "reach"},
+    {"frame_views", "reach", "exposure"},
     {"velocity", "holdout"},
     {"io", "scene", "observer"},
     {"methods"},

@@ -13,7 +13,8 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +121,30 @@ class Shutter:
         opens, closes = self.span
         return opens + (closes - opens) * x, share / share[-1]
 
+    def share(self, begin: float, end: float) -> float:
+        """The share of the exposure between two times [frame intervals], 0..1."""
+        times, integral = self.integral()
+        if times[0] == times[-1]:  # a moment
+            return float(begin <= times[0] < end or begin == times[0] == end)
+        return float(np.diff(np.interp([begin, end], times, integral))[0])
+
+    def part(self, begin: float, end: float) -> Shutter:
+        """The exposure between two times [frame intervals] within its span, as a shutter."""
+        opens, closes = self.span
+        if closes <= opens or self.curve == "box":
+            curve = self.curve
+        else:
+            whole = CURVES[self.curve] if isinstance(self.curve, str) else self.curve
+            first, last = ((t - opens) / (closes - opens) for t in (begin, end))
+            curve = partial(_stretch, whole, first, last)
+        return replace(self, degrees=360 * (end - begin), phase=(begin + end) / 2, curve=curve)
+
+    def timed(self, scale: float, offset: float) -> Shutter:
+        """The same exposure on another clock, where time t is scale * t + offset."""
+        opens, closes = self.span
+        middle = scale * (opens + closes) / 2 + offset
+        return replace(self, degrees=scale * self.degrees, phase=middle)
+
     def weight(self, times: np.ndarray) -> np.ndarray:
         """Return the weight of each time [frame intervals], per frame interval; 0 while closed."""
         edges, integral = self.integral()
@@ -155,6 +180,11 @@ class Shutter:
         """(samples,) one time in every stratum, `shift` -0.5..0.5 from its middle."""
         begin, middle, end = self.strata(samples).T
         return middle + 2 * shift * (middle - begin if shift < 0 else end - middle)
+
+
+def _stretch(curve: Weight, first: float, last: float, x: np.ndarray) -> np.ndarray:
+    """A part of a curve as a curve of its own."""
+    return curve(np.clip(first + (last - first) * x, 0, 1))
 
 
 def read_curve(path: str | Path) -> Weight:

@@ -1,0 +1,88 @@
+"""The input frames that an output frame is made of, when their rates differ.
+
+Several input frames may share the exposure of an output frame. Every input frame stands for its
+*cell*: the time from half-way to the frame before to half-way to the next one. It is blurred over
+the part of its cell that is exposed, and counts as much as the shutter weighs that part. One rule
+so covers 240 frames a second made 60, 144 made 60, 24 as 24, and variable rates.
+"""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import InputError
+from .shutter import Shutter
+
+_LEAST = 1e-9  # share of an exposure that is worth a picture
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The part of an exposure that one input frame stands for."""
+
+    index: int
+    """Of the frame, in the times that were given."""
+    share: float
+    """Of the exposure, 0..1; those of all cells of an exposure add up to 1."""
+    shutter: Shutter
+    """For the frame's blur: open while its cell is exposed, in the frame's own interval."""
+
+
+def cells(times: Sequence[float], at: float, interval: float, shutter: Shutter) -> list[Cell]:
+    """The cells of the exposure of an output frame.
+
+    `times`: of the input frames [s], ascending, with no cut between them. `at`: of the output frame
+    [s]; `interval` between output frames [s], which `shutter` is in. What is exposed before the
+    first cell and after the last one is left out; if that is all, the nearest frame is taken as it
+    is. InputError for a rolling shutter, and for times that do not ascend.
+    """
+    if shutter.rolling is not None:
+        raise InputError("a rolling shutter needs frames of the output's own rate")
+    here = np.asarray(times, np.float64)
+    if not len(here) or not (np.diff(here) > 0).all():
+        raise InputError("times of frames must ascend")
+    ends = (here[1:] + here[:-1]) / 2
+    first, last = here[0] - own_interval(here, 0) / 2, here[-1] + own_interval(here, -1) / 2
+    borders = np.concatenate([[first], ends, [last]])
+    opens, closes = (at + interval * t for t in shutter.span)
+    found = []
+    reached = np.searchsorted(borders, (opens, closes), side="right") - 1
+    for index in range(max(int(reached[0]), 0), min(int(reached[1]), len(here) - 1) + 1):
+        begin, end = max(opens, borders[index]), min(closes, borders[index + 1])
+        inner = (begin - at) / interval, (end - at) / interval
+        share = shutter.share(*inner) if closes > opens else 1.0
+        if share >= _LEAST:
+            own = own_interval(here, index)
+            part = shutter.part(*inner).timed(interval / own, (at - here[index]) / own)
+            found.append(Cell(index, share, part))
+    if not found:
+        nearest = int(np.abs(here - np.clip(at, opens, closes)).argmin())
+        return [Cell(nearest, 1.0, Shutter(0))]
+    total = sum(cell.share for cell in found)
+    return [Cell(cell.index, cell.share / total, cell.shutter) for cell in found]
+
+
+def own_interval(times: np.ndarray, index: int) -> float:
+    """Time [s] that counts as a frame's interval: half of that from the frame before to the next.
+
+    At the ends, the time to the only neighbour; for a single frame 1.
+    """
+    index %= len(times)
+    near = times[max(index - 1, 0) : index + 2]
+    return float(near[-1] - near[0]) / (len(near) - 1) if len(near) > 1 else 1.0
+
+
+def evened(times: np.ndarray, index: int) -> tuple[float, float]:
+    """Factors that turn a frame's way to its neighbours into ways in its own interval.
+
+    To the previous, to the next frame; 1 where there is none.
+    """
+    own = own_interval(times, index)
+    back = own / (times[index] - times[index - 1]) if index > 0 else 1.0
+    ahead = own / (times[index + 1] - times[index]) if index + 1 < len(times) else 1.0
+    return float(back), float(ahead)
