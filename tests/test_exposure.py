@@ -1,5 +1,7 @@
 """Cells of an exposure: shares, parts of the shutter, and what lies beyond the clip."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -54,7 +56,7 @@ def test_variable_rates_have_shares_and_parts_that_cover_the_exposure():
             spans.append([times[cell.index] + own * t for t in cell.shutter.span])
         want = [at + t / 24 for t in shutter.span]
         assert spans[0][0] == pytest.approx(want[0]) and spans[-1][1] == pytest.approx(want[1])
-        for (_, closes), (opens, _) in zip(spans, spans[1:], strict=False):
+        for (_, closes), (opens, _) in pairwise(spans):
             assert closes == pytest.approx(opens)
 
 
