@@ -177,16 +177,6 @@ def test_absurd_still_sizes_are_refused_by_name(tmp_path, suffix, size):
         stills.read(path)
 
 
-def test_deep_images_are_refused(tmp_path):
-    pixels = np.empty((4, 4), object)
-    for i in range(16):
-        pixels.flat[i] = np.ones(2, np.float32)
-    header = {"compression": OpenEXR.ZIPS_COMPRESSION, "type": OpenEXR.deepscanline}
-    OpenEXR.File(header, {"Z": pixels}).write(str(tmp_path / "deep.exr"))
-    with pytest.raises(InputError, match=r"deep\.exr.*deep"):
-        exr.read(tmp_path / "deep.exr")
-
-
 @pytest.mark.parametrize("name", ["a.exr", "a.png", "a.jpg", "a.tif"])
 @pytest.mark.parametrize("what", ["nothing", "empty", "folder", "text", "fifo"])
 def test_what_is_no_picture_is_refused_by_name(tmp_path, name, what):

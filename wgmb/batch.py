@@ -214,13 +214,17 @@ class _Pipeline:
         if not self.output.takes_views:
             del sources[1:]
         normal = "normal" in self.blur.method.uses
-        views = []
+        views: list[tuple[FrameFile, Frame, Placement]] = []
+        errors: list[tuple[InputError, FrameFile]] = []
         for source in sources:
             try:
                 made = self.clip.placed(source, self.blur.reach, neighbours, normal)
                 views.append((source, *made))
             except InputError as error:
-                raise _of_view(error, source, sources) from None
+                errors.append((error, source))
+        if errors:
+            error, source = errors[0]
+            raise _of_view(error, source, views, self.blur.method.needs)
         if unread := sorted({number - 1, number + 1} & self.clip.unread):
             made_of["unread"] = unread  # so that --resume asks for them again
         self.to_blur.put(_Job(number, views, made_of))
@@ -232,7 +236,8 @@ class _Pipeline:
             try:
                 results.append(self._blurred(source, frame, placement))
             except (InputError, GpuMemoryError) as error:
-                self._fail(job.number, _of_view(error, source, [view[0] for view in job.views]))
+                needs = self.blur.method.needs
+                self._fail(job.number, _of_view(error, source, job.views, needs))
                 return
             for name, count in frame.bad.items():
                 bad = self.report.bad.setdefault(job.number, {})
@@ -284,11 +289,16 @@ class _Pipeline:
             self.stop.set()
 
 
-def _of_view(error: Error, source: FrameFile, sources: list[FrameFile]) -> InputError:
-    """The error with the name of the file, and of the views that may do better."""
+def _of_view(
+    error: Error,
+    source: FrameFile,
+    views: list[tuple[FrameFile, Frame, Placement]],
+    needs: frozenset[str],
+) -> InputError:
+    """The error with the name of the file, and of those of its `views` that can be blurred."""
     text = str(error) if source.name in str(error) else f"{source.name}: {error}"
-    others = [other.view for other in sources if other.view not in (None, source.view)]
-    return InputError(text + (f"; choose a view: {', '.join(map(str, others))}" if others else ""))
+    others = [str(o.view) for o, frame, _ in views if o is not source and frame.has >= needs]
+    return InputError(text + (f"; choose a view: {', '.join(others)}" if others else ""))
 
 
 def _reason(error: BaseException) -> str:

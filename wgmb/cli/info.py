@@ -85,7 +85,9 @@ def describe(
     for layer, members in layers.layers(source.channels).items():
         kinds = [f"{layers.component(m).upper()} {source.channels[m].dtype}" for m in members]
         lines.append(("layer", f"{layer or '(picture)'}: {', '.join(kinds)}"))
-    lines.append(("picture", ", ".join(source.color) if source.beside else "none found"))
+    lines += [("note", text) for text in source.notes]
+    color = ", ".join(dict.fromkeys(filter(None, source.color))) if source.beside else "none found"
+    lines.append(("picture", color))
     if shown is not None:
         space = space_of(source, shown.config)
         text = space.text + ("" if space.is_linear else ", not linear: --from makes it so")

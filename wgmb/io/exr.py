@@ -15,7 +15,7 @@ import numpy as np
 import OpenEXR
 
 from ..errors import InputError, did_you_mean
-from . import limits
+from . import chroma, deep, limits
 from .limits import MOST_PIXELS_A_SIDE
 from .native import hushed, inside
 
@@ -34,6 +34,11 @@ COMPRESSIONS = {
 """The library's names of what every program reads; see also `check_compression`."""
 _LOSSY = tuple(COMPRESSIONS[name] for name in ("pxr24", "b44", "b44a", "dwaa", "dwab"))
 _SAME = "same"
+_DEEP = OpenEXR.deepscanline, OpenEXR.deeptile
+_FLATTENED = "deep pixels are flattened, the nearest sample first"
+_VOLUMES = "; volumes (ZBack) count as points at their front"
+_CHROMA = "luminance and chroma (Y, RY, BY) become R, G, B in half floats"
+_LEVELS = "of tiles in several sizes the largest is used"
 _WRITTEN_ANEW = (
     "channels",
     "compression",
@@ -44,6 +49,7 @@ _WRITTEN_ANEW = (
     "tiles",
     "chunkCount",
     "version",
+    "maxSamplesPerPixel",
     "name",
 )
 
@@ -58,6 +64,7 @@ class Part:
     data_window: tuple[int, int, int, int]  # left, top, right, bottom; the last pixels belong to it
     display_window: tuple[int, int, int, int]
     compression: OpenEXR.Compression = OpenEXR.ZIP_COMPRESSION  # as it was stored
+    notes: tuple[str, ...] = ()  # how it was stored otherwise than as flat planes
 
     @property
     def size(self) -> tuple[int, int]:
@@ -86,8 +93,10 @@ class Exr:
 def read(path: str | Path, *, header_only: bool = False, max_mb: float = limits.MAX_MB) -> Exr:
     """Read `path`; `header_only` leaves every channel an empty array.
 
-    `max_mb`: megabytes that its pixels may take. `InputError` names the file where it is missing,
-    damaged, cut off, deep, absurdly large or beyond that limit, and where memory is short.
+    Deep pixels are flattened, luminance and chroma become R, G and B, and of tiles' levels the
+    largest is read; the part's `notes` say so. `max_mb`: megabytes that its pixels may take.
+    `InputError` names the file where it is missing, damaged, cut off, absurdly large or beyond
+    that limit, and where memory is short.
     """
     path = Path(path)
     if not path.is_file():
@@ -96,6 +105,7 @@ def read(path: str | Path, *, header_only: bool = False, max_mb: float = limits.
         header = _open(path, header_only=True)
     try:
         promised = [_promised(path, part) for part in header.parts]
+        is_deep = [part.header.get("type") in _DEEP for part in header.parts]
     except (UnicodeDecodeError, KeyError, TypeError, IndexError) as error:
         raise InputError(f"{path}: not a readable EXR file: {_first_line(error)}") from None
     if (count := sum(len(part.channels) for part in promised)) > limits.MOST_CHANNELS:
@@ -104,6 +114,9 @@ def read(path: str | Path, *, header_only: bool = False, max_mb: float = limits.
         return Exr(path, promised)
     needed = sum(limits.unpacked(part.size, len(part.channels)) for part in promised)
     what = "{} x {}, ".format(*promised[0].size) + f"{count} channels,"
+    if any(is_deep):
+        needed += deep.needed(path, header.parts)
+        what += " deep,"
     limits.check(path, what, needed, path.stat().st_size, max_mb)
     with inside(), hushed() as heard:
         content = _open(path, header_only=False)
@@ -114,18 +127,63 @@ def read(path: str | Path, *, header_only: bool = False, max_mb: float = limits.
             f"{path}: damaged or cut off: pixels of {len(content.parts)} of "
             f"{len(promised)} parts could be read"
         )
-    for want, got in zip(promised, content.parts, strict=True):
-        for name in want.channels:
-            pixels = got.channels[name].pixels if name in got.channels else None
-            width, height = want.size
-            if pixels is None or pixels.shape != (height, width):
-                shape = "nothing" if pixels is None else f"{pixels.shape[::-1]}"
-                raise InputError(
-                    f"{path}: channel {name} must be {width} x {height}, got {shape} "
-                    "(damaged, or subsampled, which is not supported)"
-                )
-            want.channels[name] = pixels
+    try:
+        for want, stored in zip(promised, content.parts, strict=True):
+            _fill(path, want, stored)
+    except MemoryError:
+        raise InputError(f"{path}: not enough memory for {needed >> 20} MB of pixels") from None
     return Exr(path, promised)
+
+
+def _fill(path: Path, part: Part, stored) -> None:
+    """Give a part, promised by its header, the planes of what is stored."""
+    sampling: dict[str, tuple[int, int]] = {}
+    for name in part.channels:
+        channel = stored.channels.get(name)
+        pixels = channel.pixels if channel is not None else None
+        width, height = part.size
+        if channel is not None and (channel.xSampling, channel.ySampling) != (1, 1):
+            sampling[name] = channel.xSampling, channel.ySampling
+            width, height = width // channel.xSampling, height // channel.ySampling
+        if pixels is None or pixels.shape != (height, width):
+            shape = "nothing" if pixels is None else "{1} x {0}".format(*pixels.shape)
+            raise InputError(
+                f"{path}: channel {name} must be {width} x {height}, got {shape} (damaged)"
+            )
+        part.channels[name] = pixels
+    try:
+        if stored.header.get("type") in _DEEP:
+            volumes = deep.has_volumes(part.channels)
+            part.channels = deep.flatten(part.channels)
+            part.notes += (_FLATTENED + (_VOLUMES if volumes else ""),)
+        _fill_gaps(part, sampling)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    tiles = stored.header.get("tiles")
+    if tiles is not None and tiles.mode != OpenEXR.ONE_LEVEL:
+        part.notes += (_LEVELS,)
+
+
+def _fill_gaps(part: Part, sampling: dict[str, tuple[int, int]]) -> None:
+    """Give subsampled channels a value for every pixel, and chroma its colours."""
+    of_chroma = [name for name in part.channels if name.rpartition(".")[2] in ("RY", "BY")]
+    for lead in dict.fromkeys(name[:-2] for name in of_chroma):
+        luminance = part.channels.get(f"{lead}Y")
+        if luminance is None or any(f"{lead}{c}" in part.channels for c in "RGB"):
+            continue  # they are something else
+        none = np.zeros(part.size[::-1], np.float32)
+        both = [
+            chroma.whole(part.channels.pop(c, none), sampling.pop(c, (1, 1)))
+            for c in (f"{lead}RY", f"{lead}BY")
+        ]
+        del part.channels[f"{lead}Y"]
+        shares = chroma.weights(part.attributes.get("chromaticities"))
+        colors = to_half(chroma.rgb(luminance, (both[0], both[1]), shares))
+        part.channels |= {f"{lead}{c}": colors[..., i] for i, c in enumerate("RGB")}
+        part.notes += (_CHROMA,)
+    for name, (x, y) in sampling.items():
+        part.channels[name] = part.channels[name].repeat(x, axis=1).repeat(y, axis=0)
+        part.notes += (f"channel {name}, stored for every {x} x {y} pixels, gets a value for each",)
 
 
 def check_compression(name: str) -> None:
@@ -219,8 +277,6 @@ def _short_of_memory(heard: list[str], needed: int) -> bool:
 def _promised(path: Path, part) -> Part:
     """Return the part as declared by its header, with empty arrays."""
     header = part.header
-    if header.get("type") in (OpenEXR.deepscanline, OpenEXR.deeptile):
-        raise InputError(f"{path}: deep images are not supported")
     data, display = (_corners(header[k]) for k in ("dataWindow", "displayWindow"))
     width, height = data[2] - data[0] + 1, data[3] - data[1] + 1
     if not (0 < width <= MOST_PIXELS_A_SIDE and 0 < height <= MOST_PIXELS_A_SIDE):

@@ -45,7 +45,7 @@ class FrameFile:
 
     @cached_property
     def color(self) -> list[str]:
-        """Names of the picture's channels, 3 or 4."""
+        """Names of the picture's channels, 3 or 4 (see layers.find_color)."""
         with about(self.name):
             own = [name for name in self.channels if name not in self.shared]
             return layers.find_color(own, self.wanted)
@@ -54,7 +54,7 @@ class FrameFile:
     def beside(self) -> str | None:
         """A channel whose neighbours are preferred: the picture's first, if there is one."""
         with contextlib.suppress(InputError):
-            return self.color[0]
+            return next(name for name in self.color if name)
         return None
 
     @property
@@ -83,9 +83,9 @@ class FrameFile:
     @property
     def rgba(self) -> np.ndarray:
         """The picture, (height, width, 3 or 4), as stored (float16 or float32)."""
-        planes = [self.channels[name] for name in self.color]
+        planes = [self.channels[name] if name else np.float16(0) for name in self.color]
         kind = np.float16 if all(p.dtype == np.float16 for p in planes) else np.float32
-        rgba = np.empty((*planes[0].shape, len(planes)), kind)
+        rgba = np.empty((*self.size[::-1], len(planes)), kind)
         for i, plane in enumerate(planes):
             rgba[..., i] = plane
         return rgba
@@ -228,6 +228,7 @@ def _together(
     attributes: dict[str, Any] = {}
     origin: views.Places = {}
     shared: set[str] = set()
+    notes: dict[str, None] = {}
     onto: exr.Part | None = None
     size: tuple[int, int] | None = None
     for content, keys in contents:
@@ -246,6 +247,7 @@ def _together(
                     (set(others) - set(own) if view is not None and len(keys) > 1 else set()),
                 )
             of_view = {id(part) for part, _ in own.values()}
+            notes |= dict.fromkeys(n for part, _ in places.values() for n in part.notes)
             ranked = sorted(content.file.parts, key=lambda part: id(part) not in of_view)
             for part in reversed(ranked):
                 attributes = {**part.attributes, **attributes}
@@ -268,6 +270,7 @@ def _together(
         view,
         origin,
         frozenset(shared),
+        notes=tuple(notes),
     )
 
 
@@ -287,7 +290,7 @@ def _noted(found: tuple[FrameFile, ...], empty: Sequence[str]) -> tuple[FrameFil
 def _picture_part(file: exr.Exr, places: views.Places, wanted: str | None) -> exr.Part:
     """The part that the picture is in; the first one where none is found."""
     with contextlib.suppress(InputError):
-        return places[layers.find_color(places, wanted)[0]][0]
+        return next(places[name][0] for name in layers.find_color(places, wanted) if name)
     return next((part for part, _ in places.values()), file.parts[0])
 
 

@@ -29,10 +29,9 @@ def in_space(frame: FrameFile, space: ColorSpace) -> FrameFile:
         return replace(frame, space=working)
     with about(frame.name):
         light = space.linear(frame.rgba).transpose(2, 0, 1)
-    kinds = [frame.channels[name].dtype for name in frame.color]
-    stored = [_as(plane, kind) for plane, kind in zip(light, kinds, strict=True)]
-    channels = frame.channels | dict(zip(frame.color, stored, strict=True))
-    return replace(frame, channels=channels, space=working, made_linear=True)
+    there = {name: plane for name, plane in zip(frame.color, light, strict=True) if name}
+    stored = {name: _as(plane, frame.channels[name].dtype) for name, plane in there.items()}
+    return replace(frame, channels=frame.channels | stored, space=working, made_linear=True)
 
 
 def _as(plane: np.ndarray, kind: np.dtype) -> np.ndarray:

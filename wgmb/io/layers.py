@@ -50,9 +50,19 @@ def stem(layer: str) -> str:
 
 
 def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
-    """The channels of the picture: 3, or 4 with alpha."""
-    by_layer = {k: _rgba(v) for k, v in layers(names).items()}
-    by_layer = {k: v for k, v in by_layer.items() if v}
+    """The channels of the picture: 3, or 4 with alpha.
+
+    Where there are no R, G and B, a grey picture, three times Y; then one with R, G or B alone,
+    and "" for what it lacks.
+    """
+    names = list(names)
+    for channels_of in (_rgb, _grey, _some_of_rgb):
+        by_layer = {k: channels_of(v) for k, v in layers(names).items()}
+        by_layer = {k: v for k, v in by_layer.items() if v}
+        if channels_of is not _rgb and wanted is None:  # others may mean anything
+            by_layer = {k: v for k, v in by_layer.items() if k == "" or stem(k) in _COLOR}
+        if by_layer:
+            break
     if wanted is not None:
         chosen = pick(by_layer, wanted, "colour layer")
     elif "" in by_layer:
@@ -68,12 +78,26 @@ def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
     return by_layer[chosen]
 
 
-def _rgba(members: list[str]) -> list[str]:
+def _rgb(members: list[str]) -> list[str]:
     by_component = {component(m): m for m in members}
     for r, g, b, a in (("r", "g", "b", "a"), ("red", "green", "blue", "alpha")):
         if {r, g, b} <= by_component.keys():
             return [by_component[c] for c in (r, g, b, a) if c in by_component]
     return []
+
+
+def _grey(members: list[str]) -> list[str]:
+    own = {m.rpartition(".")[2]: m for m in members}
+    if "Y" not in own or "X" in own:  # a vector
+        return []
+    return 3 * [own["Y"]] + [own[c] for c in "A" if c in own]
+
+
+def _some_of_rgb(members: list[str]) -> list[str]:
+    own = {m.rpartition(".")[2]: m for m in members}
+    if not own.keys() & set("RGB"):
+        return []
+    return [own.get(c, "") for c in "RGB"] + [own[c] for c in "A" if c in own]
 
 
 def find_depth(

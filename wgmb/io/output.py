@@ -359,7 +359,8 @@ def _with_results(
         assert home is not None
         if space is not None and result.source.made_linear:
             twins[id(home)].attributes = relabelled(twins[id(home)].attributes, space)
-        for i, full in enumerate(result.source.color):
+        written = {full: i for i, full in enumerate(result.source.color) if full}
+        for full, i in written.items():
             part, name = _place(result.source, full)
             kind = result.source.channels[full].dtype
             plane = laid(result.picture[..., i], result.canvas, twins[id(part)].data_window)

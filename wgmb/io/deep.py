@@ -1,0 +1,193 @@
+"""Deep pixels, each with any number of samples, to flat ones: the nearest over those behind it.
+
+Colour is premultiplied and laid over (Porter and Duff 1984) in the order of Z; every other
+channel, depth and vectors too, has the value of the nearest sample. A volume (ZBack) counts as
+a point at its front. OpenEXR, "Interpreting OpenEXR Deep Pixels".
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from ..errors import InputError
+from .layers import stem
+from .vectors import CONVENTIONS
+
+_COLORS = ("r", "g", "b", "a", "y", "red", "green", "blue", "alpha")
+_NOT_COLORS = {"n", "normal", "normals", "p", "position", "id"} | {
+    stem for convention in CONVENTIONS.values() for stem in convention.stems
+}
+_MOST_HALF = float(np.finfo(np.float16).max)
+_OBJECT = 256  # bytes that the library takes for a pixel's samples of a channel, beside them
+_MANY_PARTS = 0x1000
+
+
+@np.errstate(all="ignore")  # samples may be anything
+def flatten(channels: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """(height, width) planes from (height, width) arrays of samples, None where there are none.
+
+    Where a pixel is empty its depth is infinite, and all else 0. InputError where the channels
+    of a pixel have different numbers of samples.
+    """
+    first, shape = next(iter(channels)), next(iter(channels.values())).shape
+    filled = [
+        i for i, samples in enumerate(channels[first].ravel().tolist()) if samples is not None
+    ]
+    counts = np.zeros(shape[0] * shape[1], np.int64)
+    values: dict[str, np.ndarray] = {}
+    for name, pixels in channels.items():
+        there = [samples for samples in pixels.ravel().tolist() if samples is not None]
+        lengths = np.fromiter(map(len, there), np.int64, len(there))
+        if name == first:
+            counts[filled] = lengths
+        elif not np.array_equal(lengths, counts[filled]):
+            raise InputError(f"channels {first} and {name} have not the same samples")
+        values[name] = np.concatenate(there) if there else np.empty(0, np.float32)
+    starts = np.cumsum(counts) - counts
+    orders: dict[str | None, np.ndarray] = {}
+    planes: dict[str, np.ndarray] = {}
+    seen: dict[tuple[str | None, str | None], np.ndarray] = {}
+    for name, samples in values.items():
+        depth, alpha = beside(name, "Z", channels), beside(name, "A", channels)
+        if depth not in orders:
+            orders[depth] = _order(values[depth] if depth else None, counts)
+        ordered = samples[orders[depth]]
+        if _is_color(name):
+            key = depth, alpha
+            if key not in seen:
+                clear = values[alpha][orders[depth]] if alpha else np.ones(len(ordered))
+                seen[key] = _seen(clear, starts, counts)
+            flat = _summed(ordered, seen[key], counts)
+            if samples.dtype == np.float16:
+                flat = np.clip(flat, -_MOST_HALF, _MOST_HALF)
+        else:
+            is_far = name == depth and samples.dtype.kind == "f"
+            flat = np.full(len(counts), np.inf if is_far else 0, samples.dtype)
+            flat[counts > 0] = ordered[starts[counts > 0]]
+        planes[name] = flat.astype(samples.dtype).reshape(shape)
+    return planes
+
+
+def _is_color(name: str) -> bool:
+    """Return True for a channel that is laid over, not one of vectors, normals or ids."""
+    layer, _, component = name.rpartition(".")
+    own = stem(layer)
+    if component.lower() not in _COLORS or own in _NOT_COLORS or own[-2:].isdigit():
+        return False
+    return component != "y" and (component != "Y" or not layer)
+
+
+def beside(name: str, wanted: str, names: Mapping[str, object]) -> str | None:
+    """The channel `wanted` (Z or A) that goes with a channel: of its layer, its view, or at all."""
+    *layer, _ = name.split(".")
+    leads = [".".join(layer), *layer, ""]
+    places = [f"{lead}.{wanted}" if lead else wanted for lead in leads]
+    return next((place for place in places if place in names), None)
+
+
+def has_volumes(channels: Mapping[str, np.ndarray]) -> bool:
+    """Return True if a sample reaches from Z to another ZBack."""
+    for name, pixels in channels.items():
+        front = channels.get(name.removesuffix("Back"))
+        if name.endswith("ZBack") and front is not None:
+            pairs = zip(front.flat, pixels.flat, strict=True)
+            if any(a is not None and (a != b).any() for a, b in pairs):
+                return True
+    return False
+
+
+def _order(depth: np.ndarray | None, counts: np.ndarray) -> np.ndarray:
+    """Indices that put the samples of every pixel in order, the nearest first."""
+    of = np.repeat(np.arange(len(counts)), counts)
+    if depth is None:
+        return np.arange(len(of))
+    return np.lexsort((depth, of))
+
+
+def _seen(alpha: np.ndarray, starts: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """What every sample's nearer ones let through of it, 0 to 1."""
+    clear = np.clip(1 - alpha.astype(np.float64), 0, None)
+    seen = np.ones(len(alpha))
+    pixels, rank = np.flatnonzero(counts > 1), 1
+    while len(pixels):
+        at = starts[pixels] + rank
+        seen[at] = seen[at - 1] * clear[at - 1]
+        rank += 1
+        pixels = pixels[counts[pixels] > rank]
+    return seen
+
+
+def _summed(samples: np.ndarray, seen: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """The sum of what is seen of every pixel's samples."""
+    of = np.repeat(np.arange(len(counts)), counts)
+    shares = np.zeros(len(samples))
+    np.multiply(samples, seen, out=shares, where=seen != 0)  # infinite light may be hidden
+    return np.bincount(of, shares, len(counts))
+
+
+# ---- how large ------------------------------------------------------------------------------
+
+
+def needed(path: Path, parts: Sequence) -> int:
+    """Bytes that the deep parts of a file take in memory, from the headers of their chunks.
+
+    `parts`: of OpenEXR.File, without pixels. What is damaged counts as nothing: reading the
+    pixels tells.
+    """
+    try:
+        with open(path, "rb") as file:
+            return _needed(file, parts)
+    except (struct.error, IndexError, ValueError, KeyError):
+        return 0
+
+
+def _needed(file: BinaryIO, parts: Sequence) -> int:
+    many = _skip_headers(file)
+    at, total = file.tell(), 0
+    for part in parts:
+        count, channels = int(part.header["chunkCount"]), part.header["channels"]
+        if "deep" in part.header["type"].name:
+            is_tile = "tile" in part.header["type"].name
+            file.seek(at)
+            offsets = np.frombuffer(file.read(8 * count), "<u8")
+            unpacked = sum(_unpacked(file, int(offset), many, is_tile) for offset in offsets)
+            (left, top), (right, bottom) = part.header["dataWindow"]
+            pixels = (int(right) - int(left) + 1) * (int(bottom) - int(top) + 1)
+            filled = min(pixels, unpacked // (2 * len(channels)))
+            total += 3 * unpacked + len(channels) * (8 * pixels + _OBJECT * filled)
+        at += 8 * count
+    return total
+
+
+def _unpacked(file: BinaryIO, offset: int, many: bool, is_tile: bool) -> int:
+    """Bytes of the samples of one chunk; 0 for a smaller level of a tiled part."""
+    file.seek(offset + 4 * many)
+    place = struct.unpack("<4i" if is_tile else "<i", file.read(16 if is_tile else 4))
+    _, _, unpacked = struct.unpack("<3Q", file.read(24))
+    return 0 if is_tile and place[2:] != (0, 0) else unpacked
+
+
+def _skip_headers(file: BinaryIO) -> bool:
+    """Go to the first table of offsets; returns True if the file is of the form with many parts."""
+    _, version = struct.unpack("<2I", file.read(8))
+    many = bool(version & _MANY_PARTS)
+    data = file.read(1 << 24)
+    at = 0
+    while True:
+        while data[at]:  # attributes: name, type, size, value
+            kind = data.index(b"\0", at) + 1
+            size = data.index(b"\0", kind) + 1
+            at = size + 4 + struct.unpack_from("<I", data, size)[0]
+        at += 1
+        if not many:
+            break
+        if not data[at]:
+            at += 1
+            break
+    file.seek(8 + at)
+    return many
