@@ -13,7 +13,7 @@ from ._version import __version__ as __version__
 
 TYPE_CHECKING = False  # typing's own, without the time that loading it takes
 if TYPE_CHECKING:
-    from .batch import BatchReport, blur_sequence
+    from .batch import BatchReport, blur_sequence, vectors_sequence
     from .camera import Camera, Reprojections
     from .cone import Cone
     from .display import ColorConfig, ColorSpace, Display
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .io.camera_file import CameraFile
     from .io.clip import Clip, Passes
     from .io.output import Output
+    from .io.vector_output import VectorOutput
     from .io.vectors import Vectors
     from .methods import METHODS
     from .observer import Observer
@@ -58,13 +59,15 @@ __all__ = [
     "Scene",
     "ShaderError",
     "Shutter",
+    "VectorOutput",
     "Vectors",
     "blur",
     "blur_sequence",
+    "vectors_sequence",
 ]
 
 _PLACES = {
-    "batch": ("BatchReport", "blur_sequence"),
+    "batch": ("BatchReport", "blur_sequence", "vectors_sequence"),
     "camera": ("Camera", "Reprojections"),
     "cone": ("Cone",),
     "display": ("ColorConfig", "ColorSpace", "Display"),
@@ -74,6 +77,7 @@ _PLACES = {
     "io.camera_file": ("CameraFile",),
     "io.clip": ("Clip", "Passes"),
     "io.output": ("Output",),
+    "io.vector_output": ("VectorOutput",),
     "io.vectors": ("Vectors",),
     "methods": ("METHODS",),
     "observer": ("Observer",),

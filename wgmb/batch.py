@@ -22,6 +22,7 @@ from .io.clip import Clip
 from .io.frame_file import FrameFile
 from .io.frame_numbers import has_view
 from .io.output import Output, Result
+from .io.vector_output import VectorOutput
 from .io.windows import Placement
 from .pipeline import Blur
 from .render import Render
@@ -44,7 +45,7 @@ class _Job:
     """One frame, read and to be blurred: every view of it."""
 
     number: int
-    views: list[tuple[FrameFile, Frame, Placement]]
+    views: list[tuple[FrameFile, Frame, Placement | None]]
     made_of: dict[str, Any]
 
 
@@ -213,13 +214,11 @@ class _Pipeline:
         sources = self.clip.sources(number)
         if not self.output.takes_views:
             del sources[1:]
-        normal = "normal" in self.blur.method.uses
-        views: list[tuple[FrameFile, Frame, Placement]] = []
+        views: list[tuple[FrameFile, Frame, Placement | None]] = []
         errors: list[tuple[InputError, FrameFile]] = []
         for source in sources:
             try:
-                made = self.clip.placed(source, self.blur.reach, neighbours, normal)
-                views.append((source, *made))
+                views.append((source, *self._prepared(source, neighbours)))
             except InputError as error:
                 errors.append((error, source))
         if errors:
@@ -228,6 +227,10 @@ class _Pipeline:
         if unread := sorted({number - 1, number + 1} & self.clip.unread):
             made_of["unread"] = unread  # so that --resume asks for them again
         self.to_blur.put(_Job(number, views, made_of))
+
+    def _prepared(self, source: FrameFile, neighbours: bool) -> tuple[Frame, Placement | None]:
+        normal = "normal" in self.blur.method.uses
+        return self.clip.placed(source, self.blur.reach, neighbours, normal)
 
     def blur_one(self, job: _Job) -> None:
         """The second stage, for one frame."""
@@ -244,7 +247,7 @@ class _Pipeline:
                 bad[name] = bad.get(name, 0) + count
         self.to_write.put(_Blurred(job.number, results, job.made_of))
 
-    def _blurred(self, source: FrameFile, frame: Frame, placement: Placement) -> Result:
+    def _blurred(self, source: FrameFile, frame: Frame, placement: Placement | None) -> Result:
         if self.confidence:
             return Result(source, *self.blur.with_confidence(frame), placement)
         return Result(source, self.blur(frame), placement=placement)
@@ -289,10 +292,40 @@ class _Pipeline:
             self.stop.set()
 
 
+def vectors_sequence(
+    clip: Clip,
+    output: VectorOutput,
+    *,
+    blur: Blur | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> BatchReport:
+    """Write the motion of every frame of `clip` into `output`, in the form of another program.
+
+    It is the motion that `blur_sequence` follows: of vectors in any convention, or of depth and
+    cameras. Frames without motion are in the report's `failed`; everything else is as there.
+    `blur`: gives the device, and may limit the motion (`max_blur`).
+    """
+    return _VectorPipeline(clip, blur or Blur("tap"), output, resume, False, progress).run()
+
+
+class _VectorPipeline(_Pipeline):
+    """Motion instead of blurred pictures."""
+
+    def _prepared(self, source: FrameFile, neighbours: bool) -> tuple[Frame, None]:
+        frame = self.clip.frame(source, picture=False, normal=False)
+        if "motion" not in frame.has:
+            raise InputError("no motion: neither vectors nor a camera")
+        return frame, None
+
+    def _blurred(self, source: FrameFile, frame: Frame, placement: Placement | None) -> Result:
+        return Result(source, self.blur.motion(frame))
+
+
 def _of_view(
     error: Error,
     source: FrameFile,
-    views: list[tuple[FrameFile, Frame, Placement]],
+    views: list[tuple[FrameFile, Frame, Placement | None]],
     needs: frozenset[str],
 ) -> InputError:
     """The error with the name of the file, and of those of its `views` that can be blurred."""

@@ -27,6 +27,7 @@ COMMANDS = {
     "render": "Render a built-in scene with motion blur.",
     "view": "View a scene or frames interactively.",
     "info": "Describe a frame: layers, sizes, motion vector convention, speeds.",
+    "vectors": "Write the motion of frames as other programs store it.",
     "devices": "List the GPUs that --adapter (or WGMB_ADAPTER) can choose; * is the default.",
     "compare": "Score and time methods against a ground truth; write an HTML, JSON and CSV report.",
     "bench": "Time methods on this machine: median milliseconds per frame; transfers separately.",

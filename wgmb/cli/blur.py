@@ -78,7 +78,7 @@ def blur(
             clip, made, files, resume=output.resume, confidence=confidence, progress=tick
         )
     took = f"{time.perf_counter() - started:.1f} s with {made.method.name}"
-    return _conclude(clip, files, report, took, quiet, verbose)
+    return conclude(clip, files, report, took, quiet, verbose)
 
 
 def _settings(look: BlurSettings, when: ShutterSettings, given: InputSettings) -> dict:
@@ -89,7 +89,7 @@ def _settings(look: BlurSettings, when: ShutterSettings, given: InputSettings) -
     return every
 
 
-def _conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose: bool) -> int:
+def conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose: bool) -> int:
     """Print a summary of the run; return the exit code."""
     for number, why in sorted(report.failed.items()):
         note(f"wgmb: frame {number} failed: {why}")

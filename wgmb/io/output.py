@@ -243,18 +243,22 @@ class Output:
             return
         path = self.path(first.source.number, view)
         text = record.blank(self._expected(made_of))
-        if path.suffix.lower() == ".exr":
-            only_picture = self._layers == "picture"
-            content = _with_results(results, view, text, only_picture, self._grows)
-            data = exr.encode(content, self._compression)
-        else:
-            data = stills.encode(first.displayed, path.suffix, self.bits, text, self._shown(first))
+        data = self._encoded(path, view, results, text)
         if self._resume and self._is_done(path, made_of):
             return
         if not (self._resume or self._overwrite) and path.exists():
             raise InputError(f"{path} was written by another process during this run")
         self._under_way = atomic.temporary_name(path)
         atomic.write_file(path, *record.seal(data, text), temporary=self._under_way)
+
+    def _encoded(self, path: Path, view: str | None, results: Sequence[Result], text: str) -> bytes:
+        """The file at `path`, with the record's text."""
+        if path.suffix.lower() == ".exr":
+            only_picture = self._layers == "picture"
+            content = _with_results(results, view, text, only_picture, self._grows)
+            return exr.encode(content, self._compression)
+        shown = self._shown(results[0])
+        return stills.encode(results[0].displayed, path.suffix, self.bits, text, shown)
 
     def _shown(self, result: Result) -> ToDisplay:
         """How the picture becomes display values."""
