@@ -13,8 +13,8 @@ PACKAGE, SHADERS = ROOT / "wgmb", ROOT / "wgsl"
 
 # A room imports only from lines above its own, and from itself.
 LAYERS = [
-    {"_version", "errors", "color"},
-    {"primaries"},
+    {"_version", "errors", "color", "coding"},
+    {"primaries", "ocio"},
     {"gpu", "shutter", "camera", "metrics", "display"},
     {"frame", "cone"},
     {"frame_views", "reach", "exposure"},
@@ -42,7 +42,7 @@ HOMES = {
     "imageio": {"io"},
     "PIL": {"io", "lab"},
     "fileseq": {"io"},
-    "PyOpenColorIO": {"display"},
+    "PyOpenColorIO": {"ocio"},
     "cyclopts": {"cli"},
     "rich": {"cli"},
     "imgui_bundle": {"viewer"},

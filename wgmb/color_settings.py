@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
-from .display import ColorConfig, ColorSpace, Display, installed
+from .display import ColorConfig, ColorSpace, Display
 from .errors import InputError
+from .ocio import installed
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,25 +5,19 @@ The package is optional (`pip install wgmb[ocio]`) and loaded when a ColorConfig
 
 from __future__ import annotations
 
-import contextlib
-import os
-import shutil
-from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from . import ocio
 from .color import ToDisplay
 from .errors import InputError, did_you_mean
 from .primaries import AP0, AP1, REC709, conversion, of_matrix
 
-_BUILT_IN = {"builtin": "ocio://default", "studio": "ocio://studio-config-latest"}
-_BLENDER = "*/datafiles/colormanagement/config.ocio"
 _NAMED_BY = "colorInteropID", "oiio:ColorSpace", "colorspace"
 _INTERCHANGE = {  # of configs without the role: spaces whose primaries their names tell
     "lin_ap0_scene": AP0, "lin_ap0": AP0, "ACES2065-1": AP0, "ACES - ACES2065-1": AP0,
@@ -32,16 +26,6 @@ _INTERCHANGE = {  # of configs without the role: spaces whose primaries their na
     "Linear Rec.709": REC709, "Utility - Linear - sRGB": REC709,
 }  # fmt: skip
 _MOST = 65504.0  # brighter than any display: largest half float
-_THREADS = min(os.cpu_count() or 1, 8)
-
-
-def installed() -> bool:
-    """True if OpenColorIO can be loaded."""
-    try:
-        import PyOpenColorIO  # noqa: F401
-    except ImportError:
-        return False
-    return True
 
 
 @dataclass(frozen=True)
@@ -97,17 +81,8 @@ class ColorConfig:
     """
 
     def __init__(self, config: str | Path):
-        try:
-            import PyOpenColorIO
-        except ImportError:
-            raise InputError(
-                "OpenColorIO is not installed: pip install wgmb[ocio], or --ocio off"
-            ) from None
-        self._ocio: Any = PyOpenColorIO
-        place = _BUILT_IN.get(str(config)) or str(config)
-        if place == "blender":
-            place = str(_blenders_config())
-        with self._said(str(config)):
+        self._ocio, place = ocio.load(), ocio.config_file(str(config))
+        with ocio.told(str(config)):
             self._config: Any = self._ocio.Config.CreateFromFile(place)
         self.name: str = self._config.getName() or Path(place).name
         """For messages and records."""
@@ -160,8 +135,10 @@ class ColorConfig:
         if self._interchange is None:
             return None
         onto, primaries = self._interchange
+        if space.matrix is not None:
+            return of_matrix(conversion(primaries, AP0) @ np.reshape(space.matrix, (3, 3)))
         columns = np.eye(3, dtype=np.float32)[None]
-        with self._said(f"{space.name} in {self.name}"):
+        with ocio.told(f"{space.name} in {self.name}"):
             moved = self._lossless(self._config.getProcessor(space.name, onto))
             moved.applyRGB(columns)
         matrix = conversion(primaries, AP0) @ columns[0].T.astype(np.float64)
@@ -170,15 +147,29 @@ class ColorConfig:
     def is_linear(self, name: str) -> bool:
         """True if the space of that name holds scene-linear light or data."""
         scene = self._ocio.REFERENCE_SPACE_SCENE
-        with self._said(f"{name} in {self.name}"):
+        with ocio.told(f"{name} in {self.name}"):
             data = self._config.getColorSpace(name).isData()
             return data or self._config.isColorSpaceLinear(name, scene)
 
     def linearised(self, rgb: np.ndarray, name: str) -> np.ndarray:
         """RGB (height, width, 3) in the space of that name -> `scene_linear`; new float32."""
-        with self._said(f"{name} in {self.name}"):
+        with ocio.told(f"{name} in {self.name}"):
             processor = self._config.getProcessor(name, self.scene_linear.name)
-            return _applied(self._lossless(processor), np.array(rgb, np.float32, order="C"))
+            return ocio.applied(self._lossless(processor), np.array(rgb, np.float32, order="C"))
+
+    @property
+    def displays(self) -> list[str]:
+        """Names of its displays."""
+        return list(self._config.getDisplaysAll())
+
+    def views(self, display: str) -> list[str]:
+        """Names of the views of a display."""
+        return list(self._config.getViews(display))
+
+    @property
+    def looks(self) -> list[str]:
+        """Names of its looks."""
+        return list(self._config.getLookNames())
 
     def display(
         self, display: str | None = None, view: str | None = None, look: str | None = None
@@ -189,20 +180,20 @@ class ColorConfig:
         """
         config = self._config
         display = str(display or config.getDefaultDisplay())
-        displays = list(config.getDisplaysAll())
+        displays = self.displays
         if (found := _same(display, displays)) is None:
             raise InputError(
                 f"unknown display {display!r} in {self.name}; available: {', '.join(displays)}"
                 f"{did_you_mean(display, displays)}"
             )
-        views = list(config.getViews(found))
+        views = self.views(found)
         view = str(view or config.getDefaultView(found))
         if not config.hasView(found, view):
             raise InputError(
                 f"unknown view {view!r} of display {found!r} in {self.name}; "
                 f"available: {', '.join(views)}{did_you_mean(view, views)}"
             )
-        looks = list(config.getLookNames())
+        looks = self.looks
         for name in (part.strip(" +-") for part in (look or "").replace("|", ",").split(",")):
             if name and _same(name, looks) is None:
                 raise InputError(
@@ -213,21 +204,21 @@ class ColorConfig:
 
     def processor(self, space: ColorSpace, display: str, view: str, look: str | None) -> Any:
         """OpenColorIO's processor from a space to a display and view."""
-        ocio, pipeline = self._ocio, self._ocio.LegacyViewingPipeline()
+        pipeline = self._ocio.LegacyViewingPipeline()
         pipeline.setDisplayViewTransform(
-            ocio.DisplayViewTransform(src=space.name, display=display, view=view)
+            self._ocio.DisplayViewTransform(src=space.name, display=display, view=view)
         )
         if look is not None:
             pipeline.setLooksOverrideEnabled(True)
             pipeline.setLooksOverride(look)
-        with self._said(f"{display}, {view} in {self.name}"):
+        with ocio.told(f"{display}, {view} in {self.name}"):
             shown = pipeline.getProcessor(self._config)
             if space.matrix is None:
                 return shown
             rows = np.eye(4)
             rows[:3, :3] = np.reshape(space.matrix, (3, 3))
-            first = ocio.MatrixTransform(rows.ravel().tolist())
-            every = ocio.GroupTransform([first, *shown.createGroupTransform()])
+            first = self._ocio.MatrixTransform(rows.ravel().tolist())
+            every = self._ocio.GroupTransform([first, *shown.createGroupTransform()])
             return self._config.getProcessor(every)
 
     def names_of(self, display: str, view: str) -> set[str]:
@@ -263,19 +254,6 @@ class ColorConfig:
 
     def _lossless(self, processor: Any) -> Any:
         return processor.getOptimizedCPUProcessor(self._ocio.OPTIMIZATION_LOSSLESS)
-
-    @contextlib.contextmanager
-    def _said(self, about: str) -> Iterator[None]:
-        """OpenColorIO's errors as one line of ours; it prints nothing meanwhile."""
-        ocio = self._ocio
-        level = ocio.GetLoggingLevel()
-        ocio.SetLoggingLevel(ocio.LOGGING_LEVEL_NONE)
-        try:
-            yield
-        except (ocio.Exception, ocio.ExceptionMissingFile) as error:
-            raise InputError(f"{about}: {' '.join(str(error).split())}") from None
-        finally:
-            ocio.SetLoggingLevel(level)
 
 
 class Display:
@@ -320,15 +298,22 @@ class Display:
         added = np.any(rgb != 0, axis=2, keepdims=True)
         return colors * np.where(covered, np.clip(alpha, 0, 1), added).astype(np.float32)
 
+    def shader(self, space: ColorSpace, first_binding: int) -> ocio.Shader:
+        """OpenColorIO's shader for pictures in `space` (unassociated, linear)."""
+        with ocio.told(f"{self.display}, {self.view} in {self.config.name}"):
+            return ocio.shader(self._processor(space), first_binding)
+
+    def _processor(self, space: ColorSpace) -> Any:
+        return self.config.processor(space, self.display, self.view, self.look)
+
     def _transformed(self, rgb: np.ndarray, space: ColorSpace) -> np.ndarray:
         if space not in self._processors:
-            look = self.config.processor(space, self.display, self.view, self.look)
-            self._processors[space] = look.getDefaultCPUProcessor()
+            self._processors[space] = self._processor(space).getDefaultCPUProcessor()
         light = np.nan_to_num(
             rgb.astype(np.float32), copy=False, nan=0, posinf=_MOST, neginf=-_MOST
         )
         light = np.clip(light, -_MOST, _MOST, out=np.ascontiguousarray(light))
-        shown = np.nan_to_num(_applied(self._processors[space], light), copy=False)
+        shown = np.nan_to_num(ocio.applied(self._processors[space], light), copy=False)
         return np.clip(shown, 0, 1, out=shown)
 
     def _to_display(
@@ -342,31 +327,6 @@ class Display:
         return np.concatenate([samples, covered], axis=2)
 
 
-def _applied(processor: Any, rgb: np.ndarray) -> np.ndarray:
-    """Apply a processor in place, to bands of rows at a time; each goes without Python's lock."""
-    bands = [band for band in np.array_split(rgb, _THREADS) if len(band)]
-    if rgb.size < 1 << 16 or len(bands) == 1:
-        processor.applyRGB(rgb)
-        return rgb
-    with ThreadPoolExecutor(len(bands)) as pool:
-        list(pool.map(processor.applyRGB, bands))
-    return rgb
-
-
 def _same(name: str, known: list[str]) -> str | None:
     """The name as the config writes it, which does not tell capital letters from small ones."""
     return next((k for k in known if k.casefold() == name.casefold()), None)
-
-
-def _blenders_config() -> Path:
-    """The newest config of the module bpy, or of the program `blender`."""
-    spec, program = find_spec("bpy"), shutil.which("blender")
-    folders = list(spec.submodule_search_locations or ()) if spec else []
-    folders += [Path(program).resolve().parent] if program else []
-    found = [file for folder in folders for file in sorted(Path(folder).glob(_BLENDER))]
-    if not found:
-        raise InputError(
-            "--ocio blender: neither the module bpy nor the program blender is here; name the "
-            "file datafiles/colormanagement/config.ocio in Blender's folder instead"
-        )
-    return found[-1]

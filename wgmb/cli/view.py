@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ..color_settings import ColorSettings
 from ..errors import DeviceError
 from ..settings import size_of
 from .exit_codes import DONE
-from .options import BlurOptions, Given, InputOptions, Look, ShutterOptions, When
+from .options import BlurOptions, Colors, Given, InputOptions, Look, ShutterOptions, When
+from .terminal import note
 
 
 def view(
@@ -15,6 +17,7 @@ def view(
     given: Given = InputOptions(),
     look: Look = BlurOptions(),
     when: When = ShutterOptions(),
+    color: Colors = ColorSettings(),
     *,
     config: Path | None = None,
     window: str = "1280x720",
@@ -48,6 +51,8 @@ def view(
         state = viewer.State.read(config)
     if what is not None:
         state = state.opened(what)
-    state = state.told(vars(given) | vars(look) | vars(when))
+    state = state.told(vars(given) | vars(look) | vars(when) | vars(color))
+    if color.remark:
+        note(color.remark)
     viewer.view(state, adapter=adapter, size=size_of(window))
     return DONE

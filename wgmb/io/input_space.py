@@ -47,6 +47,12 @@ def space_of(frame: FrameFile, config: ColorConfig) -> ColorSpace:
         return frame.space or config.space_of(frame.part.attributes if frame.part else {})
 
 
+def without_pixels(frame: FrameFile) -> FrameFile:
+    """The frame with nothing but what `space_of` asks."""
+    part = frame.part and replace(frame.part, channels={})
+    return replace(frame, file=None, channels={}, part=part, origin={})
+
+
 def relabelled(attributes: dict[str, Any], space: ColorSpace) -> dict[str, Any]:
     """Attributes of a part whose picture is now in another, linear space."""
     kept = {name: value for name, value in attributes.items() if name not in _SAID_OF_COLOR}

@@ -77,7 +77,7 @@ class Actions:
         rgba = np.ones((*linear.shape[:2], 4), np.float32)
         rgba[..., : linear.shape[2]] = linear
         whole = path.with_suffix(".exr")
-        write_file(whole, exr.encode(exr.new(rgba, {KEY: settings})))
+        write_file(whole, exr.encode(exr.new(rgba, self._stage.chromaticities | {KEY: settings})))
         self._say(f"saved {path.name} and {whole.name}")
 
     def _record(self, state: State) -> None:

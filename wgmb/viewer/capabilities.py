@@ -8,6 +8,7 @@ import wgpu
 
 from ..methods import METHODS
 from ..methods.options import Option, options_of
+from .displayed import Displayed
 from .source import ClipSubject, SceneSubject, Subject
 from .state import LOOKS, REFERENCE, State
 
@@ -16,7 +17,7 @@ class Choices:
     """Choices available with the device and the scene or frames."""
 
     def __init__(self, device: wgpu.GPUDevice):
-        self._device = device
+        self._device, self.displayed = device, Displayed(device)
         self._scene: SceneSubject | None = None
         self._clip: tuple[tuple, ClipSubject] | None = None
 
@@ -25,9 +26,10 @@ class Choices:
         if state.is_scene:
             self._scene = self._scene or SceneSubject(self._device)
             return self._scene
-        key = (state.source, state.given)
+        key = (state.source, state.given, state.read_as)
         if self._clip is None or self._clip[0] != key:
-            self._clip = key, ClipSubject(self._device, state)
+            display = self.displayed.display(state)
+            self._clip = key, ClipSubject(self._device, state, display)
         return self._clip[1]
 
     def methods(self, state: State) -> list[str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from imgui_bundle import imgui
 
+from ..display import Display
 from ..methods.options import Option
 from . import overlay, sections
 from .controls import Box
@@ -36,6 +37,7 @@ class Info:
     message: str = ""
     finding: str = ""
     flicked: bool = False
+    display: Display | None = None
 
 
 class Panel:

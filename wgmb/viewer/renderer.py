@@ -17,6 +17,7 @@ from .. import gpu
 from ..errors import InputError
 from ..gpu.textures import TexturePool
 from ..gpu.timing import TimestampClock
+from ..io.input_space import chromaticities
 from ..methods import METHODS
 from ..pipeline import SAMPLES, Blur
 from ..settings import ShutterSettings
@@ -94,6 +95,8 @@ class Renderer:
         self._blurs: dict[tuple, Blur] = {}
         self._shown = {"first": Shown(), "second": Shown()}
         self._coming = dict(self._shown)  # takes the place of what is shown
+        self._seen: dict[str, Image] = {}
+        self.chromaticities: dict[str, Any] = {}  # of what is shown, as an attribute of an EXR
         self._level, self._still_since, self._still = 0, 0.0, ()
         self._moved = False
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
@@ -121,6 +124,7 @@ class Renderer:
         assert first.texture is not None
         report.size, report.kind = first.texture.size[:2], first.kind
         report.labels = (first.label, last.label)
+        self._seen = self._displayed(slots, state, subject)
         unfinished = not all(self._coming[slot].ready for slot in slots)
         report.busy = moving or unfinished or self._level > 0
         if REFERENCE in names:
@@ -134,8 +138,24 @@ class Renderer:
 
     def images(self, flicked: bool) -> tuple[Image, Image]:
         """Return the images of both sides; `flicked`: the second one for both."""
-        first, second = self._shown["first"].image, self._shown["second"].image
+        first, second = self._seen["first"], self._seen.get("second", Image(None, "COLOR", ()))
         return (second if flicked else first), second
+
+    def _displayed(
+        self, slots: tuple[str, ...], state: State, subject: Subject
+    ) -> dict[str, Image]:
+        """The images by slot, colours as the display of an OpenColorIO config shows them."""
+        images = {slot: self._shown[slot].image for slot in slots}
+        displayed = self.choices.displayed
+        if (display := displayed.display(state)) is None:
+            self.chromaticities = {}
+            return images
+        space, exposure = subject.space(display.config), 2.0**state.exposure
+        self.chromaticities = chromaticities(space)
+        for slot, image in images.items():
+            if image.kind == "COLOR":
+                images[slot] = displayed.image(slot, image, display, space, exposure)
+        return images
 
     def download(self, shown: Shown | None = None) -> np.ndarray:
         """(height, width, channels) float32 of the first image, or of another."""

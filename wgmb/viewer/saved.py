@@ -10,6 +10,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, Literal
 
+from ..color_settings import ColorSettings
 from ..errors import InputError
 from ..settings import (
     METHOD_OPTIONS,
@@ -22,9 +23,13 @@ from ..settings import (
 )
 from ..settings_toml import parse
 
-GROUPS = (BlurSettings, ShutterSettings, SceneSettings, OutputSettings, InputSettings)
+GROUPS = (
+    BlurSettings, ShutterSettings, SceneSettings, OutputSettings, InputSettings, ColorSettings,
+)  # fmt: skip
 INPUTS = frozenset({*(f.name for f in fields(InputSettings)), "holdout", "scale"})
 """Options that say what frames on disk hold."""
+COLORS = frozenset(f.name for f in fields(ColorSettings))
+"""Options of colours; of scenes all but `from_`, as files write `from`."""
 VIEW = (
     "frames", "frame", "look", "compare", "against", "wipe", "gain", "fastest", "middle",
     "exposure", "tone", "cone_rate", "cone_peak", "zoom", "center", "playing", "speed", "panel",
@@ -35,7 +40,7 @@ VIEW = (
 def toml(tables: dict[str, dict[str, object]]) -> str:
     """The tables as text; what is None or an empty list is left out."""
     return "\n".join(
-        f"[{name}]\n" + "".join(_line(k, v) for k, v in table.items())
+        f"[{name}]\n" + "".join(_line(k.rstrip("_"), v) for k, v in table.items())
         for name, table in tables.items()
     )
 
@@ -65,18 +70,21 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
     known = _hints(*GROUPS) | {"fps": str | float}
     own = {f.name for f in fields(state)} & known.keys() - set(VIEW)
     allowed = own | {"set", *METHOD_OPTIONS} | (INPUTS if on_disk else set())
+    allowed |= COLORS if on_disk else COLORS - {"from_"}
     found: dict[str, Any] = {}
-    pairs: dict[str, list] = {"settings": [], "options": [], "given": []}
-    for name, value in given.items():
-        if name not in allowed:
-            raise InputError(f"settings: unknown name {name!r}")
+    pairs: dict[str, list] = {"settings": [], "options": [], "given": [], "color": []}
+    for word, value in given.items():
+        name = "from_" if word == "from" else word
+        if name not in allowed or word == "from_":
+            raise InputError(f"settings: unknown name {word!r}")
         fit = typed(name, value, known[name])
         if name == "set":
             pairs["settings"] = [_setting(text) for text in fit]
         elif name in own:
             found[name] = float(rate_of(str(fit))) if name == "fps" else fit
         else:
-            pairs["options" if name in METHOD_OPTIONS else "given"].append((name, fit))
+            group = "options" if name in METHOD_OPTIONS else "color" if name in COLORS else "given"
+            pairs[group].append((name, fit))
     hints = _hints(state)
     for name, value in view.items():
         if name not in VIEW:

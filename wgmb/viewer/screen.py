@@ -24,7 +24,7 @@ class Image:
     """An image on one side of the screen."""
 
     texture: wgpu.GPUTexture | None
-    kind: str  # COLOR, DEPTH, MOTION
+    kind: str  # COLOR, DEPTH, MOTION, DISPLAY
     stamp: tuple  # changes with what is in the texture
 
 

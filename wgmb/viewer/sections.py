@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from ..display import Display
 from ..io.frame_numbers import frame_numbers
 from ..methods import METHODS
+from ..ocio import installed
 from ..pipeline import SAMPLES
 from ..scene import builtin
 from ..shutter import CURVES, PHASES, ROLLING
@@ -205,8 +207,35 @@ def view(ui: Widgets, state: State, info: Info) -> State:
     else:
         state = _eye(ui, state) if state.eye else state
         state = ui.slide(state, "exposure", -8, 8, "%+.1f stops")
-        state = replace(state, tone=ui.combo("tone", state.tone, TONES))
+        state = _colors(ui, state, info.display)
     return _compare(ui, state, info)
+
+
+def _colors(ui: Widgets, state: State, display: Display | None) -> State:
+    """How light becomes display values: a config's display, view and look, or a tone and sRGB."""
+    if installed():
+        now = state.colors.ocio or ("$OCIO" if display else "off")
+        names = dict.fromkeys((now, "off", "builtin", "studio"))
+        config = ui.combo("ocio", now, list(names), shown=plain(now))
+        if config != now:
+            state = state.with_color(display=None, view_transform=None, look=None, from_=None)
+            return state.with_color(ocio=config)
+    if display is None:
+        return replace(state, tone=ui.combo("tone", state.tone, TONES))
+    config = display.config
+    screen = ui.combo("display", display.display, config.displays)
+    if screen != display.display:
+        return state.with_color(display=screen, view_transform=None)
+    view = ui.combo("view", display.view, config.views(screen))
+    if view != display.view:
+        state = state.with_color(view_transform=view)
+    looks = config.looks
+    if looks:
+        own = "of the view"
+        look = ui.combo("look", display.look or own, [own, *looks])
+        if look != (display.look or own):
+            state = state.with_color(look=None if look == own else look)
+    return state
 
 
 def _eye(ui: Widgets, state: State) -> State:

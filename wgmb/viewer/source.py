@@ -10,9 +10,12 @@ import numpy as np
 import wgpu
 
 from .. import gpu
+from ..display import ColorConfig, ColorSpace, Display
 from ..frame import Frame
 from ..gpu.textures import TexturePool
 from ..gpu.timing import TimestampClock
+from ..io.frame_file import FrameFile
+from ..io.input_space import space_of, without_pixels
 from ..methods import METHODS
 from ..pipeline import Blur
 from ..reach import EVERYWHERE
@@ -63,6 +66,10 @@ class SceneSubject:
         """Width and height that give the picture its shape [px]."""
         return size_of(state.size)
 
+    def space(self, config: ColorConfig) -> ColorSpace:
+        """What its colours are."""
+        return config.space_of({})
+
     def look_at(self, state: State, size: tuple[int, int], antialias: int) -> None:
         """What the next draws are of."""
         self._render.scene = self._scene(state)
@@ -101,11 +108,13 @@ class SceneSubject:
 class ClipSubject:
     """Frames on disk: their own size, their own moments, the methods they have passes for."""
 
-    def __init__(self, device: wgpu.GPUDevice, state: State):
+    def __init__(self, device: wgpu.GPUDevice, state: State, display: Display | None):
         self._device, self._images = device, TexturePool(device)
         given: dict[str, Any] = dict(state.given)
         masks = given.pop("holdout", ()), given.pop("scale", ())
-        self._clip = InputSettings(**given).open(state.source, *masks)
+        space = state.colors.space(display)
+        self._clip = InputSettings(**given).open(state.source, *masks, space)
+        self._said: dict[int, FrameFile] = {}  # what the frames say of their colours
         self._frames: OrderedDict[int, Frame] = OrderedDict()
         self._sharp = Blur("tap", device=device)
         self._number = self._clip.numbers[0]
@@ -129,6 +138,11 @@ class ClipSubject:
         """Width and height of the frames [px]."""
         return self._frame().size
 
+    def space(self, config: ColorConfig) -> ColorSpace:
+        """What the frame's colours are; InputError if nobody can tell."""
+        self._frame()
+        return space_of(self._said[self._number], config)
+
     def look_at(self, state: State, size: tuple[int, int], antialias: int) -> None:
         """What the next draws are of."""
         numbers = self._clip.numbers
@@ -139,6 +153,7 @@ class ClipSubject:
         if number not in self._frames:
             source = self._clip.source(number)
             frame = self._clip.with_neighbours(source, reach=EVERYWHERE)
+            self._said[number] = without_pixels(source)
             least, most = _FRAMES_KEPT
             kept = min(max(_MEMORY // (3 * _bytes(frame)), least), most)  # with its neighbours
             while len(self._frames) >= kept:

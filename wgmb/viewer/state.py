@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from ..color_settings import ColorSettings, option_name
 from ..cone import Cone
 from ..errors import InputError, did_you_mean
 from ..io import frame_numbers
@@ -39,6 +40,8 @@ class State:
     """The scene's parameters that differ from their defaults."""
     given: tuple[tuple[str, object], ...] = ()
     """InputSettings, holdout and scale of frames on disk that differ from their defaults."""
+    color: tuple[tuple[str, object], ...] = ()
+    """ColorSettings that differ from their defaults."""
     orbit: tuple[float, float] = (0.0, 0.0)  # degrees to the right, up
     pan: tuple[float, float] = (0.0, 0.0)  # scene units to the right, up
     dolly: float = 1.0
@@ -99,7 +102,20 @@ class State:
         """The same without what only changes how the picture is shown."""
         plain = State()
         same = replace(self, **{name: getattr(plain, name) for name in _SHOWING})
+        same = replace(same, color=self.read_as)
         return same if self.is_scene else replace(same, frame=float(math.ceil(self.frame - 0.5)))
+
+    @property
+    def colors(self) -> ColorSettings:
+        """What the input's colours are, and how pictures show them."""
+        given: dict[str, Any] = dict(self.color)
+        return ColorSettings(**given)
+
+    @property
+    def read_as(self) -> tuple[tuple[str, object], ...]:
+        """Of `color` what changes how files are read, not only how they are shown."""
+        given = dict(self.color)
+        return tuple((n, given.get(n)) for n in ("from_", "ocio")) if "from_" in given else ()
 
     @property
     def span(self) -> tuple[int, int]:
@@ -114,7 +130,8 @@ class State:
         ):
             known = ", ".join(builtin.SCENES)
             raise InputError(f"no such file or scene: {source!r}; scenes: {known}")
-        state = replace(self.unmoved(), source=source, settings=(), given=())
+        color = _changed(self.color, "from_", None)
+        state = replace(self.unmoved(), source=source, settings=(), given=(), color=color)
         before, after = self.suited(), state.suited()
         for name, value in after.items():  # what was as the last scene asks for follows the new one
             if getattr(self, name) == before[name]:
@@ -156,6 +173,13 @@ class State:
         """The same with an option of the method changed; None is its default."""
         return replace(self, options=_changed(self.options, name, value))
 
+    def with_color(self, **changes: object) -> State:
+        """The same with some of the ColorSettings changed; None is the default."""
+        color = self.color
+        for name, value in changes.items():
+            color = _changed(color, name, value)
+        return replace(self, color=color)
+
     def with_method(self, method: str) -> State:
         """The same with another method, whose options are its own."""
         return replace(self, method=method, options=()) if method != self.method else self
@@ -163,13 +187,16 @@ class State:
     def told(self, given: dict[str, object]) -> State:
         """The same with options of the command line, those that are not their defaults."""
         said = {name: value for name, value in given.items() if value != DEFAULTS[name]}
-        own = {f.name for f in fields(self)} - {"frames"}
+        own = {f.name for f in fields(self)} - {"frames"} - saved.COLORS
         state = replace(self, **{n: v for n, v in said.items() if n in own})
         if not self.is_scene:
             found = tuple((n, v) for n, v in said.items() if n in saved.INPUTS)
             state = replace(state, given=found, frames=str(said.get("frames", state.frames)))
         elif "frames" in said:
             state = replace(state, frames=str(said["frames"]))
+        of_files = () if self.is_scene else ("from_",)
+        shown = [name for name in saved.COLORS if not name.endswith("_") or name in of_files]
+        state = state.with_color(**{name: said[name] for name in sorted(shown) if name in said})
         for name in METHOD_OPTIONS:
             if name in said:
                 state = state.with_option(name, said[name])
@@ -194,6 +221,7 @@ class State:
             "rolling": self.rolling,
             "rolling_duration": self.rolling_duration,
             "fps": f"{self.fps:g}",
+            **dict(self.color),
         }
         if not self.is_scene:
             return {"pattern": self.source, **dict(self.given), **look}
@@ -228,7 +256,7 @@ class State:
             plain = list(value) if isinstance(value, (list, tuple)) else value
             if plain == (list(default) if isinstance(default, tuple) else default):
                 continue
-            flag = "--" + name.replace("_", "-")
+            flag = option_name(name)
             repeated = name in ("set", "also", "holdout", "scale")
             if repeated:
                 for item in value:  # pyright: ignore[reportGeneralTypeIssues]

@@ -241,6 +241,7 @@ class Viewer:
             message=self.message[0] if self._now < self.message[1] else "",
             finding=getattr(choices.subject(state), "finding", ""),
             flicked=self._flicked(),
+            display=choices.displayed.display(state),
         )
         self._good = state
 

@@ -30,6 +30,7 @@ override TAPS: u32 = 1u;        // per side of a pixel that shows many texels; 0
 const COLOR: u32 = 0u;
 const DEPTH: u32 = 1u;
 const MOTION: u32 = 2u;
+const DISPLAY: u32 = 3u;          // display values already
 
 const ONE: u32 = 0u;
 const WIPE: u32 = 1u;
@@ -96,7 +97,9 @@ fn seen(image: texture_2d<f32>, kind: u32, uv: vec2f) -> vec3f {
     let near = textureLoad(image, vec2u(min(uv * size, size - 1.0)), 0);
     if kind == DEPTH { return vec3f(grey_of(near.x)); }
     if kind == MOTION { return motion_color(near.zw / size.y); }
-    return displayed(filtered(image, uv * size, size));
+    let color = filtered(image, uv * size, size);
+    if kind == DISPLAY { return color; }
+    return displayed(color);
 }
 
 /// Bilinear between texels, or the mean of those under one pixel.
