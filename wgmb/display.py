@@ -19,7 +19,7 @@ from .errors import InputError, did_you_mean
 from .primaries import AP0, AP1, REC709, conversion, of_matrix
 
 _NAMED_BY = "colorInteropID", "oiio:ColorSpace", "colorspace"
-_INTERCHANGE = {  # of configs without the role: spaces whose primaries their names tell
+_NAMED = {  # linear spaces whose primaries their names tell
     "lin_ap0_scene": AP0, "lin_ap0": AP0, "ACES2065-1": AP0, "ACES - ACES2065-1": AP0,
     "lin_ap1_scene": AP1, "lin_ap1": AP1, "ACEScg": AP1, "ACES - ACEScg": AP1,
     "lin_rec709_scene": REC709, "lin_rec709": REC709, "Linear Rec.709 (sRGB)": REC709,
@@ -49,9 +49,8 @@ class ColorSpace:
     @property
     def text(self) -> str:
         """The space in words."""
-        words = {"default": "linear Rec.709", "acesImageContainerFlag": "ACES2065-1"}
-        name = self.name if self.matrix is None else words.get(self.why, "linear RGB")
-        return f"{name} (by {self.why})"
+        by_matrix = "linear Rec.709" if self.why == "default" else "linear RGB"
+        return f"{self.name if self.matrix is None else by_matrix} (by {self.why})"
 
     def check_linear(self) -> None:
         """InputError unless the numbers are linear."""
@@ -236,12 +235,17 @@ class ColorConfig:
         """A linear space of the config whose primaries are known, and these."""
         if self._config.hasRole("aces_interchange"):
             return self._config.getColorSpace("aces_interchange").getName(), AP0
-        for name, primaries in _INTERCHANGE.items():
+        for name, primaries in _NAMED.items():
             if found := self._config.getColorSpace(name):
                 return found.getName(), primaries
         return None
 
     def _by_primaries(self, primaries: tuple[float, ...], why: str) -> ColorSpace:
+        for name, known in _NAMED.items():
+            if np.allclose(primaries, known, rtol=0, atol=1e-5) and (
+                found := self._config.getColorSpace(name)
+            ):
+                return ColorSpace(self, found.getName(), why)
         if self._interchange is None:
             raise InputError(
                 f"{self.name} has no role aces_interchange, nor a space whose name tells its "

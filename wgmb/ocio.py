@@ -99,13 +99,18 @@ class Shader:
 
 
 def shader(processor: Any, first_binding: int) -> Shader:
-    """OpenColorIO's shader of a processor; its tables are bound from `first_binding` on."""
+    """OpenColorIO's shader of a processor; its tables are bound from `first_binding` on.
+
+    InputError where it has none, or one with properties of its own.
+    """
     ocio = load()
     made = ocio.GpuShaderDesc.CreateShaderDesc(
         language=ocio.GPU_LANGUAGE_GLSL_VK_4_6, functionName="shown", resourcePrefix="ocio_"
     )
     made.setDescriptorSetIndex(0, first_binding)
     processor.getDefaultGPUProcessor().extractGpuShaderInfo(made)
+    if len(list(made.getUniforms())):
+        raise InputError("OpenColorIO's shader has properties that change while it runs")
     tables, interpolated = {}, set()
     for table in made.get3DTextures():
         tables[table.samplerName] = _texels(table, (table.edgeLen,) * 3, 3)

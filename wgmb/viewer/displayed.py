@@ -6,7 +6,7 @@ import numpy as np
 import wgpu
 
 from ..display import ColorSpace, Display
-from ..errors import DeviceError
+from ..errors import DeviceError, InputError
 from ..gpu.textures import TexturePool
 from .gpu_display import OUTPUT, GpuDisplay
 from .screen import Image
@@ -56,7 +56,7 @@ class Displayed:
         if (display, space) not in self._compiled:
             try:
                 self._compiled[display, space] = GpuDisplay(self._device, display, space)
-            except DeviceError:  # the same picture, only slower
+            except (DeviceError, InputError):  # the same picture, only slower
                 self._compiled[display, space] = None
         if (compiled := self._compiled[display, space]) is not None:
             compiled.show(light, exposure, texture)
