@@ -472,7 +472,7 @@ def test_an_arrow_that_is_held_down_repeats(hand):
 
 def test_every_key_of_the_help_does_something():
     layout = controls.Layout((0, 0, 9, 9), (0, 0, 9, 9), tuple(METHODS), ("result", "sharp"),
-                             ("off", "wipe"))  # fmt: skip
+                             ("off", "wipe"), ("left", "pair"))  # fmt: skip
     names = {"space": " ", "left, right": "ArrowLeft", "up, down": "ArrowUp", "1 - 9": "2",
              "Esc": "Escape", "r": "R"}  # fmt: skip
     moved = replace(PLAIN, orbit=(5.0, 5.0))

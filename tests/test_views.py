@@ -5,16 +5,24 @@ import OpenEXR
 import pytest
 
 import make_frames as make
+from make_stereo import (
+    LEFT,
+    NUKE,
+    RIGHT,
+    STEREO,
+    blenders,
+    many_parts,
+    nukes,
+    one_view,
+    single_part,
+    with_stereo,
+)
 from wgmb import Blur, Clip, InputError, Output, blur_sequence
 from wgmb.io import exr, views
 
-RIGHT, LEFT = (6.0, 0.0), (0.0, 6.0)  # [px] each view's square moves its own way
-
-
 # ---- the rule -------------------------------------------------------------------------------
 
-STEREO, THREE, ONE = ["right", "left"], ["center", "left", "right"], ["left"]
-NUKE = ["left", "right"]
+THREE, ONE = ["center", "left", "right"], ["left"]
 
 
 @pytest.mark.parametrize(
@@ -97,69 +105,6 @@ def test_what_contradicts_the_documentation_is_named(parts, says):
 
 
 # ---- files ----------------------------------------------------------------------------------
-
-
-def one_view(number: int, velocity) -> dict[str, np.ndarray]:
-    """Channels of one eye, without its name; `forward` is what Nuke writes."""
-    channels = make.frame(number, "nuke", velocity)
-    return {name: plane for name, plane in channels.items() if "backward" not in name}
-
-
-def disparity() -> dict[str, np.ndarray]:
-    return {"disparityL.x": np.full((make.HEIGHT, make.WIDTH), 3, "f4")}
-
-
-def single_part(number: int) -> list:
-    """One part, as the documentation names channels: right is the default view."""
-    channels = one_view(number, RIGHT) | disparity()
-    for name, plane in one_view(number, LEFT).items():
-        layer, _, component = name.rpartition(".")
-        channels[f"{layer}.left.{component}".lstrip(".")] = plane
-    channels["forward.right.u"] = channels.pop("forward.u")
-    channels["forward.right.v"] = channels.pop("forward.v")
-    return [make.part(channels, {"multiView": STEREO, "owner": "me"})]
-
-
-def many_parts(number: int) -> list:
-    """A part for each layer and view, in an order that means nothing."""
-    right, left = one_view(number, RIGHT), one_view(number, LEFT)
-
-    def taken(channels, *names):
-        return {name: channels[name] for name in names}
-
-    return [
-        make.part(taken(right, *"RGBA"), {"view": "right", "owner": "me"}, name="rgba_right"),
-        make.part(taken(left, "Z"), {"view": "left"}, name="depth_left"),
-        make.part(taken(left, "forward.u", "forward.v"), {"view": "left"}, name="forward_left"),
-        make.part(disparity(), name="disparityL"),
-        make.part(taken(left, *"RGBA"), {"view": "left"}, name="rgba_left"),
-        make.part(taken(right, "forward.u", "forward.v"), {"view": "right"}, name="three"),
-        make.part(taken(right, "Z"), {"view": "right"}, name="two"),
-    ]
-
-
-def nukes(number: int) -> list:
-    """One part, the view before the layer."""
-    left, right = one_view(number, LEFT), one_view(number, RIGHT)
-    channels = {name.replace("Z", "depth.Z"): plane for name, plane in left.items()}
-    channels |= {f"right.{name.replace('Z', 'depth.Z')}": plane for name, plane in right.items()}
-    return [make.part(channels | disparity(), {"multiView": NUKE})]
-
-
-def blenders(number: int) -> list:
-    """Both views are named, between layer and component."""
-    channels = disparity()
-    for view, velocity in (("left", LEFT), ("right", RIGHT)):
-        for name, plane in make.frame(number, "blender", velocity).items():
-            layer, _, component = name.rpartition(".")
-            channels[f"{layer}.{view}.{component}"] = plane
-    return [make.part(channels, {"multiView": NUKE})]
-
-
-def with_stereo(folder, form, numbers=(1, 2, 3)) -> str:
-    for n in numbers:
-        make.write_parts(folder / f"s.{n:04d}.exr", form(n))
-    return str(folder / "s.####.exr")
 
 
 def plain_parts(path) -> list[tuple[str, dict, dict]]:

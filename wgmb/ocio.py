@@ -7,6 +7,7 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -48,7 +49,7 @@ def told(about: str) -> Iterator[None]:
     try:
         yield
     except (ocio.Exception, ocio.ExceptionMissingFile) as error:
-        raise InputError(f"{about}: {' '.join(str(error).split()).removesuffix('.')}") from None
+        raise InputError(f"{about}: {' '.join(str(error).split())}") from None
     finally:
         ocio.SetLoggingLevel(level)
 
@@ -80,8 +81,6 @@ def applied(processor: Any, rgb: np.ndarray) -> np.ndarray:
     if rgb.size < 1 << 16 or len(bands) == 1:
         processor.applyRGB(rgb)
         return rgb
-    from concurrent.futures import ThreadPoolExecutor
-
     with ThreadPoolExecutor(len(bands)) as pool:  # it lets go of Python's lock
         list(pool.map(processor.applyRGB, bands))
     return rgb

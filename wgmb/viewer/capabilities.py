@@ -10,7 +10,7 @@ from ..methods import METHODS
 from ..methods.options import Option, options_of
 from .displayed import Displayed
 from .source import ClipSubject, SceneSubject, Subject
-from .state import LOOKS, REFERENCE, State
+from .state import BOTH_EYES, LOOKS, REFERENCE, State
 
 
 class Choices:
@@ -60,6 +60,19 @@ class Choices:
         }
         return [look for look in LOOKS if can[look]] + (self.shows(state) if blurred else [])
 
+    def eyes(self, state: State) -> list[str]:
+        """Return what can be shown of stereo frames: each view, and both eyes."""
+        subject = self.subject(state)
+        if isinstance(subject, ClipSubject) and len(subject.eyes) > 1:
+            return [*subject.eyes, *BOTH_EYES]
+        return []
+
+    def sides(self, state: State) -> tuple[str, str]:
+        """The views that the left and the right eye see."""
+        subject = self.subject(state)
+        assert isinstance(subject, ClipSubject)
+        return subject.sides()
+
     def reference(self, state: State) -> str | None:
         """The method that draws what the picture should be, if there is one.
 
@@ -82,6 +95,8 @@ class Choices:
             state = state.with_method(methods[0])
         if state.look not in (looks := self.looks(state)):
             state = replace(state, look=looks[0])
+        if state.eyes not in (eyes := self.eyes(state)):
+            state = replace(state, eyes=eyes[0] if eyes else "")
         if state.against not in (rivals := self.rivals(state)):
             state = replace(state, against=rivals[0])
         return state

@@ -30,6 +30,7 @@ KEYS = {
     "1 - 9": "method",
     "c": "next comparison",
     "l": "next view",
+    "e": "stereo frames: next eye, pair, red-cyan",
     "tab": "panel",
     "r": "reset the view",
     "s": "save image, PNG and EXR",
@@ -55,6 +56,7 @@ class Layout:
     methods: tuple[str, ...] = ()
     looks: tuple[str, ...] = ()
     compare: tuple[str, ...] = ()
+    eyes: tuple[str, ...] = ()
 
 
 def grip(state: State, layout: Layout, x: float, y: float, button: int, modifiers) -> str | None:
@@ -134,6 +136,8 @@ def key(state: State, layout: Layout, name: str) -> tuple[State, str | None]:
         return replace(state, settings=tuple(s for s in state.settings if s[0] not in own)), None
     if low == "c" and layout.compare:
         return replace(state, compare=_next(layout.compare, state.compare)), None
+    if low == "e" and layout.eyes:
+        return replace(state, eyes=_next(layout.eyes, state.eyes)), None
     if low == "l" and layout.looks:
         return replace(state, look=_next(layout.looks, state.look)), None
     return state, None

@@ -25,9 +25,11 @@ def name_images(
     elif state.mode == "wipe":
         tag(first, left, y)
         tag(second, right, y, right=True)
-    elif state.mode == "split":
+    elif state.mode in ("split", "pair"):
         tag(first, left, y)
         tag(second, x + width / 2 + 12, y)
+    elif state.mode == "red-cyan":
+        tag(f"red: {first}; cyan: {second}", left, y)
     elif state.mode == "difference":
         tag(f"{first} - {second}, x {state.gain:.0f}", left, y)
     elif state.look != "result" or not state.panel:

@@ -27,6 +27,7 @@ class Info:
     adapter: str
     methods: list[str]
     looks: list[str]
+    eyes: list[str]
     rivals: list[str]
     options: dict[str, Option]
     frame_times: np.ndarray  # seconds, the last one last

@@ -46,6 +46,7 @@ class Perceived:
         state: State,
         eye: Cone,
         subject: Subject,
+        view: str | None,
         blur: Blur,
         antialias: int,
         seconds: float,
@@ -56,7 +57,7 @@ class Perceived:
         `output`, rgba32float, is what is seen; the oldest frame stands for those before it.
         """
         width, height, _ = output.size
-        alike = (replace(state.picture, frame=0.0), (width, height), antialias, blur)
+        alike = (replace(state.picture, frame=0.0), view, (width, height), antialias, blur)
         if alike != self._alike:
             self._frames, self._alike = {}, alike
         newest, count = math.floor(state.frame + 0.5), eye.frames_needed(state.fps)
@@ -74,12 +75,12 @@ class Perceived:
             left = end - time.perf_counter()
             if left <= 0 and number != newest:
                 break
-            subject.look_at(replace(state, frame=float(number)), (width, height), antialias)
+            subject.look_at(replace(state, frame=float(number)), (width, height), antialias, view)
             held.done = subject.draw(blur, held.texture, (held.done, max(left, 0)), timing)
             self._device.queue.read_buffer(self._token)  # waits
             if held.done < blur.samples:
                 break
-        subject.look_at(state, (width, height), antialias)
+        subject.look_at(state, (width, height), antialias, view)
         drawn = {n: held.texture for n in numbers if (held := self._frames.get(n)) and held.done}
         weights = dict.fromkeys(drawn, 0.0)
         after = (state.frame - newest) / state.fps

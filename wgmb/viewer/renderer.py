@@ -28,7 +28,7 @@ from .perception import Perceived
 from .quality import Measured, Quality
 from .screen import Box, Image, fit, whole
 from .source import SceneSubject, Subject
-from .state import REFERENCE, State
+from .state import BOTH_EYES, REFERENCE, State
 
 REFERENCE_SAMPLES = 1024
 _STEP = 0.07  # seconds of work on what converges, between two frames of the window
@@ -90,7 +90,8 @@ class Renderer:
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self.pace = Pace(5 if software else 0)
         self.report = Report()
-        self._images, self._perceived = TexturePool(device), Perceived(device)
+        self._images = TexturePool(device)
+        self._perceived = {slot: Perceived(device) for slot in ("first", "second")}
         self._past: SceneSubject | None = None
         self._blurs: dict[tuple, Blur] = {}
         self._shown = {"first": Shown(), "second": Shown()}
@@ -115,11 +116,11 @@ class Renderer:
         report = Report(shape if not state.is_scene else whole(place), place, area, moving)
         quick = moving and not full
         names = self._wanted(state)
-        if "perceived" not in names:
-            self._perceived.forget()
-        for slot, name in zip(("first", "second"), names, strict=False):
-            self._advance(slot, name, state, subject, size, antialias, quick, full, report)
         slots = ("first", "second")[: len(names)]
+        for slot, (name, eye) in zip(slots, names, strict=True):
+            if name != "perceived":
+                self._perceived[slot].forget()
+            self._advance(slot, name, eye, state, subject, size, antialias, quick, full, report)
         first, last = self._shown["first"], self._shown[slots[-1]]
         assert first.texture is not None
         report.size, report.kind = first.texture.size[:2], first.kind
@@ -127,7 +128,7 @@ class Renderer:
         self._seen = self._displayed(slots, state, subject)
         unfinished = not all(self._coming[slot].ready for slot in slots)
         report.busy = moving or unfinished or self._level > 0
-        if REFERENCE in names:
+        if names[-1][0] == REFERENCE:
             report.reference = last.done, last.total
             report.measured = measured = self._measure(first, last)
             if measured and measured.flip and not measured.flip.done():
@@ -193,32 +194,50 @@ class Renderer:
         width, height = whole(place)
         return (max(round(width * scale), 1), max(round(height * scale), 1)), antialias
 
-    def _wanted(self, state: State) -> list[str]:
-        """One or two names: of a look, a method or the reference."""
+    def _wanted(self, state: State) -> list[tuple[str, str | None]]:
+        """One or two names, of a look, a method or the reference, each with the view it is of."""
         if state.mode == "error":
-            return ["result", REFERENCE]
-        return [state.look] if state.mode == "off" else [state.look, state.against]
+            return [("result", None), (REFERENCE, None)]
+        if state.mode in BOTH_EYES:
+            return [(state.look, eye) for eye in self.choices.sides(state)]
+        eye = None if state.eyes in ("", *BOTH_EYES) else state.eyes
+        return (
+            [(state.look, eye)]
+            if state.mode == "off"
+            else [(name, eye) for name in (state.look, state.against)]
+        )
 
     def _advance(
-        self, slot, name, state, subject, size, antialias, quick: bool, full: bool, report: Report
+        self,
+        slot,
+        name,
+        view,
+        state,
+        subject,
+        size,
+        antialias,
+        quick: bool,
+        full: bool,
+        report: Report,
     ) -> None:
         """Draw some of `name`; it is shown once it is no coarser than what it replaces."""
         shown, coming = self._shown[slot], self._coming[slot]
         eye = state.eye if name in ("perceived", REFERENCE) else None
-        key = (name, state.picture, eye, state.frame if name == "perceived" else None)
+        key = (name, view, state.picture, eye, state.frame if name == "perceived" else None)
         fine = (size, antialias, self._level if quick else None)
         if (coming.key, coming.fine) != (key, fine):
             if self._level and shown.key == key and not _coarser(shown.fine, fine):
                 return
             texture = f"{slot} {1 + shown.name.endswith('1')}"
-            coming = Shown(self._label(name, state), key, fine, texture)
+            label = self._label(name, state) + (f", {view}" if view else "")
+            coming = Shown(label, key, fine, texture)
             self._coming[slot] = coming
         if coming.ready:
             return
         started = time.perf_counter()
         seconds = float("inf") if full else _QUICK_STEP if quick else _STEP
-        subject.look_at(state, size, antialias)
-        self._draw(coming, slot, name, state, subject, seconds, quick)
+        subject.look_at(state, size, antialias, view)
+        self._draw(coming, slot, name, view, state, subject, seconds, quick)
         if self._timing:
             report.passes |= self._timing.read()
         self.device.queue.read_buffer(self._token)  # waits
@@ -228,7 +247,7 @@ class Renderer:
         report.seconds[coming.label] = time.perf_counter() - started
 
     def _draw(
-        self, coming, slot, name, state, subject: Subject, seconds: float, quick: bool
+        self, coming, slot, name, view, state, subject: Subject, seconds: float, quick: bool
     ) -> None:
         size, antialias, _ = coming.fine
         volumes = state.is_scene and "volume" in self.choices.methods(state)
@@ -245,8 +264,8 @@ class Renderer:
             if state.is_scene:  # of its own, so that what else is drawn keeps its moment
                 subject = self._past = self._past or SceneSubject(self.device)
             coming.total = eye.frames_needed(state.fps)
-            coming.done = self._perceived.draw(
-                coming.texture, state, eye, subject, blur, antialias, seconds, self._timing
+            coming.done = self._perceived[slot].draw(
+                coming.texture, state, eye, subject, view, blur, antialias, seconds, self._timing
             )
             return
         budget = coming.done, float("inf") if quick else seconds
@@ -282,7 +301,7 @@ class Renderer:
             traced = "progress" in METHODS[method].uses
             fewer = min(count, QUICK) if traced else self.pace.samples(self._level, count)
             samples = fewer if fewer < count else samples
-        kept = slot if name != "perceived" else name  # each has the sums of a picture of its own
+        kept = slot, name == "perceived"  # each has the sums of a picture of its own
         key = (kept, method, samples, state.jitter, state.max_blur, *options.items())
         if key not in self._blurs:
             while len(self._blurs) >= _BLURS_KEPT:

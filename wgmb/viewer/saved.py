@@ -31,7 +31,7 @@ INPUTS = frozenset({*(f.name for f in fields(InputSettings)), "holdout", "scale"
 COLORS = frozenset(f.name for f in fields(ColorSettings))
 """Options of colours; of scenes all but `from_`, as files write `from`."""
 VIEW = (
-    "frames", "frame", "look", "compare", "against", "wipe", "gain", "fastest", "middle",
+    "frames", "frame", "look", "eyes", "compare", "against", "wipe", "gain", "fastest", "middle",
     "exposure", "tone", "cone_rate", "cone_peak", "zoom", "center", "playing", "speed", "panel",
 )  # fmt: skip
 """Options of the viewer alone, and the frame shown."""

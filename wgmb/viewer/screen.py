@@ -11,7 +11,7 @@ import wgpu
 from .. import gpu
 from ..gpu import wgsl
 from ..gpu.textures import TexturePool
-from .state import State
+from .state import BOTH_EYES, State
 
 _WHEEL, _KEY_HEIGHT, _KEY_WIDTH, _MARGIN = 96, 8, 180, 16  # logical pixels
 _MOST_TAPS = 4  # texels a side that are averaged for one pixel
@@ -147,7 +147,7 @@ def fit(shape: tuple[int, int], area: Box, state: State) -> Box:
 
 def key_box(state: State, kind: str, place: Box, area: Box, ratio: float) -> Box | None:
     """Return the box of the first image's colour key [px], or None if it needs none."""
-    if state.mode in ("split", "difference"):
+    if state.mode in ("split", "difference", *BOTH_EYES):
         return None
     x, y, width, height = overlap(place, area)
     margin = _MARGIN * ratio
@@ -173,7 +173,8 @@ def overlap(a: Box, b: Box) -> Box:
 
 
 def _mode(state: State) -> str:
-    return {"off": "ONE", "flicker": "ONE"}.get(state.mode, state.mode.upper())
+    names = {"off": "ONE", "flicker": "ONE", "pair": "SPLIT", "red-cyan": "RED_CYAN"}
+    return names.get(state.mode, state.mode.upper())
 
 
 def _taps(images: tuple[Image, Image], place: tuple[int, int], mode: str) -> int:

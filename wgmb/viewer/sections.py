@@ -17,7 +17,7 @@ from ..pipeline import SAMPLES
 from ..scene import builtin
 from ..shutter import CURVES, PHASES, ROLLING
 from .renderer import shutter_of
-from .state import COMPARE, REFERENCE, TONES, State
+from .state import BOTH_EYES, COMPARE, REFERENCE, TONES, State
 from .theme import ACCENT, COLORS, DIM, packed
 from .widgets import LOG, Widgets, plain
 
@@ -195,6 +195,8 @@ def _curve(ui: Widgets, state: State) -> None:
 def view(ui: Widgets, state: State, info: Info) -> State:
     """View, comparison and exposure."""
     state = replace(state, look=ui.combo("look at", state.look, info.looks))
+    if info.eyes:
+        state = replace(state, eyes=ui.combo("eyes", state.eyes, info.eyes))
     if state.look == "depth":
         state = ui.slide(state, "middle", 0.1, 100, "%.1f", log=True, label="middle grey")
     elif state.look == "velocity":
@@ -251,6 +253,8 @@ def _compare(ui: Widgets, state: State, info: Info) -> State:
     if state.mode == "error":
         state = _gain(ui, state)
         _reference(info)
+        return state
+    if state.mode in BOTH_EYES:
         return state
     state = replace(state, compare=ui.combo("compare", state.compare, COMPARE))
     if state.compare == "off":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..gpu.textures import TexturePool
 from ..gpu.timing import TimestampClock
 from ..io.frame_file import FrameFile
 from ..io.input_space import space_of, without_pixels
+from ..io.windows import NONE, Window, placed, union
 from ..methods import METHODS
 from ..pipeline import Blur
 from ..reach import EVERYWHERE
@@ -23,10 +24,11 @@ from ..render import Render
 from ..scene import builtin
 from ..scene.scene import Scene
 from ..settings import InputSettings, SceneSettings, size_of
-from .state import State
+from .state import BOTH_EYES, State
 
 _MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
 _FRAMES_KEPT = 2, 16  # but so many at least, at most
+_Which = tuple[int, str | None, bool]  # a frame's number, its view, and if it is one of a pair
 Texture = wgpu.GPUTexture
 Budget = tuple[int, float]
 """Samples done before, and seconds to spend on more."""
@@ -70,7 +72,9 @@ class SceneSubject:
         """What its colours are."""
         return config.space_of({})
 
-    def look_at(self, state: State, size: tuple[int, int], antialias: int) -> None:
+    def look_at(
+        self, state: State, size: tuple[int, int], antialias: int, eye: str | None = None
+    ) -> None:
         """What the next draws are of."""
         self._render.scene = self._scene(state)
         self._render.size, self._render.antialias, self._render.fps = size, antialias, state.fps
@@ -114,17 +118,17 @@ class ClipSubject:
         masks = given.pop("holdout", ()), given.pop("scale", ())
         space = state.colors.space(display)
         self._clip = InputSettings(**given).open(state.source, *masks, space)
-        self._said: dict[int, FrameFile] = {}  # what the frames say of their colours
-        self._frames: OrderedDict[int, Frame] = OrderedDict()
+        self._said: dict[tuple, FrameFile] = {}  # what the frames say of their colours
+        self._frames: OrderedDict[_Which, Frame] = OrderedDict()
         self._sharp = Blur("tap", device=device)
-        self._number = self._clip.numbers[0]
         self._uploaders: dict[tuple, Blur] = {}
-        self._uploaded: dict[tuple, tuple[int, dict]] = {}
+        self._uploaded: dict[tuple, tuple[_Which | None, dict]] = {}
         self.finding = self._clip.finding
+        self._now = self._which(state)
 
     def has(self, state: State) -> frozenset[str]:
         """What a method may ask for."""
-        return self._frame().has
+        return self._frame(self._which(state)).has
 
     def methods(self, state: State) -> list[str]:
         """Names of the methods that can be fed."""
@@ -136,52 +140,84 @@ class ClipSubject:
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height of the frames [px]."""
-        return self._frame().size
+        return self._frame(self._which(state)).size
 
     def space(self, config: ColorConfig) -> ColorSpace:
         """What the frame's colours are; InputError if nobody can tell."""
-        self._frame()
-        return space_of(self._said[self._number], config)
+        self._frame(self._now)
+        return space_of(self._said[self._now[:2]], config)
 
-    def look_at(self, state: State, size: tuple[int, int], antialias: int) -> None:
-        """What the next draws are of."""
-        numbers = self._clip.numbers
-        self._number = min(numbers, key=lambda n: abs(n - state.frame))
+    @property
+    def eyes(self) -> list[str]:
+        """Names of the views, the default one first; none of frames with one picture."""
+        views = self._clip.views
+        return [*self._clip.chosen, *(v for v in views if v not in self._clip.chosen)]
 
-    def _frame(self) -> Frame:
-        number = self._number
-        if number not in self._frames:
-            source = self._clip.source(number)
+    def sides(self) -> tuple[str, str]:
+        """The views for the left and the right eye: by their names, else the first two."""
+        left, right = (
+            next((v for v in self.eyes if v.lower() in (word, word[0])), None)
+            for word in ("left", "right")
+        )
+        left = left or next(v for v in self.eyes if v != right)
+        return left, right or next(v for v in self.eyes if v != left)
+
+    def look_at(
+        self, state: State, size: tuple[int, int], antialias: int, eye: str | None = None
+    ) -> None:
+        """What the next draws are of; `eye`: the view."""
+        self._now = self._which(state, eye)
+
+    def _which(self, state: State, eye: str | None = None) -> _Which:
+        number = min(self._clip.numbers, key=lambda n: abs(n - state.frame))
+        default = self.eyes[0] if self.eyes else None
+        eye = eye or (state.eyes if state.eyes in self.eyes else default)
+        return number, eye, state.mode in BOTH_EYES and len(self.eyes) > 1
+
+    def _frame(self, which: _Which) -> Frame:
+        """A frame; of a pair, on a canvas that holds both."""
+        number, eye, is_pair = which
+        frame = self._kept((number, eye, False))
+        if is_pair and which not in self._frames:
+            both = [self._kept((number, side, False)) for side in self.sides()]
+            self._frames[which] = _on_canvas(frame, union(map(_canvas, both)))
+        return self._frames[which] if is_pair else frame
+
+    def _kept(self, key: _Which) -> Frame:
+        """A frame, by its number and view, and its neighbours."""
+        if key not in self._frames:
+            source = self._clip.source(*key[:2])
             frame = self._clip.with_neighbours(source, reach=EVERYWHERE)
-            self._said[number] = without_pixels(source)
+            self._said[key[:2]] = without_pixels(source)
             least, most = _FRAMES_KEPT
             kept = min(max(_MEMORY // (3 * _bytes(frame)), least), most)  # with its neighbours
             while len(self._frames) >= kept:
                 self._frames.popitem(last=False)
-            self._frames[number] = frame
-        self._frames.move_to_end(number)
-        return self._frames[number]
+            self._frames[key] = frame
+        self._frames.move_to_end(key)
+        return self._frames[key]
 
     def _inputs(self, blur: Blur) -> dict:
         """The frame's textures, one set for all methods that take the same."""
         key = blur.method.needs, blur.method.uses
-        number, inputs = self._uploaded.get(key, (None, {}))
-        if number != self._number:
-            inputs = self._uploaders.setdefault(key, blur).upload(self._frame())
-            self._uploaded[key] = self._number, inputs
+        which, inputs = self._uploaded.get(key, (None, {}))
+        if which != self._now:
+            inputs = self._uploaders.setdefault(key, blur).upload(self._frame(self._now))
+            self._uploaded[key] = self._now, inputs
         return dict(inputs)
 
     def passes(self) -> dict[str, Texture]:
         """The sharp picture and what lies under it, by name; only what there is."""
-        frame, images = self._frame(), self._images
+        frame, images = self._frame(self._now), self._images
         inputs = self._inputs(self._sharp)
-        images.upload("color", self._sharp_rgba(frame), "rgba32float")
-        found = {"color": images.texture("color", frame.size, "rgba32float")}
+        color, depth, motion_ = (f"{name} {self._now[1]}" for name in ("color", "depth", "motion"))
+        images.upload(color, self._sharp_rgba(frame), "rgba32float")
+        found = {"color": images.texture(color, frame.size, "rgba32float")}
         if frame.depth is not None:
-            images.upload("depth", frame.depth, "r32float")
-            found["depth"] = images.texture("depth", frame.size, "r32float")
+            images.upload(depth, frame.depth, "r32float")
+            found["depth"] = images.texture(depth, frame.size, "r32float")
         if "motion" in frame.has:
-            motion = images.texture("motion", frame.size, "rgba32float")
+            motion = images.texture(motion_, frame.size, "rgba32float")
             encoder = self._device.create_command_encoder(label="motion")
             self._sharp.encode_motion(encoder, inputs["frame"], motion.create_view())
             gpu.submit(self._device, encoder)
@@ -202,6 +238,25 @@ class ClipSubject:
         blur.encode(encoder, output=view, timing=timing, **self._inputs(blur))
         gpu.submit(self._device, encoder)
         return blur.samples
+
+
+def _canvas(frame: Frame) -> Window:
+    """Where the pixels of a frame lie, counted from the display window's corner."""
+    x, y = frame.window[:2] if frame.window else (0, 0)
+    return x, y, x + frame.size[0] - 1, y + frame.size[1] - 1
+
+
+def _on_canvas(frame: Frame, onto: Window) -> Frame:
+    """A frame and its neighbours on a canvas that holds them; beyond them is nothing."""
+    window = _canvas(frame)
+    if window == onto:
+        return frame
+    one, prev, next_ = (
+        f and placed(replace(f, prev=None, next=None), window, onto, NONE)
+        for f in (frame, frame.prev, frame.next)
+    )
+    assert one is not None
+    return one.between(prev, next_)
 
 
 def _bytes(frame: Frame) -> int:

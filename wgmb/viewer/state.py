@@ -23,6 +23,7 @@ from ..settings_toml import text_of
 from . import saved
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
+BOTH_EYES = ("pair", "red-cyan")
 LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")
 TONES = ("clip", "soft")
 REFERENCE = "reference"
@@ -65,6 +66,8 @@ class State:
     rolling_duration: float = 1.0
 
     look: str = "result"
+    eyes: str = ""
+    """Of stereo frames: the view shown, or one of BOTH_EYES; "" is the default view."""
     compare: str = "off"
     against: str = "sharp"
     wipe: float = 0.5  # of the picture's width
@@ -94,8 +97,12 @@ class State:
 
     @property
     def mode(self) -> str:
-        """Comparison of two images: one of COMPARE, or "error", which chooses both itself."""
-        return "error" if self.look == "error" else self.compare
+        """Comparison of two images: one of COMPARE, or what chooses both itself: "error", or one
+        of BOTH_EYES.
+        """
+        if self.look == "error":
+            return "error"
+        return self.eyes if self.eyes in BOTH_EYES else self.compare
 
     @property
     def picture(self) -> State:

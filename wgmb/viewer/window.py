@@ -158,9 +158,11 @@ class Viewer:
     def _layout(self) -> controls.Layout:
         ratio, info = self.canvas.get_pixel_ratio(), self._info
         x, y, width, height = (v / ratio for v in self.stage.report.place)
-        methods, looks = (info.methods, info.looks) if info else ((), ())
+        methods, looks, eyes = (info.methods, info.looks, info.eyes) if info else ((), (), ())
         place = x, y, width, height
-        return controls.Layout(self._area(), place, tuple(methods), tuple(looks), COMPARE)
+        return controls.Layout(
+            self._area(), place, tuple(methods), tuple(looks), COMPARE, tuple(eyes)
+        )
 
     # ---- drawing -------------------------------------------------------------------------
 
@@ -231,6 +233,7 @@ class Viewer:
             adapter=self.device.adapter.summary,
             methods=choices.methods(state),
             looks=choices.looks(state),
+            eyes=choices.eyes(state),
             rivals=choices.rivals(state),
             options=choices.options(state.method),
             frame_times=np.array(self._frame_times),

@@ -37,6 +37,7 @@ const WIPE: u32 = 1u;
 const SPLIT: u32 = 2u;
 const DIFFERENCE: u32 = 3u;
 const ERROR: u32 = 4u;
+const RED_CYAN: u32 = 5u;
 
 const CLIP: u32 = 0u;
 const SOFT: u32 = 1u;
@@ -72,6 +73,7 @@ fn comparison(at: vec2f) -> vec3f {
     if COMPARE == DIFFERENCE {
         return clamp(abs(here - seen(second, SECOND, uv)) * view.gain, vec3f(0.0), vec3f(1.0));
     }
+    if COMPARE == RED_CYAN { return vec3f(here.r, seen(second, SECOND, uv).gb); }
     if COMPARE == ERROR {
         return heat(dot(abs(here - seen(second, SECOND, uv)), vec3f(view.gain / 3.0)));
     }
