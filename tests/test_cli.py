@@ -137,6 +137,14 @@ def test_vectors_that_are_0_everywhere_are_said_without_asking(tmp_path, capsys)
     assert "own motion blur" not in make.inside(capsys, *line, "--overwrite", "-q")[2]
 
 
+def test_cuts_that_change_nothing_are_said(tmp_path, capsys, shot):
+    line = ("blur", shot, "-o", tmp_path / "o.####.exr", "--cuts", "3,40,50")
+    code, _, err = make.inside(capsys, *line)
+    assert code == 0
+    assert "cuts outside the frames 1 to 3 change nothing: 40,50\n" in err
+    assert "camera cut before frame 3\n" in err
+
+
 def test_settings_are_written_into_every_frame(tmp_path, capsys, shot):
     make.inside(capsys, "blur", shot, "-o", tmp_path / "o.####.exr", "--shutter", 90, "--holdout",
                 "ViewLayer.Depth=3")  # fmt: skip

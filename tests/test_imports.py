@@ -43,6 +43,7 @@ HOMES = {
     "PIL": {"io", "lab"},
     "fileseq": {"io"},
     "PyOpenColorIO": {"ocio"},
+    "opentimelineio": {"io"},
     "cyclopts": {"cli"},
     "rich": {"cli"},
     "imgui_bundle": {"viewer"},

@@ -117,7 +117,7 @@ class InputSettings:
     outside: Literal["auto", "nothing", "edge"] = "auto"
     "Beyond a data window that ends within the image: nothing, or edge (unknown: its edge goes on)."
     cuts: str | None = None
-    "Frames that begin a new shot, such as 101,155, in addition to the detected cuts."
+    "Frames that begin a shot: 101,155, cut.edl[@FPS] or cut.otio; only:101,155 detects no others."
     view: str | None = None
     "The only view of stereo frames to use, such as left; by default all are blurred."
     skip_missing: bool = False

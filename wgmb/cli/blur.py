@@ -109,6 +109,9 @@ def conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose: 
                 note(
                     text if len(told) == len(report.done) else f"frames {frame_list(told)}: {text}"
                 )
+        if stray := clip.stray_cuts:
+            there = f"{clip.on_disk[0]} to {clip.on_disk[-1]}"
+            note(f"cuts outside the frames {there} change nothing: {frame_list(stray)}")
         if clip.cuts:
             note(f"camera cut before frame {', '.join(map(str, sorted(clip.cuts)))}")
         if odd := odd_sizes({n: clip.sizes[n] for n in report.done}):

@@ -24,6 +24,7 @@ from ..frame import Frame
 from ..reach import Reach
 from . import detect, exr, layers, limits, vectors, views
 from .camera_file import CameraFile
+from .cut_list import CutList
 from .frame_file import FrameFile, about, read
 from .frame_numbers import (
     MOST_FRAMES,
@@ -91,10 +92,11 @@ class Clip:
     """Reader of a frame sequence or a single image.
 
     Iterating gives Frames. `numbers` are the requested frames, `on_disk` all existing ones.
-    `finding` describes the detected vector convention. Of the frames read so far, `cuts` has
-    those after a camera cut, `unread` the neighbours that could not be read, `sizes` the
-    sizes, `notes` lines that a user should know, each with its frames, and `absent` the masks by
-    index or id (`IndexOB=4`, `CryptoObject=0x...`) that none of them has.
+    `finding` describes the detected vector convention, `stray_cuts` has the cuts given that no
+    frame on disk has. Of the frames read so far, `cuts` has those after a camera cut, `unread` the
+    neighbours that could not be read, `sizes` the sizes, `notes` lines that a user should know,
+    each with its frames, and `absent` the masks by index or id (`IndexOB=4`,
+    `CryptoObject=0x...`) that none of them has.
 
     Stereo frames have `views`. Each view has its own picture, vectors, depth and masks; cuts and
     what the vectors mean are settled on the default view.
@@ -113,13 +115,14 @@ class Clip:
         max_mb: float = limits.MAX_MB,
     ):
         """`frames`: "1-100x2", "1,3,5-8"; by default all existing ones, without gaps unless
-        `skip_missing`. `cuts`: frames that begin a new shot, in the same form, beside those that
-        are detected. `view`: the only view to blur; by default all. `space`: colour space of the
-        pictures, instead of what their files say; what is not linear is made so. `max_mb`: largest
-        decoded size of a file in megabytes. In `pattern`, %V stands for the view: one file a view.
+        `skip_missing`. `cuts`: frames that begin a new shot, in the same form, or a file that has
+        them (see CutList), beside those that are detected. `view`: the only view to blur; by
+        default all. `space`: colour space of the pictures, instead of what their files say; what
+        is not linear is made so. `max_mb`: largest decoded size of a file in megabytes. In
+        `pattern`, %V stands for the view: one file a view.
         """
         self._space = space
-        known = frozenset(frame_numbers(cuts) if cuts else ())
+        self._cut_list = CutList(cuts or "")
         self._max_mb = max_mb
         self.sizes: dict[int, tuple[int, int]] = {}
         self.pattern, self.passes = str(pattern), passes or Passes()
@@ -130,7 +133,10 @@ class Clip:
         if view is not None and view not in self.views:
             raise InputError(f"{self.pattern}: no view {view!r}; {self._those_there}")
         self._cameras = self._open_cameras()
-        self._around = Neighbours(self, known, self.passes.outside)
+        known, is_search = self._cut_list.frames(self.on_disk[0]), self._cut_list.is_search
+        self._around = Neighbours(self, known, is_search, self.passes.outside)
+        there = set(self.on_disk)
+        self.stray_cuts = sorted(cut for cut in known if not there & {cut, cut - 1})
         self.unread: set[int] = set()
         patterns = tuple(
             str(path) for p in (self.pattern, *self.passes.also) for path in self._of_views(p)
@@ -243,7 +249,8 @@ class Clip:
         patterns = (self.pattern, *passes.also)
         paths = [frame_path(p, number) for pattern in patterns for p in self._of_views(pattern)]
         camera = self._of_views(passes.camera) if passes.camera else ()
-        return [*paths, *self._masks.files(number), *camera]
+        edit = [self._cut_list.path] if self._cut_list.path else ()
+        return [*paths, *self._masks.files(number), *camera, *edit]
 
     def _of_views(self, pattern: str | Path) -> list[Path]:
         """The pattern, once for each view if %V in it stands for them."""

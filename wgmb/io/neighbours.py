@@ -39,14 +39,15 @@ _SIDES = "left", "top", "right", "bottom"
 class Neighbours:
     """The frames of a clip as a blur takes them.
 
-    `known_cuts`: frames that begin a new shot. `outside`: what lies beyond a data window, in
-    OUTSIDE. `cuts`: those found so far, and those known.
+    `known_cuts`: frames that begin a new shot; `is_search`: others are looked for. `outside`: what
+    lies beyond a data window, in OUTSIDE. `cuts`: those found so far, and those known.
     """
 
-    def __init__(self, clip: Clip, known_cuts: frozenset[int], outside: str):
+    def __init__(self, clip: Clip, known_cuts: frozenset[int], is_search: bool, outside: str):
         if outside not in OUTSIDE:
             raise InputError(f"outside must be one of {', '.join(OUTSIDE)}, got {outside!r}")
         self._clip, self._known_cuts, self._outside = clip, known_cuts, outside
+        self._is_search = is_search
         self.cuts: set[int] = set()
         self._alone: OrderedDict[tuple[int, str | None], tuple[FrameFile, bool, Frame]] = (
             OrderedDict()
@@ -157,7 +158,7 @@ class Neighbours:
                 return self._jumps[number]
         sides: list[int] = []
         for side in (-1, 1):
-            if self.is_known_cut(number, side) or jumps(frame, side):
+            if self.is_known_cut(number, side) or (self._is_search and jumps(frame, side)):
                 sides.append(side)
                 frame = straightened(frame, side)
         if source.view is not None:
@@ -168,6 +169,8 @@ class Neighbours:
         self, source: FrameFile, frame: Frame, near: Frame, side: int, normal: bool
     ) -> bool:
         """Whether a cut lies between `frame` and `near`, as is settled on the default view."""
+        if not self._is_search:  # known ones are not asked
+            return False
         if source.view is None:
             return is_cut(frame, near, side)
         key = source.number, side
