@@ -1,0 +1,364 @@
+"""Videos as pictures with times: any file that FFmpeg decodes.
+
+A video is read forwards once, from the key frame before the first picture asked for. Pictures come
+as they are stored (see coding.py), upright and without interlacing. Colours are not converted.
+"""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import contextlib
+import struct
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import cast
+
+import av
+import numpy as np
+from av.audio.stream import AudioStream
+from av.container import InputContainer
+from av.error import EOFError, FFmpegError
+from av.sidedata.sidedata import SideData, Type
+from av.stream import Stream
+from av.video.reformatter import VideoReformatter
+from av.video.stream import VideoStream
+
+from ..coding import CodedPicture
+from ..errors import InputError
+from . import limits
+from .color_tags import assumed, either, tags_of
+from .container import opened, picture_stream
+from .deinterlace import Fields
+from .hdr10 import LightLevel, Mastering
+from .pixels import Layout, is_transparent, layout, planes_of
+from .timeline import Times, lacking, scanned
+from .turn import turn_of
+
+_OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
+
+
+@dataclass(frozen=True)
+class OtherStream:
+    """A stream of sound, subtitles, attachments or data."""
+
+    index: int
+    kind: str
+    """audio, subtitle, attachment, data; video for covers and further pictures."""
+    codec: str
+    language: str
+    title: str
+    text: str
+    """Its kind in words, such as "aac, 48000 Hz, stereo"."""
+
+
+class Footage:
+    """A video file.
+
+    Pictures have numbers from 0 on and are at `times` [s], on the clock that the file's streams
+    share. `rate`: pictures a second, usually; `is_variable` if the times keep no steady rate.
+    `size` [px] is that of upright pictures. `assumed`: what the file does not say about its colours
+    and what is taken instead. `notes`: lines that a user should know. `missing`: numbers of the
+    pictures that could not be decoded, of those asked for so far; `damaged`: of those that were
+    mended by the decoder.
+
+    InputError in one line for a file that cannot be read, that has no pictures, or whose pictures
+    would take more than `max_mb` megabytes each (see limits.py).
+    """
+
+    def __init__(self, path: str | Path, *, max_mb: float = limits.MAX_MB):
+        self.path = Path(path)
+        self.missing: list[int] = []
+        self.damaged: list[int] = []
+        self.notes: list[str] = []
+        with opened(self.path) as container:
+            stream = picture_stream(container, self.path)
+            self._index = stream.index
+            self._check_size(stream, max_mb)
+            self.container, self.codec = container.format.name, stream.codec_context.name
+            self.metadata = dict(container.metadata)
+            self.chapters = len(container.chapters())
+            self.streams = tuple(_described(s) for s in container.streams if s is not stream)
+            self._tagged = tags_of(stream.codec_context)
+            self._field_order = stream.codec_context.field_order
+            self._pixel_aspect = stream.sample_aspect_ratio or Fraction(1)
+            if stream.metadata.get("alpha_mode") == "1":
+                self.notes.append("its transparency (VP8 or VP9 alpha) is not read")
+            self._packets = scanned(container, stream)
+            self.lacks = lacking(container, stream, self._packets)
+        if not len(self._packets.times):
+            raise InputError(f"{self.path}: {self._packets.problem or 'holds no pictures'}")
+        self._look()
+
+    def _check_size(self, stream: VideoStream, max_mb: float) -> None:
+        width, height = stream.codec_context.width, stream.codec_context.height
+        if not (0 < width <= limits.MOST_PIXELS_A_SIDE and 0 < height <= limits.MOST_PIXELS_A_SIDE):
+            raise InputError(
+                f"{self.path}: pictures of {width} x {height}, expected 1 to "
+                f"{limits.MOST_PIXELS_A_SIDE} pixels a side"
+            )
+        promised = limits.unpacked((width, height), 4)
+        stored = self.path.stat().st_size
+        limits.check(self.path, f"{width} x {height}", promised, stored, max_mb)
+
+    def _look(self) -> None:
+        """Decode one picture: what it says of itself counts more than what the header says."""
+        with opened(self.path) as container:
+            stream = cast(VideoStream, container.streams[self._index])
+            frame = next(_decoded(container, stream), None)
+            if frame is None:
+                raise InputError(f"{self.path}: none of its pictures can be decoded ({self.codec})")
+        self.pixels = frame.format.name
+        found = layout(self.pixels, is_transparent(frame))
+        if found is None:
+            raise InputError(f"{self.path}: pixels of kind {self.pixels} are not supported")
+        self._layout: Layout = found
+        self._frame_size = frame.width, frame.height
+        data = cast(Iterable[SideData], frame.side_data)
+        side = {one.type: bytes(one) for one in data}  # pyright: ignore[reportArgumentType]
+        self._turn = turn_of(side.get(Type.DISPLAYMATRIX))
+        self.mastering = _read(Mastering, side.get(Type.MASTERING_DISPLAY_METADATA))
+        self.light_level = _read(LightLevel, side.get(Type.CONTENT_LIGHT_LEVEL))
+        tags = either(tags_of(frame), self._tagged)
+        coding, self.assumed = assumed(found, self._frame_size, self.codec, tags)
+        turned = coding.steps[::-1] if self._turn.swaps else coding.steps
+        self.coding = replace(coding, steps=turned)
+        self.is_interlaced = frame.interlaced_frame or self._field_order in _OF_FIELDS
+        if self._packets.has_times and frame.pts is not None:
+            first = int(np.searchsorted(self._packets.times.ticks, frame.pts))
+            if 0 < first < len(self._packets.times):
+                self._packets = self._packets.from_picture(first)
+                self.notes.append(f"its first {first} pictures lack the one they build on")
+        self._timeline = self._packets.doubled() if self.is_interlaced else self._packets
+        self._note(side)
+
+    def _note(self, side: dict[Type, bytes]) -> None:
+        if self.assumed:
+            self.notes.append(f"does not state its colours: {', '.join(self.assumed)} assumed")
+        if self.is_interlaced:
+            self.notes.append(
+                f"interlaced: each of its {len(self._packets.times)} frames is taken as two "
+                f"pictures ({float(self.rate):g} a second)"
+            )
+        if not self._packets.has_times:
+            self.notes.append(f"does not say when its pictures are shown: {float(self.rate):g} a "
+                              "second assumed")  # fmt: skip
+        if Type.DOVI_METADATA in side or Type.DOVI_RPU_BUFFER in side:
+            self.notes.append("Dolby Vision data is not used: pictures are those of its base layer")
+        if Type.DYNAMIC_HDR_PLUS in side:
+            self.notes.append("HDR10+ data is not kept")
+        if self._turn.odd:
+            self.notes.append("is turned by other than a multiple of 90 degrees, which is left out")
+        if self.lacks:
+            end, whole = float(self._packets.end), float(self._packets.end + self.lacks)
+            self.notes.append(f"is cut off: it ends at {end:.2f} s of {whole:.2f} s")
+        elif gaps := self._packets.gaps:
+            at, longest = gaps[0], max(length for _, length in gaps)
+            often = "once" if len(gaps) == 1 else f"{len(gaps)} times"
+            self.notes.append(
+                f"its pictures, steady elsewhere, pause {often} for up to {longest:.2f} s, "
+                f"first at {at[0]:.2f} s: perhaps some were lost"
+            )
+        if self._packets.problem:
+            at = float(self._packets.end)
+            self.notes.append(f"is damaged after {at:.2f} s: {self._packets.problem.lower()}")
+
+    @property
+    def times(self) -> Times:
+        """When each picture is shown [s]: Fractions that ascend."""
+        return self._timeline.times
+
+    @property
+    def rate(self) -> Fraction:
+        """Pictures a second, without gaps and hitches; a known rate if within 0.1 % of one."""
+        return self._timeline.rate
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Shortest and longest time from a picture to the next [s]."""
+        steps = self._timeline.steps
+        base = float(self.times.base)
+        return (float(steps.min()) * base, float(steps.max()) * base) if len(steps) else (0.0, 0.0)
+
+    @property
+    def is_variable(self) -> bool:
+        """Return True if the pictures keep no steady rate."""
+        return self._timeline.is_variable
+
+    @property
+    def duration(self) -> Fraction:
+        """From the first picture to the end of the last one [s]."""
+        return self.times[-1] - self.times[0] + 1 / self.rate
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of upright pictures [px]."""
+        width, height = self._frame_size
+        return (height, width) if self._turn.swaps else (width, height)
+
+    @property
+    def pixel_aspect(self) -> Fraction:
+        """Width of an upright pixel to its height."""
+        return 1 / self._pixel_aspect if self._turn.swaps else self._pixel_aspect
+
+    @property
+    def rotation(self) -> int:
+        """Degrees by which pictures are turned clockwise to be upright."""
+        return self._turn.degrees
+
+    def loss(self) -> str:
+        """What of the pictures asked for could not be read, in one line; '' if nothing."""
+        said = []
+        if self.missing:
+            at = float(self.times[self.missing[0]])
+            said.append(
+                f"{len(self.missing)} of {len(self.times)} pictures could not be decoded, "
+                f"the first at {at:.2f} s"
+            )
+        if self.damaged:
+            at = float(self.times[self.damaged[0]])
+            said.append(f"{len(self.damaged)} pictures are damaged, the first at {at:.2f} s")
+        return f"{self.path}: {'; '.join(said)}" if said else ""
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __iter__(self) -> Iterator[tuple[int, CodedPicture]]:
+        return self.pictures()
+
+    def pictures(
+        self, first: int = 0, last: int | None = None
+    ) -> Iterator[tuple[int, CodedPicture]]:
+        """The pictures from number `first` to `last`, both included, each with its number.
+
+        Those that cannot be decoded are left out, and listed in `missing`.
+        """
+        last = len(self) - 1 if last is None else min(last, len(self) - 1)
+        first = max(first, 0)
+        expected, by = first, VideoReformatter()
+        for number, frame in self._from(first):
+            if number < expected:
+                continue
+            self.missing += range(expected, min(number, last + 1))
+            if number > last:
+                expected = number
+                break
+            if frame.is_corrupt:
+                self.damaged.append(number)
+            expected = number + 1
+            yield number, CodedPicture(self._upright(frame, by), self.coding)
+            if number == last:
+                break
+        self.missing += range(expected, last + 1)
+
+    def _upright(self, frame: av.VideoFrame, by: VideoReformatter) -> tuple[np.ndarray, ...]:
+        if (frame.width, frame.height) != self._frame_size:
+            size = "{} x {}".format(*self._frame_size)
+            raise InputError(
+                f"{self.path}: its pictures change from {size} to {frame.width} x {frame.height}"
+            )
+        return tuple(self._turn(plane) for plane in planes_of(frame, self._layout, by))
+
+    def _from(self, first: int) -> Iterator[tuple[int, av.VideoFrame]]:
+        """Frames with their numbers, in order, beginning at or before `first`."""
+        if not self.is_interlaced:
+            yield from self._frames(first)
+            return
+        before = max(first // 2 - 2, 0)  # what bwdif looks back on
+        fields = Fields(self._frame_size, self.pixels, self._packets.times.base)
+        for number, frame in self._frames(before):
+            if number >= before:
+                yield from fields.of(frame, number)
+        yield from fields.of(None)
+
+    def _frames(self, first: int) -> Iterator[tuple[int, av.VideoFrame]]:
+        """Decoded frames, as they are, with the numbers of their packets."""
+        ticks, keys = self._packets.times.ticks, self._packets.keys
+        for key in [*self._keys_before(ticks[first], keys), None]:
+            with opened(self.path) as container:
+                stream = cast(VideoStream, container.streams[self._index])
+                stream.thread_type = "AUTO"
+                if key is not None:
+                    with contextlib.suppress(FFmpegError):
+                        container.seek(key, stream=stream)
+                frames = self._numbered(container, stream, key)
+                begin = next(frames, None)
+                if key is not None and (begin is None or begin[0] > first):
+                    continue  # it went too far: some formats are sought by guessing
+                if begin is not None:
+                    yield begin
+                    yield from frames
+                return
+
+    def _keys_before(self, tick: int, keys: np.ndarray) -> list[int]:
+        """Places to begin decoding for the picture at `tick`, if not at the beginning."""
+        if not self._packets.has_times:
+            return []
+        last = int(np.searchsorted(keys, tick, side="right")) - 1
+        return [int(keys[n]) for n in dict.fromkeys((last, last - 1, last - 4)) if n > 0]
+
+    def _numbered(
+        self, container: InputContainer, stream: VideoStream, key: int | None
+    ) -> Iterator[tuple[int, av.VideoFrame]]:
+        ticks, last = self._packets.times.ticks, -1
+        for frame in _decoded(container, stream, key):
+            number = last + 1
+            if self._packets.has_times and frame.pts is not None:
+                number = int(np.searchsorted(ticks, frame.pts))
+                if number == len(ticks) or ticks[number] != frame.pts:
+                    continue  # what edits leave out
+            if last < number < len(ticks):
+                last = number
+                yield number, frame
+
+
+def _decoded(
+    container: InputContainer, stream: VideoStream, key: int | None = None
+) -> Iterator[av.VideoFrame]:
+    """All frames that can be decoded; from the key frame at the tick `key` or one before on."""
+    waiting = key is not None
+    packets = container.demux(stream)
+    while True:
+        try:
+            packet = next(packets, None)
+        except FFmpegError:  # said by the Timeline
+            packet = None
+        if waiting and packet is not None:
+            if not packet.is_keyframe or packet.pts is None:
+                continue
+            if key is not None and packet.pts > key:
+                return
+            waiting = False
+        try:
+            yield from stream.decode(packet if packet is not None and packet.size else None)
+        except EOFError:
+            return
+        except FFmpegError:  # this packet's pictures will be missing
+            pass
+        if packet is None or not packet.size:
+            return
+
+
+def _read(kind: type, data: bytes | None):
+    """The side data as `kind`, if there is any."""
+    with contextlib.suppress(struct.error):
+        return kind.read(data) if data else None
+
+
+def _described(stream: Stream) -> OtherStream:
+    context = stream.codec_context
+    codec = context.name if context is not None else (stream.name or "unknown")
+    text = codec
+    if isinstance(stream, AudioStream):
+        text += f", {stream.rate} Hz, {stream.layout.name}"
+    meta = stream.metadata
+    return OtherStream(
+        stream.index,
+        stream.type or "unknown",
+        codec,
+        meta.get("language", ""),
+        meta.get("title", "") or meta.get("filename", ""),
+        text,
+    )

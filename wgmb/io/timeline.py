@@ -1,0 +1,183 @@
+"""When the pictures of a video are shown: one pass over its packets, without decoding.
+
+Times are those in the file, on the clock that all its streams share: with edit lists, late starts
+and variable rates. The number of a picture says nothing about its time.
+"""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import overload
+
+import numpy as np
+from av.container import InputContainer
+from av.error import FFmpegError
+from av.stream import Disposition
+from av.video.stream import VideoStream
+
+KNOWN_RATES = tuple(
+    Fraction(rate)
+    for rate in (
+        "10", "12", "12.5", "15000/1001", "15", "18", "20", "24000/1001", "24", "25", "30000/1001",
+        "30", "48000/1001", "48", "50", "60000/1001", "60", "72", "75", "90", "96", "100",
+        "120000/1001", "120", "144", "165", "180", "200", "240000/1001", "240", "300", "360",
+        "480", "500", "960", "1000",
+    )
+)  # fmt: skip
+_NEAR = 1e-3  # of a rate: it is taken for the known one
+_UNEVEN = 0.02  # of a step: more is a variable rate
+_SELDOM = 0.05  # of the steps: if more are uneven, the rate varies
+_FINEST = 1_001_000  # denominator of a rate
+_STATE_DURATION = ("matroska", "mov,", "flv")  # formats whose headers can be relied on
+
+
+class Times(Sequence[Fraction]):
+    """Times [s], exact, kept as whole ticks of a clock."""
+
+    def __init__(self, ticks: np.ndarray, base: Fraction):
+        self.ticks, self.base = ticks, base
+
+    @overload
+    def __getitem__(self, index: int) -> Fraction: ...
+    @overload
+    def __getitem__(self, index: slice) -> Times: ...
+    def __getitem__(self, index: int | slice) -> Fraction | Times:
+        if isinstance(index, slice):
+            return Times(self.ticks[index], self.base)
+        return int(self.ticks[index]) * self.base
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    @property
+    def seconds(self) -> np.ndarray:
+        """All of them as float64."""
+        return self.ticks * float(self.base)
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """The times of the pictures of one stream, and where decoding can begin."""
+
+    times: Times
+    keys: np.ndarray
+    """Ticks at which pictures are shown that need no other."""
+    has_times: bool
+    """The file says when its pictures are shown; else they are counted at an even rate."""
+    end: Fraction
+    """When the last packet of any stream ends [s]."""
+    problem: str
+    """Why the pass ended before the file did, or ''."""
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Time from each picture to the next [ticks]."""
+        return np.diff(self.times.ticks)
+
+    @cached_property
+    def rate(self) -> Fraction:
+        """Pictures a second, by the mean of the steps without gaps and hitches.
+
+        Where steps are uneven, the nearest known rate if it is within 0.1 %, or within what the
+        clock's rounding makes of a few steps.
+        """
+        steps = self.steps
+        if not len(steps):
+            return Fraction(24)
+        middle = np.median(steps)
+        usual = steps[(steps > 0.5 * middle) & (steps < 1.5 * middle)]
+        exact = Fraction(len(usual), int(usual.sum())) / self.times.base
+        if usual.min() < usual.max():
+            rounding = 0.5 / (float(middle) * len(usual) ** 0.5)
+            off = {known: abs(float(known / exact) - 1) for known in KNOWN_RATES}
+            nearest = min(off, key=lambda known: off[known])
+            if off[nearest] < _NEAR:
+                return nearest
+            if near := [known for known in off if off[known] < rounding]:
+                return min(near, key=lambda known: (known.denominator, off[known]))
+        return exact.limit_denominator(_FINEST)
+
+    @property
+    def is_variable(self) -> bool:
+        """Return True if steps differ by more than the clock's rounding."""
+        return bool(self._uneven().any())
+
+    def _uneven(self) -> np.ndarray:
+        usual = float(1 / (self.rate * self.times.base))
+        return np.abs(self.steps - usual) > max(1.0, _UNEVEN * usual)
+
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """Where a steady rate pauses, and how long the steps there are [s]; none if it varies."""
+        uneven = np.flatnonzero(self._uneven())
+        usual = float(1 / (self.rate * self.times.base))
+        if len(uneven) > _SELDOM * len(self.steps) or (self.steps[uneven] < 1.5 * usual).any():
+            return []
+        base = float(self.times.base)
+        return [(int(self.times.ticks[n]) * base, int(self.steps[n]) * base) for n in uneven]
+
+    def from_picture(self, number: int) -> Timeline:
+        """The same without the pictures before `number`."""
+        return replace(self, times=self.times[number:])
+
+    def doubled(self) -> Timeline:
+        """Twice as many pictures: one more half-way to the next of each."""
+        ticks, step = 2 * self.times.ticks, round(2 / (self.rate * self.times.base))
+        after = np.append(ticks[1:], ticks[-1] + step)
+        both = np.stack([ticks, (ticks + after) // 2], 1).ravel()
+        return replace(self, times=Times(both, self.times.base / 2), keys=2 * self.keys)
+
+
+def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
+    """Read all packets of a file; the Timeline of one of its streams."""
+    base = stream.time_base or Fraction(1, 90000)
+    shown, decoded, keys, count = array("q"), array("q"), array("q"), 0
+    end, problem = Fraction(0), ""
+    wanted = [s for s in container.streams if not s.disposition & Disposition.attached_pic]
+    ends: dict[int, int] = {}
+    try:
+        for packet in container.demux(wanted):
+            if not packet.size:
+                continue
+            if packet.pts is not None:
+                last = packet.pts + (packet.duration or 0)
+                ends[packet.stream_index] = max(last, ends.get(packet.stream_index, last))
+            if packet.stream_index != stream.index or packet.is_discard:
+                continue
+            count += 1
+            if packet.pts is not None:
+                shown.append(packet.pts)
+                if packet.is_keyframe:
+                    keys.append(packet.pts)
+            if packet.dts is not None:
+                decoded.append(packet.dts)
+    except FFmpegError as error:
+        problem = str(error.strerror or error)
+    for index, last in ends.items():
+        end = max(end, last * (container.streams[index].time_base or base))
+    has_times = len(shown) == count
+    if not has_times and len(decoded) == count:
+        shown = decoded
+    elif not has_times:
+        rate = stream.guessed_rate or stream.average_rate or Fraction(25)
+        base, shown = 1 / rate, array("q", range(count))
+    ticks = np.unique(np.frombuffer(shown, np.int64)) if count else np.zeros(0, np.int64)
+    found = np.unique(np.frombuffer(keys, np.int64)) if len(keys) else np.zeros(0, np.int64)
+    return Timeline(Times(ticks, base), found, has_times, end, problem)
+
+
+def lacking(container: InputContainer, stream: VideoStream, timeline: Timeline) -> Fraction:
+    """How much of a file its packets leave missing, by what its header states [s]."""
+    name, stated = container.format.name, Fraction(0)
+    if name == "avi":
+        stated = stream.frames * (stream.time_base or Fraction(0))
+    elif name.startswith(_STATE_DURATION) and container.duration is not None:
+        stated = Fraction(container.duration, 1_000_000)
+    missing = stated - timeline.end
+    return missing if missing > 1 / timeline.rate + Fraction(1, 10) else Fraction(0)

@@ -1,0 +1,48 @@
+"""Pictures that a phone or a camera stored lying on their side, upright."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+
+_MATRIX = struct.Struct("=9i")  # of a display, in 1/65536
+
+
+@dataclass(frozen=True)
+class Turn:
+    """How stored pictures become upright: perhaps transposed, then mirrored."""
+
+    swaps: bool = False
+    flips: tuple[bool, bool] = (False, False)  # vertically, horizontally
+    odd: bool = False  # the file wants another angle
+
+    def __call__(self, plane: np.ndarray) -> np.ndarray:
+        """The plane, upright."""
+        if self == Turn(odd=self.odd):
+            return plane
+        plane = plane.T if self.swaps else plane
+        down, across = (slice(None, None, -1 if flip else 1) for flip in self.flips)
+        return np.ascontiguousarray(plane[down, across])
+
+    @property
+    def degrees(self) -> int:
+        """Clockwise; of a mirrored picture, after mirroring it horizontally."""
+        if self.swaps:
+            return 90 if not self.flips[0] else 270
+        return 180 if self.flips[0] else 0
+
+
+def turn_of(data: bytes | None) -> Turn:
+    """The turn that a display matrix demands: x' = a x + c y, y' = b x + d y."""
+    if data is None:
+        return Turn()
+    a, b, _, c, d = (np.sign(v) if abs(v) > 0x8000 else 0 for v in _MATRIX.unpack_from(data)[:5])
+    if a and d and not b and not c:
+        return Turn(False, (d < 0, a < 0))
+    if b and c and not a and not d:
+        return Turn(True, (b < 0, c < 0))
+    return Turn(odd=True)
