@@ -1,0 +1,73 @@
+"""The motion of most of a picture: a homography, found in spite of all that moves otherwise.
+
+RANSAC (Fischler and Bolles, "Random Sample Consensus", 1981) with a fixed number of fixed
+samples, then least squares on what agrees with the best of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+SAMPLES = 500  # of four points each
+POINTS = 4
+TOLERANCE = 3.0 / 640  # of the longer side: how far a point may end from where the motion leads
+REFINEMENTS = 3
+
+
+def dominant_homography(points: np.ndarray, motion: np.ndarray, longest: float) -> np.ndarray:
+    """The (3, 3) matrix that moves most of `points` (count, 2) [px] by their `motion` (count, 2).
+
+    `longest`: the picture's longer side [px]. The unit matrix if there are too few points.
+    """
+    if len(points) < POINTS:
+        return np.eye(3)
+    here = (2 * points.astype(float) - points.max(axis=0)) / longest  # about -1 to 1
+    there = here + 2 * motion.astype(float) / longest
+    tolerance = 2 * TOLERANCE
+    picks = np.random.default_rng(0).integers(0, len(here), (SAMPLES, POINTS))
+    candidates = np.concatenate([np.eye(3)[None], _fits(here[picks], there[picks])])
+    counts = [_agrees(h, here, there, tolerance).sum() for h in candidates]
+    best = candidates[int(np.argmax(counts))]
+    for _ in range(REFINEMENTS):
+        near = _agrees(best, here, there, tolerance)
+        if near.sum() < POINTS:
+            break
+        fitted = _least_squares(here[near], there[near])
+        if _agrees(fitted, here, there, tolerance).sum() < near.sum():
+            break
+        best = fitted
+    scale = np.diag([2 / longest, 2 / longest, 1.0])
+    scale[:2, 2] = -points.max(axis=0) / longest
+    return np.linalg.inv(scale) @ best @ scale
+
+
+def _equations(here: np.ndarray, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and right sides for the 8 unknowns of homographies whose last entry is 1."""
+    x, y, u, v = here[..., 0], here[..., 1], there[..., 0], there[..., 1]
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    across = np.stack([x, y, one, zero, zero, zero, -u * x, -u * y], axis=-1)
+    down = np.stack([zero, zero, zero, x, y, one, -v * x, -v * y], axis=-1)
+    return np.concatenate([across, down], axis=-2), np.concatenate([u, v], axis=-1)
+
+
+def _fits(here: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Homographies of samples (count, 4, 2), without those of points on a line."""
+    rows, sides = _equations(here, there)
+    good = np.abs(np.linalg.det(rows)) > 1e-9
+    solved = np.linalg.solve(rows[good], sides[good][..., None])[..., 0]
+    last = np.ones((len(solved), 1))
+    return np.concatenate([solved, last], axis=1).reshape(-1, 3, 3)
+
+
+def _least_squares(here: np.ndarray, there: np.ndarray) -> np.ndarray:
+    rows, sides = _equations(here, there)
+    solved = np.linalg.lstsq(rows, sides, rcond=None)[0]
+    return np.append(solved, 1.0).reshape(3, 3)
+
+
+def _agrees(homography, here, there, tolerance) -> np.ndarray:
+    """Which points the homography moves to where they are."""
+    moved = here @ homography[:, :2].T + homography[:, 2]
+    in_front = moved[:, 2] > 0.1
+    apart = moved[:, :2] / np.where(in_front, moved[:, 2], 1.0)[:, None] - there
+    return in_front & (np.hypot(apart[:, 0], apart[:, 1]) <= tolerance)

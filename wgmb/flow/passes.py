@@ -1,0 +1,96 @@
+"""What all passes of flow share: group 0, textures, and submission of each pass by itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..gpu import wgsl
+from ..gpu.textures import ScratchBuffer, TexturePool
+
+_USAGE = wgpu.TextureUsage
+STATES, FEATURES = ("rgba32float", 2), ("rgba8unorm", 2)  # format, layers
+
+
+class Passes:
+    """Runs passes, and lends textures that may be given back for the next frame's.
+
+    Every pass is submitted by itself: without a GPU a frame takes seconds, and a submission
+    cannot be interrupted.
+    """
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self.device, self.images = device, TexturePool(device)
+        self.landings = ScratchBuffer(device)
+        self._free: dict[tuple, list[wgpu.GPUTexture]] = {}
+        self._frames: dict[tuple[int, int], gpu.FrameBindings] = {}
+
+    def run(
+        self,
+        file: str,
+        entry: str,
+        size: tuple[int, int],
+        *,
+        grid: tuple[int, int] | None = None,
+        constants: dict[str, float] | None = None,
+        **resources: wgpu.GPUTexture | wgpu.GPUTextureView | wgpu.GPUBuffer,
+    ) -> None:
+        """Run one entry point of `wgsl/flow/<file>` for a frame of `size`.
+
+        `grid`: how many invocations it takes, across and down, if not one for every pixel.
+        """
+        kernel = gpu.kernel(self.device, f"flow/{file}", None, **(constants or {}))
+        bound = {name: self._bound(kernel, name, value) for name, value in resources.items()}
+        encoder = self.device.create_command_encoder(label=f"flow {entry}")
+        kernel.run(encoder, entry, replace(self._frame(size), size=grid or size), **bound)
+        gpu.submit(self.device, encoder)
+
+    def uniform(self, file: str, struct: str, **values) -> wgpu.GPUBuffer:
+        """The struct of `wgsl/flow/<file>` with these values, the others 0."""
+        data = np.zeros((), wgsl.load(f"flow/{file}").dtype(struct))
+        for name, value in values.items():
+            data[name] = value
+        return self.device.create_buffer_with_data(
+            label=struct, data=data, usage=wgpu.BufferUsage.UNIFORM
+        )
+
+    def take(self, size: tuple[int, int], kind: tuple[str, int]) -> wgpu.GPUTexture:
+        """A texture of a format and so many layers; what is in it is undefined."""
+        if free := self._free.get((size, kind)):
+            return free.pop()
+        gpu.check_size(self.device, *size)
+        usage = _USAGE.TEXTURE_BINDING | _USAGE.STORAGE_BINDING | _USAGE.COPY_SRC
+        return self.device.create_texture(
+            label=f"flow {kind[0]}", size=(*size, kind[1]), format=kind[0], usage=usage
+        )
+
+    def give(self, *textures: wgpu.GPUTexture) -> None:
+        """Take back textures that no later pass reads."""
+        for texture in textures:
+            width, height, layers = texture.size
+            kind = texture.format, layers
+            self._free.setdefault(((width, height), kind), []).append(texture)
+
+    def scratch(self, size: tuple[int, int], format: str, name: str) -> wgpu.GPUTexture:
+        """A texture for one stage; the next one that asks for this name gets the same."""
+        return self.images.texture(name, size, format)
+
+    def _frame(self, size: tuple[int, int]) -> gpu.FrameBindings:
+        if size not in self._frames:
+            data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
+            data["size"] = size
+            buffer = self.device.create_buffer_with_data(
+                label="frame", data=data, usage=wgpu.BufferUsage.UNIFORM
+            )
+            self._frames[size] = gpu.FrameBindings(size, {"frame": buffer})
+        return self._frames[size]
+
+    @staticmethod
+    def _bound(kernel: gpu.Kernel, name: str, value):
+        if not isinstance(value, wgpu.GPUTexture):
+            return value
+        array = "_2d_array" in kernel.bindings[name].type if name in kernel.bindings else False
+        return value.create_view(dimension="2d-array" if array else "2d")

@@ -1,0 +1,60 @@
+"""The levels of a picture, each half as large as the one before, as features that flow compares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import wgpu
+
+from .passes import FEATURES, Passes
+
+COARSEST = 160  # px along the longer side of the coarsest level, about
+
+
+def level_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
+    """Width, height of every level, the picture's own first."""
+    halvings = max(0, round(np.log2(max(size) / COARSEST)))
+    sizes = [size]
+    for _ in range(halvings):
+        sizes.append((-(-sizes[-1][0] // 2), -(-sizes[-1][1] // 2)))
+    return sizes
+
+
+def features(passes: Passes, picture: wgpu.GPUTextureView, size) -> list[wgpu.GPUTexture]:
+    """Features of every level of a linear picture."""
+    return list(_levels(passes, picture, size))
+
+
+def _levels(passes: Passes, picture, size) -> Iterator[wgpu.GPUTexture]:
+    none = passes.scratch((1, 1), "rgba32float", "none")
+    unwritten = passes.take((1, 1), FEATURES)
+
+    def run(entry, size, source, display=none, output=None, written=unwritten):
+        spare = passes.scratch((1, 1), "rgba32float", "spare")
+        passes.run(
+            "pyramid.wgsl",
+            entry,
+            size,
+            picture=source,
+            display=display,
+            output=output or spare,
+            features=written,
+        )
+
+    coarser = picture
+    for level, here in enumerate(level_sizes(size)):
+        texture = [
+            passes.scratch(here, "rgba32float", f"{name} {level}")
+            for name in ("linear", "display", "gradient", "spread")
+        ]
+        linear, display, gradient, spread = texture
+        run("halve" if level else "limit", here, coarser, output=linear)
+        run("encode_display", here, linear, output=display)
+        run("find_gradients", here, display, output=gradient)
+        run("spread", here, gradient, output=spread)
+        done = passes.take(here, FEATURES)
+        run("write_features", here, spread, display, written=done)
+        coarser = linear
+        yield done
+    passes.give(unwritten)

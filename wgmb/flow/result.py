@@ -1,0 +1,79 @@
+"""The result of a frame: motion to both neighbours, and the order in depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import wgpu
+
+from .homography import dominant_homography
+from .passes import Passes
+from .views import AROUND, Views
+
+ACROSS = 40  # points along the longer side from which the motion of most is found
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Textures of a frame: `motion` to_prev, to_next [px] (rgba32float), and `depth` (r32float)."""
+
+    motion: wgpu.GPUTexture
+    depth: wgpu.GPUTexture
+
+
+def result(
+    passes: Passes,
+    size: tuple[int, int],
+    views: Views,
+    states: wgpu.GPUTexture,
+) -> Motion:
+    """Motion and depth from the states of a frame."""
+    motion, depth = (passes.take(size, (k, 1)) for k in ("rgba32float", "r32float"))
+    apart = passes.scratch(size, "rgba32float", "apart")
+    spacing = max(1, round(max(size) / ACROSS))
+    values = {
+        "near": float(views.near - views.here),
+        "around": views.far is not None and views.factor == AROUND,
+        "spacing": spacing,
+    }
+    spare = passes.scratch((1, 1), "rgba32float", "spare")
+    spare_depth = passes.scratch((1, 1), "r32float", "spare depth")
+    none = passes.scratch((1, 1), "rgba32float", "none")
+
+    def run(entry, size, read=none, read_apart=none, **written):
+        outputs = {"motion_out": spare, "apart_out": spare, "depth_out": spare_depth} | written
+        passes.run(
+            "motion.wgsl",
+            entry,
+            size,
+            result=passes.uniform("motion.wgsl", "Result", **values),
+            states=states,
+            motion=read,
+            apart=read_apart,
+            **outputs,
+        )
+
+    run("write_motion", size, motion_out=motion)
+    few = -(-size[0] // spacing), -(-size[1] // spacing)
+    thin = passes.scratch(few, "rgba32float", "thin")
+    run("thin", few, motion, apart_out=thin)
+    values |= _homographies(passes, thin, size, spacing)
+    run("find_apart", size, motion, apart_out=apart)
+    run("write_depth", size, read_apart=apart, depth_out=depth)
+    return Motion(motion, depth)
+
+
+def _homographies(passes: Passes, thin: wgpu.GPUTexture, size, spacing: int) -> dict:
+    """The motion of most of the picture to both sides, as motion.wgsl takes it."""
+    some = passes.images.download(passes.device.create_command_encoder(), thin)
+    y, x = np.mgrid[: some.shape[0], : some.shape[1]]
+    last = np.array(size) - 1
+    points = np.minimum(np.stack([x, y], axis=-1) * spacing + spacing // 2, last) + 0.5
+    found = {}
+    for name, channels in (("to_prev", slice(0, 2)), ("to_next", slice(2, 4))):
+        motion = some[..., channels].reshape(-1, 2)
+        matrix = np.eye(4)
+        matrix[:3, :3] = dominant_homography(points.reshape(-1, 2), motion, max(size))
+        found[name] = matrix.T  # row i in numpy is column i in WGSL
+    return found

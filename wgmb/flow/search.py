@@ -1,0 +1,49 @@
+"""The first states: a full search on the coarsest level."""
+
+from __future__ import annotations
+
+import wgpu
+
+from ..gpu import wgsl
+from ..gpu.textures import ScratchBuffer
+from .passes import STATES, Passes
+
+REACH = 0.2  # of the longer side: the longest displacement along an axis
+
+
+class FullSearch:
+    """The best whole displacement of every block of pixels."""
+
+    def __init__(self, passes: Passes):
+        self._passes, self._best = passes, ScratchBuffer(passes.device)
+
+    def __call__(self, size: tuple[int, int], matched: dict) -> wgpu.GPUTexture:
+        """States of a frame on its coarsest level; `matched`: the bindings of match.wgsl."""
+        source = wgsl.load("flow/full_search.wgsl")
+        block, columns = (int(source.constant(name)) for name in ("BLOCK", "COLUMNS"))
+        blocks = -(-size[0] // block), -(-size[1] // block)
+        most = max(1, round(REACH * max(size)))
+        output = self._passes.take(size, STATES)
+        spare = self._passes.take((1, 1), STATES)
+        best = self._best.at_least(16 * blocks[0] * blocks[1])
+
+        def run(entry: str, grid: tuple[int, int], first: int, states: wgpu.GPUTexture) -> None:
+            reach = self._passes.uniform(
+                "full_search.wgsl", "Reach", most=most, first=first, blocks=blocks
+            )
+            self._passes.run(
+                "full_search.wgsl",
+                entry,
+                size,
+                grid=grid,
+                reach=reach,
+                best=best,
+                output=states,
+                **matched,
+            )
+
+        for first in range(-most, most + 1, columns):
+            run("search", blocks, first, spare)
+        run("write_states", size, 0, output)
+        self._passes.give(spare)
+        return output

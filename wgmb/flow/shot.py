@@ -1,0 +1,213 @@
+"""Flow of the frames of a shot: every stage of a frame is made once, from those of its neighbours.
+
+What a frame's stages are made of, so that the result is a function of its number alone:
+
+searched(n, coarsest)  pictures n - 1, n, n + 1
+searched(n, level)     mended(n, coarser), and searched(n - 1, coarser) and (n + 1, coarser), carried
+mended(n, level)       searched(n - 1, level), (n, level) and (n + 1, level)
+
+With three levels, pictures n - 4 to n + 4 may have a say in the motion of frame n.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from ..errors import InputError
+from ..gpu import wgsl
+from .carry import carry
+from .mend import mend
+from .passes import STATES, Passes
+from .pyramid import features, level_sizes
+from .result import Motion, result
+from .search import FullSearch
+from .sweeps import sweep
+from .views import BESIDE, Views, views_of
+
+Load = Callable[[int], np.ndarray | None]
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is done: sweeps on the coarsest level, on those between, and on the finest."""
+
+    coarsest: int
+    between: int
+    finest: int
+
+    def sweeps(self, level: int, levels: int) -> int:
+        """Sweeps on a level; 0 is the finest."""
+        if level == levels - 1:
+            return self.coarsest
+        return self.between if level else self.finest
+
+
+FINEST_STRIDE, STRIDE = 1.0, 2.0  # between the samples of a patch [px]
+FAR_PRICE = 0.03  # for being hidden in the near frame, if the far one is two frames away
+EFFORTS = {"best": Effort(4, 3, 3), "fast": Effort(3, 2, 0)}
+KEPT = {"pictures": 4, "searched": 1, "mended": 0, "motion": 2}  # frames around the one asked for
+
+
+def checked(picture: np.ndarray, number: int) -> np.ndarray:
+    """A picture as (height, width, 4) float32; InputError if it is none."""
+    picture = np.asarray(picture)
+    if picture.ndim != 3 or picture.shape[2] not in (3, 4) or 0 in picture.shape:
+        raise InputError(f"frame {number} must be (height, width, 3 or 4), got {picture.shape}")
+    if picture.dtype.kind != "f":
+        raise InputError(f"frame {number} must be floating point, got {picture.dtype}")
+    color = np.ones((*picture.shape[:2], 4), np.float32)
+    color[..., : picture.shape[2]] = picture
+    return color
+
+
+class Shot:
+    """Flow of successive frames between two cuts; made by `Flow.shot`.
+
+    Frames that are asked for one after the other share their stages: each is searched once.
+    """
+
+    def __init__(self, passes: Passes, load: Load, effort: Effort):
+        self._passes, self._load, self._effort = passes, load, effort
+        self._full_search = FullSearch(passes)
+        self._size: tuple[int, int] | None = None
+        self._made: dict[tuple[str, int, int], Any] = {}
+
+    def textures(self, number: int) -> Motion | None:
+        """Motion and depth of a frame on the GPU, valid until others are asked for.
+
+        None where the shot has no such frame.
+        """
+        if self._features(number) is None:
+            return None
+        return self._once("motion", number, 0, self._motion)
+
+    def __call__(self, number: int) -> tuple[np.ndarray, np.ndarray] | None:
+        """(height, width, 4) to_prev, to_next [px] and (height, width) depth of a frame."""
+        textures = self.textures(number)
+        if textures is None:
+            return None
+        images, device = self._passes.images, self._passes.device
+        motion, depth = (
+            images.download(device.create_command_encoder(), texture)
+            for texture in (textures.motion, textures.depth)
+        )
+        return motion, depth[..., 0]
+
+    def _once(self, stage: str, number: int, level: int, make: Callable[[int, int], Any]) -> Any:
+        key = stage, number, level
+        if key not in self._made:
+            self._made[key] = make(number, level)
+        return self._made[key]
+
+    def _features(self, number: int) -> list[wgpu.GPUTexture] | None:
+        return self._once("pictures", number, 0, self._measured)
+
+    def _measured(self, number: int, _: int) -> list[wgpu.GPUTexture] | None:
+        picture = self._load(number)
+        if picture is None:
+            return None
+        color = checked(picture, number)
+        size = color.shape[1], color.shape[0]
+        if self._size not in (None, size):
+            expected = "{} x {}".format(*self._size or size)
+            raise InputError(f"frame {number} is {size[0]} x {size[1]}, others are {expected}")
+        self._size = size
+        view = self._passes.images.upload("picture", color, "rgba32float")
+        return features(self._passes, view, size)
+
+    @property
+    def _sizes(self) -> list[tuple[int, int]]:
+        assert self._size is not None
+        return level_sizes(self._size)
+
+    def _views(self, number: int) -> Views | None:
+        return views_of(number, lambda other: self._features(other) is not None)
+
+    def _matched(self, views: Views, level: int) -> dict:
+        """The bindings of match.wgsl for a frame on a level."""
+        far = views.near if views.far is None else views.far
+        numbers = {"here": views.here, "near": views.near, "far": far}
+        textures = {name: (self._features(n) or [])[level] for name, n in numbers.items()}
+        kind = int(wgsl.load("flow/match.wgsl").constant(views.kind))
+        values = {
+            "far_factor": views.factor,
+            "far_price": FAR_PRICE if views.factor == BESIDE else 0.0,
+            "stride": FINEST_STRIDE if level == 0 else STRIDE,
+        }
+        uniform = self._passes.uniform("match.wgsl", "View", **values)
+        return {
+            "constants": {"VIEWS": kind},
+            "view": uniform,
+            **textures,
+        }
+
+    def _searched(self, number: int, level: int) -> wgpu.GPUTexture:
+        views, passes, size = self._views(number), self._passes, self._sizes[level]
+        assert views is not None
+        matched = self._matched(views, level)
+        count = self._effort.sweeps(level, len(self._sizes))
+        if level == len(self._sizes) - 1:
+            return sweep(passes, size, matched, self._full_search(size, matched), [], level, count)
+        states = self._grown(self._once("mended", number, level + 1, self._mended), level)
+        guesses = [self._carried(other, views, level) for other in views.beside] if count else []
+        states = sweep(passes, size, matched, states, guesses, level, count)
+        passes.give(*guesses)
+        return states
+
+    def _grown(self, states: wgpu.GPUTexture, level: int) -> wgpu.GPUTexture:
+        output = self._passes.take(self._sizes[level], STATES)
+        self._passes.run("grow.wgsl", "main", self._sizes[level], states=states, output=output)
+        return output
+
+    def _carried(self, other: int, views: Views, level: int) -> wgpu.GPUTexture:
+        """The states of a neighbour, from the coarser level, as guesses in the frame itself."""
+        theirs = self._views(other)
+        assert theirs is not None
+        states = self._grown(self._once("searched", other, level + 1, self._searched), level)
+        turn = -views.leads_by(other)
+        along = theirs.leads_by(views.here)
+        size = self._sizes[level]
+        output = carry(self._passes, size, self._matched(theirs, level), states, along, turn)
+        self._passes.give(states)
+        return output
+
+    def _mended(self, number: int, level: int) -> wgpu.GPUTexture:
+        views = self._views(number)
+        assert views is not None
+        neighbours = {}
+        for other in views.beside:
+            theirs = self._views(other)
+            assert theirs is not None
+            neighbours[other] = theirs, self._once("searched", other, level, self._searched)
+        states = self._once("searched", number, level, self._searched)
+        matched = self._matched(views, level)
+        return mend(self._passes, self._sizes[level], matched, views, states, neighbours)
+
+    def _motion(self, number: int, _: int) -> Motion:
+        views = self._views(number)
+        if views is None:
+            states = self._passes.take(self._sizes[0], STATES)
+            alone = Views(number, number, None, BESIDE)
+            made = result(self._passes, self._sizes[0], alone, states)
+            self._passes.give(states)
+            return made
+        states = self._once("mended", number, 0, self._mended)
+        made = result(self._passes, self._sizes[0], views, states)
+        self._forget(number)
+        return made
+
+    def _forget(self, number: int) -> None:
+        """Let go of what the frames after and before this one will not need."""
+        for key in list(self._made):
+            stage, other, level = key
+            if abs(other - number) > KEPT[stage] + level:
+                made = self._made.pop(key)
+                textures = made if isinstance(made, list) else [made] if made else []
+                if isinstance(made, Motion):
+                    textures = [made.motion, made.depth]
+                self._passes.give(*textures)

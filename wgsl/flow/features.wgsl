@@ -1,0 +1,16 @@
+// What the features of pyramid.wgsl are worth when two pixels are compared.
+
+const DIRECTION_SCALE: f32 = 0.25;      // directions are stored this many times too large, inverted
+const LIKENESS: f32 = 300.0;            // how fast the weight falls with the difference of display colours
+const LEAST_WEIGHT: f32 = 0.02;         // of a pixel unlike the centre
+
+/// How far apart two pixels are: the sum of absolute differences of their 7 features.
+fn difference(a0: vec4f, a1: vec3f, b0: vec4f, b1: vec3f) -> f32 {
+    return dot(abs(a0 - b0), vec4f(1.0)) + dot(abs(a1 - b1), vec3f(1.0, DIRECTION_SCALE, DIRECTION_SCALE));
+}
+
+/// Weight of a pixel near another one: high if their colours are alike, so that it is likely of the same surface.
+fn likeness(a: vec3f, b: vec3f) -> f32 {
+    let d = dot(abs(a - b), vec3f(1.0));
+    return 1.0 / (1.0 + LIKENESS * d * d) + LEAST_WEIGHT;
+}

@@ -1,0 +1,88 @@
+// The first states, on the coarsest level: the best of all whole displacements within reach, for one pixel of each
+// block; the sweeps pass it on.
+//#include common/loops.wgsl
+//#include flow/match.wgsl
+
+struct Reach {
+    most: i32,          // greatest displacement along either axis [px]
+    first: i32,         // the first column of displacements of this pass; it takes COLUMNS of them
+    blocks: vec2u,      // across, down
+}
+
+@group(1) @binding(4) var<uniform> reach: Reach;
+@group(1) @binding(5) var<storage, read_write> best: array<vec4f>;  // of each block: u, v, cost
+@group(1) @binding(6) var output: StatesOut;
+
+const COLUMNS: i32 = 9;             // lavapipe ends loops after 65,535 turns
+const BLOCK: i32 = 2;               // pixels along a block
+const SEARCH_SIDE: i32 = 4;         // samples along a patch,
+const SEARCH_PATCH: i32 = 16;       // and in it
+const SEARCH_STRIDE: i32 = 2;       // from one to the next [px]
+const LENGTH_PRICE: f32 = 0.0001;   // per px of displacement: of equals, the shortest
+
+var<private> own0: array<vec4f, SEARCH_PATCH>;
+var<private> own1: array<vec4f, SEARCH_PATCH>;  // xyz; w: the sample's weight
+
+fn search_offset(k: i32) -> vec2i {
+    return SEARCH_STRIDE * vec2i(k % SEARCH_SIDE, k / SEARCH_SIDE) - (SEARCH_SIDE - 1);
+}
+
+fn load_search_patch(px: vec2i) {
+    let centre = textureLoad(here, px, 0, 0).rgb;
+    var total = 0.0;
+    for (var k = 0; k < SEARCH_PATCH; k++) {
+        let at = px + search_offset(k);
+        own0[k] = textureLoad(here, at, 0, 0);
+        let is_inside = all(at >= vec2i(0)) && all(at < vec2i(frame.size));
+        let weight = select(0.0, likeness(own0[k].rgb, centre), is_inside);
+        own1[k] = vec4f(textureLoad(here, at, 1, 0).xyz, weight);
+        total += weight;
+    }
+    for (var k = 0; k < SEARCH_PATCH; k++) { own1[k].w /= total; }
+}
+
+fn whole_cost(other: texture_2d_array<f32>, at: vec2i) -> f32 {
+    let last = vec2i(frame.size) - 1;
+    var sum = 0.0;
+    for (var k = 0; k < SEARCH_PATCH; k++) {
+        let px = clamp(at + search_offset(k), vec2i(0), last);
+        let found0 = textureLoad(other, px, 0, 0);
+        let d = difference(own0[k], own1[k].xyz, found0, textureLoad(other, px, 1, 0).xyz);
+        sum += own1[k].w * min(d, MOST_DIFFERENCE);
+    }
+    return select(sum, OUTSIDE, any(at < vec2i(0)) || any(at > last));
+}
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn search(@builtin(global_invocation_id) id: vec3u) {
+    let block = min(id.xy, reach.blocks - 1u);
+    let px = min(BLOCK * vec2i(block), vec2i(frame.size) - 1);
+    let index = block.y * reach.blocks.x + block.x;
+    load_search_patch(px);
+    var found = vec3f(0.0, 0.0, 2.0 * OUTSIDE);
+    if reach.first > -reach.most { found = best[index].xyz; }
+    let turns = turns_of(u32(2 * reach.most + 1), id.x);
+    for (var column = reach.first; column < reach.first + COLUMNS; column++) {
+        for (var k = 0u; k < turns; k++) {
+            let by = vec2i(column, i32(k) - reach.most);
+            let n = whole_cost(near, px + by);
+            var cost = n;
+            if VIEWS == AROUND {
+                let f = whole_cost(far, px - by);
+                cost = min(0.5 * (n + f), min(n, f) + HIDDEN_PRICE);
+            }
+            cost += LENGTH_PRICE * f32(abs(by.x) + abs(by.y));
+            if cost < found.z && column <= reach.most { found = vec3f(vec2f(by), cost); }
+        }
+    }
+    if all(id.xy < reach.blocks) { best[index] = vec4f(found, 0.0); }
+}
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn write_states(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let block = id.xy / u32(BLOCK);
+    let found = best[block.y * reach.blocks.x + block.x];
+    textureStore(output, id.xy, 0, vec4f(found.xy, 0.0, 0.0));
+    textureStore(output, id.xy, 1, vec4f(0.0));
+}
