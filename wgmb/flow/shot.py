@@ -49,7 +49,7 @@ class Effort:
 
 FINEST_STRIDE, STRIDE = 1.0, 2.0  # between the samples of a patch [px]
 FAR_PRICE = 0.03  # for being hidden in the near frame, if the far one is two frames away
-EFFORTS = {"best": Effort(4, 3, 3), "fast": Effort(3, 2, 0)}
+EFFORTS = {"best": Effort(4, 2, 2), "fast": Effort(3, 2, 0)}
 KEPT = {"pictures": 4, "searched": 1, "mended": 0, "motion": 2}  # frames around the one asked for
 
 
@@ -143,6 +143,7 @@ class Shot:
         return {
             "constants": {"VIEWS": kind},
             "view": uniform,
+            "linear": self._passes.linear,
             **textures,
         }
 

@@ -8,10 +8,10 @@ struct Carry {
     unused: vec2u,
 }
 
-@group(1) @binding(4) var<uniform> carry: Carry;
-@group(1) @binding(5) var states: texture_2d_array<f32>;
-@group(1) @binding(6) var<storage, read_write> landings: array<Landing>;
-@group(1) @binding(7) var output: StatesOut;
+@group(1) @binding(5) var<uniform> carry: Carry;
+@group(1) @binding(6) var states: texture_2d_array<f32>;
+@group(1) @binding(7) var<storage, read_write> landings: array<Landing>;
+@group(1) @binding(8) var output: StatesOut;
 
 struct Landing {
     cost: atomic<u32>,      // the least, as the bits of a number above 0
@@ -25,7 +25,7 @@ const CORNERS: u32 = 4u;    // pixels around the place where a state lands
 /// Displacement to the other frame, and its slope.
 fn way_of(state: State) -> State {
     if carry.along > 0.0 { return state; }
-    return State(view.far_factor * state.flow + state.bend, vec2f(0.0), view.far_factor * state.slope);
+    return way_to_far(state);
 }
 
 /// One of the pixels around the place where the state of a pixel lands; -1 if it is outside.
@@ -49,8 +49,8 @@ fn claim(@builtin(global_invocation_id) id: vec3u) {
     let way = way_of(load_state(states, px));
     load_patch(px);
     let is_near = carry.along > 0.0;
-    let n = side_cost(near, way.flow, way.slope, select(-1.0, OUTSIDE, is_near));
-    let f = side_cost(far, way.flow, way.slope, select(OUTSIDE, -1.0, is_near));
+    let n = near_cost(target_of(way.flow, way.slope, select(-1.0, OUTSIDE, is_near)));
+    let f = far_cost(target_of(way.flow, way.slope, select(OUTSIDE, -1.0, is_near)));
     let cost = bitcast<u32>(min(n, f) + 1.0);
     if any(id.xy >= frame.size) { return; }
     landings[id.y * frame.size.x + id.x].own = cost;

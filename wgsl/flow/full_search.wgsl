@@ -9,9 +9,9 @@ struct Reach {
     blocks: vec2u,      // across, down
 }
 
-@group(1) @binding(4) var<uniform> reach: Reach;
-@group(1) @binding(5) var<storage, read_write> best: array<vec4f>;  // of each block: u, v, cost
-@group(1) @binding(6) var output: StatesOut;
+@group(1) @binding(5) var<uniform> reach: Reach;
+@group(1) @binding(6) var<storage, read_write> best: array<vec4f>;  // of each block: u, v, cost
+@group(1) @binding(7) var output: StatesOut;
 
 const COLUMNS: i32 = 9;             // lavapipe ends loops after 65,535 turns
 const BLOCK: i32 = 2;               // pixels along a block
@@ -28,29 +28,35 @@ fn search_offset(k: i32) -> vec2i {
 }
 
 fn load_search_patch(px: vec2i) {
-    let centre = textureLoad(here, px, 0, 0).rgb;
+    let color = textureLoad(here, px, 0, 0).rgb;
     var total = 0.0;
     for (var k = 0; k < SEARCH_PATCH; k++) {
         let at = px + search_offset(k);
         own0[k] = textureLoad(here, at, 0, 0);
         let is_inside = all(at >= vec2i(0)) && all(at < vec2i(frame.size));
-        let weight = select(0.0, likeness(own0[k].rgb, centre), is_inside);
+        let weight = select(0.0, likeness(own0[k].rgb, color), is_inside);
         own1[k] = vec4f(textureLoad(here, at, 1, 0).xyz, weight);
         total += weight;
     }
     for (var k = 0; k < SEARCH_PATCH; k++) { own1[k].w /= total; }
 }
 
-fn whole_cost(other: texture_2d_array<f32>, at: vec2i) -> f32 {
+/// Mean difference from another frame; what is above `most` may be too small, but is above `most`.
+fn whole_cost(other: texture_2d_array<f32>, at: vec2i, most: f32) -> f32 {
     let last = vec2i(frame.size) - 1;
+    let is_outside = any(at < vec2i(0)) || any(at > last);
+    let limit = select(most, -1.0, is_outside);
     var sum = 0.0;
-    for (var k = 0; k < SEARCH_PATCH; k++) {
-        let px = clamp(at + search_offset(k), vec2i(0), last);
-        let found0 = textureLoad(other, px, 0, 0);
-        let d = difference(own0[k], own1[k].xyz, found0, textureLoad(other, px, 1, 0).xyz);
-        sum += own1[k].w * min(d, MOST_DIFFERENCE);
+    for (var row = 0; row < SEARCH_SIDE && sum <= limit; row++) {
+        for (var column = 0; column < SEARCH_SIDE; column++) {
+            let k = SEARCH_SIDE * row + column;
+            let px = clamp(at + search_offset(k), vec2i(0), last);
+            let found0 = textureLoad(other, px, 0, 0);
+            let d = difference(own0[k], own1[k].xyz, found0, textureLoad(other, px, 1, 0).xyz);
+            sum += own1[k].w * min(d, MOST_DIFFERENCE);
+        }
     }
-    return select(sum, OUTSIDE, any(at < vec2i(0)) || any(at > last));
+    return select(sum, OUTSIDE, is_outside);
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -65,13 +71,16 @@ fn search(@builtin(global_invocation_id) id: vec3u) {
     for (var column = reach.first; column < reach.first + COLUMNS; column++) {
         for (var k = 0u; k < turns; k++) {
             let by = vec2i(column, i32(k) - reach.most);
-            let n = whole_cost(near, px + by);
+            let length_price = LENGTH_PRICE * f32(abs(by.x) + abs(by.y));
+            let most = found.z - length_price;
+            let n = whole_cost(near, px + by, select(most, 2.0 * most, VIEWS == AROUND));
             var cost = n;
             if VIEWS == AROUND {
-                let f = whole_cost(far, px - by);
+                let useful = min(most, n + HIDDEN_PRICE);
+                let f = whole_cost(far, px - by, max(2.0 * useful - n, useful - HIDDEN_PRICE));
                 cost = min(0.5 * (n + f), min(n, f) + HIDDEN_PRICE);
             }
-            cost += LENGTH_PRICE * f32(abs(by.x) + abs(by.y));
+            cost += length_price;
             if cost < found.z && column <= reach.most { found = vec3f(vec2f(by), cost); }
         }
     }

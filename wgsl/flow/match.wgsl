@@ -14,6 +14,7 @@ struct View {
 @group(1) @binding(1) var here: texture_2d_array<f32>;      // features of this frame
 @group(1) @binding(2) var near: texture_2d_array<f32>;      // of the near one
 @group(1) @binding(3) var far: texture_2d_array<f32>;       // of the far one
+@group(1) @binding(4) var linear: sampler;
 
 override VIEWS: u32 = 2u;           // which frames are compared with this one:
 const ONE: u32 = 1u;                // one beside it
@@ -21,68 +22,98 @@ const AROUND: u32 = 2u;             // those before and after it
 const BESIDE: u32 = 3u;             // the two nearest on one side
 
 const SIDE: u32 = 5u;           // samples along a patch
-const PATCH: u32 = 25u;         // samples in a patch
-const SPREAD_ORDER: u32 = 7u;   // samples are taken this far apart, so that the first few cover the patch
+const ROW_ORDER: u32 = 2u;      // rows are taken this far apart
 const MOST_DIFFERENCE: f32 = 0.6;   // of a sample: what differs more is something else
+const BESIDE_CENTRE: f32 = 0.0009765625;    // [px]; hardware filters in steps of 1/256
 const OUTSIDE: f32 = 2.0;       // cost of leaving the picture: more than any other
 const HIDDEN_PRICE: f32 = 0.03; // for being hidden in one of the frames
 const SLOPE_PRICE: f32 = 0.02;  // per unit of slope
 const BEND_PRICE: f32 = 0.002;  // per px of bend
 
-struct Patch {
-    x: vec2f,                   // its centre, in pixels whose centres are whole numbers
-    features0: array<vec4f, PATCH>,
-    features1: array<vec4f, PATCH>,     // xyz; w: the sample's weight, all of them sum up to 1
+var<private> centre: vec2f;             // of the patch, in pixels whose centres are whole numbers
+var<private> centre_color: vec3f;       // its display colour
+var<private> inverse_weight: f32;       // one over the weight of all samples
+
+/// Row `k` of a patch from its centre [px]: the middle one first, then the others, far from one another.
+fn row_offset(k: u32) -> f32 {
+    return view.stride * (f32((k * ROW_ORDER + SIDE / 2u) % SIDE) - f32(SIDE / 2u));
 }
 
-var<private> patch_here: Patch;
+fn column_offset(k: u32) -> f32 {
+    return view.stride * (f32(k) - f32(SIDE / 2u));
+}
 
-/// Place of a sample from the centre of its patch [px].
-fn sample_offset(k: u32) -> vec2f {
-    let i = (k * SPREAD_ORDER + PATCH / 2u) % PATCH;
-    return view.stride * (vec2f(f32(i % SIDE), f32(i / SIDE)) - f32(SIDE / 2u));
+/// Weight of a sample; 0 outside the picture.
+fn sample_weight(px: vec2i, color: vec3f) -> f32 {
+    let is_inside = all(px >= vec2i(0)) && all(px < vec2i(frame.size));
+    return select(0.0, likeness(color, centre_color), is_inside);
 }
 
 fn load_patch(px: vec2i) {
-    let centre = textureLoad(here, px, 0, 0).rgb;
-    patch_here.x = vec2f(px);
+    centre = vec2f(px);
+    centre_color = textureLoad(here, px, 0, 0).rgb;
     var total = 0.0;
-    for (var k = 0u; k < PATCH; k++) {
-        let at = px + vec2i(sample_offset(k));
-        let features0 = textureLoad(here, at, 0, 0);
-        let is_inside = all(at >= vec2i(0)) && all(at < vec2i(frame.size));
-        let weight = select(0.0, likeness(features0.rgb, centre), is_inside);
-        patch_here.features0[k] = features0;
-        patch_here.features1[k] = vec4f(textureLoad(here, at, 1, 0).xyz, weight);
-        total += weight;
+    for (var row = 0u; row < SIDE; row++) {
+        for (var column = 0u; column < SIDE; column++) {
+            let at = px + vec2i(vec2f(column_offset(column), row_offset(row)));
+            total += sample_weight(at, textureLoad(here, at, 0, 0).rgb);
+        }
     }
-    for (var k = 0u; k < PATCH; k++) { patch_here.features1[k].w /= total; }
+    inverse_weight = 1.0 / total;
 }
 
-/// Mean difference of the patch from another frame, moved by `flow`; OUTSIDE if it is more than `most`.
-fn side_cost(other: texture_2d_array<f32>, flow: vec2f, slope: vec4f, most: f32) -> f32 {
-    let centre = patch_here.x + flow;
-    let last = vec2f(frame.size) - 1.0;
-    let is_inside = all(centre >= vec2f(0.0)) && all(centre <= last);
-    let limit = select(-1.0, most, is_inside);
+struct Target {         // of a patch in another frame
+    at: vec2f,          // its centre
+    slope: vec4f,       // how its samples are drawn apart
+    limit: f32,         // cost above which it is not looked at further
+}
+
+fn target_of(flow: vec2f, slope: vec4f, most: f32) -> Target {
+    let at = centre + flow;
+    let is_inside = all(at >= vec2f(0.0)) && all(at <= vec2f(frame.size) - 1.0);
+    return Target(at, slope, select(-1.0, most, is_inside));
+}
+
+/// Where a sample is in the other frame, as the sampler takes it. Beside a pixel's centre by so little that no
+/// neighbour has a weight, so that a whole displacement gives the pixel itself wherever the rounding goes.
+fn sample_place(to: Target, offset: vec2f) -> vec2f {
+    return (to.at + offset + sloped(to.slope, offset) + 0.5 + BESIDE_CENTRE) / vec2f(frame.size);
+}
+
+/// What a sample adds to the cost if this is found in the other frame.
+fn sample_cost(offset: vec2f, found0: vec4f, found1: vec4f) -> f32 {
+    let px = vec2i(centre + offset);
+    let own0 = textureLoad(here, px, 0, 0);
+    let d = difference(own0, textureLoad(here, px, 1, 0).xyz, found0, found1.xyz);
+    return inverse_weight * sample_weight(px, own0.rgb) * min(d, MOST_DIFFERENCE);
+}
+
+/// Mean difference of the patch from the near frame; OUTSIDE if it is more than the limit.
+fn near_cost(to: Target) -> f32 {
     var sum = 0.0;
-    for (var k = 0u; k < PATCH && sum <= limit; k++) {
-        let offset = sample_offset(k);
-        let at = clamp(centre + offset + sloped(slope, offset), vec2f(0.0), last);
-        let a = vec2i(at);
-        let b = min(a + 1, vec2i(last));
-        let part = at - vec2f(a);
-        let ba = vec2i(b.x, a.y);
-        let ab = vec2i(a.x, b.y);
-        let found0 = mix(mix(textureLoad(other, a, 0, 0), textureLoad(other, ba, 0, 0), part.x),
-                         mix(textureLoad(other, ab, 0, 0), textureLoad(other, b, 0, 0), part.x), part.y);
-        let found1 = mix(mix(textureLoad(other, a, 1, 0), textureLoad(other, ba, 1, 0), part.x),
-                         mix(textureLoad(other, ab, 1, 0), textureLoad(other, b, 1, 0), part.x), part.y);
-        let own1 = patch_here.features1[k];
-        let d = difference(patch_here.features0[k], own1.xyz, found0, found1.xyz);
-        sum += own1.w * min(d, MOST_DIFFERENCE);
+    for (var row = 0u; row < SIDE && sum <= to.limit; row++) {
+        for (var column = 0u; column < SIDE; column++) {
+            let offset = vec2f(column_offset(column), row_offset(row));
+            let at = sample_place(to, offset);
+            sum += sample_cost(offset, textureSampleLevel(near, linear, at, 0, 0.0),
+                               textureSampleLevel(near, linear, at, 1, 0.0));
+        }
     }
-    return select(OUTSIDE, sum, sum <= limit);
+    return select(OUTSIDE, sum, sum <= to.limit);
+}
+
+/// The same of the far frame.
+fn far_cost(to: Target) -> f32 {
+    var sum = 0.0;
+    for (var row = 0u; row < SIDE && sum <= to.limit; row++) {
+        for (var column = 0u; column < SIDE; column++) {
+            let offset = vec2f(column_offset(column), row_offset(row));
+            let at = sample_place(to, offset);
+            sum += sample_cost(offset, textureSampleLevel(far, linear, at, 0, 0.0),
+                               textureSampleLevel(far, linear, at, 1, 0.0));
+        }
+    }
+    return select(OUTSIDE, sum, sum <= to.limit);
 }
 
 /// What a state costs in itself.
@@ -90,13 +121,19 @@ fn price(state: State) -> f32 {
     return SLOPE_PRICE * dot(abs(state.slope), vec4f(1.0)) + BEND_PRICE * (abs(state.bend.x) + abs(state.bend.y));
 }
 
+/// A state as it leads to the far frame.
+fn way_to_far(state: State) -> State {
+    return State(view.far_factor * state.flow + state.bend, vec2f(0.0), view.far_factor * state.slope);
+}
+
 /// Cost of matching, without price(); anything above `most` may be wrong, but is above `most`.
 fn match_cost(state: State, most: f32) -> f32 {
-    let n = side_cost(near, state.flow, state.slope, select(2.0 * most, most, VIEWS == ONE));
+    let n = near_cost(target_of(state.flow, state.slope, select(2.0 * most, most, VIEWS == ONE)));
     if VIEWS == ONE { return n; }
     // The far side is looked at as long as it can still change the result.
     let useful = min(most, n + HIDDEN_PRICE);
     let limit = max(2.0 * useful - n, useful - HIDDEN_PRICE - view.far_price);
-    let f = side_cost(far, view.far_factor * state.flow + state.bend, view.far_factor * state.slope, limit);
+    let way = way_to_far(state);
+    let f = far_cost(target_of(way.flow, way.slope, limit));
     return min(0.5 * (n + f), min(n, f + view.far_price) + HIDDEN_PRICE);
 }

@@ -8,13 +8,13 @@ struct Others {         // how the states of the two other frames lead back to t
     unused: vec2u,
 }
 
-@group(1) @binding(4) var<uniform> others: Others;
-@group(1) @binding(5) var states: texture_2d_array<f32>;
-@group(1) @binding(6) var near_states: texture_2d_array<f32>;
-@group(1) @binding(7) var far_states: texture_2d_array<f32>;
-@group(1) @binding(8) var lost: texture_2d<u32>;        // what `find_lost` wrote: 1 if a pixel is not found again
-@group(1) @binding(9) var lost_out: texture_storage_2d<r32uint, write>;
-@group(1) @binding(10) var output: StatesOut;
+@group(1) @binding(5) var<uniform> others: Others;
+@group(1) @binding(6) var states: texture_2d_array<f32>;
+@group(1) @binding(7) var near_states: texture_2d_array<f32>;
+@group(1) @binding(8) var far_states: texture_2d_array<f32>;
+@group(1) @binding(9) var lost: texture_2d<u32>;        // what `find_lost` wrote: 1 if a pixel is not found again
+@group(1) @binding(10) var lost_out: texture_storage_2d<r32uint, write>;
+@group(1) @binding(11) var output: StatesOut;
 
 const MOST_MISSED: f32 = 1.5;       // way there and back of a pixel that is found again [px]
 const RINGS: u32 = 9u;
@@ -68,7 +68,6 @@ fn mend(@builtin(local_invocation_index) local: u32,
     let px = vec2i(min(id, frame.size - 1u));
     var state = load_state(states, px);
     let tries = select(0u, RINGS * DIRECTIONS, textureLoad(lost, px, 0).x != 0u);
-    let centre = textureLoad(here, px, 0, 0).rgb;
     load_patch(px);
     var best = OUTSIDE;
     for (var k = 0u; k < tries; k++) {
@@ -78,7 +77,7 @@ fn mend(@builtin(local_invocation_index) local: u32,
         let is_there = all(source >= vec2i(0)) && all(source < vec2i(frame.size));
         let is_sound = is_there && textureLoad(lost, source, 0).x == 0u;
         let candidate = moved(load_state(states, source), vec2f(px - source));
-        let unlike = min(dot(abs(textureLoad(here, source, 0, 0).rgb - centre), vec3f(1.0)), MOST_UNLIKE);
+        let unlike = min(dot(abs(textureLoad(here, source, 0, 0).rgb - centre_color), vec3f(1.0)), MOST_UNLIKE);
         let least = UNLIKE_PRICE * unlike + FAR_PRICE * radius;
         let most = select(-1.0, min(best - least, MOST_COST), is_sound);
         let own = price(candidate);

@@ -14,11 +14,11 @@ struct Sweep {
     unused: u32,
 }
 
-@group(1) @binding(4) var<uniform> sweep: Sweep;
-@group(1) @binding(5) var states: texture_2d_array<f32>;
-@group(1) @binding(6) var carried_near: texture_2d_array<f32>;  // states of the near frame, carried into this one
-@group(1) @binding(7) var carried_far: texture_2d_array<f32>;   // the same of the far frame
-@group(1) @binding(8) var output: StatesOut;
+@group(1) @binding(5) var<uniform> sweep: Sweep;
+@group(1) @binding(6) var states: texture_2d_array<f32>;
+@group(1) @binding(7) var carried_near: texture_2d_array<f32>;  // states of the near frame, carried into this one
+@group(1) @binding(8) var carried_far: texture_2d_array<f32>;   // the same of the far frame
+@group(1) @binding(9) var output: StatesOut;
 
 const SMOOTHNESS: f32 = 0.08;       // cost of 1 px of difference from the neighbours
 const BEND_SHARE: f32 = 0.5;        // of a difference of bends, against one of flows
@@ -39,13 +39,14 @@ const SLOPE_FALL: f32 = 0.4;        // each is so much of the one before
 const BEND_TRIES: u32 = 4u;         // random changes of the bend, with the flow or without
 const BEND_FALL: f32 = 0.25;
 const REFINED: u32 = 15u;           // two planes, the changes, no slope, no bend
+const SAME: f32 = 0.001;            // states closer than this are not tried again [px]
 
 var<private> around: array<vec4f, NEIGHBOURS>;      // flow and bend of the neighbours, each moved here
 var<private> around_weight: array<f32, NEIGHBOURS>; // all of them sum up to SMOOTHNESS
 
 /// Each neighbour's state along its own slope, and its weight by likeness.
 fn load_neighbours(px: vec2i) {
-    let centre = textureLoad(here, px, 0, 0).rgb;
+    let color = textureLoad(here, px, 0, 0).rgb;
     var total = 1e-6;
     for (var k = 0u; k < NEIGHBOURS; k++) {
         let place = select(k, NEIGHBOURS, k == NEIGHBOURS / 2u);    // of 3 x 3, but for the centre
@@ -53,7 +54,7 @@ fn load_neighbours(px: vec2i) {
         let at = px + by;
         let is_inside = all(at >= vec2i(0)) && all(at < vec2i(frame.size));
         let state = moved(load_state(states, at), -vec2f(by));
-        let weight = select(0.0, likeness(textureLoad(here, at, 0, 0).rgb, centre), is_inside);
+        let weight = select(0.0, likeness(textureLoad(here, at, 0, 0).rgb, color), is_inside);
         around[k] = vec4f(state.flow, state.bend);
         around_weight[k] = weight;
         total += weight;
@@ -88,9 +89,12 @@ fn attempt(best: Best, candidate: State) -> Best {
     var state = candidate;
     state.slope = clamp(state.slope, vec4f(-STEEPEST), vec4f(STEEPEST));
     let least = smoothness(state) + price(state);
-    let most = best.energy - least;
+    let apart = abs(vec4f(state.flow - best.state.flow, state.bend - best.state.bend));
+    let is_same = max(max(apart.x, apart.y), max(apart.z, apart.w)) < SAME
+        && all(abs(state.slope - best.state.slope) < vec4f(SAME));
+    let most = select(best.energy - least, -1.0, is_same);
     let energy = least + match_cost(state, most);
-    if energy < best.energy { return Best(state, energy); }
+    if energy < best.energy && !is_same { return Best(state, energy); }
     return best;
 }
 
@@ -154,7 +158,7 @@ struct Plane {
 
 /// The plane through the flows near by that are of like pixels and like the state.
 fn fitted_plane(px: vec2i, state: State) -> Plane {
-    let centre = textureLoad(here, px, 0, 0).rgb;
+    let color = textureLoad(here, px, 0, 0).rgb;
     var total = 0.0;
     var sum_at = vec2f(0.0);
     var sum_flow = vec2f(0.0);
@@ -167,7 +171,7 @@ fn fitted_plane(px: vec2i, state: State) -> Plane {
         let flow = textureLoad(states, at, 0, 0).xy;
         let x = vec2f(by);
         let apart = dot(abs(flow - moved(state, x).flow), vec2f(1.0));
-        let like = likeness(textureLoad(here, at, 0, 0).rgb, centre) / (1.0 + apart * apart);
+        let like = likeness(textureLoad(here, at, 0, 0).rgb, color) / (1.0 + apart * apart);
         let weight = select(0.0, like, is_there);
         total += weight;
         sum_at += weight * x;
