@@ -19,7 +19,7 @@ LAYERS = [
     {"frame", "cone"},
     {"frame_views", "reach", "exposure"},
     {"velocity", "holdout"},
-    {"io", "scene", "observer"},
+    {"io", "scene", "observer", "flow"},
     {"methods"},
     {"residency"},
     {"pipeline"},
@@ -32,7 +32,7 @@ LAYERS = [
 PLACE = {room: number for number, layer in enumerate(LAYERS) for room in layer}
 GPU = {
     "gpu", "scene", "methods", "velocity", "holdout", "observer", "residency", "pipeline",
-    "render", "lab", "viewer", "frame_views",
+    "render", "lab", "viewer", "frame_views", "flow",
 }  # fmt: skip
 HOMES = {
     "wgpu": GPU,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .cone import Cone
     from .display import ColorConfig, ColorSpace, Display
     from .errors import DeviceError, Error, GpuMemoryError, InputError, ShaderError
+    from .flow import Flow
     from .frame import Frame
     from .frame_views import FrameViews
     from .io.camera_file import CameraFile
@@ -47,6 +48,7 @@ __all__ = [
     "DeviceError",
     "Display",
     "Error",
+    "Flow",
     "Frame",
     "FrameViews",
     "GpuMemoryError",
@@ -72,6 +74,7 @@ _PLACES = {
     "cone": ("Cone",),
     "display": ("ColorConfig", "ColorSpace", "Display"),
     "errors": ("DeviceError", "Error", "GpuMemoryError", "InputError", "ShaderError"),
+    "flow": ("Flow",),
     "frame": ("Frame",),
     "frame_views": ("FrameViews",),
     "io.camera_file": ("CameraFile",),

@@ -26,16 +26,13 @@ def dominant_homography(points: np.ndarray, motion: np.ndarray, longest: float) 
     tolerance = 2 * TOLERANCE
     picks = np.random.default_rng(0).integers(0, len(here), (SAMPLES, POINTS))
     candidates = np.concatenate([np.eye(3)[None], _fits(here[picks], there[picks])])
-    counts = [_agrees(h, here, there, tolerance).sum() for h in candidates]
-    best = candidates[int(np.argmax(counts))]
+    best = max(candidates, key=lambda h: _agreement(h, here, there, tolerance))
     for _ in range(REFINEMENTS):
-        near = _agrees(best, here, there, tolerance)
+        near = _apart(best, here, there) <= tolerance
         if near.sum() < POINTS:
             break
         fitted = _least_squares(here[near], there[near])
-        if _agrees(fitted, here, there, tolerance).sum() < near.sum():
-            break
-        best = fitted
+        best = max(best, fitted, key=lambda h: _agreement(h, here, there, tolerance))
     scale = np.diag([2 / longest, 2 / longest, 1.0])
     scale[:2, 2] = -points.max(axis=0) / longest
     return np.linalg.inv(scale) @ best @ scale
@@ -65,9 +62,14 @@ def _least_squares(here: np.ndarray, there: np.ndarray) -> np.ndarray:
     return np.append(solved, 1.0).reshape(3, 3)
 
 
-def _agrees(homography, here, there, tolerance) -> np.ndarray:
-    """Which points the homography moves to where they are."""
+def _agreement(homography, here, there, tolerance: float) -> float:
+    """How many points end where the homography moves them; those that end near it count less."""
+    return float(np.maximum(0, 1 - _apart(homography, here, there) / tolerance).sum())
+
+
+def _apart(homography, here, there) -> np.ndarray:
+    """Distance of every point's end from where the homography moves it."""
     moved = here @ homography[:, :2].T + homography[:, 2]
     in_front = moved[:, 2] > 0.1
     apart = moved[:, :2] / np.where(in_front, moved[:, 2], 1.0)[:, None] - there
-    return in_front & (np.hypot(apart[:, 0], apart[:, 1]) <= tolerance)
+    return np.where(in_front, np.hypot(apart[:, 0], apart[:, 1]), np.inf)

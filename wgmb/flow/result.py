@@ -41,8 +41,9 @@ def result(
     spare_depth = passes.scratch((1, 1), "r32float", "spare depth")
     none = passes.scratch((1, 1), "rgba32float", "none")
 
-    def run(entry, size, read=none, read_apart=none, **written):
-        outputs = {"motion_out": spare, "apart_out": spare, "depth_out": spare_depth} | written
+    def run(entry, size, read=none, read_apart=none, **written: wgpu.GPUTexture):
+        outputs: dict = {"motion_out": spare, "apart_out": spare, "depth_out": spare_depth}
+        outputs |= written
         passes.run(
             "motion.wgsl",
             entry,

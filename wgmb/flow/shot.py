@@ -2,9 +2,9 @@
 
 What a frame's stages are made of, so that the result is a function of its number alone:
 
-searched(n, coarsest)  pictures n - 1, n, n + 1
-searched(n, level)     mended(n, coarser), and searched(n - 1, coarser) and (n + 1, coarser), carried
-mended(n, level)       searched(n - 1, level), (n, level) and (n + 1, level)
+searched(n, coarsest): pictures n - 1, n, n + 1;
+searched(n, level): mended(n, coarser), and searched(n - 1, coarser) and (n + 1, coarser), carried;
+mended(n, level): searched(n - 1, level), (n, level) and (n + 1, level).
 
 With three levels, pictures n - 4 to n + 4 may have a say in the motion of frame n.
 """
@@ -19,8 +19,8 @@ import numpy as np
 import wgpu
 
 from ..errors import InputError
-from ..gpu import wgsl
 from .carry import carry
+from .match import matched
 from .mend import mend
 from .passes import STATES, Passes
 from .pyramid import features, level_sizes
@@ -47,8 +47,6 @@ class Effort:
         return self.between if level else self.finest
 
 
-FINEST_STRIDE, STRIDE = 1.0, 2.0  # between the samples of a patch [px]
-FAR_PRICE = 0.03  # for being hidden in the near frame, if the far one is two frames away
 EFFORTS = {"best": Effort(4, 2, 2), "fast": Effort(3, 2, 0)}
 KEPT = {"pictures": 4, "searched": 1, "mended": 0, "motion": 2}  # frames around the one asked for
 
@@ -130,33 +128,20 @@ class Shot:
 
     def _matched(self, views: Views, level: int) -> dict:
         """The bindings of match.wgsl for a frame on a level."""
-        far = views.near if views.far is None else views.far
-        numbers = {"here": views.here, "near": views.near, "far": far}
-        textures = {name: (self._features(n) or [])[level] for name, n in numbers.items()}
-        kind = int(wgsl.load("flow/match.wgsl").constant(views.kind))
-        values = {
-            "far_factor": views.factor,
-            "far_price": FAR_PRICE if views.factor == BESIDE else 0.0,
-            "stride": FINEST_STRIDE if level == 0 else STRIDE,
-        }
-        uniform = self._passes.uniform("match.wgsl", "View", **values)
-        return {
-            "constants": {"VIEWS": kind},
-            "view": uniform,
-            "linear": self._passes.linear,
-            **textures,
-        }
+        numbers = {views.here, views.near, views.near if views.far is None else views.far}
+        levels = {n: self._features(n) or [] for n in numbers}
+        return matched(self._passes, views, levels, level)
 
     def _searched(self, number: int, level: int) -> wgpu.GPUTexture:
         views, passes, size = self._views(number), self._passes, self._sizes[level]
         assert views is not None
-        matched = self._matched(views, level)
+        bound = self._matched(views, level)
         count = self._effort.sweeps(level, len(self._sizes))
         if level == len(self._sizes) - 1:
-            return sweep(passes, size, matched, self._full_search(size, matched), [], level, count)
+            return sweep(passes, size, bound, self._full_search(size, bound), [], level, count)
         states = self._grown(self._once("mended", number, level + 1, self._mended), level)
         guesses = [self._carried(other, views, level) for other in views.beside] if count else []
-        states = sweep(passes, size, matched, states, guesses, level, count)
+        states = sweep(passes, size, bound, states, guesses, level, count)
         passes.give(*guesses)
         return states
 
@@ -186,8 +171,8 @@ class Shot:
             assert theirs is not None
             neighbours[other] = theirs, self._once("searched", other, level, self._searched)
         states = self._once("searched", number, level, self._searched)
-        matched = self._matched(views, level)
-        return mend(self._passes, self._sizes[level], matched, views, states, neighbours)
+        bound = self._matched(views, level)
+        return mend(self._passes, self._sizes[level], bound, views, states, neighbours)
 
     def _motion(self, number: int, _: int) -> Motion:
         views = self._views(number)

@@ -8,10 +8,12 @@ from ..gpu import wgsl
 from .passes import STATES, Passes
 
 NEAR_BY = 0.05  # of the longer side: how far off random pixels are tried
-FLOW_STEP, FINEST_STEP = 1.0, 2.0  # greatest random change [px], on coarse levels and the finest
+STEP, FINEST_STEP = 1.0, 2.0  # greatest random change [px], on coarse levels and the finest
 BEND_STEP = 2.0  # the same of the bend, in pixels of the finest level
 MOST_APART, FINEST_APART = 1.0, 2.0  # differences beyond this [px] cost no more
+PASSES = 4  # of a sweep
 SEEDS = 64  # random numbers that a pass may take for a pixel
+MOST_PASSES = 1000  # on one level
 
 
 def sweep(
@@ -27,33 +29,46 @@ def sweep(
 
     `matched`: the bindings of match.wgsl; `carried`: the near frame's states, and the far one's.
     """
-    source = wgsl.load("flow/sweep.wgsl")
-    assert 2 * source.constant("REFINED") <= SEEDS
-    half = -(-size[0] // 2), size[1]
     after = passes.take(size, STATES)
-    for number in range(4 * count):
-        turn, entry = number // 2, ("propagate", "refine")[number % 2]
-        values = {
-            "color": turn % 2,
-            "seed": SEEDS * (number + 1000 * level),
-            "reach": NEAR_BY * max(size),
-            "flow_step": FLOW_STEP if level else FINEST_STEP,
-            "bend_step": BEND_STEP / 2**level,
-            "most_apart": MOST_APART if level else FINEST_APART,
-            "carried": len(carried),
-        }
-        passes.run(
-            "sweep.wgsl",
-            entry,
-            size,
-            grid=half,
-            sweep=passes.uniform("sweep.wgsl", "Sweep", **values),
-            states=states,
-            carried_near=carried[0] if carried else states,
-            carried_far=carried[-1] if carried else states,
-            output=after,
-            **matched,
-        )
+    for number in range(PASSES * count):
+        half_sweep(passes, size, matched, states, carried, level, number, after)
         states, after = after, states
     passes.give(after)
     return states
+
+
+def half_sweep(
+    passes: Passes,
+    size: tuple[int, int],
+    matched: dict,
+    states: wgpu.GPUTexture,
+    carried: list[wgpu.GPUTexture],
+    level: int,
+    number: int,
+    output: wgpu.GPUTexture,
+) -> None:
+    """Pass `number` of the sweeps: one colour of the chessboard, propagated or refined."""
+    assert 2 * wgsl.load("flow/sweep.wgsl").constant("REFINED") <= SEEDS
+    uniform = passes.uniform(
+        "sweep.wgsl",
+        "Sweep",
+        color=number // 2 % 2,
+        seed=SEEDS * (number + MOST_PASSES * level),
+        reach=NEAR_BY * max(size),
+        flow_step=STEP if level else FINEST_STEP,
+        bend_step=BEND_STEP / 2**level,
+        most_apart=MOST_APART if level else FINEST_APART,
+        carried=len(carried),
+    )
+    passes.run(
+        "sweep.wgsl",
+        "refine" if number % 2 else "propagate",
+        size,
+        grid=(-(-size[0] // 2), size[1]),
+        sweep=uniform,
+        states=states,
+        carried_near=carried[0] if carried else states,
+        carried_far=carried[-1] if carried else states,
+        output=output,
+        **matched,
+    )

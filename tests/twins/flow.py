@@ -1,0 +1,275 @@
+"""Flow's kernels, one pixel and one candidate at a time."""
+
+import math
+
+import numpy as np
+
+from wgmb.color import srgb
+
+LUMA = np.array([0.299, 0.587, 0.114])
+WEIGHTS = np.array([1, 1, 1, 1, 1, 0.25, 0.25])  # of the features, as they are stored
+
+
+def at(image, x, y):
+    """A pixel; outside, the nearest one."""
+    height, width = image.shape[:2]
+    return image[min(max(y, 0), height - 1), min(max(x, 0), width - 1)]
+
+
+def halved(picture):
+    height, width = (-(-n // 2) for n in picture.shape[:2])
+    out = np.zeros((height, width, 3))
+    for y in range(height):
+        for x in range(width):
+            out[y, x] = sum(at(picture, 2 * x + i, 2 * y + j) for i in (0, 1) for j in (0, 1)) / 4
+    return out
+
+
+def features(linear):
+    """(height, width, 7) as stored: display colour, gradient and its direction, 0 to 1."""
+    shown = srgb(linear).astype(float)
+    luma = shown @ LUMA
+    height, width = luma.shape
+    gradient = np.zeros((height, width, 2))
+    for y in range(height):
+        for x in range(width):
+            for k in (-1, 0, 1):
+                share = 0.5 if k == 0 else 0.25
+                gradient[y, x, 0] += share * (at(luma, x + 1, y + k) - at(luma, x - 1, y + k))
+                gradient[y, x, 1] += share * (at(luma, x + k, y + 1) - at(luma, x + k, y - 1))
+    square = (gradient**2).sum(axis=2)
+    kernel = np.exp(-(np.arange(-8, 9) ** 2) / 8)
+    kernel /= kernel.sum()
+    for axis in (0, 1):
+        padded = np.pad(square, [(8, 8) if i == axis else (0, 0) for i in (0, 1)], mode="edge")
+        square = np.apply_along_axis(np.convolve, axis, padded, kernel, "valid")
+    direction = 0.05 * gradient / (np.sqrt(square)[..., None] + 0.03)
+    return np.clip(np.dstack([shown, gradient + 0.5, direction / 0.25 + 0.5]), 0, 1)
+
+
+def likeness(a, b):
+    d = np.abs(a[..., :3] - b[..., :3]).sum(axis=-1)
+    return 1 / (1 + 300 * d * d) + 0.02
+
+
+def bilinear(image, x, y):
+    height, width = image.shape[:2]
+    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
+    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+    fx, fy = (x - i)[..., None], (y - j)[..., None]
+    right, below = np.minimum(i + 1, width - 1), np.minimum(j + 1, height - 1)
+    top = (1 - fx) * image[j, i] + fx * image[j, right]
+    return (1 - fy) * top + fy * ((1 - fx) * image[below, i] + fx * image[below, right])
+
+
+class Matcher:
+    """Cost of states; they are u, v, e, f, and the four slopes."""
+
+    def __init__(self, here, near, far, factor, stride, far_price=0.0):
+        self.here, self.near, self.far = here, near, far
+        self.factor, self.stride, self.far_price = factor, stride, far_price
+        self.height, self.width = here.shape[:2]
+
+    def side(self, other, x, y, flow, slope):
+        goal = np.array([x, y]) + flow
+        if not (0 <= goal[0] <= self.width - 1 and 0 <= goal[1] <= self.height - 1):
+            return 2.0
+        j, i = np.mgrid[-2:3, -2:3] * self.stride
+        px, py = x + i, y + j
+        inside = (px >= 0) & (py >= 0) & (px < self.width) & (py < self.height)
+        own = self.here[np.where(inside, py, y), np.where(inside, px, x)]
+        weight = np.where(inside, likeness(own, self.here[y, x]), 0)
+        sx = goal[0] + i + slope[0] * i + slope[1] * j
+        sy = goal[1] + j + slope[2] * i + slope[3] * j
+        d = np.abs(own - bilinear(other, sx, sy)) @ WEIGHTS
+        return float((weight * np.minimum(d, 0.6)).sum() / weight.sum())
+
+    def cost(self, x, y, state):
+        n = self.side(self.near, x, y, state[:2], state[4:])
+        if self.far is None:
+            return n
+        way = self.factor * state[:2] + state[2:4]
+        f = self.side(self.far, x, y, way, self.factor * state[4:])
+        return min((n + f) / 2, min(n, f + self.far_price) + 0.03)
+
+    def price(self, state):
+        return 0.02 * np.abs(state[4:]).sum() + 0.002 * np.abs(state[2:4]).sum()
+
+    def energy(self, x, y, state, states, most_apart):
+        """With what differs from the 8 neighbours."""
+        total = weights = 0.0
+        for j in (-1, 0, 1):
+            for i in (-1, 0, 1):
+                if (i or j) and 0 <= x + i < self.width and 0 <= y + j < self.height:
+                    near = moved(states[y + j, x + i], -i, -j)
+                    d = np.abs(near[:4] - state[:4]) @ [1, 1, 0.5, 0.5]
+                    weight = likeness(self.here[y + j, x + i], self.here[y, x])
+                    total, weights = total + weight * min(d, most_apart), weights + weight
+        smooth = 0.08 * total / max(weights, 1e-6)
+        return smooth + self.price(state) + self.cost(x, y, state)
+
+
+def moved(state, dx, dy):
+    out = np.array(state, float)
+    out[:2] += out[4] * dx + out[5] * dy, out[6] * dx + out[7] * dy
+    return out
+
+
+def propagated(matcher, states, x, y):
+    """The pixel's own state, and those that it always tries, without the random ones."""
+    tried = [states[y, x], np.zeros(8)]
+    near = [(i * n, j * n) for n in (1, 3) for i, j in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+    for i, j in near + [(i, j) for i in (-9, 9) for j in (-9, 9)]:
+        if 0 <= x + i < matcher.width and 0 <= y + j < matcher.height:
+            tried.append(moved(states[y + j, x + i], -i, -j))
+    return [np.clip(state, [-np.inf] * 4 + [-0.6] * 4, [np.inf] * 4 + [0.6] * 4) for state in tried]
+
+
+def refined(matcher, states, x, y):
+    """The same of the variations that are not random: a fitted plane."""
+    own = states[y, x]
+    rows, sides, weights = [], [], []
+    for j in range(-8, 9, 2):
+        for i in range(-8, 9, 2):
+            if 0 <= x + i < matcher.width and 0 <= y + j < matcher.height:
+                flow = states[y + j, x + i, :2]
+                apart = np.abs(flow - moved(own, i, j)[:2]).sum()
+                like = likeness(matcher.here[y + j, x + i], matcher.here[y, x])
+                rows.append([1, i, j])
+                sides.append(flow)
+                weights.append(like / (1 + apart * apart))
+    weights, rows, sides = np.array(weights), np.array(rows, float), np.array(sides)
+    square = rows.T @ (weights[:, None] * rows)
+    mean = square[0, 1:] / square[0, 0]
+    centred = square[1:, 1:] - np.outer(mean, square[0, 1:]) + np.eye(2) * square[0, 0]
+    product = rows.T @ (weights[:, None] * sides)
+    slope = np.linalg.solve(centred, product[1:] - np.outer(mean, product[0])).T
+    flow = product[0] / square[0, 0] - slope @ mean
+    sloped = np.concatenate([own[:4], slope.ravel()])
+    return [own, sloped, np.concatenate([flow, own[2:4], slope.ravel()])]
+
+
+def full_search(matcher, reach):
+    """u, v of every second pixel each way: the cheapest whole displacement."""
+    offsets = np.array([(i, j) for j in (-3, -1, 1, 3) for i in (-3, -1, 1, 3)])
+    height, width = matcher.height, matcher.width
+
+    def side(other, x, y, u, v):
+        if not (0 <= x + u < width and 0 <= y + v < height):
+            return 2.0
+        total = weights = 0.0
+        for i, j in offsets:
+            if 0 <= x + i < width and 0 <= y + j < height:
+                own = matcher.here[y + j, x + i]
+                weight = likeness(own, matcher.here[y, x])
+                d = np.abs(own - at(other, x + u + i, y + v + j)) @ WEIGHTS
+                total, weights = total + weight * min(d, 0.6), weights + weight
+        return total / weights
+
+    out = np.zeros((-(-height // 2), -(-width // 2), 2))
+    for y in range(0, height, 2):
+        for x in range(0, width, 2):
+            best = math.inf
+            for u in range(-reach, reach + 1):
+                for v in range(-reach, reach + 1):
+                    n, f = side(matcher.near, x, y, u, v), side(matcher.far, x, y, -u, -v)
+                    cost = min((n + f) / 2, min(n, f) + 0.03) + 1e-4 * (abs(u) + abs(v))
+                    if cost < best - 1e-7:
+                        best = cost
+                        out[y // 2, x // 2] = u, v
+    return out
+
+
+def carried(matcher, states, along, turn):
+    """States of a frame seen from its neighbour; the cheapest of those that land on a pixel."""
+    out, least = np.zeros_like(states), np.full(states.shape[:2], np.inf)
+    for y in range(matcher.height):
+        for x in range(matcher.width):
+            state = states[y, x]
+            flow, slope, other = state[:2], state[4:], matcher.near
+            if along < 0:
+                flow = matcher.factor * flow + state[2:4]
+                slope, other = matcher.factor * slope, matcher.far
+            cost = matcher.side(other, x, y, flow, slope)
+            left, top = math.floor(x + flow[0]), math.floor(y + flow[1])
+            for j in (top, top + 1):
+                for i in (left, left + 1):
+                    if not (0 <= i < matcher.width and 0 <= j < matcher.height):
+                        continue
+                    if cost < least[j, i]:
+                        least[j, i] = cost
+                        out[j, i] = [*turn * flow, 0, 0, *turn * slope]
+    return out
+
+
+def lost(states, near, far, factor, near_side, far_side):
+    """Which pixels are found again in neither neighbour."""
+    height, width = states.shape[:2]
+
+    def missed(x, y, flow, other, side):
+        gx, gy = x + flow[0], y + flow[1]
+        if not (0 <= gx <= width - 1 and 0 <= gy <= height - 1):
+            return True
+        back = other[..., :2] if side > 0 else other[..., 2:4] - other[..., :2]
+        return np.linalg.norm(flow + bilinear(back, np.array(gx), np.array(gy))) > 1.5
+
+    out = np.zeros((height, width), bool)
+    for y in range(height):
+        for x in range(width):
+            state = states[y, x]
+            out[y, x] = missed(x, y, state[:2], near, near_side)
+            if far is not None:
+                way = factor * state[:2] + state[2:4]
+                out[y, x] &= missed(x, y, way, far, far_side)
+    return out
+
+
+def mended(matcher, states, is_lost):
+    """Lost pixels with the best state of the sound ones on rings around them."""
+    out = states.copy()
+    for y, x in np.argwhere(is_lost):
+        best = 2.0
+        for ring in range(9):
+            radius = 2 * 1.5**ring
+            for k in range(8):
+                angle = 0.785398 * (k + 0.37 * radius)
+                i, j = round(x + radius * math.cos(angle)), round(y + radius * math.sin(angle))
+                inside = 0 <= i < matcher.width and 0 <= j < matcher.height
+                if not inside or is_lost[j, i]:
+                    continue
+                state = moved(states[j, i], x - i, y - j)
+                unlike = np.abs(matcher.here[j, i, :3] - matcher.here[y, x, :3]).sum()
+                match = matcher.price(state) + matcher.cost(x, y, state)
+                total = 0.2 * min(unlike, 0.5) + 0.001 * radius + min(match, 0.15)
+                if total < best:
+                    best, out[y, x] = total, state
+    return out
+
+
+def grown(states, size):
+    """States on the next finer level, of `size` (height, width)."""
+    out = np.zeros((*size, 8))
+    for y in range(size[0]):
+        for x in range(size[1]):
+            state = moved(states[y // 2, x // 2], x / 2 - 0.25 - x // 2, y / 2 - 0.25 - y // 2)
+            out[y, x] = state * [2, 2, 2, 2, 1, 1, 1, 1]
+    return out
+
+
+def depth(motion, to_prev, to_next):
+    """Depth from the distance of motion from two homographies, its median over 5 x 5 pixels."""
+    height, width = motion.shape[:2]
+    apart = np.zeros((height, width, 2))
+    for y in range(height):
+        for x in range(width):
+            place = np.array([x + 0.5, y + 0.5, 1])
+            for k, matrix in enumerate((to_prev, to_next)):
+                goal = matrix @ place
+                way = goal[:2] / goal[2] - place[:2]
+                apart[y, x, k] = np.linalg.norm(motion[y, x, 2 * k : 2 * k + 2] - way)
+    out = np.zeros((height, width))
+    for y in range(height):
+        for x in range(width):
+            near = [at(apart, x + i, y + j) for j in range(-2, 3) for i in range(-2, 3)]
+            out[y, x] = 1 / (1 + 0.005 * np.median(near, axis=0).max())
+    return out
