@@ -217,7 +217,8 @@ def test_a_colour_that_is_not_there_is_0(tmp_path, capsys):
     assert (rgba.shape, rgba.dtype) == ((48, 64, 3), np.float16)
     np.testing.assert_array_equal(rgba[..., 1], green)
     assert not rgba[..., [0, 2]].any()
-    blur(capsys, path, tmp_path / "o.exr", "-q")
+    said = blur(capsys, path, tmp_path / "o.exr")
+    assert "the picture has no R, B, counted as 0\n" in said
     got = make.plain_read(tmp_path / "o.exr")
     assert not {"R", "B"} & set(got)
     assert (got["G"] != green).any()

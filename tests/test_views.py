@@ -81,6 +81,32 @@ def test_a_parts_name_leads_only_where_its_channels_need_it():
     assert {"N.X", "N.Y", "N.Z"} < set(found(rgb, normal)["right"])
 
 
+@pytest.mark.parametrize(
+    ("asked", "expected"),
+    [("rgba", "rgba.R"), ("RGBA", "rgba.R"), ("rgb", "R"), ("zpass", "zpass.Z"),
+     ("mv.forward", "mv.forward.u"), ("forward", "forward.u")],
+)  # fmt: skip
+def test_a_layer_may_be_asked_for_by_the_name_of_its_part(asked, expected):
+    parts = [part_of("rgba", "R G B"), part_of("zpass", "Z"), part_of("mv", "forward.u")]
+    assert expected in views.by_view(exr.Exr(make.Path("a.exr"), parts), [asked])[None]
+
+
+def test_layers_of_parts_are_found_by_the_options_that_name_them(tmp_path, capsys):
+    """As command lines did when a part's name always led."""
+    channels = one_view(1, RIGHT)
+    masks = {"Y": np.ones((make.HEIGHT, make.WIDTH), "f4")}
+    parts = [make.part(dict(list(channels.items())[i:j]), name=name)
+             for name, i, j in (("rgba", 0, 4), ("far", 4, 5), ("mv", 5, 7))]  # fmt: skip
+    path = make.write_parts(tmp_path / "a.exr", [*parts, make.part(masks, name="matte")])
+    options = "--layer", "rgba", "--depth", "far", "--vectors", "nuke", "--keep", "matte"
+    for name in ("forward", "mv.forward"):
+        out = tmp_path / "o.exr"
+        more = "--vector-layer", name, "--overwrite"
+        code, _, err = make.inside(capsys, "blur", path, "-o", out, *options, *more)
+        assert code == 0, err
+    assert make.plain_header(out, 3)["name"] == "matte"
+
+
 def test_the_same_channel_of_two_views_is_no_clash():
     right, left = part_of("a", "R G B", view="right"), part_of("b", "R G B", view="left")
     shared = part_of("c", "disparity.x")
@@ -388,6 +414,7 @@ def test_a_view_without_a_picture_is_left_as_it_is_and_said_once(tmp_path, capsy
     code, _, err = make.inside(capsys, "blur", pattern, "-o", tmp_path / "o.####.exr")
     assert code == 0
     assert err.count("view left has no picture and is left as it is\n") == 1
+    assert "note      view left has no picture" in make.inside(capsys, "info", pattern)[1]
     before, after = (make.plain_read(tmp_path / f"{n}.0001.exr") for n in "so")
     assert (after["R"] != before["R"]).any()
     assert after["left.A"].tobytes() == before["left.A"].tobytes()

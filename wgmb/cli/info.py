@@ -85,7 +85,7 @@ def describe(
     for layer, members in layers.layers(source.channels).items():
         kinds = [f"{layers.component(m).upper()} {source.channels[m].dtype}" for m in members]
         lines.append(("layer", f"{layer or '(picture)'}: {', '.join(kinds)}"))
-    lines += [("note", text) for text in source.notes]
+    lines += [("note", text) for text, on in clip.notes.items() if source.number in on]
     color = ", ".join(dict.fromkeys(filter(None, source.color))) if source.beside else "none found"
     lines.append(("picture", color))
     if shown is not None:

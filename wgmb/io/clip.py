@@ -78,6 +78,13 @@ class Passes:
     also: tuple[str, ...] = ()
     outside: str = "auto"
 
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """Names of layers that are asked for, other than the picture's."""
+        masks = (mask.partition("=")[0] for mask in (*self.holdout, *self.scale))
+        named = self.vectors.layer, self.depth, self.object_layer, *masks
+        return tuple(name for name in named if name)
+
     def __post_init__(self) -> None:
         for name in ("holdout", "scale"):
             given = getattr(self, name)
@@ -317,7 +324,10 @@ class Clip:
             while len(self._kept) > 2:
                 self._kept.popitem(last=False)
             paths = [frame_path(p, number) for p in (self.pattern, *self.passes.also)]
-            found = read(paths, number, self.passes.color, self._max_mb, self._named, self._space)
+            passes = self.passes
+            found = read(
+                paths, number, passes.color, self._max_mb, self._named, self._space, passes.layers
+            )
             if self._space is not None:
                 found = tuple(in_space(source, self._space) for source in found)
             if self.views:  # the first frame says which is the default

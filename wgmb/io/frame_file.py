@@ -19,6 +19,8 @@ from . import exr, layers, limits, stills, views
 from .frame_numbers import frame_range, has_view, in_view
 from .windows import Window, laid
 
+_NO_PICTURE = "view {} has no picture and is left as it is"
+
 
 @dataclass(frozen=True, eq=False)
 class FrameFile:
@@ -136,16 +138,18 @@ def read(
     max_mb: float = limits.MAX_MB,
     named: Sequence[str] = (),
     space: ColorSpace | None = None,
+    asked: Sequence[str] = (),
 ) -> tuple[FrameFile, ...]:
     """Every view of a frame, the default one first; the channels of its files together.
 
     `wanted`: the picture's layer. `max_mb`: megabytes that each file may unpack to. `named`: the
     views, if %V stands for them in the first path; else that file tells them. In the other paths
     %V stands for them too; of a file without %V and without views, they are the default view's.
-    `space`: of the samples of a still (stills.read) that is the first path.
+    `space`: of the samples of a still (stills.read) that is the first path. `asked`: names of
+    layers that may begin with a part's (see views.by_view).
     `InputError` names the file that is missing, damaged, too large, or of another size.
     """
-    files = _Files(max_mb)
+    files = _Files(max_mb, (*asked, *((wanted,) if wanted else ())))
     first = files.content(in_view(paths[0], named[0] if named else None), space)
     full = tuple(view for view in first.named if first.views[view])
     there = tuple(named) or full or (None,)
@@ -194,8 +198,8 @@ class _Content:
 class _Files:
     """The files of one frame, each read once."""
 
-    def __init__(self, max_mb: float):
-        self._max_mb = max_mb
+    def __init__(self, max_mb: float, asked: Sequence[str]):
+        self._max_mb, self._asked = max_mb, asked
         self._read: dict[Path, _Content] = {}
 
     def content(self, path: Path, space: ColorSpace | None) -> _Content:
@@ -207,7 +211,7 @@ class _Files:
     def _content(self, path: Path, space: ColorSpace | None) -> _Content:
         if path.suffix.lower() == ".exr":
             file = exr.read(path, max_mb=self._max_mb)
-            return _Content(path, file, {}, views.by_view(file))
+            return _Content(path, file, {}, views.by_view(file, self._asked))
         if path.suffix.lower() in stills.SUFFIXES:
             rgba = stills.read(path, max_mb=self._max_mb, space=space)
             planes = {c: rgba[..., i] for i, c in enumerate("RGBA"[: rgba.shape[2]])}
@@ -275,16 +279,21 @@ def _together(
 
 
 def _noted(found: tuple[FrameFile, ...], empty: Sequence[str]) -> tuple[FrameFile, ...]:
-    """The views of a frame with notes on those that have no picture, where others have one."""
+    """The views of a frame with notes on those whose picture is not whole, if any has one."""
     if all(f.beside is None for f in found):
         return found
-    text = "view {} has no picture and is left as it is".format
-    noted = [
-        f if f.beside is not None else replace(f, notes=(*f.notes, text(f.view))) for f in found
-    ]
-    if empty:
-        noted[0] = replace(noted[0], notes=(*noted[0].notes, *map(text, empty)))
-    return tuple(noted)
+    more = {f.view: _remarks(f) for f in found}
+    more[found[0].view] += [_NO_PICTURE.format(view) for view in empty]
+    return tuple(replace(f, notes=(*f.notes, *more[f.view])) if more[f.view] else f for f in found)
+
+
+def _remarks(frame: FrameFile) -> list[str]:
+    """What a view's picture lacks, if anything."""
+    if frame.beside is None:
+        return [_NO_PICTURE.format(frame.view)]
+    lacks = ", ".join(c for c, name in zip("RGB", frame.color, strict=False) if not name)
+    of = f" of view {frame.view}" if frame.view else ""
+    return [f"the picture{of} has no {lacks}, counted as 0"] if lacks else []
 
 
 def _picture_part(file: exr.Exr, places: views.Places, wanted: str | None) -> exr.Part:

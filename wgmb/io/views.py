@@ -9,7 +9,7 @@ view.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from ..errors import InputError
 from .exr import Exr, Part
@@ -91,30 +91,39 @@ def names_of(file: Exr) -> tuple[str, ...]:
     return tuple(found)
 
 
-def by_view(file: Exr) -> dict[str | None, Places]:
+def by_view(file: Exr, asked: Iterable[str] = ()) -> dict[str | None, Places]:
     """Every channel of a file by view, the default one first, and name; None: in no view.
 
-    The name of a part leads where two parts hold the same channel of a view, and where channels
-    without a layer are not the picture's: `u` in the part `forward` is `forward.u`. InputError
-    where two channels are the same one.
+    The name of a part leads where two parts hold the same channel of a view, where channels
+    without a layer are not the picture's (`u` in the part `forward` is `forward.u`), and where
+    it begins a layer that is `asked` for. InputError where two channels are the same one.
     """
+    asked = [name.lower() for name in asked]
     found: dict[str | None, list[tuple[str, str, Place]]] = {v: [] for v in names_of(file)}
     for part in file.parts:
         view, multi = _view(part), _multi(part)
         for name in part.channels:
             layer, of, component = split(name, view, multi, part.channels)
             found.setdefault(of, []).append((layer, component, (part, name)))
-    return {of: _named(file, of, channels) for of, channels in found.items()}
+    return {of: _named(file, of, channels, asked) for of, channels in found.items()}
 
 
-def _named(file: Exr, view: str | None, channels: list[tuple[str, str, Place]]) -> Places:
+def _named(
+    file: Exr, view: str | None, channels: list[tuple[str, str, Place]], asked: list[str]
+) -> Places:
     """The places of a view's channels by their names."""
     count = Counter((layer, component) for layer, component, _ in channels)
     several = len(file.parts) > 1
+    wanted = {part.name for part in file.parts if _is_asked(_without_view(part.name, view), asked)}
     leads = {
         (id(part), layer)
         for layer, component, (part, _) in channels
-        if several and (count[layer, component] > 1 or not (layer or component in _RESERVED))
+        if several
+        and (
+            count[layer, component] > 1
+            or not (layer or component in _RESERVED)
+            or part.name in wanted
+        )
     }
     places: Places = {}
     for layer, component, (part, stored) in channels:
@@ -129,6 +138,11 @@ def _named(file: Exr, view: str | None, channels: list[tuple[str, str, Place]]) 
             )
         places[name] = part, stored
     return places
+
+
+def _is_asked(part: str, asked: list[str]) -> bool:
+    """Return True if a layer is asked for by the name of a part."""
+    return any(f"{name}.".startswith(f"{part.lower()}.") for name in asked)
 
 
 def _without_view(part: str, view: str | None) -> str:
