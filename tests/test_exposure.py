@@ -29,7 +29,7 @@ def slowly(times, at, interval, shutter, steps=8_000):
     return found / found.sum()
 
 
-@pytest.mark.parametrize("shutter", SHUTTERS, ids=str)
+@pytest.mark.parametrize("shutter", SHUTTERS, ids=range(len(SHUTTERS)))
 @pytest.mark.parametrize(("rate", "fps"), RATES)
 def test_every_moment_belongs_to_the_nearest_frame(rate, fps, shutter):
     times = np.arange(40) / rate
@@ -60,7 +60,7 @@ def test_variable_rates_have_shares_and_parts_that_cover_the_exposure():
             assert closes == pytest.approx(opens)
 
 
-@pytest.mark.parametrize("curve", [*CURVES, lambda x: 0.2 + x**2])
+@pytest.mark.parametrize("curve", [*CURVES, lambda x: 0.2 + x**2], ids=[*CURVES, "own"])
 def test_a_part_of_a_shutter_weighs_what_the_shutter_weighs_there(curve):
     shutter = Shutter(540, 0.2, curve)
     part = shutter.part(-0.1, 0.45)

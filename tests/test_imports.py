@@ -18,12 +18,12 @@ LAYERS = [
     {"gpu", "shutter", "camera", "metrics", "display"},
     {"frame", "cone"},
     {"frame_views", "reach", "exposure"},
-    {"velocity", "holdout"},
+    {"velocity", "holdout", "planes", "reel"},
     {"io", "scene", "observer", "flow"},
     {"methods"},
     {"residency"},
     {"pipeline"},
-    {"render", "settings", "color_settings"},
+    {"render", "exposer", "settings", "color_settings"},
     {"batch", "settings_toml"},
     {"lab", "viewer"},  # never each other
     {"cli"},  # may start the viewer
@@ -32,7 +32,7 @@ LAYERS = [
 PLACE = {room: number for number, layer in enumerate(LAYERS) for room in layer}
 GPU = {
     "gpu", "scene", "methods", "velocity", "holdout", "observer", "residency", "pipeline",
-    "render", "lab", "viewer", "frame_views", "flow",
+    "render", "lab", "viewer", "frame_views", "flow", "planes", "exposer",
 }  # fmt: skip
 HOMES = {
     "wgpu": GPU,
@@ -42,6 +42,7 @@ HOMES = {
     "imageio": {"io"},
     "PIL": {"io", "lab"},
     "fileseq": {"io"},
+    "cv2": {"flow"},
     "PyOpenColorIO": {"ocio"},
     "opentimelineio": {"io"},
     "cyclopts": {"cli"},

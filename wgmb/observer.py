@@ -31,10 +31,12 @@ class WeightedSum:
         pictures: Sequence[wgpu.GPUTexture],
         weights: np.ndarray,
         output: wgpu.GPUTexture,
+        *,
+        onto: bool = False,
     ) -> None:
         """Record it into `encoder`: float textures of one size, one weight each.
 
-        `output`: rgba32float, of that size.
+        `output`: rgba32float, of that size. `onto`: added to the sum of the call before.
         """
         width, height, _ = output.size
         kernel = gpu.kernel(self._device, "observer.wgsl")
@@ -47,7 +49,7 @@ class WeightedSum:
         for first in range(0, len(views), EIGHT):
             share = np.zeros((), kernel.source.dtype("Share"))
             share["weights"].flat[: len(views) - first] = weights[first : first + EIGHT]
-            share["first"] = first == 0
+            share["first"] = first == 0 and not onto
             kernel.run(
                 encoder,
                 "main",

@@ -325,6 +325,14 @@ class Blur:
             picture = self._images.download(encoder, output)
         return picture[..., : frame.color.shape[2]].astype("f4", copy=False)
 
+    def draw(self, frame: Frame, output: View) -> None:
+        """Submit the blur of a frame into `output`, a texture as for `encode`, without waiting."""
+        self._require(frame.has)
+        with self._working(frame.size):
+            encoder = self.device.create_command_encoder(label="wgmb")
+            self.encode(encoder, output=output, **self._views(frame))
+            gpu.submit(self.device, encoder)
+
     def with_confidence(self, frame: Frame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """Return the blurred frame and the confidence of every pixel, at twice the cost.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import wgpu
 
@@ -12,14 +14,14 @@ _BAND = 4 << 20  # bytes written at once: five times faster at 4K than all at on
 _READBACK = 256 << 20  # bytes read back at once: a buffer has a limit, and memory is not endless
 _HALF_MAX = 65504.0  # largest finite f16
 _USAGE = wgpu.TextureUsage
-_NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4"}
+_NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4", "16uint": "<u2", "8uint": "u1"}
 _STORABLE = ("rgba16float", "rgba32float", "r32float", "r32uint", "rgba32uint")
 _CHANNELS = {"r": 1, "rg": 2, "rgba": 4}
 
 
 def numpy_of(format: str) -> tuple[np.dtype, int]:
     """Numpy type and number of channels of a texture format such as `rgba16float`."""
-    letters, _, _ = format.partition("32" if "32" in format else "16")
+    letters = re.split(r"\d", format)[0]
     return np.dtype(_NUMPY[format[len(letters) :]]), _CHANNELS[letters]
 
 

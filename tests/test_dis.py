@@ -1,0 +1,63 @@
+"""Dense inverse search: shifts, ends of a shot, and the order in depth."""
+
+import sys
+
+import numpy as np
+import pytest
+
+import make_frames as make
+from wgmb import InputError
+from wgmb.flow.dis import Dis
+
+SHIFT = 3.0, -2.0
+
+
+def textured(number, height=96, width=128):
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    return make.texture((x - SHIFT[0] * number) / 3, (y - SHIFT[1] * number) / 3)
+
+
+@pytest.mark.parametrize("quality", ["fast", "best"])
+def test_a_shifted_picture_gives_its_shift(quality):
+    shot = Dis(quality).shot({-1: textured(-1), 0: textured(0), 1: textured(1)}.get)
+    motion, depth = shot(0)
+    inner = motion[16:-16, 16:-16].reshape(-1, 4)
+    np.testing.assert_allclose(np.median(inner, axis=0), [-3, 2, 3, -2], atol=0.2)
+    assert depth.shape == (96, 128) and depth.min() > 0.9
+
+
+def test_at_the_ends_of_a_shot_a_path_goes_straight_on():
+    shot = Dis().shot({0: textured(0), 1: textured(1)}.get)
+    for number in (0, 1):
+        motion, _ = shot(number)
+        np.testing.assert_array_equal(motion[..., :2], -motion[..., 2:])
+    assert shot(7) is None
+    assert Dis().shot({0: textured(0)}.get)(0) is None
+
+
+def test_a_still_picture_does_not_move_and_small_ones_are_taken():
+    for size in ((96, 128), (5, 9)):
+        still = textured(0, *size)
+        motion, _ = Dis().shot(dict.fromkeys((-1, 0, 1), still).get)(0)
+        assert np.abs(motion).max() < 0.02
+
+
+def test_what_moves_otherwise_than_most_is_nearer():
+    def moved(number):
+        picture = textured(0, 160, 240).copy()
+        at = 100 + 5 * number
+        y, x = np.mgrid[:48, :48].astype(np.float32)
+        picture[60:108, at : at + 48] = make.texture(x / 3, y / 3, 4.0)
+        return picture
+
+    _, depth = Dis("best").shot({n: moved(n) for n in (-1, 0, 1)}.get)(0)
+    assert depth[70:98, 110:138].mean() < 0.985 < 0.995 < depth[:40].mean()
+
+
+def test_without_opencv_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"wgmb\[flow\]"):
+        Dis()
+    with pytest.raises(InputError, match="fast, best"):
+        Dis("good")

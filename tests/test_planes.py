@@ -1,0 +1,168 @@
+"""Planes of videos to linear light and back: against H.273 written out, and to the sample."""
+
+import numpy as np
+import pytest
+
+from wgmb import InputError, gpu
+from wgmb.coding import CodedPicture, Coding
+from wgmb.gpu.textures import TexturePool
+from wgmb.planes import Planes
+
+SIZE = 38, 22  # width, height
+WHITE = {16: 0.0203, 18: 0.26496256}  # light that counts as 1
+CODINGS = {
+    "709, 8 bit 4:2:0": Coding(),
+    "601, full range": Coding(full_range=True, matrix=6, transfer=6, primaries=6),
+    "709, 10 bit 4:2:2": Coding(bits=10, steps=(2, 1)),
+    "2020 PQ, 10 bit": Coding(bits=10, matrix=9, transfer=16, primaries=9),
+    "2020 HLG, 12 bit 4:4:4": Coding(bits=12, steps=(1, 1), matrix=9, transfer=18, primaries=9),
+    "alpha, 12 bit 4:4:4": Coding(bits=12, steps=(1, 1), alpha=True),
+    "rgb, gamma 2.2": Coding(model="rgb", steps=(1, 1), full_range=True, matrix=0, transfer=4),
+    "rgb, 16 bit linear": Coding(
+        model="rgb", bits=16, steps=(1, 1), full_range=True, matrix=0, transfer=8
+    ),
+    "grey": Coding(model="grey", steps=(1, 1), full_range=True, transfer=13),
+    "YCgCo": Coding(steps=(1, 1), full_range=True, matrix=8, transfer=13),
+    "gamma 2.8": Coding(transfer=5, matrix=5),
+}
+
+
+def light_of(signal, transfer):
+    """H.273, table 3, and BT.2100, for one number."""
+    x = abs(signal)
+    if transfer == 8:
+        light = x
+    elif transfer in (4, 5):
+        light = x ** {4: 2.2, 5: 2.8}[transfer]
+    elif transfer == 16:
+        m1, m2 = 2610 / 16384, 2523 / 4096 * 128
+        c1, c2, c3 = 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32
+        root = min(x, 1.0) ** (1 / m2)
+        light = (max(root - c1, 0) / (c2 - c3 * root)) ** (1 / m1)
+    elif transfer == 18:
+        a, b, c = 0.17883277, 0.28466892, 0.55991073
+        light = x * x / 3 if x <= 0.5 else (np.exp((x - c) / a) + b) / 12
+    else:  # displays follow about the curve of sRGB
+        light = x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4
+    return np.sign(signal) * light / WHITE.get(transfer, 1)
+
+
+def slowly(picture):
+    """(height, width, 4) linear light, premultiplied, one pixel at a time."""
+    c = picture.coding
+    width, height = picture.size
+    out = np.ones((height, width, 4))
+    unit, most = 2 ** (c.bits - 8), 2**c.bits - 1
+    red, blue = {1: (0.2126, 0.0722), 9: (0.2627, 0.0593)}.get(c.matrix, (0.299, 0.114))
+    for y in range(height):
+        for x in range(width):
+            if c.model != "yuv":
+                s = [float(p[y, x]) / most for p in picture.planes[:3]]
+                rgb = s * 3 if c.model == "grey" else s
+            else:
+                luma = float(picture.planes[0][y, x])
+                cb, cr = (float(p[y // c.steps[1], x // c.steps[0]]) for p in picture.planes[1:3])
+                if c.full_range:
+                    luma, cb, cr = luma / most, cb / most - 2 ** (c.bits - 1) / most, (
+                        cr / most - 2 ** (c.bits - 1) / most)  # fmt: skip
+                else:
+                    luma = (luma / unit - 16) / 219
+                    cb, cr = (cb / unit - 128) / 224, (cr / unit - 128) / 224
+                if c.matrix == 8:
+                    rgb = [luma - cb + cr, luma + cb, luma - cb - cr]
+                else:
+                    r, b = luma + 2 * (1 - red) * cr, luma + 2 * (1 - blue) * cb
+                    rgb = [r, (luma - red * r - blue * b) / (1 - red - blue), b]
+            alpha = float(picture.planes[-1][y, x]) / most if c.alpha else 1.0
+            out[y, x] = [*(alpha * light_of(v, c.transfer) for v in rgb[:3]), alpha]
+    return out
+
+
+def stored(coding, seed=0):
+    """A picture of samples that a video may hold."""
+    rng = np.random.default_rng(seed)
+    width, height = SIZE
+    unit, most = 2 ** (coding.bits - 8), 2**coding.bits - 1
+    kind = np.uint8 if coding.bits == 8 else np.uint16
+    small = -(-height // coding.steps[1]), -(-width // coding.steps[0])
+    low, high = (0, most) if coding.full_range else (16 * unit, 235 * unit)
+    if coding.transfer == 16:  # nothing is brighter than its 1
+        high = 170 * unit
+    planes = [rng.integers(low, high + 1, (height, width))]
+    if coding.model == "yuv":
+        planes += [rng.integers(100 * unit, 156 * unit, small) for _ in range(2)]
+    elif coding.model == "rgb":
+        planes += [rng.integers(low, high + 1, (height, width)) for _ in range(2)]
+    if coding.alpha:
+        planes.append(rng.integers(most // 8, most + 1, (height, width)))
+    return CodedPicture(tuple(np.ascontiguousarray(p.astype(kind)) for p in planes), coding)
+
+
+@pytest.fixture(scope="module")
+def device():
+    return gpu.open_device(None)
+
+
+def decoded(device, picture, texel="rgba32float"):
+    images, encoder = TexturePool(device), device.create_command_encoder()
+    output = images.texture("light", picture.size, texel)
+    Planes(device).decode(encoder, picture, output.create_view())
+    return images.download(encoder, output)
+
+
+@pytest.mark.parametrize("name", CODINGS)
+def test_light_is_what_the_standard_says(device, name):
+    picture = stored(CODINGS[name])
+    want = slowly(picture)
+    np.testing.assert_allclose(decoded(device, picture), want, rtol=2e-4, atol=2e-5)
+
+
+@pytest.mark.parametrize("texel", ["rgba32float", "rgba16float"])
+@pytest.mark.parametrize("name", CODINGS)
+def test_what_is_stored_comes_back(device, name, texel):
+    """To the sample from 32-bit floats; within 1 of 255, 2 of 1023 from 16-bit ones."""
+    coding = CODINGS[name]
+    picture, planes = stored(coding), Planes(device)
+    images, encoder = TexturePool(device), device.create_command_encoder()
+    light = images.texture("light", SIZE, texel)
+    planes.decode(encoder, picture, light.create_view())
+    got = planes.encode(encoder, light.create_view(), coding)
+    assert got.coding == coding and len(got.planes) == len(picture.planes)
+    allowed = 0 if texel == "rgba32float" else max(1, 2 ** (coding.bits - 9))
+    if coding.transfer == 16 and texel == "rgba32float":
+        allowed = 1  # its powers of 78 and 1 / 0.16 cost a bit
+    for want, plane in zip(picture.planes, got.planes, strict=True):
+        assert plane.dtype == want.dtype and plane.shape == want.shape
+        assert np.abs(plane.astype(int) - want).max() <= allowed
+
+
+def test_odd_sizes_have_a_last_sample_of_chroma(device):
+    rng = np.random.default_rng(1)
+    shapes = ((7, 13), (4, 7), (4, 7))
+    planes = tuple(rng.integers(90, 160, s).astype(np.uint8) for s in shapes)
+    images, encoder, both = TexturePool(device), device.create_command_encoder(), Planes(device)
+    light = images.texture("light", (13, 7), "rgba32float")
+    both.decode(encoder, CodedPicture(planes, Coding()), light.create_view())
+    got = both.encode(encoder, light.create_view(), Coding())
+    for want, plane in zip(planes, got.planes, strict=True):
+        np.testing.assert_array_equal(plane, want)
+
+
+def test_chroma_is_the_mean_of_its_pixels(device):
+    light = np.zeros((2, 2, 4), "f4")
+    light[...] = 1, 0, 0, 1
+    light[0, 0] = 0, 0, 1, 1
+    images, encoder = TexturePool(device), device.create_command_encoder()
+    view = images.upload("light", light, "rgba32float")
+    got = Planes(device).encode(encoder, view, Coding())
+    cb = [128 + 224 * v for v in (0.5, -0.5 * 0.2126 / 0.9278)]
+    assert got.planes[1][0, 0] == round((cb[0] + 3 * cb[1]) / 4)
+    assert got.planes[0].tolist() == [[round(16 + 219 * 0.0722), 63], [63, 63]]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"), [({"matrix": 14}, "matrix 14"), ({"transfer": 12}, "transfer 12")]
+)
+def test_what_is_not_known_is_named(device, numbers, said):
+    with pytest.raises(InputError, match=said):
+        decoded(device, stored(Coding(**numbers)))

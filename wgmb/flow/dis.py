@@ -1,0 +1,109 @@
+"""Motion by OpenCV's dense inverse search: quick, for slow motion; the extra `flow` brings it.
+
+Kroeger, Timofte, Dai and Van Gool, "Fast Optical Flow using Dense Inverse Search" (2016).
+"""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..color import to_display
+from ..errors import InputError
+
+QUALITIES = ("fast", "best")
+_LEAST = 16  # pixels a side that OpenCV needs
+_APART = 0.005  # per pixel that a motion is off that of most of the picture, by which it is nearer
+Load = Callable[[int], np.ndarray | None]
+Found = tuple[np.ndarray, np.ndarray]
+
+
+def is_installed() -> bool:
+    """Return True if OpenCV is there."""
+    return importlib.util.find_spec("cv2") is not None
+
+
+class Dis:
+    """Motion and depth order of pictures by dense inverse search, on the CPU.
+
+    `quality`: "fast", or "best", which ends at full size.
+    """
+
+    def __init__(self, quality: str = "fast"):
+        if quality not in QUALITIES:
+            raise InputError(f"quality must be one of {', '.join(QUALITIES)}, got {quality!r}")
+        if not is_installed():
+            raise InputError("dense inverse search needs OpenCV: pip install 'wgmb[flow]'")
+        cv2: Any = importlib.import_module("cv2")
+
+        self._cv2 = cv2
+        fast = quality == "fast"
+        preset = cv2.DISOPTICAL_FLOW_PRESET_FAST if fast else cv2.DISOPTICAL_FLOW_PRESET_MEDIUM
+        self._flow: Any = cv2.DISOpticalFlow_create(preset)
+        if not fast:
+            self._flow.setFinestScale(0)
+
+    def shot(self, load: Load) -> Callable[[int], Found | None]:
+        """Motion (height, width, 4) to_prev, to_next [px] and depth of a shot's frames.
+
+        `load(number)`: the picture (height, width, 3 or 4), linear, or None outside the shot.
+        """
+        grey: dict[int, np.ndarray | None] = {}
+
+        def picture(number: int) -> np.ndarray | None:
+            if number not in grey:
+                for old in [n for n in grey if abs(n - number) > 2]:
+                    del grey[old]
+                color = load(number)
+                grey[number] = None if color is None else self._grey(color)
+            return grey[number]
+
+        def found(number: int) -> Found | None:
+            here = picture(number)
+            near = [picture(number + side) for side in (-1, 1)]
+            if here is None or all(one is None for one in near):
+                return None
+            return self._between(near[0], here, near[1])
+
+        return found
+
+    def _grey(self, color: np.ndarray) -> np.ndarray:
+        shown = to_display(np.asarray(color[..., :3], np.float32), 8)
+        return self._cv2.cvtColor(shown, self._cv2.COLOR_RGB2GRAY)
+
+    def _between(self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None) -> Found:
+        back = None if prev is None else self._way(here, prev)
+        ahead = None if next is None else self._way(here, next)
+        found = [way for way in (back, ahead) if way is not None]
+        depth = np.min([self._depth(way) for way in found], axis=0)
+        back = -found[0] if back is None else back  # a path goes on as on its other side
+        ahead = -found[0] if ahead is None else ahead
+        return np.concatenate([back, ahead], axis=2), depth
+
+    def _way(self, here: np.ndarray, other: np.ndarray) -> np.ndarray:
+        if min(here.shape) < _LEAST:
+            return np.zeros((*here.shape, 2), np.float32)
+        return self._flow.calc(here, other, None)
+
+    def _depth(self, way: np.ndarray) -> np.ndarray:
+        """What moves otherwise than most of the picture is nearer."""
+        height, width = way.shape[:2]
+        step = max(1, max(width, height) // 40)
+        y, x = np.mgrid[step // 2 : height : step, step // 2 : width : step]
+        points = np.stack([x.ravel(), y.ravel()], 1).astype(np.float64)
+        moved = points + way[y, x].reshape(-1, 2)
+        most = np.eye(3)
+        if len(points) >= 4:
+            fitted, _ = self._cv2.findHomography(points, moved, self._cv2.RANSAC, 3.0)
+            most = most if fitted is None else fitted
+        y, x = np.mgrid[:height, :width].astype(np.float64)
+        there = np.stack([x, y, np.ones_like(x)], 2) @ most.T
+        off = there[..., :2] / there[..., 2:] - np.stack([x, y], 2) - way
+        depth = 1 / (1 + _APART * np.hypot(off[..., 0], off[..., 1]))
+        return self._cv2.medianBlur(depth.astype(np.float32), 5)

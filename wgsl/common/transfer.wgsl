@@ -1,0 +1,67 @@
+// Transfer functions of videos (ITU-T H.273), both ways. Light of 1 is the white of text and paper; values below 0
+// and above 1 go through, so that what is stored comes back as it was.
+
+const CURVE_SRGB: u32 = 13u;    // also of BT.709, BT.601 and BT.2020: pictures are graded on displays about like it
+const CURVE_GAMMA22: u32 = 4u;
+const CURVE_GAMMA28: u32 = 5u;
+const CURVE_LINEAR: u32 = 8u;
+const CURVE_PQ: u32 = 16u;      // SMPTE ST 2084
+const CURVE_HLG: u32 = 18u;     // ITU-R BT.2100: light of the scene
+
+override CURVE: u32 = CURVE_SRGB;
+
+// BT.2100, tables 4 and 5.
+const PQ_M1: f32 = 0.1593017578125;
+const PQ_M2: f32 = 78.84375;
+const PQ_C1: f32 = 0.8359375;
+const PQ_C2: f32 = 18.8515625;
+const PQ_C3: f32 = 18.6875;
+const HLG_A: f32 = 0.17883277;
+const HLG_B: f32 = 0.28466892;
+const HLG_C: f32 = 0.55991073;
+// White of text and paper (ITU-R BT.2408): 203 of PQ's 10,000 cd/m2, and 75 % of HLG's signal.
+const PQ_WHITE: f32 = 0.0203;
+const HLG_WHITE: f32 = 0.26496256;
+
+/// Light of a signal.
+fn light_of(signal: vec3f) -> vec3f {
+    let x = abs(signal);
+    var light = x;
+    switch CURVE {
+        case CURVE_GAMMA22: { light = pow(x, vec3f(2.2)); }
+        case CURVE_GAMMA28: { light = pow(x, vec3f(2.8)); }
+        case CURVE_LINEAR: {}
+        case CURVE_PQ: {
+            let root = pow(min(x, vec3f(1.0)), vec3f(1.0 / PQ_M2));
+            light = pow(max(root - PQ_C1, vec3f(0.0)) / (PQ_C2 - PQ_C3 * root), vec3f(1.0 / PQ_M1)) / PQ_WHITE;
+        }
+        case CURVE_HLG: {
+            let high = (exp((x - HLG_C) / HLG_A) + HLG_B) / 12.0;
+            light = select(high, x * x / 3.0, x <= vec3f(0.5)) / HLG_WHITE;
+        }
+        default: { light = select(pow((x + 0.055) / 1.055, vec3f(2.4)), x / 12.92, x <= vec3f(0.04045)); }
+    }
+    return sign(signal) * light;
+}
+
+/// Signal of light.
+fn signal_of(light: vec3f) -> vec3f {
+    let x = abs(light);
+    var signal = x;
+    switch CURVE {
+        case CURVE_GAMMA22: { signal = pow(x, vec3f(1.0 / 2.2)); }
+        case CURVE_GAMMA28: { signal = pow(x, vec3f(1.0 / 2.8)); }
+        case CURVE_LINEAR: {}
+        case CURVE_PQ: {
+            let power = pow(x * PQ_WHITE, vec3f(PQ_M1));
+            signal = pow((PQ_C1 + PQ_C2 * power) / (1.0 + PQ_C3 * power), vec3f(PQ_M2));
+        }
+        case CURVE_HLG: {
+            let y = x * HLG_WHITE;
+            let high = HLG_A * log(max(12.0 * y - HLG_B, vec3f(1e-6))) + HLG_C;
+            signal = select(high, sqrt(3.0 * y), y <= vec3f(1.0 / 12.0));
+        }
+        default: { signal = select(1.055 * pow(max(x, vec3f(0.0031308)), vec3f(1.0 / 2.4)) - 0.055, 12.92 * x, x <= vec3f(0.0031308)); }
+    }
+    return sign(light) * signal;
+}
