@@ -165,7 +165,7 @@ def test_an_option_that_needs_the_wheel_is_one_line(tmp_path, capsys, monkeypatc
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ("--display sRGB", "--display needs an OpenColorIO config: --ocio builtin, studio"),
+        ("--display sRGB", "--display needs an OpenColorIO config: --ocio may be builtin, studio"),
         ("--view-transform AgX", "--view-transform needs an OpenColorIO config"),
         ("--look Punchy", "--look needs an OpenColorIO config"),
         ("--from acescg", "--from needs an OpenColorIO config"),

@@ -205,7 +205,9 @@ def test_a_config_without_the_role_is_understood_by_names_that_tell(tmp_path):
 
 def test_a_config_that_says_nothing_of_its_primaries_is_one_line(tmp_path):
     config = ColorConfig(film_config(tmp_path, name="scene", alias="ours"))
-    with pytest.raises(InputError, match=r"no role aces_interchange.*by chromaticities; .*--from"):
+    with pytest.raises(
+        InputError, match=r"no role aces_interchange.*by chromaticities; `space` names it"
+    ):
         config.space_of({"chromaticities": AP1})
     assert config.space("ours").is_linear
     assert config.chromaticities(config.space("ours")) is None
@@ -281,7 +283,7 @@ def test_a_picture_that_says_it_is_not_linear_is_refused(tmp_path, aces):
     with pytest.raises(InputError, match="not linear") as error:
         Output(tmp_path / "o.png", numbers=[1], display=aces.display()).write(light(), source)
     assert str(path) in str(error.value)
-    assert "--from 'ACEScct'" in str(error.value)
+    assert "`space='ACEScct'` makes it linear" in str(error.value)
 
 
 # ---- names, videos, what is missing ---------------------------------------------------------

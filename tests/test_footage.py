@@ -408,7 +408,7 @@ def test_sound_alone_has_no_pictures(tmp_path):
 
 def test_absurd_sizes_are_refused(tmp_path):
     path = clips.write(tmp_path / "c.mp4", [plain((1280, 720))])
-    with pytest.raises(InputError, match="--max-mb"):
+    with pytest.raises(InputError, match="max_mb"):
         Footage(path, max_mb=2)
 
 

@@ -68,5 +68,5 @@ def test_an_ambiguous_last_part_is_refused():
 
 
 def test_two_pictures_without_a_telling_name_are_refused_with_both():
-    with pytest.raises(InputError, match=r"--layer.*one.*two"):
+    with pytest.raises(InputError, match=r"`color` chooses one: one, two"):
         layers.find_color([f"{layer}.{c}" for layer in ("one", "two") for c in "RGB"])

@@ -89,10 +89,10 @@ def test_the_nearest_of_a_step_is_seen():
 
 
 @pytest.mark.parametrize("options, words", [
-    ({"facing": True}, "variant 'published'"),
-    ({"splat": "line"}, "variant 'published'"),
+    ({"facing": True}, "variant='published'"),
+    ({"splat": "line"}, "variant='published'"),
     ({"variant": "published", "splat": "square"}, "splat must be one of point, line"),
-    ({"variant": "published", "splat": "line", "depth_test": True}, "depth_test needs splat"),
+    ({"variant": "published", "splat": "line", "depth_test": True}, "depth_test` needs `splat"),
 ])  # fmt: skip
 def test_options_that_do_not_fit_are_named(options, words):
     with pytest.raises(InputError, match=words):

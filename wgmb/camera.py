@@ -91,7 +91,7 @@ class Reprojections:
         if self.prev is None and self.next is None:
             raise InputError("motion from a camera needs the camera of a neighbouring frame")
         if self.depth_kind not in ("planar", "clip"):
-            raise InputError(f"depth must be planar or clip, got {self.depth_kind!r}")
+            raise InputError(f"`depth_kind` must be planar or clip, got {self.depth_kind!r}")
         if not _invertible(np.asarray(self.here.clip_from_world, np.float64)):
             raise InputError("clip_from_world must be invertible")
         if not self.far > 0:

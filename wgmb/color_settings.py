@@ -36,10 +36,10 @@ class DisplaySettings:
             try:
                 return self._shown(config)
             except InputError as error:
-                raise InputError(f"$OCIO: {error}; --ocio off shows sRGB") from None
+                raise InputError(f"$OCIO: {error}; `ocio='off'` shows sRGB") from None
         if given:
-            known = "--ocio builtin, studio, blender or a file"
-            raise InputError(f"{option_name(given[0])} needs an OpenColorIO config: {known}")
+            known = "`ocio` may be builtin, studio, blender or a file"
+            raise InputError(f"`{given[0]}` needs an OpenColorIO config: {known}")
         return None
 
     def _shown(self, config: str) -> Display:

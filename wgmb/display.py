@@ -57,7 +57,7 @@ class ColorSpace:
         if not self.is_linear:
             raise InputError(
                 f"{self.why} is {self.name!r}, which is not linear, and only linear light can be "
-                f"blurred; --from '{self.name}' makes it linear first, another --from overrides it"
+                f"blurred; `space='{self.name}'` makes it linear, another `space` overrides it"
             )
 
     def linear(self, rgba: np.ndarray) -> np.ndarray:
@@ -99,7 +99,7 @@ class ColorConfig:
                 f"unknown colour space {name!r} in {self.name}; available: {', '.join(known)}"
                 f"{did_you_mean(name, every)}"
             )
-        return ColorSpace(self, found.getName(), "--from")
+        return ColorSpace(self, found.getName(), "choice")
 
     def space_of(self, attributes: Mapping[str, Any]) -> ColorSpace:
         """The space of a picture with these attributes, of an EXR's part.
@@ -250,7 +250,7 @@ class ColorConfig:
             raise InputError(
                 f"{self.name} has no role aces_interchange, nor a space whose name tells its "
                 f"primaries (ACEScg, lin_rec709, ...), to tell what a picture means by {why}; "
-                "name its space with --from"
+                "`space` names it"
             )
         name, known = self._interchange
         matrix = conversion(primaries, known)

@@ -5,6 +5,9 @@ Error
 ├── ShaderError   a WGSL file could not be read, compiled or bound; says file:line
 ├── DeviceError   no adapter, one that lacks a feature or a limit, or a device that was lost
 └── GpuMemoryError  not enough GPU memory for one frame; other frames may still fit
+
+A message names an argument that would help as `name=value` between backticks; the command line
+spells it as its option.
 """
 
 from __future__ import annotations
@@ -30,6 +33,17 @@ class DeviceError(Error):
 
 class GpuMemoryError(Error):
     """Not enough GPU memory for one frame; smaller or later frames may still fit."""
+
+
+def check_choice(name: str, value: object, known: Iterable[str], more: str = "") -> None:
+    """InputError unless `value` is one of the `known` words.
+
+    `name`: the argument. `more`: what it may be besides, such as " or a number".
+    """
+    words = list(known)
+    if value not in words:
+        hint = did_you_mean(value, words)
+        raise InputError(f"{name} must be one of {', '.join(words)}{more}, got {value!r}{hint}")
 
 
 def did_you_mean(word: object, known: Iterable[str]) -> str:

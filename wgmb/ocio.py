@@ -34,9 +34,7 @@ def load() -> Any:
     try:
         import PyOpenColorIO
     except ImportError:
-        raise InputError(
-            "OpenColorIO is not installed: pip install wgmb[ocio], or --ocio off"
-        ) from None
+        raise InputError("OpenColorIO is not installed: pip install wgmb[ocio]") from None
     return PyOpenColorIO
 
 
@@ -69,7 +67,7 @@ def _blenders_config() -> Path:
     found = [file for folder in folders for file in sorted(Path(folder).glob(_BLENDER))]
     if not found:
         raise InputError(
-            "--ocio blender: neither the module bpy nor the program blender is here; name the "
+            "config blender: neither the module bpy nor the program blender is here; name the "
             "file datafiles/colormanagement/config.ocio in Blender's folder instead"
         )
     return found[-1]

@@ -16,7 +16,7 @@ import wgpu
 
 from . import gpu
 from .camera import Window
-from .errors import InputError, did_you_mean
+from .errors import InputError, check_choice, did_you_mean
 from .frame import PASSES, Frame
 from .frame_views import FrameViews, View, check_output, check_view
 from .gpu import wgsl
@@ -81,9 +81,8 @@ class Blur:
         if not 0 <= jitter <= 1:
             raise InputError(f"jitter must be 0 to 1, got {jitter}")
         if max_blur is not None and not max_blur >= 0:
-            raise InputError(f"max_blur must be 0 or more pixels, got {max_blur}")
-        if output not in OUTPUTS:
-            raise InputError(f"output must be one of {', '.join(OUTPUTS)}, got {output!r}")
+            raise InputError(f"`max_blur` must be 0 or more pixels, got {max_blur}")
+        check_choice("output", output, OUTPUTS)
         known = options_of(METHODS[method].Options)
         if unknown := options.keys() - known.keys():
             raise InputError(

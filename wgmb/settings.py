@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal, Self, TypeVar
 
 from .display import ColorSpace, Display
-from .errors import InputError
+from .errors import InputError, check_choice
 from .io import limits, vectors
 from .io.clip import Clip, Passes
 from .io.frame_numbers import frame_numbers, is_pattern, readable
@@ -67,15 +67,12 @@ class ShutterSettings:
             try:
                 phase = float(phase)
             except ValueError:
-                raise InputError(
-                    f"phase must be start, centre, end or a number, got {phase!r}"
-                ) from None
+                check_choice("phase", phase, ("start", "centre", "end"), " or a number")
         curve = self.curve
         assert self.shutter is not None and curve is not None
         if curve not in CURVES:
             if not readable(Path(curve)):
-                known = ", ".join(CURVES)
-                raise InputError(f"curve must be one of {known}, or a CSV file; got {curve!r}")
+                check_choice("curve", curve, CURVES, " or a CSV file")
             curve = read_curve(curve)
         return Shutter(self.shutter, phase, curve, self.rolling, self.rolling_duration)
 
@@ -302,7 +299,7 @@ def parameters_of(texts: tuple[str, ...]) -> dict[str, str]:
     """`NAME=VALUE` each -> values by name."""
     pairs = [text.partition("=") for text in texts]
     if wrong := [name for name, equals, _ in pairs if not equals]:
-        raise InputError(f"--set takes NAME=VALUE, got {wrong[0]!r}")
+        raise InputError(f"`set` takes NAME=VALUE, got {wrong[0]!r}")
     return {name: value for name, _, value in pairs}
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import InputError, did_you_mean
+from .errors import InputError, check_choice
 
 Weight = Callable[[np.ndarray], np.ndarray]
 
@@ -84,17 +84,16 @@ class Shutter:
         if not (math.isfinite(self.degrees) and 0 <= self.degrees <= 36000):
             raise InputError(f"shutter must be 0 to 36000 degrees, got {self.degrees}")
         if isinstance(self.phase, str) and self.phase not in PHASES:
-            raise InputError(f"phase must be start, centre, end or a number, got {self.phase!r}")
+            check_choice("phase", self.phase, ("start", "centre", "end"), " or a number")
         if not isinstance(self.phase, str) and not abs(self.phase) <= 100:
             raise InputError(f"phase must be within 100 frame intervals, got {self.phase}")
-        if isinstance(self.curve, str) and self.curve not in CURVES:
-            known = f"{', '.join(CURVES)}, got {self.curve!r}{did_you_mean(self.curve, CURVES)}"
-            raise InputError(f"curve must be one of {known}")
-        if self.rolling is not None and self.rolling not in ROLLING:
-            raise InputError(f"rolling must be one of {', '.join(ROLLING)}, got {self.rolling!r}")
+        if isinstance(self.curve, str):
+            check_choice("curve", self.curve, CURVES)
+        if self.rolling is not None:
+            check_choice("rolling", self.rolling, ROLLING)
         if not (math.isfinite(self.rolling_duration) and 0 <= self.rolling_duration <= 100):
             raise InputError(
-                f"rolling duration must be 0 to 100 frame intervals, got {self.rolling_duration}"
+                f"`rolling_duration` must be 0 to 100 frame intervals, got {self.rolling_duration}"
             )
 
     @property

@@ -18,7 +18,7 @@ from cyclopts import Parameter
 from cyclopts.config import Dict
 
 from .._version import __version__
-from ..errors import DeviceError, Error, InputError
+from ..errors import DeviceError, Error, InputError, did_you_mean
 from . import terminal
 from .exit_codes import DONE, INTERRUPTED, NO_DEVICE, SOME_FAILED, USAGE
 
@@ -73,7 +73,7 @@ def main(arguments: list[str] | None = None) -> int:
         terminal.flush()
         return result if isinstance(result, int) else DONE
     except cyclopts.CycloptsError as error:
-        return _say_why(f"{error}{_hint(words)}", USAGE)
+        return _say_why(f"{_plainly(str(error))}{_hint(words)}", USAGE)
     except DeviceError as error:
         return _say_why(str(error), NO_DEVICE)
     except Error as error:
@@ -99,6 +99,20 @@ def _check_text(words: list[str]) -> None:
             raise InputError(f"{shown}: not UTF-8; please rename the file or folder") from None
 
 
+def _plainly(text: str) -> str:
+    """The message about a value of another type, in words: a number, not int|None."""
+    m = re.fullmatch(r'(.*): unable to convert "(.*)" into (.*)\.', text, re.DOTALL)
+    if m is None:
+        return text
+    kinds = [kind for kind in m[3].split("|") if kind != "None"]
+    choices = [word for kind in kinds for word in re.findall(r"(?<=Literal\[)[^\]]*", kind)]
+    known = [_KINDS.get(kind, kind) for kind in kinds if not kind.startswith("Literal")] + choices
+    return f"{m[1]}: {m[2]!r} is not {' or '.join(known)}{did_you_mean(m[2], choices)}"
+
+
+_KINDS = {"int": "a whole number", "float": "a number", "str": "text", "Path": "a path"}
+
+
 def _hint(words: list[str]) -> str:
     """Return a hint if a file name was parsed as an option."""
     for word in words:
@@ -122,7 +136,7 @@ def _config(words: list[str]) -> tuple[Dict, ...]:
 
 
 def _say_why(text: str, code: int) -> int:
-    terminal.note(f"wgmb: {' '.join(text.split())}")
+    terminal.complain(text)
     return code
 
 

@@ -18,7 +18,8 @@ from ..pipeline import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
 from .exit_codes import DONE, SOME_FAILED
 from .options import BlurOptions, Colors, Given, InputOptions, Look, ShutterOptions, Target, When
-from .terminal import note, progress
+from .spelling import as_options
+from .terminal import complain, note, progress
 
 
 def blur(
@@ -92,12 +93,12 @@ def _settings(look: BlurSettings, when: ShutterSettings, given: InputSettings) -
 def conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose: bool) -> int:
     """Print a summary of the run; return the exit code."""
     for number, why in sorted(report.failed.items()):
-        note(f"wgmb: frame {number} failed: {why}")
+        complain(f"frame {number} failed: {why}")
     if report.stopped:
         rest = len(clip.numbers) - len(report.done) - len(report.skipped) - len(report.failed)
-        note(f"wgmb: stopped: {report.stopped}; {rest} other frames were not written")
+        complain(f"stopped: {report.stopped}; {rest} other frames were not written")
     for mask in report.absent:
-        note(f"wgmb: {mask} is in no frame, so it changed nothing")
+        complain(f"{mask} is in no frame, so it changed nothing")
     if not quiet:
         for number, bad in sorted(report.bad.items()):
             what = ", ".join(f"{n} in {name}" for name, n in bad.items())
@@ -105,6 +106,7 @@ def conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose: 
         if verbose or clip.is_finding_notable:
             note(f"vectors: {clip.finding}")
         for text, numbers in clip.notes.items():
+            text = as_options(text)
             if told := sorted(set(numbers) & set(report.done)):
                 note(
                     text if len(told) == len(report.done) else f"frames {frame_list(told)}: {text}"
@@ -119,7 +121,7 @@ def conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose: 
         done = f"{len(report.done)} frames in {took} -> {files.pattern}"
         note(done + (f", {len(report.skipped)} already done" if report.skipped else ""))
     if report.failed:
-        note(f"wgmb: {len(report.failed)} of {len(clip.numbers)} frames failed")
+        complain(f"{len(report.failed)} of {len(clip.numbers)} frames failed")
     return SOME_FAILED if report.failed or report.stopped or report.absent else DONE
 
 

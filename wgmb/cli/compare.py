@@ -11,7 +11,7 @@ from typing import Annotated
 from cyclopts import Group, Parameter
 
 from .. import gpu
-from ..errors import InputError
+from ..errors import InputError, check_choice
 from ..lab.cases import Candidate, Case, SceneFrame, clip_case, make_scene, scene_case
 from ..lab.compare import Laboratory, crossings
 from ..lab.experiments import EXPERIMENTS
@@ -141,9 +141,7 @@ def compare(
     wanted, candidates = size_of(size), who.candidates()
     steps, budgets = who.steps(), who.budgets()
     if experiment:
-        if experiment not in EXPERIMENTS:
-            known = ", ".join(EXPERIMENTS)
-            raise InputError(f"experiment must be one of {known}, got {experiment!r}")
+        check_choice("--experiment", experiment, EXPERIMENTS)
         report.title = f"{experiment.capitalize()}'s experiment"
         EXPERIMENTS[experiment](lab, report, wanted)
         write(report, output)

@@ -56,6 +56,13 @@ def note(text: str) -> None:
         sys.stderr.write(f"{printable(text)}\n")
 
 
+def complain(text: str) -> None:
+    """Print an error in one line, in which the library's arguments are spelled as options."""
+    from .spelling import as_options
+
+    note(f"wgmb: {as_options(' '.join(text.split()))}")
+
+
 def flush() -> None:
     """Flush standard output; OSError if it cannot be written."""
     with _taken():

@@ -57,7 +57,7 @@ def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
     if _is_opengl(matching[0]) and "opengl" not in name.lower():
         raise DeviceError(
             f"only OpenGL adapters found ({listing}); install a Vulkan driver "
-            "(Debian, Ubuntu: mesa-vulkan-drivers) or select OpenGL with --adapter opengl"
+            "(Debian, Ubuntu: mesa-vulkan-drivers) or select OpenGL with `device='opengl'`"
         )
     return matching[0]
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..camera import MAX_INDEX
 from ..display import ColorSpace
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, check_choice, did_you_mean
 from ..frame import Frame
 from ..reach import Reach
 from . import detect, exr, layers, limits, vectors, views
@@ -89,8 +89,7 @@ class Passes:
         for name in ("holdout", "scale"):
             given = getattr(self, name)
             object.__setattr__(self, name, (given,) if isinstance(given, str) else tuple(given))
-        if self.depth_kind not in DEPTHS:
-            raise InputError(f"depth must be one of {', '.join(DEPTHS)}, got {self.depth_kind!r}")
+        check_choice("`depth_kind`", self.depth_kind, DEPTHS)
         if not self.far > 0:
             raise InputError(f"far must be over 0, got {self.far}")
 
@@ -166,7 +165,7 @@ class Clip:
             if not readable(path):
                 raise InputError(f"{path}: no such file")
             if frames is not None:
-                raise InputError(f"--frames needs a pattern such as shot.####.exr, got {path.name}")
+                raise InputError(f"`frames` needs a pattern such as shot.####.exr, got {path.name}")
             self.on_disk = [number_in(path)]
             return self.on_disk
         self.on_disk = there = numbers_on_disk(self._leading)
@@ -175,7 +174,7 @@ class Clip:
         if not frames and there[-1] - there[0] - len(there) >= MOST_FRAMES:
             raise InputError(
                 f"{self.pattern}: only {len(there)} of the frames {there[0]} to {there[-1]} exist; "
-                "use --skip-missing to accept gaps, or --frames to select"
+                "`skip_missing=True` accepts gaps, `frames` selects"
             )
         wanted = frame_numbers(frames) if frames else list(range(there[0], there[-1] + 1))
         found = set(there)
@@ -183,7 +182,7 @@ class Clip:
         if missing and not skip_missing:
             raise InputError(
                 f"{self.pattern}: missing frames {frame_list(missing)}; "
-                "use --skip-missing to leave them out"
+                "`skip_missing=True` leaves them out"
             )
         if not found & set(wanted):
             raise InputError(f"{self.pattern}: none of the frames {frames} exist")

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, check_choice
 from . import chroma, deep, limits
 from .limits import MOST_PIXELS_A_SIDE
 from .native import hushed, inside
@@ -188,10 +188,7 @@ def _fill_gaps(part: Part, sampling: dict[str, tuple[int, int]]) -> None:
 
 def check_compression(name: str) -> None:
     """InputError unless `name` is in COMPRESSIONS, or "same": as the file that was read."""
-    if name not in (*COMPRESSIONS, _SAME):
-        known = ", ".join((*COMPRESSIONS, _SAME))
-        hint = did_you_mean(name, (*COMPRESSIONS, _SAME))
-        raise InputError(f"compression must be one of {known}, got {name!r}{hint}")
+    check_choice("compression", name, (*COMPRESSIONS, _SAME))
 
 
 def encode(exr: Exr, compression: str = "zip") -> bytes:

@@ -71,7 +71,7 @@ def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
         named = [k for word in _COLOR for k in by_layer if stem(k) == word]
         if not named and len(by_layer) != 1:
             raise InputError(
-                "cannot tell which layer is the colour; choose one with --layer: "
+                "cannot tell which layer is the colour; `color` chooses one: "
                 f"{', '.join(by_layer) or '(no RGB layer)'}"
             )
         chosen = named[0] if named else next(iter(by_layer))

@@ -33,5 +33,5 @@ def check(path: Path, what: str, promised: int, stored: int, max_mb: float) -> N
     because = f" (over {_TIMES} times its own size)" if thin else ""
     raise InputError(
         f"{path}: image of {what} would decode to {-(-promised // 2**20)} MB{because}, "
-        f"the limit is {most:g} MB; --max-mb {needed} allows it"
+        f"the limit is {most:g} MB; `max_mb={needed}` allows it"
     )

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
+from ..errors import InputError, check_choice
 from ..frame import Frame
 from ..reach import Reach
 from .cuts import is_cut, jumps, still, straightened
@@ -44,8 +44,7 @@ class Neighbours:
     """
 
     def __init__(self, clip: Clip, known_cuts: frozenset[int], is_search: bool, outside: str):
-        if outside not in OUTSIDE:
-            raise InputError(f"outside must be one of {', '.join(OUTSIDE)}, got {outside!r}")
+        check_choice("outside", outside, OUTSIDE)
         self._clip, self._known_cuts, self._outside = clip, known_cuts, outside
         self._is_search = is_search
         self.cuts: set[int] = set()
@@ -263,7 +262,7 @@ class Neighbours:
             where = ", ".join(name for name, cut in zip(_SIDES, found, strict=True) if cut)
             text = (
                 f"the picture goes on beyond the data window ({where}): what lies there is taken "
-                "as unknown; --outside nothing takes it as empty"
+                "as unknown; `outside='nothing'` takes it as empty"
             )
             self._clip.notes.setdefault(text, []).append(there[0])
         return found

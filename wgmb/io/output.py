@@ -16,7 +16,7 @@ import numpy as np
 
 from ..color import ToDisplay, to_display
 from ..display import Display
-from ..errors import InputError
+from ..errors import InputError, check_choice
 from . import atomic, exr, record, stills, video, views
 from .frame_file import FrameFile, about
 from .frame_numbers import frame_path, has_view, in_view, is_pattern
@@ -94,8 +94,7 @@ class Output:
         _check_exr_options(pattern, layers, compression)
         if has_view(pattern) and not views:
             raise InputError(f"output {pattern}: %V stands for a view, but the frames have none")
-        if window not in WINDOWS:
-            raise InputError(f"window must be one of {', '.join(WINDOWS)}, got {window!r}")
+        check_choice("window", window, WINDOWS)
         self._layers, self._compression, self._display = layers, compression, display
         self._grows = window == "grow"
         self.pattern, self.bits, self.numbers = Path(pattern), bits, numbers
@@ -113,7 +112,7 @@ class Output:
             raise InputError(f"bits must be 8 or 16 (JPEG: 8), got {bits}")
         is_video = suffix in video.SUFFIXES
         if is_video and resume:
-            raise InputError("--resume is not available for videos, only for frame files")
+            raise InputError("`resume` is not available for videos, only for frame files")
         if not is_video and len(numbers) > 1 and not is_pattern(pattern):
             raise InputError(
                 f"output {pattern}: {len(numbers)} frames need a pattern such as out.####.exr"
@@ -149,8 +148,8 @@ class Output:
         if there and not (self._overwrite or self._resume):
             more = f" and {len(there) - 1} more" if len(there) > 1 else ""
             raise InputError(
-                f"{there[0]}{more} exists; --overwrite replaces it"
-                + ("" if is_video else ", --resume keeps finished frames")
+                f"{there[0]}{more} exists; `overwrite=True` replaces it"
+                + ("" if is_video else ", `resume=True` keeps finished frames")
             )
         return names
 
@@ -195,7 +194,9 @@ class Output:
             raise InputError(f"{path}: {error.strerror}") from None
         content = record.read(data)
         if content is None and not (record.is_ours(data) or self._overwrite):
-            raise InputError(f"{path} exists and was not written by wgmb; --overwrite replaces it")
+            raise InputError(
+                f"{path} exists and was not written by wgmb; `overwrite=True` replaces it"
+            )
         return content is not None and content == self._expected(made_of)
 
     def _expected(self, made_of: dict[str, Any] | None) -> dict[str, Any]:
@@ -334,8 +335,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
 
 
 def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> None:
-    if layers not in ("all", "picture"):
-        raise InputError(f"layers must be all or picture, got {layers!r}")
+    check_choice("layers", layers, ("all", "picture"))
     exr.check_compression(compression)
     if compression != "zip" and Path(pattern).suffix.lower() != ".exr":
         raise InputError(f"compression {compression} needs an .exr output, got {pattern}")

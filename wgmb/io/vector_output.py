@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, check_choice
 from . import exr, record, stills
 from .frame_file import FrameFile
 from .frame_numbers import has_view
@@ -111,16 +111,16 @@ class VectorOutput(Output):
 
 
 def _check(pattern: str, program: str, max_displace: float | None) -> None:
-    if program not in PROGRAMS:
-        hint = did_you_mean(program, PROGRAMS)
-        raise InputError(f"program must be one of {', '.join(PROGRAMS)}, got {program!r}{hint}")
+    check_choice("`program`", program, PROGRAMS)
     ends = (".exr", *_DEEP) if program == "rsmb" else (".exr",)
     if not pattern.lower().endswith(ends):
         raise InputError(f"output {pattern}: {program} vectors need {' or '.join(ends)}")
     if max_displace is not None and program != "rsmb":
-        raise InputError(f"max_displace is for rsmb vectors, {program} vectors are in pixels")
+        raise InputError(f"`max_displace` is for rsmb vectors, {program} vectors are in pixels")
     if max_displace is not None and not 0 < max_displace < 1e6:
-        raise InputError(f"max_displace must be over 0 and under 1000000 px, got {max_displace:g}")
+        raise InputError(
+            f"`max_displace` must be over 0 and under 1000000 px, got {max_displace:g}"
+        )
 
 
 def _file(

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, check_choice
 from .layers import component, layers, one_channel, pick, stem
 
 
@@ -108,10 +108,7 @@ class Vectors:
     mask: str | None = None
 
     def __post_init__(self) -> None:
-        if self.convention not in ("auto", "none", *CONVENTIONS):
-            known = ", ".join(("auto", *CONVENTIONS, "none"))
-            hint = did_you_mean(self.convention, known.split(", "))
-            raise InputError(f"vectors must be one of {known}, got {self.convention!r}{hint}")
+        check_choice("vectors", self.convention, ("auto", *CONVENTIONS, "none"))
         if self.flip not in ("", "x", "y", "xy"):
             raise InputError(f"vector flip must be x, y or xy, got {self.flip!r}")
         if not np.isfinite(self.scale) or not np.isfinite(self.offset or 0.0):

@@ -210,7 +210,9 @@ def clip_case(
     elif len(inputs) == 1:
         clip = open_clip(inputs[0])
         if number is None and len(clip.numbers) > 1:
-            raise InputError(f"{inputs[0]} has frames {frame_list(clip.numbers)}: set --frame")
+            raise InputError(
+                f"{inputs[0]} has frames {frame_list(clip.numbers)}; `number` chooses one"
+            )
         wanted = clip.numbers[0] if number is None else number
         if wanted not in clip.numbers:
             raise InputError(f"{inputs[0]} has no frame {wanted}")

@@ -17,7 +17,7 @@ from functools import cache
 from types import MappingProxyType, UnionType
 from typing import Any, Literal
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, check_choice
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,7 @@ class Option:
         if value is None and self.default is None:
             return
         if self.choices:
-            if value not in self.choices:
-                known = ", ".join(self.choices)
-                hint = did_you_mean(value, self.choices)
-                raise InputError(f"{self.name} must be one of {known}, got {value!r}{hint}")
+            check_choice(self.name, value, self.choices)
             return
         if self.kind is bool or isinstance(value, bool):
             if not (self.kind is bool and isinstance(value, bool)):

@@ -72,9 +72,11 @@ class Reproject:
             super().__post_init__()
             published = self.facing or self.depth_test or self.splat != "point"
             if self.variant != "published" and published:
-                raise InputError("facing, depth_test and splat need the variant 'published'")
+                raise InputError("`facing`, `depth_test` and `splat` need `variant='published'`")
             if self.depth_test and self.splat == "line":
-                raise InputError("depth_test needs splat 'point', as a line has no single depth")
+                raise InputError(
+                    "`depth_test` needs `splat='point'`, as a line has no single depth"
+                )
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
         self._device, self._output, self._options = device, output, options

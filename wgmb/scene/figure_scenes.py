@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..cone import VIDEOS
-from ..errors import InputError
+from ..errors import InputError, check_choice
 from .figure import RATE, Figure
 from .scene import CameraPath, Scene
 
@@ -25,8 +25,7 @@ def cone(video: str = "natural", time: float = 0.0, speed: float = 15.0) -> Scen
     """
     if video == "natural":
         return _scene("cone", Figure(kind="NATURAL", speed=speed, begin=time))
-    if video not in VIDEOS:
-        raise InputError(f"video must be natural or one of {', '.join(VIDEOS)}, got {video!r}")
+    check_choice("video", video, ("natural", *VIDEOS))
     shutter = VIDEOS[video]
     return _scene("cone", Figure(kind="SCREEN", speed=speed, begin=time, shutter=shutter))
 

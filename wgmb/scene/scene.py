@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
+from ..errors import InputError, check_choice
 from .bodies import PATTERNS, SHAPES, Body, Color, rotation, times_of, translation
 from .volumes import Backdrop, Instant, Volume
 
@@ -100,14 +100,10 @@ class Scene:
 
     def __post_init__(self) -> None:
         for body in self.bodies:
-            if body.shape not in SHAPES:
-                raise InputError(f"shape must be one of {', '.join(SHAPES)}, got {body.shape!r}")
+            check_choice("shape", body.shape, SHAPES)
             if not all(1e-15 < s < 1e15 for s in body.size):
                 raise InputError(f"a {body.shape} needs positive sizes, got {body.size}")
-            if body.pattern not in PATTERNS:
-                raise InputError(
-                    f"pattern must be one of {', '.join(PATTERNS)}, got {body.pattern!r}"
-                )
+            check_choice("pattern", body.pattern, PATTERNS)
             looks = (*body.color, *body.second_color, *body.repeats, body.emission, body.specular)
             if not _all_finite(looks):
                 raise InputError(f"a {body.shape} needs colours and lights within f32, got {looks}")
@@ -116,8 +112,7 @@ class Scene:
                 "sun direction must not be zero; sun and sky must be finite, "
                 f"got {self.sun}, {self.sky}"
             )
-        if self.density not in DENSITIES:
-            raise InputError(f"density must be one of {', '.join(DENSITIES)}, got {self.density!r}")
+        check_choice("density", self.density, DENSITIES)
         # Bodies come by shape on the GPU; the stable order keeps indices.
         object.__setattr__(
             self, "bodies", tuple(sorted(self.bodies, key=lambda b: SHAPES.index(b.shape)))

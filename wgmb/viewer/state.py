@@ -135,7 +135,7 @@ class State:
         if source not in builtin.SCENES and not (
             frame_numbers.readable(Path(source)) or frame_numbers.is_pattern(source)
         ):
-            known = ", ".join(builtin.SCENES)
+            known = f"{', '.join(builtin.SCENES)}{did_you_mean(source, builtin.SCENES)}"
             raise InputError(f"no such file or scene: {source!r}; scenes: {known}")
         color = _changed(self.color, "from_", None)
         state = replace(self.unmoved(), source=source, settings=(), given=(), color=color)

@@ -1,0 +1,53 @@
+"""Arguments of the library, as its messages name them, spelled as options of the command line."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from dataclasses import fields
+from functools import cache
+
+_ARGUMENT = re.compile(r"(?<![^\s(])`([a-z_]+)(?:=([^`]*))?`(?=[\s,;:.)]|$)")
+_OTHERWISE = {
+    "color": "--layer",
+    "convention": "--vectors",
+    "device": "--adapter",
+    "number": "--frame",
+    "program": "--as",
+    "space": "--from",
+    "max_displace": "--max-displace",
+}
+"""Arguments whose options have other names, or are those of one command."""
+
+
+@cache
+def options() -> dict[str, str]:
+    """The option that each argument is set by; the settings' fields have both names."""
+    from .. import settings
+    from ..color_settings import ColorSettings, option_name
+
+    groups = (
+        settings.InputSettings,
+        settings.BlurSettings,
+        settings.ShutterSettings,
+        settings.OutputSettings,
+        settings.SceneSettings,
+        ColorSettings,
+    )
+    return {f.name: option_name(f.name) for group in groups for f in fields(group)} | _OTHERWISE
+
+
+def as_options(message: str) -> str:
+    """`skip_missing=True` between backticks -> --skip-missing, `max_mb=900` -> --max-mb 900.
+
+    Names of files stay as they are: an argument stands alone, between backticks.
+    """
+    return _ARGUMENT.sub(_option, message) if "`" in message else message
+
+
+def _option(found: re.Match[str]) -> str:
+    name, value = found[1], (found[2] or "").strip("'\"")
+    option = options().get(name)
+    if option is None:
+        return found[0]
+    return option if value in ("", "True") else f"{option} {shlex.quote(value)}"
