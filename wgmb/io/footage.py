@@ -32,6 +32,7 @@ from . import limits
 from .color_tags import assumed, either, tags_of
 from .container import opened, picture_stream
 from .deinterlace import Fields
+from .encoders import Facts
 from .hdr10 import LightLevel, Mastering
 from .pixels import Layout, is_transparent, layout, planes_of
 from .timeline import Times, lacking, scanned
@@ -202,6 +203,11 @@ class Footage:
     def pixel_aspect(self) -> Fraction:
         """Width of an upright pixel to its height."""
         return 1 / self._pixel_aspect if self._turn.swaps else self._pixel_aspect
+
+    @property
+    def facts(self) -> Facts:
+        """What it says of its pictures besides their coding."""
+        return Facts(self.pixel_aspect, self.mastering, self.light_level)
 
     @property
     def rotation(self) -> int:

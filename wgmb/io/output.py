@@ -124,7 +124,7 @@ class Output:
             for view in self._views:
                 path = in_view(self.pattern, view)
                 temporary = atomic.temporary_name(path)
-                names = display.names if display else video.SRGB
+                names = display.names if display else video.SRGB_DISPLAY
                 self._videos[view] = video.Video(path, temporary, fps, self.settings, names)
 
     def _check_names(self, inputs: list[Path], is_video: bool) -> dict[Path, list[str]]:

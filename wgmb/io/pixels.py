@@ -24,7 +24,7 @@ from ..coding import Coding
 _STEPS = {"420": (2, 2), "422": (2, 1), "444": (1, 1), "440": (1, 2), "411": (4, 1), "410": (4, 4)}
 _NAMES = {steps: name for name, steps in _STEPS.items()}
 _DEPTHS = (8, 9, 10, 12, 14, 16)
-_THREADS = 1  # with more, FFmpeg 8 now and then spoils the beginning of a row
+THREADS = 1  # of a VideoReformatter: with more, FFmpeg 8 at times spoils the start of a row
 _UNREADABLE = re.compile(r"bayer_|xyz|.*f(16|32)(le|be)$")
 
 
@@ -107,9 +107,9 @@ def planes_of(frame: av.VideoFrame, into: Layout, by: VideoReformatter) -> tuple
     `by` is best the same for all frames of a video.
     """
     if into.via and frame.format.name != into.name:
-        frame = by.reformat(frame, format=into.via, threads=_THREADS)
+        frame = by.reformat(frame, format=into.via, threads=THREADS)
     if frame.format.name.replace("yuvj", "yuv") not in (into.name, "gray8"):
-        frame = by.reformat(frame, format=into.name, threads=_THREADS)
+        frame = by.reformat(frame, format=into.name, threads=THREADS)
     # The components of RGB are in the order R, G, B wherever their planes are.
     return tuple(_samples(frame, part.plane, into.bits) for part in frame.format.components)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -11,32 +10,26 @@ from typing import cast
 
 import av
 import numpy as np
-from av.container import OutputContainer
 from av.error import BlockingIOError, EOFError, FFmpegError
 from av.filter import Graph
-from av.video.reformatter import Colorspace
-from av.video.stream import VideoStream
+from av.video.reformatter import Colorspace, VideoReformatter
 
+from ..coding import BT709, SRGB, UNSPECIFIED, Coding
 from ..color import ToDisplay, to_display
 from ..errors import InputError
 from . import atomic
+from .encoders import SUFFIXES as SUFFIXES
+from .encoders import Encoding, chosen
+from .pixels import THREADS
+from .video_file import VideoFile, tag
 
-SUFFIXES = (".mp4", ".mov", ".mkv", ".webm", ".gif")
-_CODECS = {  # suffix: container, codec, pixel format, options
-    ".mp4": ("mp4", "libx264", "yuv420p", {"crf": "16", "preset": "medium"}),
-    ".mkv": ("matroska", "libx264", "yuv420p", {"crf": "16", "preset": "medium"}),
-    ".mov": ("mov", "prores_ks", "yuv422p10le", {"profile": "3"}),
-    ".webm": ("webm", "libvpx-vp9", "yuv420p", {"crf": "24", "b": "0"}),
-    ".gif": ("gif", "gif", "pal8", {}),
-}
-_BT709, _SRGB, _UNKNOWN = 1, 13, 2  # as primaries, matrix or transfer (ITU-T H.273)
-SRGB = frozenset({"srgb_rec709_display"})
+SRGB_DISPLAY = frozenset({"srgb_rec709_display"})
 _DISPLAYS = {  # primaries and transfer of displays, by the names that configs give them
-    "srgb_rec709_display": (_BT709, _SRGB), "srgb_display": (_BT709, _SRGB),
-    "g22_rec709_display": (_BT709, 4),
-    "g24_rec709_display": (_BT709, 1), "rec1886_rec709_display": (_BT709, 1),
+    "srgb_rec709_display": (BT709, SRGB), "srgb_display": (BT709, SRGB),
+    "g22_rec709_display": (BT709, 4),
+    "g24_rec709_display": (BT709, 1), "rec1886_rec709_display": (BT709, 1),
     "g24_rec2020_display": (9, 14), "rec1886_rec2020_display": (9, 14),
-    "srgb_p3d65_display": (12, _SRGB), "displayp3_display": (12, _SRGB),
+    "srgb_p3d65_display": (12, SRGB), "displayp3_display": (12, SRGB),
     "pq_rec2020_display": (9, 16), "rec2100_pq_display": (9, 16),
     "pq_p3d65_display": (12, 16), "st2084_p3d65_display": (12, 16),
     "hlg_rec2020_display": (9, 18), "rec2100_hlg_display": (9, 18),
@@ -50,10 +43,11 @@ _GIF_RATES = Fraction(1, 600), Fraction(50)  # a delay has 16 bits; under two ti
 class Video:
     """A video being written under a temporary name; `close` gives it its own.
 
-    Alpha is dropped (the colour is premultiplied, so it lies over black). Codecs that share
-    colour between pixels need even sizes: the last row or column is then repeated. A GIF has 256
-    colours per frame, dithered, and delays in steps of 1/100 s, which vary by a step to keep
-    the mean frame rate. `display`: names of the display's colour space, for the tags.
+    Alpha is dropped (the colour is premultiplied, so it lies over black). Encoders that share
+    colour between pixels may need even sizes: the last row or column is then repeated. A GIF has
+    256 colours per frame, dithered, and delays in steps of 1/100 s, which vary by a step to keep
+    the mean frame rate. `display`: names of the display's colour space, for the tags. `encoding`:
+    see encoders.chosen; by default that of the suffix.
     """
 
     def __init__(
@@ -62,10 +56,12 @@ class Video:
         temporary: Path,
         fps: Fraction,
         settings: str,
-        display: Collection[str] = SRGB,
+        display: Collection[str] = SRGB_DISPLAY,
+        encoding: Encoding | None = None,
     ):
         self.path, self.temporary, self.settings = path, temporary, settings
-        self._is_gif = path.suffix.lower() == ".gif"
+        self._encoding = encoding or chosen(path)
+        self._is_gif = self._encoding.codec == "gif"
         least, most = _GIF_RATES if self._is_gif else _RATES
         if not least <= fps <= most:
             raise InputError(
@@ -73,12 +69,12 @@ class Video:
                 f"got {float(fps):g}"
             )
         self.fps = fps.limit_denominator(_FINEST)
-        self._open: tuple[OutputContainer, VideoStream] | None = None
+        self._coding = self._encoding.coding(_coding(display, self._encoding.codec == "ffv1"))[0]
+        self._pixels = self._encoding.pixels(self._coding)
+        self._by = VideoReformatter()
+        self._file: VideoFile | None = None
         self._palettes: Graph | None = None
-        self._lock: int | None = None
         self._frames = 0
-        known = [_DISPLAYS[name] for name in sorted(display) if name in _DISPLAYS]
-        self._tags = known[0] if known else (_UNKNOWN, _UNKNOWN)
         self._size: tuple[int, ...] = ()
 
     def add(self, rgba: np.ndarray, convert: ToDisplay = to_display) -> None:
@@ -90,48 +86,45 @@ class Video:
                 f"frame of {shown.shape[1]} x {shown.shape[0]} in a video of "
                 f"{self._size[1]} x {self._size[0]}"
             )
-        if not self._is_gif:
+        if self._encoding.encoder.even:
             height, width = shown.shape[:2]
             shown = np.pad(shown, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
         try:
-            self._open = self._open or self._begin(shown.shape[1], shown.shape[0])
+            self._file = self._file or self._begin(shown.shape[1], shown.shape[0])
             self._encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(shown), format="rgb24"))
-        except (FFmpegError, OSError) as error:
+        except FFmpegError as error:
             raise atomic.about(self.path, error) from None
 
-    def _begin(self, width: int, height: int) -> tuple[OutputContainer, VideoStream]:
-        kind, codec, pixels, options = _CODECS[self.path.suffix.lower()]
-        self._lock = atomic.create(self.temporary)  # its own file, which nobody else writes to
-        container = av.open(str(self.temporary), "w", format=kind)
-        container.metadata["comment"] = f"wgmb {self.settings}"
-        stream = cast(VideoStream, container.add_stream(codec, rate=self.fps, options=options))
-        stream.width, stream.height, stream.pix_fmt = width, height, pixels
-        context = stream.codec_context
+    def _begin(self, width: int, height: int) -> VideoFile:
         if self._is_gif:
-            context.time_base = _TICK
             self._palettes = _palettes(width, height)
-        else:
-            context.color_primaries, context.color_trc = self._tags
-            context.colorspace = _BT709
-        return container, stream
+        return VideoFile(
+            self.path, self.temporary, self._encoding, self._coding, (width, height), self.fps,
+            _TICK if self._is_gif else 1 / self.fps,
+            metadata={"comment": f"wgmb {self.settings}"},
+        )  # fmt: skip
 
     def _encode(self, frame: av.VideoFrame | None) -> None:
         """Write what can be written once `frame` is there; None: all the rest."""
-        assert self._open is not None
-        container, stream = self._open
+        assert self._file is not None
         if self._palettes is None:
             if frame is not None:
-                frame = frame.reformat(format=stream.pix_fmt, dst_colorspace=Colorspace.ITU709)
-            container.mux(stream.encode(frame))
+                frame = self._by.reformat(
+                    frame, format=self._pixels, dst_colorspace=Colorspace.ITU709, threads=THREADS
+                )
+                tag(frame, self._coding)
+            self._file.encode(frame, self._frames)
+            self._frames += 1
             return
         if frame is not None:
             frame.pts, frame.time_base = self._tick(self._frames), _TICK
             self._frames += 1
         self._palettes.push(frame)
         for paletted in _pulled(self._palettes):
-            container.mux(stream.encode(paletted))
+            assert paletted.pts is not None
+            self._file.encode(paletted, paletted.pts)
         if frame is None:
-            container.mux(stream.encode(None))
+            self._file.encode(None)
 
     def _tick(self, frame: int) -> int:
         """Return the time at which a frame of a GIF is shown, in its ticks."""
@@ -139,32 +132,30 @@ class Video:
 
     def close(self) -> None:
         """Finish the file and put it in place; OSError if it cannot be."""
-        if self._open is not None:
-            try:
-                self._encode(None)
-                self._open[0].close()
-            except FFmpegError as error:
-                self.abandon()
-                raise atomic.about(self.path, error) from None
-            self._open = None
-        if self._lock is not None:
-            os.fsync(self._lock)
-        atomic.rename(self.temporary, self.path)
-        self._unlock()
-
-    def _unlock(self) -> None:
-        if self._lock is not None:
-            lock, self._lock = self._lock, None
-            os.close(lock)
+        if self._file is None:
+            raise OSError(f"{self.path}: no frames")
+        try:
+            self._encode(None)
+        except (FFmpegError, OSError) as error:
+            self.abandon()
+            raise atomic.about(self.path, error) from None
+        self._file.close()
 
     def abandon(self) -> None:
         """Leave nothing behind."""
-        if self._open is not None:
-            (container, _), self._open = self._open, None
-            with contextlib.suppress(OSError, ValueError, FFmpegError):  # say, a full disk
-                container.close()
-        self._unlock()
+        if self._file is not None:
+            self._file.abandon()
         self.temporary.unlink(missing_ok=True)
+
+
+def _coding(display: Collection[str], lossless: bool) -> Coding:
+    """What pictures for this display are coded as, if the encoder can."""
+    known = [_DISPLAYS[name] for name in sorted(display) if name in _DISPLAYS]
+    primaries, transfer = known[0] if known else (UNSPECIFIED, UNSPECIFIED)
+    if lossless:
+        return Coding("rgb", 8, (1, 1), full_range=True, matrix=0, transfer=transfer,
+                      primaries=primaries)  # fmt: skip
+    return Coding(transfer=transfer, primaries=primaries)
 
 
 def _palettes(width: int, height: int) -> Graph:

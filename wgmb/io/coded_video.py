@@ -1,0 +1,91 @@
+"""Write coded pictures as a video, at exact times, with the other streams beside them."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from av.video.reformatter import VideoReformatter
+
+from ..coding import CodedPicture, Coding
+from ..errors import InputError
+from .encoders import NO_FACTS, Encoding, Facts
+from .pixels import THREADS, frame_of, pixel_format
+from .video_file import VideoFile, tag
+
+
+class CodedVideo:
+    """A video of CodedPictures; complete under its name after `close`, or absent.
+
+    `coding` is what `encoding.coding` returned. `rate`: pictures a second, usually; `base`: the
+    tick of the file's clock [s], of which all times should be multiples (see clock.tick).
+    Encoders that share colour between pixels may need even sizes: the last row or column is then
+    repeated, which `padding` says. OSError if the file cannot be written, InputError for an encoder
+    that does not start.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        temporary: Path,
+        encoding: Encoding,
+        coding: Coding,
+        size: tuple[int, int],
+        rate: Fraction,
+        base: Fraction,
+        facts: Facts = NO_FACTS,
+        metadata: dict[str, str] | None = None,
+    ):
+        self.path, self._coding, self._base = path, coding, base
+        self._size, self._last = size, -1
+        self.padding = padded(size, encoding, coding)
+        whole = size[0] + self.padding[0], size[1] + self.padding[1]
+        self._planar, self._pixels = pixel_format(coding), encoding.pixels(coding)
+        self._by = VideoReformatter()
+        self.file = VideoFile(path, temporary, encoding, coding, whole, rate, base, facts, metadata)
+
+    def add(self, picture: CodedPicture, time: Fraction) -> None:
+        """Append a picture that is shown at `time` [s], later than the one before."""
+        if picture.coding != self._coding or picture.size != self._size:
+            raise InputError(
+                f"{self.path}: picture of {picture.size} as {picture.coding} in a video of "
+                f"{self._size} as {self._coding}"
+            )
+        now = round(time / self._base)
+        if self._last >= 0 and now <= self._last:
+            raise InputError(f"{self.path}: pictures at times that do not ascend ({float(time)} s)")
+        self._last = now
+        frame = frame_of(self._filled(picture.planes), self._planar)
+        tag(frame, self._coding)
+        if self._pixels != self._planar:
+            frame = self._by.reformat(frame, format=self._pixels, threads=THREADS)
+        self.file.encode(frame, now)
+
+    def _filled(self, planes: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+        across, down = self.padding
+        if not (across or down):
+            return planes
+        full = planes[0].shape  # chroma was rounded up already
+        return tuple(
+            np.pad(p, ((0, down), (0, across)), "edge") if p.shape == full else p for p in planes
+        )
+
+    def close(self) -> None:
+        """Complete the file and put it in place."""
+        self.file.finish()
+        self.file.close()
+
+    def abandon(self) -> None:
+        """Leave nothing behind."""
+        self.file.abandon()
+
+
+def padded(size: tuple[int, int], encoding: Encoding, coding: Coding) -> tuple[int, int]:
+    """Columns and rows that the encoder needs beyond `size`."""
+    if not encoding.encoder.even:
+        return 0, 0
+    across, down = (-length % step for length, step in zip(size, coding.steps, strict=True))
+    return across, down
