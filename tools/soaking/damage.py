@@ -168,7 +168,8 @@ def mutations(trial: Trial) -> Iterator[Line]:
     unsealed = {
         kind: sum(o["what"] == _OTHER for o in outcomes)
         for kind, outcomes in found.items()
-        if not kinds.KINDS[kind].sealed and kinds.KINDS[kind].suffix not in (".csv", ".toml")
+        if not kinds.KINDS[kind].sealed
+        and kinds.KINDS[kind].suffix not in (".csv", ".edl", ".toml")
     }
     counts = ", ".join(f"{kind} {n}" for kind, n in sorted(unsealed.items(), key=lambda p: p[1]))
     yield other.line(f"without checksums, of {trial.count} each: {counts}")

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenEXR
+import opentimelineio as otio
 import tifffile
 from PIL import Image
 
@@ -24,6 +25,7 @@ from wgmb import CameraFile, Clip, InputError, Passes, viewer
 from wgmb.cli import app
 from wgmb.color import to_display
 from wgmb.io import exr, stills
+from wgmb.io.cut_list import CutList
 from wgmb.viewer import State
 
 
@@ -40,7 +42,7 @@ class Kind:
     @property
     def is_text(self) -> bool:
         """Whether a file that was cut off may be sound, and mean something else."""
-        return self.suffix in (".csv", ".toml")
+        return self.suffix in (".csv", ".edl", ".toml")
 
 
 def read(kind: str, path: Path) -> str:
@@ -93,6 +95,10 @@ def _read_curve(path: Path) -> str:
     drawn = path.with_suffix(".svg")
     _command(path, "shutter", "--curve", path, "-o", drawn, "--overwrite")
     return _digest([np.frombuffer(drawn.read_bytes(), np.uint8)])
+
+
+def _read_cuts(path: Path) -> str:
+    return str(sorted(CutList(str(path)).frames(1)))
 
 
 def _read_settings(path: Path) -> str:
@@ -184,6 +190,20 @@ def _settings(path: Path) -> None:
     path.write_text(State(playing=True, options=(("path", "straight"),)).toml(), "utf-8")
 
 
+def _edl(path: Path) -> None:
+    at = [f"01:00:0{second}:00" for second in range(9)]
+    events = [f"{i:03}  REEL V     C        {at[0]} {at[1]} {at[i]} {at[i + 1]}" for i in range(8)]
+    path.write_text("\n".join(["TITLE: edit", "FCM: NON-DROP FRAME", *events]) + "\n")
+
+
+def _otio(path: Path) -> None:
+    span = otio.opentime.TimeRange(duration=otio.opentime.RationalTime(24, 24))
+    clips = [otio.schema.Clip(f"shot {i}", source_range=span) for i in range(4)]
+    timeline = otio.schema.Timeline("edit")
+    timeline.tracks.append(otio.schema.Track("V1", clips))
+    path.write_text(otio.adapters.write_to_string(timeline))
+
+
 def _camera(path: Path) -> None:
     body = {"index": 1, "matrix_world": np.eye(4).tolist()}
     make.write_cameras(path, range(1, 4), objects=lambda n: {"car": body})
@@ -215,5 +235,7 @@ KINDS = {
     "jpeg-grey": Kind(".jpg", _pillow("L", quality=90), _read_still),
     "camera": Kind(".json", _camera, _read_camera),
     "curve": Kind(".csv", _curve, _read_curve),
+    "edl": Kind(".edl", _edl, _read_cuts),
+    "otio": Kind(".otio", _otio, _read_cuts),
     "viewer": Kind(".toml", _settings, _read_settings),
 }
