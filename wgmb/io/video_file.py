@@ -180,6 +180,6 @@ def _why(path: Path, encoding: Encoding, error: Exception) -> Exception:
     if "avcodec_open" in str(getattr(error, "filename", "")) and kind in HARDWARE:
         return InputError(
             f"encoder {encoding.encoder.name} does not start: it needs its maker's graphics "
-            "hardware and driver; without --encoder, software encodes"
+            "hardware and driver; one of software needs none"
         )
     return atomic.about(path, error)
