@@ -26,7 +26,7 @@ from .passes import STATES, Passes
 from .pyramid import features, level_sizes
 from .result import Motion, result
 from .search import FullSearch
-from .sweeps import sweep
+from .sweeps import polish, sweep
 from .views import BESIDE, Views, views_of
 
 Load = Callable[[int], np.ndarray | None]
@@ -34,11 +34,15 @@ Load = Callable[[int], np.ndarray | None]
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is done: sweeps on the coarsest level, on those between, and on the finest."""
+    """How much is done: sweeps on the coarsest level, on those between, and on the finest.
+
+    `polish`: how often parts of a pixel are refined in the end, and noise is removed; 1 or more.
+    """
 
     coarsest: int
     between: int
     finest: int
+    polish: int
 
     def sweeps(self, level: int, levels: int) -> int:
         """Sweeps on a level; 0 is the finest."""
@@ -47,7 +51,7 @@ class Effort:
         return self.between if level else self.finest
 
 
-EFFORTS = {"best": Effort(4, 2, 2), "fast": Effort(3, 2, 0)}
+EFFORTS = {"best": Effort(4, 2, 2, 2), "fast": Effort(3, 2, 0, 1)}
 KEPT = {"pictures": 4, "searched": 1, "mended": 0, "motion": 2}  # frames around the one asked for
 
 
@@ -182,10 +186,24 @@ class Shot:
             made = result(self._passes, self._sizes[0], alone, states)
             self._passes.give(states)
             return made
-        states = self._once("mended", number, 0, self._mended)
+        states = self._polished(number, views)
         made = result(self._passes, self._sizes[0], views, states)
+        self._passes.give(states)
         self._forget(number)
         return made
+
+    def _polished(self, number: int, views: Views) -> wgpu.GPUTexture:
+        """The last states of a frame, to parts of a pixel and without noise."""
+        passes, size, bound = self._passes, self._sizes[0], self._matched(views, 0)
+        here = bound["here"]
+        states = self._once("mended", number, 0, self._mended)
+        stepped, smooth = passes.take(size, STATES), passes.take(size, STATES)
+        for _ in range(self._effort.polish):
+            polish(passes, size, bound, states, stepped)
+            passes.run("smooth.wgsl", "main", size, here=here, states=stepped, output=smooth)
+            states = smooth
+        passes.give(stepped)
+        return smooth
 
     def _forget(self, number: int) -> None:
         """Let go of what the frames after and before this one will not need."""

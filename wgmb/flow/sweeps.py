@@ -48,6 +48,23 @@ def half_sweep(
     output: wgpu.GPUTexture,
 ) -> None:
     """Pass `number` of the sweeps: one colour of the chessboard, propagated or refined."""
+    entry = "refine" if number % 2 else "propagate"
+    half = -(-size[0] // 2), size[1]
+    _run(passes, entry, size, half, matched, states, carried, level, number, output)
+
+
+def polish(
+    passes: Passes,
+    size: tuple[int, int],
+    matched: dict,
+    states: wgpu.GPUTexture,
+    output: wgpu.GPUTexture,
+) -> None:
+    """Steps of every pixel on the finest level that improve its match."""
+    _run(passes, "polish", size, size, matched, states, [], 0, 0, output)
+
+
+def _run(passes, entry, size, grid, matched, states, carried, level, number, output) -> None:
     assert 2 * wgsl.load("flow/sweep.wgsl").constant("REFINED") <= SEEDS
     uniform = passes.uniform(
         "sweep.wgsl",
@@ -62,9 +79,9 @@ def half_sweep(
     )
     passes.run(
         "sweep.wgsl",
-        "refine" if number % 2 else "propagate",
+        entry,
         size,
-        grid=(-(-size[0] // 2), size[1]),
+        grid=grid,
         sweep=uniform,
         states=states,
         carried_near=carried[0] if carried else states,

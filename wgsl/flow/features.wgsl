@@ -1,5 +1,6 @@
 // What the features of pyramid.wgsl are worth when two pixels are compared.
 
+const LUMA: vec3f = vec3f(0.299, 0.587, 0.114);     // ITU-R BT.601
 const DIRECTION_SCALE: f32 = 0.25;      // directions are stored this many times too large, inverted
 const LIKENESS: f32 = 300.0;            // how fast the weight falls with the difference of display colours
 const LEAST_WEIGHT: f32 = 0.02;         // of a pixel unlike the centre

@@ -12,7 +12,6 @@
 
 alias Features = texture_storage_2d_array<rgba8unorm, write>;
 
-const LUMA: vec3f = vec3f(0.299, 0.587, 0.114);     // ITU-R BT.601
 const SOBEL: f32 = 0.25;                // so that an edge from 0 to 1 has a gradient of 1
 const SPREAD_RADIUS: i32 = 8;           // of the Gaussian around a gradient [px]
 const SPREAD_FALLOFF: f32 = 0.125;      // 1 / (2 sigma^2), sigma = 2 px

@@ -2,6 +2,7 @@
 // pixels (Barnes et al., "PatchMatch", 2009; on planes: Bleyer et al. 2011), then variations of its own.
 //#include common/hash.wgsl
 //#include flow/match.wgsl
+//#include flow/plane.wgsl
 
 struct Sweep {
     color: u32,         // of the chessboard: 0 or 1
@@ -28,17 +29,16 @@ const DIAGONAL: f32 = 9.0;          // those along the diagonals 9 px
 const AXES: u32 = 8u;
 const FIXED: u32 = 12u;             // along axes and diagonals
 const RANDOM: u32 = 2u;             // pixels anywhere within reach
-const PROPAGATED: u32 = 17u;        // the above, standing still, and two carried states
-const PLANE_RADIUS: i32 = 8;        // of the pixels to which a plane is fitted [px]
-const PLANE_SIDE: u32 = 9u;         // such pixels along a side
-const PLANE_INERTIA: f32 = 1.0;     // how much a fitted plane tends to be level [px^2]
-const FLOW_TRIES: u32 = 4u;         // random changes of the flow, each half as large as the one before
-const SLOPE_TRIES: u32 = 3u;        // random changes of the slope
+const PROPAGATED: u32 = 18u;        // the above, standing still, two carried states, and one made of both
+const FLOW_TRIES: u32 = 3u;         // random changes of the flow, each half as large as the one before
+const SLOPE_TRIES: u32 = 2u;        // random changes of the slope
 const SLOPE_STEP: f32 = 0.05;       // greatest of the first of them
 const SLOPE_FALL: f32 = 0.4;        // each is so much of the one before
-const BEND_TRIES: u32 = 4u;         // random changes of the bend, with the flow or without
-const BEND_FALL: f32 = 0.25;
-const REFINED: u32 = 15u;           // two planes, the changes, no slope, no bend
+const BEND_TRIES: u32 = 2u;         // random changes of the bend, with the flow or without
+const REFINED: u32 = 11u;           // two planes, the changes, no slope, no bend
+const STEPS: u32 = 3u;              // see stepped()
+const FLAT: f32 = 0.00001;          // squared gradient [1/px^2] that says nothing of the place
+const LONGEST_STEP: f32 = 2.0;      // [px]
 const SAME: f32 = 0.001;            // states closer than this are not tried again [px]
 
 var<private> around: array<vec4f, NEIGHBOURS>;      // flow and bend of the neighbours, each moved here
@@ -145,49 +145,14 @@ fn propagate(@builtin(local_invocation_index) local: u32,
         if k == FIXED + RANDOM { candidate = State(); }
         if k == FIXED + RANDOM + 1u && sweep.carried > 0u { candidate = load_state(carried_near, px); }
         if k == FIXED + RANDOM + 2u && sweep.carried > 1u { candidate = load_state(carried_far, px); }
+        if k == FIXED + RANDOM + 3u && sweep.carried > 1u {     // each side as the frame there has it
+            candidate = load_state(carried_near, px);
+            candidate.bend = view.far_factor * (load_state(carried_far, px).flow - candidate.flow);
+        }
         best = attempt(best, candidate);
     }
     store(px, best.state);
     store(other_pixel(px), load_state(states, other_pixel(px)));
-}
-
-struct Plane {
-    flow: vec2f,
-    slope: vec4f,
-}
-
-/// The plane through the flows near by that are of like pixels and like the state.
-fn fitted_plane(px: vec2i, state: State) -> Plane {
-    let color = textureLoad(here, px, 0, 0).rgb;
-    var total = 0.0;
-    var sum_at = vec2f(0.0);
-    var sum_flow = vec2f(0.0);
-    var square = vec3f(0.0);    // xx, xy, yy
-    var product = vec4f(0.0);   // xu, yu, xv, yv
-    for (var k = 0u; k < PLANE_SIDE * PLANE_SIDE; k++) {
-        let by = 2 * vec2i(vec2u(k % PLANE_SIDE, k / PLANE_SIDE)) - PLANE_RADIUS;
-        let at = px + by;
-        let is_there = all(at >= vec2i(0)) && all(at < vec2i(frame.size));
-        let flow = textureLoad(states, at, 0, 0).xy;
-        let x = vec2f(by);
-        let apart = dot(abs(flow - moved(state, x).flow), vec2f(1.0));
-        let like = likeness(textureLoad(here, at, 0, 0).rgb, color) / (1.0 + apart * apart);
-        let weight = select(0.0, like, is_there);
-        total += weight;
-        sum_at += weight * x;
-        sum_flow += weight * flow;
-        square += weight * vec3f(x.x * x.x, x.x * x.y, x.y * x.y);
-        product += weight * vec4f(x * flow.x, x * flow.y);
-    }
-    let mean_at = sum_at / total;
-    let xx = square.x - mean_at.x * sum_at.x + PLANE_INERTIA * total;
-    let xy = square.y - mean_at.x * sum_at.y;
-    let yy = square.z - mean_at.y * sum_at.y + PLANE_INERTIA * total;
-    let u = product.xy - mean_at * sum_flow.x;
-    let v = product.zw - mean_at * sum_flow.y;
-    let slope = vec4f(u.x * yy - u.y * xy, u.y * xx - u.x * xy, v.x * yy - v.y * xy, v.y * xx - v.x * xy)
-        / (xx * yy - xy * xy);
-    return Plane(sum_flow / total - sloped(slope, mean_at), slope);
 }
 
 /// Variation `k` of a state.
@@ -206,11 +171,84 @@ fn varied(state: State, plane: Plane, px: vec2i, k: u32) -> State {
     let bend_try = slope_try - SLOPE_TRIES - 1u;
     if bend_try == 0xffffffffu { result.slope = vec4f(0.0); }
     if bend_try < BEND_TRIES {
-        let by = 2.0 * sweep.bend_step * pow(BEND_FALL, f32(bend_try / 2u)) * random.xy;
+        let by = 2.0 * sweep.bend_step * random.xy;
         result.bend += by;
         if bend_try % 2u == 1u { result.flow += by; }
     }
     if bend_try == BEND_TRIES { result.bend = vec2f(0.0); }
+    return result;
+}
+
+struct Slide {          // what Gauss and Newton make of the differences to a frame
+    square: vec3f,      // of the gradient: xx, xy, yy
+    product: vec2f,     // of gradient and difference
+    error: f32,
+}
+
+fn slid(slide: Slide, gradient: vec2f, weight: f32, own: vec4f, found: vec4f, apart: f32) -> Slide {
+    let w = select(0.0, weight, apart < MOST_DIFFERENCE);
+    let d = dot(found.rgb - own.rgb, LUMA);
+    return Slide(slide.square + w * vec3f(gradient.x * gradient.x, gradient.x * gradient.y, gradient.y * gradient.y),
+                 slide.product + w * d * gradient, slide.error + weight * min(apart, MOST_DIFFERENCE));
+}
+
+/// By how much the patch has to be moved so that the differences vanish [px]; 0 if that is too far to be true.
+fn step_of(square: vec3f, product: vec2f) -> vec2f {
+    let xx = square.x + FLAT;
+    let yy = square.z + FLAT;
+    let step = vec2f(square.y * product.y - yy * product.x, square.y * product.x - xx * product.y)
+        / (xx * yy - square.y * square.y);
+    return select(vec2f(0.0), step, max(abs(step.x), abs(step.y)) < LONGEST_STEP);
+}
+
+struct Steps {
+    near: vec2f,        // to match the near frame better, [px]
+    far: vec2f,
+    both: vec2f,        // to match both, with the same bend
+    better: vec2f,      // that of the side that matches better
+}
+
+/// Steps of inverse search (Baker and Matthews, "Lucas-Kanade 20 Years On", 2004): with this frame's gradients.
+fn inverse_steps(state: State) -> Steps {
+    let way = way_to_far(state);
+    let to_near = target_of(state.flow, state.slope, OUTSIDE);
+    let to_far = target_of(way.flow, way.slope, OUTSIDE);
+    var n = Slide();
+    var f = Slide();
+    for (var row = 0u; row < SIDE; row++) {
+        for (var column = 0u; column < SIDE; column++) {
+            let offset = vec2f(column_offset(column), row_offset(row));
+            let px = vec2i(centre + offset);
+            let own0 = textureLoad(here, px, 0, 0);
+            let own1 = textureLoad(here, px, 1, 0);
+            let gradient = 0.5 * (vec2f(own0.w, own1.x) - 0.5);
+            let weight = inverse_weight * sample_weight(px, own0.rgb);
+            let at_near = sample_place(to_near, offset);
+            let near0 = textureSampleLevel(near, linear, at_near, 0, 0.0);
+            let near1 = textureSampleLevel(near, linear, at_near, 1, 0.0);
+            n = slid(n, gradient, weight, own0, near0, difference(own0, own1.xyz, near0, near1.xyz));
+            let at_far = sample_place(to_far, offset);
+            let far0 = textureSampleLevel(far, linear, at_far, 0, 0.0);
+            let far1 = textureSampleLevel(far, linear, at_far, 1, 0.0);
+            f = slid(f, gradient, weight, own0, far0, difference(own0, own1.xyz, far0, far1.xyz));
+        }
+    }
+    let by = view.far_factor;
+    let near_step = step_of(n.square, n.product);
+    let far_step = step_of(f.square, f.product);
+    let both = step_of(n.square + by * by * f.square, n.product + by * f.product);
+    return Steps(near_step, far_step, both, select(far_step / by, near_step, n.error <= f.error));
+}
+
+/// Variation `k` by such a step.
+fn stepped(state: State, steps: Steps, k: u32) -> State {
+    var result = state;
+    if k == 0u { result.flow += select(steps.both, steps.near, VIEWS == ONE); }
+    if k == 1u { result.flow += steps.better; }
+    if k == 2u {
+        result.flow += steps.near;
+        result.bend += steps.far - view.far_factor * steps.near;
+    }
     return result;
 }
 
@@ -222,6 +260,29 @@ fn refine(@builtin(local_invocation_index) local: u32,
     var best = begin(inside);
     let plane = fitted_plane(inside, best.state);
     for (var k = 0u; k < REFINED; k++) { best = attempt(best, varied(best.state, plane, px, k)); }
+    let steps = inverse_steps(best.state);
+    let state = best.state;
+    for (var k = 0u; k < STEPS; k++) { best = attempt(best, stepped(state, steps, k)); }
     store(px, best.state);
     store(other_pixel(px), load_state(states, other_pixel(px)));
+}
+
+/// After the sweeps: every pixel takes the steps that improve its match, whatever its neighbours do. So all may move
+/// together by a part of a pixel, which a sweep does not let one of them do alone; smooth.wgsl removes the noise.
+@compute @workgroup_size(WG_X, WG_Y)
+fn polish(@builtin(local_invocation_index) local: u32,
+        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let px = vec2i(swizzled_pixel(local, group, groups));
+    let inside = min(px, vec2i(frame.size) - 1);
+    load_patch(inside);
+    let own = load_state(states, inside);
+    var best = Best(own, price(own) + match_cost(own, OUTSIDE));
+    let steps = inverse_steps(own);
+    for (var k = 0u; k < STEPS; k++) {
+        let candidate = stepped(own, steps, k);
+        let least = price(candidate);
+        let energy = least + match_cost(candidate, best.energy - least);
+        if energy < best.energy { best = Best(candidate, energy); }
+    }
+    store(px, best.state);
 }
