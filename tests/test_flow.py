@@ -16,7 +16,7 @@ from wgmb.flow.pyramid import features, level_sizes
 from wgmb.flow.result import result
 from wgmb.flow.search import FullSearch
 from wgmb.flow.shot import EFFORTS, Shot
-from wgmb.flow.sweeps import half_sweep, sweep
+from wgmb.flow.sweeps import half_sweep, polish, sweep
 from wgmb.flow.views import AROUND, BESIDE, Views, views_of
 
 MIDDLE, FIRST = Views(1, 2, 0, AROUND), Views(0, 1, 2, BESIDE)
@@ -161,6 +161,33 @@ def test_half_a_sweep_takes_the_best_candidate(views, number):
             assert new < min(energies) + FILTER
             improved += new < energies[0] - FILTER
     assert improved > 10
+
+
+@pytest.mark.parametrize("views", [MIDDLE, FIRST])
+def test_polishing_takes_steps_that_improve_the_match(views):
+    states, match = random_states(seed=6), matcher(views)
+    states[..., :2] = [1.3, -0.6] + 0.3 * (states[..., :2] - [1.3, -0.6])
+    bound, output = matched(kit(), views, small()[0], 0), kit().take((13, 9), STATES)
+    polish(kit(), (13, 9), bound, states_texture(states), output)
+    got = read(output).astype(float)
+    for y in range(9):
+        for x in range(13):
+            tried = twin.polished(match, states, x, y)
+            costs = [match.price(s) + match.cost(x, y, s) for s in (*tried, got[y, x])]
+            assert costs[-1] < min(costs) + FILTER
+    before, after = (np.abs(s[2:-2, 3:-3, :2] - [1.3, -0.6]).mean() for s in (states, got))
+    assert after < 0.6 * before
+
+
+def test_smooth_states_lie_on_the_planes_around(close):
+    states, output = random_states(seed=7), kit().take((13, 9), STATES)
+    here = small()[0][1][0]
+    kit().run(
+        "smooth.wgsl", "main", (13, 9), here=here, states=states_texture(states), output=output
+    )
+    match = matcher(MIDDLE)
+    want = [[twin.fitted_plane(match, states, x, y) for x in range(13)] for y in range(9)]
+    close(read(output), np.array(want), 1e-3)
 
 
 def test_a_sweep_takes_a_state_that_is_right_and_carried():

@@ -125,28 +125,74 @@ def propagated(matcher, states, x, y):
     return [np.clip(state, [-np.inf] * 4 + [-0.6] * 4, [np.inf] * 4 + [0.6] * 4) for state in tried]
 
 
-def refined(matcher, states, x, y):
-    """The same of the variations that are not random: a fitted plane."""
+def fitted_plane(matcher, states, x, y):
+    """The plane through the states around that are of like pixels and like the own one."""
     own = states[y, x]
     rows, sides, weights = [], [], []
     for j in range(-8, 9, 2):
         for i in range(-8, 9, 2):
             if 0 <= x + i < matcher.width and 0 <= y + j < matcher.height:
-                flow = states[y + j, x + i, :2]
-                apart = np.abs(flow - moved(own, i, j)[:2]).sum()
+                other = states[y + j, x + i]
+                apart = np.abs(other[:2] - moved(own, i, j)[:2]).sum()
                 like = likeness(matcher.here[y + j, x + i], matcher.here[y, x])
                 rows.append([1, i, j])
-                sides.append(flow)
+                sides.append(other[:4])
                 weights.append(like / (1 + apart * apart))
     weights, rows, sides = np.array(weights), np.array(rows, float), np.array(sides)
     square = rows.T @ (weights[:, None] * rows)
     mean = square[0, 1:] / square[0, 0]
     centred = square[1:, 1:] - np.outer(mean, square[0, 1:]) + np.eye(2) * square[0, 0]
     product = rows.T @ (weights[:, None] * sides)
-    slope = np.linalg.solve(centred, product[1:] - np.outer(mean, product[0])).T
-    flow = product[0] / square[0, 0] - slope @ mean
-    sloped = np.concatenate([own[:4], slope.ravel()])
-    return [own, sloped, np.concatenate([flow, own[2:4], slope.ravel()])]
+    flows = product[:, :2]
+    slope = np.linalg.solve(centred, flows[1:] - np.outer(mean, flows[0])).T
+    flow = flows[0] / square[0, 0] - slope @ mean
+    return np.concatenate([flow, product[0, 2:] / square[0, 0], slope.ravel()])
+
+
+def refined(matcher, states, x, y):
+    """The pixel's own state, and those of its variations that are not random."""
+    own, plane = states[y, x], fitted_plane(matcher, states, x, y)
+    return [
+        own,
+        np.concatenate([own[:4], plane[4:]]),
+        np.concatenate([plane[:2], own[2:4], plane[4:]]),
+    ]
+
+
+def inverse_step(matcher, other, x, y, flow, slope):
+    """Where inverse search moves a patch in one frame [px]; 0 if that is too far."""
+    square, product = np.eye(2) * 1e-5, np.zeros(2)
+    places = [(i * matcher.stride, j * matcher.stride) for j in range(-2, 3) for i in range(-2, 3)]
+    total = sum(_weight(matcher, x, y, i, j) for i, j in places)
+    for i, j in places:
+        weight = _weight(matcher, x, y, i, j) / total
+        if weight == 0:
+            continue
+        own = matcher.here[y + j, x + i]
+        goal_x = x + flow[0] + i + slope[0] * i + slope[1] * j
+        goal_y = y + flow[1] + j + slope[2] * i + slope[3] * j
+        found = bilinear(other, np.array(goal_x), np.array(goal_y))
+        if np.abs(found - own) @ WEIGHTS < 0.6:
+            gradient = (own[3:5] - 0.5) / 2
+            square += weight * np.outer(gradient, gradient)
+            product += weight * gradient * ((found - own)[:3] @ LUMA)
+    step = -np.linalg.solve(square, product)
+    return step if np.abs(step).max() < 2 else np.zeros(2)
+
+
+def _weight(matcher, x, y, i, j):
+    if not (0 <= x + i < matcher.width and 0 <= y + j < matcher.height):
+        return 0.0
+    return likeness(matcher.here[y + j, x + i], matcher.here[y, x])
+
+
+def polished(matcher, states, x, y):
+    """The pixel's own state, and with both displacements moved by a step of inverse search."""
+    own = states[y, x]
+    near = inverse_step(matcher, matcher.near, x, y, own[:2], own[4:])
+    way = matcher.factor * own[:2] + own[2:4]
+    far = inverse_step(matcher, matcher.far, x, y, way, matcher.factor * own[4:])
+    return [own, own + np.concatenate([near, far - matcher.factor * near, np.zeros(4)])]
 
 
 def full_search(matcher, reach):

@@ -36,7 +36,7 @@ Load = Callable[[int], np.ndarray | None]
 class Effort:
     """How much is done: sweeps on the coarsest level, on those between, and on the finest.
 
-    `polish`: how often parts of a pixel are refined in the end, and noise is removed; 1 or more.
+    `polish`: how often parts of a pixel are refined and noise is removed, on every level.
     """
 
     coarsest: int
@@ -142,12 +142,13 @@ class Shot:
         bound = self._matched(views, level)
         count = self._effort.sweeps(level, len(self._sizes))
         if level == len(self._sizes) - 1:
-            return sweep(passes, size, bound, self._full_search(size, bound), [], level, count)
+            states = sweep(passes, size, bound, self._full_search(size, bound), [], level, count)
+            return self._polished(states, size, bound) if level else states
         states = self._grown(self._once("mended", number, level + 1, self._mended), level)
         guesses = [self._carried(other, views, level) for other in views.beside] if count else []
         states = sweep(passes, size, bound, states, guesses, level, count)
         passes.give(*guesses)
-        return states
+        return self._polished(states, size, bound) if level else states
 
     def _grown(self, states: wgpu.GPUTexture, level: int) -> wgpu.GPUTexture:
         output = self._passes.take(self._sizes[level], STATES)
@@ -186,24 +187,22 @@ class Shot:
             made = result(self._passes, self._sizes[0], alone, states)
             self._passes.give(states)
             return made
-        states = self._polished(number, views)
+        states = self._mended(number, 0)
+        states = self._polished(states, self._sizes[0], self._matched(views, 0))
         made = result(self._passes, self._sizes[0], views, states)
         self._passes.give(states)
         self._forget(number)
         return made
 
-    def _polished(self, number: int, views: Views) -> wgpu.GPUTexture:
-        """The last states of a frame, to parts of a pixel and without noise."""
-        passes, size, bound = self._passes, self._sizes[0], self._matched(views, 0)
-        here = bound["here"]
-        states = self._once("mended", number, 0, self._mended)
-        stepped, smooth = passes.take(size, STATES), passes.take(size, STATES)
+    def _polished(self, states: wgpu.GPUTexture, size, bound: dict) -> wgpu.GPUTexture:
+        """The states to parts of a pixel and without noise; the given ones are taken back."""
+        passes, here = self._passes, bound["here"]
+        stepped = passes.take(size, STATES)
         for _ in range(self._effort.polish):
             polish(passes, size, bound, states, stepped)
-            passes.run("smooth.wgsl", "main", size, here=here, states=stepped, output=smooth)
-            states = smooth
+            passes.run("smooth.wgsl", "main", size, here=here, states=stepped, output=states)
         passes.give(stepped)
-        return smooth
+        return states
 
     def _forget(self, number: int) -> None:
         """Let go of what the frames after and before this one will not need."""
