@@ -27,9 +27,17 @@ class FullSearch:
         spare = self._passes.take((1, 1), STATES)
         best = self._best.at_least(16 * blocks[0] * blocks[1])
 
+        # Short displacements first: what follows is refused sooner.
+        firsts = sorted(range(-most, most + 1, columns), key=lambda n: abs(n + columns // 2))
+
         def run(entry: str, grid: tuple[int, int], first: int, states: wgpu.GPUTexture) -> None:
             reach = self._passes.uniform(
-                "full_search.wgsl", "Reach", most=most, first=first, blocks=blocks
+                "full_search.wgsl",
+                "Reach",
+                most=most,
+                first=first,
+                blocks=blocks,
+                begins=first == firsts[0],
             )
             self._passes.run(
                 "full_search.wgsl",
@@ -42,7 +50,7 @@ class FullSearch:
                 **matched,
             )
 
-        for first in range(-most, most + 1, columns):
+        for first in firsts:
             run("search", blocks, first, spare)
         run("write_states", size, 0, output)
         self._passes.give(spare)

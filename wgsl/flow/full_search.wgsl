@@ -7,6 +7,8 @@ struct Reach {
     most: i32,          // greatest displacement along either axis [px]
     first: i32,         // the first column of displacements of this pass; it takes COLUMNS of them
     blocks: vec2u,      // across, down
+    begins: u32,        // 1 in the first pass
+    unused: u32,
 }
 
 @group(1) @binding(5) var<uniform> reach: Reach;
@@ -66,7 +68,7 @@ fn search(@builtin(global_invocation_id) id: vec3u) {
     let index = block.y * reach.blocks.x + block.x;
     load_search_patch(px);
     var found = vec3f(0.0, 0.0, 2.0 * OUTSIDE);
-    if reach.first > -reach.most { found = best[index].xyz; }
+    if reach.begins == 0u { found = best[index].xyz; }
     let turns = turns_of(u32(2 * reach.most + 1), id.x);
     for (var column = reach.first; column < reach.first + COLUMNS; column++) {
         for (var k = 0u; k < turns; k++) {
@@ -81,7 +83,7 @@ fn search(@builtin(global_invocation_id) id: vec3u) {
                 cost = min(0.5 * (n + f), min(n, f) + HIDDEN_PRICE);
             }
             cost += length_price;
-            if cost < found.z && column <= reach.most { found = vec3f(vec2f(by), cost); }
+            if cost < found.z && abs(column) <= reach.most { found = vec3f(vec2f(by), cost); }
         }
     }
     if all(id.xy < reach.blocks) { best[index] = vec4f(found, 0.0); }
