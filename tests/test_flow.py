@@ -133,7 +133,7 @@ def test_every_level_is_half_as_large(close):
 
 def test_the_full_search_finds_the_cheapest_displacement():
     bound = matched(kit(), MIDDLE, small()[0], 0)
-    got = read(FullSearch(kit())((13, 9), bound))
+    got = read(FullSearch(kit(), 2)((13, 9), bound))
     want = twin.full_search(matcher(MIDDLE), reach=3)  # a fifth of 13
     assert (got[..., 2:] == 0).all()
     assert (got[::2, ::2, :2] == want).all()

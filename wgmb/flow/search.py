@@ -12,15 +12,17 @@ REACH = 0.2  # of the longer side: the longest displacement along an axis
 
 
 class FullSearch:
-    """The best whole displacement of every block of pixels."""
+    """The best whole displacement of every block of pixels; `block`: its side [px]."""
 
-    def __init__(self, passes: Passes):
-        self._passes, self._best = passes, ScratchBuffer(passes.device)
+    def __init__(self, passes: Passes, block: int):
+        self._passes, self._block = passes, block
+        self._best = ScratchBuffer(passes.device)
 
     def __call__(self, size: tuple[int, int], matched: dict) -> wgpu.GPUTexture:
         """States of a frame on its coarsest level; `matched`: the bindings of match.wgsl."""
         source = wgsl.load("flow/full_search.wgsl")
-        block, columns = (int(source.constant(name)) for name in ("BLOCK", "COLUMNS"))
+        block, columns = self._block, int(source.constant("COLUMNS"))
+        bound = matched | {"constants": matched["constants"] | {"BLOCK": block}}
         blocks = -(-size[0] // block), -(-size[1] // block)
         most = max(1, round(REACH * max(size)))
         output = self._passes.take(size, STATES)
@@ -47,7 +49,7 @@ class FullSearch:
                 reach=reach,
                 best=best,
                 output=states,
-                **matched,
+                **bound,
             )
 
         for first in firsts:

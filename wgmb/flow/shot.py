@@ -37,12 +37,14 @@ class Effort:
     """How much is done: sweeps on the coarsest level, on those between, and on the finest.
 
     `polish`: how often parts of a pixel are refined and noise is removed, on every level.
+    `block`: pixels along those that share a first state.
     """
 
     coarsest: int
     between: int
     finest: int
     polish: int
+    block: int
 
     def sweeps(self, level: int, levels: int) -> int:
         """Sweeps on a level; 0 is the finest."""
@@ -51,7 +53,7 @@ class Effort:
         return self.between if level else self.finest
 
 
-EFFORTS = {"best": Effort(4, 2, 2, 2), "fast": Effort(3, 2, 0, 1)}
+EFFORTS = {"best": Effort(4, 2, 2, 2, block=2), "fast": Effort(3, 2, 0, 1, block=4)}
 KEPT = {"pictures": 4, "searched": 1, "mended": 0, "motion": 2}  # frames around the one asked for
 
 
@@ -75,7 +77,7 @@ class Shot:
 
     def __init__(self, passes: Passes, load: Load, effort: Effort):
         self._passes, self._load, self._effort = passes, load, effort
-        self._full_search = FullSearch(passes)
+        self._full_search = FullSearch(passes, effort.block)
         self._size: tuple[int, int] | None = None
         self._made: dict[tuple[str, int, int], Any] = {}
 

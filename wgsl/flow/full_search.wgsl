@@ -16,7 +16,7 @@ struct Reach {
 @group(1) @binding(7) var output: StatesOut;
 
 const COLUMNS: i32 = 9;             // lavapipe ends loops after 65,535 turns
-const BLOCK: i32 = 2;               // pixels along a block
+override BLOCK: i32 = 2;            // pixels along a block
 const SEARCH_SIDE: i32 = 4;         // samples along a patch,
 const SEARCH_PATCH: i32 = 16;       // and in it
 const SEARCH_STRIDE: i32 = 2;       // from one to the next [px]
