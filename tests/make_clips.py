@@ -52,7 +52,10 @@ def write(
     options: dict[str, str] | None = None,
     tags: tuple[int, int, int, int] | None = None,
     tone: float = 0,
+    sound: tuple[str, int, np.ndarray] | None = None,
+    gap: tuple[float, float] = (0, 0),
     late: float = 0,
+    before: Callable[[av.container.OutputContainer], None] | None = None,
     also: Callable[[av.container.OutputContainer], None] | None = None,
     setup: Callable[[av.VideoStream], None] | None = None,
     kind: str | None = None,
@@ -61,9 +64,10 @@ def write(
 ) -> Path:
     """A clip; `times` [s] of its frames, by default RATE a second.
 
-    `tags`: range, matrix, transfer, primaries. `tone`: seconds of sound. `late`: how much later
-    than the sound pictures begin. `setup` is called on the stream of pictures, `also` on the
-    container once they are written.
+    `tags`: range, matrix, transfer, primaries. `tone`: seconds of sound; or `sound`: codec,
+    rate and samples. `gap`: where it pauses, and for how long [s]. `late`: how much later
+    than the sound pictures begin. `setup` is called on the stream of pictures, `before` on the
+    container before and `also` after they are written.
     """
     made = list(frames) if frames is not None else [frame(planes(n), pixels) for n in range(12)]
     shown = [late + t for t in (times or [Fraction(n, RATE) for n in range(len(made))])]
@@ -77,9 +81,14 @@ def write(
             context.color_trc, context.color_primaries = tags[2:]
         if setup is not None:
             setup(stream)
-        sound = out.add_stream("aac", rate=48000) if tone else None
+        if tone:
+            sound = ("aac", 48000, _tone(tone))
+        heard = None
         if sound is not None:
-            sound.layout = "mono"
+            heard = out.add_stream(sound[0], rate=sound[1])
+            heard.layout = "mono"
+        if before is not None:
+            before(out)
         for one, time in zip(made, shown, strict=True):
             one.pts, one.time_base = round(time / tick), tick
             if tags is not None:
@@ -87,10 +96,12 @@ def write(
                 one.color_trc, one.color_primaries = tags[2:]
             out.mux(stream.encode(one))
         out.mux(stream.encode(None))
-        if sound is not None:
-            for block in samples(tone):
-                out.mux(sound.encode(block))
-            out.mux(sound.encode(None))
+        if sound is not None and heard is not None:
+            for block in samples(0, sound[1], sound[2]):
+                if block.pts >= gap[0] * sound[1]:
+                    block.pts += round(gap[1] * sound[1])
+                out.mux(heard.encode(block))
+            out.mux(heard.encode(None))
         if also is not None:
             also(out)
     return path
@@ -105,11 +116,13 @@ def lossless(codec: str) -> dict[str, str]:
     }.get(codec, {})
 
 
+def _tone(seconds: float, rate: int = 48000) -> np.ndarray:
+    return 0.3 * np.sin(2 * np.pi * 440 * np.arange(round(seconds * rate)) / rate)
+
+
 def samples(seconds: float, rate: int = 48000, wave: np.ndarray | None = None):
     """Sound: a tone of 440 Hz, or `wave` (-1..1), in frames of 1024 samples."""
-    count = round(seconds * rate)
-    if wave is None:
-        wave = 0.3 * np.sin(2 * np.pi * 440 * np.arange(count) / rate)
+    wave = _tone(seconds, rate) if wave is None else wave
     for begin in range(0, len(wave), 1024):
         part = np.ascontiguousarray(wave[None, begin : begin + 1024], np.float32)
         block = av.AudioFrame.from_ndarray(part, format="fltp", layout="mono")

@@ -37,6 +37,9 @@ class Clock:
         return self.speed == 1 and self.first is None and self.end is None
 
 
+AS_IT_IS = Clock()
+
+
 def tick(*times: Fraction) -> Fraction:
     """The longest tick of which all times are multiples; 1/90000 s if that is very short."""
     found = Fraction(0)

@@ -13,6 +13,7 @@ from av.video.reformatter import VideoReformatter
 from ..coding import CodedPicture, Coding
 from ..errors import InputError
 from .encoders import NO_FACTS, Encoding, Facts
+from .other_streams import OtherStreams
 from .pixels import THREADS, frame_of, pixel_format
 from .video_file import VideoFile, tag
 
@@ -24,7 +25,8 @@ class CodedVideo:
     tick of the file's clock [s], of which all times should be multiples (see clock.tick).
     Encoders that share colour between pixels may need even sizes: the last row or column is then
     repeated, which `padding` says. OSError if the file cannot be written, InputError for an encoder
-    that does not start.
+    that does not start. `others`: streams to put beside the pictures, with their texts and
+    dates; what of them the file cannot hold is in `left_out`.
     """
 
     def __init__(
@@ -38,14 +40,20 @@ class CodedVideo:
         base: Fraction,
         facts: Facts = NO_FACTS,
         metadata: dict[str, str] | None = None,
+        others: OtherStreams | None = None,
     ):
         self.path, self._coding, self._base = path, coding, base
+        self._others = others
         self._size, self._last = size, -1
         self.padding = padded(size, encoding, coding)
         whole = size[0] + self.padding[0], size[1] + self.padding[1]
         self._planar, self._pixels = pixel_format(coding), encoding.pixels(coding)
         self._by = VideoReformatter()
-        self.file = VideoFile(path, temporary, encoding, coding, whole, rate, base, facts, metadata)
+        texts = (metadata or {}) | (others.metadata if others else {})
+        self.left_out = encoding.left_out(facts)
+        self.file = VideoFile(path, temporary, encoding, coding, whole, rate, base, facts, texts)
+        if others is not None:
+            self.left_out += others.attach(self.file.container)
 
     def add(self, picture: CodedPicture, time: Fraction) -> None:
         """Append a picture that is shown at `time` [s], later than the one before."""
@@ -63,6 +71,8 @@ class CodedVideo:
         if self._pixels != self._planar:
             frame = self._by.reformat(frame, format=self._pixels, threads=THREADS)
         self.file.encode(frame, now)
+        if self._others is not None:
+            self.file.mux(self._others.until(time))
 
     def _filled(self, planes: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
         across, down = self.padding
@@ -76,11 +86,16 @@ class CodedVideo:
     def close(self) -> None:
         """Complete the file and put it in place."""
         self.file.finish()
+        if self._others is not None:
+            self.file.mux(self._others.rest())
+            self._others.close()
         self.file.close()
 
     def abandon(self) -> None:
         """Leave nothing behind."""
         self.file.abandon()
+        if self._others is not None:
+            self._others.close()
 
 
 def padded(size: tuple[int, int], encoding: Encoding, coding: Coding) -> tuple[int, int]:

@@ -63,7 +63,7 @@ class Footage:
     `size` [px] is that of upright pictures. `assumed`: what the file does not say about its colours
     and what is taken instead. `notes`: lines that a user should know. `missing`: numbers of the
     pictures that could not be decoded, of those asked for so far; `damaged`: of those that were
-    mended by the decoder.
+    mended by the decoder. `index`: of their stream in the file.
 
     InputError in one line for a file that cannot be read, that has no pictures, or whose pictures
     would take more than `max_mb` megabytes each (see limits.py).
@@ -76,7 +76,7 @@ class Footage:
         self.notes: list[str] = []
         with opened(self.path) as container:
             stream = picture_stream(container, self.path)
-            self._index = stream.index
+            self.index = stream.index
             self._check_size(stream, max_mb)
             self.container, self.codec = container.format.name, stream.codec_context.name
             self.metadata = dict(container.metadata)
@@ -107,7 +107,7 @@ class Footage:
     def _look(self) -> None:
         """Decode one picture: what it says of itself counts more than what the header says."""
         with opened(self.path) as container:
-            stream = cast(VideoStream, container.streams[self._index])
+            stream = cast(VideoStream, container.streams[self.index])
             frame = next(_decoded(container, stream), None)
             if frame is None:
                 raise InputError(f"{self.path}: none of its pictures can be decoded ({self.codec})")
@@ -284,7 +284,7 @@ class Footage:
         ticks, keys = self._packets.times.ticks, self._packets.keys
         for key in [*self._keys_before(ticks[first], keys), None]:
             with opened(self.path) as container:
-                stream = cast(VideoStream, container.streams[self._index])
+                stream = cast(VideoStream, container.streams[self.index])
                 stream.thread_type = "AUTO"
                 if key is not None:
                     with contextlib.suppress(FFmpegError):
