@@ -23,8 +23,9 @@ LAYERS = [
     {"methods"},
     {"residency"},
     {"pipeline"},
-    {"render", "exposer", "settings", "color_settings"},
+    {"render", "exposer", "settings", "background", "video_settings", "color_settings"},
     {"batch", "settings_toml"},
+    {"video_batch"},
     {"lab", "viewer"},  # never each other
     {"cli"},  # may start the viewer
     {"__init__", "__main__"},
@@ -33,6 +34,7 @@ PLACE = {room: number for number, layer in enumerate(LAYERS) for room in layer}
 GPU = {
     "gpu", "scene", "methods", "velocity", "holdout", "observer", "residency", "pipeline",
     "render", "lab", "viewer", "frame_views", "flow", "planes", "exposer",
+    "video_batch", "video_settings",
 }  # fmt: skip
 HOMES = {
     "wgpu": GPU,

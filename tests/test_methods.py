@@ -28,7 +28,8 @@ def test_contract(name):
     if "confidence" in public:  # a name for each channel of what it shows then
         red, green, blue, alpha = method.confidence
         assert len({red, green, blue, alpha}) == 4
-    assert public - {"samples", "adaptive", "confidence", "most_in_software"} == {
+    optional = {"samples", "adaptive", "confidence", "most_in_software", "spread", "margin"}
+    assert public - optional == {
         "name",
         "needs",
         "uses",

@@ -8,7 +8,7 @@ around the present one are kept, however long it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -54,10 +54,11 @@ class Picture:
 class Reel:
     """Reads `pictures` as far as is asked for.
 
-    `is_cut(before, after)`: whether a cut lies between two pictures (height, width, 3 or 4).
+    `is_cut(before, after)`: whether a cut lies between two pictures (height, width, 3 or 4);
+    `known_cuts`: numbers of pictures that begin a shot all the same.
     `is_double(before, after)`: whether a picture only repeats the one before; it is left out, and
     its neighbours' cells reach over its time. `motion`: where motion comes from; None: there is
-    none, unless the pictures have frames with their own.
+    none, unless the pictures have frames with their own. `holdout` (height, width): 1 stays sharp.
     """
 
     def __init__(
@@ -66,12 +67,15 @@ class Reel:
         *,
         motion: MotionSource | None = None,
         is_cut: Callable[[np.ndarray, np.ndarray], bool] | None = None,
+        known_cuts: Collection[int] = (),
         is_double: Callable[[np.ndarray, np.ndarray], bool] | None = None,
         neighbours: bool = True,
+        holdout: np.ndarray | None = None,
     ):
         self._pictures, self._motion = pictures, motion
         self._is_cut, self._is_double = is_cut, is_double
-        self._neighbours = neighbours
+        self._known_cuts = known_cuts
+        self._neighbours, self._holdout = neighbours, holdout
         self._kept: dict[int, Picture] = {}
         self._count = 0
         self._last: np.ndarray | None = None
@@ -114,7 +118,7 @@ class Reel:
                 if self._is_double is not None and self._is_double(self._last, picture.color):
                     self.doubles.append(picture.number)
                     continue
-                if self._is_cut is not None and self._is_cut(self._last, picture.color):
+                if self._begins_shot(self._last, picture):
                     picture.begins_shot = True
                     self.cuts.append(picture.number)
             self._last = picture.color
@@ -122,6 +126,11 @@ class Reel:
             self._count += 1
             return True
         return False
+
+    def _begins_shot(self, before: np.ndarray, picture: Picture) -> bool:
+        if picture.number in self._known_cuts:
+            return True
+        return self._is_cut is not None and self._is_cut(before, picture.color)
 
     def _forget_before(self, index: int) -> None:
         for old in [i for i in self._kept if i < index and i + 1 in self._kept]:
@@ -160,7 +169,7 @@ class Reel:
 
     def _with_motion(self, index: int, picture: Picture) -> Frame:
         if self._motion is None:
-            return Frame(picture.color, number=picture.number).locked()
+            return self._still(picture)
         if self._shot is None or self._cut_after(self._shot_start, index):
             self._shot_start = index
             while self._same_shot(self._shot_start, self._shot_start - 1):
@@ -168,11 +177,20 @@ class Reel:
             self._shot = self._motion.shot(self._load)
         found = self._shot(index)
         if found is None:
-            return Frame(picture.color, number=picture.number).locked()
+            return self._still(picture)
         motion, depth = found
         near = [i for i in (index - 1, index, index + 1) if self._same_shot(index, i) or i == index]
         times = np.array([self._kept[i].time for i in near])
         back, ahead = evened(times, near.index(index))
         if (back, ahead) != (1.0, 1.0):
             motion = motion * np.array([back, back, ahead, ahead], np.float32)
-        return Frame(picture.color, motion=motion, depth=depth, number=picture.number).locked()
+        return Frame(
+            picture.color,
+            motion=motion,
+            depth=depth,
+            holdout=self._holdout,
+            number=picture.number,
+        ).locked()
+
+    def _still(self, picture: Picture) -> Frame:
+        return Frame(picture.color, number=picture.number).locked()

@@ -311,8 +311,8 @@ class OutputSettings:
     "Pattern or file: .exr .png .jpg .tif, or a video .mp4 .mov .mkv .webm .gif."
     bits: int = 8
     "Bits per sample of PNG and TIFF: 8 or 16."
-    fps: str = "24"
-    "Frames per second of a video, such as 24 or 30000/1001."
+    fps: str | None = None
+    "Frames per second, such as 60 or 30000/1001; default: 24, or the rate of an input video."
     overwrite: bool = False
     "Replace existing files."
     resume: bool = False
@@ -363,7 +363,11 @@ class OutputSettings:
     @property
     def rate(self) -> Fraction:
         """Frames per second, exactly."""
-        return rate_of(self.fps)
+        return self.rate_or(Fraction(24))
+
+    def rate_or(self, rate: Fraction) -> Fraction:
+        """Frames per second, exactly; `rate` unless another is set."""
+        return rate if self.fps is None else rate_of(self.fps)
 
 
 def rate_of(text: str) -> Fraction:

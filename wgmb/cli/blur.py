@@ -8,16 +8,30 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from .. import gpu
 from .._version import __version__
 from ..batch import BatchReport, blur_sequence
 from ..color_settings import ColorSettings, color_record
 from ..errors import InputError
+from ..io import stills
+from ..io.clip import Clip
 from ..io.frame_file import odd_sizes
-from ..io.frame_numbers import frame_list
+from ..io.frame_numbers import frame_list, readable
 from ..pipeline import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
+from ..video_settings import VideoSettings
 from .exit_codes import DONE, SOME_FAILED
-from .options import BlurOptions, Colors, Given, InputOptions, Look, ShutterOptions, Target, When
+from .options import (
+    BlurOptions,
+    Colors,
+    Given,
+    InputOptions,
+    Look,
+    ShutterOptions,
+    Target,
+    Videos,
+    When,
+)
 from .spelling import as_options
 from .terminal import complain, note, progress
 
@@ -29,6 +43,7 @@ def blur(
     when: When = ShutterOptions(),
     given: Given = InputOptions(),
     color: Colors = ColorSettings(),
+    video: Videos = VideoSettings(),
     *,
     confidence: bool = False,
     config: Path | None = None,
@@ -36,14 +51,16 @@ def blur(
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
-    """Blur rendered frames.
+    """Blur rendered frames, or a video.
 
     Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180 --frames 1-100
+
+    Example: wgmb blur in.mp4 -o out.mp4 --shutter 180 --fps 60
 
     Parameters
     ----------
     pattern
-        Frames to blur: shot.####.exr, shot.%04d.exr, or one file.
+        Frames to blur: shot.####.exr, shot.%04d.exr, or one file; or a video.
     confidence
         Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config
@@ -56,9 +73,16 @@ def blur(
         Print errors only.
     """
     when = when.resolved()
+    if is_video(pattern):
+        from .blur_video import blur_video
+
+        if confidence:
+            raise InputError("--confidence is for rendered frames")
+        return blur_video(pattern, output, look, when, given, video, adapter, quiet, verbose)
     shown = color.open(needed=not output.is_exr)
     space = color.space(shown)
     clip = given.open(pattern, look.holdout, look.scale, space)
+    how = _move_by_pictures(clip, video, adapter)
     look = look.resolved(clip=clip)
     made = look.make(when.make(), adapter)
     settings = _settings(look, when, given) | {"samples": samples_of(made)} | output.looks
@@ -70,6 +94,10 @@ def blur(
     files = output.make(settings, clip.numbers, clip.inputs, clip.chosen, shown)
     if color.remark and not (quiet or output.is_exr):
         note(color.remark)
+    if how:
+        settings["flow"] = how
+        if not quiet:
+            note(f"motion: {how}, as the frames hold none")
     if verbose:
         note(f"adapter: {made.device.adapter.summary}")
         note(f"settings: {files.settings}")
@@ -80,6 +108,22 @@ def blur(
         )
     took = f"{time.perf_counter() - started:.1f} s with {made.method.name}"
     return conclude(clip, files, report, took, quiet, verbose)
+
+
+def is_video(pattern: str) -> bool:
+    """Return True for a file that is neither an EXR nor a still."""
+    path = Path(pattern)
+    return path.suffix.lower() not in (".exr", *stills.SUFFIXES) and readable(path)
+
+
+def _move_by_pictures(clip: Clip, video: VideoSettings, adapter: str | None) -> str:
+    """Take motion from the pictures of frames that hold none; returns how, in words."""
+    if video.flow == "none" or len(clip.on_disk) < 2 or "motion" in clip.has:
+        return ""
+    motion, how = video.source(gpu.open_device(adapter))
+    if motion is not None:
+        clip.move_by(motion)
+    return how
 
 
 def _settings(look: BlurSettings, when: ShutterSettings, given: InputSettings) -> dict:

@@ -21,6 +21,7 @@ from ..settings import (
     ShutterSettings,
 )
 from ..shutter import CURVES, PHASES
+from ..video_settings import VideoSettings
 
 _Settings = TypeVar("_Settings", bound=type)
 
@@ -115,5 +116,6 @@ Look = Annotated[BlurOptions, Parameter(name="*", group=Group("Blur", sort_key=2
 When = Annotated[ShutterOptions, Parameter(name="*", group=Group("Shutter", sort_key=3))]
 Colors = Annotated[ColorSettings, Parameter(name="*", group=Group("Colour", sort_key=4))]
 Shown = Annotated[DisplaySettings, Parameter(name="*", group=Group("Colour", sort_key=4))]
+Videos = Annotated[VideoSettings, Parameter(name="*", group=Group("Video", sort_key=4))]
 Target = Annotated[OutputOptions, Parameter(name="*", group=Group("Output", sort_key=5))]
 SceneName = Annotated[str, Parameter(help=f"Scene: {', '.join(builtin.SCENES)}.")]

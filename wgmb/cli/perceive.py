@@ -109,7 +109,7 @@ def perceive(
         pictures = _shown(clip)
         inputs = clip.inputs
     observer = Observer(rate, who.cone, device=adapter)
-    settings = {"wgmb": __version__} | plain(who) | {"input": pattern, "fps": output.fps}
+    settings = {"wgmb": __version__} | plain(who) | {"input": pattern, "fps": str(output.rate)}
     files = output.make(settings, numbers, inputs)
     started = time.perf_counter()
     with progress(len(numbers), quiet, "perceiving") as tick:

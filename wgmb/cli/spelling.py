@@ -25,6 +25,7 @@ def options() -> dict[str, str]:
     """The option that each argument is set by; the settings' fields have both names."""
     from .. import settings
     from ..color_settings import ColorSettings, option_name
+    from ..video_settings import VideoSettings
 
     groups = (
         settings.InputSettings,
@@ -33,6 +34,7 @@ def options() -> dict[str, str]:
         settings.OutputSettings,
         settings.SceneSettings,
         ColorSettings,
+        VideoSettings,
     )
     return {f.name: option_name(f.name) for group in groups for f in fields(group)} | _OTHERWISE
 

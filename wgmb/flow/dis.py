@@ -37,7 +37,7 @@ class Dis:
 
     def __init__(self, quality: str = "fast"):
         if quality not in QUALITIES:
-            raise InputError(f"quality must be one of {', '.join(QUALITIES)}, got {quality!r}")
+            raise InputError(f"`quality` must be one of {', '.join(QUALITIES)}, got {quality!r}")
         if not is_installed():
             raise InputError("dense inverse search needs OpenCV: pip install 'wgmb[flow]'")
         cv2: Any = importlib.import_module("cv2")

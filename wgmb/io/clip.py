@@ -22,6 +22,7 @@ from ..display import ColorSpace
 from ..errors import InputError, check_choice, did_you_mean
 from ..frame import Frame
 from ..reach import Reach
+from ..reel import MotionSource
 from . import detect, exr, layers, limits, vectors, views
 from .camera_file import CameraFile
 from .cut_list import CutList
@@ -42,6 +43,7 @@ from .frame_numbers import (
 from .input_space import in_space
 from .masks import Masks
 from .neighbours import Neighbours
+from .picture_motion import FAR, PictureMotion
 from .windows import Placement, Window, laid, union
 
 DEPTHS = ("planar", "inverse", "clip")
@@ -158,6 +160,24 @@ class Clip:
         self.notes: dict[str, list[int]] = {}
         self._kept: OrderedDict[int, tuple[FrameFile, ...]] = OrderedDict()
         self._found: detect.Finding | None = None
+        self._picture_motion: PictureMotion | None = None
+        self._most_kept = 3
+
+    def move_by(self, motion: MotionSource) -> None:
+        """Take motion from the pictures (see wgmb/flow) where the files hold none."""
+        self._picture_motion = PictureMotion(self, motion)
+        self._most_kept = 2 * FAR + 3
+        self._around.forget_all()
+
+    def is_there(self, number: int) -> bool:
+        """Return True if frame `number` is on disk."""
+        if not is_pattern(self._leading):
+            return number in self.on_disk
+        return self._path(number).is_file()
+
+    def begins_shot(self, number: int) -> bool:
+        """Return True if the user said that a new shot begins with the frame."""
+        return self._around.is_known_cut(number, -1)
 
     def _numbers(self, frames: str | None, skip_missing: bool) -> list[int]:
         if not is_pattern(self._leading):
@@ -320,7 +340,7 @@ class Clip:
     def _all(self, number: int) -> tuple[FrameFile, ...]:
         """All views of frame `number`; those of the last three are kept for their neighbours."""
         if number not in self._kept:
-            while len(self._kept) > 2:
+            while len(self._kept) >= self._most_kept:
                 self._kept.popitem(last=False)
             paths = [frame_path(p, number) for p in (self.pattern, *self.passes.also)]
             passes = self.passes
@@ -485,7 +505,11 @@ class Clip:
             depth = self._depth(source)
             if meaning is not None:
                 motion = vectors.read(source.channels, meaning, source.beside)
-            if (camera := self._cameras.get(source.view)) is not None:
+            camera = self._cameras.get(source.view)
+            if motion is None and camera is None and self._picture_motion is not None:
+                motion, guessed = self._picture_motion(source) or (None, None)
+                depth = guessed if depth is None else depth
+            if camera is not None:
                 if depth is None:
                     there = ", ".join(layers.layers(source.channels))
                     raise InputError(f"motion from a camera needs depth; available layers: {there}")

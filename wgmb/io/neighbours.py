@@ -63,6 +63,11 @@ class Neighbours:
             for key in [key for key in kept if key[0] == number]:
                 del kept[key]
 
+    def forget_all(self) -> None:
+        """Drop what was made of every frame."""
+        self._alone.clear()
+        self._placed.clear()
+
     # ---- frames ----------------------------------------------------------------------------
 
     def frame(self, source: FrameFile, picture: bool = True, normal: bool = True) -> Frame:

@@ -1,0 +1,204 @@
+"""`wgmb blur` of a video: into a video, or into frames."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import fields, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._version import __version__
+from ..color import srgb
+from ..errors import InputError
+from ..io import atomic, stills
+from ..io.clock import Clock, tick
+from ..io.coded_video import CodedVideo
+from ..io.cut_list import CutList
+from ..io.encoders import SUFFIXES, Facts, chosen
+from ..io.footage import Footage
+from ..io.frame_file import size_text
+from ..io.frame_numbers import frame_numbers
+from ..io.output import refuse_inputs
+from ..io.overlay import overlay_of
+from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
+from ..video_batch import FootageBlur, FramesSink, Moment, Sink, VideoSink, blur_footage, moments
+from ..video_settings import VideoSettings
+from .exit_codes import DONE, SOME_FAILED
+from .terminal import note, progress
+
+FIRST = 1  # number of the first frame, where they are image files
+STATIC = "static"  # as a holdout: what never changes while all around it does
+
+
+def blur_video(
+    path: str,
+    output: OutputSettings,
+    look: BlurSettings,
+    when: ShutterSettings,
+    given: InputSettings,
+    video: VideoSettings,
+    adapter: str | None,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Blur a video; returns the exit code."""
+    _check_fits(given, look)
+    footage = Footage(path, max_mb=given.max_mb)
+    method = look.method or ("gather" if video.flow in ("auto", "search") else "tap")
+    look = replace(look, method=method)
+    blur = look.make(when.make(), adapter)
+    motion, how = video.source(blur.device)
+    clock = _clock(footage, given, video)
+    fps = None if output.fps == "source" else output.rate_or(footage.rate)
+    wanted = moments(footage, clock, fps)
+    cuts = CutList(given.cuts or "")
+    run = FootageBlur(
+        footage,
+        blur,
+        motion,
+        clock=clock,
+        holdout=_holdout(look.holdout, footage),
+        fill=video.duplicates == "fill",
+        cuts=cuts.is_search,
+        known_cuts=cuts.frames(0),
+    )
+    settings = {"wgmb": __version__} | plain(look) | plain(when) | plain(video)
+    settings["curve"] = when.curve_read()
+    if verbose:
+        note(f"adapter: {blur.device.adapter.summary}")
+        note(f"settings: {json.dumps(settings, sort_keys=True)}")
+    if not quiet:
+        note(f"motion: {how}")
+        for text in footage.notes:
+            note(f"{path}: {text}")
+    started = time.perf_counter()
+    into = _into_video if Path(output.output).suffix.lower() in SUFFIXES else _into_frames
+    sink, close, abandon, left_out = into(run, output, video, wanted, settings)
+    if not quiet:
+        for text in left_out:
+            note(f"{output.output}: {text}")
+    try:
+        with progress(len(wanted), quiet) as tell:
+            blur_footage(run, blur.shutter, wanted, sink, tell)
+        close()
+    except BaseException:
+        abandon()
+        raise
+    if not quiet and run.reel is not None:
+        took = f"{time.perf_counter() - started:.1f} s with {blur.method.name}"
+        if run.reel.cuts:
+            note(f"camera cut before picture {', '.join(map(str, sorted(run.reel.cuts)))}")
+        if run.reel.doubles:
+            note(f"{len(run.reel.doubles)} repeated pictures left out")
+        note(f"{len(wanted)} frames in {took} -> {output.output}")
+    if loss := footage.loss():
+        note(f"wgmb: {loss}")
+        return SOME_FAILED
+    return DONE
+
+
+def _check_fits(given: InputSettings, look: BlurSettings) -> None:
+    """InputError for options that only rendered frames have."""
+    taken = ("frames", "cuts", "max_mb")
+    for field in fields(InputSettings):
+        if field.name not in taken and getattr(given, field.name) != field.default:
+            option = field.name.replace("_", "-")
+            raise InputError(f"--{option} is for rendered frames, a video has no layers")
+    if look.scale:
+        raise InputError("--scale is for rendered frames, a video has no layers")
+
+
+def _clock(footage: Footage, given: InputSettings, video: VideoSettings) -> Clock:
+    start, (first, end) = footage.times[0], video.range
+    first, end = (None if t is None else start + t for t in (first, end))
+    if given.frames is not None:
+        if video.begin or video.end:
+            raise InputError("choose either --frames or --begin and --end")
+        numbers = frame_numbers(given.frames)
+        there = f"{footage.path} has pictures 0 to {len(footage) - 1}"
+        if not 0 <= numbers[0] <= numbers[-1] < len(footage):
+            raise InputError(f"frames {given.frames}: {there}")
+        if numbers != list(range(numbers[0], numbers[-1] + 1)):
+            raise InputError(f"frames of a video must be one range, got {given.frames}")
+        first = footage.times[numbers[0]]
+        end = None if numbers[-1] + 1 == len(footage) else footage.times[numbers[-1] + 1]
+    origin = start if first is None else Fraction(0)
+    return Clock(first or start, video.pace, origin, first, end)
+
+
+def _holdout(masks: tuple[str, ...], footage: Footage) -> np.ndarray | None:
+    """(height, width) of all masks together; None without any."""
+    whole: np.ndarray | None = None
+    for mask in masks:
+        if mask == STATIC:
+            plane = overlay_of(footage)
+        elif Path(mask).suffix.lower() in stills.SUFFIXES:
+            plane = srgb(stills.read(mask)[..., 0])
+        else:
+            known = f"{STATIC}, or an image file {' '.join(stills.SUFFIXES)}"
+            raise InputError(f"holdout of a video must be {known}; got {mask!r}")
+        if plane.shape[::-1] != footage.size:
+            expected = "{} x {}".format(*footage.size)
+            raise InputError(f"{mask} must be {expected} like the video, got {size_text(plane)}")
+        whole = plane if whole is None else np.maximum(whole, plane)
+    return whole
+
+
+Target = tuple[Sink, Callable[[], None], Callable[[], None], list[str]]
+"""Where pictures go, how that is closed and abandoned, and what it cannot hold, in lines."""
+
+
+def _into_video(
+    run: FootageBlur,
+    output: OutputSettings,
+    video: VideoSettings,
+    wanted: list[Moment],
+    settings: dict[str, Any],
+) -> Target:
+    path, footage = Path(output.output), run.footage
+    encoding = chosen(path, video.codec, video.quality, video.encoder)
+    coding, left_out = encoding.coding(footage.coding)
+    facts = Facts(
+        pixel_aspect=footage.pixel_aspect,
+        mastering=footage.mastering,
+        light_level=footage.light_level,
+    )
+    there = [path] if path.exists() else []
+    refuse_inputs(path.parent, [path.name], there, [footage.path])
+    if there and not output.overwrite:
+        raise InputError(f"{path} exists; --overwrite replaces it")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    atomic.sweep(path.parent, [path.name])
+    times = [moment.time for moment in wanted]
+    writer = CodedVideo(
+        path,
+        atomic.temporary_name(path),
+        encoding,
+        coding,
+        footage.size,
+        1 / wanted[0].interval,
+        tick(*times, wanted[0].interval),
+        facts,
+        footage.metadata | {"comment": f"wgmb {json.dumps(settings, sort_keys=True)}"},
+    )
+    sink = VideoSink(writer, run.planes, coding, run.device)
+    return sink, writer.close, writer.abandon, [*left_out, *encoding.left_out(facts)]
+
+
+def _into_frames(
+    run: FootageBlur,
+    output: OutputSettings,
+    video: VideoSettings,
+    wanted: list[Moment],
+    settings: dict[str, Any],
+) -> Target:
+    numbers = [FIRST + moment.number for moment in wanted]
+    files = output.make(settings, numbers, [run.footage.path])
+    channels = 4 if run.footage.coding.alpha else 3
+    sink = FramesSink(files, run.device, channels, FIRST)
+    return sink, files.close, files.abandon, []

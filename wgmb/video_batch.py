@@ -1,0 +1,198 @@
+"""Videos through a Blur: pictures in time, their motion, exposures at the output's own times."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import wgpu
+
+from .background import Behind, ahead
+from .batch import Progress
+from .coding import CodedPicture, Coding
+from .errors import InputError
+from .exposer import Exposer
+from .gpu.textures import TexturePool
+from .io.clock import Clock
+from .io.coded_video import CodedVideo
+from .io.cuts import pictures_differ, repeats
+from .io.footage import Footage
+from .io.frame_file import FrameFile
+from .io.output import Output, Result
+from .pipeline import Blur
+from .planes import Planes
+from .reel import MotionSource, Picture, Reel
+from .shutter import Shutter
+
+_SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
+_READ_AHEAD = 2  # coded pictures
+_BEFORE = 10  # pictures decoded before the first exposure, which its motion may depend on
+
+
+@dataclass(frozen=True)
+class Moment:
+    """An output frame: its number from 0 on; its time and interval [s], on the output's clock."""
+
+    number: int
+    time: Fraction
+    interval: Fraction
+
+
+def moments(footage: Footage, clock: Clock, fps: Fraction | None) -> list[Moment]:
+    """The output frames of a video: at `fps`, or at the times of its own pictures.
+
+    From the first picture that `clock` lets through to the end of the last one.
+    """
+    times = footage.times
+    chosen = [t for t in times if _within(t, clock)]
+    if not chosen:
+        raise InputError(f"{footage.path}: has no pictures in this range")
+    begin = clock.out(chosen[0])
+    if fps is None:
+        step = 1 / footage.rate / clock.speed
+        return [Moment(k, clock.out(t), step) for k, t in enumerate(chosen)]
+    last = times[-1] + 1 / footage.rate
+    end = clock.out(min(last, clock.end) if clock.end is not None else last)
+    count = max(1, math.ceil((end - begin) * fps - _SPARE))
+    return [Moment(k, begin + k / fps, 1 / fps) for k in range(count)]
+
+
+def _within(time: Fraction, clock: Clock) -> bool:
+    return (clock.first is None or time >= clock.first) and (clock.end is None or time < clock.end)
+
+
+class FootageBlur:
+    """The exposures of a video, one after the other.
+
+    `motion`: where motion comes from (wgmb/flow); None: pictures are averaged as they are.
+    `holdout` (height, width): 1 stays sharp. `fill`: repeated pictures are left out, and motion
+    goes on over the gap. `cuts`: whether cuts are looked for, beside
+    `known_cuts`, the numbers of pictures that begin a shot.
+    """
+
+    def __init__(
+        self,
+        footage: Footage,
+        blur: Blur,
+        motion: MotionSource | None,
+        *,
+        clock: Clock = Clock(),  # noqa: B008  it is frozen
+        holdout: np.ndarray | None = None,
+        fill: bool = False,
+        cuts: bool = True,
+        known_cuts: Collection[int] = (),
+    ):
+        self.footage, self.planes = footage, Planes(blur.device)
+        self._images, self._clock, self._holdout = TexturePool(blur.device), clock, holdout
+        self._blur, self._motion = blur, motion
+        self._exposer = Exposer(blur)
+        self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
+        self.reel: Reel | None = None
+
+    @property
+    def device(self) -> wgpu.GPUDevice:
+        """The Blur's."""
+        return self._blur.device
+
+    def exposures(
+        self, shutter: Shutter, wanted: Sequence[Moment]
+    ) -> Iterator[tuple[Moment, wgpu.GPUTexture]]:
+        """Every moment and its picture, linear light (rgba32float), which the next overwrites."""
+        self.reel = reel = Reel(
+            self._pictures(shutter, wanted),
+            motion=self._motion,
+            is_cut=pictures_differ if self._cuts else None,
+            known_cuts=self._known_cuts,
+            is_double=repeats if self._fill else None,
+            neighbours="neighbours" in self._blur.method.uses,
+            holdout=self._holdout,
+        )
+        for moment in wanted:
+            parts = reel.parts(float(moment.time), float(moment.interval), shutter)
+            yield moment, self._exposer.texture(parts)
+
+    def _pictures(self, shutter: Shutter, wanted: Sequence[Moment]) -> Iterator[Picture]:
+        """The video's pictures from before the first exposure to the end, on the output's clock."""
+        times = self.footage.times
+        opens = (
+            self._clock.back(wanted[0].time)
+            + Fraction(shutter.span[0]) * wanted[0].interval * self._clock.speed
+        )
+        first = int(np.searchsorted(times.seconds, float(opens)))
+        coded = self.footage.pictures(max(first - _BEFORE, 0))
+        for number, picture in ahead(coded, _READ_AHEAD):
+            encoder = self._blur.device.create_command_encoder(label="decode")
+            light = self._images.texture("light", picture.size, "rgba16float")
+            self.planes.decode(encoder, picture, light.create_view())
+            color = self._images.download(encoder, light)
+            if not picture.coding.alpha:
+                color = color[..., :3]
+            yield Picture(float(self._clock.out(times[number])), color, number)
+
+
+class Sink(Protocol):
+    """Where exposures go: `take` on the main thread, then `put` in a thread of its own."""
+
+    def take(self, moment: Moment, light: wgpu.GPUTexture) -> Any:
+        """What is to be written of a picture."""
+        ...
+
+    def put(self, taken: Any) -> None:
+        """Write it."""
+        ...
+
+
+class VideoSink:
+    """Exposures as coded pictures into a video."""
+
+    def __init__(self, video: CodedVideo, planes: Planes, coding: Coding, device: wgpu.GPUDevice):
+        self._video, self._planes, self._coding, self._device = video, planes, coding, device
+
+    def take(self, moment: Moment, light: wgpu.GPUTexture) -> tuple[CodedPicture, Fraction]:
+        """The picture in the video's own planes."""
+        encoder = self._device.create_command_encoder(label="encode")
+        return self._planes.encode(encoder, light.create_view(), self._coding), moment.time
+
+    def put(self, taken: tuple[CodedPicture, Fraction]) -> None:
+        """Append it."""
+        self._video.add(*taken)
+
+
+class FramesSink:
+    """Exposures as image files, numbered from `first` on."""
+
+    def __init__(self, output: Output, device: wgpu.GPUDevice, channels: int, first: int = 1):
+        self._output, self._device, self._channels, self._first = output, device, channels, first
+        self._images = TexturePool(device)
+
+    def take(self, moment: Moment, light: wgpu.GPUTexture) -> Result:
+        """The picture as an array."""
+        encoder = self._device.create_command_encoder(label="frame")
+        picture = self._images.download(encoder, light)[..., : self._channels]
+        return Result(FrameFile(self._first + moment.number, Path(), None, {}, {}), picture)
+
+    def put(self, taken: Result) -> None:
+        """Write its file."""
+        self._output.write_views([taken])
+
+
+def blur_footage(
+    run: FootageBlur,
+    shutter: Shutter,
+    wanted: Sequence[Moment],
+    sink: Sink,
+    progress: Progress | None = None,
+) -> None:
+    """Every exposure of a video into `sink`; the caller closes or abandons what it writes."""
+    tell = progress or (lambda number, state: None)
+    with Behind(sink.put) as put:
+        for moment, light in run.exposures(shutter, wanted):
+            put(sink.take(moment, light))
+            tell(moment.number, "done")

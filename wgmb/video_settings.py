@@ -1,0 +1,86 @@
+"""User settings of videos as plain values; the string under a field is its help."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal
+
+import wgpu
+
+from . import gpu
+from .errors import InputError
+from .flow import Flow
+from .flow.dis import Dis, is_installed
+from .reel import MotionSource
+
+
+@dataclass(frozen=True, kw_only=True)
+class VideoSettings:
+    """Motion, time and encoding of videos."""
+
+    flow: Literal["auto", "search", "dis", "none"] = "auto"
+    "Where motion comes from: search (best), dis (quick, OpenCV), none (pictures are averaged)."
+    flow_quality: Literal["best", "fast"] = "best"
+    "Motion: best, or fast."
+    begin: str | None = None
+    "Time in the video to begin at: 12.5 (seconds) or 1:02:03."
+    end: str | None = None
+    "Time in the video to end at."
+    speed: str = "1"
+    "Speed of the output, such as 0.5 for slow motion."
+    duplicates: Literal["keep", "fill"] = "keep"
+    "Repeated pictures: keep, or fill (motion goes on over them)."
+    codec: str | None = None
+    "Codec of the video: h264, h265, av1, vp9, prores, ffv1; default: by the name's suffix."
+    quality: int | None = None
+    "The encoder's number of constant quality: smaller is better and larger."
+    encoder: Literal["nvenc", "qsv", "amf"] | None = None
+    "Encode in hardware; software by default."
+
+    def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
+        """Where motion comes from, and the same in words."""
+        if self.flow == "none":
+            return None, "none: pictures are averaged"
+        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        if self.flow == "dis" or (self.flow == "auto" and software and is_installed()):
+            why = "" if self.flow == "dis" else ", as there is no GPU"
+            return Dis(self.flow_quality), f"dense inverse search{why}"
+        quality, why = self.flow_quality, ""
+        if self.flow == "auto" and software:
+            quality, why = "fast", ", the fast one, as there is no GPU"
+        return Flow(quality=quality, device=device), f"search{why}"
+
+    @property
+    def pace(self) -> Fraction:
+        """The speed, exactly."""
+        try:
+            found = Fraction(self.speed)
+        except (ValueError, ZeroDivisionError):
+            raise InputError(f"`speed` must be a number, got {self.speed!r}") from None
+        if not Fraction(1, 100) <= found <= 100:
+            raise InputError(f"`speed` must be 0.01 to 100, got {self.speed}")
+        return found
+
+    @property
+    def range(self) -> tuple[Fraction | None, Fraction | None]:
+        """Times to begin and to end at [s]."""
+        begin, end = time_of("begin", self.begin), time_of("end", self.end)
+        if begin is not None and end is not None and begin >= end:
+            raise InputError(f"`end` must be after `begin`, got {self.begin} to {self.end}")
+        return begin, end
+
+
+def time_of(name: str, text: str | None) -> Fraction | None:
+    """`12.5`, `2:05` or `1:02:03.5` -> seconds, exactly."""
+    if text is None:
+        return None
+    if not re.fullmatch(r"(\d{1,6}:){0,2}\d{1,9}(\.\d{1,9})?", text):
+        raise InputError(f"`{name}` must be seconds, or like 1:02:03.5, got {text!r}")
+    total = Fraction(0)
+    for part in text.split(":"):
+        total = 60 * total + Fraction(part)
+    return total
