@@ -21,7 +21,7 @@ from av.video.stream import VideoStream
 from ..coding import Coding
 from ..errors import InputError
 from . import atomic
-from .encoders import HARDWARE, NO_FACTS, Encoding, Facts
+from .encoders import CONTAINERS, HARDWARE, NO_FACTS, Encoding, Facts
 
 _RANGES = {False: 1, True: 2}  # limited, full, as FFmpeg counts them
 _FEW = 2  # frames: x265 states no decoding times for so few
@@ -29,114 +29,48 @@ _NOT_KEPT = ("major_brand", "minor_version", "compatible_brands", "encoder")  # 
 _APPLE = "com.apple."
 
 
-class VideoFile:
-    """A video with one stream of pictures, and others that `add_streams` puts beside it.
+class NewFile:
+    """A file of some container. Until `close` there is nothing at `path`.
 
-    Frames are given with exact times, in ticks of `base`. Until `close` there is nothing at `path`.
-    OSError, whose text names `path`, if it cannot be written.
+    `metadata`: texts of the whole file. OSError, whose text names `path`, if it cannot be written.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        temporary: Path,
-        encoding: Encoding,
-        coding: Coding,
-        size: tuple[int, int],
-        rate: Fraction,
-        base: Fraction,
-        facts: Facts = NO_FACTS,
-        metadata: dict[str, str] | None = None,
-    ):
+    def __init__(self, path: Path, temporary: Path, suffix: str, metadata: dict[str, str]):
         self.path, self.temporary = path, temporary
-        self._base, self._rate, self._given = base, rate, 0
-        self._late_times = encoding.encoder.name == "libx265"
+        self._container: OutputContainer | None = None
         self._lock: int | None = None
-        self._open: tuple[OutputContainer, VideoStream] | None = None
         try:
             self._lock = atomic.create(temporary)  # its own file, which nobody else writes to
-            self._open = self._begin(encoding, coding, size, facts, metadata or {})
+            kind = CONTAINERS[suffix]
+            self._container = av.open(
+                f"file:{temporary}", "w", format=kind, container_options=_muxing(kind, metadata)
+            )
         except (FFmpegError, OSError) as error:
             self.abandon()
-            raise _why(path, encoding, error) from None
-
-    def _begin(
-        self,
-        encoding: Encoding,
-        coding: Coding,
-        size: tuple[int, int],
-        facts: Facts,
-        metadata: dict[str, str],
-    ) -> tuple[OutputContainer, VideoStream]:
-        if encoding.codec == "av1":
-            os.environ.setdefault("SVT_LOG", "1")  # it writes pages to the terminal otherwise
-        container = av.open(
-            f"file:{self.temporary}",
-            "w",
-            format=encoding.container,
-            container_options=_muxing(encoding.container, metadata),
-        )
-        container.metadata.update({k: v for k, v in metadata.items() if k not in _NOT_KEPT})
-        options = encoding.options(coding, facts)
-        name = encoding.encoder.name
-        stream = cast(VideoStream, container.add_stream(name, rate=self._rate, options=options))
-        stream.width, stream.height = size
-        context = stream.codec_context
-        context.pix_fmt, context.time_base = encoding.pixels(coding), self._base
-        if facts.pixel_aspect != 1:
-            context.sample_aspect_ratio = facts.pixel_aspect
-        if encoding.codec != "gif":
-            tag(context, coding)
-        if encoding.codec == "h265" and encoding.suffix != ".mkv":
-            context.codec_tag = "hvc1"  # which Apple's players ask for
-        context.open()
-        return container, stream
+            raise atomic.about(path, error) from None
+        texts = {k: v for k, v in metadata.items() if k not in _NOT_KEPT}
+        self._container.metadata.update(texts)
 
     @property
     def container(self) -> OutputContainer:
-        """FFmpeg's container, to which streams are added before the first picture."""
-        assert self._open is not None
-        return self._open[0]
-
-    def encode(self, frame: av.VideoFrame | None, tick: int = 0) -> None:
-        """Write what can be written once `frame`, of the encoder's format, is there."""
-        assert self._open is not None
-        container, stream = self._open
-        if frame is not None:
-            frame.pts, frame.time_base = tick, self._base
-            self._given += 1
-        try:
-            container.mux(self._timed(stream.encode(frame)))
-        except (FFmpegError, OSError) as error:
-            raise atomic.about(self.path, error) from None
-
-    def _timed(self, packets: list[Packet[VideoStream]]) -> list[Packet[VideoStream]]:
-        """The packets, with decoding times also where x265 leaves them to chance."""
-        if self._late_times and self._given <= _FEW:
-            delay = round(_FEW / (self._rate * self._base))
-            for packet in packets:
-                assert packet.pts is not None
-                packet.dts = packet.pts - delay
-        return packets
+        """FFmpeg's container, to which streams are added before the first packet."""
+        assert self._container is not None
+        return self._container
 
     def mux(self, packets: Iterable[Packet[Any]]) -> None:
-        """Write packets of other streams."""
+        """Write packets."""
         try:
             for packet in packets:
                 self.container.mux_one(packet)
         except (FFmpegError, OSError) as error:
             raise atomic.about(self.path, error) from None
 
-    def finish(self) -> None:
-        """Write what the encoder still holds."""
-        self.encode(None)
-
     def close(self) -> None:
         """Complete the file and put it in place."""
         try:
-            if self._open is not None:
-                self._open[0].close()
-                self._open = None
+            if self._container is not None:
+                self._container.close()
+                self._container = None
             if self._lock is not None:
                 os.fsync(self._lock)
             atomic.rename(self.temporary, self.path)
@@ -152,12 +86,91 @@ class VideoFile:
 
     def abandon(self) -> None:
         """Leave nothing behind."""
-        if self._open is not None:
-            (container, _), self._open = self._open, None
+        if self._container is not None:
+            container, self._container = self._container, None
             with contextlib.suppress(OSError, ValueError, FFmpegError):  # say, a full disk
                 container.close()
-        self._unlock()
-        self.temporary.unlink(missing_ok=True)
+        if self._lock is not None:
+            self._unlock()
+            self.temporary.unlink(missing_ok=True)
+
+
+class VideoFile(NewFile):
+    """A video with one stream of pictures, encoded here, and others beside it.
+
+    Frames are given with exact times, in ticks of `base`. InputError for an encoder that does not
+    start.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        temporary: Path,
+        encoding: Encoding,
+        coding: Coding,
+        size: tuple[int, int],
+        rate: Fraction,
+        base: Fraction,
+        facts: Facts = NO_FACTS,
+        metadata: dict[str, str] | None = None,
+    ):
+        super().__init__(path, temporary, encoding.suffix, metadata or {})
+        self._base, self._rate, self._given = base, rate, 0
+        self._late_times = encoding.encoder.name == "libx265"
+        try:
+            self._stream = self._begin(encoding, coding, size, facts)
+        except (FFmpegError, OSError) as error:
+            self.abandon()
+            raise _why(path, encoding, error) from None
+
+    def _begin(
+        self, encoding: Encoding, coding: Coding, size: tuple[int, int], facts: Facts
+    ) -> VideoStream:
+        if encoding.codec == "av1":
+            os.environ.setdefault("SVT_LOG", "1")  # it writes pages to the terminal otherwise
+        options, name = encoding.options(coding, facts), encoding.encoder.name
+        stream = self.container.add_stream(name, rate=self._rate, options=options)
+        stream = cast(VideoStream, stream)
+        stream.width, stream.height = size
+        context = stream.codec_context
+        context.pix_fmt, context.time_base = encoding.pixels(coding), self._base
+        if facts.pixel_aspect != 1:
+            context.sample_aspect_ratio = facts.pixel_aspect
+        if encoding.codec != "gif":
+            tag(context, coding)
+        name_codec(stream, encoding)
+        context.open()
+        return stream
+
+    def encode(self, frame: av.VideoFrame | None, tick: int = 0) -> None:
+        """Write what can be written once `frame`, of the encoder's format, is there."""
+        if frame is not None:
+            frame.pts, frame.time_base = tick, self._base
+            self._given += 1
+        try:
+            packets = self._stream.encode(frame)
+        except (FFmpegError, OSError) as error:
+            raise atomic.about(self.path, error) from None
+        self.mux(self._timed(packets))
+
+    def _timed(self, packets: list[Packet[VideoStream]]) -> list[Packet[VideoStream]]:
+        """The packets, with decoding times also where x265 leaves them to chance."""
+        if self._late_times and self._given <= _FEW:
+            delay = round(_FEW / (self._rate * self._base))
+            for packet in packets:
+                assert packet.pts is not None
+                packet.dts = packet.pts - delay
+        return packets
+
+    def finish(self) -> None:
+        """Write what the encoder still holds."""
+        self.encode(None)
+
+
+def name_codec(stream: VideoStream, encoding: Encoding) -> None:
+    """Give H.265 the name that Apple's players ask for."""
+    if encoding.codec == "h265" and encoding.suffix != ".mkv":
+        stream.codec_context.codec_tag = "hvc1"
 
 
 def tag(on: av.VideoFrame | VideoCodecContext, coding: Coding) -> None:
