@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 
+import av
 import numpy as np
 import pytest
 from PIL import Image
@@ -189,6 +190,57 @@ def test_a_cut_between_pictures_is_not_crossed(tmp_path, capsys):
     assert "frames in" in text
     with Image.open(tmp_path / "a.3.png") as a, Image.open(tmp_path / "b.3.png") as b:
         assert np.abs(np.asarray(a).astype(int) - np.asarray(b)).mean() < 12
+
+
+def packets(path, kind):
+    with av.open(str(path)) as container:
+        stream = next(s for s in container.streams if s.type == kind)
+        return [bytes(p) for p in container.demux(stream) if p.size]
+
+
+def test_sound_is_copied_byte_for_byte_and_may_be_left_out(tmp_path, capsys):
+    source = write(tmp_path / "a.mp4", moving(24), 24, tone=1.0)
+    out = tmp_path / "b.mp4"
+    run(capsys, "blur", source, "-o", out, "--flow", "none", "-q")
+    assert packets(out, "audio") == packets(source, "audio")
+    run(
+        capsys,
+        "blur",
+        source,
+        "-o",
+        out,
+        "--flow",
+        "none",
+        "--streams",
+        "video",
+        "--overwrite",
+        "-q",
+    )
+    with av.open(str(alone)) as container:
+        assert [s.type for s in container.streams] == ["video"]
+
+
+def test_slow_motion_has_slow_sound(tmp_path, capsys):
+    source = write(tmp_path / "a.mp4", moving(24), 24, tone=1.0)
+    for pitch in ("keep", "follow"):
+        out = tmp_path / f"{pitch}.mp4"
+        run(
+            capsys,
+            "blur",
+            source,
+            "-o",
+            out,
+            "--flow",
+            "none",
+            "--speed",
+            "0.5",
+            "--pitch",
+            pitch,
+            "-q",
+        )
+        with av.open(str(out)) as container:
+            sound = sum(f.samples for f in container.decode(audio=0)) / 48000
+        assert abs(sound - 2) < 0.1 and abs(float(Footage(out).duration) - 2) < 0.1
 
 
 @pytest.mark.parametrize(

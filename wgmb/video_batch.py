@@ -90,7 +90,7 @@ class FootageBlur:
         known_cuts: Collection[int] = (),
     ):
         self.footage, self.planes = footage, Planes(blur.device)
-        self._images, self._clock, self._holdout = TexturePool(blur.device), clock, holdout
+        self._images, self.clock, self._holdout = TexturePool(blur.device), clock, holdout
         self._blur, self._motion = blur, motion
         self._exposer = Exposer(blur)
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
@@ -122,8 +122,8 @@ class FootageBlur:
         """The video's pictures from before the first exposure to the end, on the output's clock."""
         times = self.footage.times
         opens = (
-            self._clock.back(wanted[0].time)
-            + Fraction(shutter.span[0]) * wanted[0].interval * self._clock.speed
+            self.clock.back(wanted[0].time)
+            + Fraction(shutter.span[0]) * wanted[0].interval * self.clock.speed
         )
         first = int(np.searchsorted(times.seconds, float(opens)))
         coded = self.footage.pictures(max(first - _BEFORE, 0))
@@ -134,7 +134,7 @@ class FootageBlur:
             color = self._images.download(encoder, light)
             if not picture.coding.alpha:
                 color = color[..., :3]
-            yield Picture(float(self._clock.out(times[number])), color, number)
+            yield Picture(float(self.clock.out(times[number])), color, number)
 
 
 class Sink(Protocol):

@@ -32,6 +32,10 @@ class VideoSettings:
     "Time in the video to end at."
     speed: str = "1"
     "Speed of the output, such as 0.5 for slow motion."
+    pitch: Literal["keep", "follow"] = "keep"
+    "Pitch of the sound at another speed: keep it, or let it follow, as on a tape."
+    streams: Literal["all", "video"] = "all"
+    "Streams of the output: all (sound, subtitles, chapters are copied), or the video alone."
     duplicates: Literal["keep", "fill"] = "keep"
     "Repeated pictures: keep, or fill (motion goes on over them)."
     codec: str | None = None

@@ -23,6 +23,7 @@ from ..io.encoders import SUFFIXES, Facts, chosen
 from ..io.footage import Footage
 from ..io.frame_file import size_text
 from ..io.frame_numbers import frame_numbers
+from ..io.other_streams import OtherStreams
 from ..io.output import refuse_inputs
 from ..io.overlay import overlay_of
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
@@ -32,6 +33,7 @@ from .exit_codes import DONE, SOME_FAILED
 from .terminal import note, progress
 
 FIRST = 1  # number of the first frame, where they are image files
+_RECORD = "comment", "description", "synopsis"  # texts of a video; the first that is free
 STATIC = "static"  # as a holdout: what never changes while all around it does
 
 
@@ -162,7 +164,7 @@ def _into_video(
 ) -> Target:
     path, footage = Path(output.output), run.footage
     encoding = chosen(path, video.codec, video.quality, video.encoder)
-    coding, left_out = encoding.coding(footage.coding)
+    coding, lost = encoding.coding(footage.coding)
     facts = Facts(
         pixel_aspect=footage.pixel_aspect,
         mastering=footage.mastering,
@@ -175,6 +177,11 @@ def _into_video(
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic.sweep(path.parent, [path.name])
     times = [moment.time for moment in wanted]
+    others = None
+    if video.streams == "all":
+        keeps_pitch = video.pitch == "keep"
+        others = OtherStreams(footage.path, footage.index, run.clock, keeps_pitch)
+    free = next((name for name in _RECORD if name not in footage.metadata), _RECORD[0])
     writer = CodedVideo(
         path,
         atomic.temporary_name(path),
@@ -184,10 +191,11 @@ def _into_video(
         1 / wanted[0].interval,
         tick(*times, wanted[0].interval),
         facts,
-        footage.metadata | {"comment": f"wgmb {json.dumps(settings, sort_keys=True)}"},
+        {free: f"wgmb {json.dumps(settings, sort_keys=True)}"},
+        others,
     )
     sink = VideoSink(writer, run.planes, coding, run.device)
-    return sink, writer.close, writer.abandon, [*left_out, *encoding.left_out(facts)]
+    return sink, writer.close, writer.abandon, [*lost, *writer.left_out]
 
 
 def _into_frames(
