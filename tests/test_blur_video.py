@@ -9,6 +9,7 @@ from PIL import Image
 
 import make_clips as clips
 import make_frames as make
+from wgmb import video_batch
 from wgmb.cli import app
 from wgmb.color import linear, srgb, to_display
 from wgmb.io.footage import Footage
@@ -206,6 +207,37 @@ def test_sound_is_copied_byte_for_byte_and_may_be_left_out(tmp_path, capsys):
     run(capsys, "blur", source, "-o", alone, "--flow", "none", "--streams", "video", "-q")
     with av.open(str(alone)) as container:
         assert [s.type for s in container.streams] == ["video"]
+
+
+def test_a_run_that_was_killed_goes_on_and_gives_the_same_video(tmp_path, capsys, monkeypatch):
+    source = write(tmp_path / "a.mp4", grey_frames([20 + n % 180 for n in range(50)]), 2, tone=20)
+    whole, out = tmp_path / "whole.mp4", tmp_path / "out.mp4"
+    words = ["--flow", "none", "-q"]
+    run(capsys, "blur", source, "-o", whole, *words)
+    add, count = video_batch.VideoSink.put, [0]
+
+    def killed(self, taken):
+        count[0] += 1
+        if count[0] == 33:
+            raise KeyboardInterrupt
+        add(self, taken)
+
+    monkeypatch.setattr(video_batch.VideoSink, "put", killed)
+    run(capsys, "blur", source, "-o", out, *words, "--resume", code=130)
+    assert make.names_in(tmp_path) == ["a.mp4", "out.mp4.segments", "whole.mp4"]
+    run(capsys, "blur", source, "-o", out, *words, "--resume")
+    assert 60 <= count[0] <= 64  # 33, of which 20 were kept, and the 30 others
+    assert make.names_in(tmp_path) == ["a.mp4", "out.mp4", "whole.mp4"]
+    one, other = Footage(whole), Footage(out)
+    assert list(one.times) == list(other.times)
+    assert packets(whole, "audio") == packets(out, "audio")
+    for (_, a), (_, b) in zip(one, other, strict=True):
+        assert np.abs(a.planes[0].astype(int) - b.planes[0]).max() <= 2
+    before = out.stat().st_mtime_ns
+    assert "already done" in run(capsys, "blur", source, "-o", out, "--flow", "none", "--resume")
+    assert out.stat().st_mtime_ns == before
+    text = run(capsys, "blur", source, "-o", out, *words, "--resume", "--shutter", 90, code=2)
+    assert "made otherwise" in text
 
 
 def test_slow_motion_has_slow_sound(tmp_path, capsys):

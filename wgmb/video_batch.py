@@ -26,6 +26,7 @@ from .io.cuts import pictures_differ, repeats
 from .io.footage import Footage
 from .io.frame_file import FrameFile
 from .io.output import Output, Result
+from .io.segments import Segment
 from .pipeline import Blur
 from .planes import Planes
 from .reel import MotionSource, Picture, Reel
@@ -152,7 +153,13 @@ class Sink(Protocol):
 class VideoSink:
     """Exposures as coded pictures into a video."""
 
-    def __init__(self, video: CodedVideo, planes: Planes, coding: Coding, device: wgpu.GPUDevice):
+    def __init__(
+        self,
+        video: CodedVideo | Segment,
+        planes: Planes,
+        coding: Coding,
+        device: wgpu.GPUDevice,
+    ):
         self._video, self._planes, self._coding, self._device = video, planes, coding, device
 
     def take(self, moment: Moment, light: wgpu.GPUTexture) -> tuple[CodedPicture, Fraction]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from .._version import __version__
+from ..coding import Coding
 from ..color import srgb
 from ..errors import InputError
 from ..io import atomic, stills
@@ -26,6 +28,7 @@ from ..io.frame_numbers import frame_numbers
 from ..io.other_streams import OtherStreams
 from ..io.output import refuse_inputs
 from ..io.overlay import overlay_of
+from ..io.segments import Segment, Segments
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
 from ..video_batch import FootageBlur, FramesSink, Moment, Sink, VideoSink, blur_footage, moments
 from ..video_settings import VideoSettings
@@ -58,6 +61,7 @@ def blur_video(
     clock = _clock(footage, given, video)
     fps = None if output.fps == "source" else output.rate_or(footage.rate)
     wanted = moments(footage, clock, fps)
+    shutter = blur.shutter
     cuts = CutList(given.cuts or "")
     run = FootageBlur(
         footage,
@@ -79,18 +83,16 @@ def blur_video(
         for text in footage.notes:
             note(f"{path}: {text}")
     started = time.perf_counter()
-    into = _into_video if Path(output.output).suffix.lower() in SUFFIXES else _into_frames
-    sink, close, abandon, left_out = into(run, output, video, wanted, settings)
+    write = _write_video if Path(output.output).suffix.lower() in SUFFIXES else _write_frames
+    with progress(len(wanted), quiet) as tell:
+
+        def blur_part(moments: Sequence[Moment], sink: Sink) -> None:
+            blur_footage(run, shutter, moments, sink, tell)
+
+        left_out = write(run, output, video, wanted, settings, blur_part)
     if not quiet:
         for text in left_out:
             note(f"{output.output}: {text}")
-    try:
-        with progress(len(wanted), quiet) as tell:
-            blur_footage(run, blur.shutter, wanted, sink, tell)
-        close()
-    except BaseException:
-        abandon()
-        raise
     if not quiet and run.reel is not None:
         took = f"{time.perf_counter() - started:.1f} s with {blur.method.name}"
         if run.reel.cuts:
@@ -151,17 +153,19 @@ def _holdout(masks: tuple[str, ...], footage: Footage) -> np.ndarray | None:
     return whole
 
 
-Target = tuple[Sink, Callable[[], None], Callable[[], None], list[str]]
-"""Where pictures go, how that is closed and abandoned, and what it cannot hold, in lines."""
+BlurPart = Callable[[Sequence[Moment], Sink], None]
+"""Blurs some of the moments into a sink."""
 
 
-def _into_video(
+def _write_video(
     run: FootageBlur,
     output: OutputSettings,
     video: VideoSettings,
     wanted: list[Moment],
     settings: dict[str, Any],
-) -> Target:
+    blur_part: BlurPart,
+) -> list[str]:
+    """Write a video, with `resume` in segments; returns what it cannot hold, in lines."""
     path, footage = Path(output.output), run.footage
     encoding = chosen(path, video.codec, video.quality, video.encoder)
     coding, lost = encoding.coding(footage.coding)
@@ -170,43 +174,74 @@ def _into_video(
         mastering=footage.mastering,
         light_level=footage.light_level,
     )
+    found = os.stat(footage.path)
+    made_of = settings | {"input": [footage.path.name, found.st_size, found.st_mtime_ns]}
+    texts = _texts(footage, made_of)
     there = [path] if path.exists() else []
     refuse_inputs(path.parent, [path.name], there, [footage.path])
+    if there and output.resume and texts.items() <= Footage(path).metadata.items():
+        return ["is already done"]
     if there and not output.overwrite:
-        raise InputError(f"{path} exists; --overwrite replaces it")
+        more = " and was made otherwise" if output.resume else ""
+        raise InputError(f"{path} exists{more}; --overwrite replaces it")
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic.sweep(path.parent, [path.name])
-    times = [moment.time for moment in wanted]
+    times, rate = [moment.time for moment in wanted], 1 / wanted[0].interval
+    base = tick(*times, wanted[0].interval)
+    shape = encoding, coding, footage.size, rate, base
     others = None
     if video.streams == "all":
         keeps_pitch = video.pitch == "keep"
         others = OtherStreams(footage.path, footage.index, run.clock, keeps_pitch)
+    if output.resume:
+        segments = Segments(path, *shape, times, made_of, facts)
+        for numbers in segments.to_do():
+            part = wanted[numbers.start : numbers.stop]
+            _fill(segments.begin(numbers), run, coding, part, blur_part)
+        return [*lost, *segments.join(texts, others)]
+    writer = CodedVideo(path, atomic.temporary_name(path), *shape, facts, texts, others)
+    _fill(writer, run, coding, wanted, blur_part)
+    return [*lost, *writer.left_out]
+
+
+def _fill(
+    writer: CodedVideo | Segment,
+    run: FootageBlur,
+    coding: Coding,
+    moments: Sequence[Moment],
+    blur_part: BlurPart,
+) -> None:
+    """Write pictures and close the file, or leave nothing of it."""
+    try:
+        blur_part(moments, VideoSink(writer, run.planes, coding, run.device))
+        writer.close()
+    except BaseException:
+        writer.abandon()
+        raise
+
+
+def _texts(footage: Footage, made_of: dict[str, Any]) -> dict[str, str]:
+    """The record of a video, under the first text that its input leaves free."""
     free = next((name for name in _RECORD if name not in footage.metadata), _RECORD[0])
-    writer = CodedVideo(
-        path,
-        atomic.temporary_name(path),
-        encoding,
-        coding,
-        footage.size,
-        1 / wanted[0].interval,
-        tick(*times, wanted[0].interval),
-        facts,
-        {free: f"wgmb {json.dumps(settings, sort_keys=True)}"},
-        others,
-    )
-    sink = VideoSink(writer, run.planes, coding, run.device)
-    return sink, writer.close, writer.abandon, [*lost, *writer.left_out]
+    return {free: f"wgmb {json.dumps(made_of, sort_keys=True)}"}
 
 
-def _into_frames(
+def _write_frames(
     run: FootageBlur,
     output: OutputSettings,
     video: VideoSettings,
     wanted: list[Moment],
     settings: dict[str, Any],
-) -> Target:
+    blur_part: BlurPart,
+) -> list[str]:
+    """Write image files."""
     numbers = [FIRST + moment.number for moment in wanted]
     files = output.make(settings, numbers, [run.footage.path])
     channels = 4 if run.footage.coding.alpha else 3
-    sink = FramesSink(files, run.device, channels, FIRST)
-    return sink, files.close, files.abandon, []
+    try:
+        blur_part(wanted, FramesSink(files, run.device, channels, FIRST))
+        files.close()
+    except BaseException:
+        files.abandon()
+        raise
+    return []
