@@ -274,6 +274,34 @@ def test_masks_from_files_are_of_the_display_or_of_the_window(autocropped, tmp_p
     np.testing.assert_allclose(got, own, atol=1e-6)
 
 
+def test_a_window_far_away_fails_its_frame_and_takes_no_memory(tmp_path):
+    pattern = sequence(tmp_path / "in", slack, numbers=range(1, 6))
+    far = (300_000_000, 0, 300_000_039, 39)
+    planes, _ = ball(0, (0, 0, 39, 39), start=(20.0, 20.0))
+    write(pattern.replace("####", "0003"), planes, far)
+    clip = Clip(pattern)
+    assert "nuke" in clip.finding
+    output = Output(tmp_path / "o.####.exr", numbers=clip.numbers)
+    report = blur_sequence(clip, Blur("gather"), output)
+    assert set(report.done) >= {1, 5} and all("canvas" in why for why in report.failed.values())
+
+
+def test_overscan_that_goes_on_is_not_told_as_a_region(tmp_path):
+    folder = tmp_path / "in"
+    folder.mkdir()
+    y, x = np.mgrid[WIDE[1] : WIDE[3] + 1, WIDE[0] : WIDE[2] + 1]
+    for number in (1, 2):
+        tone = (0.5 + 0.4 * np.sin(0.2 * (x - 8 * number)) * np.cos(0.15 * y)).astype("f4")
+        planes = dict.fromkeys("RGB", tone) | {"A": np.ones_like(tone), "Z": 5 * np.ones_like(tone)}
+        planes |= {"forward.u": np.full_like(tone, 8), "forward.v": np.zeros_like(tone)}
+        write(folder / f"a.{number:04d}.exr", planes, WIDE)
+    got = blurred(str(folder / "a.####.exr"), tmp_path / "out", "gather")
+    assert got[1].data_window == WIDE
+    clip = Clip(str(folder / "a.####.exr"))
+    clip.placed(clip.source(1), Blur("gather").reach, True)
+    assert not [note for note in clip.notes if "data window" in note]
+
+
 def test_a_neighbour_with_another_display_window_is_not_used(tmp_path):
     pattern = sequence(tmp_path / "in", slack, numbers=range(1, 4))
     planes, _ = ball(3)

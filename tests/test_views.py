@@ -436,6 +436,33 @@ def test_a_view_without_vectors_is_named_with_those_that_have_some(tmp_path, cap
     assert make.inside(capsys, "blur", pattern, "-o", tmp_path / "l.####.exr", *options)[0] == 0
 
 
+def test_vectors_in_no_view_are_the_default_views(tmp_path, capsys):
+    """As OpenEXR has it: `forward.u` beside the picture of the first view."""
+
+    def unnamed(n):
+        channels = {k: c.pixels for k, c in single_part(n)[0].channels.items()}
+        for name in ("u", "v"):
+            del channels[f"forward.left.{name}"]
+            channels[f"forward.{name}"] = channels.pop(f"forward.right.{name}")
+        return [make.part(channels, {"multiView": STEREO})]
+
+    pattern = with_stereo(tmp_path, unnamed, (1, 2, 3))
+    code, _, err = make.inside(capsys, "blur", pattern, "-o", tmp_path / "o.####.exr")
+    assert code == 1 and "view left: no nuke vectors" in err
+    right = Clip(pattern, view="right")
+    assert right.frame(right.source(2)).motion is not None
+
+
+def test_a_frame_that_lacks_a_view_is_told(tmp_path, capsys):
+    def half(n):
+        gone = [f"left.{c}" for c in "RGBA"] + [f"forward.left.{c}" for c in "uv"] + ["left.Z"]
+        return without(single_part(n), *gone) if n == 2 else single_part(n)
+
+    pattern = with_stereo(tmp_path, half, (1, 2, 3))
+    code, _, err = make.inside(capsys, "blur", pattern, "-o", tmp_path / "o.####.exr")
+    assert code == 0 and "frames 2: " in err and "left" in err
+
+
 def test_resume_redoes_what_another_view_was_chosen_for(tmp_path, capsys):
     pattern, out = with_stereo(tmp_path, single_part, (1, 2)), tmp_path / "o.####.exr"
     assert make.inside(capsys, "blur", pattern, "-o", out)[0] == 0

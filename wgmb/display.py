@@ -121,6 +121,14 @@ class ColorConfig:
             return self._by_primaries(tuple(np.ravel(given).tolist()), "chromaticities")
         return self._by_primaries(REC709, "default")
 
+    def unknown(self, attributes: Mapping[str, Any]) -> str:
+        """The name of a colour space in the attributes that the config has not; '' if none."""
+        for key in _NAMED_BY:
+            value = attributes.get(key)
+            if isinstance(value, str) and value:
+                return "" if self.space_of({key: value}).why == key else f"{key} {value!r}"
+        return ""
+
     @cached_property
     def scene_linear(self) -> ColorSpace:
         """The space of the role scene_linear, which pictures in other spaces are blurred in."""

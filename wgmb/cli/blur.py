@@ -12,11 +12,14 @@ from .. import gpu
 from .._version import __version__
 from ..batch import BatchReport, blur_sequence
 from ..color_settings import ColorSettings, color_record
+from ..display import Display
 from ..errors import InputError
 from ..io import stills
 from ..io.clip import Clip
-from ..io.frame_file import odd_sizes
+from ..io.frame_file import about, odd_sizes
 from ..io.frame_numbers import frame_list, readable
+from ..io.input_space import space_of
+from ..io.masks import is_file, with_amount
 from ..pipeline import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
 from ..video_settings import VideoSettings
@@ -82,6 +85,12 @@ def blur(
     shown = color.open(needed=not output.is_exr)
     space = color.space(shown)
     clip = given.open(pattern, look.holdout, look.scale, space)
+    for scale in look.scale:
+        if "=" in scale and with_amount(scale)[1] is None and not (quiet or is_file(scale)):
+            note(f"--scale {scale}: no amount such as {scale}:0.5, so all else stands still")
+    unknown = _check_space(clip, shown) if space is None else ""
+    if unknown and not quiet:
+        note(unknown)
     how = _move_by_pictures(clip, video, adapter)
     look = look.resolved(clip=clip)
     made = look.make(when.make(), adapter)
@@ -114,6 +123,22 @@ def is_video(pattern: str) -> bool:
     """Return True for a file that is neither an EXR nor a still."""
     path = Path(pattern)
     return path.suffix.lower() not in (".exr", *stills.SUFFIXES) and readable(path)
+
+
+def _check_space(clip: Clip, shown: Display | None) -> str:
+    """InputError where frames say that they are not linear; a remark on a space of no config."""
+    if shown is None:
+        return ""
+    source = clip.source(clip.numbers[0])
+    if source.part is None:
+        return ""
+    said = shown.config.unknown(source.part.attributes)
+    found = space_of(source, shown.config)
+    with about(source.name):
+        found.check_linear()
+    if not said:
+        return ""
+    return f"{source.path}: {said} is not in {shown.config.name}, so it is taken as {found.text}"
 
 
 def _move_by_pictures(clip: Clip, video: VideoSettings, adapter: str | None) -> str:
@@ -155,6 +180,8 @@ def conclude(clip, files, report: BatchReport, took: str, quiet: bool, verbose: 
                 note(
                     text if len(told) == len(report.done) else f"frames {frame_list(told)}: {text}"
                 )
+        for mask in clip.unseen:
+            note(f"{mask} is in no pixel of these frames, so it changed nothing")
         if stray := clip.stray_cuts:
             there = f"{clip.on_disk[0]} to {clip.on_disk[-1]}"
             note(f"cuts outside the frames {there} change nothing: {frame_list(stray)}")

@@ -44,7 +44,7 @@ from .input_space import in_space
 from .masks import Masks
 from .neighbours import Neighbours
 from .picture_motion import FAR, PictureMotion
-from .windows import Placement, Window, laid, union
+from .windows import Placement, Window, laid, near_enough, union
 
 DEPTHS = ("planar", "inverse", "clip")
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
@@ -324,6 +324,12 @@ class Clip:
         found = self._all(number)
         return [s for s in found if s.beside is not None] or [found[0]]
 
+    def _own(self, source: FrameFile) -> dict[str, np.ndarray]:
+        """The channels of a view. What is in no view belongs to the default one."""
+        if source.view is None or not self.views or source.view == self.views[0]:
+            return source.channels
+        return {k: plane for k, plane in source.channels.items() if k not in source.shared}
+
     def _find(self, number: int, view: str | None) -> FrameFile:
         """A view of a frame by its name."""
         found = {source.view: source for source in self._all(number)}
@@ -353,6 +359,9 @@ class Clip:
                 found = tuple(sorted(found, key=lambda source: source.view != self.views[0]))
             self._kept[number] = found
             self.sizes[number] = found[0].whole
+            if lacking := sorted(set(self.views) - {source.view for source in found}):
+                text = f"lacks the view {', '.join(lacking)}, which others have"
+                self.notes.setdefault(text, []).append(number)
             for note in dict.fromkeys(note for source in found for note in source.notes):
                 self.notes.setdefault(note, []).append(number)
         return self._kept[number]
@@ -415,15 +424,16 @@ class Clip:
         """The vectors that the layers' names speak for, in the first view that has any."""
         first = self.leader(number)
         for source in dict.fromkeys((first, *self._all(number))):
-            if named := vectors.named(source.channels, wanted, source.beside):
+            if named := vectors.named(self._own(source), wanted, source.beside):
                 return source, named
         return first, None
 
     def _evidence(self, source: FrameFile, named: vectors.Vectors) -> detect.Evidence:
         if source.beside is None:
             return detect.Evidence(doubt="no picture to test it on")
-        motion = vectors.read(source.channels, named, source.beside)
+        motion = vectors.read(self._own(source), named, source.beside)
         near = [self._probe(source, side) for side in (-1, 1)]
+        near = [one if one and near_enough(source.data_window, one[1]) else None for one in near]
         onto = union([source.data_window, *(window for _, window in filter(None, near))])
         color, motion = (laid(a, source.data_window, onto) for a in (source.rgba, motion))
         prev, next_ = (one and laid(*one, onto) for one in near)
@@ -500,11 +510,11 @@ class Clip:
         meaning = self._decide().vectors
         with about(source.name):
             if meaning is None:  # where a layer was asked for, this says why there is none
-                meaning = vectors.named(source.channels, self.passes.vectors, source.beside)
+                meaning = vectors.named(self._own(source), self.passes.vectors, source.beside)
             motion = reprojections = ids = None
             depth = self._depth(source)
             if meaning is not None:
-                motion = vectors.read(source.channels, meaning, source.beside)
+                motion = vectors.read(self._own(source), meaning, source.beside)
             camera = self._cameras.get(source.view)
             if motion is None and camera is None and self._picture_motion is not None:
                 motion, guessed = self._picture_motion(source) or (None, None)
@@ -533,7 +543,7 @@ class Clip:
             )
 
     def _depth(self, source: FrameFile) -> np.ndarray | None:
-        name = layers.find_depth(source.channels, self.passes.depth, source.beside)
+        name = layers.find_depth(self._own(source), self.passes.depth, source.beside)
         if name is None:
             return None
         depth = source.channels[name].astype(np.float32, copy=False)
@@ -543,7 +553,7 @@ class Clip:
         return depth
 
     def _normal(self, source: FrameFile) -> np.ndarray | None:
-        names = layers.find_normal(source.channels, source.beside)
+        names = layers.find_normal(self._own(source), source.beside)
         if not names:
             return None
         return np.stack([source.channels[name] for name in names], 2, dtype=np.float32)
@@ -560,6 +570,11 @@ class Clip:
         with np.errstate(invalid="ignore"):
             index = np.rint(plane.astype(np.float64))
             return np.where(index > 0, np.minimum(index, MAX_INDEX), 0).astype(np.uint32)
+
+    @property
+    def unseen(self) -> list[str]:
+        """Masks by name that manifests list, and no pixel of the frames read so far has."""
+        return self._masks.unseen
 
     @property
     def absent(self) -> list[str]:

@@ -25,6 +25,7 @@ _NOT_COLORS = {"n", "normal", "normals", "p", "position", "id"} | {
 _MOST_HALF = float(np.finfo(np.float16).max)
 _OBJECT = 256  # bytes that the library takes for a pixel's samples of a channel, beside them
 _MANY_PARTS = 0x1000
+_MOST = 1 << 40  # bytes of a chunk: more is damage
 
 
 @np.errstate(all="ignore")  # samples may be anything
@@ -142,7 +143,7 @@ def needed(path: Path, parts: Sequence) -> int:
     try:
         with open(path, "rb") as file:
             return _needed(file, parts)
-    except (struct.error, IndexError, ValueError, KeyError):
+    except (struct.error, IndexError, ValueError, KeyError, OSError, OverflowError):
         return 0
 
 
@@ -169,6 +170,8 @@ def _unpacked(file: BinaryIO, offset: int, many: bool, is_tile: bool) -> int:
     file.seek(offset + 4 * many)
     place = struct.unpack("<4i" if is_tile else "<i", file.read(16 if is_tile else 4))
     _, _, unpacked = struct.unpack("<3Q", file.read(24))
+    if unpacked > _MOST:
+        raise ValueError("no chunk is so large")
     return 0 if is_tile and place[2:] != (0, 0) else unpacked
 
 

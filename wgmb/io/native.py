@@ -19,6 +19,7 @@ import OpenEXR
 from .limits import MOST_PIXELS_A_SIDE
 
 _MOST_THREADS = 8
+_SIEVES = 8  # kept, for as many streams
 _CHATTER = "Warning: Exception raised reading pixel data"
 
 
@@ -110,6 +111,7 @@ class _Hush:
     def __init__(self):
         self._heard: dict[int, list[str]] = {}  # by thread
         self._mutex = threading.Lock()
+        self._sieves: list[_Sieve] = []
         self._undo = contextlib.ExitStack()
 
     @contextlib.contextmanager
@@ -141,9 +143,21 @@ class _Hush:
             if isinstance(before, _Sieve):  # an old one, which somebody put back
                 before = before.stream
             stream = before if before is not None else undo.enter_context(open(os.devnull, "w"))
-            sys.stdout = sieve = _Sieve(stream, self._heard)
+            sys.stdout = sieve = self._sieve_of(stream)
             undo.callback(_put_back, before, sieve)
             self._undo = undo.pop_all()
+
+    def _sieve_of(self, stream) -> _Sieve:
+        """The sieve before a stream, the same one every time.
+
+        `print` in another thread may be within one that is no longer sys.stdout, and does not hold
+        it: so they are kept.
+        """
+        for sieve in self._sieves:
+            if sieve.stream is stream:
+                return sieve
+        self._sieves = [*self._sieves[-_SIEVES:], _Sieve(stream, self._heard)]
+        return self._sieves[-1]
 
 
 def _put_back(before, sieve: _Sieve) -> None:

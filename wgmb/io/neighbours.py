@@ -247,7 +247,7 @@ class Neighbours:
             return edge, edge, edge, edge
         there = self._clip.on_disk
         places: list[set[int]] = [set(), set(), set(), set()]
-        closed = [True] * 4
+        closed, within = [True] * 4, [True] * 4
         for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
             try:
                 source = self._clip.leader(number)
@@ -260,14 +260,17 @@ class Neighbours:
             for i, (end, border, full) in enumerate(sides):
                 places[i].add(end)
                 closed[i] &= full and end != border
+                within[i] &= end > border if i < 2 else end < border
         left, top, right, bottom = (
             full and len(ends) == 1 for full, ends in zip(closed, places, strict=True)
         )
-        if any(found := (left, top, right, bottom)):
-            where = ", ".join(name for name, cut in zip(_SIDES, found, strict=True) if cut)
+        found = left, top, right, bottom
+        told = [name for name, *both in zip(_SIDES, found, within, strict=True) if all(both)]
+        if told:
+            where = ", ".join(told)
             text = (
                 f"the picture goes on beyond the data window ({where}): what lies there is taken "
                 "as unknown; `outside='nothing'` takes it as empty"
             )
-            self._clip.notes.setdefault(text, []).append(there[0])
+            self._clip.notes[text] = list(self._clip.numbers)
         return found

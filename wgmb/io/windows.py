@@ -122,6 +122,11 @@ def canvas(needed: Window, limit: Window, windows: Iterable[Window], display: Wi
     return found
 
 
+def near_enough(one: Window, other: Window) -> bool:
+    """Whether a canvas may hold two windows."""
+    return _area(union([one, other])) <= _MOST_AREA * (_area(one) + _area(other))
+
+
 def _area(window: Window) -> int:
     width, height = size_of(window)
     return width * height
