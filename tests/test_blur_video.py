@@ -164,6 +164,19 @@ def test_a_video_becomes_pictures(tmp_path, capsys):
         assert image.size == SIZE
 
 
+def test_info_describes_a_video(tmp_path, capsys):
+    times = [Fraction(n, 100) for n in (0, 1, 2, 7, 8, 12, 20, 21)]
+    source = write(tmp_path / "a.mp4", grey_frames(range(30, 110, 10)), times=times, tone=0.2)
+    assert app.main(["info", str(source)]) == 0
+    text = capsys.readouterr().out
+    for said in ("h264 in mov", "96 x 64", "8 in 0.", "variable: 10.0 to 80.0 ms",
+                 "Y'CbCr 4:2:0, 8 bits, limited range, matrix 6", "stream    audio: aac",
+                 "does not state its colours"):  # fmt: skip
+        assert said in text, text
+    text = run(capsys, "info", source, "-o", tmp_path / "m.png", code=2)
+    assert "rendered frames" in text
+
+
 def test_pictures_without_vectors_move_by_flow(tmp_path, capsys):
     for n in range(1, 6):
         picture = to_display(make.picture(n)[..., :3], 8)

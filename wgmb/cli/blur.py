@@ -14,10 +14,9 @@ from ..batch import BatchReport, blur_sequence
 from ..color_settings import ColorSettings, color_record
 from ..display import Display
 from ..errors import InputError
-from ..io import stills
 from ..io.clip import Clip
-from ..io.frame_file import about, odd_sizes
-from ..io.frame_numbers import frame_list, readable
+from ..io.frame_file import about, is_video, odd_sizes
+from ..io.frame_numbers import frame_list
 from ..io.input_space import space_of
 from ..io.masks import is_file, with_amount
 from ..pipeline import Blur
@@ -117,12 +116,6 @@ def blur(
         )
     took = f"{time.perf_counter() - started:.1f} s with {made.method.name}"
     return conclude(clip, files, report, took, quiet, verbose)
-
-
-def is_video(pattern: str) -> bool:
-    """Return True for a file that is neither an EXR nor a still."""
-    path = Path(pattern)
-    return path.suffix.lower() not in (".exr", *stills.SUFFIXES) and readable(path)
 
 
 def _check_space(clip: Clip, shown: Display | None) -> str:

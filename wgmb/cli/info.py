@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..io import layers, stills
 from ..io.atomic import write_file
 from ..io.clip import Clip
-from ..io.frame_file import FrameFile
+from ..io.frame_file import FrameFile, is_video
 from ..io.frame_numbers import frame_list
 from ..io.input_space import space_of
 from ..io.output import refuse_inputs
@@ -43,13 +43,23 @@ def info(
     Parameters
     ----------
     pattern
-        File or pattern; describes the first frame and tests its vectors against the neighbours.
+        File or pattern; describes the first frame and tests its vectors against the neighbours. Or
+        a video: its streams, times and colours.
     output
         Draw the motion as an image: hue is direction, brightness is speed.
     overwrite
         Replace an existing image.
     """
     shown = color.open()
+    if is_video(pattern):
+        from ..io.footage import Footage
+        from .video_lines import describe_video
+
+        if output is not None:
+            raise InputError("`output` draws the motion of rendered frames, a video holds none")
+        for name, text in describe_video(Footage(pattern, max_mb=given.max_mb)):
+            out(f"{name:10}{text}")
+        return DONE
     clip = given.open(pattern, space=color.space(shown))
     if color.remark:
         note(color.remark)

@@ -16,7 +16,7 @@ import numpy as np
 from ..display import ColorSpace
 from ..errors import InputError
 from . import exr, layers, limits, stills, views
-from .frame_numbers import frame_range, has_view, in_view
+from .frame_numbers import frame_range, has_view, in_view, readable
 from .windows import Window, laid
 
 _NO_PICTURE = "view {} has no picture and is left as it is"
@@ -100,6 +100,12 @@ class FrameFile:
         left, top, right, bottom = self.part.display_window
         x, y = self.part.data_window[:2]
         return x - left, y - top, right - left + 1, bottom - top + 1
+
+
+def is_video(pattern: str | Path) -> bool:
+    """Return True for a file that is neither an EXR nor a still."""
+    path = Path(pattern)
+    return path.suffix.lower() not in (".exr", *stills.SUFFIXES) and readable(path)
 
 
 def size_text(of: np.ndarray | tuple[int, int]) -> str:
