@@ -136,7 +136,10 @@ def _check_space(clip: Clip, shown: Display | None) -> str:
 
 def _move_by_pictures(clip: Clip, video: VideoSettings, adapter: str | None) -> str:
     """Take motion from the pictures of frames that hold none; returns how, in words."""
-    if video.flow == "none" or len(clip.on_disk) < 2 or "motion" in clip.has:
+    if video.flow == "none" or len(clip.on_disk) < 2:
+        return ""
+    has = clip.has
+    if "motion" in has or not has:  # nothing can be read: its turn to fail comes
         return ""
     motion, how = video.source(gpu.open_device(adapter))
     if motion is not None:

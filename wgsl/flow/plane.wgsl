@@ -1,4 +1,4 @@
-// A plane through the states around a pixel; for shaders that bind `states` and `here`.
+// A plane through the states around a pixel.
 //#include common/frame.wgsl
 //#include flow/features.wgsl
 //#include flow/state.wgsl
@@ -14,7 +14,7 @@ struct Plane {
 }
 
 /// The plane through the flows near by that are of like pixels and like the state.
-fn fitted_plane(px: vec2i, state: State) -> Plane {
+fn fitted_plane(here: texture_2d_array<f32>, states: texture_2d_array<f32>, px: vec2i, state: State) -> Plane {
     let color = textureLoad(here, px, 0, 0).rgb;
     var total = 0.0;
     var sum_at = vec2f(0.0);

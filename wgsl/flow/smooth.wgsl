@@ -8,7 +8,7 @@
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
-    let plane = fitted_plane(vec2i(id.xy), load_state(states, vec2i(id.xy)));
+    let plane = fitted_plane(here, states, vec2i(id.xy), load_state(states, vec2i(id.xy)));
     textureStore(output, id.xy, 0, vec4f(plane.flow, plane.bend));
     textureStore(output, id.xy, 1, plane.slope);
 }

@@ -258,7 +258,7 @@ fn refine(@builtin(local_invocation_index) local: u32,
     let px = own_pixel(swizzled_pixel(local, group, groups));
     let inside = min(px, vec2i(frame.size) - 1);
     var best = begin(inside);
-    let plane = fitted_plane(inside, best.state);
+    let plane = fitted_plane(here, states, inside, best.state);
     for (var k = 0u; k < REFINED; k++) { best = attempt(best, varied(best.state, plane, px, k)); }
     let steps = inverse_steps(best.state);
     let state = best.state;
