@@ -81,11 +81,11 @@ def states_texture(states):
 
 
 @cache
-def small(size=(9, 13)):
+def small(size=(9, 13), bend=0.0):
     """Features of three small pictures that move, on the GPU and as numbers, by frame."""
     on_gpu, numbers = {}, {}
     for n in range(3):
-        picture = shifted(size, 1.3 * n, -0.6 * n, longest=16.0)
+        picture = shifted(size, 1.3 * n + bend * (n - 1) ** 2 / 2, -0.6 * n, longest=16.0)
         rgba = np.dstack([picture, np.ones(size, "f4")])
         view = kit().images.upload(f"small {n}", rgba, "rgba32float")
         on_gpu[n] = features(kit(), view, size[::-1])
@@ -93,8 +93,8 @@ def small(size=(9, 13)):
     return on_gpu, numbers
 
 
-def matcher(views, stride=1):
-    numbers = small()[1]
+def matcher(views, stride=1, bend=0.0):
+    numbers = small(bend=bend)[1]
     far_price = 0.03 if views.factor == BESIDE else 0.0
     here, near, far = (numbers[n] for n in (views.here, views.near, views.far))
     return twin.Matcher(here, near, far, views.factor, stride, far_price)
@@ -131,13 +131,16 @@ def test_every_level_is_half_as_large(close):
     close(read(got[1])[..., :7] / 255.0, twin.features(twin.halved(picture)), 0.51 / 255)
 
 
-def test_the_full_search_finds_the_cheapest_displacement():
-    bound = matched(kit(), MIDDLE, small()[0], 0)
+@pytest.mark.parametrize("bend", [0.0, 2.5])
+def test_the_full_search_finds_the_cheapest_displacements(bend):
+    """One for both sides, or two where the motion changes so much that no single one fits."""
+    bound = matched(kit(), MIDDLE, small(bend=bend)[0], 0)
     got = read(FullSearch(kit(), 2)((13, 9), bound))
-    want = twin.full_search(matcher(MIDDLE), reach=3)  # a fifth of 13
-    assert (got[..., 2:] == 0).all()
-    assert (got[::2, ::2, :2] == want).all()
+    want = twin.full_search(matcher(MIDDLE, bend=bend), reach=3)  # a fifth of 13
+    assert (got[..., 4:] == 0).all()
+    assert (got[::2, ::2, :4] == want).all()
     assert (got[1::2, ::2] == got[:-1:2, ::2]).all()
+    assert (want[..., 2:] != 0).any() == (bend > 0)
 
 
 @pytest.mark.parametrize("views", [MIDDLE, FIRST])
@@ -294,8 +297,18 @@ def test_a_shift_is_found():
     assert np.percentile(np.abs(inside - [*-way, *way]), 95) < 0.3
 
 
-def test_a_turning_and_zooming_texture_is_followed():
-    size, turn, zoom = (56, 72), 0.06, 1.03
+def test_a_shift_that_grows_is_found():
+    """5 px before, 10 px after: no constant velocity fits both sides."""
+    before, after = np.array([-5, 1]), np.array([10, 2])
+    pictures = [shifted((44, 112), *way) for way in (before, (0, 0), after)]
+    motion, _ = Flow()(*pictures)
+    error = np.abs(motion - [*before, *after]).max(axis=2)[8:-8, 22:-22]
+    assert error.mean() < 0.1
+
+
+@pytest.mark.parametrize(("turn", "zoom"), [(0.06, 1.03), (np.radians(12), 1.0)])
+def test_a_turning_and_zooming_texture_is_followed(turn, zoom):
+    size = (56, 72)
     x, y = grid(size)
     x, y = x - 36, y - 28
 
@@ -303,10 +316,12 @@ def test_a_turning_and_zooming_texture_is_followed():
         c, s, k = np.cos(turn * n), np.sin(turn * n), zoom**-n
         return texture(k * (c * x + s * y), k * (c * y - s * x))
 
+    def way(n):
+        c, s = zoom**n * np.cos(turn * n), zoom**n * np.sin(turn * n)
+        return np.stack([c * x - s * y - x, s * x + c * y - y], axis=2)
+
     motion, _ = Flow()(seen(-1), seen(0), seen(1))
-    c, s = zoom * np.cos(turn), zoom * np.sin(turn)
-    want = np.stack([c * x - s * y - x, s * x + c * y - y], axis=2)
-    error = np.linalg.norm(motion[..., 2:] - want, axis=2)[8:-8, 8:-8]
+    error = np.abs(motion - np.concatenate([way(-1), way(1)], axis=2)).max(axis=2)[8:-8, 8:-8]
     assert error.mean() < 0.2
 
 

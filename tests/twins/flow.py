@@ -93,7 +93,8 @@ class Matcher:
         return min((n + f) / 2, min(n, f + self.far_price) + 0.03)
 
     def price(self, state):
-        return 0.02 * np.abs(state[4:]).sum() + 0.002 * np.abs(state[2:4]).sum()
+        bend_price = min(0.002 * np.abs(state[2:4]).sum(), 0.01)
+        return 0.02 * np.abs(state[4:]).sum() + bend_price
 
     def energy(self, x, y, state, states, most_apart):
         """With what differs from the 8 neighbours."""
@@ -196,7 +197,7 @@ def polished(matcher, states, x, y):
 
 
 def full_search(matcher, reach):
-    """u, v of every second pixel each way: the cheapest whole displacement."""
+    """Flow and bend of every second pixel each way: the cheapest whole displacements."""
     offsets = np.array([(i, j) for j in (-3, -1, 1, 3) for i in (-3, -1, 1, 3)])
     height, width = matcher.height, matcher.width
 
@@ -212,17 +213,20 @@ def full_search(matcher, reach):
                 total, weights = total + weight * min(d, 0.6), weights + weight
         return total / weights
 
-    out = np.zeros((-(-height // 2), -(-width // 2), 2))
+    ways = [(u, v) for u in range(-reach, reach + 1) for v in range(-reach, reach + 1)]
+    ways.sort(key=lambda way: np.abs(way).sum())
+    length = np.array([1e-4 * np.abs(way).sum() for way in ways])
+    out = np.zeros((-(-height // 2), -(-width // 2), 4))
     for y in range(0, height, 2):
         for x in range(0, width, 2):
-            best = math.inf
-            for u in range(-reach, reach + 1):
-                for v in range(-reach, reach + 1):
-                    n, f = side(matcher.near, x, y, u, v), side(matcher.far, x, y, -u, -v)
-                    cost = min((n + f) / 2, min(n, f) + 0.03) + 1e-4 * (abs(u) + abs(v))
-                    if cost < best - 1e-7:
-                        best = cost
-                        out[y // 2, x // 2] = u, v
+            n = np.array([side(matcher.near, x, y, u, v) for u, v in ways])
+            f = np.array([side(matcher.far, x, y, -u, -v) for u, v in ways])
+            both = np.minimum((n + f) / 2, np.minimum(n, f) + 0.03) + length
+            best = [np.array(ways[np.argmin(cost.round(7))]) for cost in (both, n + length, f + length)]
+            bend = best[1] - best[2]
+            pair = np.array([*best[1], *bend, 0, 0, 0, 0])
+            cost = (min(n + length) + min(f + length)) / 2 + matcher.price(pair) + 0.015
+            out[y // 2, x // 2] = pair[:4] if cost < both.min() else (*best[0], 0, 0)
     return out
 
 

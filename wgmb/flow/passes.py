@@ -25,7 +25,7 @@ class Passes:
     def __init__(self, device: wgpu.GPUDevice):
         self.device, self.images = device, TexturePool(device)
         self.linear = device.create_sampler(mag_filter="linear", min_filter="linear")
-        self.landings = ScratchBuffer(device)
+        self.landings, self.costs = ScratchBuffer(device), ScratchBuffer(device)
         self._free: dict[tuple, list[wgpu.GPUTexture]] = {}
         self._frames: dict[tuple[int, int], gpu.FrameBindings] = {}
 

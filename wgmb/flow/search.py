@@ -27,7 +27,7 @@ class FullSearch:
         most = max(1, round(REACH * max(size)))
         output = self._passes.take(size, STATES)
         spare = self._passes.take((1, 1), STATES)
-        best = self._best.at_least(16 * blocks[0] * blocks[1])
+        best = self._best.at_least(source.dtype("Best").itemsize * blocks[0] * blocks[1])
 
         # Short displacements first: what follows is refused sooner.
         firsts = sorted(range(-most, most + 1, columns), key=lambda n: abs(n + columns // 2))

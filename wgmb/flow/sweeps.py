@@ -31,7 +31,8 @@ def sweep(
     """
     after = passes.take(size, STATES)
     for number in range(PASSES * count):
-        half_sweep(passes, size, matched, states, carried, level, number, after)
+        is_known = number not in (0, 2)  # the first of a colour finds out what its states cost
+        half_sweep(passes, size, matched, states, carried, level, number, after, is_known)
         states, after = after, states
     passes.give(after)
     return states
@@ -46,11 +47,15 @@ def half_sweep(
     level: int,
     number: int,
     output: wgpu.GPUTexture,
+    is_known: bool = False,
 ) -> None:
-    """Pass `number` of the sweeps: one colour of the chessboard, propagated or refined."""
+    """Pass `number` of the sweeps: one colour of the chessboard, propagated or refined.
+
+    `is_known`: what the states of this colour cost is in `passes.costs`, from an earlier pass.
+    """
     entry = "refine" if number % 2 else "propagate"
     half = -(-size[0] // 2), size[1]
-    _run(passes, entry, size, half, matched, states, carried, level, number, output)
+    _run(passes, entry, size, half, matched, states, carried, level, number, output, is_known)
 
 
 def polish(
@@ -61,10 +66,12 @@ def polish(
     output: wgpu.GPUTexture,
 ) -> None:
     """Steps of every pixel on the finest level that improve its match."""
-    _run(passes, "polish", size, size, matched, states, [], 0, 0, output)
+    _run(passes, "polish", size, size, matched, states, [], 0, 0, output, False)
 
 
-def _run(passes, entry, size, grid, matched, states, carried, level, number, output) -> None:
+def _run(
+    passes, entry, size, grid, matched, states, carried, level, number, output, is_known
+) -> None:
     assert 2 * wgsl.load("flow/sweep.wgsl").constant("REFINED") <= SEEDS
     uniform = passes.uniform(
         "sweep.wgsl",
@@ -76,6 +83,7 @@ def _run(passes, entry, size, grid, matched, states, carried, level, number, out
         bend_step=BEND_STEP / 2**level,
         most_apart=MOST_APART if level else FINEST_APART,
         carried=len(carried),
+        is_known=is_known,
     )
     passes.run(
         "sweep.wgsl",
@@ -86,6 +94,7 @@ def _run(passes, entry, size, grid, matched, states, carried, level, number, out
         states=states,
         carried_near=carried[0] if carried else states,
         carried_far=carried[-1] if carried else states,
+        costs=passes.costs.at_least(4 * size[0] * size[1]),
         output=output,
         **matched,
     )

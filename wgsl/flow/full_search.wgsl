@@ -1,5 +1,6 @@
 // The first states, on the coarsest level: the best of all whole displacements within reach, for one pixel of each
-// block; the sweeps pass it on.
+// block; the sweeps pass it on. What accelerates has no displacement that fits both sides: there each side's own best
+// one makes a state with a bend.
 //#include common/loops.wgsl
 //#include flow/match.wgsl
 
@@ -12,8 +13,14 @@ struct Reach {
 }
 
 @group(1) @binding(5) var<uniform> reach: Reach;
-@group(1) @binding(6) var<storage, read_write> best: array<vec4f>;  // of each block: u, v, cost
+@group(1) @binding(6) var<storage, read_write> best: array<Best>;   // of each block
 @group(1) @binding(7) var output: StatesOut;
+
+struct Best {           // u, v, cost
+    both: vec4f,        // of the displacement that is best for both sides together
+    near: vec4f,        // that to the near frame which is best by itself
+    far: vec4f,         // that to the far frame
+}
 
 const COLUMNS: i32 = 9;             // lavapipe ends loops after 65,535 turns
 override BLOCK: i32 = 2;            // pixels along a block
@@ -21,6 +28,7 @@ const SEARCH_SIDE: i32 = 4;         // samples along a patch,
 const SEARCH_PATCH: i32 = 16;       // and in it
 const SEARCH_STRIDE: i32 = 2;       // from one to the next [px]
 const LENGTH_PRICE: f32 = 0.0001;   // per px of displacement: of equals, the shortest
+const PAIR_PRICE: f32 = 0.015;      // for two displacements in place of one, besides what the bend costs
 
 var<private> own0: array<vec4f, SEARCH_PATCH>;
 var<private> own1: array<vec4f, SEARCH_PATCH>;  // xyz; w: the sample's weight
@@ -61,32 +69,43 @@ fn whole_cost(other: texture_2d_array<f32>, at: vec2i, most: f32) -> f32 {
     return select(sum, OUTSIDE, is_outside);
 }
 
+fn cheaper(found: vec4f, by: vec2f, cost: f32) -> vec4f {
+    return select(found, vec4f(by, cost, 0.0), cost < found.z);
+}
+
 @compute @workgroup_size(WG_X, WG_Y)
 fn search(@builtin(global_invocation_id) id: vec3u) {
     let block = min(id.xy, reach.blocks - 1u);
     let px = min(BLOCK * vec2i(block), vec2i(frame.size) - 1);
     let index = block.y * reach.blocks.x + block.x;
     load_search_patch(px);
-    var found = vec3f(0.0, 0.0, 2.0 * OUTSIDE);
-    if reach.begins == 0u { found = best[index].xyz; }
+    let none = vec4f(0.0, 0.0, 2.0 * OUTSIDE, 0.0);
+    var found = Best(none, none, none);
+    if reach.begins == 0u { found = best[index]; }
     let turns = turns_of(u32(2 * reach.most + 1), id.x);
     for (var column = reach.first; column < reach.first + COLUMNS; column++) {
         for (var k = 0u; k < turns; k++) {
             let by = vec2i(column, i32(k) - reach.most);
             let length_price = LENGTH_PRICE * f32(abs(by.x) + abs(by.y));
-            let most = found.z - length_price;
-            let n = whole_cost(near, px + by, select(most, 2.0 * most, VIEWS == AROUND));
+            let most = found.both.z - length_price;
+            let near_most = max(select(most, 2.0 * most, VIEWS == AROUND), found.near.z - length_price);
+            let n = whole_cost(near, px + by, near_most);
             var cost = n;
+            var f = n;
             if VIEWS == AROUND {
                 let useful = min(most, n + HIDDEN_PRICE);
-                let f = whole_cost(far, px - by, max(2.0 * useful - n, useful - HIDDEN_PRICE));
+                let limit = max(2.0 * useful - n, useful - HIDDEN_PRICE);
+                f = whole_cost(far, px - by, max(limit, found.far.z - length_price));
                 cost = min(0.5 * (n + f), min(n, f) + HIDDEN_PRICE);
             }
-            cost += length_price;
-            if cost < found.z && abs(column) <= reach.most { found = vec3f(vec2f(by), cost); }
+            if abs(column) <= reach.most {
+                found.both = cheaper(found.both, vec2f(by), cost + length_price);
+                found.near = cheaper(found.near, vec2f(by), n + length_price);
+                found.far = cheaper(found.far, -vec2f(by), f + length_price);
+            }
         }
     }
-    if all(id.xy < reach.blocks) { best[index] = vec4f(found, 0.0); }
+    if all(id.xy < reach.blocks) { best[index] = found; }
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -94,6 +113,10 @@ fn write_states(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let block = id.xy / u32(BLOCK);
     let found = best[block.y * reach.blocks.x + block.x];
-    textureStore(output, id.xy, 0, vec4f(found.xy, 0.0, 0.0));
-    textureStore(output, id.xy, 1, vec4f(0.0));
+    var state = State(found.both.xy, vec2f(0.0), vec4f(0.0));
+    let pair = State(found.near.xy, found.far.xy - view.far_factor * found.near.xy, vec4f(0.0));
+    let pair_cost = 0.5 * (found.near.z + found.far.z) + price(pair) + PAIR_PRICE;
+    if VIEWS == AROUND && pair_cost < found.both.z { state = pair; }
+    textureStore(output, id.xy, 0, vec4f(state.flow, state.bend));
+    textureStore(output, id.xy, 1, state.slope);
 }

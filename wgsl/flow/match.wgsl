@@ -28,7 +28,8 @@ const BESIDE_CENTRE: f32 = 0.0009765625;    // [px]; hardware filters in steps o
 const OUTSIDE: f32 = 2.0;       // cost of leaving the picture: more than any other
 const HIDDEN_PRICE: f32 = 0.03; // for being hidden in one of the frames
 const SLOPE_PRICE: f32 = 0.02;  // per unit of slope
-const BEND_PRICE: f32 = 0.002;  // per px of bend
+const BEND_PRICE: f32 = 0.002;  // per px of bend,
+const MOST_BEND_PRICE: f32 = 0.01;  // which costs no more: less than being hidden
 
 var<private> centre: vec2f;             // of the patch, in pixels whose centres are whole numbers
 var<private> centre_color: vec3f;       // its display colour
@@ -118,7 +119,8 @@ fn far_cost(to: Target) -> f32 {
 
 /// What a state costs in itself.
 fn price(state: State) -> f32 {
-    return SLOPE_PRICE * dot(abs(state.slope), vec4f(1.0)) + BEND_PRICE * (abs(state.bend.x) + abs(state.bend.y));
+    let bend_price = min(BEND_PRICE * (abs(state.bend.x) + abs(state.bend.y)), MOST_BEND_PRICE);
+    return SLOPE_PRICE * dot(abs(state.slope), vec4f(1.0)) + bend_price;
 }
 
 /// A state as it leads to the far frame.
@@ -135,5 +137,10 @@ fn match_cost(state: State, most: f32) -> f32 {
     let limit = max(2.0 * useful - n, useful - HIDDEN_PRICE - view.far_price);
     let way = way_to_far(state);
     let f = far_cost(target_of(way.flow, way.slope, limit));
+    return cost_of(n, f);
+}
+
+/// Cost of matching the near frame by `n` and the far one by `f`.
+fn cost_of(n: f32, f: f32) -> f32 {
     return min(0.5 * (n + f), min(n, f + view.far_price) + HIDDEN_PRICE);
 }

@@ -12,14 +12,15 @@ struct Sweep {
     bend_step: f32,     // of the bend [px]
     most_apart: f32,    // differences from neighbours beyond this [px] cost no more
     carried: u32,       // how many of the carried states there are
-    unused: u32,
+    is_known: u32,      // 1 if `costs` tells what the states of this colour cost
 }
 
 @group(1) @binding(5) var<uniform> sweep: Sweep;
 @group(1) @binding(6) var states: texture_2d_array<f32>;
 @group(1) @binding(7) var carried_near: texture_2d_array<f32>;  // states of the near frame, carried into this one
 @group(1) @binding(8) var carried_far: texture_2d_array<f32>;   // the same of the far frame
-@group(1) @binding(9) var output: StatesOut;
+@group(1) @binding(9) var<storage, read_write> costs: array<f32>;   // of every pixel's state: its match
+@group(1) @binding(10) var output: StatesOut;
 
 const SMOOTHNESS: f32 = 0.08;       // cost of 1 px of difference from the neighbours
 const BEND_SHARE: f32 = 0.5;        // of a difference of bends, against one of flows
@@ -75,13 +76,16 @@ fn smoothness(state: State) -> f32 {
 struct Best {
     state: State,
     energy: f32,
+    cost: f32,          // of the match alone
 }
 
 fn begin(px: vec2i) -> Best {
     load_patch(px);
     load_neighbours(px);
     let state = load_state(states, px);
-    return Best(state, smoothness(state) + price(state) + match_cost(state, OUTSIDE));
+    var cost = costs[px.y * i32(frame.size.x) + px.x];
+    if sweep.is_known == 0u { cost = match_cost(state, OUTSIDE); }
+    return Best(state, smoothness(state) + price(state) + cost, cost);
 }
 
 /// The better one of two states.
@@ -93,8 +97,8 @@ fn attempt(best: Best, candidate: State) -> Best {
     let is_same = max(max(apart.x, apart.y), max(apart.z, apart.w)) < SAME
         && all(abs(state.slope - best.state.slope) < vec4f(SAME));
     let most = select(best.energy - least, -1.0, is_same);
-    let energy = least + match_cost(state, most);
-    if energy < best.energy && !is_same { return Best(state, energy); }
+    let cost = match_cost(state, most);
+    if least + cost < best.energy && !is_same { return Best(state, least + cost, cost); }
     return best;
 }
 
@@ -116,6 +120,12 @@ fn store(px: vec2i, state: State) {
         textureStore(output, px, 0, vec4f(state.flow, state.bend));
         textureStore(output, px, 1, state.slope);
     }
+}
+
+fn store_best(px: vec2i, best: Best) {
+    if is_inside(px) { costs[px.y * i32(frame.size.x) + px.x] = best.cost; }
+    store(px, best.state);
+    store(other_pixel(px), load_state(states, other_pixel(px)));
 }
 
 /// Three random numbers, -0.5 to 0.5.
@@ -151,8 +161,7 @@ fn propagate(@builtin(local_invocation_index) local: u32,
         }
         best = attempt(best, candidate);
     }
-    store(px, best.state);
-    store(other_pixel(px), load_state(states, other_pixel(px)));
+    store_best(px, best);
 }
 
 /// Variation `k` of a state.
@@ -206,6 +215,7 @@ struct Steps {
     far: vec2f,
     both: vec2f,        // to match both, with the same bend
     better: vec2f,      // that of the side that matches better
+    cost: f32,          // of the match as it is
 }
 
 /// Steps of inverse search (Baker and Matthews, "Lucas-Kanade 20 Years On", 2004): with this frame's gradients.
@@ -237,7 +247,10 @@ fn inverse_steps(state: State) -> Steps {
     let near_step = step_of(n.square, n.product);
     let far_step = step_of(f.square, f.product);
     let both = step_of(n.square + by * by * f.square, n.product + by * f.product);
-    return Steps(near_step, far_step, both, select(far_step / by, near_step, n.error <= f.error));
+    let near_cost = select(n.error, OUTSIDE, to_near.limit < 0.0);
+    let far_cost = select(f.error, OUTSIDE, to_far.limit < 0.0);
+    let cost = select(cost_of(near_cost, far_cost), near_cost, VIEWS == ONE);
+    return Steps(near_step, far_step, both, select(far_step / by, near_step, n.error <= f.error), cost);
 }
 
 /// Variation `k` by such a step.
@@ -263,8 +276,7 @@ fn refine(@builtin(local_invocation_index) local: u32,
     let steps = inverse_steps(best.state);
     let state = best.state;
     for (var k = 0u; k < STEPS; k++) { best = attempt(best, stepped(state, steps, k)); }
-    store(px, best.state);
-    store(other_pixel(px), load_state(states, other_pixel(px)));
+    store_best(px, best);
 }
 
 /// After the sweeps: every pixel takes the steps that improve its match, whatever its neighbours do. So all may move
@@ -276,13 +288,17 @@ fn polish(@builtin(local_invocation_index) local: u32,
     let inside = min(px, vec2i(frame.size) - 1);
     load_patch(inside);
     let own = load_state(states, inside);
-    var best = Best(own, price(own) + match_cost(own, OUTSIDE));
     let steps = inverse_steps(own);
+    var state = own;
+    var energy = price(own) + steps.cost;
     for (var k = 0u; k < STEPS; k++) {
         let candidate = stepped(own, steps, k);
         let least = price(candidate);
-        let energy = least + match_cost(candidate, best.energy - least);
-        if energy < best.energy { best = Best(candidate, energy); }
+        let changed = least + match_cost(candidate, energy - least);
+        if changed < energy {
+            energy = changed;
+            state = candidate;
+        }
     }
-    store(px, best.state);
+    store(px, state);
 }
