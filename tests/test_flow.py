@@ -308,9 +308,9 @@ def test_a_shift_that_grows_is_found():
 
 @pytest.mark.parametrize(("turn", "zoom"), [(0.06, 1.03), (np.radians(12), 1.0)])
 def test_a_turning_and_zooming_texture_is_followed(turn, zoom):
-    size = (56, 72)
+    size = (48, 120)
     x, y = grid(size)
-    x, y = x - 36, y - 28
+    x, y = x - 60, y - 24
 
     def seen(n):
         c, s, k = np.cos(turn * n), np.sin(turn * n), zoom**-n
@@ -321,8 +321,11 @@ def test_a_turning_and_zooming_texture_is_followed(turn, zoom):
         return np.stack([c * x - s * y - x, s * x + c * y - y], axis=2)
 
     motion, _ = Flow()(seen(-1), seen(0), seen(1))
-    error = np.abs(motion - np.concatenate([way(-1), way(1)], axis=2)).max(axis=2)[8:-8, 8:-8]
-    assert error.mean() < 0.2
+    want = np.concatenate([way(-1), way(1)], axis=2)
+    ends = np.abs(np.stack([x, y, x, y], axis=2) + want)
+    is_seen = (ends < [54, 18, 54, 18]).all(axis=2)
+    assert is_seen.mean() > 0.4
+    assert np.abs(motion - want)[is_seen].mean() < 0.1
 
 
 def test_what_is_hidden_on_one_side_follows_the_other():

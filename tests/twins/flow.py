@@ -222,7 +222,9 @@ def full_search(matcher, reach):
             n = np.array([side(matcher.near, x, y, u, v) for u, v in ways])
             f = np.array([side(matcher.far, x, y, -u, -v) for u, v in ways])
             both = np.minimum((n + f) / 2, np.minimum(n, f) + 0.03) + length
-            best = [np.array(ways[np.argmin(cost.round(7))]) for cost in (both, n + length, f + length)]
+            best = [
+                np.array(ways[np.argmin(cost.round(7))]) for cost in (both, n + length, f + length)
+            ]
             bend = best[1] - best[2]
             pair = np.array([*best[1], *bend, 0, 0, 0, 0])
             cost = (min(n + length) + min(f + length)) / 2 + matcher.price(pair) + 0.015

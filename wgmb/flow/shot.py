@@ -4,7 +4,8 @@ What a frame's stages are made of, so that the result is a function of its numbe
 
 searched(n, coarsest): pictures n - 1, n, n + 1;
 searched(n, level): mended(n, coarser), and searched(n - 1, coarser) and (n + 1, coarser), carried;
-mended(n, level): searched(n - 1, level), (n, level) and (n + 1, level).
+mended(n, level): searched(n - 1, level), (n, level) and (n + 1, level);
+motion(n): mended(n, 0), or searched(n, 0) where the finest level has no sweeps.
 
 With three levels, pictures n - 4 to n + 4 may have a say in the motion of frame n.
 """
@@ -53,7 +54,7 @@ class Effort:
         return self.between if level else self.finest
 
 
-EFFORTS = {"best": Effort(4, 2, 2, 2, block=2), "fast": Effort(3, 2, 0, 1, block=4)}
+EFFORTS = {"best": Effort(3, 2, 2, 2, block=2), "fast": Effort(3, 2, 0, 1, block=4)}
 KEPT = {"pictures": 4, "searched": 1, "mended": 0, "motion": 2}  # frames around the one asked for
 
 
@@ -189,7 +190,8 @@ class Shot:
             made = result(self._passes, self._sizes[0], alone, states)
             self._passes.give(states)
             return made
-        states = self._mended(number, 0)
+        is_swept = self._effort.sweeps(0, len(self._sizes)) > 0
+        states = (self._mended if is_swept else self._searched)(number, 0)
         states = self._polished(states, self._sizes[0], self._matched(views, 0))
         made = result(self._passes, self._sizes[0], views, states)
         self._passes.give(states)

@@ -89,13 +89,14 @@ fn search(@builtin(global_invocation_id) id: vec3u) {
             let length_price = LENGTH_PRICE * f32(abs(by.x) + abs(by.y));
             let most = found.both.z - length_price;
             let near_most = max(select(most, 2.0 * most, VIEWS == AROUND), found.near.z - length_price);
-            let n = whole_cost(near, px + by, near_most);
+            let n = whole_cost(near, px + by, select(-1.0, near_most, abs(column) <= reach.most));
             var cost = n;
             var f = n;
             if VIEWS == AROUND {
                 let useful = min(most, n + HIDDEN_PRICE);
                 let limit = max(2.0 * useful - n, useful - HIDDEN_PRICE);
-                f = whole_cost(far, px - by, max(limit, found.far.z - length_price));
+                let far_most = max(limit, found.far.z - length_price);
+                f = whole_cost(far, px - by, select(-1.0, far_most, abs(column) <= reach.most));
                 cost = min(0.5 * (n + f), min(n, f) + HIDDEN_PRICE);
             }
             if abs(column) <= reach.most {
