@@ -358,7 +358,7 @@ def test_a_file_that_was_cut_off_says_where(tmp_path, kind, muxing):
     tick = Fraction(1, 24)
     path = long(tmp_path, kind, muxing=muxing, tick=tick)
     whole = path.read_bytes()
-    assert Footage(path).lacks == 0
+    assert not any("cut off" in note for note in Footage(path).notes)
     path.write_bytes(whole[: len(whole) // 2])
     footage = Footage(path)
     got = [n for n, _ in footage]

@@ -14,6 +14,7 @@ from av.video.stream import VideoStream
 from ..errors import InputError
 from .frame_numbers import readable
 
+_BEGINNING = 1 << 20  # bytes
 _BOXES = (b"ftyp", b"mdat", b"wide", b"free", b"skip", b"pnot")  # that begin an MP4 or MOV
 
 
@@ -55,6 +56,9 @@ def _what_is_wrong(path: Path, error: Exception) -> str:
     text = getattr(error, "strerror", None) or str(error)
     if getattr(error, "errno", 0) and not isinstance(error, ValueError):
         return text.lower()
+    with open(path, "rb") as file:
+        if b"encv" in file.read(_BEGINNING):
+            return "is encrypted"
     return "is not a video, or its beginning is damaged"
 
 
@@ -73,7 +77,9 @@ def _lacks_index(path: Path) -> bool:
             first = False
             if length == 1:
                 length = int.from_bytes(head[8:16], "big")
-            if length < 8:
+            if length == 0:  # to the end of the file
                 return True
+            if length < 8:
+                return False
             at += length
     return not first

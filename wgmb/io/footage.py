@@ -19,8 +19,6 @@ from typing import cast
 import av
 import numpy as np
 from av.audio.stream import AudioStream
-from av.container import InputContainer
-from av.error import EOFError, FFmpegError
 from av.sidedata.sidedata import SideData, Type
 from av.stream import Stream
 from av.video.reformatter import VideoReformatter
@@ -31,11 +29,12 @@ from ..errors import InputError
 from . import limits
 from .color_tags import assumed, either, tags_of
 from .container import opened, picture_stream
+from .decoding import Decoder, decoded
 from .deinterlace import Fields
 from .encoders import Facts
 from .hdr10 import LightLevel, Mastering
 from .pixels import Layout, is_transparent, layout, planes_of
-from .timeline import Times, lacking, scanned
+from .timeline import Times, scanned
 from .turn import turn_of
 
 _OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
@@ -71,8 +70,8 @@ class Footage:
 
     def __init__(self, path: str | Path, *, max_mb: float = limits.MAX_MB):
         self.path = Path(path)
-        self.missing: list[int] = []
-        self.damaged: list[int] = []
+        self.missing: set[int] = set()
+        self.damaged: set[int] = set()
         self.notes: list[str] = []
         with opened(self.path) as container:
             stream = picture_stream(container, self.path)
@@ -88,13 +87,14 @@ class Footage:
             if stream.metadata.get("alpha_mode") == "1":
                 self.notes.append("its transparency (VP8 or VP9 alpha) is not read")
             self._packets = scanned(container, stream)
-            self.lacks = lacking(container, stream, self._packets)
         if not len(self._packets.times):
             raise InputError(f"{self.path}: {self._packets.problem or 'holds no pictures'}")
         self._look()
 
     def _check_size(self, stream: VideoStream, max_mb: float) -> None:
         width, height = stream.codec_context.width, stream.codec_context.height
+        if not (width and height):
+            raise InputError(f"{self.path}: does not tell the size of its pictures: is it cut off?")
         if not (0 < width <= limits.MOST_PIXELS_A_SIDE and 0 < height <= limits.MOST_PIXELS_A_SIDE):
             raise InputError(
                 f"{self.path}: pictures of {width} x {height}, expected 1 to "
@@ -108,7 +108,7 @@ class Footage:
         """Decode one picture: what it says of itself counts more than what the header says."""
         with opened(self.path) as container:
             stream = cast(VideoStream, container.streams[self.index])
-            frame = next(_decoded(container, stream), None)
+            frame = next(decoded(container, stream), None)
             if frame is None:
                 raise InputError(f"{self.path}: none of its pictures can be decoded ({self.codec})")
         self.pixels = frame.format.name
@@ -117,9 +117,8 @@ class Footage:
             raise InputError(f"{self.path}: pixels of kind {self.pixels} are not supported")
         self._layout: Layout = found
         self._frame_size = frame.width, frame.height
-        data = cast(Iterable[SideData], frame.side_data)
-        side = {one.type: bytes(one) for one in data}  # pyright: ignore[reportArgumentType]
-        self._turn = turn_of(side.get(Type.DISPLAYMATRIX))
+        side = _side_data(frame)
+        self._turn = turn_of(side.get(Type.DISPLAYMATRIX), frame.rotation)
         self.mastering = _read(Mastering, side.get(Type.MASTERING_DISPLAY_METADATA))
         self.light_level = _read(LightLevel, side.get(Type.CONTENT_LIGHT_LEVEL))
         tags = either(tags_of(frame), self._tagged)
@@ -127,11 +126,12 @@ class Footage:
         turned = coding.steps[::-1] if self._turn.swaps else coding.steps
         self.coding = replace(coding, steps=turned)
         self.is_interlaced = frame.interlaced_frame or self._field_order in _OF_FIELDS
-        if self._packets.has_times and frame.pts is not None:
+        if not self._packets.in_order and frame.pts is not None:
             first = int(np.searchsorted(self._packets.times.ticks, frame.pts))
             if 0 < first < len(self._packets.times):
                 self._packets = self._packets.from_picture(first)
                 self.notes.append(f"its first {first} pictures lack the one they build on")
+        self._decoder = Decoder(self.path, self.index, self._packets)
         self._timeline = self._packets.doubled() if self.is_interlaced else self._packets
         self._note(side)
 
@@ -143,7 +143,7 @@ class Footage:
                 f"interlaced: each of its {len(self._packets.times)} frames is taken as two "
                 f"pictures ({float(self.rate):g} a second)"
             )
-        if not self._packets.has_times:
+        if self._packets.is_assumed:
             self.notes.append(f"does not say when its pictures are shown: {float(self.rate):g} a "
                               "second assumed")  # fmt: skip
         if Type.DOVI_METADATA in side or Type.DOVI_RPU_BUFFER in side:
@@ -152,8 +152,8 @@ class Footage:
             self.notes.append("HDR10+ data is not kept")
         if self._turn.odd:
             self.notes.append("is turned by other than a multiple of 90 degrees, which is left out")
-        if self.lacks:
-            end, whole = float(self._packets.end), float(self._packets.end + self.lacks)
+        if self._packets.lacks:
+            end, whole = (float(self._packets.end + more) for more in (0, self._packets.lacks))
             self.notes.append(f"is cut off: it ends at {end:.2f} s of {whole:.2f} s")
         elif gaps := self._packets.gaps:
             at, longest = gaps[0], max(length for _, length in gaps)
@@ -218,13 +218,13 @@ class Footage:
         """What of the pictures asked for could not be read, in one line; '' if nothing."""
         said = []
         if self.missing:
-            at = float(self.times[self.missing[0]])
+            at = float(self.times[min(self.missing)])
             said.append(
                 f"{len(self.missing)} of {len(self.times)} pictures could not be decoded, "
                 f"the first at {at:.2f} s"
             )
         if self.damaged:
-            at = float(self.times[self.damaged[0]])
+            at = float(self.times[min(self.damaged)])
             said.append(f"{len(self.damaged)} pictures are damaged, the first at {at:.2f} s")
         return f"{self.path}: {'; '.join(said)}" if said else ""
 
@@ -247,17 +247,17 @@ class Footage:
         for number, frame in self._from(first):
             if number < expected:
                 continue
-            self.missing += range(expected, min(number, last + 1))
+            self.missing.update(range(expected, min(number, last + 1)))
             if number > last:
                 expected = number
                 break
             if frame.is_corrupt:
-                self.damaged.append(number)
+                self.damaged.add(number)
             expected = number + 1
             yield number, CodedPicture(self._upright(frame, by), self.coding)
             if number == last:
                 break
-        self.missing += range(expected, last + 1)
+        self.missing.update(range(expected, last + 1))
 
     def _upright(self, frame: av.VideoFrame, by: VideoReformatter) -> tuple[np.ndarray, ...]:
         if (frame.width, frame.height) != self._frame_size:
@@ -270,81 +270,22 @@ class Footage:
     def _from(self, first: int) -> Iterator[tuple[int, av.VideoFrame]]:
         """Frames with their numbers, in order, beginning at or before `first`."""
         if not self.is_interlaced:
-            yield from self._frames(first)
+            yield from self._decoder.frames(first)
             return
         before = max(first // 2 - 2, 0)  # what bwdif looks back on
         fields = Fields(self._frame_size, self.pixels, self._packets.times.base)
-        for number, frame in self._frames(before):
+        for number, frame in self._decoder.frames(before):
             if number >= before:
                 yield from fields.of(frame, number)
         yield from fields.of(None)
 
-    def _frames(self, first: int) -> Iterator[tuple[int, av.VideoFrame]]:
-        """Decoded frames, as they are, with the numbers of their packets."""
-        ticks, keys = self._packets.times.ticks, self._packets.keys
-        for key in [*self._keys_before(ticks[first], keys), None]:
-            with opened(self.path) as container:
-                stream = cast(VideoStream, container.streams[self.index])
-                stream.thread_type = "AUTO"
-                if key is not None:
-                    with contextlib.suppress(FFmpegError):
-                        container.seek(key, stream=stream)
-                frames = self._numbered(container, stream, key)
-                begin = next(frames, None)
-                if key is not None and (begin is None or begin[0] > first):
-                    continue  # it went too far: some formats are sought by guessing
-                if begin is not None:
-                    yield begin
-                    yield from frames
-                return
 
-    def _keys_before(self, tick: int, keys: np.ndarray) -> list[int]:
-        """Places to begin decoding for the picture at `tick`, if not at the beginning."""
-        if not self._packets.has_times:
-            return []
-        last = int(np.searchsorted(keys, tick, side="right")) - 1
-        return [int(keys[n]) for n in dict.fromkeys((last, last - 1, last - 4)) if n > 0]
-
-    def _numbered(
-        self, container: InputContainer, stream: VideoStream, key: int | None
-    ) -> Iterator[tuple[int, av.VideoFrame]]:
-        ticks, last = self._packets.times.ticks, -1
-        for frame in _decoded(container, stream, key):
-            number = last + 1
-            if self._packets.has_times and frame.pts is not None:
-                number = int(np.searchsorted(ticks, frame.pts))
-                if number == len(ticks) or ticks[number] != frame.pts:
-                    continue  # what edits leave out
-            if last < number < len(ticks):
-                last = number
-                yield number, frame
-
-
-def _decoded(
-    container: InputContainer, stream: VideoStream, key: int | None = None
-) -> Iterator[av.VideoFrame]:
-    """All frames that can be decoded; from the key frame at the tick `key` or one before on."""
-    waiting = key is not None
-    packets = container.demux(stream)
-    while True:
-        try:
-            packet = next(packets, None)
-        except FFmpegError:  # said by the Timeline
-            packet = None
-        if waiting and packet is not None:
-            if not packet.is_keyframe or packet.pts is None:
-                continue
-            if key is not None and packet.pts > key:
-                return
-            waiting = False
-        try:
-            yield from stream.decode(packet if packet is not None and packet.size else None)
-        except EOFError:
-            return
-        except FFmpegError:  # this packet's pictures will be missing
-            pass
-        if packet is None or not packet.size:
-            return
+def _side_data(frame: av.VideoFrame) -> dict[Type, bytes]:
+    """What is told beside a frame; nothing if PyAV does not know all its kinds."""
+    with contextlib.suppress(ValueError):
+        data = cast(Iterable[SideData], frame.side_data)
+        return {one.type: bytes(one) for one in data}  # pyright: ignore[reportArgumentType]
+    return {}
 
 
 def _read(kind: type, data: bytes | None):
@@ -355,9 +296,9 @@ def _read(kind: type, data: bytes | None):
 
 def _described(stream: Stream) -> OtherStream:
     context = stream.codec_context
-    codec = context.name if context is not None else (stream.name or "unknown")
+    codec = context.name if context is not None else "unknown"
     text = codec
-    if isinstance(stream, AudioStream):
+    if isinstance(stream, AudioStream) and context is not None:
         text += f", {stream.rate} Hz, {stream.layout.name}"
     meta = stream.metadata
     return OtherStream(

@@ -13,11 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from av.container import InputContainer
 from av.error import FFmpegError
+from av.packet import Packet
 from av.stream import Disposition
 from av.video.stream import VideoStream
 
@@ -34,7 +35,6 @@ _NEAR = 1e-3  # of a rate: it is taken for the known one
 _UNEVEN = 0.02  # of a step: more is a variable rate
 _SELDOM = 0.05  # of the steps: if more are uneven, the rate varies
 _FINEST = 1_001_000  # denominator of a rate
-_STATE_DURATION = ("matroska", "mov,", "flv")  # formats whose headers can be relied on
 
 
 class Times(Sequence[Fraction]):
@@ -68,12 +68,16 @@ class Timeline:
     times: Times
     keys: np.ndarray
     """Ticks at which pictures are shown that need no other."""
-    has_times: bool
-    """The file says when its pictures are shown; else they are counted at an even rate."""
+    in_order: bool
+    """Decoded pictures are to be counted: their own times are not those in `times`."""
+    is_assumed: bool
+    """The file does not say when its pictures are shown: the rate is a guess."""
     end: Fraction
     """When the last packet of any stream ends [s]."""
     problem: str
     """Why the pass ended before the file did, or ''."""
+    lacks: Fraction = Fraction(0)
+    """How much more the file should hold, by what its header states [s]."""
 
     @property
     def steps(self) -> np.ndarray:
@@ -84,8 +88,8 @@ class Timeline:
     def rate(self) -> Fraction:
         """Pictures a second, by the mean of the steps without gaps and hitches.
 
-        Where steps are uneven, the nearest known rate if it is within 0.1 %, or within what the
-        clock's rounding makes of a few steps.
+        The nearest known rate if it is within 0.1 %, or within what the clock's rounding makes of a
+        few steps.
         """
         steps = self.steps
         if not len(steps):
@@ -93,14 +97,13 @@ class Timeline:
         middle = np.median(steps)
         usual = steps[(steps > 0.5 * middle) & (steps < 1.5 * middle)]
         exact = Fraction(len(usual), int(usual.sum())) / self.times.base
-        if usual.min() < usual.max():
-            rounding = 0.5 / (float(middle) * len(usual) ** 0.5)
-            off = {known: abs(float(known / exact) - 1) for known in KNOWN_RATES}
-            nearest = min(off, key=lambda known: off[known])
-            if off[nearest] < _NEAR:
-                return nearest
-            if near := [known for known in off if off[known] < rounding]:
-                return min(near, key=lambda known: (known.denominator, off[known]))
+        rounding = 0.5 / (float(middle) * len(usual) ** 0.5) if usual.min() < usual.max() else 0
+        off = {known: abs(float(known / exact) - 1) for known in KNOWN_RATES}
+        nearest = min(off, key=lambda known: off[known])
+        if off[nearest] < _NEAR:
+            return nearest
+        if near := [known for known in off if off[known] < rounding]:
+            return min(near, key=lambda known: (known.denominator, off[known]))
         return exact.limit_denominator(_FINEST)
 
     @property
@@ -137,10 +140,10 @@ class Timeline:
 def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
     """Read all packets of a file; the Timeline of one of its streams."""
     base = stream.time_base or Fraction(1, 90000)
-    shown, decoded, keys, count = array("q"), array("q"), array("q"), 0
-    end, problem = Fraction(0), ""
+    found = _Packets(stream.codec_context.name)
     wanted = [s for s in container.streams if not s.disposition & Disposition.attached_pic]
     ends: dict[int, int] = {}
+    problem = ""
     try:
         for packet in container.demux(wanted):
             if not packet.size:
@@ -148,36 +151,78 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
             if packet.pts is not None:
                 last = packet.pts + (packet.duration or 0)
                 ends[packet.stream_index] = max(last, ends.get(packet.stream_index, last))
-            if packet.stream_index != stream.index or packet.is_discard:
-                continue
-            count += 1
-            if packet.pts is not None:
-                shown.append(packet.pts)
-                if packet.is_keyframe:
-                    keys.append(packet.pts)
-            if packet.dts is not None:
-                decoded.append(packet.dts)
+            if packet.stream_index == stream.index:
+                found.add(packet)
     except FFmpegError as error:
         problem = str(error.strerror or error)
-    for index, last in ends.items():
-        end = max(end, last * (container.streams[index].time_base or base))
-    has_times = len(shown) == count
-    if not has_times and len(decoded) == count:
-        shown = decoded
-    elif not has_times:
-        rate = stream.guessed_rate or stream.average_rate or Fraction(25)
-        base, shown = 1 / rate, array("q", range(count))
-    ticks = np.unique(np.frombuffer(shown, np.int64)) if count else np.zeros(0, np.int64)
-    found = np.unique(np.frombuffer(keys, np.int64)) if len(keys) else np.zeros(0, np.int64)
-    return Timeline(Times(ticks, base), found, has_times, end, problem)
+    end = max((n * (container.streams[i].time_base or base) for i, n in ends.items()), default=base)
+    in_order, is_assumed = False, False
+    shown = found.shown
+    if len(shown) < found.count:
+        in_order, shown = True, found.decoded
+    elif container.format.name == "avi" and stream.codec_context.has_b_frames:
+        in_order = True  # it has times of decoding only
+    if len(shown) < found.count:
+        is_assumed, shown = True, array("q", range(found.count))
+        base = 1 / (stream.guessed_rate or stream.average_rate or Fraction(25))
+    timeline = Timeline(
+        Times(_sorted(shown), base), _sorted(found.keys), in_order, is_assumed, end, problem
+    )
+    return replace(timeline, lacks=_lacking(container, stream, timeline, found.read))
 
 
-def lacking(container: InputContainer, stream: VideoStream, timeline: Timeline) -> Fraction:
-    """How much of a file its packets leave missing, by what its header states [s]."""
+class _Packets:
+    """What the packets of a stream of pictures say."""
+
+    def __init__(self, codec: str):
+        self.shown, self.decoded, self.keys = array("q"), array("q"), array("q")
+        self.count = self.read = 0  # of pictures that are shown, of packets
+        self._hides = _HIDES.get(codec)
+
+    def add(self, packet: Packet[Any]) -> None:
+        """Take note of a packet, unless an edit list leaves it out, or it shows nothing."""
+        self.read += 1
+        if packet.is_discard or (self._hides is not None and self._hides(memoryview(packet))):
+            return
+        self.count += 1
+        if packet.pts is not None:
+            self.shown.append(packet.pts)
+            if packet.is_keyframe:
+                self.keys.append(packet.pts)
+        if packet.dts is not None:
+            self.decoded.append(packet.dts)
+
+
+def _hides_vp8(data: memoryview) -> bool:
+    """Return True for a frame that only others build on (RFC 6386, section 9.1)."""
+    return not data[0] >> 4 & 1
+
+
+def _hides_vp9(data: memoryview) -> bool:
+    """Return True for such a frame (VP9 bitstream specification, 6.2), if it is alone."""
+    bits = data[0] << (1 if data[0] >> 4 & 3 == 3 else 0)  # profile 3 has one bit more
+    shows = bits >> 3 & 1 or bits >> 1 & 1
+    return not shows and data[-1] & 0xE0 != 0xC0  # the end of several frames in one packet
+
+
+_HIDES = {"vp8": _hides_vp8, "vp9": _hides_vp9}
+
+
+def _sorted(ticks: array[int]) -> np.ndarray:
+    return np.unique(np.frombuffer(ticks, np.int64)) if len(ticks) else np.zeros(0, np.int64)
+
+
+def _lacking(
+    container: InputContainer, stream: VideoStream, timeline: Timeline, read: int
+) -> Fraction:
+    """How much of a file its packets leave missing [s]."""
     name, stated = container.format.name, Fraction(0)
     if name == "avi":
         stated = stream.frames * (stream.time_base or Fraction(0))
-    elif name.startswith(_STATE_DURATION) and container.duration is not None:
+    elif container.duration is not None and (
+        name.startswith(("matroska", "flv"))
+        or (name.startswith("mov,") and stream.frames and len(stream.index_entries) > read)
+    ):
         stated = Fraction(container.duration, 1_000_000)
     missing = stated - timeline.end
     return missing if missing > 1 / timeline.rate + Fraction(1, 10) else Fraction(0)

@@ -36,13 +36,18 @@ class Turn:
         return 180 if self.flips[0] else 0
 
 
-def turn_of(data: bytes | None) -> Turn:
-    """The turn that a display matrix demands: x' = a x + c y, y' = b x + d y."""
+def turn_of(data: bytes | None, degrees: int = 0) -> Turn:
+    """The turn that a display matrix demands: x' = a x + c y, y' = b x + d y.
+
+    Without one, that by `degrees` counter-clockwise.
+    """
     if data is None:
-        return Turn()
+        found = {0: Turn(), 90: Turn(True, (True, False)), 270: Turn(True, (False, True)),
+                 180: Turn(False, (True, True))}  # fmt: skip
+        return found.get(degrees % 360, Turn(odd=True))
     a, b, _, c, d = (np.sign(v) if abs(v) > 0x8000 else 0 for v in _MATRIX.unpack_from(data)[:5])
     if a and d and not b and not c:
-        return Turn(False, (d < 0, a < 0))
+        return Turn(False, (bool(d < 0), bool(a < 0)))
     if b and c and not a and not d:
-        return Turn(True, (b < 0, c < 0))
+        return Turn(True, (bool(b < 0), bool(c < 0)))
     return Turn(odd=True)

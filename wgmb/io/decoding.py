@@ -1,0 +1,116 @@
+"""Decode the pictures of a video, from any of them on, each with its number."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import cast
+
+import av
+import numpy as np
+from av.container import InputContainer
+from av.error import EOFError, FFmpegError
+from av.video.stream import VideoStream
+
+from .container import opened
+from .timeline import Timeline
+
+
+class Decoder:
+    """Decodes one stream of a file, whose pictures are shown at the times of a Timeline."""
+
+    def __init__(self, path: Path, index: int, timeline: Timeline):
+        self._path, self._index, self._timeline = path, index, timeline
+        self._last = -1  # number of the frame that was yielded last
+
+    def frames(self, first: int) -> Iterator[tuple[int, av.VideoFrame]]:
+        """Frames and their numbers, which ascend, from one at or before `first` on.
+
+        Frames that cannot be decoded are left out. Several threads decode until there is an error,
+        because they lose more than what is damaged; then one does.
+        """
+        self._last = -1
+        try:
+            yield from self._begun(first, careful=False)
+        except _DamagedError:
+            yield from self._begun(max(self._last + 1, first), careful=True)
+
+    def _begun(self, first: int, careful: bool) -> Iterator[tuple[int, av.VideoFrame]]:
+        """Frames from the last key frame on that leads to `first`."""
+        if first >= len(self._timeline.times):
+            return
+        for key in [*self._keys_before(first), None]:
+            with opened(self._path) as container:
+                stream = cast(VideoStream, container.streams[self._index])
+                stream.thread_type = "SLICE" if careful else "AUTO"
+                if key is not None:
+                    with contextlib.suppress(FFmpegError):
+                        container.seek(key, stream=stream)
+                frames = self._numbered(decoded(container, stream, key, careful))
+                begin = next(frames, None)
+                if key is not None and (begin is None or begin[0] > first):
+                    continue  # it went too far: some formats are sought by guessing
+                if begin is not None:
+                    yield begin
+                    yield from frames
+                return
+
+    def _keys_before(self, first: int) -> list[int]:
+        """Ticks at which to begin decoding, the nearest first, if not at the beginning."""
+        if self._timeline.in_order:
+            return []
+        tick = self._timeline.times.ticks[first]
+        last = int(np.searchsorted(self._timeline.keys, tick, side="right")) - 1
+        return [int(self._timeline.keys[n]) for n in (last, last - 1, last - 4) if n > 0]
+
+    def _numbered(self, frames: Iterator[av.VideoFrame]) -> Iterator[tuple[int, av.VideoFrame]]:
+        ticks, before = self._timeline.times.ticks, -1
+        for frame in frames:
+            number = before + 1
+            if not self._timeline.in_order and frame.pts is not None:
+                number = int(np.searchsorted(ticks, frame.pts))
+                if number == len(ticks) or ticks[number] != frame.pts:
+                    continue  # what edits leave out
+            if before < number < len(ticks):
+                before = number
+                if number > self._last:
+                    self._last = number
+                    yield number, frame
+
+
+def decoded(
+    container: InputContainer, stream: VideoStream, key: int | None = None, careful: bool = True
+) -> Iterator[av.VideoFrame]:
+    """All frames that can be decoded; from the key frame at the tick `key` or one before on.
+
+    Not `careful`: _DamagedError where one cannot be.
+    """
+    waiting = key is not None
+    packets = container.demux(stream)
+    while True:
+        try:
+            packet = next(packets, None)
+        except FFmpegError:  # said by the Timeline
+            packet = None
+        if waiting and packet is not None:
+            if not packet.is_keyframe or packet.pts is None:
+                continue
+            if key is not None and packet.pts > key:
+                return
+            waiting = False
+        try:
+            yield from stream.decode(packet if packet is not None and packet.size else None)
+        except EOFError:
+            return
+        except FFmpegError:
+            if not careful:
+                raise _DamagedError from None
+        if packet is None or not packet.size:
+            return
+
+
+class _DamagedError(Exception):
+    """A frame could not be decoded."""
