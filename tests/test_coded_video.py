@@ -257,6 +257,15 @@ def test_times_that_do_not_ascend_are_refused(tmp_path):
         write(tmp_path / "v.mp4", Coding(), times=[0, 1, 1, 2, 3], base=Fraction(1, 24))
 
 
+def test_a_video_without_pictures_is_none(tmp_path):
+    encoding = chosen("v.mp4")
+    video = CodedVideo(tmp_path / "v.mp4", tmp_path / "part", encoding, Coding(), (64, 48), RATE,
+                       1 / RATE)  # fmt: skip
+    with pytest.raises(InputError, match="no pictures to write"):
+        video.close()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_picture_of_another_kind_is_refused(tmp_path):
     made = [*pictures(Coding(), 2), *pictures(Coding(), 1, (32, 32))]
     with pytest.raises(InputError, match=r"picture of \(32, 32\)"):

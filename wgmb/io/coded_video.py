@@ -44,7 +44,8 @@ class CodedVideo:
     ):
         self.path, self._coding, self._base = path, coding, base
         self._others = others
-        self._size, self._last = size, -1
+        self._size = size
+        self._last: int | None = None  # tick of the picture before
         self.padding = padded(size, encoding, coding)
         whole = size[0] + self.padding[0], size[1] + self.padding[1]
         self._planar, self._pixels = pixel_format(coding), encoding.pixels(coding)
@@ -52,8 +53,12 @@ class CodedVideo:
         texts = (metadata or {}) | (others.metadata if others else {})
         self.left_out = encoding.left_out(facts)
         self.file = VideoFile(path, temporary, encoding, coding, whole, rate, base, facts, texts)
-        if others is not None:
-            self.left_out += others.attach(self.file.container)
+        try:
+            if others is not None:
+                self.left_out += others.attach(self.file.container)
+        except BaseException:
+            self.abandon()
+            raise
 
     def add(self, picture: CodedPicture, time: Fraction) -> None:
         """Append a picture that is shown at `time` [s], later than the one before."""
@@ -63,7 +68,7 @@ class CodedVideo:
                 f"{self._size} as {self._coding}"
             )
         now = round(time / self._base)
-        if self._last >= 0 and now <= self._last:
+        if self._last is not None and now <= self._last:
             raise InputError(f"{self.path}: pictures at times that do not ascend ({float(time)} s)")
         self._last = now
         frame = frame_of(self._filled(picture.planes), self._planar)
@@ -84,7 +89,10 @@ class CodedVideo:
         )
 
     def close(self) -> None:
-        """Complete the file and put it in place."""
+        """Complete the file and put it in place; InputError if it has no pictures."""
+        if self._last is None:
+            self.abandon()
+            raise InputError(f"output {self.path}: no pictures to write")
         self.file.finish()
         if self._others is not None:
             self.file.mux(self._others.rest())

@@ -101,6 +101,8 @@ class OtherStreams:
             return "only one stream of pictures is written"
         if stream.type == "data" and stream.codec_context is None:
             return "data of a kind that is not known"
+        if stream.type in ("audio", "subtitle") and stream.codec_context is None:
+            return "its codec is not known"
         return ""
 
     def _add(self, stream: Stream, to: OutputContainer) -> str:
