@@ -23,7 +23,7 @@ from . import terminal
 from .exit_codes import DONE, INTERRUPTED, NO_DEVICE, SOME_FAILED, USAGE
 
 COMMANDS = {
-    "blur": "Blur rendered frames, or a video.",
+    "blur": "Blur rendered frames, or videos.",
     "render": "Render a built-in scene with motion blur.",
     "view": "View a scene or frames interactively.",
     "info": "Describe a frame: layers, sizes, motion vector convention, speeds.",

@@ -36,10 +36,11 @@ from .options import (
 )
 from .spelling import as_options
 from .terminal import complain, note, progress
+from .video_names import is_batch
 
 
 def blur(
-    pattern: str,
+    patterns: Annotated[tuple[str, ...], Parameter(name="pattern")],
     output: Target,
     look: Look = BlurOptions(),
     when: When = ShutterOptions(),
@@ -53,16 +54,19 @@ def blur(
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
-    """Blur rendered frames, or a video.
+    """Blur rendered frames, or videos.
 
     Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180 --frames 1-100
 
     Example: wgmb blur in.mp4 -o out.mp4 --shutter 180 --fps 60
 
+    Example: wgmb blur a.mp4 b.mkv -o out/ --fps 60
+
     Parameters
     ----------
-    pattern
-        Frames to blur: shot.####.exr, shot.%04d.exr, or one file; or a video.
+    patterns
+        Frames to blur: shot.####.exr, shot.%04d.exr, or one file. Or videos: files, folders, or
+        patterns such as 'clips/*.mp4'; for several, the output is a folder, or a name with {name}.
     confidence
         Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config
@@ -74,13 +78,17 @@ def blur(
     quiet
         Print errors only.
     """
-    when = when.resolved()
-    if is_video(pattern):
+    when, pattern = when.resolved(), patterns[0]
+    if is_batch(patterns, output.output) or is_video(pattern):
         from .blur_video import blur_video
+        from .blur_videos import blur_videos
 
         if confidence:
             raise InputError("--confidence is for rendered frames")
-        return blur_video(pattern, output, look, when, given, video, adapter, quiet, verbose)
+        settings = look, when, given, video, adapter, quiet, verbose
+        if is_batch(patterns, output.output):
+            return blur_videos(patterns, output, *settings)
+        return blur_video(pattern, output, *settings)
     shown = color.open(needed=not output.is_exr)
     space = color.space(shown)
     clip = given.open(pattern, look.holdout, look.scale, space)

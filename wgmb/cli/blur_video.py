@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,8 @@ from ..io.other_streams import OtherStreams
 from ..io.output import refuse_inputs
 from ..io.overlay import overlay_of
 from ..io.segments import Segment, Segments
+from ..pipeline import Blur
+from ..reel import MotionSource
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
 from ..video_batch import FootageBlur, FramesSink, Moment, Sink, VideoSink, blur_footage, moments
 from ..video_settings import VideoSettings
@@ -38,6 +40,44 @@ from .terminal import note, progress
 FIRST = 1  # number of the first frame, where they are image files
 _RECORD = "comment", "description", "synopsis"  # texts of a video; the first that is free
 STATIC = "static"  # as a holdout: what never changes while all around it does
+
+
+Tell = Callable[..., None]
+"""What `terminal.progress` gives."""
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What all videos of a run have in common."""
+
+    look: BlurSettings
+    when: ShutterSettings
+    given: InputSettings
+    video: VideoSettings
+    blur: Blur
+    motion: MotionSource | None
+    how: str
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What a result depends on, as it is written into a video."""
+        found = {"wgmb": __version__} | plain(self.look) | plain(self.when) | plain(self.video)
+        return found | {"curve": self.when.curve_read()}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One video and the output frames that are wanted of it."""
+
+    footage: Footage
+    output: OutputSettings
+    clock: Clock
+    wanted: list[Moment]
+
+    @property
+    def name(self) -> str:
+        """The output's name."""
+        return self.output.output
 
 
 def blur_video(
@@ -52,58 +92,83 @@ def blur_video(
     verbose: bool,
 ) -> int:
     """Blur a video; returns the exit code."""
+    wish = make_wish(look, when, given, video, adapter)
+    plan = planned(path, output, wish)
+    tell_how(wish, quiet, verbose)
+    if not quiet:
+        for text in plan.footage.notes:
+            note(f"{path}: {text}")
+    started = time.perf_counter()
+    with progress(len(plan.wanted), quiet) as tell:
+        run, left_out = blurred(plan, wish, tell)
+    if not quiet:
+        for text in left_out:
+            note(f"{plan.name}: {text}")
+    if not quiet and (reel := run.reel) is not None:
+        took = f"{time.perf_counter() - started:.1f} s with {wish.blur.method.name}"
+        if reel.cuts:
+            note(f"camera cut before picture {', '.join(map(str, sorted(reel.cuts)))}")
+        if reel.doubles:
+            note(f"{len(reel.doubles)} repeated pictures left out")
+        note(f"{len(plan.wanted)} frames in {took} -> {plan.name}")
+    if loss := plan.footage.loss():
+        note(f"wgmb: {loss}")
+        return SOME_FAILED
+    return DONE
+
+
+def make_wish(
+    look: BlurSettings,
+    when: ShutterSettings,
+    given: InputSettings,
+    video: VideoSettings,
+    adapter: str | None,
+) -> Wish:
+    """The settings of a run, with what is opened once for all its videos."""
     _check_fits(given, look)
-    footage = Footage(path, max_mb=given.max_mb)
     method = look.method or ("gather" if video.flow in ("auto", "search") else "tap")
     look = replace(look, method=method)
     blur = look.make(when.make(), adapter)
-    motion, how = video.source(blur.device)
-    clock = _clock(footage, given, video)
+    return Wish(look, when, given, video, blur, *video.source(blur.device))
+
+
+def tell_how(wish: Wish, quiet: bool, verbose: bool) -> None:
+    """Say where motion comes from, and, if asked, the settings."""
+    if verbose:
+        note(f"adapter: {wish.blur.device.adapter.summary}")
+        note(f"settings: {json.dumps(wish.settings, sort_keys=True)}")
+    if not quiet:
+        note(f"motion: {wish.how}")
+
+
+def planned(path: str | Path, output: OutputSettings, wish: Wish) -> Plan:
+    """Open a video; InputError if it cannot be read or has no pictures in the range."""
+    footage = Footage(path, max_mb=wish.given.max_mb)
+    clock = _clock(footage, wish.given, wish.video)
     fps = None if output.fps == "source" else output.rate_or(footage.rate)
-    wanted = moments(footage, clock, fps)
-    shutter = blur.shutter
-    cuts = CutList(given.cuts or "")
+    return Plan(footage, output, clock, moments(footage, clock, fps))
+
+
+def blurred(plan: Plan, wish: Wish, tell: Tell) -> tuple[FootageBlur, list[str]]:
+    """Blur a video into its output; returns the run and what the output cannot hold, in lines."""
+    footage, video, shutter = plan.footage, wish.video, wish.when.make()
+    cuts = CutList(wish.given.cuts or "")
     run = FootageBlur(
         footage,
-        blur,
-        motion,
-        clock=clock,
-        holdout=_holdout(look.holdout, footage),
+        wish.blur,
+        wish.motion,
+        clock=plan.clock,
+        holdout=_holdout(wish.look.holdout, footage),
         fill=video.duplicates == "fill",
         cuts=cuts.is_search,
         known_cuts=cuts.frames(0),
     )
-    settings = {"wgmb": __version__} | plain(look) | plain(when) | plain(video)
-    settings["curve"] = when.curve_read()
-    if verbose:
-        note(f"adapter: {blur.device.adapter.summary}")
-        note(f"settings: {json.dumps(settings, sort_keys=True)}")
-    if not quiet:
-        note(f"motion: {how}")
-        for text in footage.notes:
-            note(f"{path}: {text}")
-    started = time.perf_counter()
-    write = _write_video if Path(output.output).suffix.lower() in SUFFIXES else _write_frames
-    with progress(len(wanted), quiet) as tell:
 
-        def blur_part(moments: Sequence[Moment], sink: Sink) -> None:
-            blur_footage(run, shutter, moments, sink, tell)
+    def blur_part(moments: Sequence[Moment], sink: Sink) -> None:
+        blur_footage(run, shutter, moments, sink, tell)
 
-        left_out = write(run, output, video, wanted, settings, blur_part)
-    if not quiet:
-        for text in left_out:
-            note(f"{output.output}: {text}")
-    if not quiet and run.reel is not None:
-        took = f"{time.perf_counter() - started:.1f} s with {blur.method.name}"
-        if run.reel.cuts:
-            note(f"camera cut before picture {', '.join(map(str, sorted(run.reel.cuts)))}")
-        if run.reel.doubles:
-            note(f"{len(run.reel.doubles)} repeated pictures left out")
-        note(f"{len(wanted)} frames in {took} -> {output.output}")
-    if loss := footage.loss():
-        note(f"wgmb: {loss}")
-        return SOME_FAILED
-    return DONE
+    write = _write_video if Path(plan.name).suffix.lower() in SUFFIXES else _write_frames
+    return run, write(run, plan.output, video, plan.wanted, wish.settings, blur_part)
 
 
 def _check_fits(given: InputSettings, look: BlurSettings) -> None:

@@ -112,7 +112,10 @@ def drop_streams() -> None:
 
 @contextlib.contextmanager
 def progress(frames: int, quiet: bool, doing: str = "blurring"):
-    """Yield a function to call after every frame; on a terminal it drives a progress bar."""
+    """Yield a function to call after every frame; on a terminal it drives a progress bar.
+
+    It takes the frame's number, "done", "skipped" or "failed", and what stands before the number.
+    """
     say = Console(stderr=True, highlight=False, soft_wrap=True)
     if quiet or not say.is_terminal:
         yield check
@@ -128,12 +131,12 @@ def progress(frames: int, quiet: bool, doing: str = "blurring"):
         task = bar.add_task(doing, total=frames, speed="")
         started, made = time.perf_counter(), [0]
 
-        def tick(number: int, what: str) -> None:
+        def tick(number: int, what: str, name: str = "frame") -> None:
             check()
             made[0] += what == "done"
             speed = made[0] / (time.perf_counter() - started)
             bar.update(
-                task, advance=1, description=f"frame {number}", speed=f"{speed:.1f} frames/s"
+                task, advance=1, description=f"{name} {number}", speed=f"{speed:.1f} frames/s"
             )
 
         yield tick
