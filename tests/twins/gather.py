@@ -20,7 +20,6 @@ class Layers:
     coverage: np.ndarray
     inferred: np.ndarray  # the back layer was not seen
     edgeless: np.ndarray  # no edge in the 3 x 3
-    smooth: np.ndarray  # none, and nothing brighter than white, in the 3 x 3
 
 
 @dataclass
@@ -78,8 +77,9 @@ def separate(offset, color, motion, depth):
         for x in range(width):
             near = list(around(height, width, y, x, 1))
             depths = [z[p] for p in near]
-            apart = max(np.sum((motion[p] - motion[y, x]) ** 2) for p in near)
-            edges[y, x] = max(depths) > 1.05**2 * min(depths) and apart > 0.25
+            apart = np.sqrt(max(np.sum((motion[p] - motion[y, x]) ** 2) for p in near))
+            beyond = (1.05**2 - 1) * min(1, max(0.1, 4 / max(apart, 1e-6)))
+            edges[y, x] = apart > 0.5 and max(depths) > (1 + beyond) * min(depths)
     found = [color.copy(), motion.copy(), z.copy(), np.ones((height, width))]
     back = [np.zeros_like(color), motion.copy(), np.zeros((height, width))]
     inferred = np.zeros((height, width), bool)
@@ -88,16 +88,13 @@ def separate(offset, color, motion, depth):
         if separated:
             for array, value in zip([*found, *back, inferred], separated, strict=True):
                 array[y, x] = value
-    edgeless, smooth = np.ones((2, height, width), bool)
+    edgeless = np.ones((height, width), bool)
     for y in range(height):
         for x in range(width):
             edgeless[y, x] = not any(edges[p] for p in around(height, width, y, x, 1))
-            smooth[y, x] = not any(
-                edges[p] or (np.abs(color[p]) > 1).any() for p in around(height, width, y, x, 1)
-            )
     paths = [trajectories(found[1]), trajectories(back[1])]
     depths = [found[2], back[2]]
-    return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred, edgeless, smooth)
+    return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred, edgeless)
 
 
 def trajectories(motion):
@@ -258,9 +255,9 @@ def instant(layers, tiles, x, y, t, color):
     """What is seen at the pixel at time `t`: edge, the edge behind it, what is opaque."""
     opaque, front_edge, back_edge = resolve_visibility(layers, tiles, x, y, t)
     shown = []
-    if front_edge.depth < opaque.depth / 1.05:
+    if is_before(front_edge, opaque):
         shown.append(front_edge)
-        if is_behind(back_edge, front_edge) and back_edge.depth < opaque.depth / 1.05:
+        if is_behind(back_edge, front_edge) and is_before(back_edge, opaque):
             shown.append(back_edge)
     if np.isfinite(opaque.depth):
         shown.append(opaque)
@@ -324,7 +321,7 @@ def resolve_visibility(layers, tiles, x, y, t):
 def iterate_fixed_point(paths, centre, seed, u, first):
     """Fixed point of d = displacement(centre - d): d, the last step, pixel; None: from 0."""
     height, width = paths.shape[:2]
-    d, steps = (np.zeros(2), 5) if seed is None else (seed, 3)
+    d, steps = (np.zeros(2), 9) if seed is None else (seed, 7)
     residual, pixel = np.inf, None
     if first is not None and (np.abs(d - first[0]) < 0.75).all():
         return d, residual, pixel
@@ -361,10 +358,16 @@ def is_behind(new, old):
     return new.depth >= old.depth * 1.05 * (1.0 if new.frame == old.frame else 1.1)
 
 
+def is_before(edge, opaque):
+    """Whether an edge is of another surface, before what is opaque."""
+    apart = np.hypot(*np.subtract(edge.at, opaque.at)) > 2 and edge.frame == opaque.frame
+    return edge.depth < opaque.depth / (1.0 if apart else 1.05)
+
+
 def fetch(frame, s):
     """Colour and coverage of a sample, from the texels of its own surface."""
     if not s.back and frame.edgeless[s.pixel]:
-        if frame.smooth[s.pixel] and frame.offset == 0:
+        if frame.offset == 0:
             return cubic(frame.color[0], *s.at), 1.0
         return bilinear(frame.color[0], *s.at), 1.0
     height, width = frame.edgeless.shape
@@ -387,11 +390,16 @@ def fetch(frame, s):
 
 
 def cubic(image, x, y):
-    """Catmull-Rom: the line between texels, bent by the second differences of the nearest one."""
+    """Catmull-Rom: the line between texels, bent by the second differences of the nearest one.
+
+    Never less than half of the line.
+    """
     height, width = image.shape[:2]
     i, j = int(np.clip(x, 0, width - 1)), int(np.clip(y, 0, height - 1))
     left, right = image[j, max(i - 1, 0)], image[j, min(i + 1, width - 1)]
     above, below = image[max(j - 1, 0), i], image[min(j + 1, height - 1), i]
     across, down = (left - 2 * image[j, i] + right), (above - 2 * image[j, i] + below)
     f, g = (x - 0.5) % 1, (y - 0.5) % 1
-    return bilinear(image, x, y) - (f * (1 - f) * across + g * (1 - g) * down) / 2
+    line = bilinear(image, x, y)
+    bent = line - (f * (1 - f) * across + g * (1 - g) * down) / 2
+    return np.maximum(bent, line - np.abs(line) / 2)

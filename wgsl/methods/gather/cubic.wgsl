@@ -25,5 +25,9 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let across = select(vec4f(0.0), color_at(px - vec2i(1, 0)) - twice + color_at(px + vec2i(1, 0)), wanted);
     let down = select(vec4f(0.0), color_at(px - vec2i(0, 1)) - twice + color_at(px + vec2i(0, 1)), wanted);
     textureStore(second_differences, px, vec4u(
-        pack2x16float(across.xy), pack2x16float(across.zw), pack2x16float(down.xy), pack2x16float(down.zw)));
+        pack_halves(across.xy), pack_halves(across.zw), pack_halves(down.xy), pack_halves(down.zw)));
+}
+
+fn pack_halves(v: vec2f) -> u32 {
+    return pack2x16float(clamp(v, vec2f(-HALF_MAX), vec2f(HALF_MAX)));
 }

@@ -34,13 +34,13 @@ override WEIGHTED: bool = false;    // read `weight`
 const FRONT: u32 = 0u;          // layers of an array
 const BACK: u32 = 1u;
 
-// Flags in the last two bits of a depth.
-const FLAGS: u32 = 3u;
-const EDGE: u32 = 1u;           // the pixel may show two surfaces
-const HDR: u32 = 2u;            // some channel is beyond WHITE
+const EDGE: u32 = 1u;           // flag in the last bit of a depth: the pixel may show two surfaces
 
 const EDGE_MOTION: f32 = 0.5;   // difference of the motions of different surfaces [px]
-const WHITE: f32 = 1.0;
+// From this difference on [px], motions tell surfaces apart as well: the depth ratio that is asked for shrinks with it,
+// down to LEAST_SHARE of its difference from 1, which is above what half floats round.
+const APART_MOTION: f32 = 4.0;
+const LEAST_SHARE: f32 = 0.1;
 const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and below 1 less it for 0
 const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
 
@@ -66,7 +66,7 @@ fn is_edge(flags: u32) -> bool {
 
 /// The depth that is packed with flags.
 fn flagged_depth(flags: u32) -> f32 {
-    return bitcast<f32>(flags & ~FLAGS);
+    return bitcast<f32>(flags & ~EDGE);
 }
 
 fn weight_at(px: vec2i) -> f32 {
@@ -74,7 +74,8 @@ fn weight_at(px: vec2i) -> f32 {
     return textureLoad(weight, clamped(px), 0).x;
 }
 
-/// First pass: a pixel is at an edge if depths differ in its 3 x 3, and motions from its own too.
+/// First pass: a pixel is at an edge if depths differ in its 3 x 3, and motions from its own too. The more motions differ,
+/// the less depths have to: what moves so differently is no smooth surface.
 @compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
 fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let k = worklist_index(group);
@@ -89,16 +90,16 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
     }
     let own = textureLoad(motion, px, 0);
     var difference2 = 0.0;
-    // The 3 x 3 is two pixels from side to side.
-    let differs = farthest > nearest * (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO);
-    let count = select(0, 9, differs);
+    let beyond = farthest - nearest;
+    let apart = nearest * (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO - 1.0);   // the 3 x 3 is two pixels from side to side
+    let count = select(0, 9, beyond > LEAST_SHARE * apart);
     for (var i = 0; i < count; i++) {
         let difference = textureLoad(motion, clamped(px + vec2i(i % 3, i / 3) - 1), 0) - own;
         difference2 = max(difference2, dot(difference, difference));
     }
-    let is_hdr = any(abs(textureLoad(color, px, 0)) > vec4f(WHITE));
-    let flags = select(0u, EDGE, difference2 > EDGE_MOTION * EDGE_MOTION) | select(0u, HDR, is_hdr);
-    textureStore(edge_flags_out, px, vec4u((bitcast<u32>(depth_at(px)) & ~FLAGS) | flags));
+    let share = clamp(APART_MOTION * inverseSqrt(max(difference2, 1e-12)), LEAST_SHARE, 1.0);
+    let is_there = difference2 > EDGE_MOTION * EDGE_MOTION && beyond > share * apart;
+    textureStore(edge_flags_out, px, vec4u((bitcast<u32>(depth_at(px)) & ~EDGE) | select(0u, EDGE, is_there)));
 }
 
 /// Second pass: every pixel as one layer, and the list of edge pixels, which `separate_layers` corrects.
@@ -109,12 +110,12 @@ fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(work
     if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
     let counts = weight_at(px);
     var near_edge = false;
-    var smooth_here = true;     // one surface of one weight, nothing beyond white, in the 3 x 3
+    var smooth_here = true;     // one surface of one weight in the 3 x 3
     let here = flags_at(px);
     for (var i = 0; i < 9; i++) {
         let at = px + vec2i(i % 3, i / 3) - 1;
         let flags = flags_at(at);
-        smooth_here = smooth_here && (flags & FLAGS) == 0u && weight_at(at) == counts;
+        smooth_here = smooth_here && !is_edge(flags) && weight_at(at) == counts;
         near_edge = near_edge || is_edge(flags);
     }
     let trajectory = trajectory_from(textureLoad(motion, px, 0));

@@ -26,6 +26,8 @@ const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds th
 const ITERATIONS_SAVED: u32 = 2u;       // from a tile's motion, compared with a start from nothing
 const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
 
+const ELSEWHERE: f32 = 2.0;             // samples of one frame farther apart than this [px] are of different surfaces
+
 struct Sample {
     depth: f32,         // biased, for comparisons
     true_depth: f32,
@@ -300,6 +302,13 @@ fn is_behind(b: Sample, a: Sample) -> bool {
     return b.depth >= a.depth * SURFACE_DEPTH_RATIO * select(NEIGHBOUR_DEPTH_BIAS, 1.0, a.layer == b.layer);
 }
 
+/// Whether the edge `a` is of another surface, before that of `b`: clearly nearer; or just nearer, if it is elsewhere in the
+/// same frame.
+fn is_before(a: Sample, b: Sample) -> bool {
+    let is_elsewhere = a.layer / 2u == b.layer / 2u && distance(a.at, b.at) > ELSEWHERE;
+    return a.depth < b.depth / select(SURFACE_DEPTH_RATIO, 1.0, is_elsewhere);
+}
+
 // ---- compositing ----------------------------------------------------------------------------
 
 struct Composite {
@@ -320,9 +329,8 @@ fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
 
 /// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then what is opaque.
 fn composite_front_to_back(visible: Visible) -> Composite {
-    let opaque_depth = visible.opaque.depth / SURFACE_DEPTH_RATIO;
-    let front_edge = visible.front_edge.depth < opaque_depth;
-    let back_edge = front_edge && visible.back_edge.depth < opaque_depth
+    let front_edge = is_before(visible.front_edge, visible.opaque);
+    let back_edge = front_edge && is_before(visible.back_edge, visible.opaque)
         && is_behind(visible.back_edge, visible.front_edge);
     let opaque = visible.opaque.depth < INFINITE;
     let at = visible.opaque.at;
@@ -389,13 +397,14 @@ fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32) {
 }
 
 /// Catmull-Rom interpolation where the frame's own texel is smooth, bilinear elsewhere. Between two texels the cubic
-/// differs from the line by their second differences; those of the nearest texel stand for both.
+/// differs from the line by their second differences; those of the nearest texel stand for both. It is never less than half
+/// of the line: beside a lamp it would swing far below 0.
 fn resampled(at: vec2f, layer: u32, is_own: bool) -> vec4f {
     let f = fract(at - 0.5);
     let differences = textureLoad(second_differences, nearest_pixel(at), 0);
     let across = vec4f(unpack2x16float(differences.x), unpack2x16float(differences.y));
     let down = vec4f(unpack2x16float(differences.z), unpack2x16float(differences.w));
     let share = select(vec2f(0.0), 0.5 * f * (1.0 - f), is_own);
-    return textureSampleLevel(layer_colors, linear, at / vec2f(frame.size), layer, 0.0)
-        - share.x * across - share.y * down;
+    let line = textureSampleLevel(layer_colors, linear, at / vec2f(frame.size), layer, 0.0);
+    return max(line - share.x * across - share.y * down, line - 0.5 * abs(line));
 }

@@ -18,7 +18,7 @@ struct SourceFrames {
 @group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // see pack_surface(), texture_layer()
 @group(1) @binding(2) var tile_candidates: texture_2d_array<f32>;   // CANDIDATE_LAYERS per frame
 
-const MAX_ITERATIONS: u32 = 4u; // from the pixel's own trajectory
+const MAX_ITERATIONS: u32 = 8u; // from the pixel's own trajectory
 const CONVERGED: f32 = 0.5;     // a step shorter than this [px] ends the iteration
 const MAX_RESIDUAL: f32 = 1.0;  // a sample that is farther than this [px] from the pixel is not there
 const SOLUTION_TOLERANCE: f32 = 0.75;   // displacements closer than this [px] in x and y are the same solution
