@@ -24,7 +24,8 @@ LAYERS = [
     {"residency"},
     {"pipeline"},
     {"render", "exposer", "settings", "background", "video_settings", "color_settings"},
-    {"batch", "settings_toml"},
+    {"stages", "settings_toml"},
+    {"batch"},
     {"video_batch"},
     {"lab", "viewer"},  # never each other
     {"cli"},  # may start the viewer

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .frame_views import FrameViews
     from .io.camera_file import CameraFile
     from .io.clip import Clip, Passes
-    from .io.output import Output
+    from .io.output import Output, Result
     from .io.vector_output import VectorOutput
     from .io.vectors import Vectors
     from .methods import METHODS
@@ -32,11 +32,13 @@ if TYPE_CHECKING:
     from .render import Render
     from .scene import Body, CameraPath, Scene
     from .shutter import Shutter
+    from .stages import BlurredFrame, blurred
 
 __all__ = [
     "METHODS",
     "BatchReport",
     "Blur",
+    "BlurredFrame",
     "Body",
     "Camera",
     "CameraFile",
@@ -58,6 +60,7 @@ __all__ = [
     "Passes",
     "Render",
     "Reprojections",
+    "Result",
     "Scene",
     "ShaderError",
     "Shutter",
@@ -65,6 +68,7 @@ __all__ = [
     "Vectors",
     "blur",
     "blur_sequence",
+    "blurred",
     "vectors_sequence",
 ]
 
@@ -79,7 +83,7 @@ _PLACES = {
     "frame_views": ("FrameViews",),
     "io.camera_file": ("CameraFile",),
     "io.clip": ("Clip", "Passes"),
-    "io.output": ("Output",),
+    "io.output": ("Output", "Result"),
     "io.vector_output": ("VectorOutput",),
     "io.vectors": ("Vectors",),
     "methods": ("METHODS",),
@@ -88,6 +92,7 @@ _PLACES = {
     "render": ("Render",),
     "scene": ("Body", "Scene", "CameraPath"),
     "shutter": ("Shutter",),
+    "stages": ("BlurredFrame", "blurred"),
 }
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}
 

@@ -8,12 +8,10 @@ however long the sequence. A failing frame is reported and skipped.
 
 from __future__ import annotations
 
-import queue
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from .errors import Error, GpuMemoryError, InputError
 from .frame import Frame
@@ -21,11 +19,11 @@ from .io import exr
 from .io.clip import Clip
 from .io.frame_file import FrameFile
 from .io.frame_numbers import has_view
-from .io.output import Output, Result
+from .io.output import Output
 from .io.vector_output import VectorOutput
-from .io.windows import Placement
 from .pipeline import Blur
 from .render import Render
+from .stages import IN_FLIGHT, Handover, MotionStages, ReadFrame, Stages, StopError, reason
 
 
 @dataclass
@@ -40,50 +38,11 @@ class BatchReport:
     absent: list[str] = field(default_factory=list)  # masks that no frame has; see Clip.absent
 
 
-@dataclass
-class _Job:
-    """One frame, read and to be blurred: every view of it."""
-
-    number: int
-    views: list[tuple[FrameFile, Frame, Placement | None]]
-    made_of: dict[str, Any]
-
-
-@dataclass
-class _Blurred:
-    """One frame, blurred and to be written."""
-
-    number: int
-    views: list[Result]
-    made_of: dict[str, Any]
-
-
-IN_FLIGHT = 3  # frames, with all their views: one being read, one on the GPU, one being written
 HOPELESS = 3  # frames one after the other that cannot be written for the same reason
+ON_REQUEST = "on request"  # why a run stopped whose `stop` was set
 
 Progress = Callable[[int, str], None]
 """Called with a frame's number and "done", "skipped" or "failed"."""
-
-
-class _StopError(Exception):
-    """The other end of a queue is gone."""
-
-
-class _Handover:
-    """A queue whose end notices a stop."""
-
-    def __init__(self, stop: threading.Event):
-        self._queue: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._stop = stop
-        self.put = self._queue.put
-
-    def get(self) -> Any:
-        while not self._stop.is_set():
-            try:
-                return self._queue.get(timeout=0.05)
-            except queue.Empty:
-                continue
-        raise _StopError
 
 
 def blur_sequence(
@@ -94,6 +53,7 @@ def blur_sequence(
     resume: bool = False,
     confidence: bool = False,
     progress: Progress | None = None,
+    stop: threading.Event | None = None,
 ) -> BatchReport:
     """Blur every frame of `clip` into `output`; `confidence` adds confidence layers.
 
@@ -103,8 +63,9 @@ def blur_sequence(
     Frames that cannot be read, blurred or written are in the report's `failed`, with the
     reason; the others are done. Where frame after frame cannot be written for the same reason (a
     full disk, a folder that is gone), or a video cannot go on, the run stops and `stopped`
-    says why. Interrupted, nothing half written is left and the interruption goes on.
-    InputError, before any frame is blurred, where a mask names an object that no Cryptomatte
+    says why. Once `stop` is set, no other frame is begun; those that are blurred are written, and
+    `stopped` is "on request". Interrupted, nothing half written is left and the interruption goes
+    on. InputError, before any frame is blurred, where a mask names an object that no Cryptomatte
     has. What has no name is known at the end: `absent`, if every frame was read.
     """
     try:
@@ -113,7 +74,8 @@ def blur_sequence(
     except BaseException:
         output.abandon()
         raise
-    return _Pipeline(clip, blur, output, resume, confidence, progress).run()
+    stages = Stages(clip, blur, confidence, output.takes_views)
+    return _Pipeline(stages, output, resume, progress, stop).run()
 
 
 def _check_names_of_views(clip: Clip, output: Output) -> None:
@@ -131,20 +93,20 @@ class _Pipeline:
 
     def __init__(
         self,
-        clip: Clip,
-        blur: Blur,
+        stages: Stages,
         output: Output,
         resume: bool,
-        confidence: bool,
         progress: Progress | None,
+        asked: threading.Event | None = None,
     ):
-        self.clip, self.blur, self.output = clip, blur, output
-        self.resume, self.confidence = resume, confidence
+        self.stages, self.output, self.resume = stages, output, resume
+        self.clip = stages.clip
         self.progress = progress or (lambda number, state: None)
         self.report = BatchReport()
         self.stop, self.hopeless = threading.Event(), threading.Event()
-        self.to_blur, self.to_write = _Handover(self.stop), _Handover(self.stop)
-        self.places = _Handover(self.stop)
+        self.asked = asked or threading.Event()
+        self.to_blur, self.to_write = Handover(self.stop), Handover(self.stop)
+        self.places = Handover(self.stop)
         for _ in range(IN_FLIGHT):
             self.places.put(None)
         self.crash: list[BaseException] = []
@@ -159,14 +121,16 @@ class _Pipeline:
             thread.start()
         report = self.report
         try:
-            while (job := self.to_blur.get()) is not None:
-                self.blur_one(job)
-                del job
+            while (read := self.to_blur.get()) is not None:
+                self.blur_one(read)
+                del read
             self.to_write.put(None)
             for thread in threads:
                 while thread.is_alive():  # a join without limit would hold back Ctrl-C
                     thread.join(0.1)
-        except _StopError:
+            if self.asked.is_set() and not report.stopped and self._rest():
+                report.stopped = ON_REQUEST
+        except StopError:
             pass
         finally:
             broken = any(thread.is_alive() for thread in threads) or self.crash or not report.done
@@ -189,68 +153,50 @@ class _Pipeline:
             report.absent = self.clip.absent
         return report
 
+    def _rest(self) -> int:
+        """The number of frames of which nothing was heard."""
+        report = self.report
+        known = len(report.done) + len(report.skipped) + len(report.failed)
+        return len(self.clip.numbers) - known
+
     def read(self) -> None:
         """The first stage: files to frames."""
-        neighbours = "neighbours" in self.blur.method.uses
         for number in self.clip.numbers:
             if self.hopeless.is_set():
                 break
             self.places.get()
+            if self.asked.is_set():
+                break
             try:
-                self._read_one(number, neighbours)
+                self._read_one(number)
             except (Error, OSError, MemoryError) as error:
                 self._fail(number, error)
             finally:
-                self.clip.forget(number - 1 if neighbours else number)
+                self.stages.forget(number)
         self.to_blur.put(None)
 
-    def _read_one(self, number: int, neighbours: bool) -> None:
-        made_of = self.clip.made_of(number, neighbours)
+    def _read_one(self, number: int) -> None:
+        made_of = self.stages.made_of(number)
         if self.resume and self.output.done(number, made_of):
             self.places.put(None)
             self.report.skipped.append(number)
             self.progress(number, "skipped")
             return
-        sources = self.clip.sources(number)
-        if not self.output.takes_views:
-            del sources[1:]
-        views: list[tuple[FrameFile, Frame, Placement | None]] = []
-        errors: list[tuple[InputError, FrameFile]] = []
-        for source in sources:
-            try:
-                views.append((source, *self._prepared(source, neighbours)))
-            except InputError as error:
-                errors.append((error, source))
-        if errors:
-            error, source = errors[0]
-            raise _of_view(error, source, views, self.blur.method.needs)
-        if unread := sorted({number - 1, number + 1} & self.clip.unread):
-            made_of["unread"] = unread  # so that --resume asks for them again
-        self.to_blur.put(_Job(number, views, made_of))
+        self.to_blur.put(self.stages.read(number, made_of))
 
-    def _prepared(self, source: FrameFile, neighbours: bool) -> tuple[Frame, Placement | None]:
-        normal = "normal" in self.blur.method.uses
-        return self.clip.placed(source, self.blur.reach, neighbours, normal)
-
-    def blur_one(self, job: _Job) -> None:
+    def blur_one(self, read: ReadFrame) -> None:
         """The second stage, for one frame."""
-        results: list[Result] = []
-        for source, frame, placement in job.views:
-            try:
-                results.append(self._blurred(source, frame, placement))
-            except (InputError, GpuMemoryError) as error:
-                needs = self.blur.method.needs
-                self._fail(job.number, _of_view(error, source, job.views, needs))
-                return
-            for name, count in frame.bad.items():
-                bad = self.report.bad.setdefault(job.number, {})
-                bad[name] = bad.get(name, 0) + count
-        self.to_write.put(_Blurred(job.number, results, job.made_of))
-
-    def _blurred(self, source: FrameFile, frame: Frame, placement: Placement | None) -> Result:
-        if self.confidence:
-            return Result(source, *self.blur.with_confidence(frame), placement)
-        return Result(source, self.blur(frame), placement=placement)
+        if self.asked.is_set():
+            self.places.put(None)
+            return
+        try:
+            blurred = self.stages.blur(read)
+        except (InputError, GpuMemoryError) as error:
+            self._fail(read.number, error)
+            return
+        if blurred.bad:
+            self.report.bad[read.number] = blurred.bad
+        self.to_write.put(blurred)
 
     def write(self) -> None:
         """The third stage: results to files."""
@@ -279,13 +225,13 @@ class _Pipeline:
 
     def _fail(self, number: int, error: BaseException) -> None:
         self.places.put(None)
-        self.report.failed[number] = _reason(error)
+        self.report.failed[number] = reason(error)
         self.progress(number, "failed")
 
     def _guarded(self, stage: Callable[[], None]) -> None:
         try:
             stage()
-        except _StopError:
+        except StopError:
             pass
         except BaseException as error:  # a fault of ours: the main thread raises it
             self.crash.append(error)
@@ -299,6 +245,7 @@ def vectors_sequence(
     blur: Blur | None = None,
     resume: bool = False,
     progress: Progress | None = None,
+    stop: threading.Event | None = None,
 ) -> BatchReport:
     """Write the motion of every frame of `clip` into `output`, in the form of another program.
 
@@ -306,39 +253,8 @@ def vectors_sequence(
     cameras. Frames without motion are in the report's `failed`; everything else is as there.
     `blur`: gives the device, and may limit the motion (`max_blur`).
     """
-    return _VectorPipeline(clip, blur or Blur("tap"), output, resume, False, progress).run()
-
-
-class _VectorPipeline(_Pipeline):
-    """Motion instead of blurred pictures."""
-
-    def _prepared(self, source: FrameFile, neighbours: bool) -> tuple[Frame, None]:
-        frame = self.clip.frame(source, picture=False, normal=False)
-        if "motion" not in frame.has:
-            raise InputError("no motion: neither vectors nor a camera")
-        return frame, None
-
-    def _blurred(self, source: FrameFile, frame: Frame, placement: Placement | None) -> Result:
-        return Result(source, self.blur.motion(frame))
-
-
-def _of_view(
-    error: Error,
-    source: FrameFile,
-    views: list[tuple[FrameFile, Frame, Placement | None]],
-    needs: frozenset[str],
-) -> InputError:
-    """The error with the name of the file, and of those of its `views` that can be blurred."""
-    text = str(error) if source.name in str(error) else f"{source.name}: {error}"
-    others = [str(o.view) for o, frame, _ in views if o is not source and frame.has >= needs]
-    return InputError(text + (f"; choose a view: {', '.join(others)}" if others else ""))
-
-
-def _reason(error: BaseException) -> str:
-    """The error in one line that names the file it is about."""
-    if isinstance(error, OSError) and error.strerror and error.filename is not None:
-        return f"{error.filename}: {error.strerror.lower()}"
-    return " ".join(str(error).split()) or type(error).__name__
+    stages = MotionStages(clip, blur or Blur("tap"), all_views=output.takes_views)
+    return _Pipeline(stages, output, resume, progress, stop).run()
 
 
 def render_frames(

@@ -14,8 +14,8 @@ import wgmb
 GROUPS = {
     "blurring": ("blur", "Blur", "Frame", "FrameViews", "Shutter", "METHODS"),
     "sequences": (
-        "Clip", "Passes", "Vectors", "Output", "blur_sequence", "BatchReport", "Flow",
-        "VectorOutput", "vectors_sequence",
+        "Clip", "Passes", "Vectors", "Output", "blur_sequence", "BatchReport", "blurred",
+        "BlurredFrame", "Result", "Flow", "VectorOutput", "vectors_sequence",
     ),
     "colours": ("ColorConfig", "ColorSpace", "Display"),
     "cameras": ("Camera", "Reprojections", "CameraFile"),
