@@ -100,6 +100,7 @@ def blur(
         note(unknown)
     how = _move_by_pictures(clip, video, adapter)
     look = look.resolved(clip=clip)
+    look = look.for_pictures() if how else look
     made = look.make(when.make(), adapter)
     settings = _settings(look, when, given) | {"samples": samples_of(made)} | output.looks
     settings["curve"] = when.curve_read()
