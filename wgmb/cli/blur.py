@@ -14,6 +14,7 @@ from ..batch import BatchReport, blur_sequence
 from ..color_settings import ColorSettings, color_record
 from ..display import Display
 from ..errors import InputError
+from ..extras import needed_by
 from ..io.clip import Clip
 from ..io.frame_file import about, is_video, odd_sizes
 from ..io.frame_numbers import frame_list
@@ -80,9 +81,9 @@ def blur(
     """
     when, pattern = when.resolved(), patterns[0]
     if is_batch(patterns, output.output) or is_video(pattern):
-        from .blur_video import blur_video
-        from .blur_videos import blur_videos
-
+        with needed_by(pattern, "video"):
+            from .blur_video import blur_video
+            from .blur_videos import blur_videos
         if confidence:
             raise InputError("--confidence is for rendered frames")
         settings = look, when, given, video, adapter, quiet, verbose
