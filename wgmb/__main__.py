@@ -2,7 +2,6 @@
 
 import os
 import signal
-import sys
 
 
 def _leave(*_) -> None:
@@ -17,15 +16,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     signal.signal(signal.SIGINT, _leave)
     signal.signal(signal.SIGTERM, _leave)
-    try:
-        from .cli.app import run
-    except ImportError as error:
-        from .extras import reason
+    from .cli.app import run
 
-        if not (why := reason(error)):
-            raise
-        sys.stderr.write(f"wgmb: the command line: {why}\n")
-        sys.exit(2)
     run(arguments)
 
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
@@ -69,26 +69,7 @@ class Blur:
         output: str = "rgba32float",
         **options: Any,
     ):
-        if method not in METHODS:
-            known = f"available: {', '.join(METHODS)}{did_you_mean(method, METHODS)}"
-            raise InputError(f"unknown method {method!r}; {known}")
-        self.auto = samples == "auto" and getattr(METHODS[method], "adaptive", False)
-        if samples is None:
-            samples = getattr(METHODS[method], "samples", SAMPLES)
-        samples = AUTO_SAMPLES if samples == "auto" else samples
-        if not isinstance(samples, (int, np.integer)) or not 1 <= samples <= MOST_SAMPLES:
-            raise InputError(f"samples must be 1 to {MOST_SAMPLES} or auto, got {samples!r}")
-        if not 0 <= jitter <= 1:
-            raise InputError(f"jitter must be 0 to 1, got {jitter}")
-        if max_blur is not None and not max_blur >= 0:
-            raise InputError(f"`max_blur` must be 0 or more pixels, got {max_blur}")
-        check_choice("output", output, OUTPUTS)
-        known = options_of(METHODS[method].Options)
-        if unknown := options.keys() - known.keys():
-            raise InputError(
-                f"method {method!r} has no option {', '.join(sorted(unknown))}; "
-                f"it has {', '.join(known) or 'none'}"
-            )
+        samples, self.auto = checked(method, samples, jitter, max_blur, output, options)
         self._options = METHODS[method].Options(**options)
         gpu.claim()
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
@@ -428,6 +409,41 @@ class Blur:
             label="frame", data=data, usage=wgpu.BufferUsage.UNIFORM
         )
         return gpu.FrameBindings(size, {"frame": frame, **self._group0}, window)
+
+
+def checked(
+    method: str,
+    samples: int | str | None = None,
+    jitter: float = 0.0,
+    max_blur: float | None = None,
+    output: str = OUTPUTS[0],
+    options: Mapping[str, Any] | None = None,
+) -> tuple[int, bool]:
+    """The samples that a Blur of these arguments takes, and whether they are "auto".
+
+    InputError where one of them makes no sense; no device is opened.
+    """
+    if method not in METHODS:
+        known = f"available: {', '.join(METHODS)}{did_you_mean(method, METHODS)}"
+        raise InputError(f"unknown method {method!r}; {known}")
+    auto = samples == "auto" and getattr(METHODS[method], "adaptive", False)
+    if samples is None:
+        samples = getattr(METHODS[method], "samples", SAMPLES)
+    samples = AUTO_SAMPLES if samples == "auto" else samples
+    if not isinstance(samples, (int, np.integer)) or not 1 <= samples <= MOST_SAMPLES:
+        raise InputError(f"samples must be 1 to {MOST_SAMPLES} or auto, got {samples!r}")
+    if not 0 <= jitter <= 1:
+        raise InputError(f"jitter must be 0 to 1, got {jitter}")
+    if max_blur is not None and not max_blur >= 0:
+        raise InputError(f"`max_blur` must be 0 or more pixels, got {max_blur}")
+    check_choice("output", output, OUTPUTS)
+    known = options_of(METHODS[method].Options)
+    if unknown := (options or {}).keys() - known.keys():
+        raise InputError(
+            f"method {method!r} has no option {', '.join(sorted(unknown))}; "
+            f"it has {', '.join(known) or 'none'}"
+        )
+    return int(samples), auto
 
 
 def most_samples(method: str, device: wgpu.GPUDevice) -> int:

@@ -19,9 +19,10 @@ from .io.clip import Clip, Passes
 from .io.frame_numbers import frame_numbers, is_pattern, readable
 from .io.masks import is_file, with_amount
 from .io.output import Output
+from .io.settled import Settled
 from .methods import METHODS, default_method
 from .methods.options import Option, options_of
-from .pipeline import Blur
+from .pipeline import Blur, checked
 from .scene import builtin
 from .scene.scene import Scene
 from .shutter import CURVES, PHASES, Shutter, read_curve
@@ -128,10 +129,12 @@ class InputSettings:
         holdout: tuple[str, ...] = (),
         scale: tuple[str, ...] = (),
         space: ColorSpace | None = None,
+        settled: Settled | None = None,
     ) -> Clip:
         """Return the Clip these settings describe; `space` of its pictures (ColorSettings.space).
 
-        InputError if a file is not readable, or a mask names what no Cryptomatte has.
+        `settled`: what was found out about the sequence before (Clip.settle). InputError if a file
+        is not readable, or a mask names what no Cryptomatte has.
         """
         files = [name for name in (*holdout, *(with_amount(s)[0] for s in scale)) if is_file(name)]
         for name in (*files, *self.also):
@@ -167,6 +170,7 @@ class InputSettings:
             view=self.view,
             space=space,
             max_mb=self.max_mb,
+            settled=settled,
         )
         clip.check_names()
         return clip
@@ -213,9 +217,7 @@ class BlurSettings:
     method: str | None = None
     "Blur method; by default gather if depth is available, else tap."
     samples: int | Literal["auto"] | None = None
-    """Taps, images or rays per pixel: 16 (fusion: 8), or auto for motion from pictures;
-    auto: 1 per pixel of blur length, at most 64.
-    """
+    "Taps, images or rays per pixel: 16 (fusion: 8); auto: 1 per pixel of blur length, at most 64."
     jitter: float = 0.0
     "Jitter of the sample times, 0 to 1: trades banding for noise."
     holdout: tuple[str, ...] = ()
@@ -232,17 +234,8 @@ class BlurSettings:
             suited = "volume"
         return replace(self, method=self.method or suited)
 
-    def for_pictures(self) -> Self:
-        """Return a copy for motion found in pictures, after `resolved`: unset samples are auto."""
-        adaptive = self.method in METHODS and getattr(METHODS[self.method], "adaptive", False)
-        return replace(self, samples="auto") if adaptive and self.samples is None else self
-
     def make(self, shutter_: Shutter, adapter: str | None) -> Blur:
         """Return the Blur these settings describe; an option of another method is an error."""
-        own = {name: getattr(self, name) for name in METHOD_OPTIONS}
-        given = {
-            name: value for name, value in own.items() if value is not None and value is not False
-        }
         return Blur(
             self.method or default_method({"motion", "depth"}),
             shutter=shutter_,
@@ -250,8 +243,23 @@ class BlurSettings:
             jitter=self.jitter,
             max_blur=self.max_blur,
             device=adapter,
-            **given,
+            **self._method_options(),
         )
+
+    def _method_options(self) -> dict:
+        """The method's own options that are set."""
+        own = {name: getattr(self, name) for name in METHOD_OPTIONS}
+        return {k: v for k, v in own.items() if v is not None and v is not False}
+
+    def settled_samples(self) -> int | str:
+        """The samples of the Blur, for a record: a number, or "auto".
+
+        InputError as from `make`, but for what depends on the device; none is opened.
+        """
+        method, options = self.method or "", self._method_options()
+        samples, auto = checked(method, self.samples, self.jitter, self.max_blur, options=options)
+        METHODS[method].Options(**options)
+        return "auto" if auto else samples
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -349,6 +357,7 @@ class OutputSettings:
         inputs: Iterable[Path] = (),
         views: Sequence[str] = (),
         display: Display | None = None,
+        since: int | None = None,
     ) -> Output:
         """The Output for frames of these `numbers`; see there for the others."""
         return Output(
@@ -365,6 +374,7 @@ class OutputSettings:
             views=views,
             display=display,
             window=self.window,
+            since=since,
         )
 
     @property

@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Literal
+from typing import Literal, Self
 
 import wgpu
 
@@ -47,16 +47,25 @@ class VideoSettings:
 
     def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
         """Where motion comes from, and the same in words."""
+        settled, how = self.settled(device)
+        if settled.flow == "none":
+            return None, how
+        if settled.flow == "dis":
+            return Dis(settled.flow_quality), how
+        return Flow(quality=settled.flow_quality, device=device), how
+
+    def settled(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
+        """A copy in which `flow` is chosen as it suits the device, and the choice in words."""
         if self.flow == "none":
-            return None, "none: pictures are averaged"
+            return self, "none: pictures are averaged"
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         if self.flow == "dis" or (self.flow == "auto" and software and is_installed()):
             why = "" if self.flow == "dis" else ", as there is no GPU"
-            return Dis(self.flow_quality), f"dense inverse search{why}"
+            return replace(self, flow="dis"), f"dense inverse search{why}"
         quality, why = self.flow_quality, ""
         if self.flow == "auto" and software:
             quality, why = "fast", ", the fast one, as there is no GPU"
-        return Flow(quality=quality, device=device), f"search{why}"
+        return replace(self, flow="search", flow_quality=quality), f"search{why}"
 
     @property
     def pace(self) -> Fraction:

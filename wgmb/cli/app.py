@@ -19,12 +19,12 @@ from cyclopts.config import Dict
 
 from .._version import __version__
 from ..errors import DeviceError, Error, InputError, did_you_mean
-from ..extras import reason
 from . import terminal
 from .exit_codes import DONE, INTERRUPTED, NO_DEVICE, SOME_FAILED, USAGE
 
 COMMANDS = {
     "blur": "Blur rendered frames, or videos.",
+    "job": "Write a job file, from which any machine can blur any part of a sequence.",
     "render": "Render a built-in scene with motion blur.",
     "view": "View a scene or frames interactively.",
     "info": "Describe a frame: layers, sizes, motion vector convention, speeds.",
@@ -79,10 +79,6 @@ def main(arguments: list[str] | None = None) -> int:
         return _say_why(str(error), NO_DEVICE)
     except Error as error:
         return _say_why(str(error), USAGE)
-    except ImportError as error:
-        if not (why := reason(error)):
-            raise
-        return _say_why(f"{words[0]}: {why}", USAGE)
     except OSError as error:
         why = error.strerror.lower() if error.strerror else str(error)
         if error.filename is not None:  # what was named cannot be opened
@@ -136,7 +132,10 @@ def _config(words: list[str]) -> tuple[Dict, ...]:
 
             path = Path(given or "".join(words[i + 1 : i + 2]))
             with about(path):
-                return (Dict(parse(text_of(path)), source=str(path)),)
+                tables = parse(text_of(path))
+                if words[0] == "job" and "blur" in tables:
+                    tables["job"] = tables["blur"]
+                return (Dict(tables, source=str(path)),)
     return ()
 
 

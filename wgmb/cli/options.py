@@ -8,8 +8,7 @@ from typing import Annotated, TypeVar
 from cyclopts import Group, Parameter
 
 from ..color_settings import ColorSettings, DisplaySettings
-from ..io import exr
-from ..io.suffixes import STILLS, VIDEOS
+from ..io import exr, stills, video
 from ..io.vectors import CONVENTIONS
 from ..methods import METHODS
 from ..scene import builtin
@@ -101,7 +100,8 @@ class OutputOptions(OutputSettings):
         str,
         Parameter(
             alias="-o",
-            help=f"Pattern or file: .exr {' '.join(STILLS)}, or a video {' '.join(VIDEOS)}.",
+            help=f"Pattern or file: .exr {' '.join(stills.SUFFIXES)}, or a video "
+            f"{' '.join(video.SUFFIXES)}.",
         ),
     ]
     compression: Annotated[

@@ -12,9 +12,9 @@ from .._version import __version__
 from ..batch import render_frames
 from ..color_settings import DisplaySettings, color_record
 from ..errors import InputError
+from ..job import check_confidence
 from ..render import Render
 from ..settings import SceneSettings, plain, size_of
-from .blur import check_confidence, samples_of
 from .exit_codes import DONE
 from .options import BlurOptions, Look, Moments, SceneName, Shown, ShutterOptions, Target, When
 from .terminal import note, progress
@@ -73,9 +73,9 @@ def render(
     renderer = Render(picture, made, size=size_of(what.size), fps=fps, antialias=what.antialias)
     settings = {"scene": scene, "sharp": sharp, "passes": passes} | output.looks
     settings |= plain(look) | plain(when) | plain(what) | {"wgmb": __version__, "fps": fps}
-    settings["samples"], settings["curve"] = samples_of(made), when.curve_read()
+    settings["samples"], settings["curve"] = look.settled_samples(), when.curve_read()
     if confidence:
-        check_confidence(made, output)
+        check_confidence(made.method.name, output)
         settings["confidence"] = True
     shown = color.open(needed=not output.is_exr)
     settings |= color_record(shown, output.output)

@@ -10,6 +10,7 @@ from functools import cache
 _ARGUMENT = re.compile(r"(?<![^\s(])`([a-z_]+)(?:=([^`]*))?`(?=[\s,;:.)]|$)")
 _OTHERWISE = {
     "color": "--layer",
+    "confidence": "--confidence",
     "convention": "--vectors",
     "device": "--adapter",
     "number": "--frame",

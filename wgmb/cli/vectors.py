@@ -11,9 +11,10 @@ from .._version import __version__
 from ..batch import vectors_sequence
 from ..errors import InputError
 from ..io.vector_output import PROGRAMS, VectorOutput
+from ..outcome import Outcome
 from ..pipeline import Blur
 from ..settings import plain
-from .blur import conclude
+from .conclusion import conclude
 from .options import Given, InputOptions
 from .terminal import note, progress
 
@@ -88,4 +89,4 @@ def vectors(
         if len(clip.chosen) > 1 and not files.takes_views:
             note(f"only of view {clip.chosen[0]}; %V in the output's name writes a file of each")
     took = f"{time.perf_counter() - started:.1f} s"
-    return conclude(clip, files, report, took, quiet, verbose)
+    return conclude(Outcome.of(clip, report), files.pattern, took, quiet, verbose)

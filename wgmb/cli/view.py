@@ -6,7 +6,6 @@ from pathlib import Path
 
 from ..color_settings import ColorSettings
 from ..errors import DeviceError
-from ..extras import needed_by
 from ..settings import size_of
 from .exit_codes import DONE
 from .options import BlurOptions, Colors, Given, InputOptions, Look, ShutterOptions, When
@@ -41,9 +40,8 @@ def view(
         GPU to use: a number or part of a name from `wgmb devices`.
     """
     try:
-        with needed_by("view"):
-            from .. import viewer
-    except ImportError as error:  # of a system library
+        from .. import viewer
+    except ImportError as error:  # of a system library: the packages are required
         raise DeviceError(
             f"the viewer cannot be loaded: {error}; on Debian, Ubuntu: "
             "apt-get install libx11-6 libxext6"

@@ -8,8 +8,9 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -44,6 +45,7 @@ from .input_space import in_space
 from .masks import Masks
 from .neighbours import Neighbours
 from .picture_motion import FAR, PictureMotion
+from .settled import Settled
 from .windows import Placement, Window, laid, near_enough, union
 
 DEPTHS = ("planar", "inverse", "clip")
@@ -121,30 +123,41 @@ class Clip:
         view: str | None = None,
         space: ColorSpace | None = None,
         max_mb: float = limits.MAX_MB,
+        settled: Settled | None = None,
     ):
         """`frames`: "1-100x2", "1,3,5-8"; by default all existing ones, without gaps unless
         `skip_missing`. `cuts`: frames that begin a new shot, in the same form, or a file that has
         them (see CutList), beside those that are detected. `view`: the only view to blur; by
         default all. `space`: colour space of the pictures, instead of what their files say; what
         is not linear is made so. `max_mb`: largest decoded size of a file in megabytes. In
-        `pattern`, %V stands for the view: one file a view.
+        `pattern`, %V stands for the view: one file a view. `settled`: what another Clip of the
+        same sequence has found out, `settle()`, instead of looking again.
         """
-        self._space = space
+        self._space, self._settled = space, settled
         self._cut_list = CutList(cuts or "")
         self._max_mb = max_mb
-        self.sizes: dict[int, tuple[int, int]] = {}
         self.pattern, self.passes = str(pattern), passes or Passes()
-        self._named = views_on_disk(pattern) if has_view(pattern) else ()
+        self._named = self._views_in_names()
         self._leading = str(in_view(pattern, self._named[0] if self._named else None))
         self.numbers = self._numbers(frames, skip_missing)
+        self._there = frozenset(self.on_disk)
         self.view = view
         if view is not None and view not in self.views:
             raise InputError(f"{self.pattern}: no view {view!r}; {self._those_there}")
         self._cameras = self._open_cameras()
-        known, is_search = self._cut_list.frames(self.on_disk[0]), self._cut_list.is_search
-        self._around = Neighbours(self, known, is_search, self.passes.outside)
-        there = set(self.on_disk)
+        known = settled.cuts if settled else self._cut_list.frames(self.on_disk[0])
+        self._known_cuts = frozenset(known)
+        there = self._there
         self.stray_cuts = sorted(cut for cut in known if not there & {cut, cut - 1})
+        self._found: detect.Finding | None = settled.finding if settled else None
+        self._begin()
+
+    def _begin(self) -> None:
+        """Nothing has been read yet."""
+        self.sizes: dict[int, tuple[int, int]] = {}
+        self._around = Neighbours(
+            self, self._known_cuts, self._cut_list.is_search, self.passes.outside
+        )
         self.unread: set[int] = set()
         patterns = tuple(
             str(path) for p in (self.pattern, *self.passes.also) for path in self._of_views(p)
@@ -154,14 +167,45 @@ class Clip:
             tuple(self.passes.scale),
             patterns,
             self.numbers,
-            max_mb,
+            self._max_mb,
             self._of_views,
         )
         self.notes: dict[str, list[int]] = {}
         self._kept: OrderedDict[int, tuple[FrameFile, ...]] = OrderedDict()
-        self._found: detect.Finding | None = None
         self._picture_motion: PictureMotion | None = None
         self._most_kept = 3
+        if self._settled is not None:
+            self._around.settle(self._settled.beyond)
+            self._masks.take_names_as_found()
+            self.notes |= {text: list(self.numbers) for text in self._settled.notes}
+
+    def settle(self) -> Settled:
+        """Find out all that depends on the whole sequence; `Clip(settled=)` takes it.
+
+        Parts of the sequence that are blurred by themselves then give the same pictures as the
+        whole, whatever lies on disk by then.
+        """
+        if self._settled is None:
+            self.check_names()
+            beyond = self._around.beyond
+            notes = tuple(text for text, at in self.notes.items() if len(at) == len(self.numbers))
+            self._settled = Settled(
+                tuple(self.on_disk),
+                self.views,
+                self._decide(),
+                tuple(sorted(self._known_cuts)),
+                beyond,
+                notes,
+            )
+        return self._settled
+
+    def part(self, numbers: Sequence[int]) -> Clip:
+        """A Clip of some of the frames, with the findings of this one and nothing read yet."""
+        self.settle()
+        made = copy.copy(self)
+        made.numbers = list(numbers)
+        made._begin()
+        return made
 
     def move_by(self, motion: MotionSource) -> None:
         """Take motion from the pictures (see wgmb/flow) where the files hold none."""
@@ -171,13 +215,19 @@ class Clip:
 
     def is_there(self, number: int) -> bool:
         """Return True if frame `number` is on disk."""
-        if not is_pattern(self._leading):
-            return number in self.on_disk
+        if self._settled is not None or not is_pattern(self._leading):
+            return number in self._there
         return self._path(number).is_file()
 
     def begins_shot(self, number: int) -> bool:
         """Return True if the user said that a new shot begins with the frame."""
         return self._around.is_known_cut(number, -1)
+
+    def _views_in_names(self) -> tuple[str, ...]:
+        """The names for %V, where the views have files of their own."""
+        if not has_view(self.pattern):
+            return ()
+        return self._settled.views if self._settled else views_on_disk(self.pattern)
 
     def _numbers(self, frames: str | None, skip_missing: bool) -> list[int]:
         if not is_pattern(self._leading):
@@ -188,7 +238,8 @@ class Clip:
                 raise InputError(f"`frames` needs a pattern such as shot.####.exr, got {path.name}")
             self.on_disk = [number_in(path)]
             return self.on_disk
-        self.on_disk = there = numbers_on_disk(self._leading)
+        settled = self._settled
+        self.on_disk = there = list(settled.on_disk if settled else numbers_on_disk(self._leading))
         if not frames and skip_missing:
             return there
         if not frames and there[-1] - there[0] - len(there) >= MOST_FRAMES:
@@ -217,6 +268,8 @@ class Clip:
         """Names of the views of the first readable frame, the default one first; none if its
         files do not name any.
         """
+        if self._settled is not None:
+            return self._settled.views
         if self._named:
             return self._named
         for number in self.on_disk:
@@ -297,7 +350,7 @@ class Clip:
         around = [number]
         if neighbours and is_pattern(self._leading):
             near = (number - 1, number + 1)
-            around += [n for n in near if self._path(n).is_file()]
+            around += [n for n in near if self.is_there(n)]
         paths = (p for n in around for p in (*self.files(n), *self._masks.manifests(n)))
         files = dict.fromkeys(paths)
         meaning = self._decide().vectors
@@ -457,7 +510,7 @@ class Clip:
     def _has_neighbour(self, number: int, side: int) -> bool:
         if not is_pattern(self._leading) or self._around.is_known_cut(number, side):
             return False
-        return self._path(number + side).is_file()
+        return self.is_there(number + side)
 
     def neighbour(self, source: FrameFile, side: int) -> FrameFile | None:
         """The same view of the frame before (`side` -1) or after (1).

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..extras import needed_by
 from .frame_numbers import frame_numbers, readable
 
 _ONLY = "only:"
@@ -51,6 +50,14 @@ class CutList:
     @property
     def _plain(self) -> str:
         return self.text.removeprefix(_ONLY)
+
+    def anchored(self, folder: Path) -> CutList:
+        """The same, its file named from `folder` on."""
+        found = _FILE.fullmatch(self._plain)
+        if found is None:
+            return self
+        begin = self.text.removesuffix(self._plain)
+        return CutList(f"{begin}{folder / found['path']}{self._plain[found.end('path') :]}")
 
     def frames(self, first: int) -> frozenset[int]:
         """The frames that begin a new shot; `first`: the frame with which a file's edit begins."""
@@ -131,8 +138,12 @@ def _read_otio(path: Path, fps: float | None) -> set[int]:
     text = path.read_bytes().decode("utf-8", "replace")
     if _depth(text) > _DEEPEST:  # the library would crash
         raise InputError(f"{path}: lists are nested over {_DEEPEST} deep, too deep for an edit")
-    with needed_by(str(path)):
+    try:
         import opentimelineio as otio
+    except ImportError:
+        raise InputError(
+            f"{path}: OpenTimelineIO is not installed: pip install wgmb[edit]"
+        ) from None
     try:
         timeline = otio.core.deserialize_json_from_string(text)
         is_timeline = isinstance(timeline, otio.schema.Timeline)

@@ -81,6 +81,10 @@ class Masks:
             if error := self._why_missing(mask):
                 raise error
 
+    def take_names_as_found(self) -> None:
+        """Some frame's Cryptomatte has every name, as another run over all frames has found."""
+        self._missing = dict.fromkeys(self._by_name)
+
     @property
     def _by_name(self) -> list[str]:
         """Masks that may name an object of a Cryptomatte."""

@@ -68,6 +68,15 @@ class Neighbours:
         self._alone.clear()
         self._placed.clear()
 
+    @property
+    def beyond(self) -> Sides:
+        """Sides of the data window beyond which the picture is unknown."""
+        return self._cut_through
+
+    def settle(self, beyond: Sides) -> None:
+        """Take what was found out about all frames as `beyond`."""
+        self._cut_through = beyond
+
     # ---- frames ----------------------------------------------------------------------------
 
     def frame(self, source: FrameFile, picture: bool = True, normal: bool = True) -> Frame:

@@ -10,23 +10,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..color import ToDisplay, to_display
 from ..display import Display
 from ..errors import InputError, check_choice
-from ..extras import needed_by
-from . import atomic, exr, record, stills, views
+from . import atomic, exr, record, stills, video, views
 from .frame_file import FrameFile, about
 from .frame_numbers import frame_path, has_view, in_view, is_pattern
 from .input_space import chromaticities, relabelled, space_of
-from .suffixes import STILLS, VIDEOS
 from .windows import Placement, Window, laid, result_window, union
-
-if TYPE_CHECKING:
-    from .video import Video
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +71,7 @@ class Output:
     names of views that %V in the pattern stands for, which makes a file or video of each.
     `display`: how PNG, JPEG, TIFF and videos show the light; sRGB by default. `window`: the data
     window of an EXR may "grow" with streaks that lead out of it, or "keep" its size; stills and
-    videos hold the display window.
+    videos hold the display window. `since`: a file that is older [ns since 1970] is not done.
     """
 
     def __init__(
@@ -95,6 +90,7 @@ class Output:
         views: Sequence[str] = (),
         display: Display | None = None,
         window: str = "grow",
+        since: int | None = None,
     ):
         _check_exr_options(pattern, layers, compression)
         if has_view(pattern) and not views:
@@ -106,21 +102,16 @@ class Output:
         self.settings = json.dumps(settings or {}, sort_keys=True)
         suffix = self.pattern.suffix.lower()
         self._views = tuple(views) if has_view(pattern) else (None,)
-        self._videos: dict[str | None, Video] = {}
-        self._overwrite, self._resume = overwrite, resume
+        self._videos: dict[str | None, video.Video] = {}
+        self._overwrite, self._resume, self._since = overwrite, resume, since
         self._abandoned = False
         self._under_way: Path | None = None
-        if suffix not in (".exr", *STILLS, *VIDEOS):
-            known = ", ".join((".exr", *STILLS, *VIDEOS))
+        if suffix not in (".exr", *stills.SUFFIXES, *video.SUFFIXES):
+            known = ", ".join((".exr", *stills.SUFFIXES, *video.SUFFIXES))
             raise InputError(f"output {pattern}: the name must end in one of {known}")
         if bits not in (8, 16) or (bits == 16 and suffix in (".jpg", ".jpeg")):
             raise InputError(f"bits must be 8 or 16 (JPEG: 8), got {bits}")
-        is_video = suffix in VIDEOS
-        if is_video:
-            with needed_by(f"output {pattern}", "video"):
-                from . import video
-        elif suffix in STILLS:
-            stills.require(suffix)
+        is_video = suffix in video.SUFFIXES
         if is_video and resume:
             raise InputError("`resume` is not available for videos, only for frame files")
         if not is_video and len(numbers) > 1 and not is_pattern(pattern):
@@ -197,6 +188,8 @@ class Output:
 
     def _is_done(self, path: Path, made_of: dict[str, Any] | None) -> bool:
         try:
+            if self._since is not None and path.stat().st_mtime_ns < self._since:
+                return False
             data = path.read_bytes()
         except FileNotFoundError:
             return False

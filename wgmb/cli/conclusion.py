@@ -1,0 +1,48 @@
+"""What the commands say about rendered frames at the end of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..io.frame_file import odd_sizes
+from ..io.frame_numbers import frame_list
+from ..outcome import Outcome
+from .exit_codes import DONE, SOME_FAILED
+from .spelling import as_options
+from .terminal import complain, note
+
+
+def conclude(outcome: Outcome, target: Path, took: str, quiet: bool, verbose: bool) -> int:
+    """Print a summary of the run into `target`; return the exit code."""
+    report = outcome.report
+    for number, why in sorted(report.failed.items()):
+        complain(f"frame {number} failed: {why}")
+    if report.stopped:
+        complain(f"stopped: {report.stopped}; {outcome.rest} other frames were not written")
+    for mask in report.absent:
+        complain(f"{mask} is in no frame, so it changed nothing")
+    if not quiet:
+        for number, bad in sorted(report.bad.items()):
+            what = ", ".join(f"{n} in {name}" for name, n in bad.items())
+            note(f"frame {number}: ignored pixels that are not finite: {what}")
+        if verbose or outcome.is_finding_notable:
+            note(f"vectors: {outcome.finding}")
+        for text, told in outcome.notes.items():
+            if told:
+                text = as_options(text)
+                some = "" if len(told) == len(report.done) else f"frames {frame_list(told)}: "
+                note(f"{some}{text}")
+        for mask in outcome.unseen:
+            note(f"{mask} is in no pixel of these frames, so it changed nothing")
+        if stray := outcome.stray_cuts:
+            there = "{} to {}".format(*outcome.on_disk)
+            note(f"cuts outside the frames {there} change nothing: {frame_list(stray)}")
+        if outcome.cuts:
+            note(f"camera cut before frame {', '.join(map(str, sorted(outcome.cuts)))}")
+        if odd := odd_sizes({n: size for size, at in outcome.sizes.items() for n in at}):
+            note(odd)
+        done = f"{len(report.done)} frames in {took} -> {target}"
+        note(done + (f", {len(report.skipped)} already done" if report.skipped else ""))
+    if report.failed:
+        complain(f"{len(report.failed)} of {outcome.total} frames failed")
+    return SOME_FAILED if report.failed or report.stopped or report.absent else DONE

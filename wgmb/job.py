@@ -1,0 +1,259 @@
+"""A run over rendered frames, settled: its settings, and what the whole sequence says of a frame.
+
+`settle` looks at the sequence once. Any of the frames can then be blurred by any process, in a run
+of its own, and have the bytes that one run over all of them gives.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+from . import gpu
+from ._version import __version__
+from .batch import Progress, blur_sequence
+from .color_settings import ColorSettings, color_record
+from .display import ColorSpace, Display
+from .errors import InputError
+from .io.clip import Clip
+from .io.frame_file import about
+from .io.frame_numbers import frame_list
+from .io.input_space import space_of
+from .io.masks import is_file, with_amount
+from .io.output import Output
+from .io.settled import Settled
+from .methods import METHODS
+from .outcome import Outcome
+from .pipeline import Blur
+from .settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
+from .video_settings import VideoSettings
+
+_NO_LOOK = "frames", "skip_missing", "max_mb"  # of InputSettings: they change no frame
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What `wgmb blur` is asked to do with rendered frames."""
+
+    pattern: str
+    output: OutputSettings
+    look: BlurSettings
+    when: ShutterSettings
+    given: InputSettings
+    color: ColorSettings
+    video: VideoSettings
+    confidence: bool = False
+
+    def opened(self, settled: Settled | None = None) -> tuple[Clip, Display | None]:
+        """The Clip, and how it is shown."""
+        shown = self.color.open(needed=not self.output.is_exr)
+        given = replace(self.given, frames=None, skip_missing=True) if settled else self.given
+        space = self.color.space(shown)
+        masks = self.look.holdout, self.look.scale
+        return given.open(self.pattern, *masks, space, settled), shown
+
+    def color_record(self, shown: Display | None) -> dict[str, str | None]:
+        """What of the colours changes the contents of the files."""
+        space = self.color.space(shown)
+        return color_record(shown, self.output.output, space, self.pattern)
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A run whose every frame is settled; `settle` makes one, job_file.py keeps it in a file.
+
+    `asked`: with the method, the shutter and the way to motion that were chosen. `settings`: the
+    record of every frame. `flow`: where motion comes from, in words, if the frames hold none.
+    `since`: files in the output that are older [ns since 1970] are not done; None: they may be.
+    `is_part_of_run`: another process has looked at the outputs that exist.
+    """
+
+    asked: Asked
+    settings: dict[str, Any]
+    numbers: list[int]
+    flow: str = ""
+    since: int | None = None
+    findings: Settled | None = None
+    is_part_of_run: bool = False
+    clip_opened: tuple[Clip, Display | None] | None = field(default=None, repr=False)
+    remarks: tuple[str, ...] = ()
+
+    @cached_property
+    def _opened(self) -> tuple[Clip, Display | None]:
+        if self.clip_opened is not None:
+            return self.clip_opened
+        clip, shown = self.asked.opened(self.findings)
+        self._check_machine(shown)
+        return clip.part(self.numbers), shown
+
+    @property
+    def clip(self) -> Clip:
+        """The frames; of a job from a file they are opened by this."""
+        return self._opened[0]
+
+    @property
+    def is_shown(self) -> bool:
+        """True if a config of OpenColorIO is in use."""
+        return self._opened[1] is not None
+
+    @cached_property
+    def settled(self) -> Settled:
+        """What the sequence says of all frames."""
+        return self.findings or self.clip.settle()
+
+    def _check_machine(self, shown: Display | None) -> None:
+        """InputError if colours or the shutter's curve are others here than they were."""
+        for name, value in self.asked.color_record(shown).items():
+            if self.settings.get(name) != value:
+                was = self.settings.get(name)
+                raise InputError(f"{name.replace('_', ' ')} is {value} here, but {was} in the job")
+        curve = self.asked.when.curve_read()
+        if curve and curve.rpartition(" (")[2] != str(self.settings["curve"]).rpartition(" (")[2]:
+            raise InputError(f"{self.asked.when.curve} has changed since the job was written")
+
+    def chosen(self, numbers: Sequence[int]) -> list[int]:
+        """These frames; InputError if the job has not all of them."""
+        if strange := sorted(set(numbers) - set(self.numbers)):
+            raise InputError(
+                f"`frames` {frame_list(strange)} are not in the job, "
+                f"which has {frame_list(self.numbers)}"
+            )
+        return list(numbers)
+
+    def run(self, adapter: str | None = None, numbers: Sequence[int] | None = None) -> Run:
+        """Open the GPU and the output, for all frames or for some of them."""
+        return self.run_with(self.made_blur(adapter), numbers)
+
+    def made_blur(self, adapter: str | None = None) -> Blur:
+        """The method, compiled on an adapter."""
+        return self.asked.look.make(self.asked.when.make(), adapter)
+
+    def run_with(self, blur: Blur, numbers: Sequence[int] | None = None) -> Run:
+        """`run` with a Blur that may serve many runs."""
+        clip, _ = self._opened
+        if numbers is not None:
+            clip = clip.part(self.chosen(numbers))
+        if self.flow:
+            motion, _ = self.asked.video.source(blur.device)
+            if motion is not None:
+                clip.move_by(motion)
+        files = self.make_output(None if numbers is None else clip)
+        return Run(clip, blur, files, self._resumes, self.asked.confidence)
+
+    @property
+    def _resumes(self) -> bool:
+        return self.asked.output.resume or self.is_part_of_run
+
+    def make_output(self, part: Clip | None = None) -> Output:
+        """The files of all frames, or of a `part` of them; see there what is refused."""
+        clip, shown = self._opened
+        output = replace(self.asked.output, resume=self._resumes)
+        inputs, numbers = clip.inputs, clip.numbers
+        if part is not None:  # those of the others were looked at when the job was made
+            inputs, numbers = (p for n in part.numbers for p in part.files(n)), part.numbers
+        return output.make(self.settings, numbers, inputs, clip.chosen, shown, self.since)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Frames, a Blur and an output; call it."""
+
+    clip: Clip
+    blur: Blur
+    output: Output
+    resume: bool
+    confidence: bool
+
+    def __call__(
+        self, progress: Progress | None = None, stop: threading.Event | None = None
+    ) -> Outcome:
+        """Blur every frame; see blur_sequence."""
+        report = blur_sequence(
+            self.clip,
+            self.blur,
+            self.output,
+            resume=self.resume,
+            confidence=self.confidence,
+            progress=progress,
+            stop=stop,
+        )
+        return Outcome.of(self.clip, report)
+
+
+def settle(asked: Asked, adapter: str | None = None) -> Job:
+    """Look at the frames, and choose what was left to them: method, motion, what vectors mean.
+
+    A GPU is opened only where the frames hold no motion and `flow` is "auto". InputError where the
+    settings make no sense together.
+    """
+    asked = replace(asked, when=asked.when.resolved())
+    clip, shown = asked.opened()
+    remarks = list(map(_of_scale, asked.look.scale))
+    if asked.color.space(shown) is None:
+        remarks.append(_check_space(clip, shown))
+    video, how = _motion(clip, asked.video, adapter)
+    asked = replace(asked, look=asked.look.resolved(clip=clip), video=video)
+    look, output = asked.look, asked.output
+    asked.when.make()  # says what is wrong with it
+    settings = {"wgmb": __version__} | plain(look) | plain(asked.when) | plain(asked.given)
+    for name in _NO_LOOK:
+        del settings[name]
+    settings |= {"samples": look.settled_samples()} | output.looks
+    settings["curve"] = asked.when.curve_read()
+    settings |= asked.color_record(shown)
+    if asked.confidence:
+        check_confidence(look.method or "", output)
+        settings["confidence"] = True
+    if asked.color.remark and not output.is_exr:
+        remarks.append(asked.color.remark)
+    if how:
+        settings["flow"] = how
+        remarks.append(f"motion: {how}, as the frames hold none")
+    told = tuple(filter(None, remarks))
+    return Job(asked, settings, clip.numbers, how, clip_opened=(clip, shown), remarks=told)
+
+
+def _of_scale(scale: str) -> str:
+    if "=" not in scale or with_amount(scale)[1] is not None or is_file(scale):
+        return ""
+    return f"`scale` {scale}: no amount such as {scale}:0.5, so all else stands still"
+
+
+def _check_space(clip: Clip, shown: Display | None) -> str:
+    """InputError where frames say that they are not linear; a remark on a space of no config."""
+    if shown is None:
+        return ""
+    source = clip.source(clip.numbers[0])
+    if source.part is None:
+        return ""
+    said = shown.config.unknown(source.part.attributes)
+    found: ColorSpace = space_of(source, shown.config)
+    with about(source.name):
+        found.check_linear()
+    if not said:
+        return ""
+    return f"{source.path}: {said} is not in {shown.config.name}, so it is taken as {found.text}"
+
+
+def _motion(clip: Clip, video: VideoSettings, adapter: str | None) -> tuple[VideoSettings, str]:
+    """How motion comes from the pictures of frames that hold none, settled, and in words."""
+    if video.flow == "none" or len(clip.on_disk) < 2:
+        return video, ""
+    has = clip.has
+    if "motion" in has or not has:  # nothing can be read: its turn to fail comes
+        return video, ""
+    return video.settled(gpu.open_device(adapter))
+
+
+def check_confidence(method: str, output: OutputSettings) -> None:
+    """Raise InputError unless the method reports confidence and the output can store it."""
+    names = getattr(METHODS[method], "confidence", ())
+    if not names:
+        able = ", ".join(n for n, m in METHODS.items() if hasattr(m, "confidence"))
+        raise InputError(f"method {method!r} cannot report confidence; use {able}")
+    if not output.is_exr:
+        what = ", ".join(names)
+        raise InputError(f"`confidence` ({what}) needs an .exr output, got {output.output}")
