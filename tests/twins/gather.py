@@ -15,7 +15,7 @@ class Layers:
 
     offset: float
     color: list  # front, premultiplied by coverage, and back
-    trajectory: list  # velocity, half acceleration
+    trajectory: list  # velocity, half acceleration, third term, 1 where it has a kink
     depth: list  # back: 0 where there is none
     coverage: np.ndarray
     inferred: np.ndarray  # the back layer was not seen
@@ -37,7 +37,8 @@ class Sample:
 
 def gather(frames, times):
     """Mean over `times`; frames: (offset, color, motion, depth), the frame itself first."""
-    layers = [separate(*f) for f in frames]
+    at = {f[0]: f for f in frames}
+    layers = [separate(*f, prev=at.get(f[0] - 1), next=at.get(f[0] + 1)) for f in frames]
     span = times[0] - (times[1] - times[0]) / 2, times[-1] + (times[1] - times[0]) / 2
     tiles = [tile_candidates(f, span) for f in layers]
     height, width = frames[0][1].shape[:2]
@@ -54,7 +55,8 @@ def gather(frames, times):
 
 def moved(path, u):
     """Displacement [px] after `u` frame intervals."""
-    return (path[..., :2] + path[..., 2:] * u) * u
+    bend = np.where(path[..., 6:] > 0, np.abs(u), u**2)
+    return path[..., :2] * u + path[..., 2:4] * bend + path[..., 4:6] * (u**3 - u)
 
 
 # ---- silhouettes ----------------------------------------------------------------------------
@@ -67,11 +69,19 @@ def around(height, width, y, x, radius):
             yield j, i
 
 
-def separate(offset, color, motion, depth):
-    """Separate pixels that show two surfaces into a front layer and what is behind it."""
+def valid(depth):
+    """Depths as the shaders read them."""
+    return np.where(np.isfinite(depth) & (depth > 0), np.minimum(depth, NO_DEPTH), NO_DEPTH)
+
+
+def separate(offset, color, motion, depth, prev=None, next=None):
+    """Separate pixels that show two surfaces into a front layer and what is behind it.
+
+    `prev`, `next`: the frames around, as those of `gather`.
+    """
     height, width = depth.shape
     color, motion = color.astype(float), motion.astype(float)
-    z = np.where(np.isfinite(depth) & (depth > 0), np.minimum(depth, NO_DEPTH), NO_DEPTH)
+    z = valid(depth)
     edges = np.zeros((height, width), bool)
     for y in range(height):
         for x in range(width):
@@ -80,11 +90,16 @@ def separate(offset, color, motion, depth):
             apart = np.sqrt(max(np.sum((motion[p] - motion[y, x]) ** 2) for p in near))
             beyond = (1.05**2 - 1) * min(1, max(0.1, 4 / max(apart, 1e-6)))
             edges[y, x] = apart > 0.5 and max(depths) > (1 + beyond) * min(depths)
-    found = [color.copy(), motion.copy(), z.copy(), np.ones((height, width))]
-    back = [np.zeros_like(color), motion.copy(), np.zeros((height, width))]
+    bends = np.zeros((height, width, 3))
+    for y in range(height):
+        for x in range(width):
+            bends[y, x] = bend(motion[y, x], z[y, x], y, x, prev, next)
+    own = np.concatenate([motion, bends], axis=-1)
+    found = [color.copy(), own.copy(), z.copy(), np.ones((height, width))]
+    back = [np.zeros_like(color), own.copy(), np.zeros((height, width))]
     inferred = np.zeros((height, width), bool)
     for y, x in np.argwhere(edges):
-        separated = separate_pixel(color, motion, z, edges, y, x)
+        separated = separate_pixel(color, motion, z, edges, y, x, bends, (prev, next))
         if separated:
             for array, value in zip([*found, *back, inferred], separated, strict=True):
                 array[y, x] = value
@@ -98,14 +113,69 @@ def separate(offset, color, motion, depth):
 
 
 def trajectories(motion):
-    """Velocity and half_acceleration, the latter in half precision."""
-    velocity = (motion[..., 2:] - motion[..., :2]) / 2
-    half_acceleration = (motion[..., 2:] + motion[..., :2]) / 2
-    return np.concatenate([velocity, half_acceleration.astype("f2").astype(float)], axis=-1)
+    """Velocity; half acceleration in half precision; third term in steps; whether it has a kink."""
+    velocity = (motion[..., 2:4] - motion[..., :2]) / 2
+    half_acceleration = (motion[..., 2:4] + motion[..., :2]) / 2
+    third = np.clip(np.round(motion[..., 4:6] * 32), -511, 511) / 32
+    half_acceleration = half_acceleration.astype("f2").astype(float)
+    return np.concatenate([velocity, half_acceleration, third, motion[..., 6:]], axis=-1)
 
 
-def separate_pixel(color, motion, z, edges, y, x):
-    """Front colour, motion, depth, coverage; back colour, motion, depth; whether it is inferred."""
+def bend(motion, z, y, x, prev, next):
+    """Third term of the path of a pixel through five positions, 1 if it has a kink instead."""
+    here, there = (motion[:2] + motion[2:]) / 2, []
+    for frame, step, back in ((prev, motion[:2], np.s_[2:]), (next, motion[2:], np.s_[:2])):
+        there.append(None)
+        place = np.array([x, y]) + 0.5 + step
+        if frame is None or (place < 0).any() or (place >= frame[3].shape[::-1]).any():
+            continue
+        j, i = int(place[1]), int(place[0])
+        vectors, given = frame[2][j, i].astype(float), frame[3][j, i]
+        leads_back = np.hypot(*(vectors[back] + step)) < 1.5
+        if given > 0 and 1 / 1.15 < valid(given) / z < 1.15 and leads_back:
+            there[-1] = (vectors[:2] + vectors[2:]) / 2
+    before, after = there
+    if (before is None and after is None) or (np.abs(motion) < 0.01).all():
+        return 0.0, 0.0, 0.0
+    most = max(np.hypot(*c) for c in there if c is not None)
+    if before is None:
+        change = 2 * (after - here)
+    elif after is None:
+        change = 2 * (here - before)
+    else:
+        change = after - before
+        if np.hypot(*here) > max(1.0, most / 0.15):
+            return 0.0, 0.0, 1.0
+    change = change if most <= 3 * np.hypot(*here) + 2 else np.zeros(2)
+    return *(change / 6), 0.0
+
+
+def seen_background(around_it, motion, z, y, x):
+    """Mean colour of the background that moves so as frames around show it, or None."""
+    found = []
+    for frame, step, back in zip(
+        around_it, (motion[:2], motion[2:]), (np.s_[2:], np.s_[:2]), strict=True
+    ):
+        place = np.array([x, y]) + 0.5 + step
+        if (
+            frame is None
+            or (place < 0.5).any()
+            or (place > np.array(frame[3].shape[::-1]) - 0.5).any()
+        ):
+            continue
+        j, i = int(place[1]), int(place[0])
+        near = [frame[3][p] for p in around(*frame[3].shape, j, i, 1)]
+        as_deep = all(d > 0 and 1 / 1.1 < valid(d) / z < 1.1 for d in near)
+        if as_deep and np.hypot(*(frame[2][j, i][back].astype(float) + step)) < 1:
+            found.append(bilinear(frame[1].astype(float), *place))
+    return np.mean(found, axis=0) if found else None
+
+
+def separate_pixel(color, motion, z, edges, y, x, bends, around_it):
+    """Front colour, path, depth, coverage; back colour, path, depth; whether it is inferred.
+
+    Paths are a motion and a bend, that of the nearest pixel that shows this surface alone.
+    """
     height, width = z.shape
     inner = list(around(height, width, y, x, 1))
     nearest, farthest = min(z[p] for p in inner), max(z[p] for p in inner)
@@ -132,6 +202,14 @@ def separate_pixel(color, motion, z, edges, y, x):
     way = before - behind
     if way @ way < 0.25:
         return None
+
+    def bend_of(pixels):
+        pure = [(j, i) for j, i in pixels if not edges[j, i]] or [(y, x)]
+        return bends[min(pure, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)]
+
+    def path(vectors, pixels):
+        return np.concatenate([vectors, bend_of(pixels)])
+
     coverage = (motion[y, x] - behind) @ way / (way @ way)
     if color.shape[2] == 4:
         opaque = 1.0 if thin else mean(color, front)[3]
@@ -142,17 +220,25 @@ def separate_pixel(color, motion, z, edges, y, x):
     back_depth = mean(z, back)
     if coverage < 1 - 0.98:
         back_depth = z[y, x] if z[y, x] >= between else back_depth
-        return 0.0, before, mean(z, front), 0.0, color[y, x], motion[y, x], back_depth, False
+        own = path(motion[y, x], farther)
+        return 0.0, path(before, nearer), mean(z, front), 0.0, color[y, x], own, back_depth, False
     whole = coverage > 0.98
     coverage = 1.0 if whole else coverage
-    back_color = mean(color, back)
+    seen = seen_background(around_it, behind, back_depth, y, x)
+    back_color = mean(color, back) if seen is None else seen
     front_color = np.maximum(color[y, x] - (1 - coverage) * back_color, 0)
-    front_motion = motion[y, x] if whole else before
+    front_path = path(motion[y, x] if whole else before, nearer)
+    behind = path(behind, farther)
     front_depth = z[y, x] if whole and z[y, x] < between else mean(z, front)
-    return front_color, front_motion, front_depth, coverage, back_color, behind, back_depth, True
+    return front_color, front_path, front_depth, coverage, back_color, behind, back_depth, True
 
 
 # ---- tiles ----------------------------------------------------------------------------------
+
+
+def parabola(paths):
+    """The paths without what leaves the parabola."""
+    return np.concatenate([paths[..., :4], np.zeros((*paths.shape[:-1], 3))], axis=-1)
 
 
 def trajectory_distance(a, b, u):
@@ -162,11 +248,11 @@ def trajectory_distance(a, b, u):
 
 def cluster(paths, u):
     """The longest, then always the one that is most unlike those chosen and standing still."""
-    paths = np.reshape(paths, (-1, 4))
+    paths = parabola(np.reshape(paths, (-1, 7)))
     chosen, longest = [], 0.0
     for _ in range(MOTIONS):
         distances = np.min(
-            [trajectory_distance(paths, c, u) for c in [np.zeros(4), *chosen]], axis=0
+            [trajectory_distance(paths, c, u) for c in [np.zeros(7), *chosen]], axis=0
         )
         most = max(distances, default=0.0)
         longest = longest if chosen else most
@@ -178,7 +264,7 @@ def cluster(paths, u):
 
 def nearest_cluster(path, chosen, u):
     """Index of the chosen path, or None if it stands still rather."""
-    all_ = list(chosen) + [np.zeros(4)] * (MOTIONS - len(chosen))
+    all_ = list(chosen) + [np.zeros(7)] * (MOTIONS - len(chosen))
     best = int(np.argmin(trajectory_distance(np.array(all_), path, u)))
     return best if best < len(chosen) else None
 
@@ -193,7 +279,7 @@ def tile_candidates(frame, span):
     for j in range(rows):
         for i in range(columns):
             box = np.s_[j * TILE : (j + 1) * TILE, i * TILE : (i + 1) * TILE]
-            paths = frame.trajectory[0][box].reshape(-1, 4)
+            paths = parabola(frame.trajectory[0][box].reshape(-1, 7))
             z = frame.depth[0][box].ravel()
             chosen, longest = cluster(paths, u)
             depths = [np.inf] * len(chosen)
@@ -206,7 +292,7 @@ def tile_candidates(frame, span):
 
     def sweep_interval(path, off):
         """From when to when a tile that moves along the path touches the one `off` away."""
-        bend = np.hypot(*path[2:]) * (u1 - u0) ** 2 / 4
+        bend = np.hypot(*path[2:4]) * ((u1 - u0) ** 2 / 4 + 0.4)
         steps = np.linspace(0, 1, 2001)
         at = moved(path, u0) + steps[:, None] * (moved(path, u1) - moved(path, u0)) - off
         touching = steps[(np.abs(at) <= TILE + bend).all(axis=1)]

@@ -24,3 +24,22 @@ fn slowest_time(trajectory: Trajectory, opens: f32, closes: f32) -> f32 {
     let a = trajectory.half_acceleration;
     return clamp(-0.5 * dot(v, a) / max(dot(a, a), 1e-30), opens, closes);
 }
+
+// The same through the five positions from the second frame before to the second one after: position(t) =
+// position(0) + velocity t + half_acceleration t^2 + third (t^3 - t), which is the parabola where the third term is 0.
+struct Trajectory5 {
+    velocity: vec2f,            // mean of that before and after the frame [px per frame interval]
+    half_acceleration: vec2f,   // [px per squared frame interval]
+    third: vec2f,               // a sixth of the change of acceleration [px per cubed frame interval]
+    has_kink: bool,             // two straight pieces: |t| instead of t^2
+}
+
+fn trajectory5_from(parabola: Trajectory) -> Trajectory5 {
+    return Trajectory5(parabola.velocity, parabola.half_acceleration, vec2f(0.0), false);
+}
+
+/// Displacement [px] at time `t` [frame intervals] of what is here at time 0.
+fn displacement5(trajectory: Trajectory5, t: f32) -> vec2f {
+    let bend = select(t, sign(t), trajectory.has_kink);
+    return (trajectory.velocity + trajectory.half_acceleration * bend + trajectory.third * (t * t - 1.0)) * t;
+}

@@ -53,19 +53,18 @@ class Gather:
     def __init__(self, device, options: Options, *, output="rgba32float"):
         images, confidence = TexturePool(device), options.show == "confidence"
         self._tiles = ActiveTiles(device)
-        self._layers = Layers(device, images, self._tiles)
+        self._layers = Layers(device, images)
         self._motions = TileMotions(device, images)
         self._search = Search(device, images, confidence=confidence, output=output)
 
     def encode(self, encoder, inputs, output):
         """Record layers and tile motions of every frame, then the search."""
         size, frames = inputs.bindings.size, inputs.frames
-        slots = self._layers.slots(size, frames)
         worklists = self._tiles.encode(encoder, inputs)
-        for i, (frame, slot) in enumerate(zip(frames, slots, strict=True)):
-            self._layers.encode(encoder, inputs, frame, slot, worklists)
-            surface = self._layers.front_surface(slot)
+        self._layers.encode(encoder, inputs, worklists)
+        for i in range(len(frames)):
+            surface = self._layers.front_surface(i)
             self._motions.encode(encoder, inputs, i, surface, worklists)
         candidates = self._motions.candidates(size, len(frames))
         textures = self._layers.textures
-        self._search.encode(encoder, inputs, slots, textures, candidates, worklists, output)
+        self._search.encode(encoder, inputs, textures, candidates, worklists, output)

@@ -29,7 +29,6 @@ class ActiveTiles:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._lists = device, ScratchBuffer(device)
-        self._everywhere: tuple[tuple[int, int], dict] | None = None
 
     def encode(self, encoder, inputs) -> dict[str, dict]:
         """Record which tiles are active; the worklists of active_tiles.wgsl, by name."""
@@ -60,23 +59,3 @@ class ActiveTiles:
             }
             for name in ("active", "static", "separated", "motion_only", "flagged")
         }
-
-    def everywhere(self, size) -> dict:
-        """A worklist of all cells, their rows interleaved as by interleaved_row() of frame.wgsl."""
-        if self._everywhere is None or self._everywhere[0] != size:
-            source = wgsl.load("methods/gather/worklist.wgsl")
-            interleave, row, wide, side, strip = (
-                int(source.constant(n))
-                for n in ("INTERLEAVE", "GROUPS_PER_ROW", "CELL_TILES", "TILE", "STRIP_HEIGHT")
-            )
-            across, down = grid_of(size)
-            across = -(-across // wide)
-            rows = np.concatenate([np.arange(i, down, interleave) for i in range(interleave)])
-            cells = (np.arange(across) + 65536 * rows[:, None]).ravel()
-            head = min(cells.size, row), side // strip, -(-cells.size // row), cells.size
-            spare = [0] * (-cells.size % 4)  # a struct's size is a multiple of 16 bytes
-            data = np.array([*head, *cells, *spare], np.uint32)
-            usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDIRECT
-            buffer = self._device.create_buffer_with_data(label="all", data=data, usage=usage)
-            self._everywhere = size, {"buffer": buffer, "offset": 0, "size": buffer.size}
-        return self._everywhere[1]

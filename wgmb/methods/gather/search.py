@@ -22,17 +22,13 @@ class Search:
         self._device, self._images = device, images
         self._confidence, self._output = confidence, output
 
-    def encode(self, encoder, inputs, slots, layers, candidates, worklists, output):
-        """Record the classification of blocks, then all pixels.
-
-        `slots`: where in the textures `layers` each frame of `inputs` is.
-        """
+    def encode(self, encoder, inputs, layers, candidates, worklists, output):
+        """Record the classification of blocks, then all pixels."""
         timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
         classify = gpu.kernel(self._device, "methods/gather/classify.wgsl", **timed)
         data = np.zeros((), classify.source.dtype("SourceFrames"))
-        data["offsets"][: len(slots)] = [frame.offset for frame in inputs.frames]
-        data["slots"][: len(slots)] = slots
-        data["count"] = len(slots)
+        data["offsets"][: len(inputs.frames)] = [frame.offset for frame in inputs.frames]
+        data["count"] = len(inputs.frames)
         arrays = {k: t.create_view(dimension="2d-array") for k, t in layers.items()}
         searched = {
             "sources": uniform(self._device, "sources", data),
@@ -66,7 +62,7 @@ class Search:
             **timed,
         )
         separated = worklists["separated"]
-        differences = self._differences(encoder, inputs, layers["surfaces"], slots[0], separated)
+        differences = self._differences(encoder, inputs, layers["surfaces"], separated)
         for entry, cells in (("main", worklists["active"]), ("copy_static", worklists["static"])):
             kernel.run(
                 encoder,
@@ -84,7 +80,7 @@ class Search:
                 **arrays,
             )
 
-    def _differences(self, encoder, inputs, surfaces, slot: int, cells) -> wgpu.GPUTextureView:
+    def _differences(self, encoder, inputs, surfaces, cells) -> wgpu.GPUTextureView:
         """Record the second differences of the frame's own colours."""
         differences = self._images.view("second differences", inputs.bindings.size, "rgba32uint")
         kernel = gpu.kernel(self._device, "methods/gather/cubic.wgsl")
@@ -94,7 +90,7 @@ class Search:
             inputs.bindings,
             cells,
             color=inputs.frame.color,
-            front_surface=layer_view(surfaces, 2 * slot),
+            front_surface=layer_view(surfaces, 0),
             second_differences=differences,
             worklist=cells,
         )

@@ -41,13 +41,16 @@ fn mark_active_tiles(@builtin(local_invocation_index) local: u32,
     let window = exposure_window(source.offset);
     var least = vec4f(MAX_MOTION);      // to_prev, to_next [px]
     var most = vec4f(-MAX_MOTION);
+    var bend = vec2f(0.0);              // of half accelerations
     for (var i = 0; i < side * side; i++) {
         let px = clamp(corner + vec2i(i % side, i / side), vec2i(0), vec2i(frame.size) - 1);
         let vectors = clamp(textureLoad(motion, px, 0), vec4f(-MAX_MOTION), vec4f(MAX_MOTION));
         least = min(least, vectors);
         most = max(most, vectors);
+        bend = max(bend, abs(0.5 * (vectors.xy + vectors.zw)));
     }
-    let box = union_with_origin(displacement_box(least, most, window.x), displacement_box(least, most, window.y));
+    bend = select(vec2f(0.0), MOST_BEND * bend, bend > vec2f(STATIC_EPSILON));
+    let box = union_with_origin(displacement_box(least, most, window.x), displacement_box(least, most, window.y)) + vec4f(-bend, bend);
     let margin = 1.0 + 2.0 / f32(TILE);     // as in sweep_overlaps() of the tile motions
     let first = max(here + max(vec2i(floor(box.xy / f32(TILE) - margin)), vec2i(-MAX_TILE_RADIUS)), vec2i(0));
     let last = min(here + min(vec2i(ceil(box.zw / f32(TILE) + margin)), vec2i(MAX_TILE_RADIUS)), tiles - 1);

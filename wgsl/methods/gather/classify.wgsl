@@ -44,12 +44,12 @@ fn main(@builtin(local_invocation_index) local: u32,
         var f = 0u;
         loop {          // the frame itself; then, away from its instant, the neighbour on the side of `t`
             let u = t - offset_of(f);
-            let layer = texture_layer(2u * f);
+            let layer = 2u * f;
             let handicap = select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u);
             let candidates = candidates_of(f, candidates0, candidates1, candidates2);
             let dx = displacements_x(candidates, u);
             let dy = displacements_y(candidates, u);
-            let start = displacement(unpack_trajectory(textureLoad(surfaces, low, layer, 0)), u);
+            let start = displacement5(unpack_trajectory(textureLoad(surfaces, low, layer, 0)), u);
             let visible_depth = deepest;
             var n = 0u;
             loop {      // the corners

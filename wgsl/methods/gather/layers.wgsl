@@ -5,6 +5,7 @@
 //#include common/path.wgsl
 //#include methods/gather/worklist.wgsl
 //#include methods/gather/surface.wgsl
+//#include methods/gather/around.wgsl
 
 @group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
 @group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
@@ -28,8 +29,6 @@ alias Flags = texture_storage_2d<r32uint, write>;
 alias Color = texture_storage_2d_array<rgba32float, write>;
 alias Packed = texture_storage_2d_array<rgba32uint, write>;
 alias Matte = texture_storage_2d<rgba32float, write>;
-
-override WEIGHTED: bool = false;    // read `weight`
 
 const FRONT: u32 = 0u;          // layers of an array
 const BACK: u32 = 1u;
@@ -118,8 +117,8 @@ fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(work
         smooth_here = smooth_here && !is_edge(flags) && weight_at(at) == counts;
         near_edge = near_edge || is_edge(flags);
     }
-    let trajectory = trajectory_from(textureLoad(motion, px, 0));
     let z = flagged_depth(here);
+    let trajectory = trajectory_around(px, textureLoad(motion, px, 0), z);
     textureStore(colors, px, FRONT, textureLoad(color, px, 0));
     textureStore(surfaces, px, FRONT, pack_surface(trajectory, select(z, -z, near_edge), smooth_here));
     textureStore(surfaces, px, BACK, pack_surface(trajectory, 0.0, false));
@@ -150,6 +149,11 @@ fn add(side: ptr<function, Side>, share: f32, motion_there: vec4f, z: f32, color
     (*side).depth += share * z;
     (*side).color += share * color_there;
     (*side).weight += share * weight_there;
+}
+
+struct Place {          // the nearest pure pixel of a side
+    at: vec2i,
+    distance2: f32,     // [px^2]
 }
 
 struct Neighbour {      // a pixel of the 5 x 5 around an edge pixel
@@ -201,13 +205,19 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     var back_seen = false;      // the back layer is not inferred
 
     let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= NO_DEPTH);    // depth of neither
-    var thin = true;                // no pure pixel is in front: a wire
-    var no_pure_background = true;
+    var front_place = Place(px, INFINITE);
+    var back_place = Place(px, INFINITE);
     for (var i = 0; i < 25; i++) {
         let there = neighbour(px, i, between);
-        thin = thin && !(there.counts && there.is_front && there.is_pure);
-        no_pure_background = no_pure_background && !(there.counts && !there.is_front && there.is_pure);
+        if there.counts && there.is_pure && there.is_front && there.distance2 < front_place.distance2 {
+            front_place = Place(there.at, there.distance2);
+        }
+        if there.counts && there.is_pure && !there.is_front && there.distance2 < back_place.distance2 {
+            back_place = Place(there.at, there.distance2);
+        }
     }
+    let thin = front_place.distance2 >= INFINITE;               // no pure pixel is in front: a wire
+    let no_pure_background = back_place.distance2 >= INFINITE;
     var front_side = Side();
     var back_side = Side();
     for (var i = 0; i < 25; i++) {
@@ -244,17 +254,19 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
             let measured = clamp(select(dot(own_motion - background_motion, axis) / dot(axis, axis),
                 (own_color.a / counts - back_alpha) / (front_alpha - back_alpha), by_alpha), 0.0, 1.0);
             back_depth = back_side.depth / back_side.total;
+            let seen = background_around(px, background_motion, back_depth);
+            let background = select(back_side.color / back_side.weight, seen.color / max(seen.count, 1.0), seen.count > 0.0);
             if measured < 1.0 - FULL {      // all background, whatever the one sample of the depth says
                 back_seen = true;
                 coverage = 0.0;
-                back = select(back_side.color / back_side.weight, own_color / counts, counts > 0.0);
+                back = select(background, own_color / counts, counts > 0.0);
                 front = vec4f(0.0);
                 front_motion = foreground_motion;
                 if z >= between { back_depth = z; }
                 z = front_side.depth / front_side.total;
             } else {
                 coverage = select(measured, 1.0, measured > FULL);
-                back = back_side.color / back_side.weight;
+                back = background;
                 front = max(own_color - (1.0 - coverage) * counts * back, vec4f(0.0));
                 back_motion = background_motion;
                 if measured <= FULL { front_motion = foreground_motion; }
@@ -262,11 +274,21 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
             }
         }
     }
+    // How the paths of the two go on is told by the nearest pure pixels: filtered vectors lead to mixtures.
+    let front_path = with_bend_of(front_place.at, front_motion);
+    let back_path = with_bend_of(back_place.at, back_motion);
     textureStore(colors, px, FRONT, front);
-    textureStore(surfaces, px, FRONT, pack_surface(trajectory_from(front_motion), -z, false));
+    textureStore(surfaces, px, FRONT, pack_surface(front_path, -z, false));
     if back_depth > 0.0 { textureStore(colors, px, BACK, back); }     // else nobody reads it
-    textureStore(surfaces, px, BACK, pack_surface(trajectory_from(back_motion), max(back_depth, 0.0), back_seen));
+    textureStore(surfaces, px, BACK, pack_surface(back_path, max(back_depth, 0.0), back_seen));
     textureStore(matte, px, vec4f(z, back_depth, coverage, coverage * counts));
+}
+
+/// The trajectory of these vectors, bent as that of the surface at `px` is.
+fn with_bend_of(px: vec2i, vectors: vec4f) -> Trajectory5 {
+    let parabola = trajectory_from(vectors);
+    let there = trajectory_around(px, textureLoad(motion, px, 0), flagged_depth(flags_at(px)));
+    return Trajectory5(parabola.velocity, parabola.half_acceleration, there.third, there.has_kink);
 }
 
 /// For cells far from all that moves: searches may pass over them, but nobody reads their colours.
@@ -275,7 +297,7 @@ fn copy_motion_only(@builtin(local_invocation_index) local: u32, @builtin(workgr
     let k = worklist_index(group);
     let px = vec2i(pixel_in_strip(worklist.cells[k], group, local));
     if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
-    let trajectory = trajectory_from(textureLoad(motion, px, 0));
+    let trajectory = trajectory5_from(trajectory_from(textureLoad(motion, px, 0)));
     let z = flagged_depth(bitcast<u32>(depth_at(px)));
     textureStore(surfaces, px, FRONT, pack_surface(trajectory, z, false));
     textureStore(surfaces, px, BACK, pack_surface(trajectory, 0.0, false));

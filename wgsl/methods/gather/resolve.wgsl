@@ -33,7 +33,7 @@ struct Sample {
     true_depth: f32,
     residual2: f32,     // squared distance of its position from the pixel [px^2]
     at: vec2f,          // in its frame [px]
-    layer: u32,         // see texture_layer()
+    layer: u32,         // of `surfaces`
 }
 
 struct Visible {        // the nearest samples of each kind
@@ -54,7 +54,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let candidates0 = load_candidates(tile, 0u);
     let candidates1 = load_candidates(tile, 1u);
     let candidates2 = load_candidates(tile, 2u);
-    let front = texture_layer(0u);
+    let front = 0u;
     let trajectory = unpack_trajectory(textureLoad(surfaces, id, front, 0));
     let block_trajectory = unpack_trajectory(textureLoad(surfaces, id / BLOCK * BLOCK, front, 0));  // as classified
     let shift = frame.jitter * (pixel_noise(id) - 0.5);
@@ -81,7 +81,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
         var todo = single;
         loop {              // times at which one search is enough
             let t = time_in(times, first, todo);
-            let found = iterate_fixed_point(x, displacement(block_trajectory, t), t, front);
+            let found = iterate_fixed_point(x, displacement5(block_trajectory, t), t, front);
             let px = nearest_pixel(x - found.d);
             var is_even = true;     // of one weight
             var counts = 1.0;
@@ -115,7 +115,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
             if todo == 0u { break; }
         }
         loop {              // of them, those at which no frame shows anything: a tap along the pixel's own trajectory
-            let p = x - displacement(trajectory, time_in(times, first, unresolved));
+            let p = x - displacement5(trajectory, time_in(times, first, unresolved));
             if unresolved != 0u {
                 var counts = 1.0;
                 if WEIGHTED { counts = textureSampleLevel(own_weight, linear, p / vec2f(frame.size), 0.0).x; }
@@ -179,7 +179,7 @@ const OTHER_BACK: u32 = 5u;
 const SEARCHES: u32 = 6u;
 
 /// The nearest samples that are at `x` [px] by the time `t` [frame intervals], by the candidates of all frames.
-fn resolve_visibility(x: vec2f, trajectory: Trajectory, t: f32,
+fn resolve_visibility(x: vec2f, trajectory: Trajectory5, t: f32,
                       a: Candidates, b: Candidates, c: Candidates) -> Visible {
     let has_edge = max(a.header.y, max(b.header.y, c.header.y)) > 0.0;
     var visible = Visible(nothing(), nothing(), nothing());
@@ -190,7 +190,7 @@ fn resolve_visibility(x: vec2f, trajectory: Trajectory, t: f32,
         let is_back = search == OWN_BACK || search > OTHER_FRONT;
         let u = t - offset_of(f);
         let query = Query(x, u, 2u * f + u32(is_back), select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u));
-        search_layer(&visible, query, displacement(trajectory, u), candidates_of(f, a, b, c));
+        search_layer(&visible, query, displacement5(trajectory, u), candidates_of(f, a, b, c));
         if search == OWN_FRONT { hidden = visible.opaque.depth >= INFINITE; }
         search = next_search(search, visible, t, hidden, has_edge);
         if search >= SEARCHES { break; }
@@ -218,7 +218,7 @@ fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool
 struct Query {          // what is searched, and where
     x: vec2f,           // the pixel [px]
     u: f32,             // time since the frame's instant [frame intervals]
-    layer: u32,         // see texture_layer()
+    layer: u32,         // of `surfaces`
     handicap: f32,      // factor of the layer's depths
 }
 
@@ -259,7 +259,7 @@ fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first:
     var is_there = false;
     loop {              // a turn is a step
         let back = state.d - first.state.d;
-        state = warp_step(query.x, state.d, query.u, texture_layer(query.layer));
+        state = warp_step(query.x, state.d, query.u, query.layer);
         n++;
         let again = same_solution(state.d, first.state.d);
         let farther = !is_first && unpack_depth(state.surface) * query.handicap >= limit;
@@ -334,7 +334,7 @@ fn composite_front_to_back(visible: Visible) -> Composite {
         && is_behind(visible.back_edge, visible.front_edge);
     let opaque = visible.opaque.depth < INFINITE;
     let at = visible.opaque.at;
-    let layer = texture_layer(visible.opaque.layer);
+    let layer = visible.opaque.layer;
     var filtered = opaque && visible.opaque.layer % 2u == 0u;   // as a whole, not texel by texel
     if WEIGHTED { filtered = filtered && is_smooth(textureLoad(surfaces, nearest_pixel(at), layer, 0)); }
     let parts = u32(front_edge) + u32(back_edge) + u32(opaque && !filtered);
@@ -375,7 +375,7 @@ fn composite_front_to_back(visible: Visible) -> Composite {
 
 /// Add texel `i` of the four around a sample, with its bilinear weight, if it is of the same surface.
 fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32) {
-    let front = texture_layer(sample.layer / 2u * 2u);
+    let front = sample.layer / 2u * 2u;
     let is_back = sample.layer % 2u == 1u;
     let corner = floor(sample.at - 0.5);
     let share = sample.at - 0.5 - corner;

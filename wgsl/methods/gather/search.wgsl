@@ -10,12 +10,11 @@
 
 struct SourceFrames {
     offsets: vec4f,         // [frame intervals]; the first is 0, the frame itself
-    slots: vec4u,           // of their layers in the textures, see texture_layer()
     count: u32,
 }
 
 @group(1) @binding(0) var<uniform> sources: SourceFrames;
-@group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // see pack_surface(), texture_layer()
+@group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // see pack_surface(); front, back of the frame itself, front, back of the next one, ...
 @group(1) @binding(2) var tile_candidates: texture_2d_array<f32>;   // CANDIDATE_LAYERS per frame
 
 const MAX_ITERATIONS: u32 = 8u; // from the pixel's own trajectory
@@ -103,13 +102,6 @@ fn neighbour_of(t: f32, second: bool) -> u32 {
     return select(1u, 2u, (sources.count == 3u && t > 0.0) != second);
 }
 
-/// Where in the textures a layer is. Layers are counted front, back of the frame itself, front, back of the next one, ...
-fn texture_layer(layer: u32) -> u32 {
-    let f = layer / 2u;
-    let slots = sources.slots;
-    return 2u * select(select(slots.z, slots.y, f == 1u), slots.x, f == 0u) + layer % 2u;
-}
-
 fn offset_of(f: u32) -> f32 {
     return select(select(sources.offsets.z, sources.offsets.y, f == 1u), 0.0, f == 0u);
 }
@@ -154,7 +146,7 @@ struct WarpState {
 fn warp_step(x: vec2f, d: vec2f, u: f32, layer: u32) -> WarpState {
     let p = x - d;
     let surface = textureLoad(surfaces, vec2i(floor(p)), layer, 0);
-    let next = displacement(unpack_trajectory(surface), u);
+    let next = displacement5(unpack_trajectory(surface), u);
     let step = next - d;
     return WarpState(surface, next, select(INFINITE, dot(step, step), is_inside(p)));
 }

@@ -283,7 +283,8 @@ fn sweep_overlaps(box: vec4f, off: vec2f) -> bool {
 fn sweep_interval(trajectory: vec4f, window: vec2f, off: vec2f) -> vec2f {
     let start = displacement4(trajectory, window.x) - off;
     let sweep = displacement4(trajectory, window.y) - off - start;
-    let bend = length(trajectory.zw) * (window.y - window.x) * (window.y - window.x) * 0.25;
+    let duration = window.y - window.x;
+    let bend = length(trajectory.zw) * (duration * duration * 0.25 + MOST_BEND);
     let margin = f32(TILE) + bend;
     let divisor = select(sweep, vec2f(1e-6), abs(sweep) < vec2f(1e-6));
     let a = (-margin - start) / divisor;

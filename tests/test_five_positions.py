@@ -1,0 +1,89 @@
+"""Paths through five positions: the neighbours' own vectors tell where a body is two frames away."""
+
+import numpy as np
+import pytest
+
+import wgmb
+from images import frame_of
+from twins import gather as twin
+from wgmb import Shutter
+
+SIZE = (60, 110)
+
+
+def swings(t):
+    """By 70 degrees a frame."""
+    return 24 * np.sin(np.radians(70) * t + 0.6), 8 * np.cos(np.radians(50) * t)
+
+
+def starts(t):
+    return 26 * max(t, 0.0), 9 * max(t, 0.0)
+
+
+def bounces(t):
+    return 14 * t, -16 * abs(t)
+
+
+def falls(t):
+    return 9 * t, 6 * t * t
+
+
+def shot(path, t, size=SIZE):
+    """A textured box on its path before a textured wall: colour, motion, depth."""
+    fine, (height, width) = 4, size
+    y, x = (np.mgrid[: height * fine, : width * fine] + 0.5) / fine
+    at = np.array(path(t))
+    u, v = x - at[0] - width / 2, y - at[1] - height / 2
+    box = (abs(u) < height / 3) & (abs(v) < height / 4)
+    texture = 0.5 + 0.4 * np.sin(0.9 * u + 0.2 * v) * np.sin(0.8 * v)
+    wall = 0.4 + 0.2 * np.sin(0.3 * x + 0.5 * y)
+    color = np.where(box, texture, wall)[..., None] * [1.0, 0.8, 0.6]
+    vectors = np.concatenate([np.array(path(t + side)) - at for side in (-1, 1)])
+    motion = np.where(box[..., None], vectors, 0.0)
+
+    def mean(a):
+        return a.reshape(height, fine, width, fine, -1).mean(axis=(1, 3)).astype("f4")
+
+    return mean(color), mean(motion), np.where(box, 4.0, 9.0)[2::fine, 2::fine].astype("f4")
+
+
+def decibel(frame, path):
+    """PSNR of gather's frame at 360 degrees."""
+    got = wgmb.Blur("gather", shutter=360, samples=16)(frame)
+    times = Shutter(360).sample_times(16).astype(float)
+    truth = np.mean([shot(path, t)[0] for t in times], axis=0)
+    return -10 * np.log10(np.mean((got - truth) ** 2))
+
+
+@pytest.mark.parametrize("path, gain", [(swings, 8), (starts, 12), (bounces, 8)])
+def test_a_path_bends_as_five_positions_say(path, gain):
+    sources = [shot(path, t) for t in (0, -1, 1)]
+    known = decibel(frame_of(sources), path)
+    # The same, but beyond the three positions all goes on as a parabola through them would.
+    bends = np.median((sources[0][1][..., :2] + sources[0][1][..., 2:])[16:44, 40:70], axis=(0, 1))
+    parabola = sources[:1]
+    for (color, vectors, depth), to_frame, beyond in zip(
+        sources[1:], (np.s_[2:], np.s_[:2]), (np.s_[:2], np.s_[2:]), strict=True
+    ):
+        changed = vectors.copy()
+        moves = vectors.any(axis=2)
+        changed[moves, beyond] = bends - vectors[moves, to_frame]
+        parabola.append((color, changed, depth))
+    assert known > decibel(frame_of(parabola), path) + gain
+
+
+def test_a_parabola_stays_one():
+    sources = [shot(falls, t) for t in (0, -1, 1)]
+    assert decibel(frame_of(sources), falls) > 50
+
+
+@pytest.mark.parametrize("path", [swings, starts])
+@pytest.mark.parametrize("frames", [2, 3])
+def test_gather_is_its_twin_on_such_paths(path, frames):
+    size = (32, 56)
+    sources = [(t, *shot(path, t, size)) for t in (0, -1, 1)[:frames]]
+    own, *near = [wgmb.Frame(c, motion=m, depth=d) for _, c, m, d in sources]
+    frame = own.between(*near, *[None] * (3 - frames))
+    got = wgmb.Blur("gather", samples=4, shutter=360)(frame)
+    want = twin.gather(sources, Shutter(360).sample_times(4).astype(float))
+    assert (np.abs(got - want) > 1e-3).any(axis=2).mean() < 0.01

@@ -1,0 +1,116 @@
+// What the frames before and after a frame tell of it: where a surface goes beyond them, and backgrounds that it hides.
+// Where there is no such frame its textures are empty: their depth is 0.
+//#include common/depth.wgsl
+//#include common/frame.wgsl
+//#include common/path.wgsl
+
+@group(1) @binding(12) var prev_color: texture_2d<f32>;
+@group(1) @binding(13) var prev_motion: texture_2d<f32>;
+@group(1) @binding(14) var prev_depth: texture_2d<f32>;
+@group(1) @binding(15) var prev_weight: texture_2d<f32>;
+@group(1) @binding(16) var next_color: texture_2d<f32>;
+@group(1) @binding(17) var next_motion: texture_2d<f32>;
+@group(1) @binding(18) var next_depth: texture_2d<f32>;
+@group(1) @binding(19) var next_weight: texture_2d<f32>;
+
+override WEIGHTED: bool = false;        // read weights
+
+const RETURNS: f32 = 1.5;               // a surface is found again where its vector leads back within this [px]
+const SAME_DEPTH_RATIO: f32 = 1.15;     // and its depth has not changed by more: it may come nearer
+const MOST_CHANGE: f32 = 3.0;           // of a half acceleration from one frame to the next, as a ratio
+const SPARED_CHANGE: f32 = 2.0;         // and this much more [px]: what changes more is another surface, or noise
+const KINK_ACCELERATION: f32 = 1.0;     // from this half acceleration on [px] a path may have a kink,
+const KINK_RATIO: f32 = 0.15;           // if those before and after it are smaller by this
+
+struct Acceleration {       // of a surface in a neighbouring frame
+    half: vec2f,            // [px per squared frame interval]
+    is_known: bool,
+}
+
+/// The trajectory of the surface at the centre of `px` with these vectors: through five positions as far as the frames
+/// around show the surface too, whose own vectors lead to the second frame before and after.
+fn trajectory_around(px: vec2i, motion: vec4f, z: f32) -> Trajectory5 {
+    var trajectory = trajectory5_from(trajectory_from(motion));
+    let before = acceleration_in(prev_motion, prev_depth, px, motion.xy, z, false);
+    let after = acceleration_in(next_motion, next_depth, px, motion.zw, z, true);
+    let here = trajectory.half_acceleration;
+    // The change over two frame intervals; twice that over one, if one is all that is known.
+    var change = vec2f(0.0);
+    if before.is_known && after.is_known { change = after.half - before.half; }
+    if before.is_known && !after.is_known { change = 2.0 * (here - before.half); }
+    if after.is_known && !before.is_known { change = 2.0 * (after.half - here); }
+    let most = max(select(0.0, length(before.half), before.is_known), select(0.0, length(after.half), after.is_known));
+    let stays = all(abs(motion) < vec4f(STATIC_EPSILON));
+    let believed = !stays && most <= MOST_CHANGE * length(here) + SPARED_CHANGE;
+    trajectory.third = select(vec2f(0.0), change / 6.0, believed);
+    // Straight before and after, but not here: it starts, stops or bounces in this very frame.
+    trajectory.has_kink = before.is_known && after.is_known && length(here) > KINK_ACCELERATION
+        && most < KINK_RATIO * length(here);
+    if trajectory.has_kink { trajectory.third = vec2f(0.0); }
+    return trajectory;
+}
+
+/// Half the acceleration in a neighbouring frame of what is displaced by `step` [px] up to it.
+fn acceleration_in(motion_there: texture_2d<f32>, depth_there: texture_2d<f32>, px: vec2i, step: vec2f, z: f32,
+                   is_next: bool) -> Acceleration {
+    let at = vec2f(px) + 0.5 + step;
+    let is_inside = all(at >= vec2f(0.0)) && all(at < vec2f(frame.size));
+    let there = vec2i(clamp(at, vec2f(0.0), vec2f(frame.size) - 1.0));
+    let vectors = textureLoad(motion_there, there, 0);
+    let given = textureLoad(depth_there, there, 0).x;
+    let ratio = valid_depth(given) / z;
+    let off = select(vectors.zw, vectors.xy, is_next) + step;
+    let is_same = given > 0.0 && ratio < SAME_DEPTH_RATIO && ratio > 1.0 / SAME_DEPTH_RATIO
+        && dot(off, off) < RETURNS * RETURNS;
+    return Acceleration(0.5 * (vectors.xy + vectors.zw), is_inside && is_same);
+}
+
+struct Background {         // sums over the frames that show it
+    color: vec4f,           // not premultiplied by weight
+    count: f32,
+}
+
+const BACKGROUND_DEPTH_RATIO: f32 = 1.1;    // depth that a background may differ by from where it is expected
+const BACKGROUND_RETURNS: f32 = 1.0;        // [px], see RETURNS
+
+/// The background at the centre of `px`, of these vectors and this depth, as the frames around show it.
+fn background_around(px: vec2i, motion: vec4f, z: f32) -> Background {
+    var sum = Background(vec4f(0.0), 0.0);
+    look(&sum, prev_color, prev_motion, prev_depth, prev_weight, px, motion.xy, z, false);
+    look(&sum, next_color, next_motion, next_depth, next_weight, px, motion.zw, z, true);
+    return sum;
+}
+
+/// Add what a neighbouring frame shows, if all of the 3 x 3 around the place is as deep as expected.
+fn look(sum: ptr<function, Background>, color_there: texture_2d<f32>, motion_there: texture_2d<f32>,
+        depth_there: texture_2d<f32>, weight_there: texture_2d<f32>, px: vec2i, step: vec2f, z: f32, is_next: bool) {
+    let at = vec2f(px) + 0.5 + step;
+    let is_inside = all(at >= vec2f(0.5)) && all(at <= vec2f(frame.size) - 0.5);
+    let there = vec2i(clamp(at, vec2f(0.0), vec2f(frame.size) - 1.0));
+    var is_clear = is_inside;
+    for (var i = 0; i < 9; i++) {
+        let near = clamp(there + vec2i(i % 3, i / 3) - 1, vec2i(0), vec2i(frame.size) - 1);
+        let given = textureLoad(depth_there, near, 0).x;
+        let ratio = valid_depth(given) / z;
+        is_clear = is_clear && given > 0.0 && ratio < BACKGROUND_DEPTH_RATIO && ratio > 1.0 / BACKGROUND_DEPTH_RATIO;
+    }
+    let vectors = textureLoad(motion_there, there, 0);
+    let off = select(vectors.zw, vectors.xy, is_next) + step;
+    var counts = 1.0;
+    if WEIGHTED { counts = interpolated(weight_there, at).x; }
+    if is_clear && counts > 0.5 && dot(off, off) < BACKGROUND_RETURNS * BACKGROUND_RETURNS {
+        (*sum).color += interpolated(color_there, at) / counts;
+        (*sum).count += 1.0;
+    }
+}
+
+/// Bilinear, for textures that samplers cannot filter.
+fn interpolated(image: texture_2d<f32>, at: vec2f) -> vec4f {
+    let corner = floor(at - 0.5);
+    let share = at - 0.5 - corner;
+    let low = vec2i(clamp(corner, vec2f(0.0), vec2f(frame.size) - 1.0));
+    let high = min(low + 1, vec2i(frame.size) - 1);
+    let above = mix(textureLoad(image, low, 0), textureLoad(image, vec2i(high.x, low.y), 0), share.x);
+    let below = mix(textureLoad(image, vec2i(low.x, high.y), 0), textureLoad(image, high, 0), share.x);
+    return mix(above, below, share.y);
+}
