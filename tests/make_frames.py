@@ -15,8 +15,6 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
-from wgmb.cli import app
-
 WIDTH, HEIGHT = 64, 48
 VELOCITY = (4.0, 2.0)  # pixels per frame, y down
 MAX_DISPLACE = 16.0  # of the rsmb convention
@@ -174,6 +172,8 @@ def command(*arguments, env: dict | None = None, **options) -> subprocess.Comple
 
 def inside(capsys, *arguments) -> tuple[int, str, str]:
     """`wgmb` in this process: exit code, what it said on stdout and on stderr."""
+    from wgmb.cli import app
+
     capsys.readouterr()
     code = app.main([str(a) for a in arguments])
     said = capsys.readouterr()

@@ -184,13 +184,17 @@ def test_pictures_without_vectors_move_by_flow(tmp_path, capsys):
             tmp_path / f"a.{n}.png"
         )
     words = ["blur", tmp_path / "a.#.png", "-o", tmp_path / "b.#.png", "--frames", "2-4"]
-    text = run(capsys, *words, "--flow", "dis")
+    text = run(capsys, *words, "--flow", "dis", "-v")
     assert "dense inverse search, as the frames hold none" in text
+    assert '"samples": "auto"' in text
     with Image.open(tmp_path / "a.3.png") as a, Image.open(tmp_path / "b.3.png") as b:
         off = np.abs(np.asarray(a).astype(int) - np.asarray(b))
     assert off[30:50, 40:70].mean() > 1.5 and off[:, :16].mean() < 0.5
     again = run(capsys, *words, "--flow", "dis", "--resume")
     assert "3 already done" in again
+    assert '"samples": 16' in run(
+        capsys, *words, "--flow", "dis", "--samples", 16, "-v", "--overwrite"
+    )
     assert "needs motion" in run(capsys, *words, "--flow", "none", "--overwrite", code=1)
 
 

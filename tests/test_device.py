@@ -18,6 +18,23 @@ def in_a_process(script: str, *arguments) -> subprocess.CompletedProcess:
     return subprocess.run(line, capture_output=True, text=True, timeout=120)
 
 
+ADAPTERS = """
+import os
+from wgmb import gpu
+assert gpu.adapters()
+print(os.environ.get("XDG_RUNTIME_DIR"))
+"""
+
+
+@pytest.mark.parametrize("before", [None, "", "/tmp"])
+def test_looking_for_adapters_is_silent_and_leaves_the_environment_as_it_was(before, monkeypatch):
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    if before is not None:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", before)
+    done = in_a_process(ADAPTERS)
+    assert (done.stdout, done.stderr) == (f"{before}\n", "")
+
+
 LOST = """
 import sys
 from wgmb import Blur

@@ -338,7 +338,7 @@ def test_blenders_config_is_found_in_its_module(tmp_path, monkeypatch):
 
 def test_opencolorio_that_is_missing_is_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "PyOpenColorIO", None)
-    with pytest.raises(InputError, match=r"not installed: pip install wgmb\[ocio\]"):
+    with pytest.raises(InputError, match=r"not installed: pip install 'wgmb\[ocio\]'"):
         ColorConfig("builtin")
 
 

@@ -2,9 +2,12 @@
 
 import ast
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
+
+from wgmb.extras import EXTRAS
 
 pytestmark = pytest.mark.fast
 
@@ -14,7 +17,8 @@ PACKAGE, SHADERS = ROOT / "wgmb", ROOT / "wgsl"
 # A room imports only from lines above its own, and from itself.
 LAYERS = [
     {"_version", "errors", "color", "coding"},
-    {"primaries", "ocio"},
+    {"primaries", "extras"},
+    {"ocio"},
     {"gpu", "shutter", "camera", "metrics", "display"},
     {"frame", "cone"},
     {"frame_views", "reach", "exposure"},
@@ -93,12 +97,43 @@ def test_imports_point_upwards_in_the_table_and_third_parties_stay_at_home(file)
             assert room in HOMES[module[0]], f"{room} imports {module[0]}"
 
 
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+OTHER_NAMES = {"av": "av", "cv2": "opencv-python-headless", "PIL": "pillow"}
+OTHER_NAMES |= {"PyOpenColorIO": "opencolorio"}
+
+
+def listed(requirements) -> set[str]:
+    """Names of the packages that are listed, and of those in extras that are listed."""
+    names = set()
+    for line in requirements:
+        name = re.match(r"[\w-]+", line)[0].lower().replace("_", "-")
+        if name != "wgmb":
+            names.add(name)
+            continue
+        for extra in re.search(r"\[(.*)\]", line)[1].split(","):
+            names |= listed(PROJECT["optional-dependencies"][extra])
+    return names
+
+
+def name_of(package: str) -> str:
+    """What the package index calls what Python imports."""
+    return OTHER_NAMES.get(package, package).lower().replace("_", "-")
+
+
 def test_every_third_party_has_a_home():
-    text = (ROOT / "pyproject.toml").read_text()
-    (listed,) = re.findall(r"^dependencies = \[(.*?)^\]", text, re.M | re.S)
-    names = {n.lower() for n in re.findall(r'^\s*"([A-Za-z_-]+)', listed, re.M)}
-    known = {n.lower().replace("_", "-") for n in HOMES} | {"numpy", "pillow"}
-    assert {n.replace("_", "-") for n in names} <= known
+    known = {name_of(package) for package in HOMES} | {"numpy"}
+    assert listed(PROJECT["dependencies"]) | listed(["wgmb[all]"]) <= known
+
+
+@pytest.mark.parametrize("package", EXTRAS)
+def test_the_extra_that_a_message_names_installs_the_package(package):
+    extra, _ = EXTRAS[package]
+    assert name_of(package) in listed([f"wgmb[{extra}]"])
+
+
+def test_what_is_not_of_the_core_has_an_extra():
+    core = listed(PROJECT["dependencies"]) | {"numpy"}
+    assert {package for package in HOMES if name_of(package) not in core} <= EXTRAS.keys()
 
 
 def test_no_room_stands_empty():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import make_clips
 import make_frames as make
 from wgmb.cli import app
 from wgmb.viewer import State
@@ -73,6 +74,7 @@ def desk(tmp_path, monkeypatch):
         (tmp_path / name.replace("shot", "blurred")).hardlink_to(name)
     for name in ("truth", "vecblur"):
         make.write_exr(tmp_path / f"{name}.exr", make.frame(2))
+    make_clips.write(tmp_path / "in.mp4", tone=0.1)
     Path("wgmb.toml").write_text(State(samples=2, size=SMALL).toml())
     return tmp_path
 

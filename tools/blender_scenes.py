@@ -1,17 +1,19 @@
 """Scenes with a path tracer's own motion blur: python tools/blender_scenes.py FOLDER [SCENE ...]
 
-A scene is one of this file's, or an animated glTF file, FILE.glb or FILE.glb:ANIMATION (else
-its first): its cycle is played SPEED times as fast as the file says, so that a walk blurs like
-a run, with the cycle's middle on frame 10.
+A scene is one of this file's, of light_scenes.py or of hard_scenes.py, or an animated glTF file,
+FILE.glb or FILE.glb:ANIMATION (else its first): its cycle is played SPEED times as fast as the
+file says, so that a walk blurs like a run, with the cycle's middle on frame 10.
 
 Runs in an environment of its own (Python 3.11, `pip install bpy==4.5.15 OpenEXR`, 1 GB), on
-the CPU, three to five minutes a scene on two cores. Into FOLDER/SCENE it writes
-prev.exr, curr.exr, next.exr    frames 9, 10, 11 without motion blur, with depth and vectors
+the CPU, one to five minutes a scene on two cores. Into FOLDER/SCENE it writes
+prev.exr, curr.exr, next.exr    frames 9, 10, 11 without motion blur, with depth and vectors, and
+                                with passes of light where the scene asks for them
 truth_050.exr, truth_100.exr    frame 10 with Cycles' motion blur: 180 and 360 degrees, box,
                                 centred on the frame; the mean of two halves, kept as .a and .b
 blender_vecblur_050.exr, _100   what Blender's Vector Blur node makes of curr.exr
 camera.json                     the cameras of frames 9, 9.5, 10, 10.5, 11
-Light is direct and from one point, ambient light is emission: all noise is of edges.
+Light is direct, ambient light is emission, and most scenes have one lamp, a point: noise is of
+edges alone there.
 """
 
 import json
@@ -23,122 +25,20 @@ from pathlib import Path
 import bpy
 import numpy as np
 import OpenEXR
+from blender_kit import AMBIENT, FRAME, Scene, add, animate, box, camera, limb, material, sun
+from hard_scenes import HARD
+from light_scenes import LIGHT
 from mathutils import Matrix, Vector
 
-SIZE, FPS, FRAME = (640, 360), 24, 10
-SAMPLES = 192  # of a sharp frame, and of one half of a truth
+FPS = 24
 VECTOR_BLUR = 64  # samples of Blender's node
 SHUTTERS = {"050": 0.5, "100": 1.0}
-SPAN = 2.25  # frames from the middle one to the last key: vectors of 9 and 11 lead to 8 and 12
-STEP = 0.125  # frames between keys
-AMBIENT = 0.3
 SPEED = 2.0  # of a glTF file's animation
-
-
-# ---- what scenes are made of ------------------------------------------------------------------
-
-
-def material(kind: str, a, b=(1, 1, 1), scale=4.0, space="Object"):
-    """Diffuse and a little emission of one colour, or of a pattern of two."""
-    made = bpy.data.materials.new(kind)
-    made.use_nodes = True
-    nodes, link = made.node_tree.nodes, made.node_tree.links.new
-    nodes.clear()
-    a, b = (*a, 1.0), (*b, 1.0)
-    diffuse, glow = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeEmission")
-    glow.inputs["Strength"].default_value = AMBIENT
-    both, out = nodes.new("ShaderNodeAddShader"), nodes.new("ShaderNodeOutputMaterial")
-    link(diffuse.outputs[0], both.inputs[0])
-    link(glow.outputs[0], both.inputs[1])
-    link(both.outputs[0], out.inputs["Surface"])
-    if kind == "plain":
-        diffuse.inputs["Color"].default_value = glow.inputs["Color"].default_value = a
-        return made
-    place = nodes.new("ShaderNodeTexCoord").outputs[space]
-    if kind == "brick":
-        texture = nodes.new("ShaderNodeTexBrick")
-        texture.inputs["Color1"].default_value = a
-        texture.inputs["Color2"].default_value = b
-        texture.inputs["Mortar"].default_value = (0.1, 0.1, 0.1, 1)
-        color = texture.outputs["Color"]
-    elif kind == "checker":
-        texture = nodes.new("ShaderNodeTexChecker")
-        texture.inputs["Color1"].default_value = a
-        texture.inputs["Color2"].default_value = b
-        color = texture.outputs["Color"]
-    else:  # noise, over a checker of a third of its frequency
-        texture, ramp = nodes.new("ShaderNodeTexNoise"), nodes.new("ShaderNodeValToRGB")
-        texture.inputs["Detail"].default_value = 4
-        ramp.color_ramp.elements[0].position, ramp.color_ramp.elements[1].position = 0.4, 0.6
-        ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = a, b
-        link(texture.outputs[0], ramp.inputs[0])
-        color = ramp.outputs["Color"]
-    texture.inputs["Scale"].default_value = scale
-    link(place, texture.inputs["Vector"])
-    link(color, diffuse.inputs["Color"])
-    link(color, glow.inputs["Color"])
-    return made
-
-
-def add(kind: str, color, **how):
-    """A Blender primitive of that material."""
-    getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**how)
-    bpy.context.object.data.materials.append(color)
-    return bpy.context.object
-
-
-def box(color, size, at, parent=None):
-    """A box of these sides around `at`."""
-    made = add("cube", color, size=1)
-    made.data.transform(Matrix.Diagonal((*size, 1)))
-    made.location, made.parent = at, parent
-    return made
-
-
-def limb(color, radius, length, at, parent=None):
-    """A rounded rod that hangs from its joint at `at`."""
-    made = add("cylinder", color, radius=radius, depth=length, vertices=24)
-    made.data.transform(Matrix.Translation((0, 0, -length / 2)))
-    for end in (0.0, -length):
-        ball = add("uv_sphere", color, radius=radius, segments=24, ring_count=12)
-        ball.location, ball.parent = (0, 0, end), made
-    made.location, made.parent = at, parent
-    return made
-
-
-def animate(of, path: str, value, index: int = -1):
-    """Key a property with `value(t)`, t in frames from the middle one."""
-    for i in range(int(-SPAN / STEP), int(SPAN / STEP) + 1):
-        t = i * STEP
-        now = value(t)
-        if index < 0:
-            setattr(of, path, now)
-        else:
-            getattr(of, path)[index] = now
-        of.keyframe_insert(path, index=index, frame=FRAME + t)
-    for curve in of.id_data.animation_data.action.fcurves:
-        for key in curve.keyframe_points:
-            key.interpolation = "LINEAR"
-
-
-def camera(at, toward, lens=35.0):
-    """A camera below an empty that looks `toward`; both, for animation."""
-    bpy.ops.object.empty_add(location=at)
-    head = bpy.context.object
-    head.rotation_euler = (Vector(toward) - Vector(at)).to_track_quat("-Z", "Y").to_euler()
-    bpy.ops.object.camera_add()
-    eye = bpy.context.object
-    eye.parent, eye.data.lens, eye.data.clip_end = head, lens, 300
-    bpy.context.scene.camera = eye
-    return head, eye
-
-
-def sun(toward, strength=3.0):
-    """Light from infinitely far, with hard shadows."""
-    bpy.ops.object.light_add(type="SUN")
-    lamp = bpy.context.object
-    lamp.rotation_euler = Vector(toward).to_track_quat("-Z", "Y").to_euler()
-    lamp.data.energy, lamp.data.angle = strength, 0
+LIGHT_PASSES = (
+    *(f"{kind}_{part}" for kind in ("diffuse", "glossy", "transmission")
+      for part in ("direct", "indirect", "color")),
+    "emit", "environment",
+)  # fmt: skip
 
 
 # ---- the scenes -------------------------------------------------------------------------------
@@ -324,7 +224,7 @@ def runner():
     sun((0.4, 0.7, -0.8))
 
 
-SCENES = {s.__name__: s for s in (rotozoom, propeller, flag, runner)}
+SCENES = {s.__name__: Scene(s) for s in (rotozoom, propeller, flag, runner)} | LIGHT | HARD
 
 
 # ---- a scene of a glTF file -------------------------------------------------------------------
@@ -408,7 +308,7 @@ def stand(things) -> float:
 # ---- rendering --------------------------------------------------------------------------------
 
 
-def begin():
+def begin(wanted: Scene):
     """An empty file with a sky, and Cycles set up."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
@@ -420,16 +320,20 @@ def begin():
     seen.diffuse = seen.glossy = seen.transmission = seen.scatter = False
     scene.frame_set(FRAME)
     scene.render.engine, scene.render.fps = "CYCLES", FPS
-    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.render.resolution_x, scene.render.resolution_y = wanted.size
     scene.render.resolution_percentage = 100
     cycles = scene.cycles
-    cycles.device, cycles.samples, cycles.max_bounces = "CPU", SAMPLES, 0
+    cycles.device, cycles.samples = "CPU", wanted.sharp
+    cycles.diffuse_bounces, cycles.glossy_bounces, cycles.transmission_bounces = wanted.bounces
+    cycles.max_bounces = sum(wanted.bounces)
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     scene.render.film_transparent = False
     layer = scene.view_layers[0]
     layer.name = "ViewLayer"
     layer.use_pass_z = layer.use_pass_vector = layer.use_pass_normal = True
     layer.use_pass_object_index = True
+    for name in LIGHT_PASSES if wanted.light else ():
+        setattr(layer, f"use_pass_{name}", True)
     return scene
 
 
@@ -444,20 +348,22 @@ def shoot(scene, path: Path, layers: bool):
 
 def render(folder: Path, name: str):
     """Everything of one scene but the vector blur."""
-    scene = begin()
-    about = SCENES[name]() or SCENES[name].__doc__ if name in SCENES else gltf(name)
+    wanted = SCENES.get(name) or Scene(lambda: gltf(name))
+    scene = begin(wanted)
+    about = wanted.make() or wanted.make.__doc__
     for i, thing in enumerate(bpy.data.objects):
         thing.pass_index = i + 1
         thing.cycles.use_motion_blur = thing.cycles.use_deform_motion = True
         thing.cycles.motion_steps = 3
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "camera.json").write_text(json.dumps(cameras(scene, about), indent=1))
+    (folder / "camera.json").write_text(json.dumps(cameras(scene, about, wanted.size), indent=1))
     for offset, file in ((-1, "prev"), (0, "curr"), (1, "next")):
         scene.frame_set(FRAME + offset)
         shoot(scene, folder / f"{file}.exr", True)
     scene.frame_set(FRAME)
     scene.render.use_motion_blur = True
     scene.render.motion_blur_position = "CENTER"
+    scene.cycles.samples = wanted.half
     for text, shutter in SHUTTERS.items():
         scene.render.motion_blur_shutter = shutter
         halves = []
@@ -481,14 +387,14 @@ def save_mean(files, onto: Path):
     OpenEXR.File(header, half).write(str(onto))
 
 
-def cameras(scene, about: str) -> dict:
+def cameras(scene, about: str, size: tuple[int, int]) -> dict:
     """camera.json: matrices in Blender's and OpenGL's sense."""
     found = {}
     for time in (9, 9.5, 10, 10.5, 11):
         scene.frame_set(int(time), subframe=time % 1)
         eye = scene.camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
         projection = eye.calc_matrix_camera(
-            bpy.context.evaluated_depsgraph_get(), x=SIZE[0], y=SIZE[1]
+            bpy.context.evaluated_depsgraph_get(), x=size[0], y=size[1]
         )
         found[f"{time:g}"] = {
             "camera_matrix_world": [list(row) for row in eye.matrix_world],
@@ -498,7 +404,7 @@ def cameras(scene, about: str) -> dict:
         "doc": " ".join(about.split()),
         "frame": FRAME,
         "fps": FPS,
-        "resolution": SIZE,
+        "resolution": size,
         "conventions": {
             "matrix": "row-major lists, column vectors: p_world = M @ p_camera; the camera "
             "looks along -Z, +Y up",
@@ -510,7 +416,7 @@ def cameras(scene, about: str) -> dict:
     }
 
 
-def vector_blur(folder: Path):
+def vector_blur(folder: Path, size: tuple[int, int]):
     """Blender's own filter on curr.exr, at every shutter."""
     for text, shutter in SHUTTERS.items():
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -527,19 +433,19 @@ def vector_blur(folder: Path):
             link(given.outputs[layer], node.inputs[socket])
         link(node.outputs[0], out.inputs[0])
         render_ = scene.render
-        render_.resolution_x, render_.resolution_y = SIZE
+        render_.resolution_x, render_.resolution_y = size
         render_.resolution_percentage, render_.use_sequencer = 100, False
         render_.compositor_device, render_.compositor_precision = "CPU", "FULL"
         shoot(scene, folder / f"blender_vecblur_{text}.exr", False)
 
 
 def main():
-    """Render the scenes named, or all of this file's."""
+    """Render the scenes named, or all but those of glTF files."""
     into, *names = sys.argv[1:]
     for name in names or SCENES:
         folder = Path(into).resolve() / Path(name).stem
         render(folder, name)
-        vector_blur(folder)
+        vector_blur(folder, SCENES[name].size if name in SCENES else Scene.size)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 
 
 def _leave(*_) -> None:
@@ -16,8 +17,15 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     signal.signal(signal.SIGINT, _leave)
     signal.signal(signal.SIGTERM, _leave)
-    from .cli.app import run
+    try:
+        from .cli.app import run
+    except ImportError as error:
+        from .extras import reason
 
+        if not (why := reason(error)):
+            raise
+        sys.stderr.write(f"wgmb: the command line: {why}\n")
+        sys.exit(2)
     run(arguments)
 
 

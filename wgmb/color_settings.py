@@ -50,7 +50,7 @@ class DisplaySettings:
         """What users should know whose $OCIO cannot be followed."""
         if self.ocio is not None or not os.environ.get("OCIO") or installed():
             return None
-        return "$OCIO is ignored, as OpenColorIO is not installed: pip install wgmb[ocio]"
+        return "$OCIO is ignored, as OpenColorIO is not installed: pip install 'wgmb[ocio]'"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -195,7 +195,8 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
     if asked.color.space(shown) is None:
         remarks.append(_check_space(clip, shown))
     video, how = _motion(clip, asked.video, adapter)
-    asked = replace(asked, look=asked.look.resolved(clip=clip), video=video)
+    look = asked.look.resolved(clip=clip)
+    asked = replace(asked, look=look.for_pictures() if how else look, video=video)
     look, output = asked.look, asked.output
     asked.when.make()  # says what is wrong with it
     settings = {"wgmb": __version__} | plain(look) | plain(asked.when) | plain(asked.given)

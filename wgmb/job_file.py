@@ -17,12 +17,13 @@ from typing import Any, TypeVar
 from ._version import __version__
 from .color_settings import ColorSettings
 from .errors import InputError
-from .io import atomic, video
+from .io import atomic
 from .io.cut_list import CutList
 from .io.frame_numbers import is_pattern, readable
 from .io.masks import is_file, with_amount
 from .io.picture_motion import FAR
 from .io.settled import Settled, numbers, ranges
+from .io.suffixes import VIDEOS
 from .job import Asked, Job
 from .settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings
 from .shutter import CURVES
@@ -93,7 +94,7 @@ def stored(job: Job, chunk: int, *, frames: Sequence[int] | None = None) -> Stor
 
     `frames`: those whose files are to be known; by default all.
     """
-    if Path(job.asked.output.output).suffix.lower() in video.SUFFIXES:
+    if Path(job.asked.output.output).suffix.lower() in VIDEOS:
         raise InputError(
             f"output {job.asked.output.output}: a video is written by one process; "
             "write frames, such as out.####.exr"

@@ -14,6 +14,7 @@ import numpy as np
 
 from .color import srgb
 from .errors import InputError
+from .extras import needed_by
 
 TILE = 16  # [px] where `energy_error` adds light up
 _SSIM_SIGMA, _SSIM_REACH = 1.5, 5  # Wang et al. 2004: 11 x 11 Gaussian window
@@ -168,10 +169,8 @@ def _window(planes: np.ndarray) -> np.ndarray:
 
 
 def _flip(picture, truth) -> tuple[np.ndarray, float]:
-    try:
+    with needed_by("FLIP"):
         from flip_evaluator import evaluate  # pyright: ignore[reportMissingImports]
-    except ImportError:
-        raise InputError("FLIP is missing: pip install 'wgmb[compare]'") from None
     a, b = _pair(picture, truth, display)
     image, mean, _ = evaluate(b.astype(np.float32), a.astype(np.float32), "LDR", applyMagma=False)
     return np.asarray(image), float(mean)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
+from .extras import is_installed, needed_by
 
 _BUILT_IN = {"builtin": "ocio://default", "studio": "ocio://studio-config-latest"}
 _BLENDER = "*/datafiles/colormanagement/config.ocio"
@@ -24,17 +24,13 @@ _THREADS = min(os.cpu_count() or 1, 8)
 
 def installed() -> bool:
     """True if OpenColorIO is there; it is not loaded."""
-    if "PyOpenColorIO" in sys.modules:
-        return sys.modules["PyOpenColorIO"] is not None
-    return find_spec("PyOpenColorIO") is not None
+    return is_installed("PyOpenColorIO")
 
 
 def load() -> Any:
     """The module; InputError says how to install it."""
-    try:
+    with needed_by("colour configs"):
         import PyOpenColorIO
-    except ImportError:
-        raise InputError("OpenColorIO is not installed: pip install wgmb[ocio]") from None
     return PyOpenColorIO
 
 

@@ -217,7 +217,9 @@ class BlurSettings:
     method: str | None = None
     "Blur method; by default gather if depth is available, else tap."
     samples: int | Literal["auto"] | None = None
-    "Taps, images or rays per pixel: 16 (fusion: 8); auto: 1 per pixel of blur length, at most 64."
+    """Taps, images or rays per pixel: 16 (fusion: 8), or auto for motion from pictures;
+    auto: 1 per pixel of blur length, at most 64.
+    """
     jitter: float = 0.0
     "Jitter of the sample times, 0 to 1: trades banding for noise."
     holdout: tuple[str, ...] = ()
@@ -233,6 +235,11 @@ class BlurSettings:
         if scene is not None and scene.has_volumes:
             suited = "volume"
         return replace(self, method=self.method or suited)
+
+    def for_pictures(self) -> Self:
+        """Return a copy for motion found in pictures, after `resolved`: unset samples are auto."""
+        adaptive = self.method in METHODS and getattr(METHODS[self.method], "adaptive", False)
+        return replace(self, samples="auto") if adaptive and self.samples is None else self
 
     def make(self, shutter_: Shutter, adapter: str | None) -> Blur:
         """Return the Blur these settings describe; an option of another method is an error."""

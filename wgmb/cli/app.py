@@ -19,6 +19,7 @@ from cyclopts.config import Dict
 
 from .._version import __version__
 from ..errors import DeviceError, Error, InputError, did_you_mean
+from ..extras import reason
 from . import terminal
 from .exit_codes import DONE, INTERRUPTED, NO_DEVICE, SOME_FAILED, USAGE
 
@@ -79,6 +80,10 @@ def main(arguments: list[str] | None = None) -> int:
         return _say_why(str(error), NO_DEVICE)
     except Error as error:
         return _say_why(str(error), USAGE)
+    except ImportError as error:
+        if not (why := reason(error)):
+            raise
+        return _say_why(f"{words[0]}: {why}", USAGE)
     except OSError as error:
         why = error.strerror.lower() if error.strerror else str(error)
         if error.filename is not None:  # what was named cannot be opened

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 from ..color_settings import ColorSettings
 from ..errors import InputError
+from ..extras import needed_by
 from ..io.frame_file import is_video
 from ..io.frame_numbers import frame_numbers
 from ..job import Asked, Job, settle
@@ -91,9 +92,9 @@ def blur(
         raise InputError("--output is missing, such as -o 'blurred.####.exr'")
     when, pattern = when.resolved(), patterns[0]
     if is_batch(patterns, output.output) or is_video(pattern):
-        from .blur_video import blur_video
-        from .blur_videos import blur_videos
-
+        with needed_by(pattern, "video"):
+            from .blur_video import blur_video
+            from .blur_videos import blur_videos
         if confidence:
             raise InputError("--confidence is for rendered frames")
         settings = look, when, given, video, adapter, quiet, verbose

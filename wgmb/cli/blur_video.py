@@ -127,7 +127,7 @@ def make_wish(
     """The settings of a run, with what is opened once for all its videos."""
     _check_fits(given, look)
     method = look.method or ("gather" if video.flow in ("auto", "search") else "tap")
-    look = replace(look, method=method)
+    look = replace(look, method=method).for_pictures()
     blur = look.make(when.make(), adapter)
     return Wish(look, when, given, video, blur, *video.source(blur.device))
 

@@ -12,6 +12,7 @@ from ..color import motion_picture
 from ..color_settings import ColorSettings
 from ..display import Display
 from ..errors import InputError
+from ..extras import needed_by
 from ..io import layers, stills
 from ..io.atomic import write_file
 from ..io.clip import Clip
@@ -52,9 +53,9 @@ def info(
     """
     shown = color.open()
     if is_video(pattern):
-        from ..io.footage import Footage
-        from .video_lines import describe_video
-
+        with needed_by(pattern, "video"):
+            from ..io.footage import Footage
+            from .video_lines import describe_video
         if output is not None:
             raise InputError("`output` draws the motion of rendered frames, a video holds none")
         for name, text in describe_video(Footage(pattern, max_mb=given.max_mb)):

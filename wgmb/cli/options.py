@@ -8,7 +8,8 @@ from typing import Annotated, TypeVar
 from cyclopts import Group, Parameter
 
 from ..color_settings import ColorSettings, DisplaySettings
-from ..io import exr, stills, video
+from ..io import exr
+from ..io.suffixes import STILLS, VIDEOS
 from ..io.vectors import CONVENTIONS
 from ..methods import METHODS
 from ..scene import builtin
@@ -100,8 +101,7 @@ class OutputOptions(OutputSettings):
         str,
         Parameter(
             alias="-o",
-            help=f"Pattern or file: .exr {' '.join(stills.SUFFIXES)}, or a video "
-            f"{' '.join(video.SUFFIXES)}.",
+            help=f"Pattern or file: .exr {' '.join(STILLS)}, or a video {' '.join(VIDEOS)}.",
         ),
     ]
     compression: Annotated[

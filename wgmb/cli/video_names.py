@@ -9,16 +9,16 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..io import stills
-from ..io.encoders import SUFFIXES
 from ..io.frame_file import is_video
 from ..io.frame_numbers import is_pattern
 from ..io.output import refuse_inputs
+from ..io.suffixes import VIDEOS
 
 NAME = "{name}"
 """In an output: the name of the input without folder and suffix."""
 _ELSE = ".mkv"  # what holds every stream, for inputs whose own container is not written
 _IN_FOLDERS = (
-    *SUFFIXES, ".m4v", ".avi", ".ts", ".mts", ".m2ts", ".mpg", ".mpeg", ".vob", ".wmv", ".flv",
+    *VIDEOS, ".m4v", ".avi", ".ts", ".mts", ".m2ts", ".mpg", ".mpeg", ".vob", ".wmv", ".flv",
     ".ogv", ".3gp", ".mxf",
 )  # fmt: skip
 
@@ -91,7 +91,7 @@ def _output_of(video: Path, output: str) -> str:
         return output.replace(NAME, video.stem)
     if not _is_folder(output):
         return output
-    suffix = video.suffix if video.suffix.lower() in SUFFIXES else _ELSE
+    suffix = video.suffix if video.suffix.lower() in VIDEOS else _ELSE
     return str(Path(output) / f"{video.stem}{suffix}")
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ..color_settings import ColorSettings
 from ..errors import DeviceError
+from ..extras import needed_by
 from ..settings import size_of
 from .exit_codes import DONE
 from .options import BlurOptions, Colors, Given, InputOptions, Look, ShutterOptions, When
@@ -40,8 +41,9 @@ def view(
         GPU to use: a number or part of a name from `wgmb devices`.
     """
     try:
-        from .. import viewer
-    except ImportError as error:  # of a system library: the packages are required
+        with needed_by("view"):
+            from .. import viewer
+    except ImportError as error:  # of a system library
         raise DeviceError(
             f"the viewer cannot be loaded: {error}; on Debian, Ubuntu: "
             "apt-get install libx11-6 libxext6"

@@ -8,12 +8,12 @@ Kroeger, Timofte, Dai and Van Gool, "Fast Optical Flow using Dense Inverse Searc
 from __future__ import annotations
 
 import importlib
-import importlib.util
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from .. import extras
 from ..color import to_display
 from ..errors import InputError
 
@@ -26,7 +26,7 @@ Found = tuple[np.ndarray, np.ndarray]
 
 def is_installed() -> bool:
     """Return True if OpenCV is there."""
-    return importlib.util.find_spec("cv2") is not None
+    return extras.is_installed("cv2")
 
 
 class Dis:
@@ -38,9 +38,8 @@ class Dis:
     def __init__(self, quality: str = "fast"):
         if quality not in QUALITIES:
             raise InputError(f"`quality` must be one of {', '.join(QUALITIES)}, got {quality!r}")
-        if not is_installed():
-            raise InputError("dense inverse search needs OpenCV: pip install 'wgmb[flow]'")
-        cv2: Any = importlib.import_module("cv2")
+        with extras.needed_by("dense inverse search"):
+            cv2: Any = importlib.import_module("cv2")
 
         self._cv2 = cv2
         fast = quality == "fast"

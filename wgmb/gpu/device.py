@@ -22,15 +22,31 @@ _PREFERENCE = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", SOFTWARE
 
 def adapters() -> list[wgpu.GPUAdapter]:
     """Every adapter wgpu finds, OpenGL last, the fastest kind first."""
-    if not os.environ.get("XDG_RUNTIME_DIR"):  # Mesa complains on stderr without one
-        os.environ["XDG_RUNTIME_DIR"] = tempfile.gettempdir()
-    found = wgpu.gpu.enumerate_adapters_sync()
+    with _runtime_folder():
+        found = wgpu.gpu.enumerate_adapters_sync()
 
     def rank(adapter: wgpu.GPUAdapter) -> tuple[bool, int]:
         kind = adapter.info["adapter_type"]
         return _is_opengl(adapter), _PREFERENCE.index(kind) if kind in _PREFERENCE else 3
 
     return sorted(found, key=rank)
+
+
+@contextmanager
+def _runtime_folder():
+    """Name a runtime folder where the process has none: Mesa complains on stderr otherwise."""
+    name = "XDG_RUNTIME_DIR"
+    before = os.environ.get(name)
+    if before:
+        yield
+        return
+    os.environ[name] = tempfile.gettempdir()
+    try:
+        yield
+    finally:
+        os.environ.pop(name)
+        if before is not None:
+            os.environ[name] = before
 
 
 def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..extras import needed_by
 from .frame_numbers import frame_numbers, readable
 
 _ONLY = "only:"
@@ -138,12 +139,8 @@ def _read_otio(path: Path, fps: float | None) -> set[int]:
     text = path.read_bytes().decode("utf-8", "replace")
     if _depth(text) > _DEEPEST:  # the library would crash
         raise InputError(f"{path}: lists are nested over {_DEEPEST} deep, too deep for an edit")
-    try:
+    with needed_by(str(path)):
         import opentimelineio as otio
-    except ImportError:
-        raise InputError(
-            f"{path}: OpenTimelineIO is not installed: pip install wgmb[edit]"
-        ) from None
     try:
         timeline = otio.core.deserialize_json_from_string(text)
         is_timeline = isinstance(timeline, otio.schema.Timeline)

@@ -20,8 +20,8 @@ from ..coding import BT709, BT2020, Coding
 from ..errors import InputError, did_you_mean
 from .hdr10 import LightLevel, Mastering
 from .pixels import layout
+from .suffixes import VIDEOS as SUFFIXES
 
-SUFFIXES = (".mp4", ".mov", ".mkv", ".webm", ".gif")
 CONTAINERS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska", ".webm": "webm", ".gif": "gif"}
 """FFmpeg's names of the containers, by suffix; the first codec that has one is its default."""
 HARDWARE = ("nvenc", "qsv", "amf")

@@ -10,18 +10,23 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..color import ToDisplay, to_display
 from ..display import Display
 from ..errors import InputError, check_choice
-from . import atomic, exr, record, stills, video, views
+from ..extras import needed_by
+from . import atomic, exr, record, stills, views
 from .frame_file import FrameFile, about
 from .frame_numbers import frame_path, has_view, in_view, is_pattern
 from .input_space import chromaticities, relabelled, space_of
+from .suffixes import STILLS, VIDEOS
 from .windows import Placement, Window, laid, result_window, union
+
+if TYPE_CHECKING:
+    from .video import Video
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,16 +107,21 @@ class Output:
         self.settings = json.dumps(settings or {}, sort_keys=True)
         suffix = self.pattern.suffix.lower()
         self._views = tuple(views) if has_view(pattern) else (None,)
-        self._videos: dict[str | None, video.Video] = {}
+        self._videos: dict[str | None, Video] = {}
         self._overwrite, self._resume, self._since = overwrite, resume, since
         self._abandoned = False
         self._under_way: Path | None = None
-        if suffix not in (".exr", *stills.SUFFIXES, *video.SUFFIXES):
-            known = ", ".join((".exr", *stills.SUFFIXES, *video.SUFFIXES))
+        if suffix not in (".exr", *STILLS, *VIDEOS):
+            known = ", ".join((".exr", *STILLS, *VIDEOS))
             raise InputError(f"output {pattern}: the name must end in one of {known}")
         if bits not in (8, 16) or (bits == 16 and suffix in (".jpg", ".jpeg")):
             raise InputError(f"bits must be 8 or 16 (JPEG: 8), got {bits}")
-        is_video = suffix in video.SUFFIXES
+        is_video = suffix in VIDEOS
+        if is_video:
+            with needed_by(f"output {pattern}", "video"):
+                from . import video
+        elif suffix in STILLS:
+            stills.require(suffix)
         if is_video and resume:
             raise InputError("`resume` is not available for videos, only for frame files")
         if not is_video and len(numbers) > 1 and not is_pattern(pattern):

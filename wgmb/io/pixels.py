@@ -16,6 +16,7 @@ from typing import Literal
 
 import av
 import numpy as np
+from av.stream import Discard as Discard  # a PyAV that is too old for videos lacks it
 from av.video.plane import VideoPlane
 from av.video.reformatter import VideoReformatter
 

@@ -12,23 +12,47 @@ import zlib
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
-import av
-import imageio.v3 as iio
 import numpy as np
-import tifffile
-from av.container import InputContainer
-from PIL import JpegImagePlugin
 
 from ..color import ToDisplay, linear, to_display
 from ..display import ColorSpace
 from ..errors import InputError
+from ..extras import needed_by
 from . import limits
 from .record import KEY
+from .suffixes import STILLS
 
-SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
+if TYPE_CHECKING:
+    from av.container import InputContainer
+
+SUFFIXES = STILLS
 _AFTER_HEADER = 33  # bytes of a PNG's signature and IHDR
+
+
+def require(suffix: str) -> None:
+    """InputError unless the packages for files of this kind are installed."""
+    {".png": _av, ".jpg": _jpeg, ".jpeg": _jpeg}.get(suffix.lower(), _tifffile)()
+
+
+def _av():
+    with needed_by("PNG files", "images"):
+        import av
+    return av
+
+
+def _jpeg():
+    with needed_by("JPEG files", "images"):
+        import imageio.v3
+        from PIL import JpegImagePlugin
+    return imageio.v3, JpegImagePlugin.JpegImageFile
+
+
+def _tifffile():
+    with needed_by("TIFF files", "images"):
+        import tifffile
+    return tifffile
 
 
 def read(
@@ -72,7 +96,8 @@ def _read_png(data: bytes, allow: Allow) -> np.ndarray:
     if b"IEND" not in data[-1024:]:
         raise ValueError("cut off before its end")
     allow(*struct.unpack(">II", data[16:24]))
-    with cast(InputContainer, av.open(io.BytesIO(data), format="png_pipe")) as container:
+    opened = _av().open(io.BytesIO(data), format="png_pipe")
+    with cast("InputContainer", opened) as container:
         frame = next(container.decode(video=0))
     name = frame.format.name
     alpha = name.startswith(("rgba", "ya", "pal8"))
@@ -87,7 +112,8 @@ def _read_png(data: bytes, allow: Allow) -> np.ndarray:
 
 
 def _read_jpeg(data: bytes, allow: Allow) -> np.ndarray:
-    with JpegImagePlugin.JpegImageFile(io.BytesIO(data)) as image:  # `open` has its own limit
+    _, jpeg = _jpeg()
+    with jpeg(io.BytesIO(data)) as image:  # PIL's `open` has its own limit
         allow(*image.size)
         if image.mode not in ("L", "RGB"):
             raise ValueError(f"must be grey or RGB, is {image.mode}")
@@ -95,6 +121,7 @@ def _read_jpeg(data: bytes, allow: Allow) -> np.ndarray:
 
 
 def _read_tiff(data: bytes, allow: Allow) -> np.ndarray:
+    tifffile = _tifffile()
     with tifffile.TiffFile(io.BytesIO(data)) as file:
         page = file.pages.first
         if len(file.pages) != 1:
@@ -148,7 +175,8 @@ def encode(
     suffix = suffix.lower()
     if suffix in (".jpg", ".jpeg"):
         samples = shown(rgba, 8, over_black=True)
-        return iio.imwrite(
+        imageio, _ = _jpeg()
+        return imageio.imwrite(
             "<bytes>",
             samples,
             extension=".jpg",
@@ -161,7 +189,7 @@ def encode(
         return _with_text(_png(samples), text)
     stream = io.BytesIO()
     extra = ["unassalpha"] if samples.shape[2] == 4 else None
-    tifffile.imwrite(
+    _tifffile().imwrite(
         stream,
         samples,
         photometric="rgb",
@@ -181,6 +209,7 @@ def _png(samples: np.ndarray) -> bytes:
         (4, 2): ("rgba64le", "rgba64be"),
     }
     given, stored = kinds[samples.shape[2], samples.itemsize]
+    av = _av()
     frame = av.VideoFrame.from_ndarray(samples, format=given)
     codec = av.CodecContext.create("png", "w")
     codec.width, codec.height, codec.pix_fmt = frame.width, frame.height, stored
