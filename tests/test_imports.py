@@ -21,13 +21,15 @@ LAYERS = [
     {"ocio"},
     {"gpu", "shutter", "camera", "metrics", "display"},
     {"frame", "cone"},
-    {"frame_views", "reach", "exposure"},
+    {"frame_views", "reach", "exposure", "motion_source"},
     {"velocity", "holdout", "planes", "reel"},
     {"io", "scene", "observer", "flow"},
     {"methods"},
     {"residency"},
     {"pipeline"},
-    {"render", "exposer", "settings", "background", "video_settings", "color_settings"},
+    {"render", "settings", "background", "video_settings", "color_settings", "glance"},
+    {"reel_views"},
+    {"exposer"},
     {"stages", "settings_toml"},
     {"batch"},
     {"outcome"},
@@ -42,7 +44,7 @@ PLACE = {room: number for number, layer in enumerate(LAYERS) for room in layer}
 GPU = {
     "gpu", "scene", "methods", "velocity", "holdout", "observer", "residency", "pipeline",
     "render", "lab", "viewer", "frame_views", "flow", "planes", "exposer",
-    "video_batch", "video_settings",
+    "video_batch", "video_settings", "reel_views",
 }  # fmt: skip
 HOMES = {
     "wgpu": GPU,

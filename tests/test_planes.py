@@ -6,7 +6,8 @@ import pytest
 from wgmb import InputError, gpu
 from wgmb.coding import CodedPicture, Coding
 from wgmb.gpu.textures import TexturePool
-from wgmb.planes import Planes
+from wgmb.planes import Average, Planes, averages
+from wgmb.planes.matrices import to_samples
 
 SIZE = 38, 22  # width, height
 WHITE = {16: 0.0203, 18: 0.26496256}  # light that counts as 1
@@ -86,7 +87,7 @@ def stored(coding, seed=0):
     kind = np.uint8 if coding.bits == 8 else np.uint16
     small = -(-height // coding.steps[1]), -(-width // coding.steps[0])
     low, high = (0, most) if coding.full_range else (16 * unit, 235 * unit)
-    if coding.transfer == 16:  # nothing is brighter than its 1
+    if coding.transfer == 16:  # nothing is brighter than its 1, also with chroma
         high = 170 * unit
     planes = [rng.integers(low, high + 1, (height, width))]
     if coding.model == "yuv":
@@ -134,6 +135,108 @@ def test_what_is_stored_comes_back(device, name, texel):
     for want, plane in zip(picture.planes, got.planes, strict=True):
         assert plane.dtype == want.dtype and plane.shape == want.shape
         assert np.abs(plane.astype(int) - want).max() <= allowed
+
+
+YUV = [name for name, coding in CODINGS.items() if averages(coding, coding)]
+
+
+def averaged(pictures, weights, wanted):
+    """The samples of a weighted sum in linear light, not rounded: through H.273 written out."""
+    light = sum(w * slowly(p)[..., :3] for p, w in zip(pictures, weights, strict=True))
+    code = wanted
+    white = WHITE.get(code.transfer, 1)
+    if code.transfer in (16, 18, 5):
+        known = np.linspace(0, 1.2, 200_001)
+        table = np.array([light_of(v, code.transfer) for v in known])
+        signal = np.interp(light, table, known)
+        assert white
+    else:
+        high = 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055
+        signal = np.where(light <= 0.0031308, 12.92 * light, high)
+    planes = []
+    rows = to_samples(code)
+    for n, steps in ((0, (1, 1)), (1, code.steps), (2, code.steps)):
+        samples = signal @ rows[n, :3] + rows[n, 3]
+        height, width = samples.shape
+        samples = np.pad(samples, ((0, -height % steps[1]), (0, -width % steps[0])), "edge")
+        tall, wide = samples.shape[0] // steps[1], samples.shape[1] // steps[0]
+        planes.append(samples.reshape(tall, steps[1], wide, steps[0]).mean(axis=(1, 3)))
+    return planes
+
+
+@pytest.mark.parametrize("name", YUV)
+def test_one_picture_averaged_is_itself(device, name):
+    picture = mild(stored(CODINGS[name]), 0)
+    got = Average(device)([picture], [1.0], picture.coding)
+    allowed = 1 if picture.coding.transfer == 16 else 0
+    for want, plane in zip(picture.planes, got.planes, strict=True):
+        assert plane.dtype == want.dtype and plane.shape == want.shape
+        assert np.abs(plane.astype(int) - want).max() <= allowed
+
+
+@pytest.mark.parametrize("count", [3, 19])
+@pytest.mark.parametrize("name", YUV)
+def test_an_average_of_planes_is_that_of_their_light(device, name, count):
+    """Within half a sample and rounding; more pictures than one pass takes as well."""
+    rng = np.random.default_rng(count)
+    pictures = [mild(stored(CODINGS[name], seed), seed) for seed in range(3)]
+    pictures = [pictures[n % 3] for n in range(count)]
+    weights = rng.random(count)
+    weights /= weights.sum()
+    got = Average(device)(pictures, weights, pictures[0].coding)
+    slack = 0.52 if CODINGS[name].transfer != 16 else 1.1  # its powers cost a bit
+    for want, plane in zip(
+        averaged(pictures, weights, pictures[0].coding), got.planes, strict=True
+    ):
+        assert np.abs(plane - want).max() < slack
+
+
+def mild(picture, seed):
+    """The same with chroma near grey, so that no signal is negative."""
+    rng = np.random.default_rng(seed)
+    unit = 2 ** (picture.coding.bits - 8)
+    luma, *chroma = picture.planes
+    luma = np.clip(luma, 60 * unit, 160 * unit)
+    chroma = [rng.integers(120 * unit, 136 * unit, c.shape).astype(c.dtype) for c in chroma]
+    return CodedPicture((luma, *chroma), picture.coding)
+
+
+@pytest.mark.parametrize("size", [(13, 7), (8, 2), (1, 1)])
+@pytest.mark.parametrize(
+    ("stored_as", "wanted"),
+    [((2, 2), (2, 2)), ((1, 1), (2, 2)), ((2, 2), (2, 1)), ((1, 2), (1, 1))],
+)
+@pytest.mark.parametrize("bits", [(8, 8), (12, 10)])
+def test_any_size_and_sampling_is_averaged_into_any_other(device, size, stored_as, wanted, bits):
+    rng = np.random.default_rng(5)
+    width, height = size
+    unit, kind = 2 ** (bits[0] - 8), "u1" if bits[0] == 8 else "u2"
+    small = -(-height // stored_as[1]), -(-width // stored_as[0])
+    shapes = ((height, width), small, small)
+    pictures = [
+        CodedPicture(
+            tuple(rng.integers(110 * unit, 140 * unit, s).astype(kind) for s in shapes),
+            Coding(bits=bits[0], steps=stored_as),
+        )
+        for _ in range(2)
+    ]
+    into = Coding(bits=bits[1], steps=wanted)
+    got = Average(device)(pictures, [0.25, 0.75], into)
+    for want, plane in zip(averaged(pictures, [0.25, 0.75], into), got.planes, strict=True):
+        assert plane.shape == want.shape and np.abs(plane - want).max() < 0.52
+
+
+def test_pictures_that_stay_on_the_gpu_are_not_mistaken(device):
+    """Each is uploaded once while it is needed, and its place then serves others."""
+    average, coding = Average(device), Coding()
+    levels = [CodedPicture(tuple(np.full(s, v, "u1") for s in ((4, 8), (2, 4), (2, 4))), coding)
+              for v in range(60, 200, 7)]  # fmt: skip
+    for begin in range(16):
+        some = levels[begin : begin + 4]
+        for n, picture in enumerate(some):
+            weights = np.eye(4)[n]
+            got = average(some, weights, coding)
+            np.testing.assert_array_equal(got.planes[0], picture.planes[0])
 
 
 def test_odd_sizes_have_a_last_sample_of_chroma(device):

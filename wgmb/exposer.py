@@ -4,19 +4,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 import wgpu
 
 from . import gpu
 from .exposure import Cell
-from .frame import Frame
 from .gpu.textures import TexturePool
-from .observer import EIGHT, WeightedSum
+from .observer import WeightedSum
 from .pipeline import Blur
+from .reel_views import Shown
 
-_TEXEL = "rgba32float"
+_AT_ONCE = 2  # pictures that are summed in one pass
 
 
 class Exposer:
@@ -30,41 +30,48 @@ class Exposer:
         self._images = TexturePool(blur.device)
         self._sum = WeightedSum(blur.device)
 
-    def __call__(self, parts: Sequence[tuple[Cell, Frame]]) -> np.ndarray:
-        """(height, width, 3 or 4) float32, linear: the exposure of these frames by their cells."""
-        channels = parts[0][1].color.shape[2]
-        texture = self.texture(parts)
-        encoder = self.blur.device.create_command_encoder(label="exposure")
-        return self._images.download(encoder, texture)[..., :channels]
+    def texture(
+        self, size: tuple[int, int], parts: Iterable[tuple[Cell, Shown]]
+    ) -> wgpu.GPUTexture:
+        """The exposure of pictures of `size` (width, height): linear light, rgba32float.
 
-    def texture(self, parts: Sequence[tuple[Cell, Frame]]) -> wgpu.GPUTexture:
-        """The same as a texture, rgba32float, which the next call overwrites."""
-        size, device = parts[0][1].size, self.blur.device
-        output = self._images.texture("exposure", size, _TEXEL)
-        moving = any(_moves(*part) for part in parts)
-        at_once = 2 if moving else EIGHT  # pictures that are on the GPU
-        for first in range(0, len(parts), at_once):
-            some = parts[first : first + at_once]
-            pictures = [self._picture(f"part {i}", *part) for i, part in enumerate(some)]
-            shares = np.array([cell.share for cell, _ in some], np.float32)
-            encoder = device.create_command_encoder(label="exposure")
-            self._sum.encode(encoder, pictures, shares, output, onto=first > 0)
-            gpu.submit(device, encoder)
+        The next call overwrites it.
+        """
+        output = self._images.texture("exposure", size, "rgba32float")
+        waiting: list[tuple[float, wgpu.GPUTexture]] = []
+        begun = False
+        with gpu.reported(size):
+            for cell, shown in parts:
+                waiting.append((cell.share, self._picture(f"part {len(waiting)}", cell, shown)))
+                if len(waiting) == _AT_ONCE:
+                    self._add(waiting, output, begun)
+                    begun, waiting = True, []
+            if waiting:
+                self._add(waiting, output, begun)
         return output
 
-    def _picture(self, name: str, cell: Cell, frame: Frame) -> wgpu.GPUTexture:
-        if not _moves(cell, frame):
-            color = frame.color
-            if color.shape[2] == 3:
-                color = np.concatenate([color, np.ones_like(color[..., :1])], axis=2)
-            texel = "rgba16float" if color.dtype == np.float16 else _TEXEL
-            self._images.upload(f"{name} sharp", color, texel)
-            return self._images.texture(f"{name} sharp", frame.size, texel)
+    def _add(
+        self, waiting: list[tuple[float, wgpu.GPUTexture]], output: wgpu.GPUTexture, onto: bool
+    ) -> None:
+        encoder = self.blur.device.create_command_encoder(label="exposure")
+        shares = np.array([share for share, _ in waiting], np.float32)
+        self._sum.encode(encoder, [texture for _, texture in waiting], shares, output, onto=onto)
+        gpu.submit(self.blur.device, encoder)
+
+    def _picture(self, name: str, cell: Cell, shown: Shown) -> wgpu.GPUTexture:
+        frame = shown.frame
+        if not frame.has_vectors or cell.shutter.degrees <= 0:
+            return frame.color.texture
         self.blur.shutter = cell.shutter
         texture = self._images.texture(name, frame.size, self.blur.output)
-        self.blur.draw(frame, texture.create_view())
+        encoder = self.blur.device.create_command_encoder(label="cell")
+        self.blur.encode(
+            encoder,
+            frame,
+            texture.create_view(),
+            prev=shown.prev,
+            next=shown.next,
+            number=shown.number,
+        )
+        gpu.submit(self.blur.device, encoder)
         return texture
-
-
-def _moves(cell: Cell, frame: Frame) -> bool:
-    return "motion" in frame.has and cell.shutter.degrees > 0

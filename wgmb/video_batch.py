@@ -19,17 +19,20 @@ from .batch import Progress
 from .coding import CodedPicture, Coding
 from .errors import InputError
 from .exposer import Exposer
+from .exposure import Cell
+from .glance import Glance, is_cut, is_double
 from .gpu.textures import TexturePool
 from .io.clock import Clock
 from .io.coded_video import CodedVideo
-from .io.cuts import pictures_differ, repeats
 from .io.footage import Footage
 from .io.frame_file import FrameFile
 from .io.output import Output, Result
 from .io.segments import Segment
+from .motion_source import MotionSource
 from .pipeline import Blur
-from .planes import Planes
-from .reel import MotionSource, Picture, Reel
+from .planes import Average, Planes, averages
+from .reel import Picture, Reel
+from .reel_views import ReelViews
 from .shutter import Shutter
 
 _SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
@@ -90,12 +93,12 @@ class FootageBlur:
         cuts: bool = True,
         known_cuts: Collection[int] = (),
     ):
-        self.footage, self.planes = footage, Planes(blur.device)
-        self._images, self.clock, self._holdout = TexturePool(blur.device), clock, holdout
+        self.footage, self.clock, self._holdout = footage, clock, holdout
         self._blur, self._motion = blur, motion
-        self._exposer = Exposer(blur)
+        self._exposer, self._planes = Exposer(blur), Planes(blur.device)
+        self._average = Average(blur.device)
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
-        self.reel: Reel | None = None
+        self.reel: Reel[Glance] | None = None
 
     @property
     def device(self) -> wgpu.GPUDevice:
@@ -104,22 +107,36 @@ class FootageBlur:
 
     def exposures(
         self, shutter: Shutter, wanted: Sequence[Moment]
-    ) -> Iterator[tuple[Moment, wgpu.GPUTexture]]:
-        """Every moment and its picture, linear light (rgba32float), which the next overwrites."""
+    ) -> Iterator[tuple[Moment, Exposure]]:
+        """Every moment and its exposure, which is valid until the next is asked for."""
         self.reel = reel = Reel(
             self._pictures(shutter, wanted),
-            motion=self._motion,
-            is_cut=pictures_differ if self._cuts else None,
+            is_cut=is_cut if self._cuts else None,
             known_cuts=self._known_cuts,
-            is_double=repeats if self._fill else None,
-            neighbours="neighbours" in self._blur.method.uses,
-            holdout=self._holdout,
+            is_double=is_double if self._fill else None,
         )
+        views = ReelViews(reel, self._blur, self._motion, self._holdout)
         for moment in wanted:
-            parts = reel.parts(float(moment.time), float(moment.interval), shutter)
-            yield moment, self._exposer.texture(parts)
+            cells = reel.cells(float(moment.time), float(moment.interval), shutter)
+            yield moment, Exposure(self, reel, views, cells)
 
-    def _pictures(self, shutter: Shutter, wanted: Sequence[Moment]) -> Iterator[Picture]:
+    def light(self, views: ReelViews, cells: Sequence[Cell]) -> wgpu.GPUTexture:
+        """The exposure of these cells as linear light (rgba32float)."""
+        parts = ((cell, views.shown(cell.index)) for cell in cells)
+        return self._exposer.texture(self.footage.size, parts)
+
+    def coded(
+        self, reel: Reel[Glance], views: ReelViews, cells: Sequence[Cell], coding: Coding
+    ) -> CodedPicture:
+        """The exposure of these cells in planes."""
+        if self._motion is None and averages(self.footage.coding, coding):
+            pictures = [reel[cell.index].content.coded for cell in cells]
+            return self._average(pictures, [cell.share for cell in cells], coding)
+        light = self.light(views, cells)
+        encoder = self.device.create_command_encoder(label="encode")
+        return self._planes.encode(encoder, light.create_view(), coding)
+
+    def _pictures(self, shutter: Shutter, wanted: Sequence[Moment]) -> Iterator[Picture[Glance]]:
         """The video's pictures from before the first exposure to the end, on the output's clock."""
         times = self.footage.times
         opens = (
@@ -129,19 +146,31 @@ class FootageBlur:
         first = int(np.searchsorted(times.seconds, float(opens)))
         coded = self.footage.pictures(max(first - _BEFORE, 0))
         for number, picture in ahead(coded, _READ_AHEAD):
-            encoder = self._blur.device.create_command_encoder(label="decode")
-            light = self._images.texture("light", picture.size, "rgba16float")
-            self.planes.decode(encoder, picture, light.create_view())
-            color = self._images.download(encoder, light)
-            if not picture.coding.alpha:
-                color = color[..., :3]
-            yield Picture(float(self.clock.out(times[number])), color, number)
+            yield Picture(float(self.clock.out(times[number])), Glance(picture), number)
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """An output frame, made when it is asked for as what is wanted."""
+
+    _run: FootageBlur
+    _reel: Reel[Glance]
+    _views: ReelViews
+    _cells: Sequence[Cell]
+
+    def light(self) -> wgpu.GPUTexture:
+        """As linear light (rgba32float)."""
+        return self._run.light(self._views, self._cells)
+
+    def coded(self, coding: Coding) -> CodedPicture:
+        """In the planes of a video."""
+        return self._run.coded(self._reel, self._views, self._cells, coding)
 
 
 class Sink(Protocol):
     """Where exposures go: `take` on the main thread, then `put` in a thread of its own."""
 
-    def take(self, moment: Moment, light: wgpu.GPUTexture) -> Any:
+    def take(self, moment: Moment, exposure: Exposure) -> Any:
         """What is to be written of a picture."""
         ...
 
@@ -153,19 +182,12 @@ class Sink(Protocol):
 class VideoSink:
     """Exposures as coded pictures into a video."""
 
-    def __init__(
-        self,
-        video: CodedVideo | Segment,
-        planes: Planes,
-        coding: Coding,
-        device: wgpu.GPUDevice,
-    ):
-        self._video, self._planes, self._coding, self._device = video, planes, coding, device
+    def __init__(self, video: CodedVideo | Segment, coding: Coding):
+        self._video, self._coding = video, coding
 
-    def take(self, moment: Moment, light: wgpu.GPUTexture) -> tuple[CodedPicture, Fraction]:
+    def take(self, moment: Moment, exposure: Exposure) -> tuple[CodedPicture, Fraction]:
         """The picture in the video's own planes."""
-        encoder = self._device.create_command_encoder(label="encode")
-        return self._planes.encode(encoder, light.create_view(), self._coding), moment.time
+        return exposure.coded(self._coding), moment.time
 
     def put(self, taken: tuple[CodedPicture, Fraction]) -> None:
         """Append it."""
@@ -179,10 +201,10 @@ class FramesSink:
         self._output, self._device, self._channels, self._first = output, device, channels, first
         self._images = TexturePool(device)
 
-    def take(self, moment: Moment, light: wgpu.GPUTexture) -> Result:
+    def take(self, moment: Moment, exposure: Exposure) -> Result:
         """The picture as an array."""
         encoder = self._device.create_command_encoder(label="frame")
-        picture = self._images.download(encoder, light)[..., : self._channels]
+        picture = self._images.download(encoder, exposure.light())[..., : self._channels]
         return Result(FrameFile(self._first + moment.number, Path(), None, {}, {}), picture)
 
     def put(self, taken: Result) -> None:
@@ -200,6 +222,6 @@ def blur_footage(
     """Every exposure of a video into `sink`; the caller closes or abandons what it writes."""
     tell = progress or (lambda number, state: None)
     with Behind(sink.put) as put:
-        for moment, light in run.exposures(shutter, wanted):
-            put(sink.take(moment, light))
+        for moment, exposure in run.exposures(shutter, wanted):
+            put(sink.take(moment, exposure))
             tell(moment.number, "done")

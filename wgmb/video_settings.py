@@ -15,7 +15,7 @@ from . import gpu
 from .errors import InputError
 from .flow import Flow
 from .flow.dis import Dis, is_installed
-from .reel import MotionSource
+from .motion_source import MotionSource
 
 
 @dataclass(frozen=True, kw_only=True)

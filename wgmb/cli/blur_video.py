@@ -29,8 +29,8 @@ from ..io.other_streams import OtherStreams
 from ..io.output import refuse_inputs
 from ..io.overlay import overlay_of
 from ..io.segments import Segment, Segments
+from ..motion_source import MotionSource
 from ..pipeline import Blur
-from ..reel import MotionSource
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
 from ..video_batch import FootageBlur, FramesSink, Moment, Sink, VideoSink, blur_footage, moments
 from ..video_settings import VideoSettings
@@ -278,7 +278,7 @@ def _fill(
 ) -> None:
     """Write pictures and close the file, or leave nothing of it."""
     try:
-        blur_part(moments, VideoSink(writer, run.planes, coding, run.device))
+        blur_part(moments, VideoSink(writer, coding))
         writer.close()
     except BaseException:
         writer.abandon()

@@ -51,7 +51,8 @@ class Dis:
     def shot(self, load: Load) -> Callable[[int], Found | None]:
         """Motion (height, width, 4) to_prev, to_next [px] and depth of a shot's frames.
 
-        `load(number)`: the picture (height, width, 3 or 4), linear, or None outside the shot.
+        `load(number)`: the picture (height, width, 3 or 4), linear, or (height, width) uint8, its
+        display values without colour; None outside the shot.
         """
         grey: dict[int, np.ndarray | None] = {}
 
@@ -73,6 +74,8 @@ class Dis:
         return found
 
     def _grey(self, color: np.ndarray) -> np.ndarray:
+        if color.ndim == 2:
+            return color
         shown = to_display(np.asarray(color[..., :3], np.float32), 8)
         return self._cv2.cvtColor(shown, self._cv2.COLOR_RGB2GRAY)
 

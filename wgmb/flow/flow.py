@@ -39,9 +39,10 @@ class Flow:
     def shot(self, load: Load) -> Shot:
         """Flow of the frames of a shot.
 
-        `load(number)`: the picture (height, width, 3 or 4), linear, or None before the shot's
-        first frame and after its last. The motion of a frame depends on its number and on `load`,
-        and on nothing that was asked for before.
+        `load(number)`: the picture (height, width, 3 or 4), linear, as an array, or as a texture of
+        this device that is read at once; None before the shot's first frame and after its last.
+        The motion of a frame depends on its number and on `load`, and on nothing that was asked
+        for before.
         """
         return Shot(Passes(self.device), load, self._effort)
 

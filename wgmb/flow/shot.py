@@ -30,7 +30,7 @@ from .search import FullSearch
 from .sweeps import polish, sweep
 from .views import BESIDE, Views, views_of
 
-Load = Callable[[int], np.ndarray | None]
+Load = Callable[[int], np.ndarray | wgpu.GPUTexture | None]
 
 
 @dataclass(frozen=True)
@@ -116,13 +116,18 @@ class Shot:
         picture = self._load(number)
         if picture is None:
             return None
-        color = checked(picture, number)
-        size = color.shape[1], color.shape[0]
+        if isinstance(picture, wgpu.GPUTexture):
+            size = picture.size[0], picture.size[1]
+        else:
+            picture = checked(picture, number)
+            size = picture.shape[1], picture.shape[0]
         if self._size not in (None, size):
             expected = "{} x {}".format(*self._size or size)
             raise InputError(f"frame {number} is {size[0]} x {size[1]}, others are {expected}")
         self._size = size
-        view = self._passes.images.upload("picture", color, "rgba32float")
+        if isinstance(picture, wgpu.GPUTexture):
+            return features(self._passes, picture.create_view(), size)
+        view = self._passes.images.upload("picture", picture, "rgba32float")
         return features(self._passes, view, size)
 
     @property

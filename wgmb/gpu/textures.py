@@ -43,6 +43,7 @@ class ScratchBuffer:
                 size=size,
                 usage=wgpu.BufferUsage.STORAGE
                 | wgpu.BufferUsage.COPY_DST
+                | wgpu.BufferUsage.COPY_SRC
                 | wgpu.BufferUsage.INDIRECT,
             )
         return self._buffer

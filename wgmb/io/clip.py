@@ -22,8 +22,8 @@ from ..camera import MAX_INDEX
 from ..display import ColorSpace
 from ..errors import InputError, check_choice, did_you_mean
 from ..frame import Frame
+from ..motion_source import MotionSource
 from ..reach import Reach
-from ..reel import MotionSource
 from . import detect, exr, layers, limits, vectors, views
 from .camera_file import CameraFile
 from .cut_list import CutList

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -18,11 +19,11 @@ _INSIDE = 0.05  # share of probes that must still be in the neighbour's picture
 _MOST = 0.5  # difference of tones beyond which a pixel has merely changed
 _JUMP = 8  # times the motion to the other side
 _FAR = 0.1  # of the picture's width
-_SMALL = 96  # pixels of width of the copies that are compared where there are no vectors
+SMALL = 96  # pixels of width of the copies that are compared where there are no vectors
 _BLOCK = 8  # pixels a side
 _SEARCH = 0.2  # of the width: farther nothing is looked for
 _STEP = 2  # pixels between places where a block is looked for
-_SAMPLED = 480  # pixels of width that are compared to tell a copy
+SAMPLED = 480  # pixels of width that are compared to tell a copy
 _COPY = 0.5 / 255  # mean difference of display values in a copy
 _COPY_WORST = 2 / 255  # the same in one block
 _ALIKE = 0.02  # difference of display values under which there is no cut
@@ -30,13 +31,18 @@ _UNLIKE = 0.78  # of the contrast
 
 
 def pictures_differ(before: np.ndarray, after: np.ndarray) -> bool:
-    """Return True if a cut lies between two pictures (height, width, 3 or 4) without vectors.
+    """Return True if a cut lies between two pictures (height, width, 3 or 4) without vectors."""
+    return smalls_differ(_small(before), _small(after))
 
-    Blocks of small copies are looked for within a fifth of the width. Measured: what is left is
-    0.55 to 0.63 of the blocks' own contrast where all moves, by up to 118 of 640 px, and 0.97 to
-    1.48 between unrelated pictures.
+
+def smalls_differ(a: np.ndarray, b: np.ndarray) -> bool:
+    """Return True if a cut lies between two pictures, of which these are small copies.
+
+    Copies are display values (height, width, 3), about SMALL pixels wide. Blocks of one are looked
+    for in the other within a fifth of the width. Measured: what is left is 0.55 to 0.63 of the
+    blocks' own contrast where all moves, by up to 118 of 640 px, and 0.97 to 1.48 between unrelated
+    pictures.
     """
-    a, b = _small(before), _small(after)
     if a.shape != b.shape:
         return True
     if np.abs(a - b).mean() < _ALIKE:
@@ -45,27 +51,35 @@ def pictures_differ(before: np.ndarray, after: np.ndarray) -> bool:
     if height < 1 or width < 1:
         return True
     a = a[: height * _BLOCK, : width * _BLOCK]
+    blocks = _blocks(a)
+    contrast = np.abs(blocks - blocks.mean(axis=(1, 3), keepdims=True)).sum(axis=4).mean()
+    most = _UNLIKE * max(float(contrast), _ALIKE)
     reach = round(_SEARCH * b.shape[1] / _STEP) * _STEP
     b = np.pad(b, ((reach, reach), (reach, reach), (0, 0)), mode="edge")
     left = np.full((height, width), np.inf)
-    for y in range(0, 2 * reach + 1, _STEP):
-        for x in range(0, 2 * reach + 1, _STEP):
-            off = np.abs(a - b[y : y + a.shape[0], x : x + a.shape[1]]).sum(axis=2)
-            left = np.minimum(left, _blocks(off).mean(axis=(1, 3)))
-    blocks = _blocks(a)
-    contrast = np.abs(blocks - blocks.mean(axis=(1, 3), keepdims=True)).sum(axis=4).mean()
-    return bool(left.mean() > _UNLIKE * max(contrast, _ALIKE))
+    for y, x in _ways(reach):
+        there = b[reach + y : reach + y + a.shape[0], reach + x : reach + x + a.shape[1]]
+        left = np.minimum(left, _blocks(np.abs(a - there).sum(axis=2)).mean(axis=(1, 3)))
+        if left.mean() <= most:  # it can only become less
+            return False
+    return True
 
 
-def repeats(before: np.ndarray, after: np.ndarray) -> bool:
-    """Return True if a picture (height, width, 3 or 4) is the one before again.
+@cache
+def _ways(reach: int) -> list[tuple[int, int]]:
+    """Displacements up to `reach` pixels down and across, the shortest first."""
+    ways = range(-reach, reach + 1, _STEP)
+    return sorted(((y, x) for y in ways for x in ways), key=lambda way: way[0] ** 2 + way[1] ** 2)
 
-    Codecs change a little in a copy; what moves changes some place clearly.
+
+def copies(a: np.ndarray, b: np.ndarray) -> bool:
+    """Return True if two pictures, of which these are pixels in even distances, are one.
+
+    Pixels are display values (height, width, 3). Codecs change a little in a copy; what moves
+    changes some place clearly.
     """
-    if before.shape != after.shape:
+    if a.shape != b.shape:
         return False
-    step = max(1, after.shape[1] // _SAMPLED)
-    a, b = (srgb(np.clip(c[::step, ::step, :3], 0, 1)) for c in (before, after))
     off = np.abs(a.astype(np.float32) - b).max(axis=2)
     height, width = (n // _BLOCK * _BLOCK for n in off.shape)
     worst = _blocks(off[:height, :width]).mean(axis=(1, 3)).max() if height and width else off.max()
@@ -79,8 +93,8 @@ def _blocks(plane: np.ndarray) -> np.ndarray:
 
 
 def _small(color: np.ndarray) -> np.ndarray:
-    """Display values of a copy that is at least _SMALL pixels wide, if the picture is."""
-    step = max(1, color.shape[1] // _SMALL)
+    """Display values of a copy that is at least SMALL pixels wide, if the picture is."""
+    step = max(1, color.shape[1] // SMALL)
     height, width = (n // step for n in color.shape[:2])
     cut = color[: height * step, : width * step, :3]
     parts = cut.reshape(height, step, width * step, 3).mean(axis=1, dtype=np.float32)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from ..reel import MotionSource
+from ..motion_source import MotionSource
 from .cuts import pictures_differ
 from .frame_file import FrameFile
 

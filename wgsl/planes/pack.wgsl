@@ -5,6 +5,7 @@ struct Plane {
     size: vec2u,        // width, height [samples]
     step: vec2u,        // columns, rows of pixels to one sample
     words: u32,         // of a row
+    first: u32,         // word of the plane
     most: f32,          // greatest sample
 }
 
@@ -24,7 +25,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let at = min(vec2u(id.x * each + i, id.y), plane.size - 1u);
         word |= u32(clamp(floor(mean(at) + 0.5), 0.0, plane.most)) << (BITS * i);
     }
-    packed[id.y * plane.words + id.x] = word;
+    packed[plane.first + id.y * plane.words + id.x] = word;
 }
 
 /// Mean over the pixels that a sample stands for.

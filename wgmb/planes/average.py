@@ -1,0 +1,135 @@
+"""Weighted means of coded pictures in linear light: from planes to planes in one pass."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..coding import CodedPicture, Coding
+from ..gpu.textures import ScratchBuffer, TexturePool
+from .packed import Packed, places_of
+from .uniforms import curve_of, frame_of, reading, writing
+
+EIGHT = 8  # pictures that one pass takes, and that are kept on the GPU
+_QUAD = 4  # samples to a texel
+_BLOCK = 8, 2  # columns and rows of pixels that an invocation makes
+_SUMS = 256  # bytes of a block's sums
+_BAND = 4 << 20  # bytes that are uploaded at once
+
+
+def averages(stored: Coding, wanted: Coding) -> bool:
+    """Return True if pictures that are `stored` so can be averaged and be coded as `wanted`."""
+    return all(
+        one.model == "yuv" and not one.alpha and max(one.steps) <= 2 for one in (stored, wanted)
+    )
+
+
+class Average:
+    """Averages the pictures of one video, whose planes stay on the GPU while they are needed."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device, self._images = device, TexturePool(device)
+        self._sums, self._packed = ScratchBuffer(device), Packed(device)
+        self._held: list[CodedPicture | None] = [None] * EIGHT
+
+    def __call__(
+        self, pictures: Sequence[CodedPicture], weights: Sequence[float], wanted: Coding
+    ) -> CodedPicture:
+        """The sum of pictures of one size and Coding, for which `averages` holds, by `weights`."""
+        encoder = self._device.create_command_encoder(label="average")
+        for first in range(0, len(pictures), EIGHT):
+            if first:
+                gpu.submit(self._device, encoder)
+                encoder = self._device.create_command_encoder(label="average")
+            some = pictures[first : first + EIGHT]
+            ends = first == 0, first + EIGHT >= len(pictures)
+            self._add(encoder, some, weights[first : first + EIGHT], wanted, ends)
+        places = places_of(pictures[0].size, wanted)
+        return self._packed.read(encoder, places, wanted)
+
+    def _add(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        pictures: Sequence[CodedPicture],
+        weights: Sequence[float],
+        wanted: Coding,
+        ends: tuple[bool, bool],
+    ) -> None:
+        """Record the pass over up to eight pictures; `ends`: they are the first, the last ones."""
+        (width, height), stored = pictures[0].size, pictures[0].coding
+        bits = 16 if wanted.bits > 8 else 8
+        grid = -(-width // _BLOCK[0]), -(-height // _BLOCK[1])
+        kernel = gpu.kernel(
+            self._device,
+            "planes/average.wgsl",
+            CURVE=curve_of(stored),
+            READ_X=stored.steps[0],
+            READ_Y=stored.steps[1],
+            WRITE_X=wanted.steps[0],
+            WRITE_Y=wanted.steps[1],
+            BITS=bits,
+            FIRST=ends[0],
+            LAST=ends[1],
+        )
+        places = places_of((width, height), wanted)
+        data = np.zeros((), kernel.source.dtype("Average"))
+        data["parts"][: len(pictures), 0] = weights
+        data["parts"][: len(pictures), 1] = self._layers(pictures)
+        data["count"], data["blocks"], data["most"] = len(pictures), grid[0], 2**wanted.bits - 1
+        for name, place in zip(("luma", "blue", "red"), places, strict=True):
+            data[name][:3] = place.words, place.size[1], place.first
+        kernel.run(
+            encoder,
+            "main",
+            frame_of(self._device, grid),
+            stored=reading(self._device, stored),
+            wanted=writing(self._device, wanted),
+            average=self._device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM),
+            lumas=self._layered(0, pictures[0]).create_view(dimension="2d-array"),
+            blues=self._layered(1, pictures[0]).create_view(dimension="2d-array"),
+            reds=self._layered(2, pictures[0]).create_view(dimension="2d-array"),
+            sums=self._sums.at_least(_SUMS if all(ends) else _SUMS * grid[0] * grid[1]),
+            packed=self._packed.buffer(places),
+        )
+
+    def _layers(self, pictures: Sequence[CodedPicture]) -> list[int]:
+        """The layer that holds each picture; those that are not there are uploaded."""
+        free = [n for n, held in enumerate(self._held) if not any(held is p for p in pictures)]
+        layers = []
+        for picture in pictures:
+            layer = next((n for n, held in enumerate(self._held) if held is picture), None)
+            if layer is None:
+                layer = free.pop(0)
+                self._held[layer] = picture
+                self._upload(picture, layer)
+            layers.append(layer)
+        return layers
+
+    def _layered(self, index: int, picture: CodedPicture) -> wgpu.GPUTexture:
+        """The texture that holds a plane of every picture."""
+        height, width = picture.planes[index].shape
+        kind = "rgba16uint" if picture.coding.bits > 8 else "rgba8uint"
+        return self._images.texture(f"plane {index}", (-(-width // _QUAD), height), kind, EIGHT)
+
+    def _upload(self, picture: CodedPicture, layer: int) -> None:
+        for index, plane in enumerate(picture.planes):
+            texture = self._layered(index, picture)
+            if over := -plane.shape[1] % _QUAD:
+                plane = np.pad(plane, ((0, 0), (0, over)), "edge")
+            width, height, _ = texture.size
+            row = plane.shape[1] * plane.itemsize
+            band = max(1, _BAND // row)
+            for top in range(0, height, band):
+                rows = plane[top : top + band]
+                self._device.queue.write_texture(
+                    {"texture": texture, "origin": (0, top, layer)},
+                    rows,
+                    {"bytes_per_row": row, "rows_per_image": len(rows)},
+                    (width, len(rows), 1),
+                )
+        gpu.submit(self._device)  # what is written is held in memory until a submit
