@@ -81,7 +81,8 @@ def main(arguments: list[str] | None = None) -> int:
     except Error as error:
         return _say_why(str(error), USAGE)
     except ImportError as error:
-        if not (why := reason(error)):
+        cause = error.__cause__  # of a command's module that cannot be loaded
+        if not (why := reason(cause if isinstance(cause, ImportError) else error)):
             raise
         return _say_why(f"{words[0]}: {why}", USAGE)
     except OSError as error:
