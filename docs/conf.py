@@ -12,10 +12,12 @@ author = "The wgmb authors"
 copyright = "2026, the wgmb authors"
 version = release = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "api", "commands", "mathml", "self_contained"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "api", "commands", "mathml", "self_contained"]
 exclude_patterns = ["extensions"]
 language = "en"
 
+nb_execution_mode = "off"  # tools/make_notebook.py runs the notebook, and so do the tests
+nb_ipywidgets_js = {}  # the sliders are not on the page
 myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 

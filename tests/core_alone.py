@@ -25,7 +25,7 @@ FRAMES = (1, 2, 3)
 
 def results(folder: Path) -> dict[str, np.ndarray]:
     """Pictures of every method, of arrays, scenes and EXR files, by name."""
-    return methods() | scenes() | batches(folder)
+    return methods() | scenes() | batches(folder) | shown()
 
 
 def methods() -> dict[str, np.ndarray]:
@@ -70,6 +70,11 @@ def batches(folder: Path) -> dict[str, np.ndarray]:
     return made
 
 
+def shown() -> dict[str, np.ndarray]:
+    """What a notebook shows of a frame: the bytes of a PNG."""
+    return {"png": np.frombuffer(wgmb.Frame(make.picture(1))._repr_png_(), np.uint8)}
+
+
 def said(folder: Path) -> dict[str, str]:
     """What is said where each extra is missing."""
     asked = {
@@ -78,6 +83,7 @@ def said(folder: Path) -> dict[str, str]:
         "jpeg output": lambda: wgmb.Output("o.####.jpg", numbers=[1, 2]),
         "tiff output": lambda: wgmb.VectorOutput("o.####.tif", "rsmb", numbers=[1, 2]),
         "mp4 output": lambda: wgmb.Output("o.mp4", numbers=[1, 2]),
+        "explore": lambda: wgmb.explore(wgmb.Frame(make.picture(1))),
         "config": lambda: wgmb.ColorConfig("builtin"),
     }
     told = {}

@@ -51,7 +51,7 @@ def test_every_method_scene_and_batch_has_the_same_bits_there(alone, tmp_path):
 
 EXTRA = {
     "png": "images", "png output": "images", "jpeg output": "images", "tiff output": "images",
-    "mp4 output": "video", "config": "ocio", "command": "cli",
+    "mp4 output": "video", "config": "ocio", "explore": "notebook", "command": "cli",
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Paths through five positions: the neighbours' own vectors tell where a body is two frames away."""
+"""Paths through five positions: the neighbours' vectors tell where a body is two frames away."""
 
 import numpy as np
 import pytest

@@ -16,8 +16,8 @@ PACKAGE, SHADERS = ROOT / "wgmb", ROOT / "wgsl"
 
 # A room imports only from lines above its own, and from itself.
 LAYERS = [
-    {"_version", "errors", "color", "coding"},
-    {"primaries", "extras"},
+    {"_version", "errors", "color", "coding", "charts"},
+    {"primaries", "extras", "shown"},
     {"ocio"},
     {"gpu", "shutter", "camera", "metrics", "display"},
     {"frame", "cone"},
@@ -35,7 +35,7 @@ LAYERS = [
     {"outcome"},
     {"job"},
     {"job_file"},
-    {"video_batch"},
+    {"video_batch", "hosts"},
     {"lab", "viewer"},  # never each other
     {"cli"},  # may start the viewer
     {"__init__", "__main__"},
@@ -44,7 +44,7 @@ PLACE = {room: number for number, layer in enumerate(LAYERS) for room in layer}
 GPU = {
     "gpu", "scene", "methods", "velocity", "holdout", "observer", "residency", "pipeline",
     "render", "lab", "viewer", "frame_views", "flow", "planes", "exposer",
-    "video_batch", "video_settings", "reel_views",
+    "video_batch", "video_settings", "reel_views", "hosts",
 }  # fmt: skip
 HOMES = {
     "wgpu": GPU,
@@ -62,6 +62,7 @@ HOMES = {
     "imgui_bundle": {"viewer"},
     "glfw": {"viewer"},
     "rendercanvas": {"viewer"},
+    "ipywidgets": {"hosts"},
 }
 FILES = sorted(PACKAGE.rglob("*.py"))
 KERNELS = sorted(SHADERS.rglob("*.wgsl"))

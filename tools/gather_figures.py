@@ -14,10 +14,10 @@ from PIL import Image, ImageDraw
 
 from pictures import IMAGES, enlarged, grid, levels, save
 from wgmb import Blur, Clip, Frame, Render, Shutter
+from wgmb.charts import Chart, svg
 from wgmb.color import motion_picture
 from wgmb.gpu import wgsl
 from wgmb.gpu.textures import numpy_of
-from wgmb.lab.charts import Chart, svg
 from wgmb.metrics import display
 from wgmb.scene import builtin
 

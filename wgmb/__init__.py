@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .flow import Flow
     from .frame import Frame
     from .frame_views import FrameViews
+    from .hosts.notebook import explore
     from .io.camera_file import CameraFile
     from .io.clip import Clip, Passes
     from .io.output import Output, Result
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from .pipeline import Blur, blur
     from .render import Render
     from .scene import Body, CameraPath, Scene
+    from .shown import show
     from .shutter import Shutter
     from .stages import BlurredFrame, blurred
 
@@ -69,6 +71,8 @@ __all__ = [
     "blur",
     "blur_sequence",
     "blurred",
+    "explore",
+    "show",
     "vectors_sequence",
 ]
 
@@ -81,6 +85,7 @@ _PLACES = {
     "flow": ("Flow",),
     "frame": ("Frame",),
     "frame_views": ("FrameViews",),
+    "hosts.notebook": ("explore",),
     "io.camera_file": ("CameraFile",),
     "io.clip": ("Clip", "Passes"),
     "io.output": ("Output", "Result"),
@@ -91,6 +96,7 @@ _PLACES = {
     "pipeline": ("Blur", "blur"),
     "render": ("Render",),
     "scene": ("Body", "Scene", "CameraPath"),
+    "shown": ("show",),
     "shutter": ("Shutter",),
     "stages": ("BlurredFrame", "blurred"),
 }

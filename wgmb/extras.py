@@ -16,6 +16,7 @@ EXTRAS = {
     "flip_evaluator": ("compare", "flip-evaluator"),
     "glfw": ("view", "glfw"),
     "imageio": ("images", "imageio"),
+    "ipywidgets": ("notebook", "ipywidgets"),
     "imgui_bundle": ("view", "imgui-bundle"),
     "opentimelineio": ("edit", "OpenTimelineIO"),
     "PIL": ("images", "Pillow"),

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from .camera import Reprojections, Window, window_of
 from .errors import InputError
 from .gpu import wgsl
+from .shown import show
 
 _F32_MAX = float(np.finfo(np.float32).max)
 _CHANNELS = {
@@ -139,6 +140,15 @@ class Frame:
         given = {name: getattr(self, name) for name in ("color", *_CHANNELS, "object_id")}
         return {name: array for name, array in given.items() if array is not None}
 
+    def __repr__(self) -> str:
+        width, height = self.size
+        color = f"color {'rgba'[: self.color.shape[2]]} f{8 * self.color.itemsize}"
+        given = [name for name in _SHORT if getattr(self, name) is not None]
+        return f"Frame({width} x {height}, {', '.join([color, *given])}, number {self.number})"
+
+    def _repr_png_(self) -> bytes:
+        return show(self.color).png
+
     @property
     def is_locked(self) -> bool:
         """True if all arrays are read-only; such frames are uploaded only once."""
@@ -178,6 +188,8 @@ class Frame:
         return frozenset(there)
 
 
+_SHORT = ("to_next", "to_prev", "motion", "depth", "camera", "object_id", "normal", "holdout",
+          "scale", "prev", "next")  # fmt: skip
 PASSES = tuple(f.name for f in fields(Frame) if f.init and f.name != "color")
 
 

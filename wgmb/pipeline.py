@@ -88,6 +88,14 @@ class Blur:
         self._holdout = HoldoutPass(self.device, self._images, self._unbound)
         self.shutter = shutter
 
+    def __repr__(self) -> str:
+        shutter = self._shutter
+        curve = shutter.curve if isinstance(shutter.curve, str) else "own curve"
+        words = f"shutter {shutter.degrees:g}{'' if curve == 'box' else f' {curve}'}"
+        samples = "auto" if self.auto else self.samples
+        gpu_name = self.device.adapter_info["device"]
+        return f'Blur("{self.method.name}", {words}, {samples} samples, {gpu_name})'
+
     @property
     def confidence(self) -> tuple[str, ...]:
         """Names of the `with_confidence` layers; InputError if the method has none."""

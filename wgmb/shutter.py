@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from . import charts
 from .errors import InputError, check_choice
 
 Weight = Callable[[np.ndarray], np.ndarray]
@@ -95,6 +96,10 @@ class Shutter:
             raise InputError(
                 f"`rolling_duration` must be 0 to 100 frame intervals, got {self.rolling_duration}"
             )
+
+    def _repr_svg_(self) -> str:
+        name = self.curve if isinstance(self.curve, str) else "own curve"
+        return charts.svg(charts.shutter_chart(self, name, points=301))
 
     @property
     def span(self) -> tuple[float, float]:

@@ -25,6 +25,7 @@ GROUPS = {
         "scene.OrbitingSphere", "scene.Torus", "scene.Backdrop",
     ),
     "perception": ("Cone", "Observer"),
+    "notebooks": ("show", "explore"),
     "errors": ("Error", "InputError", "DeviceError", "GpuMemoryError", "ShaderError"),
 }  # fmt: skip
 

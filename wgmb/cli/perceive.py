@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Group, Parameter
 
+from .. import charts
 from .._version import __version__
 from ..cone import VIDEOS, Cone
 from ..errors import InputError
@@ -20,7 +21,6 @@ from ..io.frame_file import FrameFile, size_text
 from ..io.frame_numbers import frame_numbers
 from ..io.output import Result
 from ..io.windows import Placement, laid, union
-from ..lab import charts
 from ..lab.shutter_study import best_shutter, compare, perception_charts
 from ..observer import Observer
 from ..pipeline import Blur

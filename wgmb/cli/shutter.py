@@ -9,9 +9,9 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
+from .. import charts
 from ..errors import InputError
 from ..io.atomic import write_file
-from ..lab import charts
 from ..shutter import OVERLAPS
 from .options import ShutterOptions, When
 from .terminal import out

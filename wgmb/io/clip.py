@@ -207,6 +207,16 @@ class Clip:
         made._begin()
         return made
 
+    def __repr__(self) -> str:
+        asked = self.passes.vectors.convention
+        known = self._found.vectors if self._found else None
+        name = known.convention if known else asked
+        vectors = {"auto": "", "none": ", no vectors"}.get(name, f", {name} vectors")
+        pattern = self.pattern if len(self.pattern) <= 200 else f"...{self.pattern[-200:]}"
+        numbers = self.numbers
+        frames = f"frame{'s' if len(numbers) > 1 else ''} {frame_list(numbers)}"
+        return f'Clip("{pattern}", {frames}{vectors})'
+
     def move_by(self, motion: MotionSource) -> None:
         """Take motion from the pictures (see wgmb/flow) where the files hold none."""
         self._picture_motion = PictureMotion(self, motion)

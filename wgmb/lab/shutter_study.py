@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from ..charts import Chart
 from ..cone import VIDEOS, Cone
 from ..errors import InputError
 from ..shutter import Shutter
-from .charts import Chart
 
 TURN = 2 * math.pi
 

@@ -1,0 +1,1 @@
+"""wgmb inside other programs: notebooks and pygfx scenes. Nothing else in wgmb imports it."""
