@@ -31,6 +31,10 @@ _CHANNELS = {
     "to_prev": (2,),
     "motion": (4,),
     "normal": (3,),
+    "diffuse_light": (3,),
+    "diffuse_color": (3,),
+    "glossy_light": (3,),
+    "glossy_color": (3,),
     "depth": (),
     "holdout": (),
     "scale": (),
@@ -76,6 +80,15 @@ class Frame:
     """The frame after."""
     number: int = 0
     """Frame number; varies the jitter."""
+    diffuse_light: np.ndarray | None = None
+    """(height, width, 3) float, linear: the light that matt surfaces scatter, before it is
+    multiplied by `diffuse_color`; with it the neighbours' own, so that shadows can move."""
+    diffuse_color: np.ndarray | None = None
+    """(height, width, 3) float, linear: the colour of matt surfaces (albedo)."""
+    glossy_light: np.ndarray | None = None
+    """(height, width, 3) float, linear: what glossy surfaces reflect, before `glossy_color`."""
+    glossy_color: np.ndarray | None = None
+    """(height, width, 3) float, linear: the colour of glossy surfaces."""
     bad: dict[str, int] = field(init=False, default_factory=dict)
     """Number of pixels per input that are not finite, or have no depth in front of the camera.
 

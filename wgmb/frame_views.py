@@ -22,6 +22,7 @@ _X_IF_USED = {"format": "r32float", "if_used": True}
 _XY = {"format": "rg32float", "if_used": False}
 _XYZW = {"format": "rgba32float", "if_used": False}
 _XYZ_IF_USED = {"format": "rgba32float", "if_used": True}
+_RGB_IF_USED = {"format": "rgba16float", "if_used": True}
 _INDEX = {"format": "r32uint", "if_used": False}
 
 
@@ -50,6 +51,14 @@ class FrameViews:
     """Index of each pixel's body in `camera`; 0 is the world."""
     normal: View | None = field(default=None, metadata=_XYZ_IF_USED)
     """Unit vectors in the world in x, y, z."""
+    diffuse_light: View | None = field(default=None, metadata=_RGB_IF_USED)
+    """As in Frame; linear, in x, y, z."""
+    diffuse_color: View | None = field(default=None, metadata=_RGB_IF_USED)
+    """As in Frame; linear, in x, y, z."""
+    glossy_light: View | None = field(default=None, metadata=_RGB_IF_USED)
+    """As in Frame; linear, in x, y, z."""
+    glossy_color: View | None = field(default=None, metadata=_RGB_IF_USED)
+    """As in Frame; linear, in x, y, z."""
     holdout: View | None = field(default=None, metadata=_X)
     """0..1 in x: 1 stays sharp and out of its neighbours' blur."""
     scale: View | None = field(default=None, metadata=_X)

@@ -118,8 +118,9 @@ class Stages:
         return done
 
     def _prepared(self, source: FrameFile) -> tuple[Frame, Placement | None]:
-        normal = "normal" in self._blur.method.uses
-        return self.clip.placed(source, self._blur.reach, self.neighbours, normal)
+        uses = self._blur.method.uses
+        normal, light = "normal" in uses, "diffuse_light" in uses
+        return self.clip.placed(source, self._blur.reach, self.neighbours, normal, light)
 
     def _blurred(self, source: FrameFile, frame: Frame, placement: Placement | None) -> Result:
         if self._confidence:
@@ -131,7 +132,7 @@ class MotionStages(Stages):
     """Motion instead of blurred pictures."""
 
     def _prepared(self, source: FrameFile) -> tuple[Frame, None]:
-        frame = self.clip.frame(source, picture=False, normal=False)
+        frame = self.clip.frame(source, picture=False, normal=False, light=False)
         if "motion" not in frame.has:
             raise InputError("no motion: neither vectors nor a camera")
         return frame, None

@@ -106,6 +106,7 @@ def describe(
     depth = layers.find_depth(source.channels, clip.passes.depth, source.beside)
     lines.append(("depth", depth or "none"))
     lines.append(("vectors", clip.finding))
+    lines.append(("light", clip.light_passes(source).text))
     if valid := clip.vector_mask(source):
         lines.append(("valid", f"vectors are used where {valid} is 1"))
     return lines + _about_motion(clip, source, output)

@@ -24,7 +24,7 @@ from ..errors import InputError, check_choice, did_you_mean
 from ..frame import Frame
 from ..motion_source import MotionSource
 from ..reach import Reach
-from . import detect, exr, layers, limits, vectors, views
+from . import detect, exr, layers, light_passes, limits, vectors, views
 from .camera_file import CameraFile
 from .cut_list import CutList
 from .frame_file import FrameFile, about, read
@@ -43,7 +43,7 @@ from .frame_numbers import (
 )
 from .input_space import in_space
 from .masks import Masks
-from .neighbours import Neighbours
+from .neighbours import Neighbours, extras
 from .picture_motion import FAR, PictureMotion
 from .settled import Settled
 from .windows import Placement, Window, laid, near_enough, union
@@ -329,7 +329,7 @@ class Clip:
         """
         for number in self.on_disk:
             with contextlib.suppress(InputError, OSError):  # its turn to fail comes
-                return self.frame(self.source(number), picture=False, normal=False).has
+                return self.frame(self.source(number), picture=False, normal=False, light=False).has
         return frozenset()
 
     def files(self, number: int) -> list[Path]:
@@ -537,7 +537,11 @@ class Clip:
             return None
 
     def with_neighbours(
-        self, source: FrameFile, normal: bool = True, reach: Reach | None = None
+        self,
+        source: FrameFile,
+        normal: bool = True,
+        reach: Reach | None = None,
+        light: bool = True,
     ) -> Frame:
         """`frame`, and the same view of the frames before and after as far as they can be read.
 
@@ -546,30 +550,45 @@ class Clip:
         Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
         Blur, once, though it is shown in three.
         """
-        return self._around.between(source, normal, reach)[0]
+        return self._around.between(source, extras(normal, light), reach)[0]
 
     def placed(
-        self, source: FrameFile, reach: Reach, neighbours: bool, normal: bool = True
+        self,
+        source: FrameFile,
+        reach: Reach,
+        neighbours: bool,
+        normal: bool = True,
+        light: bool = True,
     ) -> tuple[Frame, Placement]:
         """What a Blur of this `reach` takes: with_neighbours, or `frame`; and where that lies."""
         made = self._around.between if neighbours else self._around.alone
-        return made(source, normal, reach)
+        return made(source, extras(normal, light), reach)
 
-    def frame(self, source: FrameFile, picture: bool = True, normal: bool = True) -> Frame:
+    def frame(
+        self,
+        source: FrameFile,
+        picture: bool = True,
+        normal: bool = True,
+        light: bool = True,
+    ) -> Frame:
         """Return the Frame of `source`; without `picture`, its colour is 0; without `normal`, it
-        has no normals.
+        has no normals; without `light`, no passes of light.
 
         Motion that leads across a camera cut is left out (see cuts.jumps).
         """
-        return self._around.frame(source, picture, normal)
+        return self._around.frame(source, picture, extras(normal, light))
 
     @property
     def cuts(self) -> set[int]:
         """Frames after a camera cut, of those read so far."""
         return self._around.cuts
 
-    def passes_of(self, source: FrameFile, picture: bool, normal: bool) -> Frame:
-        """The Frame of `source` as its layers have it; see `frame`."""
+    def light_passes(self, source: FrameFile) -> light_passes.LightPasses:
+        """The passes of light of a frame's picture."""
+        return light_passes.find(self._own(source), source.beside)
+
+    def passes_of(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
+        """The Frame of `source` as its layers have it; see `frame`. `also`: "normal", "light"."""
         meaning = self._decide().vectors
         with about(source.name):
             if meaning is None:  # where a layer was asked for, this says why there is none
@@ -595,7 +614,8 @@ class Clip:
                 source.rgba if picture else np.zeros((*source.size[::-1], 3), np.float16),
                 motion=motion,
                 depth=depth,
-                normal=self._normal(source) if normal else None,
+                normal=self._normal(source) if "normal" in also else None,
+                **(self._light(source) if "light" in also else {}),
                 window=source.window,
                 camera=reprojections,
                 object_id=ids,
@@ -620,6 +640,13 @@ class Clip:
         if not names:
             return None
         return np.stack([source.channels[name] for name in names], 2, dtype=np.float32)
+
+    def _light(self, source: FrameFile) -> dict[str, Any]:
+        """Fields of Frame; what is there in vain is noted."""
+        found = self.light_passes(source)
+        if found.lacking and source.number not in (on := self.notes.setdefault(found.lacking, [])):
+            on.append(source.number)
+        return light_passes.read(source.channels, found)
 
     def _object_ids(self, source: FrameFile) -> np.ndarray | None:
         by_layer = layers.layers(source.channels, near=source.beside)

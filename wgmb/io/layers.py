@@ -56,10 +56,10 @@ def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
     and "" for what it lacks.
     """
     names = list(names)
-    for channels_of in (_rgb, _grey, _some_of_rgb):
+    for channels_of in (rgb, _grey, _some_of_rgb):
         by_layer = {k: channels_of(v) for k, v in layers(names).items()}
         by_layer = {k: v for k, v in by_layer.items() if v}
-        if channels_of is not _rgb and wanted is None:  # others may mean anything
+        if channels_of is not rgb and wanted is None:  # others may mean anything
             by_layer = {k: v for k, v in by_layer.items() if k == "" or stem(k) in _COLOR}
         if by_layer:
             break
@@ -78,7 +78,8 @@ def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
     return by_layer[chosen]
 
 
-def _rgb(members: list[str]) -> list[str]:
+def rgb(members: list[str]) -> list[str]:
+    """The channels of red, green, blue and alpha of a layer's; none if it is not coloured."""
     by_component = {component(m): m for m in members}
     for r, g, b, a in (("r", "g", "b", "a"), ("red", "green", "blue", "alpha")):
         if {r, g, b} <= by_component.keys():

@@ -36,6 +36,11 @@ if TYPE_CHECKING:
 _SIDES = "left", "top", "right", "bottom"
 
 
+def extras(normal: bool, light: bool) -> frozenset[str]:
+    """Names of the inputs that only some methods take."""
+    return frozenset(n for n, wanted in (("normal", normal), ("light", light)) if wanted)
+
+
 class Neighbours:
     """The frames of a clip as a blur takes them.
 
@@ -48,9 +53,9 @@ class Neighbours:
         self._clip, self._known_cuts, self._outside = clip, known_cuts, outside
         self._is_search = is_search
         self.cuts: set[int] = set()
-        self._alone: OrderedDict[tuple[int, str | None], tuple[FrameFile, bool, Frame]] = (
-            OrderedDict()
-        )
+        self._alone: OrderedDict[
+            tuple[int, str | None], tuple[FrameFile, frozenset[str], Frame]
+        ] = OrderedDict()
         self._placed: OrderedDict[tuple[int, str | None], tuple[Frame, Window, Frame]] = (
             OrderedDict()
         )
@@ -79,9 +84,9 @@ class Neighbours:
 
     # ---- frames ----------------------------------------------------------------------------
 
-    def frame(self, source: FrameFile, picture: bool = True, normal: bool = True) -> Frame:
+    def frame(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
         """The Frame of `source` in its own window, without motion that leads across a cut."""
-        frame = self._clip.passes_of(source, picture, normal)
+        frame = self._clip.passes_of(source, picture, also)
         if all(self.is_known_cut(source.number, side) for side in (-1, 1)):
             self.cuts |= {source.number, source.number + 1}
             return still(frame)
@@ -91,33 +96,33 @@ class Neighbours:
         return frame
 
     def alone(
-        self, source: FrameFile, normal: bool, reach: Reach | None
+        self, source: FrameFile, also: frozenset[str], reach: Reach | None
     ) -> tuple[Frame, Placement]:
         """The frame by itself, on a canvas with room for `reach`."""
-        frame = self.frame(source, normal=normal)
+        frame = self.frame(source, True, also)
         onto = self._canvas({0: (source, frame)}, reach)
         frame = placed(frame, source.data_window, onto, self._edges(source, onto))
         return frame, Placement(onto, self._bounds(source))
 
     def between(
-        self, source: FrameFile, normal: bool, reach: Reach | None
+        self, source: FrameFile, also: frozenset[str], reach: Reach | None
     ) -> tuple[Frame, Placement]:
         """The frame with those before and after it, on a canvas with room for `reach`.
 
         Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
         Blur, once, though it is shown in three.
         """
-        frames = {0: (source, self._locked(source, normal))}
+        frames = {0: (source, self._locked(source, also))}
         for side in (-1, 1):
             other = self._clip.neighbour(source, side)
             if other is None or other.display_window != source.display_window:
                 continue
             try:
-                near = self._locked(other, normal)
+                near = self._locked(other, also)
             except InputError:  # its turn to fail comes
                 self._clip.unread.add(other.number)
                 continue
-            if self._is_cut(source, frames[0][1], near, side, normal):
+            if self._is_cut(source, frames[0][1], near, side, also):
                 self.cuts.add(source.number + (side > 0))
             else:
                 frames[side] = other, near
@@ -126,15 +131,15 @@ class Neighbours:
         frame = made[0].between(made.get(-1), made.get(1))
         return frame, Placement(onto, self._bounds(source))
 
-    def _locked(self, source: FrameFile, normal: bool) -> Frame:
+    def _locked(self, source: FrameFile, also: frozenset[str]) -> Frame:
         """`frame`, made once for the three frames that it is shown in."""
         key = source.number, source.view
-        made, with_normal, frame = self._alone.get(key, (None, None, None))
-        if frame is None or made is not source or with_normal != normal:
+        made, with_also, frame = self._alone.get(key, (None, None, None))
+        if frame is None or made is not source or with_also != also:
             self._alone.pop(key, None)
             self._make_room(self._alone)
-            frame = self.frame(source, normal=normal).locked()
-            self._alone[key] = source, normal, frame
+            frame = self.frame(source, True, also).locked()
+            self._alone[key] = source, also, frame
         return frame
 
     def _on(self, onto: Window, source: FrameFile, frame: Frame) -> Frame:
@@ -167,7 +172,7 @@ class Neighbours:
         if source.view is not None and source.view != self._clip.leader(number).view:
             with contextlib.suppress(InputError):  # then this view decides
                 if number not in self._jumps:
-                    self.frame(self._clip.leader(number), picture=False, normal=False)
+                    self.frame(self._clip.leader(number), False, frozenset())
                 return self._jumps[number]
         sides: list[int] = []
         for side in (-1, 1):
@@ -179,7 +184,7 @@ class Neighbours:
         return sides
 
     def _is_cut(
-        self, source: FrameFile, frame: Frame, near: Frame, side: int, normal: bool
+        self, source: FrameFile, frame: Frame, near: Frame, side: int, also: frozenset[str]
     ) -> bool:
         """Whether a cut lies between `frame` and `near`, as is settled on the default view."""
         if not self._is_search:  # known ones are not asked
@@ -193,7 +198,7 @@ class Neighbours:
                 with contextlib.suppress(InputError, OSError):  # then this view decides
                     other = self._clip.neighbour(leader, side)
                     if other is not None and other.display_window == leader.display_window:
-                        frame, near = self._locked(leader, normal), self._locked(other, normal)
+                        frame, near = self._locked(leader, also), self._locked(other, also)
             self._cuts_to[key] = is_cut(frame, near, side)
         return self._cuts_to[key]
 

@@ -51,6 +51,21 @@ class Inputs:
     """Samples done before, samples to do now."""
 
     @property
+    def exposed(self) -> tuple[float, float]:
+        """When the frame is exposed anywhere: first and last time [frame intervals].
+
+        The same as exposure_window() of shutter.wgsl for the frame itself.
+        """
+        x, y, width, height = self.bindings.window
+        whole, size = (width, height), self.bindings.size
+        late = 0.0
+        for delay, first, length, full in zip(self.shutter.delay, (x, y), size, whole, strict=True):
+            ends = 0.5 - first / full, (first + length) / full - 0.5
+            late += abs(delay) * max(0.5, *ends)
+        opens, closes = self.shutter.span
+        return opens - late, closes + late
+
+    @property
     def frame(self) -> PreparedFrame:
         """The frame that is blurred."""
         return self.frames[0]
@@ -72,8 +87,8 @@ class Method(Protocol):
     needs: frozenset[str]
     """Of "color", "motion", "depth", "scene"."""
     uses: frozenset[str]
-    """Optional inputs: "neighbours", "depth", "normal"; "progress": its samples may be recorded
-    in portions."""
+    """Optional inputs: "neighbours", "depth", "normal", passes of light; "progress": its samples
+    may be recorded in portions."""
 
     Options: type[MethodOptions]
     """Its own options; see options.py."""

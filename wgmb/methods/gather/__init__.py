@@ -8,8 +8,10 @@ from typing import Annotated, Literal
 from ...gpu.textures import TexturePool
 from ..options import MethodOptions
 from .active_tiles import ActiveTiles
+from .kinds import PASSES, Shading, kinds_of
 from .layers import Layers
 from .search import Search
+from .shading import MovingLight, Times
 from .tile_motions import TileMotions
 
 
@@ -29,15 +31,20 @@ class Gather:
     accepted, the share that neighbouring frames gave, the mean residual [px] and the share of
     times whose path left the picture, as r, g, b, a.
 
+    `shading`: light that moves over surfaces, as shadows and reflections do, is followed too, where
+    the passes of light of the frame and of a neighbour tell it from what it falls on (see
+    Frame.diffuse_light). "auto" and "passes": by these, where they are; "frames": shadows by the
+    colours alone, which is less sure; "off": shading stays that of the frame.
+
     Strong: the closest to the truth. Reveals hidden surfaces, blurs across silhouettes.
-    Artefacts: shading is that of one frame; surfaces hidden in all three are guessed from their
-    surroundings; those that move more than 256 px by a sample's time may be missed; costs
-    7 to 26 times as much as taps.
+    Artefacts: without passes of light, shading is that of one frame; surfaces hidden in all three
+    are guessed from their surroundings; those that move more than 256 px by a sample's time may be
+    missed; costs 7 to 26 times as much as taps.
     """
 
     name = "gather"
     needs = frozenset({"color", "motion", "depth"})
-    uses = frozenset({"neighbours"})
+    uses = frozenset({"neighbours", *PASSES})
     adaptive = True
     most_in_software = 512  # loops end there after 65,535 turns, all of a pixel together
     confidence = ("accepted", "disocclusion", "residual", "left")
@@ -49,9 +56,18 @@ class Gather:
         show: Annotated[
             Literal["color", "confidence"], "the blurred image, or confidence layers"
         ] = "color"
+        shading: Annotated[
+            Shading,
+            "shadows and reflections that move: auto, passes: followed by passes of light, where "
+            "there are any; frames: shadows by the colours alone; off: as in the frame",
+        ] = "auto"
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
         images, confidence = TexturePool(device), options.show == "confidence"
+        self._shading: Shading = "off" if confidence else options.shading
+        if self._shading in ("off", "frames"):
+            self.uses = frozenset({"neighbours"})
+        self._light = MovingLight(device)
         self._tiles = ActiveTiles(device)
         self._layers = Layers(device, images)
         self._motions = TileMotions(device, images)
@@ -67,4 +83,9 @@ class Gather:
             self._motions.encode(encoder, inputs, i, surface, worklists)
         candidates = self._motions.candidates(size, len(frames))
         textures = self._layers.textures
-        self._search.encode(encoder, inputs, textures, candidates, worklists, output)
+        added = None
+        if kinds := kinds_of(inputs, self._shading):
+            opens, closes = inputs.exposed
+            times = Times.within(opens, closes, inputs.samples)
+            added = self._light.encode(encoder, inputs.bindings, kinds, times, inputs.frame.weight)
+        self._search.encode(encoder, inputs, textures, candidates, worklists, output, added)

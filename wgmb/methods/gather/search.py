@@ -8,9 +8,11 @@ import numpy as np
 import wgpu
 
 from ... import gpu
+from ...gpu import wgsl
 from ...gpu.textures import TexturePool
 from .active_tiles import grid_of, uniform
 from .layers import layer_view
+from .shading import Added
 
 
 class Search:
@@ -22,8 +24,8 @@ class Search:
         self._device, self._images = device, images
         self._confidence, self._output = confidence, output
 
-    def encode(self, encoder, inputs, layers, candidates, worklists, output):
-        """Record the classification of blocks, then all pixels."""
+    def encode(self, encoder, inputs, layers, candidates, worklists, output, added: Added | None):
+        """Record the classification of blocks, then all pixels. `added`: moving light."""
         timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
         classify = gpu.kernel(self._device, "methods/gather/classify.wgsl", **timed)
         data = np.zeros((), classify.source.dtype("SourceFrames"))
@@ -53,32 +55,65 @@ class Search:
             active_cells=worklists["active"],
             **searched,
         )
-        kernel = gpu.kernel(
-            self._device,
-            "methods/gather/resolve.wgsl",
-            {"Output": self._output},
-            WEIGHTED=inputs.frame.weight is not None,
-            CONFIDENCE=self._confidence,
-            **timed,
-        )
         separated = worklists["separated"]
         differences = self._differences(encoder, inputs, layers["surfaces"], separated)
         for entry, cells in (("main", worklists["active"]), ("copy_static", worklists["static"])):
-            kernel.run(
-                encoder,
-                entry,
-                inputs.bindings,
-                cells,
-                worklist=cells,
-                single_layer_mask=mask,
-                second_differences=differences,
-                own_color=inputs.frame.color,
-                own_weight=inputs.frame.weight or inputs.unbound,
-                linear=inputs.linear,
-                output=output,
-                **searched,
-                **arrays,
-            )
+            for lit, groups in self._groups(encoder, inputs, cells, added):
+                kernel = gpu.kernel(
+                    self._device,
+                    "methods/gather/resolve.wgsl",
+                    {"Output": self._output},
+                    WEIGHTED=inputs.frame.weight is not None,
+                    CONFIDENCE=self._confidence,
+                    MOVING_LIGHT=lit is not None,
+                    **timed,
+                )
+                kernel.run(
+                    encoder,
+                    entry,
+                    inputs.bindings,
+                    groups,
+                    worklist=cells,
+                    single_layer_mask=mask,
+                    second_differences=differences,
+                    own_color=inputs.frame.color,
+                    own_weight=inputs.frame.weight or inputs.unbound,
+                    linear=inputs.linear,
+                    output=output,
+                    **self._light(lit),
+                    **searched,
+                    **arrays,
+                )
+
+    def _groups(
+        self, encoder, inputs, cells: dict, added: Added | None
+    ) -> list[tuple[Added | None, dict]]:
+        """Workgroups of a pass over `cells`: with moving light, and without it where none moves."""
+        if added is None:
+            return [(None, cells)]
+        kernel = gpu.kernel(self._device, "methods/gather/shading/choose.wgsl")
+        usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDIRECT
+        groups = self._device.create_buffer(label="groups", size=32, usage=usage)
+        alone = replace(inputs.bindings, size=(1, 1))
+        kernel.run(encoder, "main", alone, found=added.found, worklist=cells, groups=groups)
+        return [
+            (one, {"buffer": groups, "offset": offset, "size": 12})
+            for one, offset in ((added, 0), (None, 12))
+        ]
+
+    def _light(self, added: Added | None) -> dict:
+        """What the search binds for moving light, or for none."""
+        source = wgsl.load("methods/gather/moving_light.wgsl")
+        nodes = np.zeros((), source.dtype("LightNodes"))
+        if added is None:
+            layers = self._images.texture("no light", (1, 1), "rgba16float")
+        else:
+            layers, times = added.layers, added.times
+            nodes["first"], nodes["step"], nodes["count"] = times.first, times.step, times.count
+        return {
+            "light_nodes": uniform(self._device, "light nodes", nodes),
+            "added_light": layers.create_view(dimension="2d-array"),
+        }
 
     def _differences(self, encoder, inputs, surfaces, cells) -> wgpu.GPUTextureView:
         """Record the second differences of the frame's own colours."""

@@ -7,6 +7,7 @@
 //#include common/shutter.wgsl
 //#include methods/gather/worklist.wgsl
 //#include methods/gather/motion.wgsl
+//#include methods/gather/moving_light.wgsl
 //#include methods/gather/search.wgsl
 
 @group(1) @binding(3) var single_layer_mask: texture_2d_array<u32>; // bits of times, see the classification
@@ -90,7 +91,8 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
                 counts = textureLoad(mattes, px, front / 2u, 0).w;
             }
             if todo != 0u && is_even {
-                let color = resampled(x - found.d, front, true);
+                var color = resampled(x - found.d, front, true);
+                if MOVING_LIGHT { color += moving_light(x - found.d, 0u, t, duration_in(times, first, todo)); }
                 let residual = min(sqrt(found.residual2), HALF_MAX);    // a wild motion may end it anywhere
                 add(&sum, Composite(color, counts, 1.0, residual, 0.0), share);
                 accepted += 1.0;
@@ -104,7 +106,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
         loop {              // all others
             let t = time_in(times, first, todo);
             let visible = resolve_visibility(x, trajectory, t, candidates0, candidates1, candidates2);
-            let result = composite_front_to_back(visible);
+            let result = composite_front_to_back(visible, t, duration_in(times, first, todo));
             let is_covered = result.coverage > 0.5;
             if todo != 0u && is_covered {
                 add(&sum, result, share / result.coverage);
@@ -115,11 +117,13 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
             if todo == 0u { break; }
         }
         loop {              // of them, those at which no frame shows anything: a tap along the pixel's own trajectory
-            let p = x - displacement5(trajectory, time_in(times, first, unresolved));
+            let t = time_in(times, first, unresolved);
+            let p = x - displacement5(trajectory, t);
             if unresolved != 0u {
                 var counts = 1.0;
                 if WEIGHTED { counts = textureSampleLevel(own_weight, linear, p / vec2f(frame.size), 0.0).x; }
-                let color = textureSampleLevel(own_color, linear, p / vec2f(frame.size), 0.0);
+                var color = textureSampleLevel(own_color, linear, p / vec2f(frame.size), 0.0);
+                if MOVING_LIGHT { color += moving_light(p, 0u, t, duration_in(times, first, unresolved)); }
                 add(&sum, Composite(color, counts, 1.0, 0.0, 0.0), share);
                 if !is_inside(p) { left_image += 1.0; }
             }
@@ -149,17 +153,37 @@ fn copy_static(@builtin(local_invocation_index) local: u32, @builtin(workgroup_i
     textureStore(output, id, result);
 }
 
-/// The frame's own pixel, to the bit.
+/// The frame's own pixel; without moving light, to the bit.
 fn static_color(px: vec2u) -> vec4f {
-    let color = textureLoad(own_color, px, 0);
+    let color = lit_color(px);
     if !WEIGHTED { return color; }
     let counts = textureLoad(own_weight, px, 0).x;
     return select(vec4f(0.0), color / counts, counts > 0.0);
 }
 
+/// Of the frame's own pixel, the mean over the exposure.
+fn lit_color(px: vec2u) -> vec4f {
+    let color = textureLoad(own_color, px, 0);
+    if !MOVING_LIGHT { return color; }
+    let x = vec2f(px) + 0.5;
+    let times = shutter_times(x, 0.0);
+    let share = 1.0 / f32(times.count);
+    var sum = vec4f(0.0);
+    for (var i = 0u; i < times.count; i++) {
+        sum += share * moving_light(x, 0u, shutter_time(times, i), sample_duration(times, i));
+    }
+    return max(color + sum, vec4f(0.0));
+}
+
 /// Time of the lowest set bit of a word whose bit 0 is sample `first`.
 fn time_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
     return shutter_time(times, min(first + firstTrailingBit(bits), times.count - 1u));
+}
+
+/// For how long that sample stands [frame intervals].
+fn duration_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
+    if !MOVING_LIGHT { return 0.0; }
+    return sample_duration(times, min(first + firstTrailingBit(bits), times.count - 1u));
 }
 
 /// The pixel of the image nearest to a position [px].
@@ -328,7 +352,7 @@ fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
 }
 
 /// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then what is opaque.
-fn composite_front_to_back(visible: Visible) -> Composite {
+fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite {
     let front_edge = is_before(visible.front_edge, visible.opaque);
     let back_edge = front_edge && is_before(visible.back_edge, visible.opaque)
         && is_behind(visible.back_edge, visible.front_edge);
@@ -356,6 +380,7 @@ fn composite_front_to_back(visible: Visible) -> Composite {
             one.weight /= one.coverage;
             one.coverage = 1.0;
         }
+        if MOVING_LIGHT && n < parts { one.color += one.coverage * moving_light(part.at, part.layer, t, duration); }
         one.residual = one.coverage * sqrt(part.residual2);
         one.neighbours = select(0.0, one.coverage, part.layer > 1u);
         add(&sum, one, 1.0 - sum.coverage);
@@ -366,7 +391,8 @@ fn composite_front_to_back(visible: Visible) -> Composite {
         var counts = 1.0;
         if WEIGHTED { counts = textureLoad(mattes, nearest_pixel(at), layer / 2u, 0).w; }
         let neighbours = select(0.0, 1.0, visible.opaque.layer > 1u);
-        let color = resampled(at, layer, visible.opaque.layer == 0u);
+        var color = resampled(at, layer, visible.opaque.layer == 0u);
+        if MOVING_LIGHT { color += moving_light(at, visible.opaque.layer, t, duration); }
         let one = Composite(color, counts, 1.0, sqrt(visible.opaque.residual2), neighbours);
         add(&sum, one, 1.0 - sum.coverage);
     }

@@ -1,0 +1,332 @@
+"""Light that moves over surfaces, a stage at a time: the slow and obvious form of wgsl/.../shading.
+
+Arrays are (height, width[, channels]); an image position is x, y [px], of a pixel's middle n + 0.5.
+"""
+
+import numpy as np
+
+NO_DEPTH = 2.0**33
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+PATCH, STRIDE, STEPS = 12, 4, 6
+
+
+def shifted(a, dx, dy):
+    """The values dx, dy pixels further on; edges repeat."""
+    y = np.clip(np.arange(a.shape[0]) + dy, 0, a.shape[0] - 1)
+    x = np.clip(np.arange(a.shape[1]) + dx, 0, a.shape[1] - 1)
+    return a[y][:, x]
+
+
+def sampled(a, x, y):
+    """Bilinear, edges repeat."""
+    left, top = np.floor(x - 0.5), np.floor(y - 0.5)
+    u, v = x - 0.5 - left, y - 0.5 - top
+    total = 0.0
+    for j in (0, 1):
+        for i in (0, 1):
+            row = np.clip(top + j, 0, a.shape[0] - 1).astype(int)
+            column = np.clip(left + i, 0, a.shape[1] - 1).astype(int)
+            share = (u if i else 1 - u) * (v if j else 1 - v)
+            total = total + a[row, column] * (share[..., None] if a.ndim == 3 else share)
+    return total
+
+
+def centres(size):
+    """x, y of all pixels' middles; `size`: height, width."""
+    y, x = np.mgrid[: size[0], : size[1]]
+    return x + 0.5, y + 0.5
+
+
+def dark(pulled):
+    return 0.05 if pulled else 0.02
+
+
+def plain(depth, motion):
+    """Where a pixel shows one surface."""
+    depth = np.where(np.isfinite(depth) & (depth > 0), np.minimum(depth, NO_DEPTH), NO_DEPTH)
+    near = [shifted(depth, i, j) for j in (-1, 0, 1) for i in (-1, 0, 1)]
+    moved = [((shifted(motion, i, j) - motion) ** 2).sum(2) for j in (-1, 0, 1) for i in (-1, 0, 1)]
+    low, high = np.min(near, 0), np.max(near, 0)
+    return ~((high > low * 1.05**2) | ((high > low * 1.01) & (np.max(moved, 0) > 1)))
+
+
+def cubic(a, x, y):
+    """Catmull and Rom's interpolation."""
+    left, top = np.floor(x - 0.5), np.floor(y - 0.5)
+    u, v = x - 0.5 - left, y - 0.5 - top
+    total = 0.0
+    for j in range(4):
+        for i in range(4):
+            row = np.clip(top + j - 1, 0, a.shape[0] - 1).astype(int)
+            column = np.clip(left + i - 1, 0, a.shape[1] - 1).astype(int)
+            total = total + a[row, column] * (_weight(u, i) * _weight(v, j))[..., None]
+    return np.maximum(total, 0)
+
+
+def _weight(u, i):
+    return (
+        ((-0.5 * u + 1) * u - 0.5) * u,
+        (1.5 * u - 2.5) * u * u + 1,
+        ((-1.5 * u + 2) * u + 0.5) * u,
+        (0.5 * u - 0.5) * u * u,
+    )[i]
+
+
+def measure(here, there, side, pulled=False):
+    """log(light there) - log(light here), and whether it is seen; frames: light, depth, motion."""
+    way = here["motion"][..., 2:] if side > 0 else here["motion"][..., :2]
+    back_there = there["motion"][..., :2] if side > 0 else there["motion"][..., 2:]
+    height, width = here["depth"].shape
+    x, y = centres((height, width))
+    x, y = x + way[..., 0], y + way[..., 1]
+    inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+    row = np.clip(np.floor(y), 0, height - 1).astype(int)
+    column = np.clip(np.floor(x), 0, width - 1).astype(int)
+    back = way + sampled(back_there, x, y)
+    a, b = here["depth"], there["depth"][row, column]
+    seen = inside & (np.maximum(a, b) < 1.15 * np.minimum(a, b)) & ((back**2).sum(2) < 1)
+    whole = [plain(f["depth"], f["motion"]) for f in (here, there)]
+    whole = [np.min([shifted(w, i, j) for j in (-1, 0, 1) for i in (-1, 0, 1)], 0) for w in whole]
+    seen &= whole[0] & whole[1][row, column]
+    e = dark(pulled)
+    change = np.log(cubic(there["light"], x, y) + e) - np.log(here["light"] + e)
+    return np.where(seen[..., None], change, 0), seen
+
+
+def gauss(a, sigma, radius):
+    """A Gaussian over a square of pixels; edges repeat."""
+    total, weights = 0.0, 0.0
+    for j in range(-radius, radius + 1):
+        for i in range(-radius, radius + 1):
+            weight = np.exp(-0.5 * (i * i + j * j) / sigma**2)
+            total, weights = total + weight * shifted(a, i, j), weights + weight
+    return total / weights
+
+
+def limited(change, seen, light, albedo, pulled=False):
+    """The changes that count."""
+    if not pulled:
+        mask = seen.astype(float)
+        spread = gauss(change * mask[..., None], 0.5, 1)
+        share = gauss(mask, 0.5, 1)
+        change = np.where(seen[..., None], spread / np.maximum(share, 1e-6)[..., None], 0)
+    brighter = np.maximum(light, (light + dark(pulled)) * np.exp(change) - dark(pulled))
+    shown = np.minimum(albedo.mean(2) * brighter.mean(2) / 0.02, 1)
+    peak = np.abs(gauss(change @ LUMINANCE, 1, 3)) * shown
+    peak = np.max([shifted(peak, i, j) for j in range(-2, 3) for i in range(-2, 3)], 0)
+    gain = gauss(np.clip((peak - 0.1) / 0.1, 0, 1), 1, 3) * seen
+    return np.clip(change * gain[..., None], -4, 4)
+
+
+def closed(light, depth, before, after, steps):
+    """The brightest light around on the same surface, as a logarithm."""
+    state = np.log(light + 0.02) + np.maximum(0, np.maximum(before, after))
+    for sign in (1, -1):
+        for _ in range(steps):
+            most = sign * state
+            for by in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+                z = shifted(depth, *by)
+                same = np.maximum(z, depth) < 1.06 * np.minimum(z, depth)
+                near = sign * shifted(state, *by)
+                most = np.where(same[..., None], np.maximum(most, near), most)
+            state = sign * most
+    return state
+
+
+def values(light, before, after, bright, change, pulled=False):
+    """Darkness, or levels of light, of a frame; and how much of it."""
+    level = np.log(light + dark(pulled))
+    most = np.maximum(0, np.maximum(before, after))
+    if pulled:
+        median = before + after - most - np.minimum(0, np.minimum(before, after))
+        return np.dstack([level + change, np.abs(median - change).max(2)])
+    darkness = 1 - np.exp(change - np.maximum(most, bright - level))
+    return np.dstack([darkness, np.maximum(darkness @ LUMINANCE, 0)])
+
+
+def first_level(found, pulled=False):
+    """Brightness and its gradient."""
+    return _level(0.2 * (found[..., :3] @ LUMINANCE) if pulled else np.exp(-found[..., 3]))
+
+
+def next_level(level):
+    """The same at half the size."""
+    height, width = level.shape[:2]
+    y, x = np.mgrid[-1 : (height + 1) // 2 + 1, -1 : (width + 1) // 2 + 1]
+    a, b = np.clip(2 * y, 0, height - 1), np.clip(2 * x, 0, width - 1)
+    below, right = np.minimum(a + 1, height - 1), np.minimum(b + 1, width - 1)
+    v = level[..., 0]
+    wide = (v[a, b] + v[a, right] + v[below, b] + v[below, right]) / 4
+    middle = wide[1:-1, 1:-1]
+    across, down = wide[1:-1, 2:] - wide[1:-1, :-2], wide[2:, 1:-1] - wide[:-2, 1:-1]
+    return np.dstack([middle, across / 2, down / 2])
+
+
+def _level(v):
+    across, down = shifted(v, 1, 0) - shifted(v, -1, 0), shifted(v, 0, 1) - shifted(v, 0, -1)
+    return np.dstack([v, across / 2, down / 2])
+
+
+class Patch:
+    """A patch of a level, which is looked for in another one."""
+
+    def __init__(self, here, there, index):
+        height, width = here.shape[:2]
+        self.x, self.y = (
+            max(min(STRIDE * i, n - PATCH), 0) for i, n in zip(index, (width, height), strict=True)
+        )
+        rows = np.minimum(self.y + np.arange(PATCH), height - 1)
+        columns = np.minimum(self.x + np.arange(PATCH), width - 1)
+        self.px, self.py = np.meshgrid(columns + 0.5, rows + 0.5)
+        block = here[rows][:, columns]
+        self.own, self.gradient, self.there = block[..., 0], block[..., 1:3], there[..., 0]
+        gx, gy = self.gradient[..., 0], self.gradient[..., 1]
+        m = np.array([[(gx * gx).sum(), (gx * gy).sum()], [(gx * gy).sum(), (gy * gy).sum()]])
+        self.is_flat = np.trace(m) < 1e-5 * PATCH**2
+        self.inverse = np.linalg.inv(m + (0.001 * np.trace(m) + 1e-9) * np.eye(2))
+
+    def compare(self, flow):
+        """The squared difference without means, and the step that makes it less."""
+        d = sampled(self.there, self.px + flow[0], self.py + flow[1]) - self.own
+        d = d - d.mean()
+        force = (self.gradient * d[..., None]).sum((0, 1))
+        return (d * d).sum(), -self.inverse @ force
+
+    def best(self, flows):
+        """The best of several starts, and where it leads."""
+        tried = [(np.asarray(flow), *self.compare(flow)) for flow in flows]
+        flow, cost, step = min(tried, key=lambda one: one[1])
+        start = flow
+        for _ in range(STEPS):
+            new = flow + step
+            if np.hypot(*step) < 0.02 or np.hypot(*(new - start)) > PATCH:
+                break
+            found, after = self.compare(new)
+            if found >= cost:
+                break
+            flow, cost, step = new, found, after
+        return flow, cost
+
+
+def blurred(a, sigma):
+    """A Gaussian, along one axis and then the other."""
+    radius = int(np.ceil(3 * sigma))
+    for axis in ((1, 0), (0, 1)):
+        total, weights = 0.0, 0.0
+        for k in range(-radius, radius + 1):
+            weight = np.exp(-0.5 * k * k / sigma**2)
+            total = total + weight * shifted(a, k * axis[0], k * axis[1])
+            weights += weight
+        a = total / weights
+    return a
+
+
+def trust(flow, back, own, other):
+    """How far flow is to be trusted; own, other: how much there is of what moves."""
+    x, y = centres(own.shape)
+    x, y = x + flow[..., 0], y + flow[..., 1]
+    astray = np.hypot(*np.moveaxis(flow + sampled(back, x, y), 2, 0))
+    unlike = np.abs(sampled(other, x, y) - own)
+    length = np.hypot(flow[..., 0], flow[..., 1])
+    return np.clip(2 - astray / (12 + 0.1 * length), 0, 1) * np.clip(
+        2 - unlike / (0.2 + 0.5 * own), 0, 1
+    )
+
+
+def filled(flow, trusted, own):
+    """Flow in which that around it stands for what is not trusted."""
+    weight = trusted * np.minimum(own / 0.1, 1)
+    around = blurred(np.dstack([flow * weight[..., None], weight]), 5.0)
+    share = around[..., 2]
+    keep = (trusted * np.minimum(share / 0.05, 1))[..., None]
+    mean = around[..., :2] / np.maximum(share, 1e-4)[..., None]
+    return np.where(share[..., None] > 0.01, mean * (1 - keep) + flow * keep, flow)
+
+
+def explained(flow, back, own, other):
+    """Differences with the motion, and without."""
+    x, y = centres(own.shape)
+    ahead = sampled(other, x + flow[..., 0], y + flow[..., 1])
+    behind = sampled(own, x + back[..., 0], y + back[..., 1])
+    with_ = np.abs(ahead - own) + np.abs(behind - other)
+    return blurred(np.dstack([with_, 2 * np.abs(other - own)]), 4.0)
+
+
+def pushed(found, flow, trusted, along):
+    """Darkness times weight, and weight, where they are after a share of the way."""
+    height, width = found.shape[:2]
+    out = np.zeros((height, width, 4))
+    for y in range(height):
+        for x in range(width):
+            weight = trusted[y, x] * min(found[y, x, 3] / 0.1, 1)
+            at = x + along * flow[y, x, 0], y + along * flow[y, x, 1]
+            left, top = int(np.floor(at[0])), int(np.floor(at[1]))
+            u, v = at[0] - left, at[1] - top
+            for j in (0, 1):
+                for i in (0, 1):
+                    share = (u if i else 1 - u) * (v if j else 1 - v)
+                    if 0 <= left + i < width and 0 <= top + j < height:
+                        value = np.append(found[y, x, :3], 1)
+                        out[top + j, left + i] += weight * share * np.clip(value, 0, 1)
+    return out
+
+
+def smooth(x, half):
+    """A step from 0.5 - half to 0.5 + half."""
+    u = np.clip((x - 0.5 + half) / (2 * half), 0, 1)
+    return u * u * (3 - 2 * u)
+
+
+def from_pushed(a, b, own, other, trusts, guard, time):
+    """The change of the logarithm of light, from what came from here (a) and from there (b)."""
+    late = smooth(time, 0.3)
+    n = (1 - late) * np.minimum(a[..., 3], 1) + late * np.minimum(b[..., 3], 1)
+    mean = sum(
+        share * one[..., :3] / np.maximum(one[..., 3:], 1)
+        for share, one in ((1 - late, a), (late, b))
+    )
+    there = np.minimum(np.maximum(a[..., 3], b[..., 3]), 1)
+    moved = mean * (there / np.maximum(n, 1e-3))[..., None]
+    late = smooth(time, 0.2)
+    rests = (1 - late) * (1 - trusts[0])[..., None] * own + late * (1 - trusts[1])[
+        ..., None
+    ] * other
+    share = np.clip((0.85 - guard[..., 0] / np.maximum(guard[..., 1], 1e-4)) / 0.25, 0, 1)
+    dark_ = np.log(np.maximum(1 - moved - rests, 0.005)) - np.log(np.maximum(1 - own, 0.005))
+    return share[..., None] * dark_
+
+
+def pulled(own, other, flows, trusts, time):
+    """The change of the logarithm of light that has come along both flows."""
+    x, y = centres(own.shape[:2])
+    places = []
+    for (flow, trusted), part in zip(
+        zip(flows, trusts, strict=True), (time, 1 - time), strict=True
+    ):
+        by = flow
+        for _ in range(3):
+            by = sampled(flow, x - part * by[..., 0], y - part * by[..., 1])
+        at = x - part * by[..., 0], y - part * by[..., 1]
+        places.append((at, sampled(trusted, *at)))
+    late = smooth(time, 0.4)
+    shares = (1 - late) * places[0][1], late * places[1][1]
+    come = sum(
+        share[..., None] * (sampled(level, *at) - own)
+        for share, level, (at, _) in zip(shares, (own, other), places, strict=True)
+    )
+    total = shares[0] + shares[1]
+    return come * (np.minimum(total / 0.3, 1) / np.maximum(total, 1e-3))[..., None]
+
+
+def clamped(change, before, after):
+    """No more than a frame showed around."""
+    low, high = np.minimum(0, np.minimum(before, after)), np.maximum(0, np.maximum(before, after))
+    near = [(i, j) for j in (-1, 0, 1) for i in (-1, 0, 1)]
+    low = np.min([shifted(low, *by) for by in near], 0)
+    high = np.max([shifted(high, *by) for by in near], 0)
+    return np.clip(change, low, high)
+
+
+def added(change, light, albedo, pulled=False):
+    """What is added to the colour."""
+    return albedo * (light + dark(pulled)) * (np.exp(change) - 1)

@@ -1,0 +1,178 @@
+"""What moving light adds to a frame's colours, at a few times of its exposure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from ....gpu import wgsl
+from ....gpu.textures import ScratchBuffer, TexturePool
+from .changes import Seen, View, changes
+from .flow import Flow, flow, grids, pyramid
+from .stage import FOLDER, Stage
+from .values import values
+
+NODES = 8  # times of an exposure at which light is known, at most
+
+
+@dataclass(frozen=True)
+class Times:
+    """Times of the nodes: `first`, and from one to the next [frame intervals]."""
+
+    first: float
+    step: float
+    count: int
+
+    @classmethod
+    def within(cls, opens: float, closes: float, samples: int) -> Times:
+        """The middles of as many equal parts of an exposure as there are samples, or NODES."""
+        count = min(samples, NODES)
+        step = max(closes - opens, 1e-6) / count
+        return cls(opens + 0.5 * step, step, count)
+
+    def __iter__(self):
+        return (self.first + i * self.step for i in range(self.count))
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of light in up to three frames, by their offsets; 0 is the frame itself.
+
+    `pulled`: reflections; else shadows. `albedo`: None is 1 everywhere. `by_color`: the light is
+    the picture itself.
+    """
+
+    pulled: bool
+    frames: Mapping[int, Seen]
+    albedo: View | None
+    by_color: bool = False
+
+
+@dataclass(frozen=True)
+class Added:
+    """What is added: a layer a node, then one for the previous frame and one for the next one.
+
+    `found`: a buffer whose first word is 1 if light changes anywhere; if not, the layers are
+    undefined. The others are of tiles, see active.wgsl.
+    """
+
+    layers: wgpu.GPUTexture
+    times: Times
+    found: wgpu.GPUBuffer
+
+
+class MovingLight:
+    """The passes that find out where light was at other times."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device, self._images = device, TexturePool(device)
+        self._pushed = {name: ScratchBuffer(device) for name in ("from_here", "from_there")}
+        self._linear = device.create_sampler(mag_filter="linear", min_filter="linear")
+
+    def encode(
+        self, encoder, bindings, kinds: Sequence[Kind], times: Times, weight: View | None
+    ) -> Added:
+        """Record all passes. `weight`: of every pixel (see PreparedFrame)."""
+        usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
+        found = self._device.create_buffer_with_data(
+            label="found", data=np.zeros(1 + _tiles(bindings.size), np.uint32), usage=usage
+        )
+        stage = Stage(self._device, self._images, encoder, bindings, "", False, {})
+        stages = [
+            replace(stage, name="glossy" if kind.pulled else "diffuse", pulled=kind.pulled)
+            for kind in kinds
+        ]
+        changed = [
+            changes(stage, kind.frames, kind.albedo, kind.by_color, found)
+            for stage, kind in zip(stages, kinds, strict=True)
+        ]
+        gated = stage.gated(found, grids(stage.size)).gates
+        earlier = None
+        for stage, kind, by_side in zip(stages, kinds, changed, strict=True):
+            stage = replace(stage, gates=gated)
+            earlier = self._layers(stage, kind, by_side, times, weight, earlier, found)
+        assert earlier is not None, "no kind of light"
+        return Added(earlier, times, found)
+
+    def _layers(
+        self,
+        stage: Stage,
+        kind: Kind,
+        changed: Mapping[int, View],
+        times: Times,
+        weight: View | None,
+        earlier: wgpu.GPUTexture | None,
+        found: wgpu.GPUBuffer,
+    ) -> wgpu.GPUTexture:
+        """Record the layers of one kind, added to the `earlier` ones."""
+        present = values(stage, kind.frames[0], changed, kind.by_color)
+        seen = {offset: (view, pyramid(stage, str(offset), view))
+                for offset, view in present.items()}  # fmt: skip
+        flows = {side: flow(stage, side, seen[0], seen[side], self._linear) for side in changed}
+        result = self._images.texture(
+            f"light {stage.name}", stage.size, "rgba16float", times.count + 2
+        )
+        pixels = 8 * stage.size[0] * stage.size[1]
+        buffers: dict[str, Any] = {
+            name: buffer.at_least(pixels) for name, buffer in self._pushed.items()
+        }
+        for buffer in buffers.values():
+            stage.encoder.clear_buffer(buffer, 0, pixels)
+        none = stage.none("rgba16float")
+        constants: dict[str, float] = {
+            "HAS_ALBEDO": kind.albedo is not None,
+            "WEIGHTED": weight is not None,
+            "ONTO": earlier is not None,
+        }
+        for i, time in enumerate([*times, -1.0, 1.0]):
+            side, share = (-1 if time < 0 else 1), min(abs(time), 1.0)
+            entry = "main" if i < times.count else "add_neighbour"
+            if side not in changed:
+                entry = "add_nothing"
+            way = flows.get(side, Flow(none, none, none))
+            there = present.get(side, none)
+            if entry == "main" and not kind.pulled:
+                for name, along, value, by in (
+                    ("from_here", share, present[0], way.ahead),
+                    ("from_there", 1 - share, there, way.back),
+                ):
+                    push = stage.uniform("push", "Push", along=along)
+                    stage.run("push", push=push, values=value, flow=by, found=found,
+                              pushed=buffers[name])  # fmt: skip
+            before, after = (changed.get(one, none) for one in (-1, 1))
+            stage.run(
+                "compose",
+                entry,
+                constants=constants,
+                node=stage.uniform("compose", "Node", time=share),
+                light_here=kind.frames[0].light,
+                albedo=kind.albedo or none,
+                weight=weight or none,
+                before=changed.get(side, none) if entry == "add_neighbour" else before,
+                after=after,
+                values=present[0],
+                values_there=there,
+                flow=way.ahead,
+                flow_back=way.back,
+                explained=way.explained,
+                earlier=none if earlier is None else layer_of(earlier, i),
+                linear=self._linear,
+                found=found,
+                added=layer_of(result, i),
+                **buffers,
+            )
+        return result
+
+
+def _tiles(size: tuple[int, int]) -> int:
+    side = int(wgsl.load(f"{FOLDER}/active.wgsl").constant("LIGHT_TILE"))
+    return -(-size[0] // side) * -(-size[1] // side)
+
+
+def layer_of(texture: wgpu.GPUTexture, index: int) -> View:
+    """One layer of an array texture, as a texture of its own."""
+    return texture.create_view(dimension="2d", base_array_layer=index, array_layer_count=1)

@@ -1,0 +1,96 @@
+"""The passes of one frame, recorded by their files; left out where no light changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import wgpu
+
+from .... import gpu
+from ....gpu import wgsl
+from ....gpu.textures import TexturePool
+
+FOLDER = "methods/gather/shading"
+_GATES = int(wgsl.load(f"{FOLDER}/gate.wgsl").constant("GATES"))
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Records passes over `bindings.size` into `encoder`.
+
+    `name`: of the kind of light. `gates`: workgroups of passes by their sizes; none: all run.
+    """
+
+    device: wgpu.GPUDevice
+    images: TexturePool
+    encoder: wgpu.GPUCommandEncoder
+    bindings: gpu.FrameBindings
+    name: str
+    pulled: bool
+    gates: dict[tuple[int, int], dict]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [px]."""
+        return self.bindings.size
+
+    def texture(self, name: str, format: str, size: tuple[int, int] | None = None):
+        """The view of a texture of this name; one for each kind of light."""
+        return self.images.view(f"{self.name} {name}", size or self.size, format)
+
+    def none(self, format: str) -> wgpu.GPUTextureView:
+        """Bound where a pass reads nothing; black."""
+        return self.images.view(f"none {format}", (1, 1), format)
+
+    def spare(self, format: str) -> wgpu.GPUTextureView:
+        """Bound where a pass writes nothing."""
+        return self.images.view(f"spare {format}", (1, 1), format)
+
+    def run(
+        self,
+        file: str,
+        entry: str = "main",
+        *,
+        size: tuple[int, int] | None = None,
+        constants: dict[str, float] | None = None,
+        **resources,
+    ) -> None:
+        """Record one entry point over `size` invocations, or over the image.
+
+        The textures of another size than the frame's come with their own.
+        """
+        path, given = f"{FOLDER}/{file}.wgsl", dict(constants or {})
+        if "override PULLED" in wgsl.load(path).text:
+            given["PULLED"] = self.pulled
+        kernel = gpu.kernel(self.device, path, None, **given)
+        size = size or self.size
+        gate = self.gates.get(size) if self.gates else None
+        if self.gates and gate is None:
+            raise KeyError(f"no gate for passes of {size}")
+        kernel.run(self.encoder, entry, replace(self.bindings, size=size), gate, **resources)
+
+    def uniform(self, file: str, struct: str, **values) -> wgpu.GPUBuffer:
+        """The struct of a file with these values, the others 0."""
+        data = np.zeros((), wgsl.load(f"{FOLDER}/{file}.wgsl").dtype(struct))
+        for name, value in values.items():
+            data[name] = value
+        usage = wgpu.BufferUsage.UNIFORM
+        return self.device.create_buffer_with_data(label=struct, data=data, usage=usage)
+
+    def gated(self, found: wgpu.GPUBuffer, sizes: list[tuple[int, int]]) -> Stage:
+        """The same, whose passes of these sizes run only if `found` says so."""
+        assert len(sizes) <= _GATES
+        counts = np.zeros((_GATES, 4), np.uint32)
+        counts[: len(sizes), :2] = sizes
+        length = 4 * 3 * _GATES
+        usage = wgpu.BufferUsage
+        gates = self.device.create_buffer(
+            label="gates", size=length, usage=usage.STORAGE | usage.INDIRECT
+        )
+        self.run("gate", size=(1, 1), sizes=self.uniform("gate", "Sizes", counts=counts),
+                 found=found, gates=gates)  # fmt: skip
+        each = {
+            size: {"buffer": gates, "offset": 12 * i, "size": 12} for i, size in enumerate(sizes)
+        }
+        return replace(self, gates=each)

@@ -1,0 +1,52 @@
+"""What moves over a frame's surfaces, in the frame and in its neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .changes import Seen, View
+from .stage import Stage
+
+STEPS = 12  # [px] that the brightest light around is looked for
+
+
+def values(
+    stage: Stage, here: Seen, changed: Mapping[int, View], by_color: bool
+) -> dict[int, View]:
+    """Darkness, or levels of light, by the offset of the frame: see values.wgsl.
+
+    `by_color`: the light is the picture itself, and what is brightest around may be its texture.
+    """
+    none = stage.none("rgba16float")
+    sides: dict[str, Any] = {"before": changed.get(-1, none), "after": changed.get(1, none)}
+    closed = none if stage.pulled else _closed(stage, here, sides, 0 if by_color else STEPS)
+    result = {}
+    for offset in (0, *changed):
+        result[offset] = stage.texture(f"values {offset}", "rgba16float")
+        stage.run(
+            "values",
+            light_here=here.light,
+            closed=closed,
+            own=changed.get(offset, none),
+            values=result[offset],
+            **sides,
+        )
+    return result
+
+
+def _closed(stage: Stage, here: Seen, sides: Mapping[str, Any], steps: int) -> View:
+    """The light without its shadows."""
+    state, other = (stage.texture(f"closing {k}", "rgba32float") for k in "ab")
+    for entry in ("begin", *("grow",) * steps, *("shrink",) * steps):
+        stage.run(
+            "closing",
+            entry,
+            light_here=here.light,
+            depth_here=here.depth,
+            state=other,
+            output=state,
+            **sides,
+        )
+        state, other = other, state
+    return other

@@ -1,0 +1,62 @@
+// Light that moves: what is added to the colour of a surface because it is seen at another time than that of its frame.
+// It is known on this frame's surfaces at a few times, the nodes (see shading/compose.wgsl).
+//#include common/path.wgsl
+//#include common/shutter.wgsl
+//#include methods/gather/search.wgsl
+
+struct LightNodes {
+    first: f32,         // time of the first one [frame intervals]
+    step: f32,          // from one to the next [frame intervals]
+    count: u32,         // then follow layers for the light of the previous frame and of the next one
+}
+
+@group(1) @binding(12) var<uniform> light_nodes: LightNodes;
+@group(1) @binding(13) var added_light: texture_2d_array<f32>;  // premultiplied by weight; a of the last two layers: seen there
+
+override MOVING_LIGHT: bool = false;    // whether there is any
+
+const SAME_SURFACE: f32 = 1.0;  // a way there and back ends no farther than this from where it began [px]
+
+/// For how long sample `i` stands [frame intervals].
+fn sample_duration(times: SampleTimes, i: u32) -> f32 {
+    let count = f32(times.count);
+    if BOX_SHUTTER { return (shutter.span.y - shutter.span.x) / count; }
+    if ADAPTIVE { return time_at_share((f32(i) + 1.0) / count) - time_at_share(f32(i) / count); }
+    return strata[i].end - strata[i].begin;
+}
+
+/// For a sample `at` [px] of a layer, around the time `t`, for as long as `duration`.
+fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
+    if layer == 0u { return vec4f(light_during(at, t, duration), 0.0); }
+    let f = layer / 2u;
+    let offset = offset_of(min(f, 2u));
+    let surface = textureLoad(surfaces, vec2i(floor(at)), min(layer, 5u), 0);
+    let here = at + displacement5(unpack_trajectory(surface), -offset);
+    let own = textureLoad(surfaces, vec2i(floor(here)), 0u, 0);
+    let back = here + displacement5(unpack_trajectory(own), offset) - at;
+    let node = light_nodes.count + select(0u, 1u, offset > 0.0);
+    let there = textureSampleLevel(added_light, linear, here / vec2f(frame.size), node, 0.0);
+    let same = layer % 2u == 0u && layer < 6u && is_inside(here) && dot(back, back) < SAME_SURFACE * SAME_SURFACE;
+    let change = light_during(here, t, duration) - there.rgb;
+    return vec4f(select(vec3f(0.0), there.a * change, same), 0.0);
+}
+
+/// What is added on a place of this frame [px]: the mean over a time.
+fn light_during(at: vec2f, t: f32, duration: f32) -> vec3f {
+    let uv = at / vec2f(frame.size);
+    let last = f32(light_nodes.count) - 1.0;
+    let half = max(0.5 * duration / light_nodes.step, 0.5);
+    let u = clamp((t - light_nodes.first) / light_nodes.step, half - 0.5, max(last - half + 0.5, half - 0.5));
+    // A node stands for half a step to either side.
+    let first = clamp(ceil(u - half - 0.5), 0.0, last);
+    let count = i32(clamp(ceil(2.0 * half), 1.0, last + 1.0)) + 1;
+    var sum = vec3f(0.0);
+    var total = 0.0;
+    for (var k = 0; k < count; k++) {
+        let node = first + f32(k);
+        let share = max(min(node + 0.5, u + half) - max(node - 0.5, u - half), 0.0);
+        sum += share * textureSampleLevel(added_light, linear, uv, u32(min(node, last)), 0.0).rgb;
+        total += share;
+    }
+    return sum / max(total, 1e-6);
+}

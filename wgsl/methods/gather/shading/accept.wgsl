@@ -1,0 +1,47 @@
+// How far flow is to be trusted: it leads back, and to what is as dark. Where it is not, that around it stands for it.
+//#include common/frame.wgsl
+//#include methods/gather/shading/light.wgsl
+
+@group(1) @binding(0) var flow: texture_2d<f32>;        // to the other frame [px]
+@group(1) @binding(1) var flow_back: texture_2d<f32>;
+@group(1) @binding(2) var values: texture_2d<f32>;
+@group(1) @binding(3) var values_there: texture_2d<f32>;
+@group(1) @binding(4) var around: texture_2d<f32>;      // of `fill`: weighted flow, weight, blurred
+@group(1) @binding(5) var linear: sampler;
+@group(1) @binding(6) var flow_out: Flow;               // flow [px], trust 0..1
+@group(1) @binding(7) var weighted: Weighted;           // flow times weight, weight
+
+alias Flow = texture_storage_2d<rgba16float, write>;
+alias Weighted = texture_storage_2d<rgba32float, write>;
+
+const ASTRAY: f32 = 12.0;       // distance from where it came from up to which a way back is trusted wholly [px],
+const ASTRAY_SHARE: f32 = 0.1;  // and this share of the flow; twice as far, not at all
+const UNLIKE: f32 = 0.2;        // difference of values trusted wholly,
+const UNLIKE_SHARE: f32 = 0.5;  // and this share of the value
+const PRESENT: f32 = 0.1;       // value from which on there is something to move
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn trust(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let by = textureLoad(flow, id.xy, 0).xy;
+    let at = (vec2f(id.xy) + 0.5 + by) / vec2f(frame.size);
+    let value = textureLoad(values, id.xy, 0).a;
+    let astray = length(by + textureSampleLevel(flow_back, linear, at, 0.0).xy);
+    let unlike = abs(textureSampleLevel(values_there, linear, at, 0.0).a - value);
+    let trusted = clamp(2.0 - astray / (ASTRAY + ASTRAY_SHARE * length(by)), 0.0, 1.0)
+        * clamp(2.0 - unlike / (UNLIKE + UNLIKE_SHARE * value), 0.0, 1.0);
+    let weight = trusted * min(value / PRESENT, 1.0);
+    textureStore(flow_out, id.xy, vec4f(by, trusted, 0.0));
+    textureStore(weighted, id.xy, vec4f(weight * by, weight, 0.0));
+}
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn fill(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let own = textureLoad(flow, id.xy, 0);
+    let near = textureLoad(around, id.xy, 0);
+    let keep = own.z * min(near.z / 0.05, 1.0);
+    let filled = mix(near.xy / max(near.z, 1e-4), own.xy, keep);
+    textureStore(flow_out, id.xy, vec4f(select(own.xy, filled, near.z > 0.01), own.z, 0.0));
+    textureStore(weighted, id.xy, vec4f(0.0));
+}

@@ -1,0 +1,54 @@
+// The brightest light around on the same surface, which stands for the light without its shadows: greatest values are
+// spread, then smallest ones (a closing). So shadows are found that lie on a place in all three frames.
+//#include common/depth.wgsl
+//#include common/frame.wgsl
+//#include methods/gather/shading/light.wgsl
+
+@group(1) @binding(0) var light_here: texture_2d<f32>;
+@group(1) @binding(1) var depth_here: texture_2d<f32>;
+@group(1) @binding(2) var before: texture_2d<f32>;      // changes to the previous frame, to the next one
+@group(1) @binding(3) var after: texture_2d<f32>;
+@group(1) @binding(4) var state: texture_2d<f32>;       // what the pass before wrote
+@group(1) @binding(5) var output: State;
+
+alias State = texture_storage_2d<rgba32float, write>;
+
+const AS_DEEP: f32 = 1.06;      // ratio of the depths of pixels side by side on one surface
+
+fn own_light(px: vec2i) -> vec3f {
+    return log(valid_light(textureLoad(light_here, px, 0)) + dark());
+}
+
+/// The brightest of the three frames.
+@compute @workgroup_size(WG_X, WG_Y)
+fn begin(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let px = vec2i(id.xy);
+    let most = max(vec3f(0.0), max(textureLoad(before, px, 0).rgb, textureLoad(after, px, 0).rgb));
+    textureStore(output, px, vec4f(own_light(px) + most, valid_depth(textureLoad(depth_here, px, 0).x)));
+}
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn grow(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    spread(vec2i(id.xy), 1.0);
+}
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn shrink(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    spread(vec2i(id.xy), -1.0);
+}
+
+/// The greatest (`sign` 1) or smallest (-1) of the pixel and the four around it on the same surface.
+fn spread(px: vec2i, sign: f32) {
+    let own = textureLoad(state, px, 0);
+    var most = sign * own.rgb;
+    for (var k = 0; k < 4; k++) {
+        let by = select(vec2i(0, k * 2 - 5), vec2i(k * 2 - 1, 0), k < 2);
+        let there = textureLoad(state, inside(px + by), 0);
+        let same = max(there.a, own.a) < AS_DEEP * min(there.a, own.a);
+        most = max(most, select(most, sign * there.rgb, same));
+    }
+    textureStore(output, px, vec4f(sign * most, own.a));
+}

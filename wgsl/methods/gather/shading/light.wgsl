@@ -1,0 +1,22 @@
+// What all passes of moving light share: how bright it is, and what is told of it from frame to frame.
+//#include common/finite.wgsl
+//#include common/frame.wgsl
+
+const LUMINANCE: vec3f = vec3f(0.2126, 0.7152, 0.0722);
+const BRIGHTEST_LIGHT: f32 = 1e4;   // more than this is taken for this
+
+override PULLED: bool = false;      // reflections, which are pulled along their flow; else shadows, which are pushed
+
+/// Light below this is dark [linear].
+fn dark() -> f32 {
+    return select(0.02, 0.05, PULLED);
+}
+
+/// Light as it came, which may be anything.
+fn valid_light(given: vec4f) -> vec3f {
+    return select(vec3f(0.0), clamp(given.rgb, vec3f(0.0), vec3f(BRIGHTEST_LIGHT)), is_finite4(vec4f(given.rgb, 0.0)));
+}
+
+fn inside(px: vec2i) -> vec2i {
+    return clamp(px, vec2i(0), vec2i(frame.size) - 1);
+}

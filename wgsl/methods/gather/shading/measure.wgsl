@@ -1,0 +1,86 @@
+// How the light on every surface differs in a neighbouring frame: log(light there) - log(light here), where the same
+// surface is seen there.
+//#include common/depth.wgsl
+//#include common/frame.wgsl
+//#include methods/gather/shading/light.wgsl
+
+struct Side {
+    next: u32,          // 1: the neighbour is the next frame; 0: the previous one
+}
+
+@group(1) @binding(0) var<uniform> side: Side;
+@group(1) @binding(1) var light_here: texture_2d<f32>;
+@group(1) @binding(2) var light_there: texture_2d<f32>;
+@group(1) @binding(3) var depth_here: texture_2d<f32>;
+@group(1) @binding(4) var depth_there: texture_2d<f32>;
+@group(1) @binding(5) var motion_here: texture_2d<f32>;     // to_prev, to_next [px]
+@group(1) @binding(6) var motion_there: texture_2d<f32>;
+@group(1) @binding(7) var plain_here: texture_2d<u32>;
+@group(1) @binding(8) var plain_there: texture_2d<u32>;
+@group(1) @binding(9) var ratio: Ratio;     // of light, as a logarithm; a: 1 where the surface is seen there
+
+alias Ratio = texture_storage_2d<rgba16float, write>;
+
+const LEADS_BACK: f32 = 1.0;    // a vector that leads farther away from where it came from [px] is of something else
+const AS_DEEP: f32 = 1.15;      // ratio of the depths of the same surface in two frames
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let px = vec2i(id.xy);
+    let both = textureLoad(motion_here, px, 0);
+    let way = select(both.xy, both.zw, side.next == 1u);
+    let at = vec2f(px) + 0.5 + way;
+    let is_there = all(at >= vec2f(0.0)) && all(at < vec2f(frame.size));
+    let landing = inside(vec2i(floor(at)));
+    let back = way + way_back(at);
+    let z = valid_depth(textureLoad(depth_here, px, 0).x);
+    let z_there = valid_depth(textureLoad(depth_there, landing, 0).x);
+    let as_deep = max(z, z_there) < AS_DEEP * min(z, z_there) && z < NO_DEPTH;
+    let seen = is_there && as_deep && dot(back, back) < LEADS_BACK * LEADS_BACK
+        && is_plain(plain_here, px) && is_plain(plain_there, landing);
+    let here = valid_light(textureLoad(light_here, px, 0));
+    let there = cubic(at);
+    let change = log(there + dark()) - log(here + dark());
+    textureStore(ratio, px, select(vec4f(0.0), vec4f(change, 1.0), seen));
+}
+
+/// Whether the pixel and those around it show one surface.
+fn is_plain(plain: texture_2d<u32>, px: vec2i) -> bool {
+    var all_plain = 1u;
+    for (var k = 0; k < 9; k++) { all_plain &= textureLoad(plain, inside(px + vec2i(k % 3, k / 3) - 1), 0).x; }
+    return all_plain == 1u;
+}
+
+/// The neighbour's motion to this frame, between its pixels [px].
+fn way_back(at: vec2f) -> vec2f {
+    let corner = floor(at - 0.5);
+    let share = at - 0.5 - corner;
+    var sum = vec2f(0.0);
+    for (var k = 0; k < 4; k++) {
+        let step = vec2f(f32(k & 1), f32(k >> 1u));
+        let both = textureLoad(motion_there, inside(vec2i(corner + step)), 0);
+        let shares = mix(1.0 - share, share, step);
+        sum += shares.x * shares.y * select(both.zw, both.xy, side.next == 1u);
+    }
+    return sum;
+}
+
+/// The neighbour's light between its pixels, by Catmull and Rom.
+fn cubic(at: vec2f) -> vec3f {
+    let corner = floor(at - 0.5);
+    let u = at - 0.5 - corner;
+    let across = catmull_rom(u.x);
+    let down = catmull_rom(u.y);
+    var sum = vec3f(0.0);
+    for (var k = 0; k < 16; k++) {
+        let px = inside(vec2i(corner) + vec2i(k % 4, k / 4) - 1);
+        sum += across[k % 4] * down[k / 4] * valid_light(textureLoad(light_there, px, 0));
+    }
+    return max(sum, vec3f(0.0));
+}
+
+fn catmull_rom(u: f32) -> vec4f {
+    return vec4f(((-0.5 * u + 1.0) * u - 0.5) * u, (1.5 * u - 2.5) * u * u + 1.0,
+                 ((-1.5 * u + 2.0) * u + 0.5) * u, (0.5 * u - 0.5) * u * u);
+}

@@ -1,0 +1,42 @@
+// Pictures of what moves, each level half as large as the one before, with their gradients.
+//#include common/frame.wgsl
+//#include methods/gather/shading/light.wgsl
+
+@group(1) @binding(0) var source: texture_2d<f32>;      // values, or the finer level
+@group(1) @binding(1) var level: Level;                 // brightness; its change a pixel across, down
+
+alias Level = texture_storage_2d<rgba16float, write>;
+
+const CONTRAST: f32 = 0.2;      // of a logarithm of light
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn begin(@builtin(global_invocation_id) id: vec3u) {
+    let px = vec2i(id.xy);
+    if any(px >= vec2i(textureDimensions(source))) { return; }
+    let across = brightness(px + vec2i(1, 0)) - brightness(px - vec2i(1, 0));
+    let down = brightness(px + vec2i(0, 1)) - brightness(px - vec2i(0, 1));
+    textureStore(level, px, vec4f(brightness(px), 0.5 * across, 0.5 * down, 0.0));
+}
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn halve(@builtin(global_invocation_id) id: vec3u) {
+    let px = vec2i(id.xy);
+    if any(px >= (vec2i(textureDimensions(source)) + 1) / 2) { return; }
+    let across = quarter(px + vec2i(1, 0)) - quarter(px - vec2i(1, 0));
+    let down = quarter(px + vec2i(0, 1)) - quarter(px - vec2i(0, 1));
+    textureStore(level, px, vec4f(quarter(px), 0.5 * across, 0.5 * down, 0.0));
+}
+
+fn brightness(px: vec2i) -> f32 {
+    let value = textureLoad(source, clamp(px, vec2i(0), vec2i(textureDimensions(source)) - 1), 0);
+    return select(exp(-value.a), CONTRAST * dot(value.rgb, LUMINANCE), PULLED);
+}
+
+/// The mean of 2 x 2 pixels of the finer level.
+fn quarter(px: vec2i) -> f32 {
+    let last = vec2i(textureDimensions(source)) - 1;
+    let a = clamp(2 * px, vec2i(0), last);
+    let b = min(a + 1, last);
+    return 0.25 * (textureLoad(source, a, 0).x + textureLoad(source, vec2i(b.x, a.y), 0).x
+        + textureLoad(source, vec2i(a.x, b.y), 0).x + textureLoad(source, b, 0).x);
+}

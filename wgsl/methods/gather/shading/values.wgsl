@@ -1,0 +1,33 @@
+// What moves over the surfaces of this frame, in one of the three frames. Shadows: the darkness, the part of the light
+// that is missing; reflections: the logarithm of the light. a: how much there is of it.
+//#include common/frame.wgsl
+//#include methods/gather/shading/light.wgsl
+
+@group(1) @binding(0) var light_here: texture_2d<f32>;
+@group(1) @binding(1) var before: texture_2d<f32>;      // changes to the previous frame, to the next one
+@group(1) @binding(2) var after: texture_2d<f32>;
+@group(1) @binding(3) var closed: texture_2d<f32>;      // what closing.wgsl wrote
+@group(1) @binding(4) var own: texture_2d<f32>;         // changes to the frame that is asked for; black: this one
+@group(1) @binding(5) var values: Values;
+
+alias Values = texture_storage_2d<rgba16float, write>;
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let px = vec2i(id.xy);
+    let level = log(valid_light(textureLoad(light_here, px, 0)) + dark());
+    let a = textureLoad(before, px, 0).rgb;
+    let b = textureLoad(after, px, 0).rgb;
+    let change = textureLoad(own, px % vec2i(textureDimensions(own)), 0).rgb;
+    let most = max(vec3f(0.0), max(a, b));
+    if PULLED {
+        let median = a + b - most - min(vec3f(0.0), min(a, b));
+        let apart = abs(median - change);
+        textureStore(values, px, vec4f(level + change, max(apart.r, max(apart.g, apart.b))));
+        return;
+    }
+    let brightest = max(most, textureLoad(closed, px, 0).rgb - level);
+    let darkness = 1.0 - exp(change - brightest);
+    textureStore(values, px, vec4f(darkness, max(dot(darkness, LUMINANCE), 0.0)));
+}
