@@ -1,0 +1,77 @@
+"""The panel in the output properties; it draws and does nothing else."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import sharp
+
+
+class WGMB_PT_motion_blur(bpy.types.Panel):
+    """Motion Blur (wgmb)."""
+
+    bl_label = "Motion Blur (wgmb)"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "output"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings and the buttons."""
+        layout, scene = self.layout, context.scene
+        own = scene.wgmb
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        draw_exposure(layout.column(), scene)
+        column = layout.column()
+        column.prop(own, "method")
+        row = column.row()
+        row.prop(own, "is_auto")
+        row = column.row()
+        row.active = not own.is_auto
+        row.prop(own, "samples")
+        column = layout.column()
+        column.prop(own, "sharp")
+        column.prop(own, "handles")
+        column.prop(own, "overscan")
+        if sharp.has_compositor(scene):
+            column.prop(own, "compositing")
+        draw_kept(layout.column(), own)
+        column = layout.column()
+        column.operator("wgmb.render_and_blur", icon="RENDER_ANIMATION")
+        column.operator("wgmb.blur_rendered", icon="FILE_REFRESH")
+        column.operator("wgmb.compare", icon="IMAGE_DATA")
+
+
+def draw_exposure(column: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """The scene's own motion blur settings, which the blur follows."""
+    render = scene.render
+    column.label(text="Exposure, as in Render Properties, Motion Blur")
+    column.prop(render, "motion_blur_position")
+    column.prop(render, "motion_blur_shutter")
+    if render.engine == "CYCLES":
+        column.prop(scene.cycles, "rolling_shutter_type")
+        if scene.cycles.rolling_shutter_type != "NONE":
+            column.prop(scene.cycles, "rolling_shutter_duration")
+    column.label(text="Blender's own motion blur is off while frames are rendered", icon="INFO")
+
+
+def draw_kept(column: bpy.types.UILayout, own: bpy.types.PropertyGroup) -> None:
+    """The collections that stay sharp."""
+    row = column.row()
+    row.label(text="Keep Sharp")
+    row.operator("wgmb.keep", text="", icon="ADD")
+    for i, item in enumerate(own.kept):
+        row = column.row(align=True)
+        row.prop(item, "collection", text="")
+        row.operator("wgmb.keep_no_more", text="", icon="REMOVE").index = i
+
+
+def register() -> None:
+    """Show the panel."""
+    bpy.utils.register_class(WGMB_PT_motion_blur)
+
+
+def unregister() -> None:
+    """Hide it."""
+    bpy.utils.unregister_class(WGMB_PT_motion_blur)

@@ -1,0 +1,13 @@
+"""What the user is told instead of a traceback."""
+
+
+class ProblemError(Exception):
+    """A sentence for the user: why nothing, or nothing more, is done."""
+
+
+class NoAdapterError(ProblemError):
+    """There is nothing that the blur could run on."""
+
+
+class StoppedError(ProblemError):
+    """The user stopped the rendering."""
