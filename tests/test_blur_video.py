@@ -257,6 +257,20 @@ def test_a_run_that_was_killed_goes_on_and_gives_the_same_video(tmp_path, capsys
     assert "made otherwise" in text
 
 
+@pytest.mark.parametrize("words", [["--overwrite"], []])
+def test_segments_of_a_killed_run_go_when_the_video_is_made_again(tmp_path, capsys, words):
+    source = write(tmp_path / "a.mp4", grey_frames(range(40, 46)))
+    out, other = tmp_path / "b.mp4", tmp_path / "c.mp4.segments"
+    for folder in (tmp_path / "b.mp4.segments", other):
+        folder.mkdir()
+        (folder / "00000.mp4").write_bytes(b"half")
+    if words:
+        out.write_bytes(b"older")
+    run(capsys, "blur", source, "-o", out, "--flow", "none", "-q", *words)
+    assert make.names_in(tmp_path) == ["a.mp4", "b.mp4", "c.mp4.segments"]
+    assert (other / "00000.mp4").is_file() and len(Footage(out)) == 6
+
+
 def test_slow_motion_has_slow_sound(tmp_path, capsys):
     source = write(tmp_path / "a.mp4", moving(24), 24, tone=1.0)
     for pitch in ("keep", "follow"):

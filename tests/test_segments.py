@@ -21,7 +21,7 @@ from wgmb.io.encoders import Facts, chosen
 from wgmb.io.footage import Footage
 from wgmb.io.hdr10 import LightLevel
 from wgmb.io.other_streams import OtherStreams
-from wgmb.io.segments import Segments
+from wgmb.io.segments import Segments, remove_left
 
 pytestmark = pytest.mark.fast
 
@@ -143,7 +143,9 @@ def test_a_process_that_is_killed_leaves_nothing_in_the_way(tmp_path):
     left = {p.name for p in parts.folder.iterdir()}
     assert {"00000.mp4", "00000.json"} < left
     assert parts.to_do() == [range(15, 30), range(30, 40)]
-    assert {p.name for p in parts.folder.iterdir()} == {"00000.mp4", "00000.json"}
+    now = {p.name for p in parts.folder.iterdir()}
+    own = {name for name in now if f"-{os.getpid()}-" in name}  # tells others that it is in use
+    assert len(own) == 1 and now - own == {"00000.mp4", "00000.json"}
     fill(parts, coding, times)
     parts.join()
     assert list(Footage(path).times) == times
@@ -230,3 +232,53 @@ def test_hdr10_data_outlives_the_join(tmp_path):
 def test_a_gif_has_no_segments(tmp_path):
     with pytest.raises(InputError, match="a GIF cannot be resumed"):
         segmented(tmp_path / "v.gif")
+
+
+def test_what_a_run_left_is_removed_and_what_is_not_its_own_stays(tmp_path):
+    parts, coding, times = segmented(tmp_path / "a.mp4")
+    other, *_ = segmented(tmp_path / "b.mp4")
+    fill(parts, coding, times, stop=20)
+    fill(other, coding, times, stop=20)
+    parts.release(), other.release()
+    own, dead = f"-{os.getpid()}-", subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    for path in parts.folder.glob(f".0*{own}*"):  # as if another process had been killed
+        path.unlink()
+        path.with_name(path.name.replace(own, f"-{dead.pid}-")).write_bytes(b"half")
+    remove_left(tmp_path / "a.mp4")
+    assert not parts.folder.exists() and (other.folder / "00000.mp4").is_file()
+    parts.folder.mkdir()
+    (parts.folder / "00000.mp4").write_bytes(b"segment")
+    (parts.folder / "mine.txt").write_bytes(b"mine")
+    remove_left(tmp_path / "a.mp4")
+    assert [p.name for p in parts.folder.iterdir()] == ["mine.txt"]
+
+
+def test_the_segments_of_a_run_that_is_alive_are_left_alone(tmp_path):
+    """Also between two segments, when it writes none."""
+    parts, coding, times = segmented(tmp_path / "a.mp4")
+    first = parts.to_do()[0]
+    segment = parts.begin(first)
+    for n in first:
+        segment.add(picture(n, coding), times[n])
+    segment.close()
+    code = (
+        "import sys, pathlib; from wgmb.io.segments import remove_left\n"
+        "remove_left(pathlib.Path(sys.argv[1]))"
+    )
+    again = [sys.executable, "-c", code, str(tmp_path / "a.mp4")]
+    subprocess.run(again, check=True)
+    assert (parts.folder / "00000.mp4").is_file() and parts.to_do()[0] != first
+    parts.release()
+    subprocess.run(again, check=True)
+    assert not parts.folder.exists()
+
+
+def test_another_run_that_ends_first_takes_no_segments_away(tmp_path):
+    slow, coding, times = segmented(tmp_path / "a.mp4")
+    fill(slow, coding, times)
+    quick, *_ = segmented(tmp_path / "a.mp4")
+    assert quick.to_do() == []
+    quick.join()
+    slow.join()
+    assert len(Footage(tmp_path / "a.mp4")) == COUNT and not slow.folder.exists()

@@ -28,7 +28,7 @@ from ..io.frame_numbers import frame_numbers
 from ..io.other_streams import OtherStreams
 from ..io.output import refuse_inputs
 from ..io.overlay import overlay_of
-from ..io.segments import Segment, Segments
+from ..io.segments import Segment, Segments, remove_left
 from ..motion_source import MotionSource
 from ..pipeline import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
@@ -245,6 +245,7 @@ def _write_video(
     there = [path] if path.exists() else []
     refuse_inputs(path.parent, [path.name], there, [footage.path])
     if there and output.resume and texts.items() <= Footage(path).metadata.items():
+        remove_left(path)
         return ["is already done"]
     if there and not output.overwrite:
         more = " and was made otherwise" if output.resume else ""
@@ -260,12 +261,16 @@ def _write_video(
         others = OtherStreams(footage.path, footage.index, run.clock, keeps_pitch)
     if output.resume:
         segments = Segments(path, *shape, times, made_of, facts)
-        for numbers in segments.to_do():
-            part = wanted[numbers.start : numbers.stop]
-            _fill(segments.begin(numbers), run, coding, part, blur_part)
-        return [*lost, *segments.join(texts, others)]
+        try:
+            for numbers in segments.to_do():
+                part = wanted[numbers.start : numbers.stop]
+                _fill(segments.begin(numbers), run, coding, part, blur_part)
+            return [*lost, *segments.join(texts, others)]
+        finally:
+            segments.release()
     writer = CodedVideo(path, atomic.temporary_name(path), *shape, facts, texts, others)
     _fill(writer, run, coding, wanted, blur_part)
+    remove_left(path)
     return [*lost, *writer.left_out]
 
 

@@ -12,7 +12,7 @@ import os
 import re
 import secrets
 import socket
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 Buffer = bytes | memoryview
@@ -97,13 +97,24 @@ def about(path: Path, error: Exception) -> OSError:
     return named
 
 
-def sweep(folder: Path, names: Collection[str]) -> None:
-    """Remove what dead processes of this host left of files with these names."""
+def is_temporary(name: str) -> bool:
+    """Return True for a name that `temporary_name` may have made, on any host."""
+    return _TEMPORARY.fullmatch(name) is not None
+
+
+def sweep(folder: Path, names: Collection[str] | Callable[[str], bool]) -> None:
+    """Remove what dead processes of this host left of files with these names.
+
+    `names`: them all, or what tells whether a name is one of them.
+    """
     left = [m for m in map(_TEMPORARY.fullmatch, os.listdir(folder)) if m and m["host"] == _HOST]
-    begins = {_begin(name) for name in names} if left else set()
+    if not left:
+        return
+    if not callable(names):
+        names = {_begin(name) for name in names}.__contains__
     for m in left:
         path = folder / m[0]
-        if m["name"] in begins and _is_left(path, int(m["process"])):
+        if names(m["name"]) and _is_left(path, int(m["process"])):
             with contextlib.suppress(OSError):  # of somebody else
                 path.unlink()
 

@@ -37,6 +37,7 @@ from .video_file import NewFile, name_codec
 
 SECONDS = 10
 _NAME = re.compile(r"\d{5}\.(mp4|mov|mkv|webm|json)")
+_CLAIM = "run"  # a file of this name is locked by each run that makes segments
 _PART = 1 << 20  # bytes that are read at once
 
 
@@ -45,8 +46,8 @@ class Segments:
 
     `made_of`: what pictures depend on (settings, inputs); segments that were made of anything else
     are made again. Use: for every range of numbers in `to_do`, `begin` it, add its pictures, close
-    it; then `join`. The other parameters are CodedVideo's. InputError for a GIF, which has no
-    segments.
+    it; then `join`; `release` in any case. The other parameters are CodedVideo's. InputError for
+    a GIF, which has no segments.
     """
 
     def __init__(
@@ -63,7 +64,8 @@ class Segments:
     ):
         if encoding.codec == "gif":
             raise InputError(f"output {path}: a GIF cannot be resumed")
-        self.path, self.folder = path, path.with_name(f"{path.name}.segments")
+        self.path, self.folder = path, folder_of(path)
+        self._claim: tuple[Path, int] | None = None
         self._encoding, self._coding, self._size = encoding, coding, size
         self._rate, self._base, self._times, self._facts = rate, base, times, facts
         per = max(round(SECONDS * rate), 1)
@@ -82,17 +84,12 @@ class Segments:
 
     def to_do(self) -> list[range]:
         """The numbers of the pictures of every segment that is not there, whole and as wanted."""
-        if self.folder.is_dir():
-            names = [self._file(index).name for index in range(len(self._ranges))]
-            atomic.sweep(self.folder, [*names, *(f"{name[:5]}.json" for name in names)])
+        self._claimed()
         return [r for index, r in enumerate(self._ranges) if not self._is_there(index)]
 
     def begin(self, numbers: range) -> Segment:
         """Begin a segment that `to_do` returned."""
-        try:
-            self.folder.mkdir(exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{self.folder}: {(error.strerror or str(error)).lower()}") from None
+        self._claimed()
         index = self._ranges.index(numbers)
         path = self._file(index)
         path.with_suffix(".json").unlink(missing_ok=True)  # of what it is going to replace
@@ -183,15 +180,34 @@ class Segments:
         inside = min(max(number, 0), len(self._times) - 1)
         return round((self._times[inside] + (number - inside) / self._rate) / self._base)
 
-    def clear(self) -> None:
-        """Remove the segments and their folder, unless others have put something there."""
-        if not self.folder.is_dir():
+    def _claimed(self) -> None:
+        """Make the folder, without what dead runs left half done, and tell others it is in use."""
+        if self._claim is not None:
             return
-        for path in self.folder.iterdir():
-            if _NAME.fullmatch(path.name):
-                path.unlink(missing_ok=True)
-        with contextlib.suppress(OSError):
-            self.folder.rmdir()
+        try:
+            for _ in range(3):  # another run may remove it meanwhile
+                self.folder.mkdir(exist_ok=True)
+                temporary = atomic.temporary_name(self.folder / _CLAIM)
+                with contextlib.suppress(FileNotFoundError):
+                    self._claim = temporary, atomic.create(temporary)
+                    break
+        except OSError as error:
+            raise InputError(f"{self.folder}: {(error.strerror or str(error)).lower()}") from None
+        _sweep(self.folder)
+
+    def release(self) -> None:
+        """Let others remove the segments."""
+        if self._claim is not None:
+            (temporary, lock), self._claim = self._claim, None
+            temporary.unlink(missing_ok=True)
+            os.close(lock)
+            with contextlib.suppress(OSError):  # unless there are segments in it
+                self.folder.rmdir()
+
+    def clear(self) -> None:
+        """Remove the segments and their folder, unless others use it."""
+        self.release()
+        remove_left(self.path)
 
     def _file(self, index: int) -> Path:
         return self.folder / f"{index:05d}{self._encoding.suffix}"
@@ -215,6 +231,34 @@ class Segments:
             return content is not None and content == self._content(index) | _sum(path)
         except OSError:
             return False
+
+
+def folder_of(path: Path) -> Path:
+    """Where the segments of a video are."""
+    return path.with_name(f"{path.name}.segments")
+
+
+def remove_left(path: Path) -> None:
+    """Remove the segments that runs which have ended left of the video `path`.
+
+    Nothing is touched while another run makes them, and what is not a segment stays.
+    """
+    folder = folder_of(path)
+    if not folder.is_dir() or folder.is_symlink():
+        return
+    _sweep(folder)
+    names = os.listdir(folder)
+    if any(atomic.is_temporary(name) for name in names):  # of a run that is alive
+        return
+    for name in filter(_NAME.fullmatch, names):
+        (folder / name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what dead runs were writing into a folder of segments."""
+    atomic.sweep(folder, lambda name: name == _CLAIM or bool(_NAME.fullmatch(name)))
 
 
 class Segment:
