@@ -34,7 +34,7 @@ LAYERS = [
     {"batch"},
     {"outcome"},
     {"job"},
-    {"job_file"},
+    {"job_file", "video_pictures"},
     {"video_batch", "hosts"},
     {"lab", "viewer"},  # never each other
     {"cli"},  # may start the viewer
@@ -44,7 +44,7 @@ PLACE = {room: number for number, layer in enumerate(LAYERS) for room in layer}
 GPU = {
     "gpu", "scene", "methods", "velocity", "holdout", "observer", "residency", "pipeline",
     "render", "lab", "viewer", "frame_views", "flow", "planes", "exposer",
-    "video_batch", "video_settings", "reel_views", "hosts",
+    "video_batch", "video_settings", "reel_views", "hosts", "video_pictures",
 }  # fmt: skip
 HOMES = {
     "wgpu": GPU,

@@ -13,19 +13,50 @@ import wgpu
 
 from . import gpu
 from .errors import InputError
-from .flow import Flow
-from .flow.dis import Dis, is_installed
+from .extras import is_installed
 from .motion_source import MotionSource
 
 
 @dataclass(frozen=True, kw_only=True)
-class VideoSettings:
-    """Motion, time and encoding of videos."""
+class FlowSettings:
+    """Where the motion of pictures comes from."""
 
     flow: Literal["auto", "search", "dis", "none"] = "auto"
     "Where motion comes from: search (best), dis (quick, OpenCV), none (pictures are averaged)."
     flow_quality: Literal["best", "fast"] = "best"
     "Motion: best, or fast."
+
+    def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
+        """Where motion comes from, and the same in words."""
+        settled, how = self.settled(device)
+        if settled.flow == "none":
+            return None, how
+        if settled.flow == "dis":
+            from .flow.dis import Dis  # only where it is needed
+
+            return Dis(settled.flow_quality), how
+        from .flow import Flow
+
+        return Flow(quality=settled.flow_quality, device=device), how
+
+    def settled(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
+        """A copy in which `flow` is chosen as it suits the device, and the choice in words."""
+        if self.flow == "none":
+            return self, "none: pictures are averaged"
+        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        if self.flow == "dis" or (self.flow == "auto" and software and is_installed("cv2")):
+            why = "" if self.flow == "dis" else ", as there is no GPU"
+            return replace(self, flow="dis"), f"dense inverse search{why}"
+        quality, why = self.flow_quality, ""
+        if self.flow == "auto" and software:
+            quality, why = "fast", ", the fast one, as there is no GPU"
+        return replace(self, flow="search", flow_quality=quality), f"search{why}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class VideoSettings(FlowSettings):
+    """Motion, time and encoding of videos."""
+
     begin: str | None = None
     "Time in the video to begin at: 12.5 (seconds) or 1:02:03."
     end: str | None = None
@@ -44,28 +75,6 @@ class VideoSettings:
     "The encoder's number of constant quality: smaller is better and larger."
     encoder: Literal["nvenc", "qsv", "amf"] | None = None
     "Encode in hardware; software by default."
-
-    def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
-        """Where motion comes from, and the same in words."""
-        settled, how = self.settled(device)
-        if settled.flow == "none":
-            return None, how
-        if settled.flow == "dis":
-            return Dis(settled.flow_quality), how
-        return Flow(quality=settled.flow_quality, device=device), how
-
-    def settled(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
-        """A copy in which `flow` is chosen as it suits the device, and the choice in words."""
-        if self.flow == "none":
-            return self, "none: pictures are averaged"
-        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        if self.flow == "dis" or (self.flow == "auto" and software and is_installed()):
-            why = "" if self.flow == "dis" else ", as there is no GPU"
-            return replace(self, flow="dis"), f"dense inverse search{why}"
-        quality, why = self.flow_quality, ""
-        if self.flow == "auto" and software:
-            quality, why = "fast", ", the fast one, as there is no GPU"
-        return replace(self, flow="search", flow_quality=quality), f"search{why}"
 
     @property
     def pace(self) -> Fraction:

@@ -27,7 +27,7 @@ COMMANDS = {
     "blur": "Blur rendered frames, or videos.",
     "job": "Write a job file, from which any machine can blur any part of a sequence.",
     "render": "Render a built-in scene with motion blur.",
-    "view": "View a scene or frames interactively.",
+    "view": "View a scene, frames or a video interactively.",
     "info": "Describe a frame: layers, sizes, motion vector convention, speeds.",
     "vectors": "Write the motion of frames as other programs store it.",
     "devices": "List the GPUs that --adapter (or WGMB_ADAPTER) can choose; * is the default.",

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from ..color_settings import ColorSettings
 from ..errors import DeviceError
 from ..extras import needed_by
-from ..settings import size_of
+from ..settings import rate_of, size_of
+from ..video_settings import FlowSettings
 from .exit_codes import DONE
-from .options import BlurOptions, Colors, Given, InputOptions, Look, ShutterOptions, When
+from .options import (
+    BlurOptions,
+    Colors,
+    Given,
+    InputOptions,
+    Look,
+    Motions,
+    ShutterOptions,
+    When,
+)
 from .terminal import note
 
 
@@ -19,22 +30,27 @@ def view(
     look: Look = BlurOptions(),
     when: When = ShutterOptions(),
     color: Colors = ColorSettings(),
+    motion: Motions = FlowSettings(),
     *,
     config: Path | None = None,
+    fps: str | None = None,
     window: str = "1280x720",
     adapter: str | None = None,
 ) -> int:
-    """View a scene or frames interactively.
+    """View a scene, frames or a video interactively.
 
     Example: wgmb view wheel
     Example: wgmb view 'shot.####.exr' --method reproject
+    Example: wgmb view clip.mp4 --flow dis --fps 60
 
     Parameters
     ----------
     what
-        Scene, file or pattern; by default the one in --config, else the scene crossing.
+        Scene, file, pattern or video; by default the one in --config, else the scene crossing.
     config
         TOML file saved by the viewer: start with its settings.
+    fps
+        Frames per second; of videos those of the output, whose interval the shutter is in.
     window
         Window size, WIDTHxHEIGHT.
     adapter
@@ -53,7 +69,9 @@ def view(
         state = viewer.State.read(config)
     if what is not None:
         state = state.opened(what)
-    state = state.told(vars(given) | vars(look) | vars(when) | vars(color))
+    state = state.told(vars(given) | vars(look) | vars(when) | vars(color) | vars(motion))
+    if fps is not None:
+        state = replace(state, fps=float(rate_of(fps)))
     if color.remark:
         note(color.remark)
     viewer.view(state, adapter=adapter, size=size_of(window))

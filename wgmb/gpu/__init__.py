@@ -8,6 +8,7 @@ from .device import (
     claim,
     open_device,
     reported,
+    second_device,
     submit,
     texel,
 )
@@ -24,6 +25,7 @@ __all__ = [
     "kernel",
     "open_device",
     "reported",
+    "second_device",
     "submit",
     "texel",
 ]

@@ -97,9 +97,21 @@ def open_device(name: str | None = None) -> wgpu.GPUDevice:
     return _device(name)
 
 
+def second_device(device: wgpu.GPUDevice) -> wgpu.GPUDevice:
+    """A new device on the adapter of another one: for a thread whose work that one must not await.
+
+    Nothing is shared between the two.
+    """
+    claim()
+    return _opened(choose_adapter(device.adapter.summary))
+
+
 @cache
 def _device(name: str) -> wgpu.GPUDevice:
-    adapter = choose_adapter(name)
+    return _opened(choose_adapter(name))
+
+
+def _opened(adapter: wgpu.GPUAdapter) -> wgpu.GPUDevice:
     wanted = ("float32-filterable", "timestamp-query")
     limits = ("max-texture-dimension-2d", "max-buffer-size", "max-storage-buffer-binding-size")
     try:

@@ -9,6 +9,7 @@ import wgpu
 from ..methods import METHODS
 from ..methods.options import Option, options_of
 from .displayed import Displayed
+from .footage_subject import FootageSubject
 from .source import ClipSubject, SceneSubject, Subject
 from .state import BOTH_EYES, LOOKS, REFERENCE, State
 
@@ -19,18 +20,32 @@ class Choices:
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self.displayed = device, Displayed(device)
         self._scene: SceneSubject | None = None
-        self._clip: tuple[tuple, ClipSubject] | None = None
+        self._clip: tuple[tuple, ClipSubject | FootageSubject] | None = None
 
     def subject(self, state: State) -> Subject:
         """The scene or the frames that the state is about."""
         if state.is_scene:
             self._scene = self._scene or SceneSubject(self._device)
             return self._scene
-        key = (state.source, state.given, state.read_as)
+        flow = (state.flow, state.flow_quality) if state.is_video else ()
+        key = (state.source, state.given, state.read_as, flow)
         if self._clip is None or self._clip[0] != key:
-            display = self.displayed.display(state)
-            self._clip = key, ClipSubject(self._device, state, display)
+            self._clip = key, self._opened(state)
         return self._clip[1]
+
+    def _opened(self, state: State) -> ClipSubject | FootageSubject:
+        """The video or the frames; what was shown before is let go of."""
+        if state.is_video:
+            made = FootageSubject(self._device, state)
+        else:
+            made = ClipSubject(self._device, state, self.displayed.display(state))
+        self.close()
+        return made
+
+    def close(self) -> None:
+        """End what goes on beside the window."""
+        if self._clip is not None and isinstance(self._clip[1], FootageSubject):
+            self._clip[1].close()
 
     def methods(self, state: State) -> list[str]:
         """Names of the methods that can be used."""
@@ -53,7 +68,7 @@ class Choices:
         can = {
             "result": blurred,
             "sharp": "color" in has,
-            "perceived": blurred,
+            "perceived": blurred and not state.is_video,
             "depth": "depth" in has,
             "velocity": "motion" in has,
             "error": blurred and "distributed" in methods,

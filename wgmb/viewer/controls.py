@@ -40,7 +40,7 @@ KEYS = {
     "Esc": "quit",
 }
 MOUSE = {
-    "left drag": "orbit (frames on disk: move)",
+    "left drag": "orbit (frames and videos: move)",
     "right or shift drag": "pan",
     "wheel, two fingers": "zoom in, out",
     "drag the divider": "move the wipe",
@@ -156,7 +156,7 @@ def stepped(state: State, frames: float) -> State:
 def played(state: State, seconds: float) -> State:
     """Return the state `seconds` later."""
     first, last = state.span
-    moved = seconds * state.fps * state.speed
+    moved = seconds * state.rate * state.speed
     return replace(state, frame=first + (state.frame + moved - first) % (last - first + 1))
 
 

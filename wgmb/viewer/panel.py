@@ -90,7 +90,7 @@ class Panel:
         self._header(info)
         state = self._transport(state)
         for title, section, opened in (
-            ("Scene" if state.is_scene else "Frames", sections.scene, True),
+            (_subject(state), sections.scene, True),
             ("Blur", sections.blur, True),
             ("Shutter", sections.shutter, True),
             ("View", sections.view, True),
@@ -162,3 +162,8 @@ class Panel:
         self._ui.label(name)
         _, self._files[name] = imgui.input_text(f"##{name}", self._files[name])
         self._ui.keep(f"file {name}")
+
+
+def _subject(state: State) -> str:
+    """What is seen, as the title of its section."""
+    return "Scene" if state.is_scene else "Video" if state.is_video else "Frames"

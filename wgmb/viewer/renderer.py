@@ -24,6 +24,7 @@ from ..settings import ShutterSettings
 from ..shutter import Shutter
 from .adaptive import QUICK, Pace
 from .capabilities import Choices
+from .footage_subject import FootageSubject
 from .perception import Perceived
 from .quality import Measured, Quality
 from .screen import Box, Image, fit, whole
@@ -34,6 +35,7 @@ REFERENCE_SAMPLES = 1024
 _STEP = 0.07  # seconds of work on what converges, between two frames of the window
 _QUICK_STEP = 0.03  # while something moves
 _SETTLE = 0.35  # seconds of stillness before antialiasing
+_SHORT = 0.02  # seconds
 _BLURS_KEPT = 12
 _PASSES = {"sharp": "color", "depth": "depth", "velocity": "motion"}
 
@@ -77,6 +79,7 @@ class Report:
     kind: str = "COLOR"
     reference: tuple[int, int] = (0, 1)  # samples done, of how many
     measured: Measured | None = None
+    waiting: str = ""  # what is shown meanwhile, and what for
     busy: bool = False
     changed: bool = False
 
@@ -128,6 +131,9 @@ class Renderer:
         self._seen = self._displayed(slots, state, subject)
         unfinished = not all(self._coming[slot].ready for slot in slots)
         report.busy = moving or unfinished or self._level > 0
+        if isinstance(subject, FootageSubject) and any(name != "sharp" for name, _ in names):
+            report.waiting = subject.waiting
+            report.busy |= subject.busy
         if names[-1][0] == REFERENCE:
             report.reference = last.done, last.total
             report.measured = measured = self._measure(first, last)
@@ -223,7 +229,8 @@ class Renderer:
         """Draw some of `name`; it is shown once it is no coarser than what it replaces."""
         shown, coming = self._shown[slot], self._coming[slot]
         eye = state.eye if name in ("perceived", REFERENCE) else None
-        key = (name, view, state.picture, eye, state.frame if name == "perceived" else None)
+        known = self._known(name, state, subject, full)
+        key = (name, view, state.picture, eye, state.frame if name == "perceived" else None, known)
         fine = (size, antialias, self._level if quick else None)
         if (coming.key, coming.fine) != (key, fine):
             if self._level and shown.key == key and not _coarser(shown.fine, fine):
@@ -245,6 +252,18 @@ class Renderer:
             self._shown[slot] = coming
         report.changed = True
         report.seconds[coming.label] = time.perf_counter() - started
+
+    def _known(self, name: str, state: State, subject: Subject, full: bool) -> tuple:
+        """What is known of a video's motion, all that is needed if `full`."""
+        if not isinstance(subject, FootageSubject) or name == "sharp":
+            return ()
+        method = METHODS[name if name in METHODS else state.method]
+        asked = state, shutter_of(state), "neighbours" in method.uses
+        known = subject.stamp(*asked)
+        while full and subject.busy:
+            time.sleep(_SHORT)
+            known = subject.stamp(*asked)
+        return known
 
     def _draw(
         self, coming, slot, name, view, state, subject: Subject, seconds: float, quick: bool
@@ -284,7 +303,7 @@ class Renderer:
     def _blur(self, slot: str, name: str, state: State, quick: bool) -> Blur:
         """The compiled method called `name`, kept for the next time it is asked for."""
         options: dict[str, Any] = dict(state.options)
-        method, samples, shutter = state.method, state.samples, shutter_of(state)
+        method, samples, shutter = state.method, state.sampling, shutter_of(state)
         if name == REFERENCE:
             options, method, samples = {}, self.choices.reference(state), REFERENCE_SAMPLES
             shutter = state.eye.shutter(state.fps) if state.eye else shutter
@@ -294,6 +313,7 @@ class Renderer:
             options, method, shutter = {}, "volume", Shutter(0)
         elif name not in ("result", "perceived", state.method):
             options, method = {}, name
+            samples = state.with_method(name).sampling
         if method not in (allowed := self.choices.methods(state)):
             raise InputError(f"method {method!r} is not available here; use {', '.join(allowed)}")
         if quick:

@@ -22,14 +22,18 @@ from ..settings import (
     rate_of,
 )
 from ..settings_toml import parse
+from ..video_settings import FlowSettings
 
 GROUPS = (
     BlurSettings, ShutterSettings, SceneSettings, OutputSettings, InputSettings, ColorSettings,
+    FlowSettings,
 )  # fmt: skip
 INPUTS = frozenset({*(f.name for f in fields(InputSettings)), "holdout", "scale"})
 """Options that say what frames on disk hold."""
 COLORS = frozenset(f.name for f in fields(ColorSettings))
 """Options of colours; of scenes all but `from_`, as files write `from`."""
+FLOW = frozenset(f.name for f in fields(FlowSettings))
+"""Options of videos."""
 VIEW = (
     "frames", "frame", "look", "eyes", "compare", "against", "wipe", "gain", "fastest", "middle",
     "exposure", "tone", "cone_rate", "cone_peak", "zoom", "center", "playing", "speed", "panel",
@@ -69,6 +73,7 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
     """Fields of the dataclass `state` from what the tables [render], or [blur], and [view] hold."""
     known = _hints(*GROUPS) | {"fps": str | float}
     own = {f.name for f in fields(state)} & known.keys() - set(VIEW)
+    own -= set() if on_disk else FLOW
     allowed = own | {"set", *METHOD_OPTIONS} | (INPUTS if on_disk else set())
     allowed |= COLORS if on_disk else COLORS - {"from_"}
     found: dict[str, Any] = {}

@@ -17,7 +17,7 @@ from ..pipeline import SAMPLES
 from ..scene import builtin
 from ..shutter import CURVES, PHASES, ROLLING
 from .renderer import shutter_of
-from .state import BOTH_EYES, COMPARE, REFERENCE, TONES, State
+from .state import BOTH_EYES, COMPARE, FLOWS, QUALITIES, REFERENCE, TONES, State
 from .theme import ACCENT, COLORS, DIM, packed
 from .widgets import LOG, Widgets, plain
 
@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 
 
 def scene(ui: Widgets, state: State, info: Info) -> State:
-    """Another scene, its parameters, its camera; of frames on disk what was found out."""
+    """Another scene, its parameters, its camera; of frames on disk what was found out, of videos
+    where motion comes from.
+    """
     names = list(builtin.SCENES) if state.is_scene else [state.source, *builtin.SCENES]
     label = "scene" if state.is_scene else "shown"
     chosen = ui.combo(label, state.source, names, shown=plain(state.source))
@@ -36,7 +38,11 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
         return state.opened(chosen)
     if not state.is_scene:
         if info.finding:
-            ui.dim(f"vectors: {info.finding}")
+            ui.dim(info.finding)
+        if state.is_video:
+            state = replace(state, flow=ui.combo("flow", state.flow, FLOWS))
+            quality = ui.combo("quality", state.flow_quality, QUALITIES)
+            state = replace(state, flow_quality=quality)
         return state
     known = inspect.signature(builtin.SCENES[state.source]).parameters
     defaults = {name: parameter.default for name, parameter in known.items()}
@@ -112,7 +118,7 @@ def blur(ui: Widgets, state: State, info: Info) -> State:
 
 
 def _samples(ui: Widgets, state: State) -> State:
-    auto = state.samples == "auto"
+    auto = state.sampling == "auto"
     own = getattr(METHODS[state.method], "samples", SAMPLES)
     ui.label("samples")
     imgui.set_next_item_width(-64)
@@ -125,7 +131,7 @@ def _samples(ui: Widgets, state: State) -> State:
     toggled, auto = imgui.checkbox("auto", auto)
     ui.keep("auto")
     if toggled:
-        return replace(state, samples="auto" if auto else None)
+        return replace(state, samples="auto" if auto else own if state.is_video else None)
     return replace(state, samples=max(number, 1)) if changed else state
 
 

@@ -24,6 +24,7 @@ from ..render import Render
 from ..scene import builtin
 from ..scene.scene import Scene
 from ..settings import InputSettings, SceneSettings, size_of
+from .footage_subject import FootageSubject
 from .state import BOTH_EYES, State
 
 _MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
@@ -123,7 +124,7 @@ class ClipSubject:
         self._sharp = Blur("tap", device=device)
         self._uploaders: dict[tuple, Blur] = {}
         self._uploaded: dict[tuple, tuple[_Which | None, dict]] = {}
-        self.finding = self._clip.finding
+        self.finding = f"vectors: {self._clip.finding}"
         self._now = self._which(state)
 
     def has(self, state: State) -> frozenset[str]:
@@ -264,7 +265,7 @@ def _bytes(frame: Frame) -> int:
     return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
 
 
-Subject = SceneSubject | ClipSubject
+Subject = SceneSubject | ClipSubject | FootageSubject
 
 
 def methods_for(has: frozenset[str]) -> list[str]:

@@ -6,8 +6,11 @@
 from __future__ import annotations
 
 import math
+import os
 import shlex
 from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +18,8 @@ from ..color_settings import ColorSettings, option_name
 from ..cone import Cone
 from ..errors import InputError, did_you_mean
 from ..io import frame_numbers
-from ..io.frame_file import about
+from ..io.footage import Footage
+from ..io.frame_file import about, is_video
 from ..methods import METHODS
 from ..scene import builtin
 from ..settings import METHOD_OPTIONS, ShutterSettings
@@ -26,6 +30,7 @@ COMPARE = ("off", "wipe", "split", "difference", "flicker")
 BOTH_EYES = ("pair", "red-cyan")
 LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")
 TONES = ("clip", "soft")
+FLOWS, QUALITIES = ("auto", "search", "dis", "none"), ("best", "fast")
 REFERENCE = "reference"
 DEFAULTS = {f.name: f.default for group in saved.GROUPS for f in fields(group)}
 """Defaults of the command line's options."""
@@ -51,6 +56,10 @@ class State:
     size: str = "1280x720"
     antialias: int = 2
     fps: float = 24.0
+    """Of a video: of the output, whose interval the shutter is in."""
+    flow: str = "auto"
+    """Of a video: where motion comes from (FlowSettings)."""
+    flow_quality: str = "best"
 
     method: str = "gather"
     samples: int | str | None = None
@@ -89,6 +98,22 @@ class State:
     def is_scene(self) -> bool:
         """True if `source` is a built-in scene."""
         return self.source in builtin.SCENES
+
+    @property
+    def is_video(self) -> bool:
+        """True if `source` is a video."""
+        return not self.is_scene and _is_video(self.source)
+
+    @property
+    def rate(self) -> float:
+        """Frames a second that are played at full speed."""
+        return float(_video(self.source)[1]) if self.is_video else self.fps
+
+    @property
+    def sampling(self) -> int | str | None:
+        """The samples, which for motion from pictures are adaptive unless they are set."""
+        adaptive = getattr(METHODS[self.method], "adaptive", False)
+        return "auto" if self.samples is None and adaptive and self.is_video else self.samples
 
     @property
     def eye(self) -> Cone | None:
@@ -151,6 +176,8 @@ class State:
                 last = round(loop * state.fps) - 1
                 return replace(state, frames=f"0-{last}", frame=0.0, speed=1.0)
             return replace(state, frames=plain.frames, frame=0.0, speed=plain.speed)
+        if state.is_video:
+            state = replace(state, fps=float(_video(source)[1]))
         return replace(state, frames=_on_disk(source), frame=math.nan, speed=1.0).settled()
 
     def suited(self) -> dict[str, Any]:
@@ -230,6 +257,10 @@ class State:
             "fps": f"{self.fps:g}",
             **dict(self.color),
         }
+        if self.is_video:
+            look |= {"flow": self.flow, "flow_quality": self.flow_quality}
+            if self.fps == self.rate:
+                del look["fps"]
         if not self.is_scene:
             return {"pattern": self.source, **dict(self.given), **look}
         return {
@@ -305,6 +336,8 @@ class State:
             raise InputError(f"settings: {source!r} is {'' if on_disk else 'not '}a built-in scene")
         given.pop("time", None)
         state = State(source, **saved.values(given, tables.get("view", {}), State, on_disk=on_disk))
+        if "fps" not in given and state.is_video:
+            state = replace(state, fps=state.rate)
         Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
         for name, value, known in (
             ("method", state.method, METHODS),
@@ -326,7 +359,25 @@ def _changed(pairs: tuple, name: str, value: object) -> tuple:
     return kept if value is None else (*kept, (name, value))
 
 
+@lru_cache(maxsize=64)
+def _is_video(source: str) -> bool:
+    return is_video(source)
+
+
+def _video(source: str) -> tuple[int, Fraction]:
+    """The number of pictures of a video, and how many there are a second."""
+    return _counted(source, os.stat(source).st_mtime_ns)
+
+
+@lru_cache(maxsize=8)
+def _counted(source: str, changed: int) -> tuple[int, Fraction]:
+    footage = Footage(source)
+    return len(footage), footage.rate
+
+
 def _on_disk(source: str) -> str:
+    if _is_video(source):
+        return f"0-{_video(source)[0] - 1}"
     if not frame_numbers.is_pattern(source):
         return str(frame_numbers.number_in(Path(source)))
     return frame_numbers.frame_range(frame_numbers.numbers_on_disk(source))

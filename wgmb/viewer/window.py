@@ -31,6 +31,7 @@ _REPEAT = 0.4, 0.05  # seconds until a held arrow key repeats, and from one time
 _FLICKER = 0.5  # seconds an image is shown
 _AFTER_EVENT = 3  # frames: ImGui hides what appears for its first one
 _MESSAGE = 4.0  # seconds a message stays
+_WAIT = 0.03  # seconds between frames that only wait for a video's motion
 _TIMES = 90  # frames in the plots
 _HANDLED = ("pointer_down", "pointer_up", "pointer_move", "wheel", "key_down", "key_up")
 _SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "char", "resize")
@@ -206,6 +207,8 @@ class Viewer:
         if report.changed or state.playing:
             self._frame_times.append(max(seconds, self._now - before if report.moving else 0))
             self._draw_times.append(report.seconds["draw"])
+        if report.waiting and not (report.changed or report.moving):
+            time.sleep(_WAIT)  # the work is not here
         self._ask_for_more(report.busy)
 
     def _prepare(self, state: State) -> None:
@@ -241,7 +244,7 @@ class Viewer:
             passes={k: v for k, v in self._passes.items() if k != "draw"},
             recording="recording" if full else "",
             export=self.actions.export_said,
-            message=self.message[0] if self._now < self.message[1] else "",
+            message=self.message[0] if self._now < self.message[1] else report.waiting,
             finding=getattr(choices.subject(state), "finding", ""),
             flicked=self._flicked(),
             display=choices.displayed.display(state),
@@ -321,6 +324,7 @@ def view(state: State, *, adapter: str | None = None, size: tuple[int, int] = (1
     viewer = Viewer(canvas, state, device=device)
     loop.run()
     viewer.actions.close()
+    viewer.stage.choices.close()
     if viewer.failed is not None:
         raise viewer.failed
 

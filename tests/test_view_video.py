@@ -1,0 +1,182 @@
+"""The viewer shows videos: pictures at once, their blur as soon as their motion is known."""
+
+import time
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import make_clips as clips
+import make_frames as make
+from wgmb import Blur, InputError, Shutter, gpu
+from wgmb.flow.dis import Dis
+from wgmb.gpu.textures import TexturePool
+from wgmb.io.clock import Clock
+from wgmb.io.footage import Footage
+from wgmb.video_batch import FootageBlur, moments
+from wgmb.video_pictures import VideoPictures
+from wgmb.viewer import State, controls, motion_maker, offscreen
+from wgmb.viewer.window import frame
+
+SIZE = 96, 64
+WINDOW = 96, 64  # of the picture alone
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    """A square that passes over a background, 48 a second, and a cut before picture 10."""
+    width, height = SIZE
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    frames = []
+    for n in range(14):
+        at = 12 + 3.0 * n
+        inside = (abs(x - at) < 12) & (abs(y - 32) < 14)
+        behind = make.texture(x, y, 0.0 if n < 10 else 9.0)[..., 0]
+        tone = np.where(inside, make.texture(x - at, y, 5.0)[..., 1], behind)
+        tone = tone if n < 10 else 1 - tone[::-1] ** 3
+        luma = np.clip(16 + 219 * tone, 16, 235).round().astype(np.uint8)
+        chroma = np.full((height // 2, width // 2), 128, np.uint8)
+        frames.append(clips.frame([luma, chroma, chroma], "yuv420p"))
+    times = [Fraction(n, 48) for n in range(14)]
+    return clips.write(tmp_path_factory.mktemp("clip") / "a.mp4", frames, times)
+
+
+class Held:
+    """A source of motion that waits until it may go on, and counts."""
+
+    def __init__(self):
+        self.made, self.free = [], True
+        self.dis = Dis("best")
+
+    def shot(self, load):
+        found = self.dis.shot(load)
+
+        def motion(number):
+            while not self.free:
+                time.sleep(0.01)
+            self.made.append(number)
+            return found(number)
+
+        return motion
+
+
+@pytest.fixture
+def held(monkeypatch):
+    source = Held()
+    monkeypatch.setattr(motion_maker.FlowSettings, "source", lambda self, device: (source, "held"))
+    return source
+
+
+def opened(clip, **changes):
+    state = replace(State().opened(str(clip)), panel=False, method="tap", samples=8)
+    return offscreen(replace(state, **changes), WINDOW)
+
+
+def settled(viewer):
+    """The result when nothing lacks any more (height, width, 3)."""
+    for _ in range(600):
+        frame(viewer)
+        if not viewer.stage.report.busy:
+            return viewer.stage.download()[..., :3]
+    raise AssertionError(viewer.stage.report)
+
+
+def command_line(clip, number, fps=None, method="tap", motion=True, **shutter):
+    """The picture that `wgmb blur` makes for the time of an input picture."""
+    footage, blur = Footage(clip), Blur(method, samples=8)
+    run = FootageBlur(footage, blur, Dis("best") if motion else None)
+    wanted = [m for m in moments(footage, Clock(), Fraction(fps or 48)) if m.time * 48 == number]
+    for _, exposure in run.exposures(Shutter(**shutter), wanted):
+        encoder = blur.device.create_command_encoder()
+        return TexturePool(blur.device).download(encoder, exposure.light())[..., :3]
+
+
+@pytest.mark.parametrize(
+    ("changes", "made"),
+    [
+        ({}, {}),
+        ({"shutter": 360.0, "phase": "start"}, {"degrees": 360, "phase": "start"}),
+        ({"fps": 12.0}, {"fps": 12}),
+        ({"method": "gather"}, {"method": "gather"}),
+        ({"fps": 12.0, "shutter": 360.0, "frame": 8.0}, {"fps": 12, "degrees": 360}),
+        ({"fps": 12.0, "flow": "none"}, {"fps": 12, "motion": False}),
+    ],
+    ids=["own rate", "into the next", "four in one", "neighbours", "up to the cut", "averaged"],
+)
+def test_it_shows_what_the_command_line_makes(clip, changes, made):
+    changes = {"flow": "dis", "frame": 4.0} | changes
+    viewer = opened(clip, **changes)
+    want = command_line(clip, int(changes["frame"]), **made)
+    np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
+    viewer.stage.choices.close()
+
+
+def test_the_sharp_picture_comes_first_and_says_so(clip, held):
+    held.free = False
+    viewer = opened(clip, frame=5.0)
+    for _ in range(3):
+        frame(viewer)
+    report = viewer.stage.report
+    assert report.waiting.startswith("sharp: the motion of picture 5 is being found")
+    sharp = VideoPictures(Footage(clip), gpu.open_device()).at(5)
+    np.testing.assert_allclose(viewer.stage.download()[..., :3], sharp, atol=1e-6)
+    held.free = True
+    assert np.abs(settled(viewer) - sharp).max() > 0.05
+    assert not viewer.stage.report.waiting
+    viewer.stage.choices.close()
+
+
+def test_motion_is_made_once_whatever_changes(clip, held):
+    viewer = opened(clip, frame=5.0)
+    first = settled(viewer)
+    assert held.made == [5]  # tap takes no neighbours
+    for change in (
+        {"shutter": 90.0},
+        {"samples": 4},
+        {"method": "reproject"},
+        {"look": "velocity"},
+    ):
+        viewer.state = replace(viewer.state, **change)
+        settled(viewer)
+    viewer.state = replace(viewer.state, frame=2.0)
+    settled(viewer)
+    assert sorted(held.made) == sorted(set(held.made)) and {2, 5} <= set(held.made)
+    before = len(held.made)
+    viewer.state = replace(viewer.state, frame=5.0, shutter=180.0, samples=8, method="tap",
+                           look="result")  # fmt: skip
+    np.testing.assert_array_equal(settled(viewer), first)
+    assert len(held.made) == before
+    viewer.stage.choices.close()
+
+
+def test_it_plays_at_its_own_rate_and_steps_from_picture_to_picture(clip):
+    state = State().opened(str(clip))
+    assert (state.frames, state.frame, state.fps, state.rate) == ("0-13", 0.0, 48.0, 48.0)
+    assert controls.stepped(state, 1).frame == 1
+    assert controls.played(replace(state, fps=12.0), 0.125).frame == pytest.approx(6)
+
+
+def test_what_it_is_set_to_is_what_the_command_line_is_told(clip):
+    state = replace(State().opened(str(clip)), flow="dis", frames="2-5").settled()
+    words = state.command("b.mp4")
+    assert words[:4] == ["blur", str(clip), "-o", "b.mp4"] and "--fps" not in words
+    assert words[words.index("--flow") + 1] == "dis" and words[words.index("--frames") + 1] == "2-5"
+    assert "--fps" in replace(state, fps=24.0).command("b.mp4")
+    assert State.of_toml(state.toml()) == state
+    with pytest.raises(InputError, match="flow cannot be 'dise'"):
+        State.of_toml(state.toml().replace('"dis"', '"dise"'))
+
+
+def test_options_of_rendered_frames_are_refused(clip):
+    with pytest.raises(InputError, match="--layer is for rendered frames"):
+        frame(opened(clip, given=(("layer", "beauty"),)))
+
+
+def test_pictures_are_found_in_any_order(clip):
+    pictures, want = VideoPictures(Footage(clip), gpu.open_device()), {}
+    for number, light in VideoPictures(Footage(clip), gpu.open_device()).read():
+        want[number] = light
+    for number in (3, 4, 5, 9, 2, 2, 13, 0, 12):
+        np.testing.assert_array_equal(pictures.at(number), want[number])
+    assert pictures.at(14) is None
