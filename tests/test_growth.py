@@ -9,8 +9,14 @@ import pytest
 
 from wgmb import Blur, Frame, Render, Shutter, gpu
 from wgmb.camera import Camera, Reprojections
+from wgmb.coding import CodedPicture, Coding
+from wgmb.exposer import Exposer
+from wgmb.glance import Glance
 from wgmb.methods import METHODS
 from wgmb.observer import Observer
+from wgmb.planes import Average
+from wgmb.reel import Picture, Reel
+from wgmb.reel_views import ReelViews
 from wgmb.scene import builtin
 from wgmb.viewer import State
 from wgmb.viewer.renderer import Renderer
@@ -178,3 +184,48 @@ PARTS |= {
 @pytest.mark.parametrize("name", PARTS)
 def test_memory_does_not_grow_with_frames(fresh, name):
     assert growth(PARTS[name](fresh)) <= MOST
+
+
+def test_exposures_of_cells_leave_nothing_behind():
+    """Also where shutters, shares and numbers of cells change from one to the next."""
+    blur = Blur("tap", samples=4)
+    reel = Reel(Picture(n / 144, _coded(n), n) for n in range(10_000))
+    views, exposer, number = ReelViews(reel, blur, _Sideways()), Exposer(blur), 0
+
+    def step():
+        nonlocal number
+        cells = reel.cells(number / 60, 1 / 60, Shutter(180))
+        exposer.texture(SIZE, ((cell, views.shown(cell.index)) for cell in cells))
+        number += 1
+
+    assert growth(step) <= MOST
+
+
+def test_averages_of_planes_leave_nothing_behind():
+    average, number = Average(gpu.open_device(None)), 0
+    pictures = [_coded(n).coded for n in range(10)]
+
+    def step():
+        nonlocal number
+        number += 1
+        count = 2 + number % 3
+        weights = np.random.default_rng(number).random(count)
+        average(pictures[number % 6 :][:count], weights, Coding())
+
+    assert growth(step) <= MOST
+
+
+def _coded(number: int) -> Glance:
+    width, height = SIZE
+    luma = np.random.default_rng(number % 7).integers(40, 200, (height, width), np.uint8)
+    chroma = np.full((height // 2, width // 2), 128, np.uint8)
+    return Glance(CodedPicture((luma, chroma, chroma), Coding()))
+
+
+class _Sideways:
+    """All moves by the same."""
+
+    def shot(self, load):
+        width, height = SIZE
+        motion = np.full((height, width, 4), (-3, 0, 3, 0), np.float32)
+        return lambda number: (motion, np.ones((height, width), np.float32))

@@ -39,7 +39,6 @@ class WeightedSum:
         `output`: rgba32float, of that size. `onto`: added to the sum of the call before.
         """
         width, height, _ = output.size
-        kernel = gpu.kernel(self._device, "observer.wgsl")
         data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
         data["size"] = width, height
         uniform = wgpu.BufferUsage.UNIFORM
@@ -47,9 +46,10 @@ class WeightedSum:
         bindings = gpu.FrameBindings((width, height), {"frame": create(data=data, usage=uniform)})
         views = [picture.create_view() for picture in pictures]
         for first in range(0, len(views), EIGHT):
+            begins = first == 0 and not onto
+            kernel = gpu.kernel(self._device, "observer.wgsl", FIRST=begins)
             share = np.zeros((), kernel.source.dtype("Share"))
             share["weights"].flat[: len(views) - first] = weights[first : first + EIGHT]
-            share["first"] = first == 0 and not onto
             kernel.run(
                 encoder,
                 "main",

@@ -14,9 +14,11 @@
 @group(1) @binding(9) var<storage, read_write> sums: array<vec4f>;
 @group(1) @binding(10) var output: Output;
 
+// Not a uniform: lavapipe would compile the shader anew at every dispatch, and keep it (lavapipe.md).
+override FIRST: bool = true;    // `sums` is empty
+
 struct Share {
     weights: array<vec4f, 2>,   // of the eight frames
-    first: u32,                 // 1: `sums` is empty
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -26,7 +28,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let a = share.weights[0];
     let b = share.weights[1];
     var sum = vec4f(0.0);
-    if share.first == 0u { sum = sums[at]; }
+    if !FIRST { sum = sums[at]; }
     sum += a.x * finite_or_black(textureLoad(picture0, id.xy, 0)) + a.y * finite_or_black(textureLoad(picture1, id.xy, 0));
     sum += a.z * finite_or_black(textureLoad(picture2, id.xy, 0)) + a.w * finite_or_black(textureLoad(picture3, id.xy, 0));
     sum += b.x * finite_or_black(textureLoad(picture4, id.xy, 0)) + b.y * finite_or_black(textureLoad(picture5, id.xy, 0));
