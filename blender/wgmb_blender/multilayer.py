@@ -15,7 +15,7 @@ from .sharp import MATTE, PASSES, View
 
 _LOSSLESS = "zip"
 _DATA = ("Depth", "Vector", "Normal", "Position", "UV", "Mist")
-_INDICES = ("Index", "Crypto")
+_IDS = ("Index", "Crypto")  # also Object Index, as 5.0 has it
 
 
 def save_multilayer(
@@ -44,7 +44,7 @@ def save_multilayer(
             if (kept := _kept(scene, part.channels, image.color_depth == "16"))
         ]
         if composite is not None:
-            parts[0] = _with(parts[0], exr.read(composite).parts[0].channels, image.color_depth)
+            parts = _with(parts, exr.read(composite).parts[0].channels, image.color_depth)
         whole = exr.Exr(path, parts)
         codec = codec if codec in exr.COMPRESSIONS else _LOSSLESS
         if codec in ("pxr24", "b44", "b44a", "dwaa", "dwab") and _has_ids(parts):
@@ -56,12 +56,17 @@ def save_multilayer(
             raise ProblemError(f"Cannot write {path}: {(error.strerror or '').lower()}") from None
 
 
-def _with(part: Any, composite: dict[str, Any], depth: str) -> Any:
+def _with(parts: list[Any], composite: dict[str, Any], depth: str) -> list[Any]:
+    """The parts and the composite: a part of its own where each layer has one (5.0)."""
     from wgmb.io import exr
 
     made = exr.to_half if depth == "16" else (lambda plane: plane)
-    added = {f"{COMPOSITE}.Combined.{c}": made(plane) for c, plane in composite.items()}
-    return replace(part, channels={**added, **part.channels})
+    name = f"{COMPOSITE}.Combined"
+    added = {f"{name}.{c}": made(plane) for c, plane in composite.items()}
+    first, *others = parts
+    if others:
+        return [replace(first, name=name, channels=added), *parts]
+    return [replace(first, channels={**added, **first.channels})]
 
 
 def _kept(scene: bpy.types.Scene, channels: dict[str, Any], is_half: bool) -> dict[str, Any]:
@@ -79,7 +84,8 @@ def _kept(scene: bpy.types.Scene, channels: dict[str, Any], is_half: bool) -> di
         what = rest.rpartition(".")[0]
         if any(layer == of and what.rstrip("0123456789") == one for of, one in left_out):
             continue
-        is_color = not what.startswith((*_DATA, *_INDICES)) and name[-2:] in (
+        is_data = what.startswith(_DATA) or any(word in what for word in _IDS)
+        is_color = not is_data and name[-2:] in (
             ".R",
             ".G",
             ".B",

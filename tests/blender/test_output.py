@@ -111,7 +111,7 @@ def frames_of(path: Path, scene) -> list[np.ndarray]:
         image.file_format, image.color_mode, image.color_depth = "PNG", "RGB", "8"
         render.dither_intensity = 0
         editor = other.sequence_editor_create()
-        strips = getattr(editor, "strips", None) or editor.sequences
+        strips = editor.strips if hasattr(editor, "strips") else editor.sequences
         strips.new_movie("film", str(path), 1, 1)
         other.frame_start, other.frame_end = 1, 3
         render.filepath = str(path.parent / "frame")
@@ -136,8 +136,11 @@ def test_every_second_frame_of_a_film_and_its_sound(tmp_path):
         file.writeframes(tone.astype("<i2").tobytes())
     scene = scenes.crossing(size=(64, 36))
     editor = scene.sequence_editor_create()
-    strips = getattr(editor, "strips", None) or editor.sequences
-    strips.new_sound("tone", str(tmp_path / "tone.wav"), 1, 1)
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+    try:
+        strips.new_sound("tone", str(tmp_path / "tone.wav"), 1, 1)
+    except RuntimeError as error:
+        pytest.skip(str(error))  # the module of 4.2 is compiled without sound
     scenes.output(scene, tmp_path, "FFMPEG", None, "RGB", "VIDEO")
     made = scene.render.ffmpeg
     made.format, made.codec, made.audio_codec = "MPEG4", "H264", "AAC"
@@ -164,10 +167,11 @@ def test_a_multilayer_file_keeps_the_other_passes(tmp_path):
     (path,) = run(scene, 5, is_rendering=False).files
     got = exr.read(path).channels()
     layers = {name.split(".")[1] for name in got}
-    assert {"Combined", "Depth", "IndexOB"} <= layers
+    index = "Object Index" if scenes.FIVE else "IndexOB"
+    assert {"Combined", "Depth", index} <= layers
     assert not layers & {"Vector", "CryptoObject00"}  # which only the blur needed
     sharp = exr.read(tmp_path / "sharp" / "sharp_0005.exr").channels()
-    for name in ("ViewLayer.Depth.Z", "ViewLayer.IndexOB.X"):
+    for name in ("ViewLayer.Depth.Z", f"ViewLayer.{index}.X"):
         assert got[name].dtype == np.float32 and np.array_equal(got[name], sharp[name])
     blurred = np.dstack([got[f"ViewLayer.Combined.{c}"] for c in "RGBA"])
     assert blurred.dtype == np.float16

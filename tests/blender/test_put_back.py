@@ -18,7 +18,16 @@ from wgmb_blender.settings import wanted_of
 
 FIVE = scenes.FIVE
 PLAIN = {"BOOLEAN", "INT", "FLOAT", "ENUM", "STRING"}
-VARIES = {"frame_current_final", "frame_float", "session_uid", "is_updated", "is_updated_data"}
+# 4.2 itself counts a user too many of each object when a scene is copied and removed; loading a
+# file counts anew.
+MISCOUNTED = {"users"} if bpy.app.version < (4, 5, 0) else set()
+VARIES = MISCOUNTED | {
+    "frame_current_final",
+    "frame_float",
+    "session_uid",
+    "is_updated",
+    "is_updated_data",
+}
 
 
 def values(owner) -> dict:
