@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .backends import leave_opengl
 from .picture import Picture
 from .problem import NoAdapterError, ProblemError
 from .sharp import MATTE, SharpFrames, View
@@ -60,6 +61,7 @@ def open_blur(method: str, shutter: Any, samples: int | str, device: str | None)
     """A wgmb.Blur; NoAdapterError where there is nothing to run it on."""
     import wgmb
 
+    leave_opengl()
     try:
         return wgmb.Blur(method, shutter=shutter, samples=samples, device=device)
     except wgmb.DeviceError as error:

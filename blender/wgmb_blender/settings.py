@@ -14,6 +14,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from .backends import leave_opengl
 from .job import Wanted
 
 # Without it, 4.5 and later warn of paths beside the file; 4.2 does not know the word.
@@ -89,6 +90,7 @@ def adapters() -> tuple[tuple[str, str, str], ...]:
     try:
         from wgmb import gpu
 
+        leave_opengl()
         return tuple((one.summary, one.summary, "") for one in gpu.adapters())
     except Exception as error:  # no driver, no wheel: the panel is drawn all the same
         print(f"wgmb: {error}")

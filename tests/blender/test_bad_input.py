@@ -97,6 +97,18 @@ def test_no_frames(tmp_path):
         next(job.steps(scene, replace(wanted_of(scene), frames=()), Report()))
 
 
+def test_opengl_is_left_to_blenders_window():
+    """Where wgpu looks for its adapters beside a window, it ends Blender."""
+    import wgpu
+
+    from wgmb_blender import settings
+
+    settings.adapters.cache_clear()
+    assert settings.adapters()
+    kinds = {one.info["backend_type"] for one in wgpu.gpu.enumerate_adapters_sync()}
+    assert kinds and kinds <= {"Vulkan", "Metal", "D3D12"}
+
+
 def test_no_adapter(tmp_path, monkeypatch, capfd):
     scene = small(tmp_path)
     monkeypatch.setenv("WGMB_ADAPTER", "no such thing")
