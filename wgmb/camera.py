@@ -105,10 +105,21 @@ class Reprojections:
         neighbour is missing, its matrix maps everything behind the camera, and the other one's
         motion goes on.
         """
-        bodies = None, *(int(k) for k in self.indices[1:])
-        return np.array(
-            [[self._reprojection(self.prev, k), self._reprojection(self.next, k)] for k in bodies]
-        )
+        bodies = [int(k) for k in self.indices[1:]]
+        world = self.world_from_pixel()
+        own = np.array([self.here.bodies[k] for k in bodies], np.float64).reshape(-1, 4, 4)
+        inverse = np.linalg.inv(own)
+        made = np.zeros((1 + len(bodies), 2, 4, 4))
+        for side, there in enumerate((self.prev, self.next)):
+            if there is None:
+                continue
+            moved = np.tile(np.eye(4), (1 + len(bodies), 1, 1))
+            known = [row for row, k in enumerate(bodies) if k in there.bodies]
+            if known:
+                theirs = np.array([there.bodies[bodies[row]] for row in known], np.float64)
+                moved[1 + np.array(known)] = theirs @ inverse[known]
+            made[:, side] = np.asarray(there.clip_from_world) @ moved @ world
+        return made
 
     @property
     def indices(self) -> np.ndarray:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field, fields
+from functools import cache
 
 import wgpu
 
@@ -165,6 +166,7 @@ def _check_readable(name: str, view: View, like: str) -> None:
         raise InputError(f"{name} must hold {wanted}; got {format}")
 
 
+@cache
 def _channels(format: str) -> int:
     """The number of channels that a texture format has for a shader."""
     if format.startswith(("depth", "stencil")):

@@ -78,6 +78,7 @@ class Blur:
         self.method = METHODS[method](self.device, self._options, output=output)
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._lock = threading.RLock()
+        self._groups = gpu.BindGroups()
         self._images = TexturePool(self.device)
         wanted = self.method.needs | self.method.uses
         self._residency = Residency(self._images, wanted)
@@ -413,10 +414,8 @@ class Blur:
         data["index"] = number % 2**32
         data["origin"], data["display"] = window[:2], window[2:]
         data["max_blur"] = np.inf if self.max_blur is None else self.max_blur
-        frame = self.device.create_buffer_with_data(
-            label="frame", data=data, usage=wgpu.BufferUsage.UNIFORM
-        )
-        return gpu.FrameBindings(size, {"frame": frame, **self._group0}, window)
+        frame = gpu.constant(self.device, "frame", data)
+        return gpu.FrameBindings(size, {"frame": frame, **self._group0}, window, self._groups)
 
 
 def checked(

@@ -72,11 +72,11 @@ class VelocityPass:
             # Row i of a matrix in numpy is column i in WGSL.
             table["prev"] = matrices[:, 0].transpose(0, 2, 1)
             table["next"] = matrices[:, 1].transpose(0, 2, 1)
-        create = self._device.create_buffer_with_data
+        storage = wgpu.BufferUsage.STORAGE
         return (
-            create(label="velocity", data=data, usage=wgpu.BufferUsage.UNIFORM),
-            create(label="reprojections", data=table, usage=wgpu.BufferUsage.STORAGE),
-            create(label="indices", data=indices, usage=wgpu.BufferUsage.STORAGE),
+            gpu.constant(self._device, "velocity", data),
+            gpu.constant(self._device, "reprojections", table, storage),
+            gpu.constant(self._device, "indices", indices, storage),
         )
 
 

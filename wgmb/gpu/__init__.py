@@ -1,5 +1,6 @@
 """The thin layer over wgpu: devices, kernels, textures, timing. It is independent of blur."""
 
+from .bind_groups import BindGroups, constant
 from .device import (
     SOFTWARE,
     adapters,
@@ -16,12 +17,14 @@ from .kernels import FrameBindings, Kernel, kernel
 
 __all__ = [
     "SOFTWARE",
+    "BindGroups",
     "FrameBindings",
     "Kernel",
     "adapters",
     "check_size",
     "choose_adapter",
     "claim",
+    "constant",
     "kernel",
     "open_device",
     "reported",

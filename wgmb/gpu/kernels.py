@@ -10,6 +10,7 @@ import wgpu
 
 from ..errors import ShaderError
 from . import wgsl
+from .bind_groups import BindGroups, forget_constants, made_group
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,7 @@ class FrameBindings:
     size: tuple[int, int]  # width, height [px]
     resources: dict[str, wgpu.GPUBuffer]  # by binding name
     window: tuple[int, int, int, int] = (0, 0, 0, 0)  # x, y in the display window, its size [px]
+    groups: BindGroups | None = None  # where bind groups are kept; None: each is made anew
 
 
 class Kernel:
@@ -41,6 +43,7 @@ class Kernel:
             module = device.create_shader_module(code=source.text, label=source.name)
         except wgpu.GPUError as error:
             raise ShaderError(_located(str(error), source)) from None
+        self._names = {b.name for b in self.bindings.values() if b.group > 0}
         self.groups = range(1 + max((b.group for b in self.bindings.values()), default=-1))
         self.layouts = [
             device.create_bind_group_layout(
@@ -60,6 +63,11 @@ class Kernel:
             )
             for name in source.entry_points()
         }
+        self._labels = {name: f"{source.name}:{name}" for name in self.pipelines}
+        self._places = [
+            {b.name: b.index for b in self.bindings.values() if b.group == group}
+            for group in self.groups
+        ]
 
     def run(
         self,
@@ -74,20 +82,16 @@ class Kernel:
 
         `groups`: the part of a buffer that holds how many workgroups it takes instead.
         """
-        wanted = {name for name, b in self.bindings.items() if b.group > 0}
-        if resources.keys() != wanted:
-            raise ShaderError(f"{self.source.name} binds {sorted(wanted)}, got {sorted(resources)}")
+        if resources.keys() != self._names:
+            wanted, got = sorted(self._names), sorted(resources)
+            raise ShaderError(f"{self.source.name} binds {wanted}, got {got}")
         every = bindings.resources | resources
-        compute = encoder.begin_compute_pass(label=f"{self.source.name}:{entry}")
+        make = made_group if bindings.groups is None else bindings.groups.group
+        compute = encoder.begin_compute_pass(label=self._labels[entry])
         compute.set_pipeline(self.pipelines[entry])
         for group, layout in zip(self.groups, self.layouts, strict=True):
-            entries = [
-                {"binding": b.index, "resource": _resource(every[name])}
-                for name, b in self.bindings.items()
-                if b.group == group
-            ]
-            bound = self.device.create_bind_group(layout=layout, entries=entries)
-            compute.set_bind_group(group, bound)
+            bound = {index: every[name] for name, index in self._places[group].items()}
+            compute.set_bind_group(group, make(self.device, layout, bound))
         if groups:
             compute.dispatch_workgroups_indirect(groups["buffer"], groups["offset"])
         else:
@@ -112,19 +116,14 @@ def kernel(device, file: str, texels: dict[str, str] | None = None, **constants:
 
 
 def forget_kernels() -> None:
-    """Let go of all compiled kernels: their device is lost."""
+    """Let go of all compiled kernels, and of constants: their device is lost."""
     _kernel.cache_clear()
+    forget_constants()
 
 
 def _located(message: str, source: wgsl.WgslSource) -> str:
     """The compiler's message with lines of the joined text turned into file:line."""
     return re.sub(r"wgsl:(\d+):(\d+)", lambda m: f"{source.where(int(m[1]))}:{m[2]}", message)
-
-
-def _resource(resource):
-    if isinstance(resource, wgpu.GPUBuffer):
-        return {"buffer": resource, "offset": 0, "size": resource.size}
-    return resource
 
 
 def _layout_entry(b: wgsl.Binding, source: wgsl.WgslSource) -> dict:

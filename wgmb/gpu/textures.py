@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -55,6 +56,7 @@ class TexturePool:
     def __init__(self, device: wgpu.GPUDevice):
         self.device = device
         self._textures: dict[str, wgpu.GPUTexture] = {}
+        self._views: dict[str, dict[tuple, wgpu.GPUTextureView]] = {}  # by the texture's name
         self._staging: wgpu.GPUBuffer | None = None
 
     def texture(
@@ -71,11 +73,19 @@ class TexturePool:
                 label=name, size=(*size, layers), format=format, usage=usage
             )
             self._textures[name] = kept
+            self._views[name] = {}
         return kept
 
     def view(self, name: str, size: tuple[int, int], format: str) -> wgpu.GPUTextureView:
-        """A view of the texture called `name`."""
-        return self.texture(name, size, format).create_view()
+        """A view of the texture called `name`, the same one for as long as the texture stays."""
+        return self.view_of(self.texture(name, size, format))
+
+    def view_of(self, texture: wgpu.GPUTexture, **options: Any) -> wgpu.GPUTextureView:
+        """A view of a texture of this pool; `options` as for create_view."""
+        views, key = self._views[texture.label], tuple(options.items())
+        if key not in views:
+            views[key] = texture.create_view(**options)
+        return views[key]
 
     def upload(self, name: str, image: np.ndarray, format: str) -> wgpu.GPUTextureView:
         """Put `image` (height, width[, channels]) into the texture called `name`."""
@@ -97,7 +107,7 @@ class TexturePool:
                 (width, len(rows), 1),
             )
             submit(self.device)  # what is written is held in memory until a submit
-        return texture.create_view()
+        return self.view_of(texture)
 
     def download(self, encoder, texture: wgpu.GPUTexture) -> np.ndarray:
         """Submit `encoder` and return `texture` as a new (height, width, channels) array."""

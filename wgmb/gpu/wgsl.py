@@ -54,10 +54,10 @@ class WgslSource:
 
     def constant(self, name: str) -> float | int:
         """Value of `const name: type = value;`."""
-        m = re.search(rf"^const {name}\s*:\s*\w+\s*=\s*([-\d.eExXa-fA-F]+?)u?;", self.text, re.M)
-        if not m:
+        value = _constant(self.text, name)
+        if value is None:
             raise ShaderError(f"no constant {name} in {self.name}")
-        return int(m[1], 0) if re.fullmatch(r"-?(\d+|0[xX].+)", m[1]) else float(m[1])
+        return value
 
     def dtype(self, name: str) -> np.dtype:
         """The numpy dtype with exactly the layout the GPU gives struct `name`."""
@@ -83,6 +83,14 @@ class WgslSource:
             pattern = rf"^(alias {alias} = texture_storage_2d(?:_array)?<)\w+"
             text = re.sub(pattern, rf"\g<1>{texel}", text, flags=re.M)
         return WgslSource(text, self.files)
+
+
+@cache
+def _constant(text: str, name: str) -> float | int | None:
+    m = re.search(rf"^const {name}\s*:\s*\w+\s*=\s*([-\d.eExXa-fA-F]+?)u?;", text, re.M)
+    if not m:
+        return None
+    return int(m[1], 0) if re.fullmatch(r"-?(\d+|0[xX].+)", m[1]) else float(m[1])
 
 
 def texel_aliases(text: str) -> dict[str, str]:

@@ -129,9 +129,7 @@ class Reproject:
                 encoder,
                 entry,
                 inputs.bindings,
-                chunk=self._device.create_buffer_with_data(
-                    label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM
-                ),
+                chunk=gpu.constant(self._device, "chunk", data),
                 color=frame.color,
                 motion=frame.motion,
                 depth=frame.depth,

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
-import wgpu
 
 from .. import gpu
 from ..gpu.textures import ScratchBuffer, TexturePool
@@ -89,9 +88,7 @@ class Tiles:
         count = -(-(left + width) // edge) - first[0], -(-(top + height) // edge) - first[1]
         data = np.zeros((), kernel.source.dtype("Tiles"))
         data["count"], data["first"], data["edge"] = count, first, edge
-        tiles = self._device.create_buffer_with_data(
-            label="tiles", data=data, usage=wgpu.BufferUsage.UNIFORM
-        )
+        tiles = gpu.constant(self._device, "tiles", data)
         velocity_depth = self._images.view("velocity, depth", (width, height), "rgba32float")
         velocity.run(
             encoder,

@@ -20,8 +20,7 @@ def grid_of(size: tuple[int, int]) -> tuple[int, int]:
 
 def uniform(device: wgpu.GPUDevice, name: str, data: np.ndarray) -> wgpu.GPUBuffer:
     """A uniform buffer that holds the struct `data`."""
-    usage = wgpu.BufferUsage.UNIFORM
-    return device.create_buffer_with_data(label=name, data=data, usage=usage)
+    return gpu.constant(device, name, data)
 
 
 class ActiveTiles:

@@ -10,9 +10,9 @@ from ... import gpu
 from ...gpu.textures import ScratchBuffer, TexturePool
 
 
-def layer_view(texture: wgpu.GPUTexture, index: int) -> wgpu.GPUTextureView:
-    """One layer of an array texture, as a texture of its own."""
-    return texture.create_view(dimension="2d", base_array_layer=index, array_layer_count=1)
+def layer_view(images: TexturePool, texture: wgpu.GPUTexture, index: int) -> wgpu.GPUTextureView:
+    """One layer of an array texture of the pool, as a texture of its own."""
+    return images.view_of(texture, dimension="2d", base_array_layer=index, array_layer_count=1)
 
 
 class Layers:
@@ -28,20 +28,20 @@ class Layers:
 
     def front_surface(self, slot: int) -> wgpu.GPUTextureView:
         """The foreground's surfaces of the frame in a slot."""
-        return layer_view(self.textures["surfaces"], 2 * slot)
+        return layer_view(self._images, self.textures["surfaces"], 2 * slot)
 
     def _views(self, slot: int) -> dict[str, wgpu.GPUTextureView]:
         """The layers in a slot, by the names of their bindings."""
 
         def both(texture: wgpu.GPUTexture) -> wgpu.GPUTextureView:
-            return texture.create_view(
-                dimension="2d-array", base_array_layer=2 * slot, array_layer_count=2
+            return self._images.view_of(
+                texture, dimension="2d-array", base_array_layer=2 * slot, array_layer_count=2
             )
 
         return {
             "colors": both(self.textures["layer_colors"]),
             "surfaces": both(self.textures["surfaces"]),
-            "matte": layer_view(self.textures["mattes"], slot),
+            "matte": layer_view(self._images, self.textures["mattes"], slot),
         }
 
     def encode(self, encoder, inputs, worklists: dict[str, dict]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import wgpu
@@ -31,7 +32,8 @@ class Search:
         data = np.zeros((), classify.source.dtype("SourceFrames"))
         data["offsets"][: len(inputs.frames)] = [frame.offset for frame in inputs.frames]
         data["count"] = len(inputs.frames)
-        arrays = {k: t.create_view(dimension="2d-array") for k, t in layers.items()}
+        array = partial(self._images.view_of, dimension="2d-array")
+        arrays = {name: array(texture) for name, texture in layers.items()}
         searched = {
             "sources": uniform(self._device, "sources", data),
             "surfaces": arrays.pop("surfaces"),
@@ -46,7 +48,7 @@ class Search:
         words = self._images.texture(
             "single-layer mask", blocks, "r32uint", -(-inputs.samples // times) + 1
         )
-        mask = words.create_view(dimension="2d-array")
+        mask = array(words)
         classify.run(
             encoder,
             "main",
@@ -125,7 +127,7 @@ class Search:
             inputs.bindings,
             cells,
             color=inputs.frame.color,
-            front_surface=layer_view(surfaces, 0),
+            front_surface=layer_view(self._images, surfaces, 0),
             second_differences=differences,
             worklist=cells,
         )

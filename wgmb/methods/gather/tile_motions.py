@@ -25,7 +25,7 @@ class TileMotions:
         layers = int(wgsl.load("methods/gather/surface.wgsl").constant("CANDIDATE_LAYERS"))
         grid = grid_of(size)
         texture = self._images.texture("tile candidates", grid, "rgba32float", layers * count)
-        return texture.create_view(dimension="2d-array")
+        return self._images.view_of(texture, dimension="2d-array")
 
     def encode(self, encoder, inputs, index: int, front_surface, worklists):
         """Record the candidate motions of every tile in frame `index` of the inputs."""
@@ -37,9 +37,9 @@ class TileMotions:
         grid = grid_of(inputs.bindings.size)
         layers = int(kernel.source.constant("MOTION_LAYERS"))
         motions = self._images.texture("tile motions", grid, "rgba32float", layers)
-        motions = motions.create_view(dimension="2d-array")
+        motions = self._images.view_of(motions, dimension="2d-array")
         no_motions = self._images.texture("no tile motions", (1, 1), "rgba32float")
-        no_motions = no_motions.create_view(dimension="2d-array")
+        no_motions = self._images.view_of(no_motions, dimension="2d-array")
         candidates = self.candidates(inputs.bindings.size, len(inputs.frames))
         side = int(kernel.source.constant("COARSE"))
         coarse = -(-grid[0] // side), -(-grid[1] // side)
