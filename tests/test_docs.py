@@ -60,7 +60,12 @@ def test_python_blocks_run_in_their_order(page, tmp_path, monkeypatch):
 
 def test_the_pages_that_teach_python_have_blocks():
     taught = {name for name in PAGES if re.fullmatch(r"docs/python/[a-z-]+\.md", name)}
-    others = {"README.md", "docs/engineers/embedding.md", "docs/engineers/flow.md"}
+    others = {
+        "README.md",
+        "docs/engineers/pygfx.md",
+        "docs/engineers/embedding.md",
+        "docs/engineers/flow.md",
+    }
     assert taught | others == set(WITH_PYTHON)
 
 

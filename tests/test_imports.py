@@ -63,6 +63,7 @@ HOMES = {
     "glfw": {"viewer"},
     "rendercanvas": {"viewer"},
     "ipywidgets": {"hosts"},
+    "pygfx": {"hosts"},
 }
 FILES = sorted(PACKAGE.rglob("*.py"))
 KERNELS = sorted(SHADERS.rglob("*.wgsl"))

@@ -23,6 +23,7 @@ import wgpu
 
 from wgmb import Blur, Render, Shutter, gpu
 from wgmb.gpu import kernels, wgsl
+from wgmb.gpu.bind_groups import forget_constants
 from wgmb.scene import make
 
 SCENE, TIME, SIZE, RAYS = "crossing", 0.25, (640, 360), 2
@@ -52,6 +53,7 @@ class Recorder:
     @contextmanager
     def listening(self, device: wgpu.GPUDevice) -> Iterator[None]:
         """Notice buffers, views, uploads, cleared buffers and kernels of `device`."""
+        forget_constants()  # so that those that are kept are made, and noticed, again
         usage = wgpu.TextureUsage.TEXTURE_BINDING
         probe = device.create_texture(size=(1, 1, 1), format=OUTPUT, usage=usage)
         with ExitStack() as stack:

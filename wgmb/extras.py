@@ -21,6 +21,7 @@ EXTRAS = {
     "opentimelineio": ("edit", "OpenTimelineIO"),
     "PIL": ("images", "Pillow"),
     "PyOpenColorIO": ("ocio", "OpenColorIO"),
+    "pygfx": ("pygfx", "pygfx"),
     "rendercanvas": ("view", "rendercanvas"),
     "rich": ("cli", "rich"),
     "tifffile": ("images", "tifffile"),

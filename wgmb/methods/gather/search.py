@@ -108,13 +108,14 @@ class Search:
         source = wgsl.load("methods/gather/moving_light.wgsl")
         nodes = np.zeros((), source.dtype("LightNodes"))
         if added is None:
-            layers = self._images.texture("no light", (1, 1), "rgba16float")
+            none = self._images.texture("no light", (1, 1), "rgba16float")
+            layers = self._images.view_of(none, dimension="2d-array")
         else:
-            layers, times = added.layers, added.times
+            layers, times = added.layers.create_view(dimension="2d-array"), added.times
             nodes["first"], nodes["step"], nodes["count"] = times.first, times.step, times.count
         return {
             "light_nodes": uniform(self._device, "light nodes", nodes),
-            "added_light": layers.create_view(dimension="2d-array"),
+            "added_light": layers,
         }
 
     def _differences(self, encoder, inputs, surfaces, cells) -> wgpu.GPUTextureView:
