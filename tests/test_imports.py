@@ -35,7 +35,7 @@ LAYERS = [
     {"outcome"},
     {"job"},
     {"job_file", "video_pictures"},
-    {"video_batch", "hosts"},
+    {"video_batch", "hosts", "perceived_video"},
     {"lab", "viewer"},  # never each other
     {"cli"},  # may start the viewer
     {"__init__", "__main__"},
@@ -45,6 +45,7 @@ GPU = {
     "gpu", "scene", "methods", "velocity", "holdout", "observer", "residency", "pipeline",
     "render", "lab", "viewer", "frame_views", "flow", "planes", "exposer",
     "video_batch", "video_settings", "reel_views", "hosts", "video_pictures",
+    "perceived_video",
 }  # fmt: skip
 HOMES = {
     "wgpu": GPU,

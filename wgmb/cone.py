@@ -66,7 +66,7 @@ class Cone:
         """Return F(x), the share of the response completed `x` seconds after a flash."""
         return np.exp(-np.exp(np.minimum(self.shift - self.rate * np.asarray(x, float), 80)))
 
-    def weights(self, ages: np.ndarray, held: float) -> np.ndarray:
+    def weights(self, ages: np.ndarray, held: np.ndarray | float) -> np.ndarray:
         """Return the weights of images shown for `held` [s], on average `ages` [s] ago."""
         ages = np.asarray(ages, float)
         return self.step_response(ages + held / 2) - self.step_response(ages - held / 2)
@@ -78,6 +78,17 @@ class Cone:
         newest one [s].
         """
         weights = self.weights(after + np.arange(count) / rate, 1 / rate)
+        weights[-1] += 1 - weights.sum()
+        return weights
+
+    def shares_held(self, held: np.ndarray, after: float = 0.0) -> np.ndarray:
+        """Return the weights of images each held for its own time [s], as `shares`.
+
+        `held`: of the newest image first. `after`: time since the middle of the newest one [s].
+        """
+        held = np.asarray(held, float)
+        ages = after + np.cumsum(held) - held[:1] / 2 - held / 2
+        weights = self.weights(ages, held)
         weights[-1] += 1 - weights.sum()
         return weights
 

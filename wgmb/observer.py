@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
@@ -64,7 +65,8 @@ class WeightedSum:
 class Observer:
     """Simulates the perception of successive images, on the GPU.
 
-    `rate`: images per second, each held until the next. The first one counts as shown for ever.
+    `rate`: images per second, each held until the next, unless it is said how long each is held;
+    as many are remembered as count at this rate. The first one counts as shown for ever.
     `device`: your own wgpu device, the name of an adapter, or None for the best one.
     """
 
@@ -80,10 +82,14 @@ class Observer:
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         self._images, self._sum = TexturePool(self.device), WeightedSum(self.device)
         self._size, self._shown = (0, 0), 0
+        self._held_for: deque[float | None] = deque(maxlen=self.held)  # the newest first
         self._lock = threading.RLock()
 
-    def present(self, picture: np.ndarray) -> None:
-        """Show one more: (height, width, 3 or 4), linear light."""
+    def present(self, picture: np.ndarray, held: float | None = None) -> None:
+        """Show one more: (height, width, 3 or 4), linear light; `held` [s], 1 / `rate` if None.
+
+        Of images that are held for different times, each needs its own.
+        """
         if picture.ndim != 3 or picture.shape[2] not in (3, 4):
             raise InputError(f"picture must be (height, width, 3 or 4), got {picture.shape}")
         height, width, channels = picture.shape
@@ -91,15 +97,26 @@ class Observer:
             raise InputError(
                 f"picture is {width} x {height}, earlier ones {self._size[0]} x {self._size[1]}"
             )
+        if held is not None and not 0 < held < float("inf"):
+            raise InputError(f"held must be over 0 seconds, got {held}")
         if channels == 3:
             picture = np.concatenate([picture, np.ones_like(picture[..., :1])], axis=2)
         with self._lock, gpu.reported((width, height)):
             self._size = width, height
             self._images.upload(f"ring {self._shown % self.held}", picture, "rgba16float")
             self._shown += 1
+            self._held_for.appendleft(held)
 
     def perceived(self, after: float = 0.0) -> np.ndarray:
         """(height, width, 4) float32: what is seen `after` [s] the middle of the last picture."""
+        output = self.texture(after)
+        with self._lock, gpu.reported(self._size):
+            return self._images.download(
+                self.device.create_command_encoder(label="perceived"), output
+            )
+
+    def texture(self, after: float = 0.0) -> wgpu.GPUTexture:
+        """The same as a texture, rgba32float, which the next call overwrites."""
         if not self._shown:
             raise InputError("no image has been shown yet")
         with self._lock, gpu.reported(self._size):
@@ -110,5 +127,13 @@ class Observer:
             ]
             output = self._images.texture("output", self._size, "rgba32float")
             encoder = self.device.create_command_encoder(label="perceive")
-            self._sum.encode(encoder, pictures, self.cone.shares(count, self.rate, after), output)
-            return self._images.download(encoder, output)
+            self._sum.encode(encoder, pictures, self._weights(count, after), output)
+            gpu.submit(self.device, encoder)
+            return output
+
+    def _weights(self, count: int, after: float) -> np.ndarray:
+        """The weights of the last images, newest first."""
+        if all(held is None for held in self._held_for):
+            return self.cone.shares(count, self.rate, after)
+        held = [1 / self.rate if held is None else held for held in self._held_for]
+        return self.cone.shares_held(np.array(held[:count]), after)

@@ -167,10 +167,22 @@ class Exposure:
         return self._run.coded(self._reel, self._views, self._cells, coding)
 
 
+class Seen(Protocol):
+    """A picture that is made when it is asked for; an Exposure is one."""
+
+    def light(self) -> wgpu.GPUTexture:
+        """As linear light (rgba32float)."""
+        ...
+
+    def coded(self, coding: Coding) -> CodedPicture:
+        """In the planes of a video."""
+        ...
+
+
 class Sink(Protocol):
     """Where exposures go: `take` on the main thread, then `put` in a thread of its own."""
 
-    def take(self, moment: Moment, exposure: Exposure) -> Any:
+    def take(self, moment: Moment, exposure: Seen) -> Any:
         """What is to be written of a picture."""
         ...
 
@@ -185,7 +197,7 @@ class VideoSink:
     def __init__(self, video: CodedVideo | Segment, coding: Coding):
         self._video, self._coding = video, coding
 
-    def take(self, moment: Moment, exposure: Exposure) -> tuple[CodedPicture, Fraction]:
+    def take(self, moment: Moment, exposure: Seen) -> tuple[CodedPicture, Fraction]:
         """The picture in the video's own planes."""
         return exposure.coded(self._coding), moment.time
 
@@ -201,7 +213,7 @@ class FramesSink:
         self._output, self._device, self._channels, self._first = output, device, channels, first
         self._images = TexturePool(device)
 
-    def take(self, moment: Moment, exposure: Exposure) -> Result:
+    def take(self, moment: Moment, exposure: Seen) -> Result:
         """The picture as an array."""
         encoder = self._device.create_command_encoder(label="frame")
         picture = self._images.download(encoder, exposure.light())[..., : self._channels]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -14,31 +13,24 @@ from typing import Any
 import numpy as np
 
 from .._version import __version__
-from ..coding import Coding
 from ..color import srgb
 from ..errors import InputError
-from ..io import atomic, stills
-from ..io.clock import Clock, tick
-from ..io.coded_video import CodedVideo
+from ..io import stills
+from ..io.clock import Clock
 from ..io.cut_list import CutList
-from ..io.encoders import SUFFIXES, Facts, chosen
 from ..io.footage import Footage
 from ..io.frame_file import size_text
 from ..io.frame_numbers import frame_numbers
-from ..io.other_streams import OtherStreams
-from ..io.output import refuse_inputs
 from ..io.overlay import overlay_of
-from ..io.segments import Segment, Segments, remove_left
 from ..motion_source import MotionSource
 from ..pipeline import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
-from ..video_batch import FootageBlur, FramesSink, Moment, Sink, VideoSink, blur_footage, moments
+from ..video_batch import FootageBlur, Moment, Sink, blur_footage, moments
 from ..video_settings import VideoSettings
 from .exit_codes import DONE, SOME_FAILED
 from .terminal import note, progress
+from .video_output import write
 
-FIRST = 1  # number of the first frame, where they are image files
-_RECORD = "comment", "description", "synopsis"  # texts of a video; the first that is free
 STATIC = "static"  # as a holdout: what never changes while all around it does
 
 
@@ -125,7 +117,7 @@ def make_wish(
     adapter: str | None,
 ) -> Wish:
     """The settings of a run, with what is opened once for all its videos."""
-    _check_fits(given, look)
+    check_fits(given, look)
     method = look.method or ("gather" if video.flow in ("auto", "search") else "tap")
     look = replace(look, method=method).for_pictures()
     blur = look.make(when.make(), adapter)
@@ -144,7 +136,7 @@ def tell_how(wish: Wish, quiet: bool, verbose: bool) -> None:
 def planned(path: str | Path, output: OutputSettings, wish: Wish) -> Plan:
     """Open a video; InputError if it cannot be read or has no pictures in the range."""
     footage = Footage(path, max_mb=wish.given.max_mb)
-    clock = _clock(footage, wish.given, wish.video)
+    clock = clock_of(footage, wish.given, wish.video)
     fps = None if output.fps == "source" else output.rate_or(footage.rate)
     return Plan(footage, output, clock, moments(footage, clock, fps))
 
@@ -167,11 +159,10 @@ def blurred(plan: Plan, wish: Wish, tell: Tell) -> tuple[FootageBlur, list[str]]
     def blur_part(moments: Sequence[Moment], sink: Sink) -> None:
         blur_footage(run, shutter, moments, sink, tell)
 
-    write = _write_video if Path(plan.name).suffix.lower() in SUFFIXES else _write_frames
     return run, write(run, plan.output, video, plan.wanted, wish.settings, blur_part)
 
 
-def _check_fits(given: InputSettings, look: BlurSettings) -> None:
+def check_fits(given: InputSettings, look: BlurSettings) -> None:
     """InputError for options that only rendered frames have."""
     taken = ("frames", "cuts", "max_mb")
     for field in fields(InputSettings):
@@ -182,7 +173,8 @@ def _check_fits(given: InputSettings, look: BlurSettings) -> None:
         raise InputError("--scale is for rendered frames, a video has no layers")
 
 
-def _clock(footage: Footage, given: InputSettings, video: VideoSettings) -> Clock:
+def clock_of(footage: Footage, given: InputSettings, video: VideoSettings) -> Clock:
+    """The clock of the part that is asked for; InputError if there is no such part."""
     start, (first, end) = footage.times[0], video.range
     first, end = (None if t is None else start + t for t in (first, end))
     if given.frames is not None:
@@ -216,102 +208,3 @@ def _holdout(masks: tuple[str, ...], footage: Footage) -> np.ndarray | None:
             raise InputError(f"{mask} must be {expected} like the video, got {size_text(plane)}")
         whole = plane if whole is None else np.maximum(whole, plane)
     return whole
-
-
-BlurPart = Callable[[Sequence[Moment], Sink], None]
-"""Blurs some of the moments into a sink."""
-
-
-def _write_video(
-    run: FootageBlur,
-    output: OutputSettings,
-    video: VideoSettings,
-    wanted: list[Moment],
-    settings: dict[str, Any],
-    blur_part: BlurPart,
-) -> list[str]:
-    """Write a video, with `resume` in segments; returns what it cannot hold, in lines."""
-    path, footage = Path(output.output), run.footage
-    encoding = chosen(path, video.codec, video.quality, video.encoder)
-    coding, lost = encoding.coding(footage.coding)
-    facts = Facts(
-        pixel_aspect=footage.pixel_aspect,
-        mastering=footage.mastering,
-        light_level=footage.light_level,
-    )
-    found = os.stat(footage.path)
-    made_of = settings | {"input": [footage.path.name, found.st_size, found.st_mtime_ns]}
-    texts = _texts(footage, made_of)
-    there = [path] if path.exists() else []
-    refuse_inputs(path.parent, [path.name], there, [footage.path])
-    if there and output.resume and texts.items() <= Footage(path).metadata.items():
-        remove_left(path)
-        return ["is already done"]
-    if there and not output.overwrite:
-        more = " and was made otherwise" if output.resume else ""
-        raise InputError(f"{path} exists{more}; --overwrite replaces it")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    atomic.sweep(path.parent, [path.name])
-    times, rate = [moment.time for moment in wanted], 1 / wanted[0].interval
-    base = tick(*times, wanted[0].interval)
-    shape = encoding, coding, footage.size, rate, base
-    others = None
-    if video.streams == "all":
-        keeps_pitch = video.pitch == "keep"
-        others = OtherStreams(footage.path, footage.index, run.clock, keeps_pitch)
-    if output.resume:
-        segments = Segments(path, *shape, times, made_of, facts)
-        try:
-            for numbers in segments.to_do():
-                part = wanted[numbers.start : numbers.stop]
-                _fill(segments.begin(numbers), run, coding, part, blur_part)
-            return [*lost, *segments.join(texts, others)]
-        finally:
-            segments.release()
-    writer = CodedVideo(path, atomic.temporary_name(path), *shape, facts, texts, others)
-    _fill(writer, run, coding, wanted, blur_part)
-    remove_left(path)
-    return [*lost, *writer.left_out]
-
-
-def _fill(
-    writer: CodedVideo | Segment,
-    run: FootageBlur,
-    coding: Coding,
-    moments: Sequence[Moment],
-    blur_part: BlurPart,
-) -> None:
-    """Write pictures and close the file, or leave nothing of it."""
-    try:
-        blur_part(moments, VideoSink(writer, coding))
-        writer.close()
-    except BaseException:
-        writer.abandon()
-        raise
-
-
-def _texts(footage: Footage, made_of: dict[str, Any]) -> dict[str, str]:
-    """The record of a video, under the first text that its input leaves free."""
-    free = next((name for name in _RECORD if name not in footage.metadata), _RECORD[0])
-    return {free: f"wgmb {json.dumps(made_of, sort_keys=True)}"}
-
-
-def _write_frames(
-    run: FootageBlur,
-    output: OutputSettings,
-    video: VideoSettings,
-    wanted: list[Moment],
-    settings: dict[str, Any],
-    blur_part: BlurPart,
-) -> list[str]:
-    """Write image files."""
-    numbers = [FIRST + moment.number for moment in wanted]
-    files = output.make(settings, numbers, [run.footage.path])
-    channels = 4 if run.footage.coding.alpha else 3
-    try:
-        blur_part(wanted, FramesSink(files, run.device, channels, FIRST))
-        files.close()
-    except BaseException:
-        files.abandon()
-        raise
-    return []

@@ -15,9 +15,10 @@ from .. import charts
 from .._version import __version__
 from ..cone import VIDEOS, Cone
 from ..errors import InputError
+from ..extras import needed_by
 from ..io.atomic import write_file
 from ..io.clip import Clip
-from ..io.frame_file import FrameFile, size_text
+from ..io.frame_file import FrameFile, is_video, size_text
 from ..io.frame_numbers import frame_numbers
 from ..io.output import Result
 from ..io.windows import Placement, laid, union
@@ -69,16 +70,19 @@ def perceive(
 ) -> int:
     """Simulate what a viewer perceives: each frame is held, and earlier ones fade.
 
-    A scene name instead of files simulates continuous time, at --nature images per second.
+    A scene name instead of files simulates continuous time, at --nature images per second. The
+    pictures of a video are held for their own times.
 
     Example: wgmb perceive 'blurred.####.exr' -o 'seen.####.exr' --fps 60
+
+    Example: wgmb perceive clip.mp4 -o seen.mp4
 
     Example: wgmb perceive --report -o report.svg --fps 60 --speed 40
 
     Parameters
     ----------
     pattern
-        Frames: shot.####.exr, shot.%04d.exr, or one file; or a scene of `wgmb render`.
+        Frames: shot.####.exr, shot.%04d.exr, or one file; a video; or a scene of `wgmb render`.
     report
         Plot the difference between perceived videos and perceived nature over speed, per shutter.
     speed
@@ -100,6 +104,10 @@ def perceive(
         raise InputError(
             "--resume is not available for perceive: each frame depends on the previous ones"
         )
+    if pattern not in builtin.SCENES and is_video(pattern):
+        with needed_by(pattern, "video"):
+            from .perceive_video import perceive_video
+        return perceive_video(pattern, output, given, who.cone, plain(who), adapter, quiet)
     if pattern in builtin.SCENES:
         numbers, pictures, rate = _nature(pattern, given, who, float(output.rate), adapter)
         inputs = ()
