@@ -23,6 +23,7 @@ from soaking import (
     damage,
     devices,
     disks,
+    footage,
     hostile,
     memory,
     names,
@@ -34,7 +35,9 @@ from soaking import (
 from soaking.processes import wgmb
 from soaking.table import HEAD, ROWS, Row, run_rows, write_whole
 
-MODULES = (memory, stopping, damage, hostile, resuming, numbers, devices, disks, names, videos)
+MODULES = (
+    memory, stopping, damage, hostile, resuming, numbers, devices, disks, names, videos, footage,
+)  # fmt: skip
 LISTED = [
     row for module in MODULES for row in ROWS.values() if row.run.__module__ == module.__name__
 ]

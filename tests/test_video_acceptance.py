@@ -1,0 +1,226 @@
+"""Videos through the command line as people have them: sound, colours, damage, games."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+from test_other_streams import FLASH, flash_and_click, flashing, packets
+
+import make_clips as clips
+import make_frames as make
+from wgmb.cli import app
+from wgmb.coding import CodedPicture, Coding
+from wgmb.io.clock import tick
+from wgmb.io.coded_video import CodedVideo
+from wgmb.io.encoders import Facts, chosen
+from wgmb.io.footage import Footage
+from wgmb.io.hdr10 import LightLevel, Mastering
+
+P3 = ((0.68, 0.32), (0.265, 0.69), (0.15, 0.06), (0.3127, 0.329))
+PQ = Coding(bits=10, matrix=9, transfer=16, primaries=9)
+HLG = replace(PQ, transfer=18)
+
+
+def blur(capsys, *words, code=0):
+    got = app.main(["blur", *(str(w) for w in words), "--flow", "none"])
+    text = capsys.readouterr().err
+    assert got == code, text
+    return text
+
+
+VARIED = [Fraction(n, 100) for n in np.cumsum([0] + [4, 3, 5, 4, 8, 4, 2, 4, 4] * 4).tolist()]
+
+
+@pytest.mark.parametrize(
+    ("name", "late", "times", "more"),
+    [("a.mp4", 0, None, {}), ("a.mkv", 0.123, None, {}), ("a.mp4", 0, VARIED, {}),
+     ("a.mp4", 0, [Fraction(n - 3, 24) for n in range(36)],
+      {"options": {"bf": "0", "qp": "0"}, "muxing": {"avoid_negative_ts": "disabled"}})],
+    ids=["mp4", "mkv that begins late", "variable rate", "edit list"],
+)  # fmt: skip
+@pytest.mark.parametrize("fps", [24, 60])
+def test_sound_is_the_same_and_at_the_same_time(tmp_path, capsys, name, late, times, more, fps):
+    """The flash within half an output frame of the click, which is not touched."""
+    source, out = flashing(tmp_path / name, times, late, **more), tmp_path / f"b{name[1:]}"
+    times = times or [Fraction(n, 24) for n in range(36)]
+    _, click = flash_and_click(source)
+    blur(capsys, source, "-o", out, "--fps", fps, "--shutter", 360, "-q")
+    assert packets(out)[1] == packets(source)[1]
+    shown, heard = brightest(out), sounded(out)
+    first = float(Footage(source).times[0] - Footage(out).times[0])
+    assert heard == pytest.approx(click - first, abs=0.002)
+    lasts = float(times[FLASH + 1] - times[FLASH])
+    assert abs(shown - heard) <= 0.5 / fps + max(lasts - 1 / fps, 0) + 0.002
+
+
+def brightest(path):
+    """When the brightest picture is shown [s]."""
+    footage = Footage(path)
+    means = [float(picture.planes[0].mean()) for _, picture in footage]
+    return float(footage.times[int(np.argmax(means))])
+
+
+def sounded(path):
+    """When the click sounds [s]."""
+    loud, heard = 0.0, 0.0
+    with av.open(str(path)) as container:
+        for frame in container.decode(audio=0):
+            wave = np.abs(frame.to_ndarray().reshape(-1).astype(np.float64))
+            if wave.max() > loud:
+                loud, heard = wave.max(), frame.time + int(wave.argmax()) / frame.sample_rate
+    return heard
+
+
+def still(path, coding, facts, codec, size=(64, 48)):
+    """A video of one picture, six times."""
+    encoding = chosen(path, codec)
+    stored, _ = encoding.coding(coding)
+    times = [Fraction(n, 48) for n in range(6)]
+    video = CodedVideo(path, path.with_name("part"), encoding, stored, size, Fraction(48),
+                       tick(*times, Fraction(1, 48)), facts)  # fmt: skip
+    planes = clips.planes(2, size, stored.steps, stored.bits)
+    for time in times:
+        video.add(CodedPicture(planes, stored), time)
+    video.close()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("coding", "codec", "allowed"),
+    [(Coding(), "ffv1", 1), (PQ, "ffv1", 2), (HLG, "ffv1", 2),
+     (Coding(matrix=6, transfer=6, primaries=6, full_range=True), "ffv1", 1)],
+    ids=["709", "PQ", "HLG", "601, full range"],
+)  # fmt: skip
+def test_colours_come_back_with_their_tags(tmp_path, capsys, coding, codec, allowed):
+    source, out = still(tmp_path / "a.mkv", coding, Facts(), codec), tmp_path / "b.mkv"
+    blur(capsys, source, "-o", out, "--codec", codec, "--fps", 24, "-q")
+    one, other = Footage(source), Footage(out)
+    assert other.coding == one.coding == coding
+    (_, want), (_, got) = next(iter(one)), next(iter(other))
+    for a, b in zip(want.planes, got.planes, strict=True):
+        assert np.abs(a.astype(int) - b).max() <= allowed
+
+
+def test_untagged_hd_comes_back(tmp_path, capsys):
+    planes = clips.planes(2, (1280, 720))
+    source = clips.write(tmp_path / "a.mkv", [clips.frame(planes, "yuv420p")] * 2, codec="ffv1")
+    assert "does not state" in blur(capsys, source, "-o", tmp_path / "b.mkv", "--codec", "ffv1")
+    _, got = next(iter(Footage(tmp_path / "b.mkv")))
+    for a, b in zip(planes, got.planes, strict=True):
+        assert np.abs(a.astype(int) - b).max() <= 1
+
+
+def test_hdr10_data_are_the_same_after_a_blur(tmp_path, capsys):
+    facts = Facts(mastering=Mastering(P3, (0.0005, 1000.0)), light_level=LightLevel(993, 412))
+    source, out = still(tmp_path / "a.mp4", PQ, facts, "h265"), tmp_path / "b.mp4"
+    blur(capsys, source, "-o", out, "--codec", "h265", "-q")
+    one, other = Footage(source), Footage(out)
+    assert other.coding == one.coding == PQ
+    assert other.light_level == one.light_level and other.mastering == one.mastering
+
+
+def game(path):
+    """A recording at 144 a second: hitches, pictures that repeat, a display that never changes."""
+    width, height = 96, 64
+    rng = np.random.default_rng(3)
+    y, x = np.mgrid[:height, :width].astype("f4")
+    frames, times, at, shown = [], [], Fraction(0), 0
+    for n in range(48):
+        if n % 6 != 5:  # every sixth repeats the one before
+            shown = n
+        tone = make.texture(x + 2.0 * shown, y, 2.0)[..., 1]
+        tone = np.where((x > 40) & (x < 56) & (y < 10), (x + y) % 2, tone)
+        luma = np.clip(16 + 219 * tone, 16, 235).round().astype("u1")
+        frames.append(clips.frame([luma, *[np.full((32, 48), 128, "u1")] * 2], "yuv420p"))
+        times.append(at)
+        at += Fraction(1, 144) * (3 if rng.random() < 0.06 else 1)
+    return clips.write(path, frames, times, tone=0.5)
+
+
+def test_a_recording_of_a_game(tmp_path, capsys):
+    """Its head-up display stays, repeats are left out, what moves is blurred, times are even."""
+    source, out = game(tmp_path / "a.mkv"), tmp_path / "b.mkv"
+    words = ["--fps", 60, "--duplicates", "fill", "--holdout", "static", "--codec", "ffv1"]
+    got = app.main([*map(str, ["blur", source, "-o", out, *words]), "--flow", "dis"])
+    text = capsys.readouterr().err
+    assert got == 0 and "8 repeated pictures left out" in text, text
+    before, after = Footage(source), Footage(out)
+    assert before.is_variable and not after.is_variable and after.rate == 60
+    assert abs(float(after.duration - before.duration)) < 1 / 30
+    lumas = [picture.planes[0].astype(int) for _, picture in before]
+    for _, picture in after:
+        off = np.abs(picture.planes[0].astype(int) - lumas[0])
+        assert off[1:9, 42:55].max() <= 1
+    detail = [np.abs(np.diff(p.astype(float), axis=1))[16:].mean()
+              for p in (lumas[20], [p for _, p in after][8].planes[0])]  # fmt: skip
+    assert detail[1] < 0.9 * detail[0]
+
+
+def damaged(data):
+    middle = len(data) // 2
+    return data[:middle] + np.random.default_rng(1).bytes(300) + data[middle + 300 :]
+
+
+ODD = {
+    "cut off, no index": ("c.mp4", lambda d: d[:-3000], "is cut off: its index"),
+    "no bytes": ("c.mp4", lambda d: b"", "is empty"),
+    "noise": ("c.mp4", lambda d: np.random.default_rng(2).bytes(5000), "is not a video"),
+    "text as video": ("c.mov", lambda d: b"not a video\n" * 50, "is not a video"),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_what_cannot_be_read_is_one_line(tmp_path, capsys, name):
+    file, spoil, said = ODD[name]
+    source = clips.write(tmp_path / "a.mp4", tone=1)
+    data = source.read_bytes()
+    source.unlink()
+    (tmp_path / file).write_bytes(spoil(data))
+    text = blur(capsys, tmp_path / file, "-o", tmp_path / "o.mp4", "-q", code=2)
+    assert said in text and text.count("\n") == 1
+    assert make.names_in(tmp_path) == [file]
+
+
+def test_a_wrong_suffix_does_not_matter(tmp_path, capsys):
+    source = clips.write(tmp_path / "a.mkv").rename(tmp_path / "a.mp4")
+    blur(capsys, source, "-o", tmp_path / "b.mp4", "-q")
+    assert len(Footage(tmp_path / "b.mp4")) == 12
+
+
+def test_sound_without_pictures_is_one_line(tmp_path, capsys):
+    with av.open(str(tmp_path / "a.mp4"), "w") as out:
+        heard = out.add_stream("aac", rate=48000)
+        heard.layout = "mono"
+        for block in clips.samples(0.5):
+            out.mux(heard.encode(block))
+        out.mux(heard.encode(None))
+    text = blur(capsys, tmp_path / "a.mp4", "-o", tmp_path / "b.mp4", "-q", code=2)
+    assert "has no pictures that move" in text and text.count("\n") == 1
+
+
+def test_lost_pictures_are_counted_and_nothing_else_is_lost(tmp_path, capsys):
+    rng = np.random.default_rng(0)
+    frames = []
+    for n in range(48):
+        luma, *chroma = clips.planes(n)
+        noise = luma + rng.integers(0, 30, luma.shape, np.uint8)
+        frames.append(clips.frame([noise, *chroma], "yuv420p"))
+    source = clips.write(tmp_path / "a.mkv", frames, options={"crf": "20", "g": "12"})
+    source.write_bytes(damaged(source.read_bytes()))
+    text = blur(capsys, source, "-o", tmp_path / "b.mkv", "-q", code=1)
+    assert text.count("\n") == 1
+    assert "could not be decoded" in text or "are damaged" in text
+    assert len(Footage(tmp_path / "b.mkv")) > 36
+
+
+def test_an_output_that_cannot_be_written_is_one_line(tmp_path, capsys, monkeypatch):
+    source = clips.write(tmp_path / "a.mp4")
+    (tmp_path / "file").write_bytes(b"mine")
+    text = blur(capsys, source, "-o", tmp_path / "file" / "b.mp4", "-q", code=2)
+    assert text.count("\n") == 1 and (tmp_path / "file").read_bytes() == b"mine"
+    words = ["-o", tmp_path / "b.mp4", "--encoder", "amf", "-q"]
+    text = blur(capsys, source, *words, code=2)
+    assert "encoder" in text and text.count("\n") == 1
+    assert make.names_in(tmp_path) == ["a.mp4", "file"]

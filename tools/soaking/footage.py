@@ -1,0 +1,190 @@
+"""Videos of people: long ones in the same memory, kills and resumes, and sound that stays."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+
+from .processes import WGMB, environment, use, wgmb
+from .table import Line, Tally, Trial, row
+
+_MOST_GROWN = 20.0  # MiB after the first pictures
+_FIRST = 0.25  # of a run, after which memory counts: modules are loaded, encoders have filled
+_PATIENCE = 3600.0
+
+
+def flat(path: Path, count: int, size: tuple[int, int], fps: int = 240, tone: float = 0) -> Path:
+    """A video with one thing that moves, quickly decoded, and perhaps with sound."""
+    width, height = size
+    part = max(2, width // 24)
+    with av.open(str(path), "w") as out:
+        stream = out.add_stream("libx264", rate=fps, options={"preset": "ultrafast"})
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        heard = out.add_stream("aac", rate=48000) if tone else None
+        luma = np.full((height, width), 90, np.uint8)
+        chroma = np.full((height // 2, width // 2), 128, np.uint8)
+        for number in range(count):
+            picture = luma.copy()
+            at = 3 * number % (width - part)
+            picture[height // 3 : height // 3 + part, at : at + part] = 200
+            whole = np.concatenate([p.ravel() for p in (picture, chroma, chroma)])
+            frame = av.VideoFrame.from_ndarray(whole.reshape(-1, width), format="yuv420p")
+            frame.pts, frame.time_base = number, Fraction(1, fps)
+            out.mux(stream.encode(frame))
+        out.mux(stream.encode(None))
+        if heard is not None:
+            wave = np.sin(np.arange(round(48000 * tone)) * 0.05).astype(np.float32)[None]
+            sound = av.AudioFrame.from_ndarray(np.repeat(wave, 2, 0), "fltp", "stereo")
+            sound.sample_rate, sound.pts = 48000, 0
+            out.mux(heard.encode(sound))
+            out.mux(heard.encode(None))
+    return path
+
+
+def _held(arguments: list[str]) -> tuple[list[float], int]:
+    """MiB that a run of `wgmb blur` holds, as time goes by, and its exit code."""
+    quiet = subprocess.DEVNULL
+    process = subprocess.Popen([*WGMB, *arguments], stdout=quiet, stderr=quiet, env=environment())
+    held: list[float] = []
+    while process.poll() is None:
+        try:
+            held.append(use(process.pid).memory / 1024)
+        except OSError:  # it has ended meanwhile
+            break
+        time.sleep(0.25)
+    return held, process.wait()
+
+
+@row(full=3000)
+def video_memory(trial: Trial) -> Iterator[Line]:
+    """A long video is blurred in the memory of a short one: 1080p averaged, 192 x 108 by motion."""
+    for flow, size in (("none", (1920, 1080)), ("dis", (192, 108))):
+        source = flat(trial.folder / f"{flow}.mp4", trial.count, size)
+        out = trial.folder / f"{flow} out.mp4"
+        words = ["blur", str(source), "-o", str(out), "--flow", flow, "--fps", "60", "-q"]
+        held, code = _held(words)
+        steady = held[: len(held) - 4]  # at the end it lets go
+        warm = round(_FIRST * len(steady))
+        grown = max(steady[warm:], default=0.0) - (steady[warm] if warm < len(steady) else 0.0)
+        tally = Tally(f"memory of {trial.count:,} pictures, --flow {flow}", "videos")
+        wrong = f"exit {code}" if code else f"+{grown:.0f} MiB" if grown > _MOST_GROWN else ""
+        tally.note("{} x {}".format(*size), wrong)
+        yield tally.line(f"{grown:+.1f} MiB, at most {max(held, default=0):.0f} MiB")
+
+
+def _times_and_sums(path: Path) -> tuple[list[float], list[int]]:
+    """When the pictures of a video are shown, and the sum of the luma of each."""
+    with av.open(str(path)) as container:
+        found = [
+            (frame.time or 0.0, int(frame.to_ndarray(format="gray").sum(dtype=np.int64)))
+            for frame in container.decode(video=0)
+        ]
+    return [time for time, _ in found], [total for _, total in found]
+
+
+def _sound(path: Path) -> list[bytes]:
+    with av.open(str(path)) as container:
+        return [bytes(p) for p in container.demux(audio=0) if p.size]
+
+
+@row(quick=2, full=20)
+def resumed_videos(trial: Trial) -> Iterator[Line]:
+    """`kill -9` at a random moment, then --resume: the times and pictures of one run."""
+    source = flat(trial.folder / "in.mp4", 240, (96, 64), fps=4, tone=60)
+    whole = trial.folder / "whole.mp4"
+    words = ["--flow", "none", "-q"]
+    ended = wgmb("blur", source, "-o", whole, *words)
+    if ended.code:
+        raise RuntimeError(ended.wrong(0))
+    want, tally = _times_and_sums(whole), Tally("video, `kill -9`, then --resume", "runs")
+    rng, lasts = np.random.default_rng(trial.seed), ended.seconds
+    for number in range(trial.count):
+        out = trial.folder / f"out {number}.mp4"
+        line = [*WGMB, "blur", str(source), "-o", str(out), *words, "--resume"]
+        quiet = subprocess.DEVNULL
+        process = subprocess.Popen(line, stdout=quiet, stderr=quiet, env=environment())
+        time.sleep(rng.uniform(0.2, 1.1) * lasts)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        again = wgmb(*line[len(WGMB) :], seconds=_PATIENCE)
+        wrong = again.wrong(0)
+        if not wrong:
+            times, sums = _times_and_sums(out)
+            far = max((abs(a - b) for a, b in zip(times, want[0], strict=False)), default=0.0)
+            off = max((abs(a - b) for a, b in zip(sums, want[1], strict=False)), default=0)
+            if len(times) != len(want[0]) or far > 1e-6:
+                wrong = f"{len(times)} of {len(want[0])} pictures, {far:.4f} s off"
+            elif off > 2 * 96 * 64:  # encoders round otherwise at the beginning of a segment
+                wrong = f"a picture is {off / (96 * 64):.1f} levels off"
+            elif _sound(out) != _sound(source):
+                wrong = "its sound is another"
+            begins = (".", f"{out.name}.")
+            left = [p.name for p in trial.folder.iterdir() if p.name.startswith(begins)]
+            wrong = wrong or (f"left over: {left[0]}" if left else "")
+        tally.note(f"run {number}", wrong)
+    yield tally.line()
+
+
+def _flash_and_click(path: Path) -> tuple[float, float]:
+    """When the brightest picture is shown, and the loudest sound is heard [s]."""
+    with av.open(str(path)) as container:
+        shown = max(
+            (int(f.to_ndarray(format="gray").sum(dtype=np.int64)), -(f.time or 0.0))
+            for f in container.decode(video=0)
+        )
+    loud, heard = 0.0, 0.0
+    with av.open(str(path)) as container:
+        for frame in container.decode(audio=0):
+            wave = np.abs(frame.to_ndarray()[0].astype(np.float64))
+            if wave.max() > loud:
+                loud = float(wave.max())
+                heard = (frame.time or 0.0) + int(wave.argmax()) / frame.sample_rate
+    return -shown[1], heard
+
+
+@row(full=600)
+def slow_sound(trial: Trial) -> Iterator[Line]:
+    """Ten minutes at --speed 0.4: a flash near the end within half an output frame of its click."""
+    seconds, fps = trial.count, 24
+    source, out = trial.folder / "long.mkv", trial.folder / "slow.mkv"
+    flash = round((seconds - 5) * fps)
+    with av.open(str(source), "w") as file:
+        stream = file.add_stream("libx264", rate=fps, options={"preset": "ultrafast"})
+        stream.width, stream.height, stream.pix_fmt = 32, 32, "yuv420p"
+        heard = file.add_stream("flac", rate=48000)
+        heard.layout = "mono"
+        for number in range(seconds * fps):
+            data = np.full((48, 32), 128, np.uint8)
+            data[:32] = 220 if number == flash else 20
+            frame = av.VideoFrame.from_ndarray(data, format="yuv420p")
+            frame.pts, frame.time_base = number, Fraction(1, fps)
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+        click = round(48000 * (flash / fps + 0.001))
+        for second in range(seconds):
+            wave = np.zeros((1, 48000), np.int16)
+            if second == click // 48000:
+                wave[0, click % 48000 : click % 48000 + 48] = 30_000
+            sound = av.AudioFrame.from_ndarray(wave, "s16", "mono")
+            sound.sample_rate, sound.pts = 48000, 48000 * second
+            sound.time_base = Fraction(1, 48000)
+            file.mux(heard.encode(sound))
+        file.mux(heard.encode(None))
+    words = ["--flow", "none", "--speed", "0.4", "--fps", fps, "-q"]
+    ended = wgmb("blur", source, "-o", out, *words, seconds=_PATIENCE)
+    wrong, told = ended.wrong(0), ""
+    if not wrong:
+        shown, heard = _flash_and_click(out)
+        apart = heard - shown - 0.001 / 0.4
+        told = f"{1000 * apart:+.1f} ms apart"
+        wrong = told if abs(apart) > 0.5 / fps else ""
+    tally = Tally(f"{seconds} s at --speed 0.4, flash and click", "videos")
+    tally.note("long.mkv", wrong)
+    yield tally.line(told)
