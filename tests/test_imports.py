@@ -35,6 +35,8 @@ LAYERS = [
     {"outcome"},
     {"job"},
     {"job_file", "video_pictures"},
+    {"farm_worker"},
+    {"farm"},
     {"video_batch", "hosts", "perceived_video"},
     {"lab", "viewer"},  # never each other
     {"cli"},  # may start the viewer
@@ -58,6 +60,8 @@ HOMES = {
     "cv2": {"flow"},
     "PyOpenColorIO": {"ocio"},
     "opentimelineio": {"io"},
+    "distributed": {"farm", "farm_worker"},
+    "dask": {"farm"},
     "cyclopts": {"cli"},
     "rich": {"cli"},
     "imgui_bundle": {"viewer"},

@@ -288,7 +288,7 @@ def test_words_that_do_not_go_with_a_job_are_one_line(own, capsys, words, says):
     [
         ("-o o.mp4 -j a.json", "a video is written by one process; write frames"),
         ("-o o.####.exr -j a.txt", "must end in .json"),
-        ("-o o.####.exr -j other.json", "other.json exists and is no job of wgmb"),
+        ("-o o.####.exr -j other.json", "other.json exists and was not written by wgmb job"),
         ("-o o.####.exr -j a.json --chunk 0", "--chunk must be 1 frame or more"),
         ("-o o.####.exr -j a.json --method gahter", "did you mean 'gather'"),
         ("-o o.####.exr -j a.json --method tap --weights published", "method 'tap' has no option"),

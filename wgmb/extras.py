@@ -13,6 +13,8 @@ EXTRAS = {
     "av": ("video", "PyAV"),
     "cv2": ("flow", "OpenCV"),
     "cyclopts": ("cli", "cyclopts"),
+    "dask": ("cluster", "dask"),
+    "distributed": ("cluster", "dask.distributed"),
     "flip_evaluator": ("compare", "flip-evaluator"),
     "glfw": ("view", "glfw"),
     "imageio": ("images", "imageio"),

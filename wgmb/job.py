@@ -18,9 +18,10 @@ from .batch import Progress, blur_sequence
 from .color_settings import ColorSettings, color_record
 from .display import ColorSpace, Display
 from .errors import InputError
+from .io import atomic
 from .io.clip import Clip
 from .io.frame_file import about
-from .io.frame_numbers import frame_list
+from .io.frame_numbers import frame_list, frame_path, has_view, in_view
 from .io.input_space import space_of
 from .io.masks import is_file, with_amount
 from .io.output import Output
@@ -155,6 +156,15 @@ class Job:
         if part is not None:  # those of the others were looked at when the job was made
             inputs, numbers = (p for n in part.numbers for p in part.files(n)), part.numbers
         return output.make(self.settings, numbers, inputs, clip.chosen, shown, self.since)
+
+    def sweep(self) -> None:
+        """Remove what dead processes of this host left of the job's own files; see atomic.sweep."""
+        pattern = self.asked.output.output
+        for view in self.clip.chosen if has_view(pattern) else (None,):
+            of_view = in_view(pattern, view)
+            names = [frame_path(of_view, n).name for n in self.numbers]
+            if of_view.parent.is_dir():
+                atomic.sweep(of_view.parent, names)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -30,7 +30,7 @@ from .options import (
     When,
 )
 from .spelling import as_options
-from .terminal import note, progress
+from .terminal import muted, note, progress
 from .video_names import is_batch
 
 
@@ -44,6 +44,8 @@ def blur(
     video: Videos = VideoSettings(),
     *,
     job: Path | None = None,
+    workers: int | Literal["auto"] | None = None,
+    cluster: str | None = None,
     confidence: bool = False,
     config: Path | None = None,
     adapter: str | None = None,
@@ -60,6 +62,8 @@ def blur(
 
     Example: wgmb blur --job shot.json --frames 17-32
 
+    Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --cluster tcp://farm:8786
+
     Parameters
     ----------
     patterns
@@ -67,6 +71,10 @@ def blur(
         patterns such as 'clips/*.mp4'; for several, the output is a folder, or a name with {name}.
     job
         Job file of `wgmb job`, which has all settings; --frames takes a part of it.
+    workers
+        Processes that share the frames on this machine; auto: one for each GPU.
+    cluster
+        Scheduler of dask.distributed whose workers share the frames, such as tcp://farm:8786.
     confidence
         Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config
@@ -78,14 +86,16 @@ def blur(
     quiet
         Print errors only.
     """
+    crew = _crew(workers, cluster)
     if job is not None:
         rest = replace(given, frames=None), look, when, color, video, output
         plain = InputOptions(), BlurOptions(), ShutterOptions(), ColorSettings(), VideoSettings()
         if patterns or confidence or config or rest != (*plain, None):
             raise InputError(
-                "--job has all settings; only --frames, --adapter, --verbose and --quiet go with it"
+                "--job has all settings; only --frames, --workers, --cluster, --adapter, --verbose "
+                "and --quiet go with it"
             )
-        return blur_job(job, given.frames, adapter, verbose, quiet)
+        return blur_job(job, given.frames, crew, adapter, verbose, quiet)
     if not patterns:
         raise InputError("what is to be blurred? name frames such as 'shot.####.exr', or a video")
     if output is None:
@@ -95,8 +105,9 @@ def blur(
         with needed_by(pattern, "video"):
             from .blur_video import blur_video
             from .blur_videos import blur_videos
-        if confidence:
-            raise InputError("--confidence is for rendered frames")
+        if confidence or crew:
+            option = "--confidence" if confidence else "--workers" if workers else "--cluster"
+            raise InputError(f"{option} is for rendered frames")
         settings = look, when, given, video, adapter, quiet, verbose
         if is_batch(patterns, output.output):
             return blur_videos(patterns, output, *settings)
@@ -111,17 +122,64 @@ def blur(
         video=video,
         confidence=confidence,
     )
-    return blur_frames(settle(asked, adapter), adapter, verbose, quiet)
+    made = settle(asked, adapter)
+    if crew:
+        return blur_on_farm(made, *crew, adapter, verbose, quiet)
+    return blur_frames(made, adapter, verbose, quiet)
+
+
+Crew = tuple[int | None, str | None]
+"""How many workers are started here, None for as many as suit; or the scheduler of others."""
+
+
+def _crew(workers: int | Literal["auto"] | None, cluster: str | None) -> Crew | None:
+    if workers is None and cluster is None:
+        return None
+    if workers is not None and cluster is not None:
+        raise InputError("choose either --workers, on this machine, or --cluster")
+    count = None if workers == "auto" else workers
+    if count is not None and not 1 <= count <= 256:
+        raise InputError(f"--workers must be 1 to 256 or auto, got {count}")
+    return count, cluster
 
 
 def blur_job(
-    path: Path, frames: str | None, adapter: str | None, verbose: bool, quiet: bool
+    path: Path,
+    frames: str | None,
+    crew: Crew | None,
+    adapter: str | None,
+    verbose: bool,
+    quiet: bool,
 ) -> int:
     """Blur some frames of a job file, or all; returns the exit code."""
     kept = read_job(path)
     numbers = kept.job.chosen(frame_numbers(frames) if frames else kept.job.numbers)
     kept.check(numbers, str(path))
+    if crew:
+        return blur_on_farm(replace(kept.job, numbers=numbers), *crew, adapter, verbose, quiet)
     return blur_frames(kept.job, adapter, verbose, quiet, numbers)
+
+
+def blur_on_farm(
+    job: Job,
+    workers: int | None,
+    cluster: str | None,
+    adapter: str | None,
+    verbose: bool,
+    quiet: bool,
+) -> int:
+    """Blur frames of a job in several processes; returns the exit code."""
+    from ..farm import Farm, as_farm_job
+
+    for text in () if quiet else job.remarks:
+        note(as_options(text))
+    job = as_farm_job(job)
+    farm = Farm(cluster, workers, adapter, note, note if verbose else lambda text: None)
+    started = time.perf_counter()
+    with progress(len(job.numbers), quiet) as tick, muted():
+        outcome = farm.blur(job, tick)
+    took = f"{time.perf_counter() - started:.1f} s with {job.asked.look.method}"
+    return conclude(outcome, Path(job.asked.output.output), took, quiet, verbose)
 
 
 def blur_frames(

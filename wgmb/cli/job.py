@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -16,6 +17,7 @@ from ..io.frame_numbers import frame_list
 from ..job import Asked, settle
 from ..job_file import is_job, stored, time_there
 from ..video_settings import VideoSettings
+from . import submit
 from .exit_codes import DONE
 from .options import (
     BlurOptions,
@@ -29,6 +31,7 @@ from .options import (
     When,
 )
 from .spelling import as_options
+from .submit import is_ours
 from .terminal import note
 
 
@@ -43,6 +46,8 @@ def job(
     *,
     file: Annotated[Path, Parameter(name="--job", alias="-j")],
     chunk: int = 16,
+    openjd: Path | None = None,
+    slurm: Path | None = None,
     confidence: bool = False,
     config: Path | None = None,
     adapter: str | None = None,
@@ -51,6 +56,8 @@ def job(
     """Write a job file, from which any machine can blur any part of a sequence.
 
     Example: wgmb job 'shot.####.exr' -o 'blurred.####.exr' --method gather -j shot.json
+
+    Example: wgmb job 'shot.####.exr' -o 'blurred.####.exr' -j shot.json --openjd shot.yaml
 
     The machines then run: wgmb blur --job shot.json --frames 17-32
 
@@ -62,6 +69,10 @@ def job(
         The job file to write, .json; another job is replaced.
     chunk
         Frames that one machine does at a time.
+    openjd
+        Also write an OpenJD template, .yaml, in the folder of the job file.
+    slurm
+        Also write a script for sbatch, .sh.
     confidence
         Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config
@@ -75,7 +86,9 @@ def job(
         raise InputError(f"{pattern}: a video is read by one process; `wgmb blur` blurs it")
     if chunk < 1:
         raise InputError(f"--chunk must be 1 frame or more, got {chunk}")
-    _check_target(file, ".json")
+    _check_target("--job", file, (".json",), is_job)
+    _check_target("--openjd", openjd, (".yaml", ".yml"), is_ours)
+    _check_target("--slurm", slurm, (".sh",), is_ours)
     asked = Asked(
         pattern=pattern,
         output=output,
@@ -88,11 +101,18 @@ def job(
     )
     made = settle(asked, adapter)
     kept = stored(made, chunk)
+    texts = {file: ""}
+    if openjd is not None:
+        texts[openjd] = submit.openjd(openjd, file, made.numbers, chunk)
+    if slurm is not None:
+        texts[slurm] = submit.slurm(slurm, file, made.numbers, chunk)
     made.make_output()
     if output.overwrite and not output.resume:
         since = time_there(Path(output.output).parent)
         kept = replace(kept, job=replace(kept.job, since=since))
-    write_file(file, kept.text().encode())
+    texts[file] = kept.text()
+    for path, text in texts.items():
+        write_file(path, text.encode())
     for text in () if quiet else made.remarks:
         note(as_options(text))
     if not quiet:
@@ -103,9 +123,13 @@ def job(
     return DONE
 
 
-def _check_target(path: Path, suffix: str) -> None:
-    """InputError unless a job may be written here."""
-    if path.suffix.lower() != suffix:
-        raise InputError(f"--job {path}: the name must end in {suffix}")
-    if path.exists() and not (path.is_file() and is_job(path)):
-        raise InputError(f"{path} exists and is no job of wgmb; choose another name")
+def _check_target(
+    option: str, path: Path | None, suffixes: tuple[str, ...], is_own: Callable[[Path], bool]
+) -> None:
+    """InputError unless a file that is written beside the frames may be written here."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{option} {path}: the name must end in {suffixes[0]}")
+    if path.exists() and not (path.is_file() and is_own(path)):
+        raise InputError(f"{path} exists and was not written by wgmb job; choose another name")

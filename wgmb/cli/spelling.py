@@ -9,14 +9,16 @@ from functools import cache
 
 _ARGUMENT = re.compile(r"(?<![^\s(])`([a-z_]+)(?:=([^`]*))?`(?=[\s,;:.)]|$)")
 _OTHERWISE = {
+    "cluster": "--cluster",
     "color": "--layer",
     "confidence": "--confidence",
     "convention": "--vectors",
     "device": "--adapter",
     "number": "--frame",
     "program": "--as",
-    "space": "--from",
     "max_displace": "--max-displace",
+    "space": "--from",
+    "workers": "--workers",
 }
 """Arguments whose options have other names, or are those of one command."""
 

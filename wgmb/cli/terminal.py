@@ -101,6 +101,35 @@ def own_streams() -> None:
         setattr(sys, name, os.fdopen(own, "w", buffering=1, encoding=encoding, errors="replace"))
 
 
+@contextlib.contextmanager
+def muted():
+    """Keep other processes, which are started meanwhile, from writing between our lines.
+
+    Our own streams are elsewhere; see `own_streams`.
+    """
+    if any(_number(stream) in (1, 2) for stream in (sys.stdout, sys.stderr)):
+        yield
+        return
+    kept = [os.dup(number) for number in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for number in (1, 2):
+            os.dup2(nowhere, number)
+        yield
+    finally:
+        for number, was in zip((1, 2), kept, strict=True):
+            os.dup2(was, number)
+            os.close(was)
+        os.close(nowhere)
+
+
+def _number(stream) -> int | None:
+    try:
+        return stream.fileno()
+    except (OSError, ValueError, AttributeError):
+        return None
+
+
 def drop_streams() -> None:
     """Before the process ends: what cannot be handed over must not change its exit code."""
     for name in ("stdout", "stderr"):
