@@ -1,0 +1,202 @@
+"""Figures of farms: what sharing a shot costs, what a killed worker loses, and 64 workers at once.
+
+    python tools/farm_figures.py               all of them; takes minutes
+    python tools/farm_figures.py share kill    some: share, work, kill, farm
+    python tools/farm_figures.py farm --frames 5000 --workers 16
+
+share: 1,000 frames of 64 x 48 on two workers, CPU over that of one process (wanted: at most 1.2).
+work: CPU of one process over that of two workers, from about 20 s of work a worker on (0.9).
+kill: kill -9 of a worker at a random moment, 20 times: complete, the same bytes, nothing left over.
+farm: a simulated farm whose workers wait as for a GPU: the scheduler's share, the driver's memory.
+
+CPU is user and system time of all processes. Wall times depend on what else the machine does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tools")]
+
+import farm_stub  # noqa: E402
+
+import make_frames as make  # noqa: E402
+
+
+def shot(folder: Path, count: int, scale: int = 1) -> str:
+    """Frames of 64 x 48 pixels, or `scale` times as wide and high, that are three pictures."""
+    folder.mkdir(parents=True)
+    for n in range(1, 4):
+        channels = {k: v.repeat(scale, 0).repeat(scale, 1) for k, v in make.frame(n).items()}
+        make.write_exr(folder / f"of.{n}.exr", channels)
+    for n in range(1, count + 1):
+        (folder / f"s.{n:04d}.exr").hardlink_to(folder / f"of.{(n - 1) % 3 + 1}.exr")
+    return str(folder / "s.####.exr")
+
+
+def blurred(pattern: str, out: Path, *more: object) -> float:
+    """Run `wgmb blur`; returns the CPU seconds of its processes."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    line = [sys.executable, "-m", "wgmb", "blur", pattern, "-o", out / "o.####.exr", "-q"]
+    line += ["--vectors", "blender", *more]
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    subprocess.run(list(map(str, line)), check=True, env=env)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def digest(folder: Path) -> str:
+    """Of all files in a folder, with their names."""
+    found = hashlib.sha256()
+    for path in sorted(folder.iterdir()):
+        found.update(path.name.encode() + b"\0" + path.read_bytes())
+    return found.hexdigest()[:12]
+
+
+def share(folder: Path) -> None:
+    """1,000 small frames on two workers."""
+    pattern = shot(folder / "in", 1000)
+    one = blurred(pattern, folder / "one", "--method", "tap")
+    two = blurred(pattern, folder / "two", "--method", "tap", "--workers", 2)
+    same = digest(folder / "one") == digest(folder / "two")
+    told = f"one process {one:.1f} s CPU, two workers {two:.1f} s: {two / one:.2f} times"
+    bytes_ = "same bytes" if same else "OTHER BYTES"
+    print(f"share  1,000 frames 64 x 48, tap: {told}; {bytes_}", flush=True)
+
+
+def work(folder: Path) -> None:
+    """More work a worker."""
+    for count in (60, 180):
+        base = folder / str(count)
+        pattern = shot(base / "in", count, scale=6)
+        one = blurred(pattern, base / "one", "--method", "gather")
+        two = blurred(pattern, base / "two", "--method", "gather", "--workers", 2)
+        same = digest(base / "one") == digest(base / "two")
+        print(f"work   {count} frames 384 x 288, gather: one process {one:.1f} s CPU, two workers "
+              f"{two:.1f} s ({two / 2:.0f} s each): {one / two:.2f}; "
+              f"{'same bytes' if same else 'OTHER BYTES'}", flush=True)  # fmt: skip
+
+
+def children(process: int) -> list[int]:
+    """The processes that descend from one."""
+    found = []
+    for task in Path(f"/proc/{process}/task").iterdir():
+        for child in map(int, (task / "children").read_text().split()):
+            found += [child, *children(child)]
+    return found
+
+
+def kill(folder: Path, times: int = 20) -> None:
+    """Workers killed at random."""
+    from wgmb.farm import Farm, as_farm_job
+
+    pattern = shot(folder / "in", 96)
+    blurred(pattern, folder / "whole", "--method", "tap")
+    whole = digest(folder / "whole")
+    tally = {"complete": 0, "same bytes": 0, "nothing left over": 0, "killed": 0}
+    luck = random.Random(1)
+    for i in range(times):
+        out = folder / f"out{i}"
+        job = as_farm_job(farm_stub.job_of(pattern, out))
+        died, begun, over = [], threading.Event(), threading.Event()
+
+        def shoot(wait: float, begun=begun, over=over, died=died) -> None:
+            begun.wait()
+            if over.wait(wait):
+                return
+            workers = [p for p in children(os.getpid()) if farm_stub.is_worker(p)]
+            if workers:
+                os.kill(luck.choice(workers), signal.SIGKILL)
+                died.append(1)
+
+        thread = threading.Thread(target=shoot, args=(luck.uniform(0.0, 2.0),))
+        thread.start()
+        outcome = Farm(workers=2).blur(job, lambda n, state, begun=begun: begun.set())
+        over.set()
+        begun.set()
+        thread.join()
+        report = outcome.report
+        tally["killed"] += len(died)
+        tally["complete"] += not report.failed and not report.stopped
+        names = {p.name for p in out.iterdir()}
+        tally["nothing left over"] += not [n for n in names if not n.startswith("o.")]
+        tally["same bytes"] += digest(out) == whole
+        shutil.rmtree(out)
+    told = ", ".join(f"{what} {count}" for what, count in tally.items())
+    print(f"kill   of {times} runs of 96 frames on two workers: {told}", flush=True)
+
+
+def farm(folder: Path, frames: int, workers: int, seconds: float) -> None:
+    """Workers that wait."""
+    from wgmb.farm import Farm
+
+    job = farm_stub.long_job(folder, frames)
+    memory: list[tuple[int, float]] = []
+    done = [0]
+
+    def tick(number: int, state: str) -> None:
+        done[0] += 1
+        if done[0] % max(frames // 10, 1) == 0:
+            memory.append((done[0], farm_stub.memory_of(os.getpid())))
+
+    place = Farm(workers=workers, plugin=farm_stub.Waiting, patience=600)
+    os.environ["WGMB_STUB_SECONDS"] = str(seconds)
+    started, cpu = time.monotonic(), 0.0
+
+    def first(number: int, state: str) -> None:
+        nonlocal started, cpu
+        if not done[0]:
+            started, cpu = time.monotonic(), time.process_time()
+        tick(number, state)
+
+    outcome = place.blur(job, first)
+    took, used = time.monotonic() - started, time.process_time() - cpu
+    assert len(outcome.report.done) == frames, outcome.report
+    waited = frames * seconds
+    at = ", ".join(f"{count}: {mib:.0f}" for count, mib in memory)
+    print(f"farm   {frames} frames of {seconds:g} s on {workers} simulated workers: {took:.0f} s, "
+          f"{waited / workers / took:.0%} of it in the workers' waiting; driver and scheduler used "
+          f"{used:.1f} s CPU, {used / waited:.2%} of the workers' time, "
+          f"{1000 * used / frames:.2f} ms a frame", flush=True)  # fmt: skip
+    print(f"farm   memory of driver and scheduler [MiB] after so many frames: {at}", flush=True)
+
+
+def main() -> None:
+    """Print the figures that are asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("what", nargs="*", default=["share", "work", "kill", "farm"])
+    parser.add_argument("--frames", type=int, default=100_000, help="of farm")
+    parser.add_argument("--workers", type=int, default=64, help="of farm")
+    parser.add_argument("--seconds", type=float, default=0.1, help="of farm, a frame")
+    parser.add_argument("--times", type=int, default=20, help="of kill")
+    asked = parser.parse_args()
+    for what in asked.what:
+        with tempfile.TemporaryDirectory(prefix="wgmb-farm-") as name:
+            folder = Path(name)
+            if what == "share":
+                share(folder)
+            elif what == "work":
+                work(folder)
+            elif what == "kill":
+                kill(folder, asked.times)
+            elif what == "farm":
+                farm(folder, asked.frames, asked.workers, asked.seconds)
+            else:
+                parser.error(f"{what}: choose share, work, kill, farm")
+
+
+if __name__ == "__main__":
+    main()

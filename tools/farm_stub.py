@@ -1,0 +1,73 @@
+"""Workers and jobs for farm_figures.py; workers import this module."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import make_frames as make
+from wgmb.batch import BatchReport
+from wgmb.color_settings import ColorSettings
+from wgmb.farm_worker import Blurring
+from wgmb.io.settled import Settled
+from wgmb.job import Asked, Job, settle
+from wgmb.outcome import Outcome
+from wgmb.settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings
+from wgmb.video_settings import VideoSettings
+
+
+def job_of(pattern: str, out: Path) -> Job:
+    """The job of `wgmb blur` with tap."""
+    asked = Asked(
+        pattern=pattern,
+        output=OutputSettings(output=str(out / "o.####.exr")),
+        look=BlurSettings(method="tap"),
+        when=ShutterSettings(),
+        given=InputSettings(vectors="blender"),
+        color=ColorSettings(),
+        video=VideoSettings(),
+    )
+    return settle(asked)
+
+
+def long_job(folder: Path, count: int) -> Job:
+    """A job of very many frames, of which only three are there."""
+    pattern = make.write_sequence(folder, (1, 2, 3))
+    short = job_of(pattern, folder / "out")
+    every = list(range(1, count + 1))
+    found: Settled = replace(short.settled, on_disk=tuple(every))
+    return replace(short, numbers=every, findings=found, clip_opened=None)
+
+
+class Waiting(Blurring):
+    """A worker that waits for every frame as for a GPU."""
+
+    def prepare(self, adapter: str | None) -> None:
+        """There is nothing to be opened."""
+        self._seconds = float(os.environ.get("WGMB_STUB_SECONDS", "0.1"))
+
+    def blur(self, chosen, tell, stop) -> Outcome:
+        """Wait."""
+        made = Outcome(len(chosen), (chosen[0], chosen[-1]), "", False, [])
+        for number in chosen:
+            time.sleep(self._seconds)
+            tell(number, "done")
+        made.report = BatchReport(done=list(chosen))
+        made.sizes = {(1920, 1080): list(chosen)}
+        return made
+
+
+def memory_of(process: int) -> float:
+    """MiB of a process in RAM."""
+    pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
+def is_worker(process: int) -> bool:
+    """Return True for a process that dask's nanny started."""
+    try:
+        return b"spawn_main" in Path(f"/proc/{process}/cmdline").read_bytes()
+    except OSError:
+        return False
