@@ -18,12 +18,12 @@ from wgmb.settings import BlurSettings, InputSettings, OutputSettings, ShutterSe
 from wgmb.video_settings import VideoSettings
 
 
-def job_of(pattern: str, out: Path) -> Job:
-    """The job of `wgmb blur` with tap."""
+def job_of(pattern: str, out: Path, method: str = "tap") -> Job:
+    """The job of `wgmb blur`."""
     asked = Asked(
         pattern=pattern,
         output=OutputSettings(output=str(out / "o.####.exr")),
-        look=BlurSettings(method="tap"),
+        look=BlurSettings(method=method),
         when=ShutterSettings(),
         given=InputSettings(vectors="blender"),
         color=ColorSettings(),
@@ -39,6 +39,26 @@ def long_job(folder: Path, count: int) -> Job:
     every = list(range(1, count + 1))
     found: Settled = replace(short.settled, on_disk=tuple(every))
     return replace(short, numbers=every, findings=found, clip_opened=None)
+
+
+class Timed(Blurring):
+    """A worker that writes down its CPU seconds after every part."""
+
+    def prepare(self, adapter: str | None) -> None:
+        """Begin to count."""
+        self._cpu = time.process_time()
+        super().prepare(adapter)
+        self._log()
+
+    def blur(self, chosen, tell, stop) -> Outcome:
+        """Blur, and count."""
+        made = super().blur(chosen, tell, stop)
+        self._log()
+        return made
+
+    def _log(self) -> None:
+        with open(os.environ["WGMB_STUB_LOG"], "a") as file:
+            file.write(f"{os.getpid()} {time.process_time() - self._cpu}\n")
 
 
 class Waiting(Blurring):
