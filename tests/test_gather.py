@@ -173,3 +173,37 @@ def test_a_software_adapter_takes_no_more_samples_than_its_loops_have_turns(sour
     if gpu.open_device().adapter_info["adapter_type"] == gpu.SOFTWARE:
         with pytest.raises(wgmb.InputError, match="1 to 512 samples without a GPU, got 513"):
             wgmb.Blur("gather", samples=513)
+
+
+def flight(is_there, t, fine=4):
+    """Something flies over a wall of one colour; vectors are of the middles of pixels."""
+    height, width = 64, 120
+    y, x = (np.mgrid[: height * fine, : width * fine] + 0.5) / fine
+    shape = is_there(x - 60 - 22 * t, y - 32)
+    color = np.where(shape[..., None], [0.9, 0.5, 0.1], [0.2, 0.3, 0.4])
+    color = color.reshape(height, fine, width, fine, 3).mean(axis=(1, 3)).astype("f4")
+    middle = shape[fine // 2 :: fine, fine // 2 :: fine]
+    motion = np.where(middle[..., None], [-22, 0, 22, 0], 0).astype("f4")
+    return color, motion, np.where(middle, 2.0, 9.0).astype("f4")
+
+
+def blurred(is_there):
+    """Such a flight blurred, what is there, and confidence."""
+    times = Shutter(360).sample_times(16)
+    truth = np.mean([flight(is_there, t)[0] for t in times], axis=0)
+    frame = frame_of([flight(is_there, t) for t in (0, -1, 1)])
+    return *wgmb.Blur("gather", shutter=360).with_confidence(frame), truth
+
+
+def test_what_all_frames_hide_is_like_what_is_around():
+    """Bars, each of which is at its neighbour's place a frame later."""
+    picture, told, truth = blurred(lambda x, y: (x % 22 < 16) & (abs(y) < 20))
+    hidden = (told["accepted"] < 0.9)[14:50, 30:90]
+    assert hidden.mean() > 0.2
+    assert np.abs(picture - truth)[14:50, 30:90][hidden].max() < 0.06
+
+
+def test_colours_tell_coverage_if_neither_alpha_nor_vectors_do():
+    picture, told, truth = blurred(lambda x, y: x**2 + y**2 < 26**2)
+    assert error(picture, truth) < 0.003
+    assert told["disocclusion"].max() > 0.2

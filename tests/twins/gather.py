@@ -49,6 +49,9 @@ def gather(frames, times):
             here = [t[y // TILE][x // TILE] for t in tiles]
             if max(tile["longest"] for tile in here) >= 0.01:
                 seen = [instant(layers, here, x, y, t, own) for t in times]
+                if any(one is None for one in seen):
+                    filled = hidden(layers[0], x, y, own)
+                    seen = [filled if one is None else one for one in seen]
                 out[y, x] = np.maximum(np.mean(seen, axis=0), 0)
     return out
 
@@ -210,27 +213,40 @@ def separate_pixel(color, motion, z, edges, y, x, bends, around_it):
     def path(vectors, pixels):
         return np.concatenate([vectors, bend_of(pixels)])
 
-    coverage = (motion[y, x] - behind) @ way / (way @ way)
-    if color.shape[2] == 4:
-        opaque = 1.0 if thin else mean(color, front)[3]
-        clear = mean(color, back)[3]
-        if opaque - clear > 0.5:
-            coverage = (color[y, x, 3] - clear) / (opaque - clear)
-    coverage = np.clip(coverage, 0, 1)
     back_depth = mean(z, back)
+    seen = seen_background(around_it, behind, back_depth, y, x)
+    back_color = mean(color, back) if seen is None else seen
+    coverage = np.clip((motion[y, x] - behind) @ way / (way @ way), 0, 1)
+    has_alpha = color.shape[2] == 4
+    opaque = 1.0 if thin or not has_alpha else mean(color, front)[3]
+    clear = mean(color, back)[3] if has_alpha else 1.0
+    shares = [(motion[p] - behind) @ way / (way @ way) for p in inner]
+    if opaque - clear > 0.5:
+        coverage = np.clip((color[y, x, 3] - clear) / (opaque - clear), 0, 1)
+    elif not thin and not any(0.1 < share < 0.9 for share in shares):
+        coverage = coverage_by_color(color[y, x], mean(color, front), back_color, coverage)
     if coverage < 1 - 0.98:
         back_depth = z[y, x] if z[y, x] >= between else back_depth
         own = path(motion[y, x], farther)
         return 0.0, path(before, nearer), mean(z, front), 0.0, color[y, x], own, back_depth, False
     whole = coverage > 0.98
     coverage = 1.0 if whole else coverage
-    seen = seen_background(around_it, behind, back_depth, y, x)
-    back_color = mean(color, back) if seen is None else seen
     front_color = np.maximum(color[y, x] - (1 - coverage) * back_color, 0)
     front_path = path(motion[y, x] if whole else before, nearer)
     behind = path(behind, farther)
     front_depth = z[y, x] if whole and z[y, x] < between else mean(z, front)
     return front_color, front_path, front_depth, coverage, back_color, behind, back_depth, True
+
+
+def coverage_by_color(own, front, back, at_middle):
+    """Place of a colour between two others, on the side of one half that the pixel's middle is."""
+    way, off = (front - back)[:3], (own - back)[:3]
+    if np.linalg.norm(way) <= 0.05:
+        return at_middle
+    share = off @ way / (way @ way)
+    if np.linalg.norm(off - share * way) >= 0.25 * np.linalg.norm(way):
+        return at_middle
+    return np.clip(share, 0.5, 1) if at_middle >= 0.5 else np.clip(share, 0, 0.5)
 
 
 # ---- tiles ----------------------------------------------------------------------------------
@@ -338,7 +354,10 @@ def tile_candidates(frame, span):
 
 
 def instant(layers, tiles, x, y, t, color):
-    """What is seen at the pixel at time `t`: edge, the edge behind it, what is opaque."""
+    """What is seen at the pixel at time `t`: edge, the edge behind it, what is opaque.
+
+    None: something that all frames hide.
+    """
     opaque, front_edge, back_edge = resolve_visibility(layers, tiles, x, y, t)
     shown = []
     if is_before(front_edge, opaque):
@@ -354,8 +373,43 @@ def instant(layers, tiles, x, y, t, color):
         clear *= 1 - cover
     if clear < 0.5:
         return sum_ / (1 - clear)
-    way = moved(layers[0].trajectory[0][y, x], t)
+    own = layers[0].trajectory[0][y, x]
+    if min(miss(frame, own, x, y, t - frame.offset) for frame in layers) > 8:
+        return None
+    way = moved(own, t)
     return bilinear(color, x + 0.5 - way[0], y + 0.5 - way[1])
+
+
+def miss(frame, own, x, y, u):
+    """How far from the pixel the search along a path ends [px]."""
+    height, width = frame.edgeless.shape
+    centre, d, residual = np.array([x + 0.5, y + 0.5]), moved(own, u), np.inf
+    for _ in range(8):
+        q = centre - d
+        if not (0 <= q[0] < width and 0 <= q[1] < height):
+            return np.inf
+        step = moved(frame.trajectory[0][int(q[1]), int(q[0])], u)
+        residual, d = np.hypot(*(step - d)), step
+        if residual < 0.5:
+            break
+    return residual
+
+
+def hidden(frame, x, y, color):
+    """Mean of the nearest surfaces behind the pixel's own, in eight directions."""
+    height, width = frame.edgeless.shape
+    sum_, total = 0.0, 0.0
+    for angle in np.arange(8) * np.pi / 4:
+        for distance in 2 ** (np.arange(13) / 2):
+            i = int(np.floor(x + 0.5 + distance * np.cos(angle)))
+            j = int(np.floor(y + 0.5 + distance * np.sin(angle)))
+            if not (0 <= i < width and 0 <= j < height):
+                continue
+            if frame.edgeless[j, i] and frame.depth[0][j, i] > 1.1 * frame.depth[0][y, x]:
+                sum_ = sum_ + frame.color[0][j, i] / distance**2
+                total += 1 / distance**2
+                break
+    return sum_ / total if total else color[y, x]
 
 
 def resolve_visibility(layers, tiles, x, y, t):

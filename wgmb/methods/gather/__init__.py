@@ -19,17 +19,17 @@ class Gather:
     """Find the surface visible at every pixel and sample time by searching up to three frames.
 
     Fixed-point iterative warping (Bowles et al., "Iterative Image Warping", 2012) of the frame and
-    its neighbours (Yang et al., "Image-Based Bidirectional Scene Reprojection", 2011) along curved
-    trajectories. It starts from the pixel's own motion and from the few candidate motions that
-    reach its tile (after the tile maxima of McGuire et al. 2012 and Guertin et al. 2014).
-    Silhouettes are first separated into a foreground and a background layer, so that each part of
-    a mixed pixel follows its own motion; coverage is alpha in front of transparent pixels, else
-    that of filtered vectors. The nearest sample is visible, the frame's own unless a neighbouring
-    frame's is clearly nearer; where no frame shows the surface, a tap follows the pixel's own
-    trajectory.
+    its neighbours (Yang et al., "Image-Based Bidirectional Scene Reprojection", 2011) along
+    trajectories through five positions, as the neighbours' own vectors lead on. It starts from the
+    pixel's own motion and from the few candidate motions that reach its tile (after the tile maxima
+    of McGuire et al. 2012 and Guertin et al. 2014). Silhouettes are first separated into a
+    foreground and a background layer, so that each part of a mixed pixel follows its own motion;
+    coverage is alpha in front of transparent pixels, else that of filtered vectors, else that of
+    colours. The nearest sample is visible, the frame's own unless a neighbouring frame's is clearly
+    nearer; what all frames hide is filled from the surfaces around and behind.
     `show`: "confidence" gives, instead of colour, the share of times at which a sample was
-    accepted, the share that neighbouring frames gave, the mean residual [px] and the share of
-    times whose path left the picture, as r, g, b, a.
+    accepted, the share that neighbouring frames gave (backgrounds included), the mean residual [px]
+    and the share of times whose path left the picture, as r, g, b, a.
 
     `shading`: light that moves over surfaces, as shadows and reflections do, is followed too, where
     the passes of light of the frame and of a neighbour tell it from what it falls on (see
@@ -38,7 +38,7 @@ class Gather:
 
     Strong: the closest to the truth. Reveals hidden surfaces, blurs across silhouettes.
     Artefacts: without passes of light, shading is that of one frame; surfaces hidden in all three
-    are guessed from their surroundings; those that move more than 256 px by a sample's time may be
+    are filled from their surroundings; those that move more than 256 px by a sample's time may be
     missed; costs 7 to 26 times as much as taps.
     """
 

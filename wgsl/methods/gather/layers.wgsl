@@ -41,6 +41,9 @@ const EDGE_MOTION: f32 = 0.5;   // difference of the motions of different surfac
 const APART_MOTION: f32 = 4.0;
 const LEAST_SHARE: f32 = 0.1;
 const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and below 1 less it for 0
+const BETWEEN: f32 = 0.4;       // a vector from 0.1 to 0.9 of the way between two is a mixture of them
+const LEAST_CONTRAST: f32 = 0.05;   // of two colours that tell coverage
+const OFF_AXIS: f32 = 0.25;     // distance of a mixed colour from the line between them, as a share of its length
 const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
 
 fn clamped(px: vec2i) -> vec2i {
@@ -203,6 +206,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     var back_depth = 0.0;
     var coverage = 1.0;
     var back_seen = false;      // the back layer is not inferred
+    var seen_around = false;    // its colour is that of neighbouring frames
 
     let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= NO_DEPTH);    // depth of neither
     var front_place = Place(px, INFINITE);
@@ -251,11 +255,17 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
             let front_alpha = select(front_side.color.a / max(front_side.weight, 1e-9), 1.0, thin);
             let back_alpha = back_side.color.a / back_side.weight;
             let by_alpha = front_alpha - back_alpha > MATTE_CONTRAST && counts > 0.0;
-            let measured = clamp(select(dot(own_motion - background_motion, axis) / dot(axis, axis),
-                (own_color.a / counts - back_alpha) / (front_alpha - back_alpha), by_alpha), 0.0, 1.0);
+            let by_vector = dot(own_motion - background_motion, axis) / dot(axis, axis);
             back_depth = back_side.depth / back_side.total;
             let seen = background_around(px, background_motion, back_depth);
-            let background = select(back_side.color / back_side.weight, seen.color / max(seen.count, 1.0), seen.count > 0.0);
+            seen_around = seen.count > 0.0;
+            let background = select(back_side.color / back_side.weight, seen.color / max(seen.count, 1.0), seen_around);
+            var measured = clamp(select(by_vector,
+                (own_color.a / counts - back_alpha) / (front_alpha - back_alpha), by_alpha), 0.0, 1.0);
+            if !by_alpha && !thin && counts > 0.0 && !are_filtered(px, background_motion, axis) {
+                measured = coverage_by_color(own_color / counts, front_side.color / max(front_side.weight, 1e-9), background,
+                                             measured);
+            }
             if measured < 1.0 - FULL {      // all background, whatever the one sample of the depth says
                 back_seen = true;
                 coverage = 0.0;
@@ -280,8 +290,32 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     textureStore(colors, px, FRONT, front);
     textureStore(surfaces, px, FRONT, pack_surface(front_path, -z, false));
     if back_depth > 0.0 { textureStore(colors, px, BACK, back); }     // else nobody reads it
-    textureStore(surfaces, px, BACK, pack_surface(back_path, max(back_depth, 0.0), back_seen));
+    var back_surface = pack_surface(back_path, max(back_depth, 0.0), back_seen);
+    if seen_around && !back_seen { back_surface.w |= AROUND; }
+    textureStore(surfaces, px, BACK, back_surface);
     textureStore(matte, px, vec4f(z, back_depth, coverage, coverage * counts));
+}
+
+/// Whether some vector of the 3 x 3 is between those of the two surfaces: the renderer has filtered them.
+fn are_filtered(px: vec2i, back: vec4f, axis: vec4f) -> bool {
+    var result = false;
+    for (var i = 0; i < 9; i++) {
+        let share = dot(textureLoad(motion, clamped(px + vec2i(i % 3, i / 3) - 1), 0) - back, axis) / dot(axis, axis);
+        result = result || abs(share - 0.5) < BETWEEN;
+    }
+    return result;
+}
+
+/// Coverage where vectors are of the pixel's middle, by the colour's place between those of front and back, if it is between them.
+/// It is over or under one half, as that middle says.
+fn coverage_by_color(own: vec4f, front: vec4f, back: vec4f, at_middle: f32) -> f32 {
+    let axis = front.rgb - back.rgb;
+    let length2 = dot(axis, axis);
+    let share = dot(own.rgb - back.rgb, axis) / max(length2, 1e-12);
+    let off = own.rgb - back.rgb - share * axis;
+    let is_between = length2 > LEAST_CONTRAST * LEAST_CONTRAST && dot(off, off) < OFF_AXIS * OFF_AXIS * length2;
+    let least = select(0.0, 0.5, at_middle >= 0.5);
+    return select(at_middle, clamp(share, least, least + 0.5), is_between);
 }
 
 /// The trajectory of these vectors, bent as that of the surface at `px` is.

@@ -1,5 +1,6 @@
 // The image: for every pixel and every time of the exposure, the samples of up to three frames that are there by then
 // are searched, the nearest ones composited front to back, and the results averaged.
+//#include common/angle.wgsl
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include common/noise.wgsl
@@ -27,6 +28,11 @@ const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds th
 const ITERATIONS_SAVED: u32 = 2u;       // from a tile's motion, compared with a start from nothing
 const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
 
+const MAX_MISS: f32 = 8.0;              // if no path comes nearer than this [px], what is there is hidden
+const FILL_DIRECTIONS: u32 = 8u;
+const FILL_STEPS: u32 = 13u;            // to every side, each FILL_GROWTH times as far as the one before: 64 px
+const FILL_GROWTH: f32 = 1.414213562;
+const FILL_DEPTH_RATIO: f32 = 1.1;      // of what is behind a surface
 const ELSEWHERE: f32 = 2.0;             // samples of one frame farther apart than this [px] are of different surfaces
 
 struct Sample {
@@ -74,6 +80,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     var sum = Composite();
     var accepted = select(0.0, f32(times.count), is_static);
     var left_image = 0.0;
+    var hidden = 0.0;       // times at which another surface must be there that no frame shows
     var first = 0u;         // time of this turn's words of bits
     loop {
         let valid = select(select(0u, (1u << (samples - first)) - 1u, samples > first), ~0u,
@@ -119,20 +126,21 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
         loop {              // of them, those at which no frame shows anything: a tap along the pixel's own trajectory
             let t = time_in(times, first, unresolved);
             let p = x - displacement5(trajectory, t);
-            if unresolved != 0u {
-                var counts = 1.0;
-                if WEIGHTED { counts = textureSampleLevel(own_weight, linear, p / vec2f(frame.size), 0.0).x; }
-                var color = textureSampleLevel(own_color, linear, p / vec2f(frame.size), 0.0);
-                if MOVING_LIGHT { color += moving_light(p, 0u, t, duration_in(times, first, unresolved)); }
-                add(&sum, Composite(color, counts, 1.0, 0.0, 0.0), share);
-                if !is_inside(p) { left_image += 1.0; }
+            let is_hidden = is_far_from_all(x, trajectory, t);
+            if unresolved != 0u && is_hidden { hidden += 1.0; }
+            if unresolved != 0u && !is_hidden {
+                var one = tap(p);
+                if MOVING_LIGHT { one.color += moving_light(p, 0u, t, duration_in(times, first, unresolved)); }
+                add(&sum, one, share);
             }
+            if unresolved != 0u && !is_inside(p) { left_image += 1.0; }
             unresolved &= unresolved - 1u;
             if unresolved == 0u { break; }
         }
         first += TIMES_PER_WORD;
         if first >= samples { break; }
     }
+    add_hidden(&sum, id, hidden * share);
     var result = max(sum.color, vec4f(0.0)) / sum.weight;
     if is_static || sum.weight <= 0.0 { result = static_color(id); }
     if CONFIDENCE {
@@ -333,6 +341,66 @@ fn is_before(a: Sample, b: Sample) -> bool {
     return a.depth < b.depth / select(SURFACE_DEPTH_RATIO, 1.0, is_elsewhere);
 }
 
+// ---- what no frame shows ----------------------------------------------------------------------
+
+/// A tap of the frame itself.
+fn tap(p: vec2f) -> Composite {
+    var counts = 1.0;
+    if WEIGHTED { counts = textureSampleLevel(own_weight, linear, p / vec2f(frame.size), 0.0).x; }
+    return Composite(textureSampleLevel(own_color, linear, p / vec2f(frame.size), 0.0), counts, 1.0, 0.0, 0.0);
+}
+
+/// Whether the searches along the pixel's own trajectory end farther than MAX_MISS from it, in all frames.
+fn is_far_from_all(x: vec2f, trajectory: Trajectory5, t: f32) -> bool {
+    var least2 = INFINITE;
+    var f = 0u;
+    loop {
+        let u = t - offset_of(f);
+        least2 = min(least2, iterate_fixed_point(x, displacement5(trajectory, u), u, 2u * f).residual2);
+        f++;
+        if f >= sources.count { break; }
+    }
+    return least2 > MAX_MISS * MAX_MISS;
+}
+
+/// Add what is hidden behind the pixel in all frames: the nearest surfaces behind its own, in FILL_DIRECTIONS
+/// directions, weighted by the inverse square of their distances.
+fn add_hidden(sum: ptr<function, Composite>, id: vec2u, share: f32) {
+    let z = abs(unpack_depth(textureLoad(surfaces, id, 0, 0)));
+    let count = select(0u, FILL_DIRECTIONS, share > 0.0);
+    var filled = Composite();
+    var direction = 0u;
+    loop {
+        let angle = TAU * f32(direction) / f32(FILL_DIRECTIONS);
+        let along = vec2f(cos(angle), sin(angle));
+        var distance = 1.0;
+        var step = select(FILL_STEPS, 0u, direction < count);
+        loop {
+            let px = vec2i(floor(vec2f(id) + 0.5 + distance * along));
+            let is_there = step < FILL_STEPS && all(px >= vec2i(0)) && all(px < vec2i(frame.size));
+            let is_behind = unpack_depth(textureLoad(surfaces, px, 0, 0)) > z * FILL_DEPTH_RATIO;
+            if is_there && is_behind {
+                let part = 1.0 / (distance * distance);
+                let counts = textureLoad(mattes, px, 0, 0).w;
+                add(&filled, Composite(textureLoad(layer_colors, px, 0, 0), counts, 1.0, 0.0, 0.0), part);
+                step = FILL_STEPS;
+            }
+            distance *= FILL_GROWTH;
+            step++;
+            if step >= FILL_STEPS { break; }
+        }
+        direction++;
+        if direction >= count { break; }
+    }
+    if share > 0.0 {
+        if filled.coverage > 0.0 {
+            add(sum, filled, share / filled.coverage);
+        } else {
+            add(sum, tap(vec2f(id) + 0.5), share);
+        }
+    }
+}
+
 // ---- compositing ----------------------------------------------------------------------------
 
 struct Composite {
@@ -382,7 +450,11 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite
         }
         if MOVING_LIGHT && n < parts { one.color += one.coverage * moving_light(part.at, part.layer, t, duration); }
         one.residual = one.coverage * sqrt(part.residual2);
-        one.neighbours = select(0.0, one.coverage, part.layer > 1u);
+        var from_around = part.layer > 1u;
+        if CONFIDENCE && part.layer == 1u {
+            from_around = (textureLoad(surfaces, nearest_pixel(part.at), 1, 0).w & AROUND) != 0u;
+        }
+        one.neighbours = select(0.0, one.coverage, from_around);
         add(&sum, one, 1.0 - sum.coverage);
         n++;
         if n >= parts { break; }

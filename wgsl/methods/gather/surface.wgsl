@@ -18,7 +18,7 @@ fn tiles_of(size: vec2u) -> vec2u {
 }
 
 /// All that the search needs to know of a pixel's front or back layer, as rgba32uint: velocity, half acceleration in
-/// half floats, depth. The sign of the depth and its last three bits are flags.
+/// half floats, depth. The sign of the depth and its last four bits are flags.
 /// Front layer: depth is negative if an edge is within a pixel; LAST_BIT says that it is smooth, one surface of
 /// one weight in its 3 x 3. Back layer: depth is 0 if there is none; LAST_BIT says that it was seen, not inferred.
 /// KINK and CUBIC are of the trajectory: of a cubic the last THIRD_BITS bits of both velocities are its third term.
@@ -37,7 +37,8 @@ fn pack_surface(trajectory: Trajectory5, depth: f32, last_bit: bool) -> vec4u {
 const LAST_BIT: u32 = 1u;
 const KINK: u32 = 2u;
 const CUBIC: u32 = 4u;
-const FLAGS: u32 = 7u;
+const AROUND: u32 = 8u;         // of a back layer, set by the separation: its colour is that of neighbouring frames
+const FLAGS: u32 = 15u;
 const THIRD_BITS: u32 = 10u;
 const THIRD_STEP: f32 = 1.0 / 32.0;     // [px]: up to 0.39 of it are seen within a frame interval
 const THIRD_MAX: f32 = 511.0;
