@@ -32,6 +32,9 @@ class Reach:
     """Longest blur [px]."""
     margin: Callable[[int], int] = lambda height: 0
     """Pixels that the method looks at beyond that, in pictures of this height [px]."""
+    bend: float = 0.0
+    """How far its paths may leave the parabola through three positions, as a share of half the
+    acceleration."""
 
     def box(self, frame: Frame, offset: int = 0) -> Box | None:
         """The pixels that content of `frame`, `offset` frame intervals away, may get to.
@@ -54,7 +57,8 @@ class Reach:
         with np.errstate(all="ignore"):
             turns = np.clip(np.nan_to_num(-velocity / (2 * acceleration)), opens, closes)
         ways = [velocity * t + acceleration * t**2 for t in (opens, closes, turns)]
-        least, most = np.min(ways, axis=0), np.max(ways, axis=0)
+        spare = self.bend * np.abs(acceleration)
+        least, most = np.min(ways, axis=0) - spare, np.max(ways, axis=0) + spare
         if self.spread == "around":
             far = np.hypot(*np.maximum(-least, most).T)[:, None]
             least, most = -far, far

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from ...gpu import wgsl
 from ...gpu.textures import TexturePool
 from ..options import MethodOptions
 from .active_tiles import ActiveTiles
@@ -47,6 +48,7 @@ class Gather:
     uses = frozenset({"neighbours", *PASSES})
     adaptive = True
     most_in_software = 512  # loops end there after 65,535 turns, all of a pixel together
+    bend = float(wgsl.load("methods/gather/motion.wgsl").constant("MOST_BEND"))
     confidence = ("accepted", "disocclusion", "residual", "left")
 
     @dataclass(frozen=True, kw_only=True)
