@@ -8,9 +8,11 @@ import pytest
 import wgmb
 from twins import moving_light as twin
 from wgmb import Blur, Frame, InputError, Shutter, gpu
+from wgmb import scene as scenes
 from wgmb.gpu.textures import TexturePool
 from wgmb.methods.gather.shading import Kind, MovingLight, Seen, Times
 from wgmb.methods.gather.shading.flow import level_sizes, patch_grid
+from wgmb.render import Render
 
 SIZE = (45, 70)  # height, width
 SPEED = (4.0, -1.5)  # of the shadow [px per frame]
@@ -99,7 +101,8 @@ class Stages:
         self._kind = "glossy" if pulled else "diffuse"
 
     def __getitem__(self, name):
-        texture = self._light._images._textures[f"{self._kind} {name}"]
+        name = f"{self._kind} {name}" if name.startswith("changes") else name
+        texture = self._light._images._textures[f"shading {name}"]
         return self._pool.download(self._device.create_command_encoder(), texture).astype(float)
 
     def layer(self, index):
@@ -331,3 +334,15 @@ def test_sizes_that_fit_no_patch():
     for size in ((1, 1), (3, 40), (13, 9)):
         frame = around(size=size)
         assert np.isfinite(wgmb.Blur("gather")(frame)).all()
+
+
+def test_own_scenes_know_their_light():
+    render = Render(scenes.make("crossing"), Blur("tap", samples=2), size=(48, 27), fps=24)
+    frame = render.frame(0.5, light=True)
+    assert frame.diffuse_light is not None and frame.diffuse_color is not None
+    plain = render.frame(0.5)
+    assert plain.diffuse_light is None
+    np.testing.assert_array_equal(frame.color, plain.color)
+    seen = np.abs(frame.color[..., :3] - frame.diffuse_light * frame.diffuse_color).max(axis=2)
+    assert np.median(seen) < 0.02  # the rest is sky, gloss and edges
+    assert np.ptp(frame.diffuse_light) > 0.5

@@ -305,7 +305,7 @@ def render_frames(
             skipped += 1
             progress(number, "skipped")
             continue
-        seen = render.frame(time, number) if passes else None
+        seen = render.frame(time, number, light=True) if passes else None
         planes = {}
         if confidence:
             result, planes = render.with_confidence(time, number)
@@ -331,6 +331,9 @@ def _with_passes(render: Render, frame: Frame, number: int) -> FrameFile:
     channels |= {f"normal.{c}": frame.normal[..., i] for i, c in enumerate("XYZ")}
     names = ("to_prev.x", "to_prev.y", "to_next.x", "to_next.y")
     channels |= {name: motion[..., i] for i, name in enumerate(names)}
+    for layer, light in (("DiffDir", frame.diffuse_light), ("DiffCol", frame.diffuse_color)):
+        if light is not None:
+            channels |= {f"{layer}.{c}": light[..., i] for i, c in enumerate("RGB")}
     width, height = frame.size
     window = (0, 0, width - 1, height - 1)
     part = exr.Part("", channels, {}, window, window)

@@ -195,14 +195,20 @@ class Render:
             textures["motion"] = motion
         return {name: texture for name, texture in textures.items() if name != "camera"}
 
-    def frame(self, time: float, number: int = 0) -> Frame:
-        """The sharp picture at `time` [s] with its depth, normals, object indices and motion."""
-        arrays = {}
+    def frame(self, time: float, number: int = 0, *, light: bool = False) -> Frame:
+        """The sharp picture at `time` [s] with its depth, normals, object indices and motion.
+
+        `light`: with passes of light too, which scenes with a backdrop have not.
+        """
+        arrays: dict[str, np.ndarray] = {}
+        passes: dict[str, Any] = {}
         with self._working():
             camera = self._see(time, number, 0, self.blur).camera
             for name in ("color", "depth", "normal", "object"):
                 encoder = self.blur.device.create_command_encoder(label="download")
                 arrays[name] = self._images.download(encoder, self._pictures[0][name])
+            if light:
+                passes = self._light(time, number)
         return Frame(
             arrays["color"],
             depth=arrays["depth"][..., 0],
@@ -210,7 +216,21 @@ class Render:
             object_id=arrays["object"][..., 0],
             camera=camera,
             number=number,
+            **passes,
         )
+
+    def _light(self, time: float, number: int) -> dict[str, Any]:
+        """Passes of light, as fields of Frame."""
+        bindings = self.blur.frame_bindings(self.size, number)
+        encoder = self.blur.device.create_command_encoder(label="light")
+        lit = self.on_gpu(time).encode_light(encoder, bindings, self._images, 0.0)
+        gpu.submit(self.blur.device, encoder)
+        found = {}
+        for name, field in (("light", "diffuse_light"), ("albedo", "diffuse_color")):
+            if name in lit:
+                encoder = self.blur.device.create_command_encoder(label="download")
+                found[field] = self._images.download(encoder, lit[name])[..., :3].copy()
+        return found
 
     def sharp(self, time: float) -> np.ndarray:
         """(height, width, 4) float32, linear: the picture at `time` [s] without any blur."""

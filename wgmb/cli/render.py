@@ -45,7 +45,7 @@ def render(
     sharp
         Render without blur.
     passes
-        EXR: add layers for depth, motion, normal and object index, as input for `wgmb blur`.
+        EXR: add layers for depth, motion, normal, object index and light, as input for `wgmb blur`.
     confidence
         Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config

@@ -125,6 +125,30 @@ class SceneOnGpu:
         kernel.run(encoder, "main", bindings, view=buffer, **self.resources, **views)
         return textures
 
+    def encode_light(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        bindings: gpu.FrameBindings,
+        images: TexturePool,
+        time: float,
+    ) -> dict[str, wgpu.GPUTexture]:
+        """Record the passes of light at `time` [frame intervals from this frame]; their textures.
+
+        None of scenes with a backdrop, whose solids are shaded otherwise.
+        """
+        if self.scene.backdrop is not None:
+            return {}
+        kernel = gpu.kernel(self.device, "scene/light.wgsl", None, **self.constants)
+        view = np.zeros((), kernel.source.dtype("View"))
+        view["time"] = time
+        buffer = self.device.create_buffer_with_data(
+            label="view", data=view, usage=wgpu.BufferUsage.UNIFORM
+        )
+        textures = {k: images.texture(k, self.size, "rgba32float") for k in ("light", "albedo")}
+        views = {k: t.create_view() for k, t in textures.items()}
+        kernel.run(encoder, "main", bindings, view=buffer, **self.resources, **views)
+        return textures
+
     def reprojections(self, time: float = 0.0) -> Reprojections:
         """Camera and body motion around `time` [frame intervals from this frame]."""
         prev, here, next_ = (self._camera(time + k) for k in (-1, 0, 1))

@@ -250,6 +250,19 @@ fn radiance(hit: Hit, ray: Ray, now: Instant) -> vec3f {
     let view = normalize(ray.direction);
     if BACKDROP { return staged(hit, ray, view, now); }
     if hit.depth >= BACKGROUND_DEPTH { return mix(scene.horizon.rgb, scene.sky.rgb, smoothstep(0.0, 0.6, view.y)); }
+    let lit = lighting(hit, ray, view, now);
+    return lit.color * (lit.sun + lit.ambient + lit.emitted) + vec3f(lit.specular * scene.sun.w);
+}
+
+struct Lighting {       // of what a ray met
+    color: vec3f,
+    sun: f32,           // light that is multiplied by the colour: with its shadow,
+    ambient: f32,
+    emitted: f32,
+    specular: f32,      // times the sun's strength
+}
+
+fn lighting(hit: Hit, ray: Ray, view: vec3f, now: Instant) -> Lighting {
     let body = bodies[hit.body];
     let met = surface(hit, ray);
     let n = met.world_normal;
@@ -266,7 +279,7 @@ fn radiance(hit: Hit, ray: Ray, now: Instant) -> vec3f {
     sun *= select(1.0, SHADE, blocked) * scene.sun.w;
     let ambient = scene.sky.w * mix(0.55, 1.0, 0.5 + 0.5 * n.y);
     let specular = body.other.w * pow(max(dot(reflect(view, n), towards), 0.0), 40.0) * select(1.0, 0.0, blocked);
-    return color * (sun + ambient + body.color.w) + vec3f(specular * scene.sun.w);
+    return Lighting(color, sun, ambient, body.color.w, specular);
 }
 
 /// The same for the solids of volumes, shaded as the method "volume" shades the volumes.

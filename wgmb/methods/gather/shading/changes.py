@@ -43,7 +43,8 @@ def changes(
         if offset == 0:
             continue
         raw, smooth, limited = (
-            stage.texture(name, "rgba16float") for name in ("raw", "smooth", f"changes {offset}")
+            stage.texture(name, "rgba16float")
+            for name in ("raw", "smooth", f"{stage.name} changes {offset}")
         )
         stage.run(
             "measure",

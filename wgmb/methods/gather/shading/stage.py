@@ -36,8 +36,8 @@ class Stage:
         return self.bindings.size
 
     def texture(self, name: str, format: str, size: tuple[int, int] | None = None):
-        """The view of a texture of this name; one for each kind of light."""
-        return self.images.view(f"{self.name} {name}", size or self.size, format)
+        """The view of a texture of this name; kinds of light share it, one after the other."""
+        return self.images.view(f"shading {name}", size or self.size, format)
 
     def none(self, format: str) -> wgpu.GPUTextureView:
         """Bound where a pass reads nothing; black."""
