@@ -7,7 +7,9 @@ import pytest
 
 from twins import flow as twin
 from wgmb import Blur, Flow, Frame, InputError
+from wgmb.flow import passes as flow_passes
 from wgmb.flow.carry import carry
+from wgmb.flow.dominant import follow_most
 from wgmb.flow.homography import dominant_homography
 from wgmb.flow.match import matched
 from wgmb.flow.mend import mend
@@ -135,12 +137,47 @@ def test_every_level_is_half_as_large(close):
 def test_the_full_search_finds_the_cheapest_displacements(bend):
     """One for both sides, or two where the motion changes so much that no single one fits."""
     bound = matched(kit(), MIDDLE, small(bend=bend)[0], 0)
-    got = read(FullSearch(kit(), 2)((13, 9), bound))
-    want = twin.full_search(matcher(MIDDLE, bend=bend), reach=3)  # a fifth of 13
+    states, centres, ways = FullSearch(kit(), 2)((13, 9), bound)
+    got = read(states)
+    want, sides = twin.full_search(matcher(MIDDLE, bend=bend), reach=3)  # a fifth of 13
+    x, y = np.meshgrid(np.arange(0, 13, 2), np.arange(0, 9, 2))
+    assert (centres.reshape(5, 7, 2) - 0.5 == np.stack([x, y], axis=2)).all()
+    assert (ways.reshape(5, 7, 4) == sides).all()
     assert (got[..., 4:] == 0).all()
     assert (got[::2, ::2, :4] == want).all()
     assert (got[1::2, ::2] == got[:-1:2, ::2]).all()
     assert (want[..., 2:] != 0).any() == (bend > 0)
+
+
+def test_the_motion_of_most_is_taken_where_it_matches_better():
+    """What moves like it to one side is not hidden on the other; the others keep their states."""
+    size, bend = (9, 13), 2.5
+    states, match = random_states(seed=8), matcher(MIDDLE, bend=bend)
+    x, y = (n.ravel() for n in grid(size))
+    true = np.array([1.3 + bend / 2, -0.6, -1.3 + bend / 2, 0.6])
+    ways = np.tile(np.round(true), (len(x), 1))
+    ways[::10] += 7
+    bound, given = matched(kit(), MIDDLE, small(bend=bend)[0], 0), states_texture(states)
+    got = follow_most(kit(), (13, 9), bound, MIDDLE, given, np.stack([x, y], axis=1), ways)
+    got = read(got).astype(float)
+    is_kept = (got == states.astype("f4")).all(axis=2)
+    assert 0 < is_kept.sum() < 100
+    taken = got[~is_kept]
+    ways = np.concatenate([taken[:, :2], taken[:, 2:4] - taken[:, :2]], axis=1)
+    assert np.median(np.abs(ways - true)) < 0.3
+    for row, column in np.argwhere(~is_kept):
+        own, most = states[row, column], got[row, column]
+        near, far = own[:2] - most[:2], own[2:4] - own[:2] - most[2:4] + most[:2]
+        cost = match.price(own) + match.cost(column, row, own)
+        cost += 0.03 * (min(np.hypot(*near), np.hypot(*far)) < 1)
+        assert match.cost(column, row, most) < cost + FILTER
+
+
+def test_a_motion_of_most_that_does_not_bend_is_left_to_the_search():
+    states, centres = states_texture(random_states()), np.array([[0, 0], [9, 0], [0, 9], [9, 9.0]])
+    bound = matched(kit(), MIDDLE, small()[0], 0)
+    for ways in (np.zeros((4, 4)), np.tile([1.3, -0.6, -1.3, 0.6], (4, 1))):
+        assert follow_most(kit(), (13, 9), bound, MIDDLE, states, centres, ways) is states
 
 
 @pytest.mark.parametrize("views", [MIDDLE, FIRST])
@@ -297,13 +334,26 @@ def test_a_shift_is_found():
     assert np.percentile(np.abs(inside - [*-way, *way]), 95) < 0.3
 
 
-def test_a_shift_that_grows_is_found():
-    """5 px before, 10 px after: no constant velocity fits both sides."""
-    before, after = np.array([-5, 1]), np.array([10, 2])
-    pictures = [shifted((44, 112), *way) for way in (before, (0, 0), after)]
-    motion, _ = Flow()(*pictures)
-    error = np.abs(motion - [*before, *after]).max(axis=2)[8:-8, 22:-22]
+@pytest.mark.parametrize(("before", "after", "width"), [(-5, 10, 112), (3, 6, 232)])
+def test_a_shift_that_grows_is_found(before, after, width):
+    """5 px before, 10 px after, or a turning back: no constant velocity fits both sides."""
+    ways = np.array([[before, 1], [0, 0], [after, 2]])
+    motion, _ = Flow()(*[shifted((44, width), *way) for way in ways])
+    error = np.abs(motion - [*ways[0], *ways[2]]).max(axis=2)[8:-8, 22:-22]
     assert error.mean() < 0.1
+
+
+def test_bands_give_the_same_bits(monkeypatch):
+    """Without a GPU, long passes are submitted in parts."""
+    pictures = [shifted((21, 230), 4 * n, n * n / 4) for n in range(3)]
+    found = []
+    for most in (1, 200, 1 << 30):
+        monkeypatch.setattr(flow_passes, "AT_ONCE", most)
+        monkeypatch.setattr(flow_passes.gpu, "SOFTWARE", kit().device.adapter_info["adapter_type"])
+        found.append(Flow()(*pictures))
+    for motion, depth in found[1:]:
+        assert (motion == found[0][0]).all()
+        assert (depth == found[0][1]).all()
 
 
 @pytest.mark.parametrize(("turn", "zoom"), [(0.06, 1.03), (np.radians(12), 1.0)])

@@ -197,7 +197,9 @@ def polished(matcher, states, x, y):
 
 
 def full_search(matcher, reach):
-    """Flow and bend of every second pixel each way: the cheapest whole displacements."""
+    """Flow and bend of every second pixel each way, the cheapest whole displacements, and (..., 4)
+    those to the near frame and to the far one, each by itself.
+    """
     offsets = np.array([(i, j) for j in (-3, -1, 1, 3) for i in (-3, -1, 1, 3)])
     height, width = matcher.height, matcher.width
 
@@ -217,6 +219,7 @@ def full_search(matcher, reach):
     ways.sort(key=lambda way: np.abs(way).sum())
     length = np.array([1e-4 * np.abs(way).sum() for way in ways])
     out = np.zeros((-(-height // 2), -(-width // 2), 4))
+    sides = np.zeros_like(out)
     for y in range(0, height, 2):
         for x in range(0, width, 2):
             n = np.array([side(matcher.near, x, y, u, v) for u, v in ways])
@@ -225,11 +228,12 @@ def full_search(matcher, reach):
             best = [
                 np.array(ways[np.argmin(cost.round(7))]) for cost in (both, n + length, f + length)
             ]
+            sides[y // 2, x // 2] = [*best[1], *-best[2]]
             bend = best[1] - best[2]
             pair = np.array([*best[1], *bend, 0, 0, 0, 0])
             cost = (min(n + length) + min(f + length)) / 2 + matcher.price(pair) + 0.015
             out[y // 2, x // 2] = pair[:4] if cost < both.min() else (*best[0], 0, 0)
-    return out
+    return out, sides
 
 
 def carried(matcher, states, along, turn):

@@ -10,20 +10,23 @@ import numpy as np
 
 SAMPLES = 500  # of four points each
 POINTS = 4
-TOLERANCE = 3.0 / 640  # of the longer side: how far a point may end from where the motion leads
+TOLERANCE = 3.0 / 640  # of the longer side, unless another one is asked for
 REFINEMENTS = 3
 
 
-def dominant_homography(points: np.ndarray, motion: np.ndarray, longest: float) -> np.ndarray:
+def dominant_homography(
+    points: np.ndarray, motion: np.ndarray, longest: float, tolerance: float = TOLERANCE
+) -> np.ndarray:
     """The (3, 3) matrix that moves most of `points` (count, 2) [px] by their `motion` (count, 2).
 
-    `longest`: the picture's longer side [px]. The unit matrix if there are too few points.
+    `longest`: the picture's longer side [px]; `tolerance`: of that, how far a point may end from
+    where the matrix moves it. The unit matrix if there are too few points.
     """
     if len(points) < POINTS:
         return np.eye(3)
     here = (2 * points.astype(float) - points.max(axis=0)) / longest  # about -1 to 1
     there = here + 2 * motion.astype(float) / longest
-    tolerance = 2 * TOLERANCE
+    tolerance *= 2
     picks = np.random.default_rng(0).integers(0, len(here), (SAMPLES, POINTS))
     candidates = np.concatenate([np.eye(3)[None], _fits(here[picks], there[picks])])
     best = max(candidates, key=lambda h: _agreement(h, here, there, tolerance))

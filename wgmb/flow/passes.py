@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -12,18 +13,20 @@ from ..gpu import wgsl
 from ..gpu.textures import ScratchBuffer, TexturePool
 
 _USAGE = wgpu.TextureUsage
+AT_ONCE = 1 << 15  # invocations of a submission without a GPU, where a pass is banded
 STATES, FEATURES = ("rgba32float", 2), ("rgba8unorm", 2)  # format, layers
 
 
 class Passes:
     """Runs passes, and lends textures that may be given back for the next frame's.
 
-    Every pass is submitted by itself: without a GPU a frame takes seconds, and a submission
-    cannot be interrupted.
+    Every pass is submitted by itself, and without a GPU the long ones in bands: a frame takes
+    seconds there, and a submission cannot be interrupted.
     """
 
     def __init__(self, device: wgpu.GPUDevice):
         self.device, self.images = device, TexturePool(device)
+        self._in_software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self.linear = device.create_sampler(mag_filter="linear", min_filter="linear")
         self.landings, self.costs = ScratchBuffer(device), ScratchBuffer(device)
         self._free: dict[tuple, list[wgpu.GPUTexture]] = {}
@@ -45,9 +48,25 @@ class Passes:
         """
         kernel = gpu.kernel(self.device, f"flow/{file}", None, **(constants or {}))
         bound = {name: self._bound(kernel, name, value) for name, value in resources.items()}
-        encoder = self.device.create_command_encoder(label=f"flow {entry}")
-        kernel.run(encoder, entry, replace(self._frame(size), size=grid or size), **bound)
-        gpu.submit(self.device, encoder)
+        width, height = grid or size
+        for first, rows in self._bands(kernel, width, height):
+            if "band" in kernel.bindings:
+                whole = -(-height // kernel.workgroup[1])
+                bound["band"] = self.uniform("band.wgsl", "Band", first=first, rows=whole)
+            encoder = self.device.create_command_encoder(label=f"flow {entry}")
+            part = replace(self._frame(size), size=(width, rows * kernel.workgroup[1]))
+            kernel.run(encoder, entry, part, **bound)
+            gpu.submit(self.device, encoder)
+
+    def _bands(self, kernel: gpu.Kernel, width: int, height: int) -> Iterator[tuple[int, int]]:
+        """The first row of workgroups, and how many, of every submission of a pass."""
+        across, down = kernel.workgroup
+        whole = -(-height // down)
+        most = whole
+        if "band" in kernel.bindings and self._in_software:
+            most = max(1, AT_ONCE // (-(-width // across) * across * down))
+        for first in range(0, whole, most):
+            yield first, min(most, whole - first)
 
     def uniform(self, file: str, struct: str, **values) -> wgpu.GPUBuffer:
         """The struct of `wgsl/flow/<file>` with these values, the others 0."""

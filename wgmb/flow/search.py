@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import wgpu
 
 from ..gpu import wgsl
 from ..gpu.textures import ScratchBuffer
+from .dominant import ACROSS, spaced
 from .passes import STATES, Passes
 
 REACH = 0.2  # of the longer side: the longest displacement along an axis
@@ -18,8 +20,14 @@ class FullSearch:
         self._passes, self._block = passes, block
         self._best = ScratchBuffer(passes.device)
 
-    def __call__(self, size: tuple[int, int], matched: dict) -> wgpu.GPUTexture:
-        """States of a frame on its coarsest level; `matched`: the bindings of match.wgsl."""
+    def __call__(
+        self, size: tuple[int, int], matched: dict
+    ) -> tuple[wgpu.GPUTexture, np.ndarray, np.ndarray]:
+        """States of a frame on its coarsest level; `matched`: the bindings of match.wgsl.
+
+        Also, for a few pixels, their centres (count, 2) [px] and (count, 4) the displacements to
+        the near frame and to the far one that match best, each by itself.
+        """
         source = wgsl.load("flow/full_search.wgsl")
         block, columns = self._block, int(source.constant("COLUMNS"))
         bound = matched | {"constants": matched["constants"] | {"BLOCK": block}}
@@ -55,5 +63,12 @@ class FullSearch:
         for first in firsts:
             run("search", blocks, first, spare)
         run("write_states", size, 0, output)
-        self._passes.give(spare)
-        return output
+        few = min(blocks[0], ACROSS), min(blocks[1], ACROSS)
+        ways = self._passes.take(few, STATES)
+        run("write_ways", few, 0, ways)
+        found = self._passes.images.download(
+            self._passes.device.create_command_encoder(), ways
+        ).reshape(-1, 4)
+        self._passes.give(spare, ways)
+        centres = np.minimum(block * spaced(few, blocks), np.array(size) - 1) + 0.5
+        return output, centres, found

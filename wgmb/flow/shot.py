@@ -21,6 +21,7 @@ import wgpu
 
 from ..errors import InputError
 from .carry import carry
+from .dominant import follow_most
 from .match import matched
 from .mend import mend
 from .passes import STATES, Passes
@@ -150,7 +151,9 @@ class Shot:
         bound = self._matched(views, level)
         count = self._effort.sweeps(level, len(self._sizes))
         if level == len(self._sizes) - 1:
-            states = sweep(passes, size, bound, self._full_search(size, bound), [], level, count)
+            states, *some = self._full_search(size, bound)
+            states = follow_most(passes, size, bound, views, states, *some)
+            states = sweep(passes, size, bound, states, [], level, count)
             return self._polished(states, size, bound) if level else states
         states = self._grown(self._once("mended", number, level + 1, self._mended), level)
         guesses = [self._carried(other, views, level) for other in views.beside] if count else []

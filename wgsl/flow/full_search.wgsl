@@ -121,3 +121,13 @@ fn write_states(@builtin(global_invocation_id) id: vec3u) {
     textureStore(output, id.xy, 0, vec4f(state.flow, state.bend));
     textureStore(output, id.xy, 1, state.slope);
 }
+
+/// Each side's own best displacement of a few blocks, evenly spaced: one for each pixel of a small picture.
+@compute @workgroup_size(WG_X, WG_Y)
+fn write_ways(@builtin(global_invocation_id) id: vec3u) {
+    let few = textureDimensions(output);
+    if any(id.xy >= few) { return; }
+    let block = (2u * id.xy + 1u) * reach.blocks / (2u * few);
+    let found = best[block.y * reach.blocks.x + block.x];
+    textureStore(output, id.xy, 0, vec4f(found.near.xy, found.far.xy));
+}

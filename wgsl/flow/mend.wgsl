@@ -1,5 +1,6 @@
 // Pixels that are not found again take over the state of sound ones around them that are like them: what is hidden
 // moves as what it belongs to.
+//#include flow/band.wgsl
 //#include flow/match.wgsl
 
 struct Others {         // how the states of the two other frames lead back to this one
@@ -49,9 +50,10 @@ fn back(other: texture_2d_array<f32>, px: vec2i, side: f32) -> vec2f {
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn find_lost(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
+fn find_lost(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     let state = load_state(states, px);
     var is_lost = missed(px, state.flow, near_states, others.near) > MOST_MISSED;
     if others.far != 0.0 {
@@ -62,9 +64,8 @@ fn find_lost(@builtin(global_invocation_id) id: vec3u) {
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn mend(@builtin(local_invocation_index) local: u32,
-        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let id = swizzled_pixel(local, group, groups);
+fn mend(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
     let px = vec2i(min(id, frame.size - 1u));
     var state = load_state(states, px);
     let tries = select(0u, RINGS * DIRECTIONS, textureLoad(lost, px, 0).x != 0u);

@@ -1,8 +1,9 @@
 // Half a sweep: every second pixel, as on a chessboard, tries other states and keeps the best. First those of other
 // pixels (Barnes et al., "PatchMatch", 2009; on planes: Bleyer et al. 2011), then variations of its own.
 //#include common/hash.wgsl
-//#include flow/match.wgsl
+//#include flow/band.wgsl
 //#include flow/plane.wgsl
+//#include flow/steps.wgsl
 
 struct Sweep {
     color: u32,         // of the chessboard: 0 or 1
@@ -37,9 +38,6 @@ const SLOPE_STEP: f32 = 0.05;       // greatest of the first of them
 const SLOPE_FALL: f32 = 0.4;        // each is so much of the one before
 const BEND_TRIES: u32 = 2u;         // random changes of the bend, with the flow or without
 const REFINED: u32 = 11u;           // two planes, the changes, no slope, no bend
-const STEPS: u32 = 3u;              // see stepped()
-const FLAT: f32 = 0.00001;          // squared gradient [1/px^2] that says nothing of the place
-const LONGEST_STEP: f32 = 2.0;      // [px]
 const SAME: f32 = 0.001;            // states closer than this are not tried again [px]
 
 var<private> around: array<vec4f, NEIGHBOURS>;      // flow and bend of the neighbours, each moved here
@@ -144,9 +142,8 @@ fn source_of(px: vec2i, k: u32) -> vec2i {
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn propagate(@builtin(local_invocation_index) local: u32,
-        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let px = own_pixel(swizzled_pixel(local, group, groups));
+fn propagate(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let px = own_pixel(banded_pixel(local, group));
     var best = begin(min(px, vec2i(frame.size) - 1));
     for (var k = 0u; k < PROPAGATED; k++) {
         var source = source_of(px, k);
@@ -188,87 +185,9 @@ fn varied(state: State, plane: Plane, px: vec2i, k: u32) -> State {
     return result;
 }
 
-struct Slide {          // what Gauss and Newton make of the differences to a frame
-    square: vec3f,      // of the gradient: xx, xy, yy
-    product: vec2f,     // of gradient and difference
-    error: f32,
-}
-
-fn slid(slide: Slide, gradient: vec2f, weight: f32, own: vec4f, found: vec4f, apart: f32) -> Slide {
-    let w = select(0.0, weight, apart < MOST_DIFFERENCE);
-    let d = dot(found.rgb - own.rgb, LUMA);
-    return Slide(slide.square + w * vec3f(gradient.x * gradient.x, gradient.x * gradient.y, gradient.y * gradient.y),
-                 slide.product + w * d * gradient, slide.error + weight * min(apart, MOST_DIFFERENCE));
-}
-
-/// By how much the patch has to be moved so that the differences vanish [px]; 0 if that is too far to be true.
-fn step_of(square: vec3f, product: vec2f) -> vec2f {
-    let xx = square.x + FLAT;
-    let yy = square.z + FLAT;
-    let step = vec2f(square.y * product.y - yy * product.x, square.y * product.x - xx * product.y)
-        / (xx * yy - square.y * square.y);
-    return select(vec2f(0.0), step, max(abs(step.x), abs(step.y)) < LONGEST_STEP);
-}
-
-struct Steps {
-    near: vec2f,        // to match the near frame better, [px]
-    far: vec2f,
-    both: vec2f,        // to match both, with the same bend
-    better: vec2f,      // that of the side that matches better
-    cost: f32,          // of the match as it is
-}
-
-/// Steps of inverse search (Baker and Matthews, "Lucas-Kanade 20 Years On", 2004): with this frame's gradients.
-fn inverse_steps(state: State) -> Steps {
-    let way = way_to_far(state);
-    let to_near = target_of(state.flow, state.slope, OUTSIDE);
-    let to_far = target_of(way.flow, way.slope, OUTSIDE);
-    var n = Slide();
-    var f = Slide();
-    for (var row = 0u; row < SIDE; row++) {
-        for (var column = 0u; column < SIDE; column++) {
-            let offset = vec2f(column_offset(column), row_offset(row));
-            let px = vec2i(centre + offset);
-            let own0 = textureLoad(here, px, 0, 0);
-            let own1 = textureLoad(here, px, 1, 0);
-            let gradient = 0.5 * (vec2f(own0.w, own1.x) - 0.5);
-            let weight = inverse_weight * sample_weight(px, own0.rgb);
-            let at_near = sample_place(to_near, offset);
-            let near0 = textureSampleLevel(near, linear, at_near, 0, 0.0);
-            let near1 = textureSampleLevel(near, linear, at_near, 1, 0.0);
-            n = slid(n, gradient, weight, own0, near0, difference(own0, own1.xyz, near0, near1.xyz));
-            let at_far = sample_place(to_far, offset);
-            let far0 = textureSampleLevel(far, linear, at_far, 0, 0.0);
-            let far1 = textureSampleLevel(far, linear, at_far, 1, 0.0);
-            f = slid(f, gradient, weight, own0, far0, difference(own0, own1.xyz, far0, far1.xyz));
-        }
-    }
-    let by = view.far_factor;
-    let near_step = step_of(n.square, n.product);
-    let far_step = step_of(f.square, f.product);
-    let both = step_of(n.square + by * by * f.square, n.product + by * f.product);
-    let near_cost = select(n.error, OUTSIDE, to_near.limit < 0.0);
-    let far_cost = select(f.error, OUTSIDE, to_far.limit < 0.0);
-    let cost = select(cost_of(near_cost, far_cost), near_cost, VIEWS == ONE);
-    return Steps(near_step, far_step, both, select(far_step / by, near_step, n.error <= f.error), cost);
-}
-
-/// Variation `k` by such a step.
-fn stepped(state: State, steps: Steps, k: u32) -> State {
-    var result = state;
-    if k == 0u { result.flow += select(steps.both, steps.near, VIEWS == ONE); }
-    if k == 1u { result.flow += steps.better; }
-    if k == 2u {
-        result.flow += steps.near;
-        result.bend += steps.far - view.far_factor * steps.near;
-    }
-    return result;
-}
-
 @compute @workgroup_size(WG_X, WG_Y)
-fn refine(@builtin(local_invocation_index) local: u32,
-        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let px = own_pixel(swizzled_pixel(local, group, groups));
+fn refine(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let px = own_pixel(banded_pixel(local, group));
     let inside = min(px, vec2i(frame.size) - 1);
     var best = begin(inside);
     let plane = fitted_plane(here, states, inside, best.state);
@@ -282,9 +201,8 @@ fn refine(@builtin(local_invocation_index) local: u32,
 /// After the sweeps: every pixel takes the steps that improve its match, whatever its neighbours do. So all may move
 /// together by a part of a pixel, which a sweep does not let one of them do alone; smooth.wgsl removes the noise.
 @compute @workgroup_size(WG_X, WG_Y)
-fn polish(@builtin(local_invocation_index) local: u32,
-        @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let px = vec2i(swizzled_pixel(local, group, groups));
+fn polish(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let px = vec2i(banded_pixel(local, group));
     let inside = min(px, vec2i(frame.size) - 1);
     load_patch(inside);
     let own = load_state(states, inside);

@@ -1,0 +1,87 @@
+"""The motion of most of the picture as a first state: a camera's, which may turn and bend."""
+
+from __future__ import annotations
+
+import numpy as np
+import wgpu
+
+from .homography import dominant_homography
+from .passes import STATES, Passes
+from .views import AROUND, Views
+
+WHOLE, PARTS = 1.0, 0.5  # how far off the motion of most displacements may be [px]
+LEAST_BEND = 0.5  # less [px] is left to the sweeps, which begin at constant velocity
+CORRECTIONS = 2  # by inverse search, to parts of a pixel
+ACROSS = 40  # pixels along a side that take part in them
+
+
+def follow_most(
+    passes: Passes,
+    size: tuple[int, int],
+    matched: dict,
+    views: Views,
+    states: wgpu.GPUTexture,
+    centres: np.ndarray,
+    ways: np.ndarray,
+) -> wgpu.GPUTexture:
+    """States; where the motion of most bends and explains a pixel better, that.
+
+    The given states are given back as they are, or taken back.
+
+    `centres` (count, 2) [px] of some pixels, `ways` (count, 4) their whole displacements to the
+    near frame and to the far one; `matched`: the bindings of match.wgsl.
+    """
+    bound = {"states": states} | matched
+    most = _matrices(size, views, centres, ways, WHOLE)
+    if any((matrix != np.eye(3)).any() for matrix in most):
+        few = min(size[0], ACROSS), min(size[1], ACROSS)
+        centres, thin = spaced(few, size) + 0.5, passes.take(few, STATES)
+        for _ in range(CORRECTIONS):
+            _run(passes, "correct", size, most, grid=few, output=thin, **bound)
+            encoder = passes.device.create_command_encoder()
+            ways = passes.images.download(encoder, thin).reshape(-1, 4)
+            most = _matrices(size, views, centres, ways, PARTS)
+        passes.give(thin)
+    if not _bends(views, most, centres, ways):
+        return states
+    output = passes.take(size, STATES)
+    _run(passes, "follow", size, most, output=output, **bound)
+    passes.give(states)
+    return output
+
+
+def spaced(few: tuple[int, int], many: tuple[int, int]) -> np.ndarray:
+    """(count, 2) numbers of `few` pixels across and down, evenly spaced among `many`."""
+    y, x = np.mgrid[: few[1], : few[0]]
+    return ((2 * np.stack([x, y], axis=-1) + 1) * many // (2 * np.array(few))).reshape(-1, 2)
+
+
+def _matrices(size, views: Views, centres, ways, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """The homographies of most of the picture to the near frame and the far one."""
+    longest = max(size)
+    near = dominant_homography(centres, ways[:, :2], longest, tolerance / longest)
+    if views.factor != AROUND:
+        return near, near @ near  # two frames on, as before
+    return near, dominant_homography(centres, ways[:, 2:], longest, tolerance / longest)
+
+
+def _bends(views: Views, most: tuple[np.ndarray, np.ndarray], centres, ways) -> bool:
+    """Whether at least half of the pixels move like most, and so leave constant velocity."""
+    agree = np.ones(len(centres), bool)
+    for matrix, way in zip(most, (ways[:, :2], ways[:, 2:]), strict=True):
+        moved = np.concatenate([centres, np.ones((len(centres), 1))], axis=1) @ matrix.T
+        apart = moved[:, :2] / moved[:, 2:] - centres - way
+        agree &= np.hypot(apart[:, 0], apart[:, 1]) < PARTS
+    bend = (ways[:, 2:] - views.factor * ways[:, :2])[agree]
+    half = 2 * len(bend) >= len(centres)
+    return bool(half and np.median(np.hypot(bend[:, 0], bend[:, 1])) >= LEAST_BEND)
+
+
+def _run(passes: Passes, entry: str, size, most: tuple[np.ndarray, np.ndarray], **bound) -> None:
+    values = {}
+    for name, matrix in zip(("to_near", "to_far"), most, strict=True):
+        whole = np.eye(4)
+        whole[:3, :3] = matrix
+        values[name] = whole.T  # row i in numpy is column i in WGSL
+    uniform = passes.uniform("dominant.wgsl", "Dominant", **values)
+    passes.run("dominant.wgsl", entry, size, dominant=uniform, **bound)
