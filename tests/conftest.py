@@ -12,6 +12,7 @@ import standard
 from wgmb import gpu
 
 np.seterr(all="raise", under="ignore")
+collect_ignore = ["blender"]  # test_blender.py runs them in Blender's own Python
 if "PYTEST_XDIST_WORKER" in os.environ:  # the workers have shared out the cores already
     os.environ["LP_NUM_THREADS"] = "1"
 
@@ -19,8 +20,9 @@ os.environ.pop("OCIO", None)  # a config of whoever runs the tests
 standard.record()  # every kernel that a test makes; they are sent through Dawn in the end
 
 # Files that take longest are begun first, so that all workers end at about the same time.
-LONGEST = ("test_page", "test_window", "test_viewer", "test_twins", "test_faults", "test_volume",
-           "test_experiments", "test_reference", "test_perceive")  # fmt: skip
+LONGEST = ("test_blender", "test_page", "test_window", "test_viewer", "test_moving_light",
+           "test_pygfx", "test_farm", "test_twins", "test_faults", "test_volume", "test_flow",
+           "test_experiments", "test_reference", "test_blur_video", "test_perceive")  # fmt: skip
 
 
 def pytest_collection_modifyitems(items):
