@@ -20,7 +20,7 @@ LAYERS = [
     {"primaries", "extras", "shown"},
     {"ocio"},
     {"gpu", "shutter", "camera", "metrics", "display"},
-    {"frame", "cone"},
+    {"frame", "cone", "highlights"},
     {"frame_views", "reach", "exposure", "motion_source"},
     {"velocity", "holdout", "planes", "reel"},
     {"io", "scene", "observer", "flow"},

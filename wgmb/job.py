@@ -10,6 +10,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from . import gpu
@@ -18,6 +19,7 @@ from .batch import Progress, blur_sequence
 from .color_settings import ColorSettings, color_record
 from .display import ColorSpace, Display
 from .errors import InputError
+from .highlights import check as check_highlights
 from .io import atomic
 from .io.clip import Clip
 from .io.frame_file import about
@@ -26,6 +28,7 @@ from .io.input_space import space_of
 from .io.masks import is_file, with_amount
 from .io.output import Output
 from .io.settled import Settled
+from .io.suffixes import STILLS
 from .methods import METHODS
 from .outcome import Outcome
 from .pipeline import Blur
@@ -141,6 +144,8 @@ class Job:
             motion, _ = self.asked.video.source(blur.device)
             if motion is not None:
                 clip.move_by(motion)
+        if self.asked.video.highlights != 1:
+            clip.expand_highlights(self.asked.video.highlights)
         files = self.make_output(None if numbers is None else clip)
         return Run(clip, blur, files, self._resumes, self.asked.confidence)
 
@@ -220,6 +225,16 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
         settings["confidence"] = True
     if asked.color.remark and not output.is_exr:
         remarks.append(asked.color.remark)
+    if video.highlights != 1:
+        check_highlights(video.highlights)
+        if Path(asked.pattern).suffix.lower() not in STILLS:
+            raise InputError(
+                f"{asked.pattern}: `highlights` is for pictures that end at white, such as PNG; "
+                "EXR holds light above it"
+            )
+        if asked.color.space(shown) is not None:
+            raise InputError("`highlights` is for sRGB pictures, not for those with `from_`")
+        settings["highlights"] = video.highlights
     if how:
         settings["flow"] = how
         remarks.append(f"motion: {how}, as the frames hold none")

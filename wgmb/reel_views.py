@@ -42,6 +42,7 @@ class ReelViews:
     """Textures of a reel's pictures, on the device of the Blur that takes them.
 
     `motion`: where motion comes from, or None. `holdout` (height, width): 1 stays sharp.
+    `highlights`: times white that white becomes; motion is searched without.
     """
 
     def __init__(
@@ -50,9 +51,11 @@ class ReelViews:
         blur: Blur,
         motion: MotionSource | None = None,
         holdout: np.ndarray | None = None,
+        highlights: float = 1.0,
     ):
         self._reel, self._source = reel, motion
-        self._device, self._planes = blur.device, Planes(blur.device)
+        self._device = blur.device
+        self._planes, self._plain = Planes(blur.device, highlights), Planes(blur.device)
         self._images = TexturePool(blur.device)
         self._neighbours = "neighbours" in blur.method.uses
         self._holdout: View | None = None
@@ -101,13 +104,13 @@ class ReelViews:
             free = {f"light {n}" for n in range(LIGHTS)} - set(self._lights.values())
             oldest = next(iter(self._lights), None)
             self._lights[index] = min(free) if free else self._lights.pop(oldest or 0)
-            self._decode(content, self._lights[index])
+            self._decode(self._planes, content, self._lights[index])
         return self._images.texture(self._lights[index], content.coded.size, _TEXEL)
 
-    def _decode(self, content: Glance, name: str) -> wgpu.GPUTexture:
+    def _decode(self, planes: Planes, content: Glance, name: str) -> wgpu.GPUTexture:
         texture = self._images.texture(name, content.coded.size, _TEXEL)
         encoder = self._device.create_command_encoder(label="decode")
-        self._planes.decode(encoder, content.coded, texture.create_view())
+        planes.decode(encoder, content.coded, texture.create_view())
         gpu.submit(self._device, encoder)
         return texture
 
@@ -146,7 +149,7 @@ class ReelViews:
             return None
         content = self._reel[index].content
         if isinstance(self._shot, Shot):
-            return self._decode(content, "searched")
+            return self._decode(self._plain, content, "searched")
         return content.grey
 
     def _factors(self, index: int) -> tuple[float, float]:

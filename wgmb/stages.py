@@ -13,8 +13,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from .errors import Error, GpuMemoryError, InputError
 from .frame import Frame
+from .highlights import compressed
 from .io.clip import Clip
 from .io.frame_file import FrameFile
 from .io.output import Result
@@ -123,9 +126,14 @@ class Stages:
         return self.clip.placed(source, self._blur.reach, self.neighbours, normal, light)
 
     def _blurred(self, source: FrameFile, frame: Frame, placement: Placement | None) -> Result:
+        confidence: dict[str, np.ndarray] = {}
         if self._confidence:
-            return Result(source, *self._blur.with_confidence(frame), placement)
-        return Result(source, self._blur(frame), placement=placement)
+            picture, confidence = self._blur.with_confidence(frame)
+        else:
+            picture = self._blur(frame)
+        if self.clip.highlights != 1:
+            picture = compressed(picture, self.clip.highlights)
+        return Result(source, picture, confidence, placement)
 
 
 class MotionStages(Stages):

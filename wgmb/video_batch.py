@@ -14,9 +14,10 @@ from typing import Any, Protocol
 import numpy as np
 import wgpu
 
+from . import gpu
 from .background import Behind, ahead
 from .batch import Progress
-from .coding import CodedPicture, Coding
+from .coding import HLG, PQ, CodedPicture, Coding
 from .errors import InputError
 from .exposer import Exposer
 from .exposure import Cell
@@ -78,7 +79,8 @@ class FootageBlur:
     `motion`: where motion comes from (wgmb/flow); None: pictures are averaged as they are.
     `holdout` (height, width): 1 stays sharp. `fill`: repeated pictures are left out, and motion
     goes on over the gap. `cuts`: whether cuts are looked for, beside
-    `known_cuts`, the numbers of pictures that begin a shot.
+    `known_cuts`, the numbers of pictures that begin a shot. `highlights`: times white that white
+    counts as while it is blurred; InputError where the video holds light above white.
     """
 
     def __init__(
@@ -92,10 +94,16 @@ class FootageBlur:
         fill: bool = False,
         cuts: bool = True,
         known_cuts: Collection[int] = (),
+        highlights: float = 1.0,
     ):
+        if highlights != 1 and footage.coding.transfer in (PQ, HLG):
+            raise InputError(
+                f"{footage.path}: `highlights` is for videos that end at white, not for HDR"
+            )
+        self._highlights = highlights
         self.footage, self.clock, self._holdout = footage, clock, holdout
         self._blur, self._motion = blur, motion
-        self._exposer, self._planes = Exposer(blur), Planes(blur.device)
+        self._exposer, self._planes = Exposer(blur), Planes(blur.device, highlights)
         self._average = Average(blur.device)
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
         self.reel: Reel[Glance] | None = None
@@ -115,26 +123,37 @@ class FootageBlur:
             known_cuts=self._known_cuts,
             is_double=is_double if self._fill else None,
         )
-        views = ReelViews(reel, self._blur, self._motion, self._holdout)
+        views = ReelViews(reel, self._blur, self._motion, self._holdout, self._highlights)
         for moment in wanted:
             cells = reel.cells(float(moment.time), float(moment.interval), shutter)
             yield moment, Exposure(self, reel, views, cells)
 
     def light(self, views: ReelViews, cells: Sequence[Cell]) -> wgpu.GPUTexture:
         """The exposure of these cells as linear light (rgba32float)."""
-        parts = ((cell, views.shown(cell.index)) for cell in cells)
-        return self._exposer.texture(self.footage.size, parts)
+        light = self._light(views, cells)
+        if self._highlights == 1:
+            return light
+        encoder = self.device.create_command_encoder(label="compress")
+        light = self._planes.compress(encoder, light.create_view())
+        gpu.submit(self.device, encoder)
+        return light
 
     def coded(
         self, reel: Reel[Glance], views: ReelViews, cells: Sequence[Cell], coding: Coding
     ) -> CodedPicture:
         """The exposure of these cells in planes."""
-        if self._motion is None and averages(self.footage.coding, coding):
+        plain = self._motion is None and self._highlights == 1
+        if plain and averages(self.footage.coding, coding):
             pictures = [reel[cell.index].content.coded for cell in cells]
             return self._average(pictures, [cell.share for cell in cells], coding)
-        light = self.light(views, cells)
+        light = self._light(views, cells)
         encoder = self.device.create_command_encoder(label="encode")
         return self._planes.encode(encoder, light.create_view(), coding)
+
+    def _light(self, views: ReelViews, cells: Sequence[Cell]) -> wgpu.GPUTexture:
+        """The same with highlights expanded."""
+        parts = ((cell, views.shown(cell.index)) for cell in cells)
+        return self._exposer.texture(self.footage.size, parts)
 
     def _pictures(self, shutter: Shutter, wanted: Sequence[Moment]) -> Iterator[Picture[Glance]]:
         """The video's pictures from before the first exposure to the end, on the output's clock."""

@@ -69,6 +69,8 @@ class VideoSettings(FlowSettings):
     "Streams of the output: all (sound, subtitles, chapters are copied), or the video alone."
     duplicates: Literal["keep", "fill"] = "keep"
     "Repeated pictures: keep, or fill (motion goes on over them)."
+    highlights: float = 1.0
+    "Of videos and 8-bit pictures: times white that white counts as in the blur, such as 8; 1: off."
     codec: str | None = None
     "Codec of the video: h264, h265, av1, vp9, prores, ffv1; default: by the name's suffix."
     quality: int | None = None

@@ -60,6 +60,8 @@ def blur(
 
     Example: wgmb blur a.mp4 b.mkv -o out/ --fps 60
 
+    Example: wgmb blur night.mp4 -o out.mp4 --highlights 8
+
     Example: wgmb blur --job shot.json --frames 17-32
 
     Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --cluster tcp://farm:8786

@@ -15,6 +15,7 @@ import numpy as np
 from .._version import __version__
 from ..color import srgb
 from ..errors import InputError
+from ..highlights import check as check_highlights
 from ..io import stills
 from ..io.clock import Clock
 from ..io.cut_list import CutList
@@ -118,6 +119,7 @@ def make_wish(
 ) -> Wish:
     """The settings of a run, with what is opened once for all its videos."""
     check_fits(given, look)
+    check_highlights(video.highlights)
     method = look.method or ("gather" if video.flow in ("auto", "search") else "tap")
     look = replace(look, method=method).for_pictures()
     blur = look.make(when.make(), adapter)
@@ -154,6 +156,7 @@ def blurred(plan: Plan, wish: Wish, tell: Tell) -> tuple[FootageBlur, list[str]]
         fill=video.duplicates == "fill",
         cuts=cuts.is_search,
         known_cuts=cuts.frames(0),
+        highlights=video.highlights,
     )
 
     def blur_part(moments: Sequence[Moment], sink: Sink) -> None:

@@ -22,6 +22,8 @@ from ..camera import MAX_INDEX
 from ..display import ColorSpace
 from ..errors import InputError, check_choice, did_you_mean
 from ..frame import Frame
+from ..highlights import check as check_highlights
+from ..highlights import expanded
 from ..motion_source import MotionSource
 from ..reach import Reach
 from . import detect, exr, layers, light_passes, limits, vectors, views
@@ -173,6 +175,7 @@ class Clip:
         self.notes: dict[str, list[int]] = {}
         self._kept: OrderedDict[int, tuple[FrameFile, ...]] = OrderedDict()
         self._picture_motion: PictureMotion | None = None
+        self._highlights = 1.0
         self._most_kept = 3
         if self._settled is not None:
             self._around.settle(self._settled.beyond)
@@ -222,6 +225,21 @@ class Clip:
         self._picture_motion = PictureMotion(self, motion)
         self._most_kept = 2 * FAR + 3
         self._around.forget_all()
+
+    def expand_highlights(self, highlights: float) -> None:
+        """Let white be so many times white in frames, for blurs alone (see wgmb/highlights.py).
+
+        `blurred` and `blur_sequence` compress it again. InputError unless it is 1 (off) to 32. A
+        frame that holds light above white cannot be read then.
+        """
+        check_highlights(highlights)
+        self._highlights = highlights
+        self._around.forget_all()
+
+    @property
+    def highlights(self) -> float:
+        """Times white that white is in frames."""
+        return self._highlights
 
     def is_there(self, number: int) -> bool:
         """Return True if frame `number` is on disk."""
@@ -583,6 +601,9 @@ class Clip:
         """Frames after a camera cut, of those read so far."""
         return self._around.cuts
 
+    def _bright(self, rgba: np.ndarray) -> np.ndarray:
+        return rgba if self._highlights == 1 else expanded(rgba, self._highlights)
+
     def light_passes(self, source: FrameFile) -> light_passes.LightPasses:
         """The passes of light of a frame's picture."""
         return light_passes.find(self._own(source), source.beside)
@@ -611,7 +632,9 @@ class Clip:
                 )
                 ids = self._object_ids(source) if reprojections.here.bodies else None
             return Frame(
-                source.rgba if picture else np.zeros((*source.size[::-1], 3), np.float16),
+                self._bright(source.rgba)
+                if picture
+                else np.zeros((*source.size[::-1], 3), np.float16),
                 motion=motion,
                 depth=depth,
                 normal=self._normal(source) if "normal" in also else None,

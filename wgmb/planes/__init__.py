@@ -25,9 +25,13 @@ def check(coding: Coding) -> None:
 
 
 class Planes:
-    """Converts pictures on one device; keeps its textures from picture to picture."""
+    """Converts pictures on one device; keeps its textures from picture to picture.
 
-    def __init__(self, device: wgpu.GPUDevice):
+    `highlights`: times white that white becomes in light (see highlights.py); 1 is off.
+    """
+
+    def __init__(self, device: wgpu.GPUDevice, highlights: float = 1.0):
+        self._highlights = highlights
         self._device, self._images, self._packed = device, TexturePool(device), Packed(device)
 
     def decode(
@@ -46,6 +50,7 @@ class Planes:
             "planes/decode.wgsl",
             {"Output": output.texture.format},
             CURVE=curve_of(coding),
+            HIGHLIGHTS=self._highlights,
             GREY=coding.model == "grey",
             ALPHA=coding.alpha,
         )
@@ -73,6 +78,7 @@ class Planes:
             "planes/encode.wgsl",
             {"Output": "rgba32float"},
             CURVE=curve_of(coding),
+            HIGHLIGHTS=self._highlights,
             ALPHA=coding.alpha,
         )
         kernel.run(
@@ -87,6 +93,22 @@ class Planes:
         for place in places:
             self._pack(encoder, samples, place, places, coding)
         return self._packed.read(encoder, places, coding)
+
+    def compress(
+        self, encoder: wgpu.GPUCommandEncoder, light: wgpu.GPUTextureView
+    ) -> wgpu.GPUTexture:
+        """Record the way of light with `highlights` to light without, rgba32float."""
+        size = light.size[0], light.size[1]
+        output = self._images.texture("compressed", size, "rgba32float")
+        kernel = gpu.kernel(
+            self._device,
+            "planes/compress.wgsl",
+            {"Output": "rgba32float"},
+            HIGHLIGHTS=self._highlights,
+        )
+        frame = frame_of(self._device, size)
+        kernel.run(encoder, "main", frame, light=light, output=output.create_view())
+        return output
 
     def _pack(
         self,

@@ -1,5 +1,6 @@
 // Stored planes of a picture (Y, Cb, Cr; R, G, B; grey) -> linear light, premultiplied by alpha.
 //#include common/frame.wgsl
+//#include common/highlights.wgsl
 //#include common/transfer.wgsl
 //#include planes/code.wgsl
 
@@ -23,7 +24,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         samples.z = f32(textureLoad(plane2, at, 0).x);
     }
     let known = vec4f(samples, 1.0);
-    let light = light_of(vec3f(dot(code.x, known), dot(code.y, known), dot(code.z, known)));
+    let light = expanded(light_of(vec3f(dot(code.x, known), dot(code.y, known), dot(code.z, known))));
     var alpha = 1.0;
     if ALPHA { alpha = code.alpha * f32(textureLoad(plane3, id.xy, 0).x); }
     textureStore(output, id.xy, vec4f(light * alpha, alpha));

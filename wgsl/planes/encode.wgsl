@@ -1,5 +1,6 @@
 // Linear light, premultiplied by alpha -> the samples that are stored, not rounded yet.
 //#include common/frame.wgsl
+//#include common/highlights.wgsl
 //#include common/transfer.wgsl
 //#include planes/code.wgsl
 
@@ -13,7 +14,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let premultiplied = textureLoad(light, id.xy, 0);
     var color = premultiplied.xyz;
     if ALPHA { color = select(vec3f(0.0), color / premultiplied.w, premultiplied.w > 0.0); }
-    let signal = vec4f(signal_of(color), 1.0);
+    let signal = vec4f(signal_of(compressed(color)), 1.0);
     let samples = vec3f(dot(code.x, signal), dot(code.y, signal), dot(code.z, signal));
     textureStore(output, id.xy, vec4f(samples, code.alpha * premultiplied.w));
 }
