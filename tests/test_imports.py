@@ -31,6 +31,7 @@ LAYERS = [
     {"reel_views"},
     {"exposer"},
     {"stages", "settings_toml"},
+    {"rates"},
     {"batch"},
     {"outcome"},
     {"job"},

@@ -23,6 +23,7 @@ from .io.frame_numbers import frame_list, has_view
 from .io.output import Output
 from .io.vector_output import VectorOutput
 from .pipeline import Blur
+from .rates import Conversion, ConversionStages
 from .render import Render
 from .stages import IN_FLIGHT, Handover, MotionStages, ReadFrame, Stages, StopError, reason
 
@@ -95,14 +96,38 @@ def blur_sequence(
     on. InputError, before any frame is blurred, where a mask names an object that no Cryptomatte
     has. What has no name is known at the end: `absent`, if every frame was read.
     """
+    _check_names(clip, output)
+    stages = Stages(clip, blur, confidence, output.takes_views)
+    return _Pipeline(stages, output, resume, progress, stop).run()
+
+
+def convert_sequence(
+    clip: Clip,
+    blur: Blur,
+    output: Output,
+    conversion: Conversion,
+    *,
+    resume: bool = False,
+    progress: Progress | None = None,
+    stop: threading.Event | None = None,
+) -> BatchReport:
+    """Blur `clip` into `output` at another rate; numbers are those of the output's frames.
+
+    Everything else is as for `blur_sequence`; see rates.py for what an output frame is made of.
+    """
+    _check_names(clip, output)
+    stages = ConversionStages(clip, blur, conversion, output.takes_views)
+    return _Pipeline(stages, output, resume, progress, stop).run()
+
+
+def _check_names(clip: Clip, output: Output) -> None:
+    """InputError where views or masks do not fit; the output is then abandoned."""
     try:
         _check_names_of_views(clip, output)
         clip.check_names()
     except BaseException:
         output.abandon()
         raise
-    stages = Stages(clip, blur, confidence, output.takes_views)
-    return _Pipeline(stages, output, resume, progress, stop).run()
 
 
 def _check_names_of_views(clip: Clip, output: Output) -> None:
@@ -176,7 +201,7 @@ class _Pipeline:
                 report.stopped = str(error)
         if self.output.is_video and report.stopped:  # it is not there at all
             report.done.clear()
-        if len(report.done) == len(self.clip.numbers):
+        if len(report.done) == len(self.stages.numbers):
             report.absent = self.clip.absent
         return report
 
@@ -184,11 +209,11 @@ class _Pipeline:
         """The number of frames of which nothing was heard."""
         report = self.report
         known = len(report.done) + len(report.skipped) + len(report.failed)
-        return len(self.clip.numbers) - known
+        return len(self.stages.numbers) - known
 
     def read(self) -> None:
         """The first stage: files to frames."""
-        for number in self.clip.numbers:
+        for number in self.stages.numbers:
             if self.hopeless.is_set():
                 break
             self.places.get()

@@ -15,7 +15,7 @@ from typing import Any
 
 from . import gpu
 from ._version import __version__
-from .batch import Progress, blur_sequence
+from .batch import Progress, blur_sequence, convert_sequence
 from .color_settings import ColorSettings, color_record
 from .display import ColorSpace, Display
 from .errors import InputError
@@ -32,7 +32,15 @@ from .io.suffixes import STILLS
 from .methods import METHODS
 from .outcome import Outcome
 from .pipeline import Blur
-from .settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
+from .rates import Conversion
+from .settings import (
+    BlurSettings,
+    InputSettings,
+    OutputSettings,
+    ShutterSettings,
+    plain,
+    rate_of,
+)
 from .video_settings import VideoSettings
 
 _NO_LOOK = "frames", "skip_missing", "max_mb"  # of InputSettings: they change no frame
@@ -50,6 +58,23 @@ class Asked:
     color: ColorSettings
     video: VideoSettings
     confidence: bool = False
+    fps_in: str | None = None
+
+    @property
+    def conversion(self) -> Conversion | None:
+        """To the output's rate, if the frames have another one; InputError where it cannot be."""
+        if self.fps_in is None:
+            return None
+        if self.output.fps is None:
+            raise InputError("`fps_in` needs `fps`, the rate of the output, such as 60")
+        made = Conversion(rate_of(self.fps_in, "`fps_in`"), self.output.rate)
+        if made.step == 1:
+            return None
+        if self.confidence:
+            raise InputError("`confidence` is of single frames; it does not go with `fps_in`")
+        if self.when.make().rolling is not None:
+            raise InputError("a rolling shutter needs frames of the output's own rate")
+        return made
 
     def opened(self, settled: Settled | None = None) -> tuple[Clip, Display | None]:
         """The Clip, and how it is shown."""
@@ -147,7 +172,8 @@ class Job:
         if self.asked.video.highlights != 1:
             clip.expand_highlights(self.asked.video.highlights)
         files = self.make_output(None if numbers is None else clip)
-        return Run(clip, blur, files, self._resumes, self.asked.confidence)
+        asked = self.asked
+        return Run(clip, blur, files, self._resumes, asked.confidence, asked.conversion)
 
     @property
     def _resumes(self) -> bool:
@@ -157,7 +183,8 @@ class Job:
         """The files of all frames, or of a `part` of them; see there what is refused."""
         clip, shown = self._opened
         output = replace(self.asked.output, resume=self._resumes)
-        inputs, numbers = clip.inputs, clip.numbers
+        conversion = self.asked.conversion
+        inputs, numbers = clip.inputs, conversion.numbers(clip) if conversion else clip.numbers
         if part is not None:  # those of the others were looked at when the job was made
             inputs, numbers = (p for n in part.numbers for p in part.files(n)), part.numbers
         return output.make(self.settings, numbers, inputs, clip.chosen, shown, self.since)
@@ -181,20 +208,23 @@ class Run:
     output: Output
     resume: bool
     confidence: bool
+    conversion: Conversion | None = None
+
+    @property
+    def numbers(self) -> list[int]:
+        """The frames of the output."""
+        return self.conversion.numbers(self.clip) if self.conversion else self.clip.numbers
 
     def __call__(
         self, progress: Progress | None = None, stop: threading.Event | None = None
     ) -> Outcome:
-        """Blur every frame; see blur_sequence."""
-        report = blur_sequence(
-            self.clip,
-            self.blur,
-            self.output,
-            resume=self.resume,
-            confidence=self.confidence,
-            progress=progress,
-            stop=stop,
-        )
+        """Blur every frame; see blur_sequence and convert_sequence."""
+        files = self.clip, self.blur, self.output
+        how: dict[str, Any] = {"resume": self.resume, "progress": progress, "stop": stop}
+        if self.conversion is not None:
+            report = convert_sequence(*files, self.conversion, **how)
+            return Outcome.of(self.clip, report, self.numbers)
+        report = blur_sequence(*files, confidence=self.confidence, **how)
         return Outcome.of(self.clip, report)
 
 
@@ -209,6 +239,10 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
     remarks = list(map(_of_scale, asked.look.scale))
     if asked.color.space(shown) is None:
         remarks.append(_check_space(clip, shown))
+    conversion = asked.conversion
+    if conversion:
+        remarks.append(_of_conversion(conversion, clip, asked.output))
+        asked = replace(asked, output=replace(asked.output, layers="picture"))
     video, how = _motion(clip, asked.video, adapter)
     look = asked.look.resolved(clip=clip)
     asked = replace(asked, look=look.for_pictures() if how else look, video=video)
@@ -223,6 +257,8 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
     if asked.confidence:
         check_confidence(look.method or "", output)
         settings["confidence"] = True
+    if conversion:
+        settings |= {"fps_in": str(conversion.fps_in), "fps": str(conversion.fps)}
     if asked.color.remark and not output.is_exr:
         remarks.append(asked.color.remark)
     if video.highlights != 1:
@@ -246,6 +282,17 @@ def _of_scale(scale: str) -> str:
     if "=" not in scale or with_amount(scale)[1] is not None or is_file(scale):
         return ""
     return f"`scale` {scale}: no amount such as {scale}:0.5, so all else stands still"
+
+
+def _of_conversion(conversion: Conversion, clip: Clip, output: OutputSettings) -> str:
+    made = frame_list(conversion.numbers(clip))
+    text = (
+        f"frames {frame_list(clip.numbers)} at {conversion.fps_in} frames per second become "
+        f"frames {made} at {conversion.fps}"
+    )
+    if output.is_exr and output.layers == "all":
+        text += "; only the picture is written, as the other layers belong to the input's rate"
+    return text
 
 
 def _check_space(clip: Clip, shown: Display | None) -> str:

@@ -42,12 +42,16 @@ class Outcome:
         )
 
     @classmethod
-    def of(cls, clip: Clip, report: BatchReport) -> Outcome:
-        """After a run of one process."""
+    def of(cls, clip: Clip, report: BatchReport, converted: Sequence[int] | None = None) -> Outcome:
+        """After a run of one process; `converted`: the frames asked for, if the rate is another."""
         made, done = cls.begun(clip), set(report.done)
         made.report, made.cuts = report, set(clip.cuts)
         made.notes = {text: sorted(done & set(at)) for text, at in clip.notes.items()}
         made.unseen, made.absent = clip.unseen, clip.absent
+        if converted is not None:  # frames of the clip have other numbers
+            made.total = len(converted)
+            made.notes = {text: sorted(done) for text, at in clip.notes.items() if at}
+            return made
         for number in report.done:
             made.sizes.setdefault(clip.sizes[number], []).append(number)
         return made

@@ -394,16 +394,19 @@ class OutputSettings:
         return rate if self.fps is None else rate_of(self.fps)
 
 
-def rate_of(text: str) -> Fraction:
-    """`24`, `23.976`, `30000/1001` -> frames per second, exactly; 0.001 to 1000."""
+def rate_of(text: str, name: str = "fps") -> Fraction:
+    """`24`, `23.976`, `30000/1001` -> frames per second, exactly; 0.001 to 1000.
+
+    `name`: of the setting, for messages.
+    """
     try:
         if re.search(r"e[+-]?[\d_]{4}", text, re.IGNORECASE):  # would be worked out in full
             raise ValueError
         fps = Fraction(text)
     except (ValueError, ZeroDivisionError):
-        raise InputError(f"fps must be a number or a fraction, got {text!r}") from None
+        raise InputError(f"{name} must be a number or a fraction, got {text!r}") from None
     if not Fraction(1, 1000) <= fps <= 1000:
-        raise InputError(f"fps must be 0.001 to 1000, got {text}")
+        raise InputError(f"{name} must be 0.001 to 1000, got {text}")
     return fps
 
 

@@ -80,6 +80,7 @@ class Stages:
         self.clip, self._blur = clip, blur
         self._confidence, self._all_views = confidence, all_views
         self.neighbours = "neighbours" in blur.method.uses
+        self.numbers = clip.numbers
 
     def made_of(self, number: int) -> dict[str, Any]:
         """What a frame depends on."""

@@ -46,6 +46,7 @@ def blur(
     job: Path | None = None,
     workers: int | Literal["auto"] | None = None,
     cluster: str | None = None,
+    fps_in: str | None = None,
     confidence: bool = False,
     config: Path | None = None,
     adapter: str | None = None,
@@ -62,6 +63,8 @@ def blur(
 
     Example: wgmb blur night.mp4 -o out.mp4 --highlights 8
 
+    Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --fps-in 240 --fps 60
+
     Example: wgmb blur --job shot.json --frames 17-32
 
     Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --cluster tcp://farm:8786
@@ -77,6 +80,9 @@ def blur(
         Processes that share the frames on this machine; auto: one for each GPU.
     cluster
         Scheduler of dask.distributed whose workers share the frames, such as tcp://farm:8786.
+    fps_in
+        Frames per second of rendered frames that become --fps: each is blurred by its own vectors
+        over its share of an exposure. Output numbers count from the first input frame on.
     confidence
         Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config
@@ -92,7 +98,7 @@ def blur(
     if job is not None:
         rest = replace(given, frames=None), look, when, color, video, output
         plain = InputOptions(), BlurOptions(), ShutterOptions(), ColorSettings(), VideoSettings()
-        if patterns or confidence or config or rest != (*plain, None):
+        if patterns or confidence or fps_in or config or rest != (*plain, None):
             raise InputError(
                 "--job has all settings; only --frames, --workers, --cluster, --adapter, --verbose "
                 "and --quiet go with it"
@@ -107,8 +113,10 @@ def blur(
         with needed_by(pattern, "video"):
             from .blur_video import blur_video
             from .blur_videos import blur_videos
-        if confidence or crew:
-            option = "--confidence" if confidence else "--workers" if workers else "--cluster"
+        if confidence or fps_in or crew:
+            option = "--fps-in" if fps_in else "--confidence"
+            if crew and not (confidence or fps_in):
+                option = "--workers" if workers else "--cluster"
             raise InputError(f"{option} is for rendered frames")
         settings = look, when, given, video, adapter, quiet, verbose
         if is_batch(patterns, output.output):
@@ -123,7 +131,10 @@ def blur(
         color=color,
         video=video,
         confidence=confidence,
+        fps_in=fps_in,
     )
+    if crew and asked.conversion:
+        raise InputError("--fps-in does not go with --workers or --cluster")
     made = settle(asked, adapter)
     if crew:
         return blur_on_farm(made, *crew, adapter, verbose, quiet)
@@ -195,7 +206,7 @@ def blur_frames(
         note(f"adapter: {run.blur.device.adapter.summary}")
         note(f"settings: {run.output.settings}")
     started = time.perf_counter()
-    with progress(len(run.clip.numbers), quiet) as tick:
+    with progress(len(run.numbers), quiet) as tick:
         outcome = run(tick)
     if len(run.clip.numbers) < len(job.numbers):
         outcome.be_a_part()

@@ -14,6 +14,7 @@ _OTHERWISE = {
     "confidence": "--confidence",
     "convention": "--vectors",
     "device": "--adapter",
+    "fps_in": "--fps-in",
     "number": "--frame",
     "program": "--as",
     "max_displace": "--max-displace",

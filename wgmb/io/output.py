@@ -37,6 +37,7 @@ class Result:
     picture: np.ndarray
     confidence: Mapping[str, np.ndarray] = field(default_factory=dict)
     placement: Placement | None = None  # None: it fills the source's data window
+    is_converted: bool = False  # to another rate: the source's time and rate are not its own
 
     @property
     def canvas(self) -> Window:
@@ -63,6 +64,7 @@ class Result:
 
 
 WINDOWS = ("grow", "keep")
+_OF_TIME = "framesPerSecond", "timeCode", "keyCode"  # attributes of EXR files
 
 
 class Output:
@@ -384,6 +386,10 @@ def _with_results(
             plane = exr.to_half(plane) if kind == np.float16 else plane.astype(kind)
             twins[id(part)].channels[name] = plane
             new.add((id(twins[id(part)]), name))
+    if any(result.is_converted for result in results):
+        for part in parts:
+            for name in _OF_TIME:
+                part.attributes.pop(name, None)
     if only_picture:
         _keep(parts, new)
         for part in parts:
