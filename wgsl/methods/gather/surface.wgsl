@@ -40,7 +40,7 @@ const CUBIC: u32 = 4u;
 const AROUND: u32 = 8u;         // of a back layer, set by the separation: its colour is that of neighbouring frames
 const FLAGS: u32 = 15u;
 const THIRD_BITS: u32 = 10u;
-const THIRD_STEP: f32 = 1.0 / 32.0;     // [px]: up to 0.39 of it are seen within a frame interval
+const THIRD_STEP: f32 = 0.03125;        // [px]: up to 0.39 of it are seen within a frame interval
 const THIRD_MAX: f32 = 511.0;
 
 fn unpack_trajectory(surface: vec4u) -> Trajectory5 {
