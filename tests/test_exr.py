@@ -491,6 +491,7 @@ def test_too_many_channels_are_refused(tmp_path):
 
 SHORT = """
     import resource, sys
+    import av  # before the limit, so that it is the pixels that lack memory
     from wgmb import InputError
     from wgmb.io import exr, stills
     small, damaged, large, png = sys.argv[1:]

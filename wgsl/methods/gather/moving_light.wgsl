@@ -10,6 +10,7 @@ struct LightNodes {
     count: u32,         // then follow layers for the light of the previous frame and of the next one
 }
 
+@group(1) @binding(9) var linear: sampler;
 @group(1) @binding(12) var<uniform> light_nodes: LightNodes;
 @group(1) @binding(13) var added_light: texture_2d_array<f32>;  // premultiplied by weight; a of the last two layers: seen there
 

@@ -17,7 +17,6 @@
 @group(1) @binding(6) var second_differences: texture_2d<u32>;  // of the frame's own front colours
 @group(1) @binding(7) var own_color: texture_2d<f32>;       // the frame as it came
 @group(1) @binding(8) var own_weight: texture_2d<f32>;
-@group(1) @binding(9) var linear: sampler;
 @group(1) @binding(10) var output: Output;
 @group(1) @binding(11) var<storage, read> worklist: WorkList;
 
