@@ -141,19 +141,80 @@ def test_motion_that_stays_on_the_gpu_is_that_of_arrays():
 
 def test_a_cut_ends_exposures_and_motion():
     motion = Known()
-    nine, ten = coded(make.picture(9)).sampled, coded(make.picture(10)).sampled
+    first = {coded(make.picture(n)).sampled.tobytes() for n in range(10)}
 
     def is_cut(before, after):
-        return np.array_equal(before.sampled, nine) and np.array_equal(after.sampled, ten)
+        return before.sampled.tobytes() in first and after.sampled.tobytes() not in first
 
-    exposed = Exposed(Reel(pictures(20), is_cut=is_cut), Blur("gather"), motion)
+    reel = Reel(pictures(12), is_cut=is_cut)  # later ones would be the first again
+    exposed = Exposed(reel, Blur("gather"), motion)
     cells = exposed.reel.cells(9 / 240, 1 / 60, Shutter(360))
     assert max(cell.index for cell in cells) <= 9 and exposed.reel.cuts == [10]
     exposed(9 / 240, 1 / 60, Shutter(360))
-    exposed(12 / 240, 1 / 60, Shutter(360))
+    exposed(11 / 240, 1 / 60, Shutter(360))
     assert motion.shots == 2
     assert all(max(near) <= 9 for n, near in motion.seen.items() if n <= 9)
     assert all(min(near) >= 10 for n, near in motion.seen.items() if n >= 10)
+
+
+def with_flash(count, flashes, fps):
+    for picture in pictures(count, fps):
+        if picture.number in flashes:
+            picture = Picture(picture.time, coded(np.ones_like(make.picture(0))), picture.number)
+        yield picture
+
+
+def is_bright(content):
+    return content.coded.planes[0].min() > 60000
+
+
+def brightens(before, after):
+    """A test for cuts that sees flashes alone."""
+    return is_bright(before) != is_bright(after)
+
+
+@pytest.mark.parametrize(
+    ("fps", "flashes", "cuts"),
+    [(240, [8], []), (12, [8], []), (240, [8, 9, 10], []), (240, [8, 11], []),
+     (24, [8, 9], [8, 10]), (240, range(8, 20), [8, 20]), (240, range(8, 40), [8])],
+    ids=["one", "one of a slow video", "three", "two", "too long for a flash", "a short shot",
+         "up to the end"],
+)  # fmt: skip
+def test_a_flash_is_no_shot(fps, flashes, cuts):
+    reel = Reel(with_flash(40, flashes, fps), is_cut=brightens)
+    for k in range(30):
+        reel.cells(k / fps, 1 / fps, Shutter(180))
+    assert reel.cuts == cuts
+    assert bool(reel.flashes) == (not cuts)
+
+
+def test_a_flash_is_exposed_by_its_share_and_has_no_part_in_motion():
+    motion, shutter = Known(), Shutter(360)
+    reel = Reel(with_flash(24, [8], 240), is_cut=brightens)
+    exposed = Exposed(reel, Blur("gather", samples=8), motion)
+    without = Exposed(Reel(pictures(24)), Blur("gather", samples=8), Known())
+    found = [(exposed(k / 60, 1 / 60, shutter), without(k / 60, 1 / 60, shutter)) for k in range(5)]
+    sharp = np.clip(make.picture(8)[..., :3], 0, 1)
+    for k, (got, want) in enumerate(found):
+        share = {2: 0.25}.get(k, 0)
+        still = np.s_[:4, :4]  # nothing moves there
+        np.testing.assert_allclose(got[still], (want + share * (1 - sharp))[still], atol=2e-3)
+    assert motion.seen[8] == [8]
+    assert all(max(near) <= 7 for n, near in motion.seen.items() if n <= 7)
+    assert all(min(near) >= 9 for n, near in motion.seen.items() if n >= 9)
+
+
+def test_motion_beside_a_flash_goes_on_as_on_the_other_side():
+    times = [0.0, 0.1, 0.2, 0.5, 0.6, 0.9, 1.0, 1.1, 1.2, 1.3]
+    many = [
+        Picture(t, p.content, p.number) for t, p in zip(times, with_flash(10, [3], 1), strict=True)
+    ]
+    exposed = Exposed(Reel(iter(many), is_cut=brightens), Blur("tap"), Known())
+    exposed.reel.cells(0.2, 0.1, Shutter(180))
+    to_prev, to_next = make.motion(0)
+    motion = exposed.motion(2)  # its own interval is 0.2 s, and it moved for 0.1 s
+    np.testing.assert_allclose(motion[..., :2], 2 * to_prev)
+    np.testing.assert_allclose(motion[..., 2:], 2 * to_next)
 
 
 def test_a_repeated_picture_is_left_out_and_its_neighbours_reach_over_it():

@@ -12,6 +12,7 @@ import make_clips as clips
 import make_frames as make
 from wgmb.cli import app
 from wgmb.coding import CodedPicture, Coding
+from wgmb.color import linear
 from wgmb.io.clock import tick
 from wgmb.io.coded_video import CodedVideo
 from wgmb.io.encoders import Facts, chosen
@@ -156,6 +157,29 @@ def test_a_recording_of_a_game(tmp_path, capsys):
     detail = [np.abs(np.diff(p.astype(float), axis=1))[16:].mean()
               for p in (lumas[20], [p for _, p in after][8].planes[0])]  # fmt: skip
     assert detail[1] < 0.9 * detail[0]
+
+
+@pytest.mark.parametrize("flow", ["none", "dis"])
+def test_a_flash_counts_by_its_share(tmp_path, capsys, flow):
+    """A white picture among 240 a second: a quarter of the light of one of 60, and no cut."""
+    y, x = np.mgrid[:64, :96].astype("f4")
+    frames = []
+    for n in range(24):
+        tone = make.texture(x + 2 * n, y, 2.0)[..., 1] if n != 9 else np.ones_like(x)
+        luma = np.clip(16 + 219 * tone, 16, 235).round().astype("u1")
+        frames.append(clips.frame([luma, *[np.full((32, 48), 128, "u1")] * 2], "yuv420p"))
+    times = [Fraction(n, 240) for n in range(24)]
+    source = clips.write(tmp_path / "a.mkv", frames, times, codec="ffv1")
+    out = tmp_path / "b.mkv"
+    words = ["--fps", 60, "--shutter", 360, "--codec", "ffv1", "--flow", flow]
+    assert app.main([*map(str, ["blur", source, "-o", out, *words])]) == 0
+    text = capsys.readouterr().err
+    assert "flash at picture 9" in text and "cut" not in text
+    light = [float(linear((p.planes[0] - 16.0) / 219).mean()) for _, p in Footage(out)]
+    added = np.array(light) - np.median(light)
+    white = 1 - np.median(light)
+    assert added[2] == pytest.approx(white / 4, abs=0.02)
+    assert np.abs(np.delete(added, 2)).max() < 0.02
 
 
 def damaged(data):

@@ -26,6 +26,16 @@ WINDOW = 96, 64  # of the picture alone
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory):
     """A square that passes over a background, 48 a second, and a cut before picture 10."""
+    return passing(tmp_path_factory.mktemp("clip") / "a.mp4")
+
+
+@pytest.fixture(scope="module")
+def flash(tmp_path_factory):
+    """The same with a white picture 5."""
+    return passing(tmp_path_factory.mktemp("flash") / "a.mp4", white=5)
+
+
+def passing(path, white=None):
     width, height = SIZE
     y, x = np.mgrid[:height, :width].astype(np.float32)
     frames = []
@@ -35,11 +45,11 @@ def clip(tmp_path_factory):
         behind = make.texture(x, y, 0.0 if n < 10 else 9.0)[..., 0]
         tone = np.where(inside, make.texture(x - at, y, 5.0)[..., 1], behind)
         tone = tone if n < 10 else 1 - tone[::-1] ** 3
+        tone = np.ones_like(tone) if n == white else tone
         luma = np.clip(16 + 219 * tone, 16, 235).round().astype(np.uint8)
         chroma = np.full((height // 2, width // 2), 128, np.uint8)
         frames.append(clips.frame([luma, chroma, chroma], "yuv420p"))
-    times = [Fraction(n, 48) for n in range(14)]
-    return clips.write(tmp_path_factory.mktemp("clip") / "a.mp4", frames, times)
+    return clips.write(path, frames, [Fraction(n, 48) for n in range(14)])
 
 
 class Held:
@@ -109,6 +119,16 @@ def test_it_shows_what_the_command_line_makes(clip, changes, made):
     viewer = opened(clip, **changes)
     want = command_line(clip, int(changes["frame"]), **made)
     np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
+    viewer.stage.choices.close()
+
+
+@pytest.mark.parametrize("changes", [{"frame": 4.0}, {"frame": 4.0, "method": "gather"}])
+def test_it_shows_a_flash_as_the_command_line_does(clip, flash, changes):
+    made = {"fps": 12, "degrees": 360, "method": changes.get("method", "tap")}
+    viewer = opened(flash, flow="dis", fps=12.0, shutter=360.0, **changes)
+    want = command_line(flash, 4, **made)
+    np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
+    assert want.mean() > command_line(clip, 4, **made).mean() + 0.1
     viewer.stage.choices.close()
 
 

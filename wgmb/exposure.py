@@ -77,12 +77,19 @@ def own_interval(times: np.ndarray, index: int) -> float:
     return float(near[-1] - near[0]) / (len(near) - 1) if len(near) > 1 else 1.0
 
 
-def evened(times: np.ndarray, index: int) -> tuple[float, float]:
+def evened(
+    times: np.ndarray, index: int, known: tuple[bool, bool] = (True, True)
+) -> tuple[float, float]:
     """Factors that turn a frame's way to its neighbours into ways in its own interval.
 
-    To the previous, to the next frame; 1 where there is none.
+    To the previous, to the next frame; 1 where there is none. `known`: whether its way to each of
+    them is; where only one is, the other goes straight on from it.
     """
     own = own_interval(times, index)
     back = own / (times[index] - times[index - 1]) if index > 0 else 1.0
     ahead = own / (times[index + 1] - times[index]) if index + 1 < len(times) else 1.0
+    if known == (False, True):
+        back = ahead
+    elif known == (True, False):
+        ahead = back
     return float(back), float(ahead)

@@ -74,7 +74,7 @@ class ReelViews:
         """
         wanted = [index]
         if self._source is not None and self._neighbours:
-            wanted = [i for i in (index - 1, index, index + 1) if self._reel.same_shot(index, i)]
+            wanted = [i for i in (index - 1, index, index + 1) if self._reel.moves_on(index, i)]
         found = {i: self._frame(i) for i in wanted}
         near = (found.get(i) for i in (index - 1, index + 1))
         before, after = (one if one is not None and one.has_vectors else None for one in near)
@@ -118,7 +118,7 @@ class ReelViews:
         """Motion and depth of a picture, within its own interval of time."""
         if self._source is None:
             return None
-        if self._shot is None or not self._reel.same_shot(self._first, index):
+        if self._shot is None or not self._reel.moves_on(self._first, index):
             # The first of a shot that is kept is the same, whatever was asked for before.
             self._shot = self._source.shot(self._load)
         self._first = index
@@ -145,7 +145,7 @@ class ReelViews:
 
     def _load(self, index: int) -> Any:
         """The picture of an index of the present shot, None outside it."""
-        if not self._reel.same_shot(self._first, index):
+        if not self._reel.moves_on(self._first, index):
             return None
         content = self._reel[index].content
         if isinstance(self._shot, Shot):
@@ -156,7 +156,8 @@ class ReelViews:
         """See exposure.evened."""
         near = [i for i in (index - 1, index, index + 1) if self._reel.same_shot(index, i)]
         times = np.array([self._reel[i].time for i in near])
-        return evened(times, near.index(index))
+        back, ahead = (self._reel.moves_on(index, i) for i in (index - 1, index + 1))
+        return evened(times, near.index(index), (back, ahead))
 
     def _paced(
         self, motion: wgpu.GPUTexture, index: int, factors: tuple[float, float]

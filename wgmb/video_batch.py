@@ -32,7 +32,7 @@ from .io.segments import Segment
 from .motion_source import MotionSource
 from .pipeline import Blur
 from .planes import Average, Planes, averages
-from .reel import Picture, Reel
+from .reel import FLASH, Picture, Reel
 from .reel_views import ReelViews
 from .shutter import Shutter
 
@@ -122,6 +122,7 @@ class FootageBlur:
             is_cut=is_cut if self._cuts else None,
             known_cuts=self._known_cuts,
             is_double=is_double if self._fill else None,
+            flash=FLASH / float(self.clock.speed),
         )
         views = ReelViews(reel, self._blur, self._motion, self._holdout, self._highlights)
         for moment in wanted:

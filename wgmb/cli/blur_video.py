@@ -101,6 +101,8 @@ def blur_video(
         took = f"{time.perf_counter() - started:.1f} s with {wish.blur.method.name}"
         if reel.cuts:
             note(f"camera cut before picture {', '.join(map(str, sorted(reel.cuts)))}")
+        if reel.flashes:
+            note(f"flash at picture {', '.join(map(str, reel.flashes))}")
         if reel.doubles:
             note(f"{len(reel.doubles)} repeated pictures left out")
         note(f"{len(plan.wanted)} frames in {took} -> {plan.name}")

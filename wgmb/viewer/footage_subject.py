@@ -202,6 +202,13 @@ class FootageSubject:
         """Whether it is known that a picture and the one before belong to one shot."""
         before, here = self._maker.known(number - 1), self._maker.known(number)
         if here is not None:
+            return not here.begins_shot
+        return before is not None and not before.ends_shot
+
+    def _moves_on(self, number: int) -> bool:
+        """Whether it is known that motion leads from the picture before to this one."""
+        before, here = self._maker.known(number - 1), self._maker.known(number)
+        if here is not None:
             return not here.begins
         return before is not None and not before.ends
 
@@ -212,7 +219,7 @@ class FootageSubject:
             return frame
         before, after = (
             self._frame(n)
-            if 0 <= n < len(self._footage) and self._same_shot(max(n, number))
+            if 0 <= n < len(self._footage) and self._moves_on(max(n, number))
             else None
             for n in (number - 1, number + 1)
         )
@@ -233,8 +240,9 @@ class FootageSubject:
         color = self._color(number)
         if known is None or known.motion is None:
             return Frame(color, number=number).locked()
-        first, last = number - (not known.begins), number + (not known.ends)
-        back, ahead = evened(self._times[first : last + 1], number - first)
+        first, last = number - (not known.begins_shot), number + (not known.ends_shot)
+        there = not known.begins, not known.ends
+        back, ahead = evened(self._times[first : last + 1], number - first, there)
         motion = known.motion
         if (back, ahead) != (1.0, 1.0):
             motion = motion * np.array([back, back, ahead, ahead], np.float32)

@@ -23,6 +23,7 @@ from ..glance import Glance, is_cut
 from ..io.footage import Footage
 from ..io.picture_motion import FAR
 from ..motion_source import MotionSource
+from ..reel import FLASH, LONGEST
 from ..video_pictures import VideoPictures
 from ..video_settings import FlowSettings
 
@@ -39,9 +40,11 @@ class Known:
     """(height, width, 4) to_prev, to_next [px]; None without a source of motion, or alone."""
     depth: np.ndarray | None
     begins: bool
-    """A shot begins with it."""
+    """No motion leads to it from the picture before: that is of another shot, or of a flash."""
     ends: bool
-    """A shot ends with it."""
+    """No motion leads from it to the next picture."""
+    begins_shot: bool
+    ends_shot: bool
 
 
 class _Finder:
@@ -49,6 +52,7 @@ class _Finder:
 
     def __init__(self, footage: Footage, device: wgpu.GPUDevice, motion: MotionSource | None):
         self._pictures, self._count = VideoPictures(footage, device), len(footage)
+        self._times = footage.times.seconds
         self._kept: OrderedDict[int, Glance | None] = OrderedDict()
         self._motion, self._shot, self._anchor = motion, None, 0
         self._cuts: dict[int, bool] = {}
@@ -62,7 +66,9 @@ class _Finder:
                 self._shot = self._motion.shot(self._load)
             self._anchor = number
             motion, depth = self._shot(number) or (None, None)
-        return Known(motion, depth, self._begins(number), self._begins(number + 1))
+        parts = [self._begins(n) for n in (number, number + 1)]
+        shots = [begins and not self._is_flash(number + n) for n, begins in enumerate(parts)]
+        return Known(motion, depth, *parts, *shots)
 
     def _load(self, number: int) -> np.ndarray | None:
         if not self._same_shot(self._anchor, number):
@@ -78,8 +84,32 @@ class _Finder:
         near = abs(a - b) <= 2 * FAR
         return near and not any(map(self._begins, range(min(a, b) + 1, max(a, b) + 1)))
 
+    def _is_flash(self, number: int) -> bool:
+        """Whether what begins with a picture is a flash, or the end of one (see reel.py)."""
+        for first in range(number, max(number - LONGEST, 0), -1):
+            before = self._picture(first - 1)
+            if not self._within(first, number) or before is None:
+                return False
+            if not self._begins(first):
+                continue
+            for last in range(first + 1, min(first + LONGEST, self._count - 1) + 1):
+                after = self._picture(last) if self._within(first, last) else None
+                if after is None:
+                    break
+                if not is_cut(before, after):
+                    if last >= number:
+                        return True
+                    break
+        return False
+
+    def _within(self, first: int, last: int) -> bool:
+        """Whether a flash may last from one picture to another."""
+        if last <= first + 1:
+            return last < self._count
+        return last < self._count and self._times[last] - self._times[first] <= FLASH
+
     def _begins(self, number: int) -> bool:
-        """Whether a cut, or a gap, lies before a picture."""
+        """Whether a cut, a flash, the end of one, or a gap lies before a picture."""
         if number not in self._cuts:
             before, here = self._picture(number - 1), self._picture(number)
             self._cuts[number] = before is None or here is None or is_cut(before, here)
