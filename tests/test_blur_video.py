@@ -11,8 +11,11 @@ import make_clips as clips
 import make_frames as make
 from wgmb import video_batch
 from wgmb.cli import app
+from wgmb.cli.blur_video import make_wish
 from wgmb.color import linear, srgb, to_display
 from wgmb.io.footage import Footage
+from wgmb.settings import BlurSettings, InputSettings, ShutterSettings
+from wgmb.video_settings import VideoSettings
 
 SIZE = 96, 64  # width, height
 
@@ -196,6 +199,30 @@ def test_pictures_without_vectors_move_by_flow(tmp_path, capsys):
         capsys, *words, "--flow", "dis", "--samples", 16, "-v", "--overwrite"
     )
     assert "needs motion" in run(capsys, *words, "--flow", "none", "--overwrite", code=1)
+
+
+@pytest.mark.parametrize(
+    ("flow", "asked", "method"),
+    [
+        ("search", None, "gather"),
+        ("auto", None, "gather"),
+        ("dis", None, "tap"),
+        ("dis", "gather", "gather"),
+        ("search", "tap", "tap"),
+    ],
+)
+def test_the_method_suits_where_motion_comes_from(tmp_path, capsys, flow, asked, method):
+    """Pictures without vectors and a video take the same one."""
+    for n in (1, 2):
+        picture = to_display(make.picture(n)[..., :3], 8)
+        Image.fromarray(picture).save(tmp_path / f"a.{n}.png")
+    words = ["--flow", flow, *(["--method", asked] if asked else [])]
+    job = tmp_path / "a.json"
+    run(capsys, "job", tmp_path / "a.#.png", "-o", tmp_path / "b.#.png", "-j", job, *words)
+    assert f'"method": "{method}"' in job.read_text()
+    look, when = BlurSettings(method=asked), ShutterSettings().resolved()
+    wish = make_wish(look, when, InputSettings(), VideoSettings(flow=flow), None)
+    assert wish.blur.method.name == method
 
 
 def test_a_cut_between_pictures_is_not_crossed(tmp_path, capsys):

@@ -244,8 +244,11 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
         remarks.append(_of_conversion(conversion, clip, asked.output))
         asked = replace(asked, output=replace(asked.output, layers="picture"))
     video, how = _motion(clip, asked.video, adapter)
-    look = asked.look.resolved(clip=clip)
-    asked = replace(asked, look=look.for_pictures() if how else look, video=video)
+    if how:
+        look = replace(asked.look, method=asked.look.method or asked.video.method).for_pictures()
+    else:
+        look = asked.look.resolved(clip=clip)
+    asked = replace(asked, look=look, video=video)
     look, output = asked.look, asked.output
     asked.when.make()  # says what is wrong with it
     settings = {"wgmb": __version__} | plain(look) | plain(asked.when) | plain(asked.given)

@@ -215,7 +215,7 @@ class BlurSettings:
     """Blur method and options; the fields of METHOD_OPTIONS are added."""
 
     method: str | None = None
-    "Blur method; by default gather if depth is available, else tap."
+    "Blur method; by default gather if there is depth or motion is searched, else tap."
     samples: int | Literal["auto"] | None = None
     """Taps, images or rays per pixel: 16 (fusion: 8), or auto for motion from pictures;
     auto: 1 per pixel of blur length, at most 64.

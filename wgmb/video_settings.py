@@ -26,6 +26,11 @@ class FlowSettings:
     flow_quality: Literal["best", "fast"] = "best"
     "Motion: best, or fast."
 
+    @property
+    def method(self) -> str:
+        """The blur method that suits this motion: dense inverse search is to be quick."""
+        return "gather" if self.flow in ("auto", "search") else "tap"
+
     def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
         """Where motion comes from, and the same in words."""
         settled, how = self.settled(device)

@@ -122,8 +122,7 @@ def make_wish(
     """The settings of a run, with what is opened once for all its videos."""
     check_fits(given, look)
     check_highlights(video.highlights)
-    method = look.method or ("gather" if video.flow in ("auto", "search") else "tap")
-    look = replace(look, method=method).for_pictures()
+    look = replace(look, method=look.method or video.method).for_pictures()
     blur = look.make(when.make(), adapter)
     return Wish(look, when, given, video, blur, *video.source(blur.device))
 

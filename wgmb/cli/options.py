@@ -59,7 +59,10 @@ class BlurOptions(BlurSettings):
 
     method: Annotated[
         str | None,
-        Parameter(help=f"{', '.join(METHODS)}; default: gather if depth is available, else tap."),
+        Parameter(
+            help=f"{', '.join(METHODS)}; default: gather if there is depth or motion is searched, "
+            "else tap."
+        ),
     ] = None
 
 
