@@ -1,11 +1,15 @@
 """Videos through the command line as people have them: sound, colours, damage, games."""
 
+import os
+import tempfile
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import av
 import numpy as np
 import pytest
+from test_faults import small_disk
 from test_other_streams import FLASH, flash_and_click, flashing, packets
 
 import make_clips as clips
@@ -237,6 +241,98 @@ def test_lost_pictures_are_counted_and_nothing_else_is_lost(tmp_path, capsys):
     assert text.count("\n") == 1
     assert "could not be decoded" in text or "are damaged" in text
     assert len(Footage(tmp_path / "b.mkv")) > 36
+
+
+def encrypted(source, path):
+    """The same video with its samples encrypted (ISO/IEC 23001-7, cenc)."""
+    how = {
+        "encryption_scheme": "cenc-aes-ctr",
+        "encryption_key": "00112233445566778899aabbccddeeff",
+        "encryption_kid": "ffeeddccbbaa99887766554433221100",
+    }
+    with av.open(str(source)) as there, av.open(str(path), "w", container_options=how) as here:
+        into = {s.index: here.add_stream_from_template(s, opaque=True) for s in there.streams}
+        for packet in there.demux():
+            if packet.dts is not None:
+                packet.stream = into[packet.stream.index]
+                here.mux(packet)
+    return path
+
+
+def test_an_encrypted_file_says_so(tmp_path, capsys):
+    source = encrypted(clips.write(tmp_path / "a.mp4", tone=1), tmp_path / "e.mp4")
+    text = blur(capsys, source, "-o", tmp_path / "b.mp4", "-q", code=2)
+    assert "e.mp4: is encrypted" in text and text.count("\n") == 1
+    assert make.names_in(tmp_path) == ["a.mp4", "e.mp4"]
+
+
+@pytest.mark.parametrize("name", ["b.mp4", "b.mkv", "b.webm", "b.mov", "b.gif"])
+@pytest.mark.parametrize("resume", [False, True], ids=["", "resume"])
+def test_a_full_disk_is_one_line_and_nothing_is_left_or_lost(tmp_path, capsys, name, resume):
+    if resume and name in ("b.gif", "b.webm", "b.mov"):
+        pytest.skip("segments are the same in each container, and a GIF has none")
+    source, out = clips.write(tmp_path / "a.mp4", tone=1), tmp_path / "out"
+    out.mkdir()
+    words = ["--resume"] if resume else ["--overwrite"]
+    if not resume:
+        (out / name).write_bytes(b"mine")
+    with small_disk(1500):
+        text = blur(capsys, source, "-o", out / name, *words, "-q", code=1)
+    assert text.count("\n") == 1 and f"{out / name}" in text
+    assert make.names_in(out) == ([] if resume else [name])
+    assert resume or (out / name).read_bytes() == b"mine"
+
+
+@pytest.fixture
+def nobody(tmp_path_factory):
+    """A folder for a user who may not do everything, whom root becomes as long as the test runs."""
+    if os.geteuid():
+        yield tmp_path_factory.mktemp("nobody")
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        os.chmod(folder, 0o755)
+        try:
+            yield Path(folder)
+        finally:
+            os.seteuid(0)
+
+
+def test_files_and_folders_without_permission_are_one_line(nobody, capsys):
+    source, locked = clips.write(nobody / "a.mp4"), nobody / "locked"
+    hidden = clips.write(nobody / "hidden.mp4")
+    blur(capsys, source, "-o", nobody / "b.mp4", "-q")  # modules are loaded while they may be
+    hidden.chmod(0)
+    locked.mkdir()
+    locked.chmod(0o555)
+    before = make.names_in(nobody)
+    if not os.geteuid():
+        os.seteuid(65534)
+    cases = [
+        (hidden, nobody / "c.mp4", ()),
+        (source, locked / "c.mp4", ()),
+        (source, locked / "c.mp4", ("--resume",)),
+        (source, locked / "d" / "c.mp4", ()),
+    ]
+    for given, out, more in cases:
+        code = app.main([str(w) for w in ("blur", given, "-o", out, "--flow", "none", "-q", *more)])
+        text = capsys.readouterr().err
+        assert code in (1, 2) and "permission denied" in text.lower(), text
+        assert text.count("\n") == 1
+    assert make.names_in(nobody) == before and make.names_in(locked) == []
+
+
+def test_a_video_becomes_a_gif(tmp_path, capsys):
+    source, out = clips.write(tmp_path / "a.mp4", tone=1), tmp_path / "b.gif"
+    text = blur(capsys, source, "-o", out, "--fps", 12)
+    assert "b.gif: stream 1 (sound) is left out" in text
+    found = Footage(out)
+    assert (len(found), found.rate) == (6, 12)
+    for n, (_, picture) in enumerate(found):
+        grey = (clips.level(2 * n) - 16) / 219
+        shown = picture.planes[1][:40:2, :40:2].mean() / 255
+        assert abs(shown - grey) < 0.2
+    text = blur(capsys, source, "-o", tmp_path / "c.gif", "--fps", 60, "-q", code=2)
+    assert ".gif takes 1/600 to 50 frames per second, got 60" in text
 
 
 def test_an_output_that_cannot_be_written_is_one_line(tmp_path, capsys, monkeypatch):

@@ -96,14 +96,23 @@ def _sound(path: Path) -> list[bytes]:
 
 @row(quick=2, full=20)
 def resumed_videos(trial: Trial) -> Iterator[Line]:
-    """`kill -9` at a random moment, then --resume: the times and pictures of one run."""
+    """`kill -9` at a random moment, then --resume: the bytes of an unbroken run with --resume.
+
+    Those have the times and the sound of a run without, and its pictures but for what encoders
+    round otherwise at the beginning of a segment.
+    """
     source = flat(trial.folder / "in.mp4", 240, (96, 64), fps=4, tone=60)
-    whole = trial.folder / "whole.mp4"
+    plain, whole = trial.folder / "plain.mp4", trial.folder / "whole.mp4"
     words = ["--flow", "none", "-q"]
-    ended = wgmb("blur", source, "-o", whole, *words)
-    if ended.code:
-        raise RuntimeError(ended.wrong(0))
-    want, tally = _times_and_sums(whole), Tally("video, `kill -9`, then --resume", "runs")
+    ended = wgmb("blur", source, "-o", whole, *words, "--resume")
+    simple = wgmb("blur", source, "-o", plain, *words)
+    if ended.code or simple.code:
+        raise RuntimeError(ended.wrong(0) or simple.wrong(0))
+    tally = Tally("video, --resume, beside one run without", "videos")
+    other = "" if _sound(whole) == _sound(source) else "its sound is another"
+    tally.note("whole", _apart(plain, whole) or other)
+    yield tally.line()
+    tally, midway = Tally("video, `kill -9`, then --resume", "runs"), 0
     rng, lasts = np.random.default_rng(trial.seed), ended.seconds
     for number in range(trial.count):
         out = trial.folder / f"out {number}.mp4"
@@ -113,23 +122,25 @@ def resumed_videos(trial: Trial) -> Iterator[Line]:
         time.sleep(rng.uniform(0.2, 1.1) * lasts)
         process.send_signal(signal.SIGKILL)
         process.wait()
+        midway += out.with_name(f"{out.name}.segments").is_dir()
         again = wgmb(*line[len(WGMB) :], seconds=_PATIENCE)
-        wrong = again.wrong(0)
-        if not wrong:
-            times, sums = _times_and_sums(out)
-            far = max((abs(a - b) for a, b in zip(times, want[0], strict=False)), default=0.0)
-            off = max((abs(a - b) for a, b in zip(sums, want[1], strict=False)), default=0)
-            if len(times) != len(want[0]) or far > 1e-6:
-                wrong = f"{len(times)} of {len(want[0])} pictures, {far:.4f} s off"
-            elif off > 2 * 96 * 64:  # encoders round otherwise at the beginning of a segment
-                wrong = f"a picture is {off / (96 * 64):.1f} levels off"
-            elif _sound(out) != _sound(source):
-                wrong = "its sound is another"
-            begins = (".", f"{out.name}.")
-            left = [p.name for p in trial.folder.iterdir() if p.name.startswith(begins)]
-            wrong = wrong or (f"left over: {left[0]}" if left else "")
+        begins = (".", f"{out.name}.")
+        left = [p.name for p in trial.folder.iterdir() if p.name.startswith(begins)]
+        wrong = again.wrong(0) or (f"left over: {left[0]}" if left else "")
+        if not wrong and out.read_bytes() != whole.read_bytes():
+            wrong = _apart(whole, out) or "its bytes are others"
         tally.note(f"run {number}", wrong)
-    yield tally.line()
+    yield tally.line(f"{midway} died with segments begun")
+
+
+def _apart(one: Path, other: Path) -> str:
+    """What is different in two videos of one picture size; "" where nothing is that matters."""
+    (times, sums), (also, more) = _times_and_sums(one), _times_and_sums(other)
+    far = max((abs(a - b) for a, b in zip(times, also, strict=False)), default=0.0)
+    if len(times) != len(also) or far > 1e-6:
+        return f"{len(also)} of {len(times)} pictures, {far:.4f} s off"
+    off = max((abs(a - b) for a, b in zip(sums, more, strict=True)), default=0)
+    return f"a picture is {off / (96 * 64):.1f} levels off" if off > 2 * 96 * 64 else ""
 
 
 def _flash_and_click(path: Path) -> tuple[float, float]:

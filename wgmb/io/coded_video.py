@@ -7,6 +7,7 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
+import av
 import numpy as np
 from av.video.reformatter import VideoReformatter
 
@@ -14,6 +15,7 @@ from ..coding import CodedPicture, Coding
 from ..errors import InputError
 from .encoders import NO_FACTS, Encoding, Facts
 from .other_streams import OtherStreams
+from .palettes import TICK, Palettes, check_rate
 from .pixels import THREADS, frame_of, pixel_format
 from .video_file import VideoFile, tag
 
@@ -24,7 +26,8 @@ class CodedVideo:
     `coding` is what `encoding.coding` returned. `rate`: pictures a second, usually; `base`: the
     tick of the file's clock [s], of which all times should be multiples (see clock.tick).
     Encoders that share colour between pixels may need even sizes: the last row or column is then
-    repeated, which `padding` says. OSError if the file cannot be written, InputError for an encoder
+    repeated, which `padding` says. A GIF counts hundredths of a second, and has 256 colours a
+    picture. OSError if the file cannot be written, InputError for an encoder
     that does not start. `others`: streams to put beside the pictures, with their texts and
     dates; what of them the file cannot hold is in `left_out`.
     """
@@ -42,6 +45,10 @@ class CodedVideo:
         metadata: dict[str, str] | None = None,
         others: OtherStreams | None = None,
     ):
+        is_gif = encoding.codec == "gif"
+        if is_gif:
+            check_rate(path, rate)
+            base = TICK
         self.path, self._coding, self._base = path, coding, base
         self._others = others
         self._size = size
@@ -50,6 +57,7 @@ class CodedVideo:
         whole = size[0] + self.padding[0], size[1] + self.padding[1]
         self._planar, self._pixels = pixel_format(coding), encoding.pixels(coding)
         self._by = VideoReformatter()
+        self._palettes = Palettes(*whole) if is_gif else None
         texts = (metadata or {}) | (others.metadata if others else {})
         self.left_out = encoding.left_out(facts)
         self.file = VideoFile(path, temporary, encoding, coding, whole, rate, base, facts, texts)
@@ -72,12 +80,21 @@ class CodedVideo:
             raise InputError(f"{self.path}: pictures at times that do not ascend ({float(time)} s)")
         self._last = now
         frame = frame_of(self._filled(picture.planes), self._planar)
-        tag(frame, self._coding)
-        if self._pixels != self._planar:
-            frame = self._by.reformat(frame, format=self._pixels, threads=THREADS)
-        self.file.encode(frame, now)
+        if self._palettes is not None:
+            frame = self._by.reformat(frame, format="rgb24", threads=THREADS)
+            self._paint(self._palettes, frame, now)
+        else:
+            tag(frame, self._coding)
+            if self._pixels != self._planar:
+                frame = self._by.reformat(frame, format=self._pixels, threads=THREADS)
+            self.file.encode(frame, now)
         if self._others is not None:
             self.file.mux(self._others.until(time))
+
+    def _paint(self, palettes: Palettes, frame: av.VideoFrame | None, tick: int = 0) -> None:
+        """Encode a picture of a GIF, or what is left of it."""
+        for painted, at in palettes.of(frame, tick):
+            self.file.encode(painted, at)
 
     def _filled(self, planes: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
         across, down = self.padding
@@ -93,6 +110,8 @@ class CodedVideo:
         if self._last is None:
             self.abandon()
             raise InputError(f"output {self.path}: no pictures to write")
+        if self._palettes is not None:
+            self._paint(self._palettes, None)
         self.file.finish()
         if self._others is not None:
             self.file.mux(self._others.rest())

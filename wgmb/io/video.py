@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from fractions import Fraction
 from pathlib import Path
-from typing import cast
 
 import av
 import numpy as np
-from av.error import BlockingIOError, EOFError, FFmpegError
-from av.filter import Graph
+from av.error import FFmpegError
 from av.video.reformatter import Colorspace, VideoReformatter
 
 from ..coding import BT709, SRGB, UNSPECIFIED, Coding
@@ -20,6 +17,7 @@ from ..errors import InputError
 from . import atomic
 from .encoders import SUFFIXES as SUFFIXES
 from .encoders import Encoding, chosen
+from .palettes import TICK, Palettes, check_rate
 from .pixels import THREADS
 from .video_file import VideoFile, tag
 
@@ -35,9 +33,7 @@ _DISPLAYS = {  # primaries and transfer of displays, by the names that configs g
     "hlg_rec2020_display": (9, 18), "rec2100_hlg_display": (9, 18),
 }  # fmt: skip
 _FINEST = 1_001_000  # denominator of a rate: FFmpeg counts in 32 bits
-_TICK = Fraction(1, 100)  # of a GIF's clock [s]
 _RATES = Fraction(1, 1000), Fraction(1000)
-_GIF_RATES = Fraction(1, 600), Fraction(50)  # a delay has 16 bits; under two ticks it counts as ten
 
 
 class Video:
@@ -62,18 +58,16 @@ class Video:
         self.path, self.temporary, self.settings = path, temporary, settings
         self._encoding = encoding or chosen(path)
         self._is_gif = self._encoding.codec == "gif"
-        least, most = _GIF_RATES if self._is_gif else _RATES
-        if not least <= fps <= most:
-            raise InputError(
-                f"output {path}: {path.suffix} takes {least} to {most} frames per second, "
-                f"got {float(fps):g}"
-            )
+        if self._is_gif:
+            check_rate(path, fps)
+        else:
+            check_rate(path, fps, _RATES)
         self.fps = fps.limit_denominator(_FINEST)
         self._coding = self._encoding.coding(_coding(display, self._encoding.codec == "ffv1"))[0]
         self._pixels = self._encoding.pixels(self._coding)
         self._by = VideoReformatter()
         self._file: VideoFile | None = None
-        self._palettes: Graph | None = None
+        self._palettes: Palettes | None = None
         self._frames = 0
         self._size: tuple[int, ...] = ()
 
@@ -97,10 +91,10 @@ class Video:
 
     def _begin(self, width: int, height: int) -> VideoFile:
         if self._is_gif:
-            self._palettes = _palettes(width, height)
+            self._palettes = Palettes(width, height)
         return VideoFile(
             self.path, self.temporary, self._encoding, self._coding, (width, height), self.fps,
-            _TICK if self._is_gif else 1 / self.fps,
+            TICK if self._is_gif else 1 / self.fps,
             metadata={"comment": f"wgmb {self.settings}"},
         )  # fmt: skip
 
@@ -116,19 +110,15 @@ class Video:
             self._file.encode(frame, self._frames)
             self._frames += 1
             return
-        if frame is not None:
-            frame.pts, frame.time_base = self._tick(self._frames), _TICK
-            self._frames += 1
-        self._palettes.push(frame)
-        for paletted in _pulled(self._palettes):
-            assert paletted.pts is not None
-            self._file.encode(paletted, paletted.pts)
+        for painted, tick in self._palettes.of(frame, self._tick(self._frames)):
+            self._file.encode(painted, tick)
+        self._frames += frame is not None
         if frame is None:
             self._file.encode(None)
 
     def _tick(self, frame: int) -> int:
         """Return the time at which a frame of a GIF is shown, in its ticks."""
-        return round(frame / (self.fps * _TICK))
+        return round(frame / (self.fps * TICK))
 
     def close(self) -> None:
         """Finish the file and put it in place; OSError if it cannot be."""
@@ -156,27 +146,3 @@ def _coding(display: Collection[str], lossless: bool) -> Coding:
         return Coding("rgb", 8, (1, 1), full_range=True, matrix=0, transfer=transfer,
                       primaries=primaries)  # fmt: skip
     return Coding(transfer=transfer, primaries=primaries)
-
-
-def _palettes(width: int, height: int) -> Graph:
-    """A filter that gives every frame the 256 colours that suit it, and dithers."""
-    graph = Graph()
-    pixels = av.VideoFormat("rgb24", width, height)
-    source = graph.add_buffer(width=width, height=height, format=pixels, time_base=_TICK)
-    copies = graph.add("split")
-    colors = graph.add("palettegen", "stats_mode=single")
-    painted = graph.add("paletteuse", "new=1:dither=floyd_steinberg")
-    source.link_to(copies)
-    copies.link_to(painted, 0, 0)
-    copies.link_to(colors, 1, 0)
-    colors.link_to(painted, 0, 1)
-    painted.link_to(graph.add("buffersink"))
-    graph.configure()
-    return graph
-
-
-def _pulled(graph: Graph) -> Iterator[av.VideoFrame]:
-    """The frames that are ready."""
-    with contextlib.suppress(BlockingIOError, EOFError):
-        while True:
-            yield cast(av.VideoFrame, graph.pull())
