@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import make_frames as make
+import make_stereo as stereo
 from wgmb import InputError, Shutter
 from wgmb.io import exr
 from wgmb.rates import Conversion
@@ -182,6 +183,81 @@ def test_no_exposure_mixes_two_shots(tmp_path, capsys):
         assert min(light[..., 0].max(), light[..., 1].max()) == 0
 
 
+HALF = "--fps-in", "48", "--fps", "24", "--shutter", "360"
+
+
+def test_vectors_of_files_beside_the_pictures_are_those_of_one_file(tmp_path, capsys):
+    places = {name: tmp_path / name for name in ("whole", "color", "data")}
+    for place in places.values():
+        place.mkdir()
+    for n in range(1, 7):
+        channels = make.frame(n)
+        color = {k: v for k, v in channels.items() if "Combined" in k}
+        data = {k: v for k, v in channels.items() if k not in color}
+        for name, some in zip(places, (channels, color, data), strict=True):
+            make.write_exr(places[name] / f"x.{n:04d}.exr", some)
+    whole, color, data = (str(place / "x.####.exr") for place in places.values())
+    run(capsys, whole, tmp_path / "a", *HALF)
+    run(capsys, color, tmp_path / "b", *HALF, "--also", data)
+    names = make.names_in(tmp_path / "a")
+    assert names == make.names_in(tmp_path / "b") and len(names) == 3
+    for name in names:
+        np.testing.assert_array_equal(read(tmp_path / "b" / name), read(tmp_path / "a" / name))
+    before = contents(tmp_path / "b")
+    make.write_exr(places["data"] / "x.0006.exr", {
+        k: v for k, v in make.frame(6, velocity=FAST).items() if "Combined" not in k
+    })  # fmt: skip
+    assert "2 already done" in run(capsys, color, tmp_path / "b", *HALF, "--also", data, "--resume")
+    changed = {name for name, data in contents(tmp_path / "b").items() if data != before[name]}
+    assert changed == {"b.0003.exr"}
+
+
+def test_each_view_of_stereo_frames_is_converted_by_its_own_vectors(tmp_path, capsys):
+    both = tmp_path / "both"
+    both.mkdir()
+    pattern = stereo.with_stereo(both, stereo.single_part, range(1, 7))
+    run(capsys, pattern, tmp_path / "o", *HALF)
+    names = make.names_in(tmp_path / "o")
+    assert len(names) == 3
+    for view, velocity in (("right", stereo.RIGHT), ("left", stereo.LEFT)):
+        alone = tmp_path / view
+        alone.mkdir()
+        for n in range(1, 7):
+            make.write_exr(alone / f"x.{n:04d}.exr", stereo.one_view(n, velocity))
+        run(capsys, str(alone / "x.####.exr"), tmp_path / f"o {view}", *HALF)
+        lead = "" if view == "right" else "left."
+        for name in names:
+            got, want = (make.plain_read(tmp_path / o / name) for o in ("o", f"o {view}"))
+            for c in "RGB":
+                np.testing.assert_array_equal(got[lead + c], want[c])
+    run(capsys, pattern, tmp_path / "p", *HALF, "--view", "left")
+    assert make.names_in(tmp_path / "p") == names
+
+
+def test_views_in_files_of_their_own_stay_there(tmp_path, capsys):
+    for view, velocity in (("left", stereo.LEFT), ("right", stereo.RIGHT)):
+        for n in range(1, 5):
+            make.write_exr(tmp_path / f"x.{view}.{n:04d}.exr", stereo.one_view(n, velocity))
+    words = "blur", tmp_path / "x.%V.####.exr", "-o", tmp_path / "o" / "b.%V.####.exr"
+    code, _, err = make.inside(capsys, *words, "--method", "tap", *HALF)
+    assert code == 0, err
+    assert make.names_in(tmp_path / "o") == [
+        f"b.{view}.{n:04d}.exr" for view in ("left", "right") for n in (1, 2)
+    ]
+
+
+def test_a_view_that_a_frame_of_an_exposure_lacks_fails_that_exposure(tmp_path, capsys):
+    for n in range(1, 7):
+        views = ("left", "right") if n != 5 else ("left",)
+        for view in views:
+            channels = stereo.one_view(n, getattr(stereo, view.upper()))
+            make.write_exr(tmp_path / f"x.{view}.{n:04d}.exr", channels)
+    words = "blur", tmp_path / "x.%V.####.exr", "-o", tmp_path / "o" / "b.%V.####.exr"
+    code, _, err = make.inside(capsys, *words, "--method", "tap", *HALF)
+    assert code == 1 and "frame 3 failed" in err, err
+    assert "b.right.0003.exr" not in make.names_in(tmp_path / "o")
+
+
 # ---- runs -----------------------------------------------------------------------------------
 
 
@@ -252,3 +328,7 @@ def test_videos_and_jobs_have_no_rate_of_their_frames(tmp_path, capsys):
     code, _, err = make.inside(capsys, "blur", "--job", tmp_path / "j.json", "--fps-in", "240")
     assert (code, err.count("\n")) == (2, 1)
     assert "--job has all settings" in err
+    words = "job", tmp_path / "x.####.exr", "-o", tmp_path / "o.####.exr", "-j", tmp_path / "j.json"
+    code, _, err = make.inside(capsys, *words, "--fps-in", "240", "--fps", "60")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "--fps-in does not go into job files" in err and "wgmb blur" in err

@@ -218,6 +218,35 @@ def test_a_missing_layer_is_refused_with_the_files_name_once(shot, passes):
     assert "available: " in str(error.value)
 
 
+@pytest.mark.parametrize(
+    "options",
+    ["--layer nope", "--depth nope", "--vectors nuke", "--vectors blender --vector-layer nope",
+     "--holdout nope", "--scale nope:2", "--holdout IndexOB=7"],
+)  # fmt: skip
+def test_a_layer_that_no_frame_has_is_one_line_before_the_first_frame(
+    tmp_path, capsys, shot, options
+):
+    words = "blur", shot, "-o", tmp_path / "o" / "b.####.exr", "--method", "tap", *options.split()
+    code, said, err = make.inside(capsys, *words)
+    assert (code, said, err.count("\n")) == (2, "", 1)
+    assert "available: " in err and not (tmp_path / "o").exists()
+
+
+def test_a_layer_that_some_frames_lack_fails_those(tmp_path, capsys):
+    for n in range(1, 6):
+        plane = {"mask.Y": np.zeros((make.HEIGHT, make.WIDTH), "f4")} if n > 2 else {}
+        make.write_exr(tmp_path / f"x.{n:04d}.exr", make.frame(n) | plane)
+    words = "blur", tmp_path / "x.####.exr", "-o", tmp_path / "o" / "b.####.exr", "--method", "tap"
+    code, _, err = make.inside(capsys, *words, "--holdout", "mask")
+    assert code == 1 and "2 of 5 frames failed" in err
+    assert make.names_in(tmp_path / "o") == [f"b.{n:04d}.exr" for n in (3, 4, 5)]
+
+
+def test_vectors_of_passes_are_not_a_word():
+    with pytest.raises(InputError, match=r"`vectors` must be Vectors, .*got 'none'"):
+        Passes(vectors="none")
+
+
 # ---- cameras --------------------------------------------------------------------------------
 
 

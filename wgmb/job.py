@@ -236,6 +236,7 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
     """
     asked = replace(asked, when=asked.when.resolved())
     clip, shown = asked.opened()
+    clip.check_layers()
     remarks = list(map(_of_scale, asked.look.scale))
     if asked.color.space(shown) is None:
         remarks.append(_check_space(clip, shown))

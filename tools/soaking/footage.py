@@ -119,10 +119,13 @@ def resumed_videos(trial: Trial) -> Iterator[Line]:
         line = [*WGMB, "blur", str(source), "-o", str(out), *words, "--resume"]
         quiet = subprocess.DEVNULL
         process = subprocess.Popen(line, stdout=quiet, stderr=quiet, env=environment())
-        time.sleep(rng.uniform(0.2, 1.1) * lasts)
+        segments = out.with_name(f"{out.name}.segments")
+        while number % 4 and process.poll() is None and not segments.is_dir():
+            time.sleep(0.01)
+        time.sleep(rng.uniform(0, 0.5) * lasts)
         process.send_signal(signal.SIGKILL)
         process.wait()
-        midway += out.with_name(f"{out.name}.segments").is_dir()
+        midway += segments.is_dir()
         again = wgmb(*line[len(WGMB) :], seconds=_PATIENCE)
         begins = (".", f"{out.name}.")
         left = [p.name for p in trial.folder.iterdir() if p.name.startswith(begins)]

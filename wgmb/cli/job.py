@@ -48,6 +48,7 @@ def job(
     chunk: int = 16,
     openjd: Path | None = None,
     slurm: Path | None = None,
+    fps_in: Annotated[str | None, Parameter(show=False)] = None,
     confidence: bool = False,
     config: Path | None = None,
     adapter: str | None = None,
@@ -84,6 +85,10 @@ def job(
     """
     if is_video(pattern):
         raise InputError(f"{pattern}: a video is read by one process; `wgmb blur` blurs it")
+    if fps_in is not None:
+        raise InputError(
+            "`fps_in` does not go into job files: `wgmb blur` makes frames of another rate"
+        )
     if chunk < 1:
         raise InputError(f"--chunk must be 1 frame or more, got {chunk}")
     _check_target("--job", file, (".json",), is_job)

@@ -44,6 +44,7 @@ from .frame_numbers import (
     views_on_disk,
 )
 from .input_space import in_space
+from .layers import MissingLayerError
 from .masks import Masks
 from .neighbours import Neighbours, extras
 from .picture_motion import FAR, PictureMotion
@@ -92,6 +93,9 @@ class Passes:
         return tuple(name for name in named if name)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.vectors, vectors.Vectors):
+            given = f"got {self.vectors!r}"
+            raise InputError(f"`vectors` must be Vectors, such as Vectors('none'), {given}")
         for name in ("holdout", "scale"):
             given = getattr(self, name)
             object.__setattr__(self, name, (given,) if isinstance(given, str) else tuple(given))
@@ -700,6 +704,27 @@ class Clip:
         The headers of the frames are searched once, up to the first that has the name.
         """
         self._masks.check_names()
+
+    def check_layers(self) -> None:
+        """InputError where a layer that is asked for by its name is in none of the frames.
+
+        The first frame is looked at, and only if it lacks one the middle and the last one.
+        """
+        named = self.passes.color, *self.passes.layers
+        if not any(named) and self.passes.vectors.convention in ("auto", "none"):
+            return
+        first: MissingLayerError | None = None
+        for number in dict.fromkeys(self.numbers[i] for i in (0, len(self.numbers) // 2, -1)):
+            try:
+                for source in self.sources(number):
+                    self.frame(source)
+                return
+            except MissingLayerError as error:
+                first = first or error
+            except (InputError, OSError):  # its turn to fail comes
+                return
+        if first is not None:
+            raise first
 
 
 def _size_and_time(path: Path) -> tuple[int, int]:

@@ -134,7 +134,7 @@ def about(name: str | Path):
     except InputError as error:
         if str(name) in str(error):
             raise
-        raise InputError(f"{name}: {error}") from None
+        raise type(error)(f"{name}: {error}") from None
 
 
 def read(

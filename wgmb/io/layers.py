@@ -10,6 +10,11 @@ from ..errors import InputError
 
 Channels = Mapping[str, np.ndarray]
 
+
+class MissingLayerError(InputError):
+    """A layer that was asked for by its name is not in a file."""
+
+
 _COMPONENTS = (
     {"x": 0, "y": 1, "z": 2, "w": 3},
     {"r": 0, "g": 1, "b": 2, "a": 3},
@@ -131,7 +136,8 @@ def pick(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:
     alike = [k for k in by_layer if stem(k) == wanted.lower()]
     if len(alike) == 1:
         return alike[0]
-    raise InputError(f"no {what} {wanted!r}; available: {', '.join(map(repr, by_layer))}")
+    there = ", ".join(map(repr, by_layer))
+    raise MissingLayerError(f"no {what} {wanted!r}; available: {there}")
 
 
 def one_channel(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:

@@ -125,7 +125,9 @@ class Output:
         elif suffix in STILLS:
             stills.require(suffix)
         if is_video and resume:
-            raise InputError("`resume` is not available for videos, only for frame files")
+            raise InputError(
+                "`resume` is not available for videos of rendered frames, only for frame files"
+            )
         if not is_video and len(numbers) > 1 and not is_pattern(pattern):
             raise InputError(
                 f"output {pattern}: {len(numbers)} frames need a pattern such as out.####.exr"

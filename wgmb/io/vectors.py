@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError, check_choice
-from .layers import component, layers, one_channel, pick, stem
+from .layers import MissingLayerError, component, layers, one_channel, pick, stem
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ def channels_of(
             else:
                 found.append(("next", members, convention.next))
     if not found:
-        raise InputError(
+        raise MissingLayerError(
             f"no {vectors.convention} vectors ({' or '.join(convention.stems)}); "
             f"available: {', '.join(map(repr, by_layer))}"
         )
