@@ -14,6 +14,7 @@ from functools import cache
 import wgpu
 
 from ..errors import DeviceError, GpuMemoryError, InputError
+from .c_types import quicken_wgpu
 from .kernels import forget_kernels
 
 SOFTWARE = "CPU"  # adapter_type of lavapipe, SwiftShader, WARP
@@ -152,6 +153,7 @@ def claim() -> None:
             'that is spawned (multiprocessing.get_context("spawn")), or forked earlier'
         )
     _process = os.getpid()
+    quicken_wgpu()
 
 
 @contextmanager
