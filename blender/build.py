@@ -122,8 +122,8 @@ def files_of(platform: str, wheels: list[Path]) -> Iterator[tuple[str, bytes]]:
     """Names and contents of a bundle's files."""
     yield "blender_manifest.toml", manifest(platform, wheels).encode()
     yield "LICENSE", (HERE / "LICENSE").read_bytes()
-    for path in sorted(ADD_ON.glob("*.py")):
-        yield path.name, path.read_bytes()
+    for path in sorted(ADD_ON.rglob("*.py")):
+        yield path.relative_to(ADD_ON).as_posix(), path.read_bytes()
     for path in wheels:
         yield f"wheels/{path.name}", path.read_bytes()
 

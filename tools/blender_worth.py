@@ -21,6 +21,7 @@ import scenes
 import wgmb
 from wgmb_blender import picture, sharp
 from wgmb_blender.rendering import at_once
+from wgmb_blender.wgmb_worker.recipe import SharpFrames
 
 SIZE, NUMBER, TRUTH = (240, 135), 5, 512
 
@@ -46,7 +47,7 @@ def shaded():
 
 def sharp_frames(scene, folder: Path, samples: int) -> float:
     """Render frame 5 and its neighbours; returns the seconds of one."""
-    files = sharp.SharpFrames(str(folder / f"sharp{samples}_"))
+    files = SharpFrames(str(folder / f"sharp{samples}_"))
     scene.cycles.samples = samples
     seconds = []
     for n in (NUMBER - 1, NUMBER, NUMBER + 1):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import command, operators, panel, settings
+from . import command, operators, panel, process, settings
 
 _PARTS = (settings, operators, panel, command)
 
@@ -31,3 +31,4 @@ def unregister() -> None:
     """Remove all that `register` added."""
     for part in reversed(_PARTS):
         part.unregister()
+    process.end_kept()

@@ -1,219 +1,82 @@
-"""Sharp files to blurred ones, by wgmb, in a thread: nothing here touches Blender.
-
-A blurred file has the picture alone, or all that its sharp one has, with other pictures.
-"""
+"""Frames blurred by the other process, ahead of the one that is asked for."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import bpy
 
-from .backends import leave_opengl
-from .picture import Picture
-from .problem import NoAdapterError, ProblemError
-from .sharp import MATTE, SharpFrames, View
+from .process import Process
+from .sharp import PASSES
+from .wgmb_worker.problem import ProblemError
+from .wgmb_worker.recipe import COMPOSITE, MATTE, Recipe, Setup, View, told
 
-COMPOSITE = "Composite"
 _AHEAD = 2  # frames that are blurred, or wait to be, while one is written
 
 
-@dataclass
-class Blurred:
-    """One frame: the blurred file of each view, and what there is to say about it."""
-
-    number: int
-    files: list[Path]
-    notes: list[str] = field(default_factory=list)
-    moves: bool = True
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """How frames are blurred. `layers`: the view layers, or the composite, whose pictures are.
-
-    `rendered`: frames that may be neighbours; None: all on disk. `kept`: names of objects that
-    stay sharp. `folder`: for the blurred files, which are `is_whole` if they have all passes.
-    """
-
-    sharp: SharpFrames
-    views: Sequence[View]
-    layers: Sequence[str]
-    frames: Sequence[int]
-    rendered: frozenset[int] | None
-    picture: Picture
-    cuts: Sequence[int]
-    kept: Sequence[str]
-    folder: Path
-    is_whole: bool
-
-    def file(self, number: int, view: View) -> Path:
-        """The blurred file of a frame."""
-        return self.folder / f"blurred_{number:06d}{view.suffix}.exr"
-
-
-def open_blur(method: str, shutter: Any, samples: int | str, device: str | None) -> Any:
-    """A wgmb.Blur; NoAdapterError where there is nothing to run it on."""
-    import wgmb
-
-    leave_opengl()
-    try:
-        return wgmb.Blur(method, shutter=shutter, samples=samples, device=device)
-    except wgmb.DeviceError as error:
-        raise NoAdapterError(
-            "No Vulkan, Metal or DirectX 12 driver found; motion blur cannot run here "
-            f"({plain(error)})"
-        ) from None
-    except wgmb.Error as error:
-        raise ProblemError(plain(error)) from None
-
-
 class Blurring:
-    """Blurs the frames of a recipe, one after the other, ahead of the one that is asked for."""
+    """The frames of a recipe, one after the other."""
 
-    def __init__(self, recipe: Recipe, blur: Any):
-        self._recipe, self._blur = recipe, blur
-        self._clips: dict[tuple[str, str], Any] = {}
-        self._pool = ThreadPoolExecutor(1, "wgmb")
-        self._running: dict[int, Future[Blurred]] = {}
+    def __init__(self, process: Process, setup: Setup, recipe: Recipe):
+        self.process, self.recipe = process, recipe
+        self._words = {"setup": told(setup), "recipe": told(recipe)}
+        self._running: dict[int, Future[dict[str, Any]]] = {}
 
-    def blurred(self, number: int) -> Iterator[Future[Blurred]]:
-        """Yields the frame's future until it is done."""
-        ahead = [n for n in self._recipe.frames if n >= number][: 1 + _AHEAD]
-        for n in ahead:
+    def ask(self, number: int) -> Future[dict[str, Any]]:
+        """The frame: its `files`, one of each view, `notes`, and whether anything `moves`."""
+        for n in [n for n in self.recipe.frames if n >= number][: 1 + _AHEAD]:
             if n not in self._running:
-                self._running[n] = self._pool.submit(self._one, n)
-        future = self._running[number]
-        yield future
-        while not future.done():
-            yield future
-
-    def close(self) -> None:
-        """Wait for the frame that is being blurred, and do no other."""
-        self._pool.shutdown(wait=True, cancel_futures=True)
-
-    def _one(self, number: int) -> Blurred:
-        recipe, notes, moves, files = self._recipe, [], False, []
-        for view in recipe.views:
-            path = recipe.sharp.path(number, view)
-            if not path.is_file():
-                raise ProblemError(f"Frame {number}: there is no {path}")
-            results = {}
-            for layer in recipe.layers:
-                clip = self._clip(view, layer)
-                source = clip.source(number)
-                if not any(name.endswith("Vector.X") for name in source.channels):
-                    raise ProblemError(f"Frame {number}: {path.name} has no Vector pass")
-                frame = self._frame(clip, source, number)
-                moves |= bool(np.any(frame.motion))
-                results[layer] = source, self._blur(frame)
-                clip.forget(number - 1)
-                if number in clip.cuts:
-                    notes.append(f"Camera cut before frame {number}")
-                notes += [f"Frame {n}: {text}" for text, on in clip.notes.items() for n in on]
-            files.append(self._write(number, view, results))
-        return Blurred(number, files, notes, moves)
-
-    def _frame(self, clip: Any, source: Any, number: int) -> Any:
-        """The frame and those of its neighbours that were rendered with it."""
-        frame = clip.with_neighbours(source)
-        there = self._recipe.rendered
-        if there is not None:
-            gone = {"prev": number - 1, "next": number + 1}
-            gone = {name: None for name, n in gone.items() if n not in there}
-            frame = replace(frame, **gone).locked() if gone else frame
-        return frame
-
-    def _clip(self, view: View, layer: str) -> Any:
-        if (view.name, layer) not in self._clips:
-            import wgmb
-
-            recipe = self._recipe
-            kept = held_out(recipe, view, layer) if recipe.kept else ()
-            self._clips[view.name, layer] = wgmb.Clip(
-                recipe.sharp.pattern(view),
-                passes=wgmb.Passes(
-                    color=f"{layer}.Combined", vectors=wgmb.Vectors("blender"), holdout=kept
-                ),
-                skip_missing=True,
-                cuts=",".join(map(str, recipe.cuts)) or None,
-            )
-        return self._clips[view.name, layer]
-
-    def _write(self, number: int, view: View, results: dict[str, tuple[Any, np.ndarray]]) -> Path:
-        from wgmb.io import atomic, exr
-
-        recipe, laid = self._recipe, self._recipe.picture.laid
-        path = recipe.file(number, view)
-        width, height = recipe.picture.result
-        window = (0, 0, width - 1, height - 1)
-        first, rgba = next(iter(results.values()))
-        if not recipe.is_whole:
-            planes = {c: laid(rgba[..., i]) for i, c in enumerate("RGBA"[: rgba.shape[2]])}
-            part = exr.Part("", planes, {}, window, window)
-            atomic.write_file(path, exr.encode(exr.Exr(path, [part]), "zips"))
-            return path
-        channels: dict[int, dict[str, np.ndarray]] = {}
-        for i, part in enumerate(first.file.parts):
-            channels[i] = {name: laid(plane) for name, plane in part.channels.items()}
-        for source, rgba in results.values():
-            for c, name in enumerate(source.color):
-                part, stored = source.origin[name]
-                place = next(i for i, one in enumerate(source.file.parts) if one is part)
-                channels[place][stored] = laid(rgba[..., c])
-        parts = [
-            replace(part, channels=channels[i], data_window=window, display_window=window)
-            for i, part in enumerate(first.file.parts)
-        ]
-        atomic.write_file(path, exr.encode(exr.Exr(path, parts), "zips"))
-        return path
+                self._running[n] = self.process.ask("blur", number=n, **self._words)
+        return self._running.pop(number)
 
 
-def held_out(recipe: Recipe, view: View, layer: str) -> tuple[str, ...]:
-    """The masks of the objects that stay sharp, by the ids in the Cryptomatte of a layer.
+def save_layers(
+    process: Process,
+    scene: bpy.types.Scene,
+    files: Sequence[Path],
+    composites: Sequence[Path] | None,
+    targets: Sequence[Path],
+) -> Iterator[Future[None]]:
+    """Blurred files, of each view, as multilayer files; yields what is to be waited for.
 
-    The ids are a hash of the names, so the first frame that lists an object tells for all.
+    Passes that were only switched on for the blur are left out; depth and compression are those of
+    the scene's output.
     """
-    from wgmb.io import exr
-
-    ids: dict[str, str] = {}
-    matte = ""
-    for number in recipe.frames:
-        path = recipe.sharp.path(number, view)
-        if not path.is_file():
-            continue
-        for part in exr.read(path, header_only=True).parts:
-            for name, manifest in _mattes(part.attributes):
-                own = name.rpartition(".")
-                if own[2] == MATTE[1] and (own[0] == layer or layer == COMPOSITE):
-                    matte = matte or name
-                    ids |= {k: v for k, v in manifest.items() if k in recipe.kept}
-        if len(ids) == len(recipe.kept):
-            break
-    if not matte:
+    image = scene.render.image_settings
+    if len(files) != len(targets):
         raise ProblemError(
-            f"Keep Sharp: the sharp frames have no Cryptomatte of objects in {layer}; render them "
-            "again, or switch the pass on"
+            "Stereo frames as OpenEXR MultiLayer need Views Format: Individual in the output"
         )
-    return tuple(f"{matte}=0x{id_}" for id_ in dict.fromkeys(ids.values()))
+    left_out = [
+        (layer.name, name)
+        for layer in scene.view_layers
+        for switch, name in (*PASSES.items(), MATTE)
+        if not getattr(layer, switch)
+    ]
+    for i, (file, target) in enumerate(zip(files, targets, strict=True)):
+        yield process.ask(
+            "layers",
+            file=str(file),
+            composite=None if composites is None else str(composites[i]),
+            path=str(target),
+            left_out=left_out,
+            is_half=image.color_depth == "16",
+            codec=image.exr_codec,
+        )
 
 
-def _mattes(attributes: dict[str, Any]) -> Iterator[tuple[str, dict[str, str]]]:
-    """The Cryptomattes of a file: name and ids by object."""
-    for key, name in attributes.items():
-        if key.startswith("cryptomatte/") and key.endswith("/name"):
-            manifest = attributes.get(key.removesuffix("name") + "manifest", "{}")
-            try:
-                yield str(name), json.loads(manifest)
-            except ValueError:
-                raise ProblemError(f"The manifest of the Cryptomatte {name} is damaged") from None
-
-
-def plain(error: BaseException) -> str:
-    """A message in one line, without the names that Python has for things."""
-    return " ".join(str(error).replace("`", "").split()) or type(error).__name__
+def both_halves(
+    process: Process, recipe: Recipe, number: int, file: Path, view: View, layer: str, path: Path
+) -> Future[None]:
+    """Ask for a sharp frame and its blurred one, side by side in a numpy file."""
+    return process.ask(
+        "both",
+        file=str(file),
+        sharp=str(recipe.sharp.path(number, view)),
+        layer=COMPOSITE if COMPOSITE in recipe.layers else layer,
+        picture=told(recipe.picture),
+        path=str(path),
+    )

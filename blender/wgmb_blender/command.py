@@ -10,11 +10,10 @@ from dataclasses import replace
 import bpy
 
 from . import job
-from .blurring import plain
-from .job import Report, Wanted
-from .operators import errors
-from .problem import NoAdapterError, ProblemError
+from .process import lent
 from .settings import METHODS, wanted_of
+from .wanted import ERRORS, Report, Wanted
+from .wgmb_worker.problem import NoAdapterError, ProblemError, plain
 
 _DONE, _FAILED, _USAGE, _NO_ADAPTER, _INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -65,7 +64,7 @@ def command(words: Sequence[str]) -> int:
     except KeyboardInterrupt:
         print("wgmb: interrupted", file=sys.stderr)
         return _INTERRUPTED
-    except errors() as error:
+    except ERRORS as error:
         _tell(report)
         print(f"wgmb: {plain(error)}", file=sys.stderr, flush=True)
         if isinstance(error, NoAdapterError):
@@ -90,8 +89,6 @@ def _scene(name: str | None) -> bpy.types.Scene:
 
 
 def _wanted(scene: bpy.types.Scene, given: argparse.Namespace) -> Wanted:
-    from wgmb.io.frame_numbers import frame_numbers
-
     wanted = wanted_of(scene)
     samples = given.samples or wanted.samples
     if isinstance(samples, str) and samples != "auto":
@@ -102,12 +99,19 @@ def _wanted(scene: bpy.types.Scene, given: argparse.Namespace) -> Wanted:
         wanted,
         method=given.method or wanted.method,
         samples=samples,
-        frames=tuple(frame_numbers(given.frames)) if given.frames else None,
+        frames=_frames(given.frames),
         device=given.device or wanted.device,
         sharp=given.sharp or wanted.sharp,
         is_rendering=not given.use_rendered,
         is_blurring=not given.render_only,
     )
+
+
+def _frames(text: str | None) -> tuple[int, ...] | None:
+    if not text:
+        return None
+    with lent() as process:
+        return tuple(process.ask("frames", text=text).result())
 
 
 _registered: list[object] = []

@@ -1,4 +1,4 @@
-"""The scene's own motion blur settings and its cuts, in wgmb's words."""
+"""The scene's own motion blur settings and its cuts."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any
 import bpy
 import numpy as np
 
+from .wgmb_worker.recipe import Exposure
+
 _MIDDLE = {"START": 0.5, "CENTER": 0.0, "END": -0.5}
 _POINTS = 257  # at which the curve is taken
 _FLAT = 1e-4
 
 
-def shutter_of(scene: bpy.types.Scene) -> Any:
-    """Shutter, position, curve and rolling shutter of the render settings: a wgmb.Shutter.
+def exposure_of(scene: bpy.types.Scene) -> Exposure:
+    """Shutter, position, curve and rolling shutter of the render settings.
 
     Cycles' rolling shutter exposes each row for a share of the shutter's time; the rest of the time
     is the delay from the top row to the bottom one. The middle is that of the whole time.
     """
-    import wgmb
-
     render = scene.render
     length = render.motion_blur_shutter  # frame intervals
     middle = _MIDDLE[render.motion_blur_position] * length
@@ -30,19 +30,19 @@ def shutter_of(scene: bpy.types.Scene) -> Any:
         share = scene.cycles.rolling_shutter_duration
         rolling = {"rolling": "down", "rolling_duration": (1 - share) * length}
         length *= share
-    return wgmb.Shutter(360 * length, phase=middle, curve=_curve(render), **rolling)
+    return Exposure(360 * length, middle, _curve(render), **rolling)
 
 
-def _curve(render: bpy.types.RenderSettings) -> Any:
-    """The shutter curve as a function, or "box" where it is flat."""
+def _curve(render: bpy.types.RenderSettings) -> tuple[float, ...] | None:
+    """The shutter curve, or None where it is flat."""
     mapping = render.motion_blur_shutter_curve
     mapping.initialize()
     curve = mapping.curves[0]
     x = np.linspace(0, 1, _POINTS)
     y = np.clip([mapping.evaluate(curve, float(t)) for t in x], 0, None)
     if np.ptp(y) < _FLAT or not y.any():
-        return "box"
-    return lambda t: np.interp(t, x, y)
+        return None
+    return tuple(float(value) for value in y)
 
 
 def cuts_of(scene: bpy.types.Scene) -> list[int]:

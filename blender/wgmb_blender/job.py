@@ -11,7 +11,8 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,74 +20,17 @@ import bpy
 import numpy as np
 
 from . import sharp
-from .blurring import COMPOSITE, Blurring, Recipe, open_blur, plain
-from .exposure import cuts_of, shutter_of
-from .multilayer import save_multilayer
-from .picture import Picture, picture_of
-from .problem import ProblemError
+from .blurring import Blurring, both_halves, save_layers
+from .comparison import show
+from .exposure import cuts_of, exposure_of
+from .folders import check_folder, put_in_place, remove
+from .picture import picture_of
+from .process import Process, lent
 from .rendering import Render, at_once
 from .saving import Compositing, Saving, paths_of
-from .sharp import SharpFrames, View
-
-Step = tuple[float, str]
-"""The share that is done, 0..1, and what is being done."""
-
-COMPARISON = "Motion Blur: sharp, blurred"
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What the user asks for. `frames`: by default the scene's. `samples`: a number or "auto".
-
-    `handles`: render the frames around those too. `overscan`: pixels. `composited`: blur what the
-    compositor makes, not what it is given. `kept`: collections that stay sharp. `sharp`: where the
-    sharp frames lie, as in the panel. `device`: a part of an adapter's name.
-    """
-
-    method: str = "gather"
-    samples: int | str = 16
-    frames: tuple[int, ...] | None = None
-    handles: bool = True
-    overscan: int = 0
-    composited: bool = False
-    kept: tuple[str, ...] = ()
-    sharp: str = "//sharp/"
-    device: str | None = None
-    is_rendering: bool = True
-    is_blurring: bool = True
-
-
-@dataclass
-class Report:
-    """What was done: frames, those that failed and why, remarks, and files."""
-
-    done: list[int] = field(default_factory=list)
-    failed: dict[int, str] = field(default_factory=dict)
-    skipped: list[int] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    files: list[Path] = field(default_factory=list)
-
-    @property
-    def lines(self) -> list[str]:
-        """What the user reads, the most important last."""
-        lines = list(dict.fromkeys(self.notes))
-        if self.skipped:
-            lines.append(f"{_count(self.skipped)} already there: Overwrite is off")
-        lines += list(self.failed.values())
-        if self.done or self.failed:
-            lines.append(f"{_count(self.done)} blurred")
-        return lines
-
-
-def _count(frames: Sequence[int]) -> str:
-    return "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
-
-
-def frames_of(scene: bpy.types.Scene, wanted: Wanted) -> list[int]:
-    """The frames to blur."""
-    if wanted.frames is not None:
-        return list(dict.fromkeys(wanted.frames))
-    return list(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+from .wanted import ERRORS, Report, Step, Wanted, frames_of, objects_of
+from .wgmb_worker.problem import ProblemError, plain
+from .wgmb_worker.recipe import COMPOSITE, Picture, Recipe, Setup, SharpFrames, View, told
 
 
 def steps(
@@ -144,10 +88,11 @@ class _Work:
         self.is_multilayer = (
             scene.render.image_settings.file_format == "OPEN_EXR_MULTILAYER" and not is_shown
         )
-        self.kept = _names(wanted.kept)
+        self.kept = objects_of(wanted.kept)
         self.shown = frames_of(scene, wanted)
         if not self.shown:
             raise ProblemError("There are no frames: the end is before the start")
+        self.setup = Setup(wanted.method, exposure_of(scene), wanted.samples, wanted.device)
         self.cuts = cuts_of(scene)
         self.rendered: set[int] = set()
         self._done = 0
@@ -162,19 +107,24 @@ class _Work:
         if wanted.is_blurring and not self.is_shown:
             self._check_output(saving)
         if wanted.is_rendering:
-            _check_folder(Path(self.files.stem).parent)
-        blur = None
-        if wanted.is_blurring:  # what cannot run is known before hours of rendering
-            shutter = shutter_of(self.scene)
-            blur = open_blur(wanted.method, shutter, wanted.samples, wanted.device)
-            if blur.device.adapter_info["adapter_type"] == "CPU":
-                self.report.notes.append("No GPU found: blurred on the CPU")
+            check_folder(Path(self.files.stem).parent)
         around = self._around() if wanted.is_rendering else []
         self._all = len(around) + (len(self.shown) if wanted.is_blurring else 0) or 1
-        yield from self._render(around)
-        if blur is not None:
-            yield from self._blur(blur, saving)
+        if wanted.is_blurring:
+            with lent() as process:
+                yield from self._open(process)
+                yield from self._render(around)
+                yield from self._blur(process, saving)
+        else:
+            yield from self._render(around)
         yield 1.0, "Done"
+
+    def _open(self, process: Process) -> Iterator[Step]:
+        """What cannot run is known before hours of rendering."""
+        opening = process.ask("open", setup=told(self.setup))
+        yield from self._until(opening, "Opening the GPU")
+        if opening.result()["is_cpu"]:
+            self.report.notes.append("No GPU found: blurred on the CPU")
 
     def _around(self) -> list[int]:
         near = (-1, 0, 1) if self.wanted.handles else (0,)
@@ -182,6 +132,20 @@ class _Work:
 
     def _step(self, text: str) -> Step:
         return self._done / self._all, text
+
+    def _told(self, text: str, work: Iterator[None]) -> Iterator[Step]:
+        """The steps of something that has no text of its own."""
+        with contextlib.closing(work) as all_steps:
+            for _ in all_steps:
+                yield self._step(text)
+
+    def _until(self, future: Future[Any], text: str) -> Iterator[Step]:
+        """Wait for the other process."""
+        yield self._step(text)
+        while not future.done():
+            if self.render is at_once:
+                future.exception()  # nothing else is to be done meanwhile
+            yield self._step(text)
 
     def _check_output(self, saving: Saving) -> None:
         """ProblemError where results could not be written, or would replace what they are of."""
@@ -198,7 +162,7 @@ class _Work:
                 "another output, or another place for the sharp frames"
             )
         for folder in {path.parent for path in targets}:
-            _check_folder(folder)
+            check_folder(folder)
 
     # ---- rendering -----------------------------------------------------------------------------
 
@@ -220,9 +184,7 @@ class _Work:
                         self.is_composited,
                         self.render,
                     )
-                    with contextlib.closing(rendering):
-                        for _ in rendering:
-                            yield self._step(f"Rendering frame {number}")
+                    yield from self._told(f"Rendering frame {number}", rendering)
                 self.rendered.add(number)
                 self._done += 1
         finally:
@@ -231,11 +193,11 @@ class _Work:
 
     # ---- blurring ------------------------------------------------------------------------------
 
-    def _blur(self, blur: Any, saving: Saving) -> Iterator[Step]:
+    def _blur(self, process: Process, saving: Saving) -> Iterator[Step]:
         saving.numbers = self.shown
         is_film = saving.is_film and not self.is_shown
         folder = self._folder(is_film)
-        blurring_ = Blurring(self._recipe(folder), blur)
+        blurring = Blurring(process, self.setup, self._recipe(folder))
         compositing = None
         if self.has_compositor and not self.is_composited:
             compositing = Compositing(self.scene, self.picture, self.views)
@@ -243,36 +205,16 @@ class _Work:
         moves = False
         try:
             for number in self.shown:
-                text = f"Blurring frame {number}"
-                yield self._step(text)
-                future = None
-                for future in blurring_.blurred(number):
-                    yield self._step(text)
-                    if not future.done() and self.render is at_once:
-                        future.exception()  # nothing else is to be done meanwhile
-                assert future is not None
+                future = blurring.ask(number)
+                yield from self._until(future, f"Blurring frame {number}")
                 if (error := future.exception()) is not None:
                     self._failed(number, error)
                 else:
                     found = future.result()
-                    moves |= found.moves
-                    self.report.notes += found.notes
-                    files = found.files
-                    if compositing is not None:
-                        yield from self._told(text, compositing(number, files))
-                        files = compositing.composites(number, found.files)
-                        if not self.is_multilayer:
-                            _remove(found.files)
-                    if self.is_shown:
-                        self._show(number, files[0])
-                    elif is_film:
-                        film.append(list(files))
-                    elif self.is_multilayer:
-                        self._save_layers(number, found.files, files, saving)
-                    else:
-                        yield from self._told(text, saving.picture(number, files))
-                    if not is_film:
-                        _remove([*found.files, *files])
+                    moves |= found["moves"]
+                    self.report.notes += found["notes"]
+                    layers = [Path(file) for file in found["files"]]
+                    yield from self._finish(number, layers, compositing, saving, film, blurring)
                     self.report.done.append(number)
                 self._done += 1
             if film:
@@ -283,7 +225,8 @@ class _Work:
                     "they were rendered"
                 )
         finally:
-            blurring_.close()
+            if not process.is_idle:
+                process.close()  # before its folder goes
             saving.close()
             if compositing is not None:
                 compositing.close()
@@ -293,11 +236,33 @@ class _Work:
             elif film:
                 self.report.notes.append(f"The blurred frames without the film are in {folder}")
 
-    def _told(self, text: str, work: Iterator[None]) -> Iterator[Step]:
-        """The steps of something that has no text of its own."""
-        with contextlib.closing(work) as all_steps:
-            for _ in all_steps:
-                yield self._step(text)
+    def _finish(
+        self,
+        number: int,
+        layers: list[Path],
+        compositing: Compositing | None,
+        saving: Saving,
+        film: list[list[Path]],
+        blurring: Blurring,
+    ) -> Iterator[Step]:
+        """A blurred frame to where it belongs, through the compositor if there is one."""
+        text = f"Blurring frame {number}"
+        files, composites = layers, None
+        if compositing is not None:
+            yield from self._told(text, compositing(number, layers))
+            files = composites = compositing.composites(number, layers)
+            if not self.is_multilayer:
+                remove(layers)
+        if self.is_shown:
+            yield from self._show(number, files[0], blurring)
+        elif saving.is_film:
+            film.append(list(files))
+            return
+        elif self.is_multilayer:
+            yield from self._save_layers(number, layers, composites, saving, blurring)
+        else:
+            yield from self._told(text, saving.picture(number, files))
+        remove([*layers, *files])
 
     def _film(self, saving: Saving, film: list[list[Path]]) -> Iterator[Step]:
         if self.report.failed:
@@ -309,9 +274,7 @@ class _Work:
         yield from self._told("Writing the film", saving.film(film, self.render))
 
     def _failed(self, number: int, error: BaseException) -> None:
-        import wgmb
-
-        if not isinstance(error, (wgmb.Error, ProblemError, OSError, MemoryError)):
+        if not isinstance(error, ERRORS):
             raise error
         text = plain(error)
         named = text if f"rame {number}" in text else f"Frame {number}: {text}"
@@ -338,38 +301,40 @@ class _Work:
             views=self.views,
             layers=layers,
             frames=self.shown,
-            rendered=frozenset(self.rendered) if self.wanted.is_rendering else None,
+            rendered=sorted(self.rendered) if self.wanted.is_rendering else None,
             picture=self.picture,
             cuts=self.cuts,
             kept=self.kept,
-            folder=folder,
+            folder=str(folder),
             is_whole=is_whole,
         )
 
     def _save_layers(
-        self, number: int, layers: Sequence[Path], composites: Sequence[Path], saving: Saving
-    ) -> None:
+        self,
+        number: int,
+        layers: Sequence[Path],
+        composites: Sequence[Path] | None,
+        saving: Saving,
+        blurring: Blurring,
+    ) -> Iterator[Step]:
         paths = saving.paths(number)
-        added = composites if composites is not layers else [None] * len(layers)
-        save_multilayer(self.scene, list(zip(self.views, layers, added, strict=True)), paths)
+        made = [path.with_name(f"layers_{path.name}") for path in layers]
+        for future in save_layers(blurring.process, self.scene, layers, composites, made):
+            yield from self._until(future, f"Blurring frame {number}")
+            future.result()
+        for file, path in zip(made, paths, strict=True):
+            put_in_place(file, path)
         saving.files += paths
 
-    def _show(self, number: int, file: Path) -> None:
+    def _show(self, number: int, file: Path, blurring: Blurring) -> Iterator[Step]:
         """Put the sharp frame and the blurred one side by side into an image."""
-        from wgmb.io import exr
-
-        layer = COMPOSITE if self.is_composited else sharp.layers_of(self.scene)[0].name
-        channels = exr.read(self.files.path(number, self.views[0])).channels()
-        before = np.stack([channels[f"{layer}.Combined.{c}"] for c in "RGBA"], 2)
-        channels = exr.read(file).channels()
-        stem = "" if "R" in channels else f"{layer}.Combined."
-        after = np.stack([channels[stem + c] for c in "RGBA" if stem + c in channels], 2)
-        image_of(np.hstack([self.picture.laid(before), after]))
-
-
-def _remove(files: Sequence[Path]) -> None:
-    for path in files:
-        path.unlink(missing_ok=True)
+        layer, path = sharp.layers_of(self.scene)[0].name, file.with_name("both.npy")
+        future = both_halves(
+            blurring.process, blurring.recipe, number, file, self.views[0], layer, path
+        )
+        yield from self._until(future, f"Blurring frame {number}")
+        future.result()
+        show(np.load(path))
 
 
 def _renamed(path: Path, number: int, view: View) -> Path:
@@ -377,51 +342,3 @@ def _renamed(path: Path, number: int, view: View) -> Path:
     target = path.with_name(f"film_{number:06d}{view.suffix}.exr")
     os.replace(path, target)
     return target
-
-
-def _names(collections: Sequence[str]) -> tuple[str, ...]:
-    """The objects of collections, with those that they instance, by name."""
-    names: dict[str, None] = {}
-    ahead = [bpy.data.collections.get(name) for name in collections]
-    missing = [name for name, one in zip(collections, ahead, strict=True) if one is None]
-    if missing:
-        raise ProblemError(f"Keep Sharp: there is no collection {missing[0]!r}")
-    seen: set[str] = set()
-    while ahead:
-        collection = ahead.pop()
-        if collection is None or collection.name_full in seen:
-            continue
-        seen.add(collection.name_full)
-        for one in collection.all_objects:
-            names[one.name] = None
-            ahead.append(one.instance_collection)
-    return tuple(names)
-
-
-def _check_folder(folder: Path) -> None:
-    """Make a folder; ProblemError unless files can be written into it."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(prefix=".wgmb_", dir=folder):
-            pass
-    except OSError as error:
-        why = (error.strerror or str(error)).lower()
-        raise ProblemError(f"Cannot write into {folder}: {why}") from None
-
-
-def image_of(rgba: np.ndarray) -> bpy.types.Image:
-    """The image COMPARISON, with linear premultiplied light, the first row on top."""
-    height, width, channels = rgba.shape
-    image = bpy.data.images.get(COMPARISON)
-    if image is not None and tuple(image.size) != (width, height):
-        bpy.data.images.remove(image)
-        image = None
-    if image is None:
-        image = bpy.data.images.new(COMPARISON, width, height, alpha=True, float_buffer=True)
-        image.alpha_mode = "PREMUL"
-        image.use_view_as_render = True
-    four = np.ones((height, width, 4), np.float32)
-    four[..., :channels] = rgba
-    image.pixels.foreach_set(np.ascontiguousarray(four[::-1]).ravel())
-    image.update()
-    return image

@@ -9,23 +9,13 @@ import bpy
 from bpy.props import IntProperty
 
 from . import job
-from .blurring import plain
-from .job import Report, Step, Wanted
-from .problem import ProblemError, StoppedError
+from .comparison import COMPARISON
 from .rendering import Render, at_once, beside
 from .settings import wanted_of
+from .wanted import ERRORS, Report, Step, Wanted
+from .wgmb_worker.problem import StoppedError, plain
 
 _EVERY = 0.02  # seconds between two events
-
-
-def errors() -> tuple[type[BaseException], ...]:
-    """What is told in a sentence; all else is a fault of ours."""
-    known = ProblemError, OSError, MemoryError, ImportError
-    try:
-        import wgmb
-    except ImportError:  # which then ends the job too
-        return known
-    return wgmb.Error, *known
 
 
 class Running:
@@ -56,7 +46,7 @@ class Running:
         try:
             for _ in self.begin(context, at_once):
                 pass
-        except errors() as error:
+        except ERRORS as error:
             return self._failed(error)
         return self._told(context)
 
@@ -66,7 +56,7 @@ class Running:
             return self.execute(context)
         try:
             self._steps = self.begin(context, beside)
-        except errors() as error:
+        except ERRORS as error:
             return self._failed(error)
         manager = context.window_manager
         self._timer = manager.event_timer_add(_EVERY, window=context.window)
@@ -87,7 +77,7 @@ class Running:
             share, text = next(self._steps)
         except StopIteration:
             return self._end(context, None)
-        except errors() as error:
+        except ERRORS as error:
             return self._end(context, error)
         except BaseException:
             self._end(context, None)
@@ -157,13 +147,13 @@ class WGMB_OT_compare(Running, bpy.types.Operator):
         return job.compare(scene, wanted_of(scene), report, render)
 
     def _told(self, context: bpy.types.Context) -> set[str]:
-        image = bpy.data.images.get(job.COMPARISON)
+        image = bpy.data.images.get(COMPARISON)
         for area in getattr(context.screen, "areas", ()):
             if area.type == "IMAGE_EDITOR" and image is not None:
                 area.spaces.active.image = image
                 break
         else:
-            self.report({"INFO"}, f"Open the image {job.COMPARISON!r} in an Image Editor")
+            self.report({"INFO"}, f"Open the image {COMPARISON!r} in an Image Editor")
         return super()._told(context)
 
 

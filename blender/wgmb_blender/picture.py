@@ -3,58 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import bpy
-import numpy as np
 
 from .changed import Change
 from .exposure import cameras_of
-from .problem import ProblemError
+from .wgmb_worker.problem import ProblemError
+from .wgmb_worker.recipe import Picture
 
 _LENS = ("sensor_width", "sensor_height", "sensor_fit", "ortho_scale", "shift_x", "shift_y")
-
-
-@dataclass(frozen=True)
-class Picture:
-    """`size`: of the whole picture; `part`: left, top, right, bottom of what is rendered of it.
-
-    `margin`: pixels rendered around the part and cut off after the blur. `is_cropped`: the
-    result is the part alone, otherwise it lies in the whole picture, with nothing around it.
-    """
-
-    size: tuple[int, int]
-    part: tuple[int, int, int, int]
-    margin: int = 0
-    is_cropped: bool = False
-
-    @property
-    def rendered(self) -> tuple[int, int]:
-        """Width and height of a sharp frame."""
-        left, top, right, bottom = self.part
-        return right - left + 2 * self.margin, bottom - top + 2 * self.margin
-
-    @property
-    def result(self) -> tuple[int, int]:
-        """Width and height of a blurred frame."""
-        left, top, right, bottom = self.part
-        return (right - left, bottom - top) if self.is_cropped else self.size
-
-    def laid(self, plane: np.ndarray) -> np.ndarray:
-        """What a sharp frame's (height, width, ...) array is in the result."""
-        width, height = self.rendered
-        if plane.shape[:2] != (height, width):
-            raise ProblemError(
-                f"a sharp frame must be {width} x {height} pixels with these settings, got "
-                f"{plane.shape[1]} x {plane.shape[0]}: was it rendered with others?"
-            )
-        inside = plane[self.margin : height - self.margin, self.margin : width - self.margin]
-        if self.result == inside.shape[1::-1]:
-            return inside
-        whole = np.zeros((*self.size[::-1], *plane.shape[2:]), plane.dtype)
-        left, top, right, bottom = self.part
-        whole[top:bottom, left:right] = inside
-        return whole
 
 
 def picture_of(scene: bpy.types.Scene, margin: int = 0) -> Picture:

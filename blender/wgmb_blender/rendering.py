@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from .problem import ProblemError, StoppedError
+from .wgmb_worker.problem import ProblemError, StoppedError
 
 Render = Callable[..., Iterator[None]]
 """Called with a scene, a frame and the files to be written; without files, a whole film. A

@@ -12,10 +12,10 @@ from typing import Any
 
 import bpy
 
-from .picture import Picture
-from .problem import ProblemError
 from .rendering import Render, at_once
-from .sharp import FIVE, View
+from .sharp import FIVE
+from .wgmb_worker.problem import ProblemError
+from .wgmb_worker.recipe import Picture, View
 
 _SOUND = {"SPEAKER"}  # objects that a film needs
 

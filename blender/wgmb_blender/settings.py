@@ -14,8 +14,11 @@ from bpy.props import (
     StringProperty,
 )
 
-from .backends import leave_opengl
-from .job import Wanted
+from .process import lent
+from .wanted import Wanted
+from .wgmb_worker.problem import ProblemError
+
+_PATIENCE = 30  # seconds to wait for a list of GPUs
 
 # Without it, 4.5 and later warn of paths beside the file; 4.2 does not know the word.
 _BESIDE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
@@ -85,22 +88,20 @@ class WgmbSettings(bpy.types.PropertyGroup):
 
 
 @cache
-def adapters() -> tuple[tuple[str, str, str], ...]:
-    """The GPUs as an enum's items, asked for once."""
+def adapters() -> tuple[str, ...]:
+    """The names of the GPUs, asked for once."""
     try:
-        from wgmb import gpu
-
-        leave_opengl()
-        return tuple((one.summary, one.summary, "") for one in gpu.adapters())
-    except Exception as error:  # no driver, no wheel: the panel is drawn all the same
-        print(f"wgmb: {error}")
+        with lent() as process:
+            return tuple(process.ask("adapters").result(_PATIENCE))
+    except (ProblemError, TimeoutError) as error:  # the panel is drawn all the same
+        print(f"wgmb: {error or 'no answer about the GPUs'}")
         return ()
 
 
 def _devices(
-    self: bpy.types.AddonPreferences, context: bpy.types.Context
-) -> list[tuple[str, str, str]]:
-    return [("AUTO", "Automatic", "The fastest kind"), *adapters()]
+    self: bpy.types.AddonPreferences, context: bpy.types.Context, text: str
+) -> tuple[str, ...]:
+    return adapters()
 
 
 class WgmbPreferences(bpy.types.AddonPreferences):
@@ -108,7 +109,12 @@ class WgmbPreferences(bpy.types.AddonPreferences):
 
     bl_idname = __package__
 
-    device: EnumProperty(name="GPU", items=_devices)
+    device: StringProperty(
+        name="GPU",
+        description="A part of its name; empty: the fastest kind",
+        search=_devices,
+        search_options={"SUGGESTION"},
+    )
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the choice of a GPU."""
@@ -118,15 +124,14 @@ class WgmbPreferences(bpy.types.AddonPreferences):
                 text="No Vulkan, Metal or DirectX 12 driver found. Motion blur cannot run here.",
                 icon="ERROR",
             )
-        elif all("(CPU)" in name for name, _, _ in adapters()):
+        elif all("(CPU)" in name for name in adapters()):
             self.layout.label(text="No GPU found: blurring on the CPU", icon="INFO")
 
 
 def device() -> str | None:
     """The GPU chosen in the preferences; None: the fastest."""
     addon = bpy.context.preferences.addons.get(__package__)
-    chosen = getattr(getattr(addon, "preferences", None), "device", "AUTO")
-    return None if chosen in ("AUTO", "") else chosen
+    return getattr(getattr(addon, "preferences", None), "device", "").strip() or None
 
 
 def wanted_of(scene: bpy.types.Scene) -> Wanted:

@@ -4,44 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 
 from . import picture
 from .changed import Change, changed
-from .picture import Picture
-from .problem import ProblemError
 from .rendering import Render
+from .wgmb_worker.problem import ProblemError
+from .wgmb_worker.recipe import MATTE, Picture, SharpFrames, View
 
 FIVE = bpy.app.version >= (5, 0, 0)
 _ENGINES = {"CYCLES": "Cycles", "BLENDER_EEVEE_NEXT": "EEVEE", "BLENDER_EEVEE": "EEVEE"}
 PASSES = {"use_pass_z": "Depth", "use_pass_vector": "Vector"}
-MATTE = "use_pass_cryptomatte_object", "CryptoObject"
-
-
-@dataclass(frozen=True)
-class View:
-    """One eye of a stereo picture; without a name, the only one."""
-
-    name: str = ""
-    suffix: str = ""
-
-
-@dataclass(frozen=True)
-class SharpFrames:
-    """The files: `stem` and a number, then the suffix of the view."""
-
-    stem: str
-
-    def pattern(self, view: View = View()) -> str:
-        """The files of a view, with the number left open."""
-        return f"{self.stem}####{view.suffix}.exr"
-
-    def path(self, number: int, view: View = View()) -> Path:
-        """The file of a frame."""
-        return Path(f"{self.stem}{number:04d}{view.suffix}.exr")
 
 
 def sharp_frames(text: str) -> SharpFrames:

@@ -47,13 +47,18 @@ sys.path.insert(1, str(unpacked()))
 import bpy
 
 import wgmb_blender
+from wgmb_blender import process
+
+_PROCESSES: list[process.Process] = []
 
 
 @pytest.fixture(autouse=True)
 def _registered():
-    """The add-on, and nothing of it left behind."""
+    """The add-on, and nothing of it left behind; its process is lent on to the next test."""
     wgmb_blender.register()
+    process._kept += _PROCESSES
     yield
+    _PROCESSES[:], process._kept[:] = process._kept, []
     wgmb_blender.unregister()
     assert len(bpy.data.scenes) == 1
     assert not [tree for tree in bpy.data.node_groups if tree.name.startswith("wgmb")]

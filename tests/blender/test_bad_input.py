@@ -8,10 +8,10 @@ import pytest
 
 import scenes
 from test_put_back import difference, everything, small
-from wgmb_blender import blurring, command, job
-from wgmb_blender.job import Report
-from wgmb_blender.problem import ProblemError
+from wgmb_blender import command, job, process
 from wgmb_blender.settings import wanted_of
+from wgmb_blender.wanted import Report
+from wgmb_blender.wgmb_worker.problem import ProblemError, plain
 
 
 def no_camera(scene, folder):
@@ -97,20 +97,9 @@ def test_no_frames(tmp_path):
         next(job.steps(scene, replace(wanted_of(scene), frames=()), Report()))
 
 
-def test_opengl_is_left_to_blenders_window():
-    """Where wgpu looks for its adapters beside a window, it ends Blender."""
-    import wgpu
-
-    from wgmb_blender import settings
-
-    settings.adapters.cache_clear()
-    assert settings.adapters()
-    kinds = {one.info["backend_type"] for one in wgpu.gpu.enumerate_adapters_sync()}
-    assert kinds and kinds <= {"Vulkan", "Metal", "D3D12"}
-
-
 def test_no_adapter(tmp_path, monkeypatch, capfd):
     scene = small(tmp_path)
+    process.end_kept()
     monkeypatch.setenv("WGMB_ADAPTER", "no such thing")
     before = everything(scene)
     with pytest.raises(RuntimeError, match="No Vulkan, Metal or DirectX 12 driver found"):
@@ -118,6 +107,7 @@ def test_no_adapter(tmp_path, monkeypatch, capfd):
     assert difference(before, everything(scene)) == []
     assert command.command([]) == 3
     assert "motion blur cannot run here" in capfd.readouterr().err
+    process.end_kept()
 
 
 def test_frames_that_are_missing_in_the_middle(tmp_path, capfd):
@@ -237,7 +227,7 @@ def test_frames_before_0(tmp_path):
 
 def blender_name(scene, number):
     from wgmb_blender.saving import paths_of
-    from wgmb_blender.sharp import View
+    from wgmb_blender.wgmb_worker.recipe import View
 
     return paths_of(scene, [View()], number)[0]
 
@@ -270,7 +260,7 @@ def test_an_output_that_cannot_be_written_ends_the_run(tmp_path):
 
 
 def test_messages_have_no_marks_of_python():
-    assert blurring.plain(ValueError("`skip_missing`\n leaves")) == "skip_missing leaves"
+    assert plain(ValueError("`skip_missing`\n leaves")) == "skip_missing leaves"
 
 
 @pytest.mark.parametrize(

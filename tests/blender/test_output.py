@@ -11,8 +11,8 @@ import scenes
 from test_table import compositor, layered
 from wgmb_blender import job
 from wgmb_blender.changed import changed
-from wgmb_blender.job import Report, Wanted
 from wgmb_blender.settings import wanted_of
+from wgmb_blender.wanted import Report, Wanted
 
 
 def run(scene, *frames: int, **more) -> Report:

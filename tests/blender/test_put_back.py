@@ -12,9 +12,10 @@ import scenes
 import wgmb_blender
 from wgmb_blender import job, operators, rendering
 from wgmb_blender.changed import changed
-from wgmb_blender.job import Report
-from wgmb_blender.problem import ProblemError, StoppedError
+from wgmb_blender.comparison import COMPARISON
 from wgmb_blender.settings import wanted_of
+from wgmb_blender.wanted import Report
+from wgmb_blender.wgmb_worker.problem import ProblemError, StoppedError
 
 FIVE = scenes.FIVE
 PLAIN = {"BOOLEAN", "INT", "FLOAT", "ENUM", "STRING"}
@@ -264,7 +265,8 @@ def test_the_window_runs_to_the_end(tmp_path, monkeypatch):
     assert window.reports[-1] == ({"INFO"}, "2 frames blurred")
     assert window.told[-3:] == ["timer removed", "progress ended", None]
     texts = [t for t in window.told if isinstance(t, str) and t.startswith("Motion blur: ")]
-    assert texts[0] == "Motion blur: Rendering frame 3, 0%   Esc: cancel"
+    assert texts[0] == "Motion blur: Opening the GPU, 0%   Esc: cancel"
+    assert "Motion blur: Rendering frame 3, 0%   Esc: cancel" in texts
     assert any(t.startswith("Motion blur: Blurring frame 5, ") for t in texts)
     assert {p.name for p in tmp_path.glob("*.png")} == {"blurred_0004.png", "blurred_0005.png"}
 
@@ -334,7 +336,7 @@ def test_compare_shows_both_halves(tmp_path):
     scene.render.motion_blur_shutter = 1.0
     before = everything(scene)
     assert bpy.ops.wgmb.compare() == {"FINISHED"}
-    image = bpy.data.images[job.COMPARISON]
+    image = bpy.data.images[COMPARISON]
     assert tuple(image.size) == (64, 18)
     values = np.array(image.pixels[:]).reshape(18, 64, 4)
     left, right = values[:, :32], values[:, 32:]

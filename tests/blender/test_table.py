@@ -15,7 +15,7 @@ import pytest
 
 import scenes
 from wgmb_blender import job
-from wgmb_blender.job import Report, Wanted
+from wgmb_blender.wanted import Report, Wanted
 
 SLACK = 0.5
 

@@ -11,3 +11,8 @@ class NoAdapterError(ProblemError):
 
 class StoppedError(ProblemError):
     """The user stopped the rendering."""
+
+
+def plain(error: BaseException) -> str:
+    """A message in one line, without the names that Python has for things."""
+    return " ".join(str(error).replace("`", "").split()) or type(error).__name__
