@@ -5,7 +5,8 @@ import pytest
 
 import wgmb
 from images import frame_of
-from twins import gather as twin
+from twins import gather as gather_twin
+from twins import reproject as reproject_twin
 from wgmb import Shutter
 
 SIZE = (60, 110)
@@ -47,18 +48,21 @@ def shot(path, t, size=SIZE):
     return mean(color), mean(motion), np.where(box, 4.0, 9.0)[2::fine, 2::fine].astype("f4")
 
 
-def decibel(frame, path):
-    """PSNR of gather's frame at 360 degrees."""
-    got = wgmb.Blur("gather", shutter=360, samples=16)(frame)
+def decibel(frame, path, method="gather"):
+    """PSNR of a method's frame at 360 degrees."""
+    got = wgmb.Blur(method, shutter=360, samples=16)(frame)
     times = Shutter(360).sample_times(16).astype(float)
     truth = np.mean([shot(path, t)[0] for t in times], axis=0)
     return -10 * np.log10(np.mean((got - truth) ** 2))
 
 
-@pytest.mark.parametrize("path, gain", [(swings, 8), (starts, 12), (bounces, 8)])
-def test_a_path_bends_as_five_positions_say(path, gain):
+@pytest.mark.parametrize("method, path, gain", [
+    ("gather", swings, 8), ("gather", starts, 12), ("gather", bounces, 8),
+    ("reproject", swings, 3), ("reproject", starts, 7), ("reproject", bounces, 6),
+])  # fmt: skip
+def test_a_path_bends_as_five_positions_say(method, path, gain):
     sources = [shot(path, t) for t in (0, -1, 1)]
-    known = decibel(frame_of(sources), path)
+    known = decibel(frame_of(sources), path, method)
     # The same, but beyond the three positions all goes on as a parabola through them would.
     bends = np.median((sources[0][1][..., :2] + sources[0][1][..., 2:])[16:44, 40:70], axis=(0, 1))
     parabola = sources[:1]
@@ -69,21 +73,27 @@ def test_a_path_bends_as_five_positions_say(path, gain):
         moves = vectors.any(axis=2)
         changed[moves, beyond] = bends - vectors[moves, to_frame]
         parabola.append((color, changed, depth))
-    assert known > decibel(frame_of(parabola), path) + gain
+    assert known > decibel(frame_of(parabola), path, method) + gain
 
 
-def test_a_parabola_stays_one():
+@pytest.mark.parametrize("method, least", [("gather", 50), ("reproject", 48)])
+def test_a_parabola_stays_one(method, least):
     sources = [shot(falls, t) for t in (0, -1, 1)]
-    assert decibel(frame_of(sources), falls) > 50
+    assert decibel(frame_of(sources), falls, method) > least
 
 
 @pytest.mark.parametrize("path", [swings, starts])
 @pytest.mark.parametrize("frames", [2, 3])
-def test_gather_is_its_twin_on_such_paths(path, frames):
+@pytest.mark.parametrize("method", ["gather", "reproject"])
+def test_methods_are_their_twins_on_such_paths(method, path, frames):
     size = (32, 56)
     sources = [(t, *shot(path, t, size)) for t in (0, -1, 1)[:frames]]
     own, *near = [wgmb.Frame(c, motion=m, depth=d) for _, c, m, d in sources]
     frame = own.between(*near, *[None] * (3 - frames))
-    got = wgmb.Blur("gather", samples=4, shutter=360)(frame)
-    want = twin.gather(sources, Shutter(360).sample_times(4).astype(float))
+    got = wgmb.Blur(method, samples=4, shutter=360)(frame)
+    times = Shutter(360).sample_times(4).astype(float)
+    if method == "gather":
+        want = gather_twin.gather(sources, times)
+    else:
+        want, _ = reproject_twin.reproject(sources, times)
     assert (np.abs(got - want) > 1e-3).any(axis=2).mean() < 0.01

@@ -11,8 +11,10 @@ import wgpu
 from .. import gpu
 from ..camera import Camera, Reprojections
 from ..errors import InputError
+from ..gpu import wgsl
 from ..gpu.textures import ScratchBuffer
 from ..velocity import viewport_of
+from .bends import Bends
 from .options import MethodOptions
 
 GOLDEN = (5**0.5 - 1) / 2
@@ -47,6 +49,7 @@ class Reproject:
     name = "reproject"
     needs = frozenset({"color", "motion", "depth"})
     uses = frozenset({"neighbours", "normal"})
+    bend = float(wgsl.load("common/path.wgsl").constant("MOST_BEND"))
 
     @dataclass(frozen=True, kw_only=True)
     class Options(MethodOptions):
@@ -84,6 +87,7 @@ class Reproject:
         self._hits, self._open = ScratchBuffer(device), ScratchBuffer(device)
         self._means, self._counts = ScratchBuffer(device), ScratchBuffer(device)
         self._carries, self._links, self._heads = (ScratchBuffer(device) for _ in range(3))
+        self._bends = Bends(device)
 
     def encode(self, encoder, inputs, output):
         """Record three passes a source for several slices, or two for several steps."""
@@ -91,6 +95,7 @@ class Reproject:
         record(encoder, inputs, output)
 
     def _slices(self, encoder, inputs, output):
+        sources = inputs.frames
         kernel = gpu.kernel(
             self._device,
             "methods/reproject.wgsl",
@@ -98,12 +103,15 @@ class Reproject:
             BOX_SHUTTER=inputs.even,
             WEIGHTED=inputs.frame.weight is not None,
             COUNTS=self._options.show == "count",
+            FIVE_POSITIONS=len(sources) > 1,
         )
+        bends = [self._bends.unbound]
+        if len(sources) > 1:
+            bends = self._bends.encode(encoder, inputs)
         width, height = inputs.bindings.size
         pixels = width * height
         bits = int(kernel.source.constant("BLOCK_BITS"))
         blocks = ((width >> bits) + 1) * ((height >> bits) + 1)
-        sources = inputs.frames
         most = max(1, min(int(kernel.source.constant("SLICES")), AT_ONCE // (4 * pixels)))
         most = min(most, inputs.samples)
         shared = {
@@ -134,6 +142,7 @@ class Reproject:
                 motion=frame.motion,
                 depth=frame.depth,
                 weight=frame.weight or inputs.unbound,
+                bends=bends[source],
                 **shared,
             )
 

@@ -34,6 +34,10 @@ struct Trajectory5 {
     has_kink: bool,             // two straight pieces: |t| instead of t^2
 }
 
+/// How far any trajectory may leave its parabola within a frame interval of its instant, as a share of its half
+/// acceleration: a kink by 1/4, a cubic by 0.064 of a change that MOST_CHANGE limits.
+const MOST_BEND: f32 = 0.4;
+
 fn trajectory5_from(parabola: Trajectory) -> Trajectory5 {
     return Trajectory5(parabola.velocity, parabola.half_acceleration, vec2f(0.0), false);
 }

@@ -1,9 +1,9 @@
 // Sample reprojection in depth-tested time slices: every sample is splatted to its position at every time, the
 // nearest one is visible (Taylor, extended by the depth test and the object motion that he left to others).
 //#include common/depth.wgsl
+//#include common/five_positions.wgsl
 //#include common/frame.wgsl
 //#include common/loops.wgsl
-//#include common/path.wgsl
 //#include common/shutter.wgsl
 
 struct Chunk {                  // time slices of one source frame that are done together
@@ -28,7 +28,9 @@ struct Chunk {                  // time slices of one source frame that are done
 @group(1) @binding(11) var<storage, read_write> means: array<vec4f>;            // mean colour over the slices so far
 @group(1) @binding(12) var<storage, read_write> counts: array<f32>;             // weight of that mean
 @group(1) @binding(13) var output: Output;
+@group(1) @binding(14) var bends: texture_2d<u32>;       // of the source, see bends.wgsl
 
+override FIVE_POSITIONS: bool = false;     // read `bends`; else paths are parabolas
 override WEIGHTED: bool = false;
 override COUNTS: bool = false;      // show the share of slices that reached a pixel instead of its colour
 
@@ -104,7 +106,7 @@ fn resolve(@builtin(global_invocation_id) id: vec3u) {
         if slices != 0u && visible >> SOURCE_BIT == chunk.source {
             holes &= ~(1u << k);
             let px = vec2u(visible & ((1u << ROW_BIT) - 1u), (visible & ((1u << SOURCE_BIT) - 1u)) >> ROW_BIT);
-            let moved = displacement_in(trajectory_from(textureLoad(motion, px, 0)), times_at(px), k);
+            let moved = displacement_in(trajectory_at(px), times_at(px), k);
             let uv = (vec2f(id.xy) + 0.5 - moved) / vec2f(frame.size);
             let is_static = all(moved == vec2f(0.0));       // then the pixel itself, to the bit
             let sample_color = select(textureSampleLevel(color, linear, uv, 0.0), static_color, is_static);
@@ -152,7 +154,7 @@ fn block_of(px: vec2u) -> u32 {
 
 struct Sample {
     x: vec2f,           // in the display window [px], centres of pixels are integers
-    trajectory: Trajectory,
+    trajectory: Trajectory5,
     depth: f32,
     times: SampleTimes,
     slices: u32,        // bits of those in which it may be visible
@@ -162,7 +164,14 @@ fn sample_at(px: vec2u) -> Sample {
     let z = valid_depth(textureLoad(depth, px, 0).x);
     var slices = (1u << chunk.count) - 1u;
     if WEIGHTED { slices = select(0u, slices, textureLoad(weight, px, 0).x > 0.0); }
-    return Sample(vec2f(vec2i(px) + frame.origin), trajectory_from(textureLoad(motion, px, 0)), z, times_at(px), slices);
+    return Sample(vec2f(vec2i(px) + frame.origin), trajectory_at(px), z, times_at(px), slices);
+}
+
+/// The trajectory of the source's sample at `px`.
+fn trajectory_at(px: vec2u) -> Trajectory5 {
+    let vectors = textureLoad(motion, px, 0);
+    if !FIVE_POSITIONS { return trajectory5_from(trajectory_from(vectors)); }
+    return trajectory_with(vectors, textureLoad(bends, px, 0).x);
 }
 
 /// Sample times of the source's pixel at `px`, in the source frame's own time.
@@ -174,8 +183,8 @@ fn times_at(px: vec2u) -> SampleTimes {
 }
 
 /// Displacement by the time of slice `k` of the chunk [px].
-fn displacement_in(trajectory: Trajectory, times: SampleTimes, k: u32) -> vec2f {
-    return displacement(trajectory, shutter_time(times, chunk.first + k));
+fn displacement_in(trajectory: Trajectory5, times: SampleTimes, k: u32) -> vec2f {
+    return displacement5(trajectory, shutter_time(times, chunk.first + k));
 }
 
 /// Position of a sample in slice `k` of the chunk, in the display window [px].

@@ -48,7 +48,7 @@ class Gather:
     uses = frozenset({"neighbours", *PASSES})
     adaptive = True
     most_in_software = 512  # loops end there after 65,535 turns, all of a pixel together
-    bend = float(wgsl.load("methods/gather/motion.wgsl").constant("MOST_BEND"))
+    bend = float(wgsl.load("common/path.wgsl").constant("MOST_BEND"))
     confidence = ("accepted", "disocclusion", "residual", "left")
 
     @dataclass(frozen=True, kw_only=True)

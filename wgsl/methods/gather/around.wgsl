@@ -1,8 +1,8 @@
 // What the frames before and after a frame tell of it: where a surface goes beyond them, and backgrounds that it hides.
 // Where there is no such frame its textures are empty: their depth is 0.
 //#include common/depth.wgsl
+//#include common/five_positions.wgsl
 //#include common/frame.wgsl
-//#include common/path.wgsl
 
 @group(1) @binding(12) var prev_color: texture_2d<f32>;
 @group(1) @binding(13) var prev_motion: texture_2d<f32>;
@@ -15,54 +15,11 @@
 
 override WEIGHTED: bool = false;        // read weights
 
-const RETURNS: f32 = 1.5;               // a surface is found again where its vector leads back within this [px]
-const SAME_DEPTH_RATIO: f32 = 1.15;     // and its depth has not changed by more: it may come nearer
-const MOST_CHANGE: f32 = 3.0;           // of a half acceleration from one frame to the next, as a ratio
-const SPARED_CHANGE: f32 = 2.0;         // and this much more [px]: what changes more is another surface, or noise
-const KINK_ACCELERATION: f32 = 1.0;     // from this half acceleration on [px] a path may have a kink,
-const KINK_RATIO: f32 = 0.15;           // if those before and after it are smaller by this
-
-struct Acceleration {       // of a surface in a neighbouring frame
-    half: vec2f,            // [px per squared frame interval]
-    is_known: bool,
-}
-
-/// The trajectory of the surface at the centre of `px` with these vectors: through five positions as far as the frames
-/// around show the surface too, whose own vectors lead to the second frame before and after.
+/// The trajectory of the surface at the centre of `px` with these vectors, as far as the frames around tell.
 fn trajectory_around(px: vec2i, motion: vec4f, z: f32) -> Trajectory5 {
-    var trajectory = trajectory5_from(trajectory_from(motion));
     let before = acceleration_in(prev_motion, prev_depth, px, motion.xy, z, false);
     let after = acceleration_in(next_motion, next_depth, px, motion.zw, z, true);
-    let here = trajectory.half_acceleration;
-    // The change over two frame intervals; twice that over one, if one is all that is known.
-    var change = vec2f(0.0);
-    if before.is_known && after.is_known { change = after.half - before.half; }
-    if before.is_known && !after.is_known { change = 2.0 * (here - before.half); }
-    if after.is_known && !before.is_known { change = 2.0 * (after.half - here); }
-    let most = max(select(0.0, length(before.half), before.is_known), select(0.0, length(after.half), after.is_known));
-    let stays = all(abs(motion) < vec4f(STATIC_EPSILON));
-    let believed = !stays && most <= MOST_CHANGE * length(here) + SPARED_CHANGE;
-    trajectory.third = select(vec2f(0.0), change / 6.0, believed);
-    // Straight before and after, but not here: it starts, stops or bounces in this very frame.
-    trajectory.has_kink = before.is_known && after.is_known && length(here) > KINK_ACCELERATION
-        && most < KINK_RATIO * length(here);
-    if trajectory.has_kink { trajectory.third = vec2f(0.0); }
-    return trajectory;
-}
-
-/// Half the acceleration in a neighbouring frame of what is displaced by `step` [px] up to it.
-fn acceleration_in(motion_there: texture_2d<f32>, depth_there: texture_2d<f32>, px: vec2i, step: vec2f, z: f32,
-                   is_next: bool) -> Acceleration {
-    let at = vec2f(px) + 0.5 + step;
-    let is_inside = all(at >= vec2f(0.0)) && all(at < vec2f(frame.size));
-    let there = vec2i(clamp(at, vec2f(0.0), vec2f(frame.size) - 1.0));
-    let vectors = textureLoad(motion_there, there, 0);
-    let given = textureLoad(depth_there, there, 0).x;
-    let ratio = valid_depth(given) / z;
-    let off = select(vectors.zw, vectors.xy, is_next) + step;
-    let is_same = given > 0.0 && ratio < SAME_DEPTH_RATIO && ratio > 1.0 / SAME_DEPTH_RATIO
-        && dot(off, off) < RETURNS * RETURNS;
-    return Acceleration(0.5 * (vectors.xy + vectors.zw), is_inside && is_same);
+    return trajectory_between(motion, before, after);
 }
 
 struct Background {         // sums over the frames that show it

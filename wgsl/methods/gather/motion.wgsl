@@ -15,10 +15,6 @@ fn displacement4(trajectory: vec4f, u: f32) -> vec2f {
     return (trajectory.xy + trajectory.zw * u) * u;
 }
 
-/// How far any trajectory may leave its parabola within a frame interval of its instant, as a share of its half
-/// acceleration: a kink by 1/4, a cubic by 0.064 of a change that MOST_CHANGE limits.
-const MOST_BEND: f32 = 0.4;
-
 /// The longest time from the instant of the frame `offset` intervals away, before or after, at which it is exposed.
 fn max_abs_time(offset: f32) -> f32 {
     let window = abs(exposure_window(offset));

@@ -1,0 +1,45 @@
+"""Paths through five positions, from the vectors of three frames, one pixel at a time."""
+
+import numpy as np
+
+NO_DEPTH = 2.0**33
+
+
+def valid(depth):
+    """Depths as the shaders read them."""
+    return np.where(np.isfinite(depth) & (depth > 0), np.minimum(depth, NO_DEPTH), NO_DEPTH)
+
+
+def bend(motion, z, y, x, prev, next):
+    """Third term of the path of a pixel through five positions, 1 if it has a kink instead."""
+    here, there = (motion[:2] + motion[2:]) / 2, []
+    for frame, step, back in ((prev, motion[:2], np.s_[2:]), (next, motion[2:], np.s_[:2])):
+        there.append(None)
+        place = np.array([x, y]) + 0.5 + step
+        if frame is None or (place < 0).any() or (place >= frame[3].shape[::-1]).any():
+            continue
+        j, i = int(place[1]), int(place[0])
+        vectors, given = frame[2][j, i].astype(float), frame[3][j, i]
+        leads_back = np.hypot(*(vectors[back] + step)) < 1.5
+        if given > 0 and 1 / 1.15 < valid(given) / z < 1.15 and leads_back:
+            there[-1] = (vectors[:2] + vectors[2:]) / 2
+    before, after = there
+    if (before is None and after is None) or (np.abs(motion) < 0.01).all():
+        return 0.0, 0.0, 0.0
+    most = max(np.hypot(*c) for c in there if c is not None)
+    if before is None:
+        change = 2 * (after - here)
+    elif after is None:
+        change = 2 * (here - before)
+    else:
+        change = after - before
+        if np.hypot(*here) > max(1.0, most / 0.15):
+            return 0.0, 0.0, 1.0
+    change = change if most <= 3 * np.hypot(*here) + 2 else np.zeros(2)
+    return *(change / 6), 0.0
+
+
+def moved(path, u):
+    """Displacement [px] after `u` frame intervals; path: velocity, half acceleration, bend."""
+    bend = np.where(path[..., 6:] > 0, np.abs(u), u**2)
+    return path[..., :2] * u + path[..., 2:4] * bend + path[..., 4:6] * (u**3 - u)

@@ -1,0 +1,45 @@
+"""How paths go on beyond the three positions that a frame's own vectors lead to."""
+
+from __future__ import annotations
+
+from .. import gpu
+from ..gpu.textures import TexturePool
+from .contract import Inputs, View
+
+
+class Bends:
+    """A word per pixel and frame; see trajectory_with() of wgsl/common/five_positions.wgsl."""
+
+    def __init__(self, device):
+        self._device, self._images = device, TexturePool(device)
+
+    def encode(self, encoder, inputs: Inputs) -> list[View]:
+        """Record the bends of all frames; returns them in the frames' order."""
+        kernel = gpu.kernel(self._device, "methods/bends.wgsl")
+        by_offset = {frame.offset: frame for frame in inputs.frames}
+        made = []
+        for frame in inputs.frames:
+            bends = self._images.view(f"bends {frame.offset}", inputs.bindings.size, "r32uint")
+            around = {"prev": by_offset.get(frame.offset - 1),
+                      "next": by_offset.get(frame.offset + 1)}  # fmt: skip
+            others = {
+                f"{side}_{name}": getattr(other, name, inputs.unbound)
+                for side, other in around.items()
+                for name in ("motion", "depth")
+            }
+            kernel.run(
+                encoder,
+                "main",
+                inputs.bindings,
+                motion=frame.motion,
+                depth=frame.depth,
+                bends=bends,
+                **others,
+            )
+            made.append(bends)
+        return made
+
+    @property
+    def unbound(self) -> View:
+        """Bound where there are none."""
+        return self._images.view("no bends", (1, 1), "r32uint")
