@@ -16,9 +16,9 @@ from .packed import Packed, places_of
 from .uniforms import curve_of, frame_of, reading, writing
 
 EIGHT = 8  # pictures that one pass takes, and that are kept on the GPU
-_QUAD = 4  # samples to a texel
-_BLOCK = 8, 2  # columns and rows of pixels that an invocation makes
-_SUMS = 256  # bytes of a block's sums
+_BLOCK = 16, 2  # columns and rows of pixels that an invocation makes
+_SUMS = 512  # bytes of a block's sums
+_KINDS = {8: "rg32uint", 16: "rgba32uint"}  # of texels, by their bytes
 _BAND = 4 << 20  # bytes that are uploaded at once
 
 
@@ -62,7 +62,6 @@ class Average:
     ) -> None:
         """Record the pass over up to eight pictures; `ends`: they are the first, the last ones."""
         (width, height), stored = pictures[0].size, pictures[0].coding
-        bits = 16 if wanted.bits > 8 else 8
         grid = -(-width // _BLOCK[0]), -(-height // _BLOCK[1])
         kernel = gpu.kernel(
             self._device,
@@ -72,7 +71,8 @@ class Average:
             READ_Y=stored.steps[1],
             WRITE_X=wanted.steps[0],
             WRITE_Y=wanted.steps[1],
-            BITS=bits,
+            READ_BITS=8 * _bytes(stored),
+            BITS=8 * _bytes(wanted),
             FIRST=ends[0],
             LAST=ends[1],
         )
@@ -113,13 +113,16 @@ class Average:
     def _layered(self, index: int, picture: CodedPicture) -> wgpu.GPUTexture:
         """The texture that holds a plane of every picture."""
         height, width = picture.planes[index].shape
-        kind = "rgba16uint" if picture.coding.bits > 8 else "rgba8uint"
-        return self._images.texture(f"plane {index}", (-(-width // _QUAD), height), kind, EIGHT)
+        samples = _samples(index, picture.coding)
+        row = -(-width // samples) * samples * _bytes(picture.coding)
+        texel = min(samples * _bytes(picture.coding), max(_KINDS))
+        size = row // texel, height
+        return self._images.texture(f"plane {index}", size, _KINDS[texel], EIGHT)
 
     def _upload(self, picture: CodedPicture, layer: int) -> None:
         for index, plane in enumerate(picture.planes):
             texture = self._layered(index, picture)
-            if over := -plane.shape[1] % _QUAD:
+            if over := -plane.shape[1] % _samples(index, picture.coding):
                 plane = np.pad(plane, ((0, 0), (0, over)), "edge")
             width, height, _ = texture.size
             row = plane.shape[1] * plane.itemsize
@@ -133,3 +136,13 @@ class Average:
                     (width, len(rows), 1),
                 )
         gpu.submit(self._device)  # what is written is held in memory until a submit
+
+
+def _bytes(coding: Coding) -> int:
+    """Of a sample."""
+    return 2 if coding.bits > 8 else 1
+
+
+def _samples(index: int, coding: Coding) -> int:
+    """Of a plane in a row of a block."""
+    return _BLOCK[0] // (coding.steps[0] if index else 1)

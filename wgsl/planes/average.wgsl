@@ -1,5 +1,6 @@
 // Stored planes of several pictures (Y, Cb, Cr) -> the planes of their weighted sum in linear light, with nothing
-// between. An invocation makes a block of 8 x 2 pixels: whole words of all three planes.
+// between. An invocation makes a block of 16 x 2 pixels: whole words of all three planes, from as few loads as there can
+// be, because a load of one texel takes lavapipe longer than to make four pixels linear.
 //#include common/frame.wgsl
 //#include common/loops.wgsl
 //#include common/transfer.wgsl
@@ -18,98 +19,129 @@ struct Average {
 @group(1) @binding(0) var<uniform> stored: Code;
 @group(1) @binding(1) var<uniform> wanted: Code;
 @group(1) @binding(2) var<uniform> average: Average;
-@group(1) @binding(3) var lumas: texture_2d_array<u32>;         // four samples to a texel
-@group(1) @binding(4) var blues: texture_2d_array<u32>;
+@group(1) @binding(3) var lumas: texture_2d_array<u32>;         // sixteen bytes to a texel
+@group(1) @binding(4) var blues: texture_2d_array<u32>;         // the same, or eight samples if READ_X is 2
 @group(1) @binding(5) var reds: texture_2d_array<u32>;
 @group(1) @binding(6) var<storage, read_write> sums: array<mat4x4f>;    // where there are more than eight pictures
 @group(1) @binding(7) var<storage, read_write> packed: array<u32>;
 
 override READ_X: u32 = 2u;      // 1 or 2: columns, rows of pixels to one sample of chroma, of what is read
 override READ_Y: u32 = 2u;
+override READ_BITS: u32 = 8u;   // 8 or 16: of a sample in its texel
 override WRITE_X: u32 = 2u;     // of what is written
 override WRITE_Y: u32 = 2u;
 override BITS: u32 = 8u;        // 8 or 16: of a sample that is written, in its word
 override FIRST: bool = true;    // `sums` is empty
 override LAST: bool = true;     // the sum is whole, and is written
 
+/// Light of sixteen pixels of a row.
+struct Row {
+    a: mat4x3f,
+    b: mat4x3f,
+    c: mat4x3f,
+    d: mat4x3f,
+}
+
+/// One component of sixteen pixels of a row.
+struct Samples {
+    a: vec4f,
+    b: vec4f,
+    c: vec4f,
+    d: vec4f,
+}
+
+var<private> red_row: vec4f;        // of `stored`, as uniforms are slow within loops
+var<private> green_row: vec4f;
+var<private> blue_row: vec4f;
+
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let turns = turns_of(average.count, id.x);
     // Below the last row stands the last row again.
     let rows = vec2u(2u * id.y, min(2u * id.y + 1u, average.luma.y - 1u));
-    let coarse = vec2u(rows.x / READ_Y, select(rows.y, rows.x / 2u, READ_Y == 2u));
-    let left = 2u * id.x;
-    var a = mat4x3f();          // the four pixels at the upper left
-    var b = mat4x3f();
-    var c = mat4x3f();          // at the lower left
-    var d = mat4x3f();
+    red_row = stored.x;
+    green_row = stored.y;
+    blue_row = stored.z;
+    var upper = Row();
+    var lower = Row();
     var n = 0u;
     loop {
         let weight = average.parts[n].x;
         let layer = i32(average.parts[n].y);
-        let upper = chroma(id.x, coarse.x, layer);
-        let lower = chroma(id.x, coarse.y, layer);
-        a = add(a, weight, textureLoad(lumas, vec2u(left, rows.x), layer, 0), upper.blue_left, upper.red_left);
-        b = add(b, weight, textureLoad(lumas, vec2u(left + 1u, rows.x), layer, 0), upper.blue_right, upper.red_right);
-        c = add(c, weight, textureLoad(lumas, vec2u(left, rows.y), layer, 0), lower.blue_left, lower.red_left);
-        d = add(d, weight, textureLoad(lumas, vec2u(left + 1u, rows.y), layer, 0), lower.blue_right, lower.red_right);
+        let above = vec2u(id.x, rows.x / READ_Y);
+        let blue = chroma(blues, above, layer);
+        let red = chroma(reds, above, layer);
+        upper = add(upper, weight, sixteen(lumas, vec2u(id.x, rows.x), layer), blue, red);
+        let luma = sixteen(lumas, vec2u(id.x, rows.y), layer);
+        if READ_Y == 2u {
+            lower = add(lower, weight, luma, blue, red);
+        } else {
+            let below = vec2u(id.x, rows.y);
+            lower = add(lower, weight, luma, chroma(blues, below, layer), chroma(reds, below, layer));
+        }
         n++;
         if n >= turns { break; }
     }
     if rows.x > rows.y || id.x >= average.blocks { return; }    // outside; not before the loop, see lavapipe.md
-    let place = 4u * (id.y * average.blocks + id.x);
+    let place = 8u * (id.y * average.blocks + id.x);
     if !FIRST {
-        a += colors(sums[place]);
-        b += colors(sums[place + 1u]);
-        c += colors(sums[place + 2u]);
-        d += colors(sums[place + 3u]);
+        upper = with_sums(upper, place);
+        lower = with_sums(lower, place + 4u);
     }
     if !LAST {
-        sums[place] = padded(a);
-        sums[place + 1u] = padded(b);
-        sums[place + 2u] = padded(c);
-        sums[place + 3u] = padded(d);
+        keep(upper, place);
+        keep(lower, place + 4u);
         return;
     }
-    let upper_left = signals_of(a);
-    let upper_right = signals_of(b);
-    let lower_left = signals_of(c);
-    let lower_right = signals_of(d);
-    write_row(average.luma, id.x, rows.x, mixed(wanted.x, upper_left), mixed(wanted.x, upper_right));
-    write_row(average.luma, id.x, rows.y, mixed(wanted.x, lower_left), mixed(wanted.x, lower_right));
-    if WRITE_Y == 2u {
-        write_chroma(id.x, id.y, upper_left + lower_left, upper_right + lower_right);
-    } else {
-        write_chroma(id.x, rows.x, upper_left, upper_right);
-        write_chroma(id.x, rows.y, lower_left, lower_right);
+    write_quads(2u * id.x, id.y, rows, upper.a, upper.b, lower.a, lower.b);
+    write_quads(2u * id.x + 1u, id.y, rows, upper.c, upper.d, lower.c, lower.d);
+}
+
+/// Samples of a plane for the sixteen pixels of block `at`, which has as many.
+fn sixteen(plane: texture_2d_array<u32>, at: vec2u, layer: i32) -> Samples {
+    if READ_BITS == 8u {
+        let bytes = textureLoad(plane, at, layer, 0);
+        return Samples(of_bytes(bytes.x), of_bytes(bytes.y), of_bytes(bytes.z), of_bytes(bytes.w));
     }
+    let left = textureLoad(plane, vec2u(2u * at.x, at.y), layer, 0);
+    let right = textureLoad(plane, vec2u(2u * at.x + 1u, at.y), layer, 0);
+    return Samples(of_halves(left.xy), of_halves(left.zw), of_halves(right.xy), of_halves(right.zw));
 }
 
-/// Samples of chroma for eight pixels of a row.
-struct Chroma {
-    blue_left: vec4f,
-    blue_right: vec4f,
-    red_left: vec4f,
-    red_right: vec4f,
-}
-
-fn chroma(block: u32, row: u32, layer: i32) -> Chroma {
-    if READ_X == 2u {
-        let at = vec2u(block, row);
-        let blue = floats(textureLoad(blues, at, layer, 0));
-        let red = floats(textureLoad(reds, at, layer, 0));
-        return Chroma(blue.xxyy, blue.zzww, red.xxyy, red.zzww);
+/// Samples of a plane of chroma for the same.
+fn chroma(plane: texture_2d_array<u32>, at: vec2u, layer: i32) -> Samples {
+    if READ_X == 1u { return sixteen(plane, at, layer); }
+    let texel = textureLoad(plane, at, layer, 0);
+    var left = of_bytes(texel.x);
+    var right = of_bytes(texel.y);
+    if READ_BITS == 16u {
+        left = of_halves(texel.xy);
+        right = of_halves(texel.zw);
     }
-    let at = vec2u(2u * block, row);
-    let next = at + vec2u(1u, 0u);
-    return Chroma(
-        floats(textureLoad(blues, at, layer, 0)), floats(textureLoad(blues, next, layer, 0)),
-        floats(textureLoad(reds, at, layer, 0)), floats(textureLoad(reds, next, layer, 0)));
+    return Samples(left.xxyy, left.zzww, right.xxyy, right.zzww);
 }
 
-/// Light of four pixels, added to a sum.
-fn add(sum: mat4x3f, weight: f32, luma: vec4u, blue: vec4f, red: vec4f) -> mat4x3f {
-    let y = floats(luma);
+fn of_bytes(word: u32) -> vec4f {
+    return floats(vec4u(word & 0xffu, (word >> 8u) & 0xffu, (word >> 16u) & 0xffu, word >> 24u));
+}
+
+fn of_halves(words: vec2u) -> vec4f {
+    return floats(vec4u(words.x & 0xffffu, words.x >> 16u, words.y & 0xffffu, words.y >> 16u));
+}
+
+/// Samples, which lavapipe converts ten times as fast as signed numbers.
+fn floats(samples: vec4u) -> vec4f {
+    return vec4f(vec4i(samples));
+}
+
+/// Light of sixteen pixels, added to a sum.
+fn add(sum: Row, weight: f32, luma: Samples, blue: Samples, red: Samples) -> Row {
+    return Row(
+        add_four(sum.a, weight, luma.a, blue.a, red.a), add_four(sum.b, weight, luma.b, blue.b, red.b),
+        add_four(sum.c, weight, luma.c, blue.c, red.c), add_four(sum.d, weight, luma.d, blue.d, red.d));
+}
+
+fn add_four(sum: mat4x3f, weight: f32, y: vec4f, blue: vec4f, red: vec4f) -> mat4x3f {
     return mat4x3f(
         fma(vec3f(weight), light(y.x, blue.x, red.x), sum[0]), fma(vec3f(weight), light(y.y, blue.y, red.y), sum[1]),
         fma(vec3f(weight), light(y.z, blue.z, red.z), sum[2]), fma(vec3f(weight), light(y.w, blue.w, red.w), sum[3]));
@@ -117,22 +149,47 @@ fn add(sum: mat4x3f, weight: f32, luma: vec4u, blue: vec4f, red: vec4f) -> mat4x
 
 fn light(y: f32, cb: f32, cr: f32) -> vec3f {
     let tint = vec3f(
-        fma(stored.x.y, cb, fma(stored.x.z, cr, stored.x.w)), fma(stored.y.y, cb, fma(stored.y.z, cr, stored.y.w)),
-        fma(stored.z.y, cb, fma(stored.z.z, cr, stored.z.w)));
-    return light_of(fma(vec3f(stored.x.x, stored.y.x, stored.z.x), vec3f(y), tint));
+        fma(red_row.y, cb, fma(red_row.z, cr, red_row.w)), fma(green_row.y, cb, fma(green_row.z, cr, green_row.w)),
+        fma(blue_row.y, cb, fma(blue_row.z, cr, blue_row.w)));
+    return light_of(fma(vec3f(red_row.x, green_row.x, blue_row.x), vec3f(y), tint));
 }
 
-/// Samples, which lavapipe converts ten times as fast as signed numbers.
-fn floats(texel: vec4u) -> vec4f {
-    return vec4f(vec4i(texel));
+/// A sum, and what was kept of the one before.
+fn with_sums(row: Row, place: u32) -> Row {
+    return Row(
+        row.a + colors(sums[place]), row.b + colors(sums[place + 1u]),
+        row.c + colors(sums[place + 2u]), row.d + colors(sums[place + 3u]));
 }
 
 fn colors(kept: mat4x4f) -> mat4x3f {
     return mat4x3f(kept[0].xyz, kept[1].xyz, kept[2].xyz, kept[3].xyz);
 }
 
+fn keep(row: Row, place: u32) {
+    sums[place] = padded(row.a);
+    sums[place + 1u] = padded(row.b);
+    sums[place + 2u] = padded(row.c);
+    sums[place + 3u] = padded(row.d);
+}
+
 fn padded(sum: mat4x3f) -> mat4x4f {
     return mat4x4f(vec4f(sum[0], 0.0), vec4f(sum[1], 0.0), vec4f(sum[2], 0.0), vec4f(sum[3], 0.0));
+}
+
+/// Write half a block, 8 x 2 pixels: four at the upper left (a), at the upper right, below those.
+fn write_quads(half: u32, low: u32, rows: vec2u, a: mat4x3f, b: mat4x3f, c: mat4x3f, d: mat4x3f) {
+    let upper_left = signals_of(a);
+    let upper_right = signals_of(b);
+    let lower_left = signals_of(c);
+    let lower_right = signals_of(d);
+    write_row(average.luma, half, rows.x, mixed(wanted.x, upper_left), mixed(wanted.x, upper_right));
+    write_row(average.luma, half, rows.y, mixed(wanted.x, lower_left), mixed(wanted.x, lower_right));
+    if WRITE_Y == 2u {
+        write_chroma(half, low, upper_left + lower_left, upper_right + lower_right);
+    } else {
+        write_chroma(half, rows.x, upper_left, upper_right);
+        write_chroma(half, rows.y, lower_left, lower_right);
+    }
 }
 
 /// R, G and B of four pixels.
