@@ -345,6 +345,18 @@ def test_a_real_worker_without_a_gpu_is_named_once(shot, whole, tmp_path):
     assert "does nothing: no GPU adapter" in notes[0]
 
 
+@DASK_LEAVES_SOCKETS
+def test_workers_have_the_environment_of_today(shot, whole, tmp_path, monkeypatch):
+    """Though the process that they are forked from may have begun with another one."""
+    job = as_farm_job(job_of(shot, tmp_path / "out"))
+    monkeypatch.setenv("WGMB_ADAPTER", "nonsense")
+    with pytest.raises(DeviceError, match="no adapter matches 'nonsense'; found"):
+        Farm(workers=1).blur(job)
+    monkeypatch.setenv("WGMB_ADAPTER", "")
+    assert not Farm(workers=1).blur(job).report.failed
+    assert contents(tmp_path / "out") == whole
+
+
 def begun(line, has_begun) -> subprocess.Popen:
     process = subprocess.Popen(
         [*make.COMMAND, *line], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -86,8 +86,10 @@ def memory_of(process: int) -> float:
 
 
 def is_worker(process: int) -> bool:
-    """Return True for a process that dask's nanny started."""
+    """Return True for a process that dask's nanny started: one that has no children of its own."""
     try:
-        return b"spawn_main" in Path(f"/proc/{process}/cmdline").read_bytes()
+        line = Path(f"/proc/{process}/cmdline").read_bytes()
+        children = Path(f"/proc/{process}/task/{process}/children").read_text()
     except OSError:
         return False
+    return (b"spawn_main" in line or b"forkserver" in line) and not children.strip()

@@ -27,6 +27,7 @@ from .io.frame_numbers import frame_list
 from .io.settled import ranges
 from .job import Job
 from .job_file import stored, time_there
+from .local_workers import closing, local_client
 from .outcome import Outcome
 
 SMALLEST, LARGEST = 4, 64  # frames of a part
@@ -100,40 +101,18 @@ class Farm:
 
     @contextlib.contextmanager
     def _client(self) -> Iterator[Any]:
-        import dask.config
-        from distributed import Client, LocalCluster
-
-        if self.cluster is not None:
-            try:
-                client = Client(self.cluster, set_as_default=False, timeout=_CONNECT)
-            except (OSError, ValueError) as error:
-                raise InputError(f"no scheduler at {self.cluster}: {error}") from None
-            with _closing(client):
+        if self.cluster is None:
+            with local_client(self.workers or max(1, len(hardware_adapters()))) as client:
                 yield client
             return
-        count = self.workers or max(1, len(hardware_adapters()))
-        settings = {"distributed.worker.multiprocessing-method": "spawn"}
-        with dask.config.set(settings):
-            cluster = LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                dashboard_address="127.0.0.1:0",
-                silence_logs=50,
-                memory_limit=0,
-                host="127.0.0.1",
-            )
-            with _closing(cluster), _closing(Client(cluster, set_as_default=False)) as client:
-                yield client
+        from distributed import Client
 
-
-@contextlib.contextmanager
-def _closing(what: Any) -> Iterator[Any]:
-    """Close a client or a cluster, whose connection may be gone."""
-    try:
-        yield what
-    finally:
-        with contextlib.suppress(Exception):
-            what.close(timeout=5)
+        try:
+            client = Client(self.cluster, set_as_default=False, timeout=_CONNECT)
+        except (OSError, ValueError) as error:
+            raise InputError(f"no scheduler at {self.cluster}: {error}") from None
+        with closing(client):
+            yield client
 
 
 class Driver:
