@@ -8,7 +8,7 @@ from dataclasses import replace
 import bpy
 from bpy.props import IntProperty
 
-from . import job
+from . import job, running
 from .comparison import COMPARISON
 from .rendering import Render, at_once, beside
 from .settings import wanted_of
@@ -25,11 +25,13 @@ class Running:
     _steps: Iterator[Step] | None = None
     _timer: bpy.types.Timer | None = None
     _report: Report
-    _is_stopping = False
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return False while Blender renders."""
+        """Return False while Blender renders, or one of these operators is at work."""
+        if running.now() is not None:
+            cls.poll_message_set("Frames are being blurred")
+            return False
         return context.scene is not None and not bpy.app.is_job_running("RENDER")
 
     def begin(self, context: bpy.types.Context, render: Render) -> Iterator[Step]:
@@ -62,16 +64,18 @@ class Running:
         self._timer = manager.event_timer_add(_EVERY, window=context.window)
         manager.modal_handler_add(self)
         manager.progress_begin(0, 100)
+        running.begin()
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Do a step, or stop."""
+        now = running.now() or running.begin()
         if event.type == "ESC":
-            self._is_stopping = True
+            now.is_stopping = True
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
         # A frame that Blender renders ends by Esc itself; until then its settings are needed.
-        if self._is_stopping and not bpy.app.is_job_running("RENDER"):
+        if now.is_stopping and not bpy.app.is_job_running("RENDER"):
             return self._end(context, StoppedError("Stopped; finished frames are kept"))
         try:
             share, text = next(self._steps)
@@ -82,8 +86,11 @@ class Running:
         except BaseException:
             self._end(context, None)
             raise
-        context.window_manager.progress_update(round(100 * share))
-        context.workspace.status_text_set(f"Motion blur: {text}, {share:.0%}   Esc: cancel")
+        if (now.share, now.text) != (share, text):
+            now.share, now.text = share, text
+            context.window_manager.progress_update(round(100 * share))
+            context.workspace.status_text_set(f"Motion blur: {text}, {share:.0%}   Esc: cancel")
+            running.redraw(context.window_manager)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -91,6 +98,8 @@ class Running:
         self._end(context, None)
 
     def _end(self, context: bpy.types.Context, error: BaseException | None) -> set[str]:
+        running.end()
+        running.redraw(context.window_manager)
         self._steps.close()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
@@ -157,6 +166,21 @@ class WGMB_OT_compare(Running, bpy.types.Operator):
         return super()._told(context)
 
 
+class WGMB_OT_stop(bpy.types.Operator):
+    """Stop after the frame that is being rendered; Esc stops this one too"""
+
+    bl_idname = "wgmb.stop"
+    bl_label = "Stop"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Tell the one that is at work."""
+        now = running.now()
+        if now is None:
+            return {"CANCELLED"}
+        now.is_stopping = True
+        return {"FINISHED"}
+
+
 class WGMB_OT_keep(bpy.types.Operator):
     """Add a collection whose objects stay sharp"""
 
@@ -189,6 +213,7 @@ CLASSES = (
     WGMB_OT_render_and_blur,
     WGMB_OT_blur_rendered,
     WGMB_OT_compare,
+    WGMB_OT_stop,
     WGMB_OT_keep,
     WGMB_OT_keep_no_more,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import sharp
+from . import running, sharp
 
 
 class WGMB_PT_motion_blur(bpy.types.Panel):
@@ -22,7 +22,7 @@ class WGMB_PT_motion_blur(bpy.types.Panel):
         own = scene.wgmb
         layout.use_property_split = True
         layout.use_property_decorate = False
-        draw_exposure(layout.column(), scene)
+        draw_exposure(layout, scene)
         column = layout.column()
         column.prop(own, "method")
         row = column.row()
@@ -37,23 +37,37 @@ class WGMB_PT_motion_blur(bpy.types.Panel):
         if sharp.has_compositor(scene):
             column.prop(own, "compositing")
         draw_kept(layout.column(), own)
-        column = layout.column()
+        draw_buttons(layout.column())
+
+
+def draw_buttons(column: bpy.types.UILayout) -> None:
+    """What can be begun, or how far it is."""
+    now = running.now()
+    if now is None:
         column.operator("wgmb.render_and_blur", icon="RENDER_ANIMATION")
         column.operator("wgmb.blur_rendered", icon="FILE_REFRESH")
         column.operator("wgmb.compare", icon="IMAGE_DATA")
+    else:
+        row = column.row()
+        row.progress(factor=now.share, text=now.text)
+        row.operator("wgmb.stop", text="", icon="CANCEL")
 
 
-def draw_exposure(column: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+def draw_exposure(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """The scene's own motion blur settings, which the blur follows."""
-    render = scene.render
+    render, column = scene.render, layout.column()
     column.label(text="Exposure, as in Render Properties, Motion Blur")
     column.prop(render, "motion_blur_position")
     column.prop(render, "motion_blur_shutter")
     if render.engine == "CYCLES":
-        column.prop(scene.cycles, "rolling_shutter_type")
+        column.prop(scene.cycles, "rolling_shutter_type", text="Rolling Shutter")
         if scene.cycles.rolling_shutter_type != "NONE":
             column.prop(scene.cycles, "rolling_shutter_duration")
-    column.label(text="Blender's own motion blur is off while frames are rendered", icon="INFO")
+    header, curve = layout.panel("wgmb_shutter_curve", default_closed=True)
+    header.label(text="Shutter Curve")
+    if curve is not None:
+        curve.template_curve_mapping(render, "motion_blur_shutter_curve")
+    layout.label(text="Blender's own motion blur is off while frames are rendered", icon="INFO")
 
 
 def draw_kept(column: bpy.types.UILayout, own: bpy.types.PropertyGroup) -> None:

@@ -218,6 +218,7 @@ class Window:
             progress_begin=lambda low, high: None,
             progress_update=lambda value: self.told.append(value),
             progress_end=lambda: self.told.append("progress ended"),
+            windows=[],
         )
         self.context = SimpleNamespace(
             scene=scene,
@@ -233,7 +234,6 @@ class Window:
         one = SimpleNamespace(report=lambda level, text: self.reports.append((level, text)))
         for name in ("begin", "steps", "execute", "_told", "_failed", "_end"):
             setattr(one, name, getattr(kind, name).__get__(one))
-        one._is_stopping = False
         done, events = kind.invoke(one, self.context, None), 0
         while done & {"RUNNING_MODAL", "PASS_THROUGH"}:
             events += 1
@@ -366,3 +366,24 @@ def test_the_add_on_enabled_twice_is_a_sentence_and_harms_nothing(tmp_path):
         wgmb_blender.register()
     small(tmp_path)
     assert bpy.ops.wgmb.render_and_blur() == {"FINISHED"}
+
+
+def test_the_stop_button_and_one_run_at_a_time(tmp_path, monkeypatch):
+    """Blender itself takes an Esc that comes as a frame ends; the button's press is not lost."""
+    scene = small(tmp_path)
+    assert operators.WGMB_OT_render_and_blur.poll(bpy.context)
+    assert bpy.ops.wgmb.stop() == {"CANCELLED"}
+    window, seen = Window(scene), []
+
+    def press(text):
+        if text is not None and "Blurring frame 5" in text:
+            seen.append(operators.WGMB_OT_compare.poll(bpy.context))
+            assert bpy.ops.wgmb.stop() == {"FINISHED"}
+
+    window.context.workspace.status_text_set = press
+    with unchanged(scene):
+        done, _ = window.run(operators.WGMB_OT_render_and_blur, monkeypatch)
+    assert done == {"CANCELLED"} and seen[0] is False
+    assert window.reports[-1] == ({"WARNING"}, "Stopped; finished frames are kept")
+    assert [p.name for p in tmp_path.glob("*.png")] == ["blurred_0004.png"]
+    assert operators.WGMB_OT_render_and_blur.poll(bpy.context)
