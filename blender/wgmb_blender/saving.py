@@ -72,7 +72,8 @@ class Desk:
     def close(self) -> None:
         """Remove all that was made."""
         with contextlib.suppress(ReferenceError):
-            bpy.data.scenes.remove(self.scene)
+            # `scenes.remove` asks the context's window, and ends a `blender -c`, which has none.
+            bpy.data.batch_remove([self.scene])
         for image in self.images:
             with contextlib.suppress(ReferenceError):
                 bpy.data.images.remove(image)

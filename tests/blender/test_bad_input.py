@@ -286,3 +286,11 @@ def test_the_command_renders_on_one_machine_and_blurs_on_another(tmp_path, capfd
     out = capfd.readouterr().out
     assert "wgmb: 0% Blurring frame 5\n" in out and "wgmb: 1 frame blurred\n" in out
     assert scene.name == bpy.context.scene.name
+
+
+def test_the_command_has_no_window(tmp_path):
+    """Some functions of Blender's take one for granted, and `blender -c` has none."""
+    small(tmp_path)
+    with bpy.context.temp_override(window=None):
+        assert command.command(["--frames", "4"]) == 0
+    assert [p.name for p in tmp_path.glob("*.png")] == ["blurred_0004.png"]
