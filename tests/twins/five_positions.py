@@ -27,16 +27,39 @@ def bend(motion, z, y, x, prev, next):
     if (before is None and after is None) or (np.abs(motion) < 0.01).all():
         return 0.0, 0.0, 0.0
     most = max(np.hypot(*c) for c in there if c is not None)
-    if before is None:
-        change = 2 * (after - here)
-    elif after is None:
-        change = 2 * (here - before)
-    else:
-        change = after - before
-        if np.hypot(*here) > max(1.0, most / 0.15):
-            return 0.0, 0.0, 1.0
-    change = change if most <= 3 * np.hypot(*here) + 2 else np.zeros(2)
-    return *(change / 6), 0.0
+    if before is not None and after is not None and np.hypot(*here) > max(1.0, most / 0.15):
+        return 0.0, 0.0, 1.0
+    limit = 3 * np.hypot(*here) + 2
+    if most > limit:
+        return 0.0, 0.0, 0.0
+    before = continued(here, after) if before is None else before
+    after = continued(here, before) if after is None else after
+    factor = min(turn_factor(here, (before + after) / 2), limit / max(most, 1e-6))
+    return *(factor * (after - before) / 6), 0.0
+
+
+def continued(here, there):
+    """The acceleration on the side that is not seen: turned back, or changed the other way."""
+    length2 = here @ here
+    turns = length2 > 1 and -0.2 * length2 < here @ there < length2
+    if turns and abs(there @ there / length2 - 1) < 0.2:
+        return 2 * (here @ there) / length2 * here - there
+    return 2 * here - there
+
+
+def turn_factor(here, mean):
+    """How much more than five positions tell is the third term of what turns or swings."""
+    if here @ here <= 1:
+        return 1.0
+    cosine = mean @ here / (here @ here)
+    off = mean - cosine * here
+    if cosine <= -0.2 or off @ off >= 0.04 * (here @ here):
+        return 1.0
+    angle = np.arccos(min(cosine, 1.0))
+    # By which the cubic misses a circle in the middle between two frames.
+    circle = np.sin(angle / 2) - np.sin(angle) / 2
+    cubic = np.sin(angle) * (1 - np.cos(angle)) / 8
+    return circle / cubic if cubic > 1e-9 else 1.0
 
 
 def moved(path, u):

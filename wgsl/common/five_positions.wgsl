@@ -10,6 +10,10 @@ const MOST_CHANGE: f32 = 3.0;           // of a half acceleration from one frame
 const SPARED_CHANGE: f32 = 2.0;         // and this much more [px]: what changes more is another surface, or noise
 const KINK_ACCELERATION: f32 = 1.0;     // from this half acceleration on [px] a path may have a kink,
 const KINK_RATIO: f32 = 0.15;           // if those before and after it are smaller by this
+const LEAST_TURNED: f32 = 1.0;          // half acceleration [px] from which on turns are told
+const LEAST_COSINE: f32 = -0.2;         // of the angle per frame: beyond 100 degrees it may be another one
+const SAME_LENGTH: f32 = 0.2;           // of accelerations on a circle: relative difference of their squares
+const OFF_TURN: f32 = 0.2;              // share of the acceleration by which a turn may miss
 
 struct Acceleration {       // of a surface in a neighbouring frame
     half: vec2f,            // [px per squared frame interval]
@@ -20,20 +24,44 @@ struct Acceleration {       // of a surface in a neighbouring frame
 fn trajectory_between(motion: vec4f, before: Acceleration, after: Acceleration) -> Trajectory5 {
     var trajectory = trajectory5_from(trajectory_from(motion));
     let here = trajectory.half_acceleration;
-    // The change over two frame intervals; twice that over one, if one is all that is known.
-    var change = vec2f(0.0);
-    if before.is_known && after.is_known { change = after.half - before.half; }
-    if before.is_known && !after.is_known { change = 2.0 * (here - before.half); }
-    if after.is_known && !before.is_known { change = 2.0 * (after.half - here); }
+    let both = before.is_known && after.is_known;
+    var earlier = before.half;
+    var later = after.half;
+    if !before.is_known { earlier = continued(here, later); }
+    if !after.is_known { later = continued(here, earlier); }
     let most = max(select(0.0, length(before.half), before.is_known), select(0.0, length(after.half), after.is_known));
+    let limit = MOST_CHANGE * length(here) + SPARED_CHANGE;
     let stays = all(abs(motion) < vec4f(STATIC_EPSILON));
-    let believed = !stays && most <= MOST_CHANGE * length(here) + SPARED_CHANGE;
-    trajectory.third = select(vec2f(0.0), change / 6.0, believed);
     // Straight before and after, but not here: it starts, stops or bounces in this very frame.
-    trajectory.has_kink = before.is_known && after.is_known && length(here) > KINK_ACCELERATION
-        && most < KINK_RATIO * length(here);
-    if trajectory.has_kink { trajectory.third = vec2f(0.0); }
+    trajectory.has_kink = both && length(here) > KINK_ACCELERATION && most < KINK_RATIO * length(here);
+    if (before.is_known || after.is_known) && !stays && most <= limit && !trajectory.has_kink {
+        let factor = min(turn_factor(here, 0.5 * (earlier + later)), limit / max(most, 1e-6));
+        trajectory.third = factor * (later - earlier) / 6.0;
+    }
     return trajectory;
+}
+
+/// Half the acceleration in the neighbouring frame that does not show the surface, from those here and in the other
+/// one: turned back by the same angle if its length stays, as on a circle; else changed as much the other way.
+fn continued(here: vec2f, there: vec2f) -> vec2f {
+    let length2 = dot(here, here);
+    let cosine = dot(there, here) / max(length2, 1e-12);
+    let turns = length2 > LEAST_TURNED * LEAST_TURNED && cosine > LEAST_COSINE && cosine < 1.0
+        && abs(dot(there, there) / length2 - 1.0) < SAME_LENGTH;
+    return 2.0 * select(1.0, cosine, turns) * here - there;
+}
+
+/// What turns about a point or swings by an angle w per frame has accelerations around it whose mean is cos w times
+/// its own. Its third term is then larger than five positions alone tell, by a factor that makes the path exact in
+/// the middle between the frames. 1 for all else.
+fn turn_factor(here: vec2f, mean: vec2f) -> f32 {
+    let length2 = dot(here, here);
+    let cosine = dot(mean, here) / max(length2, 1e-12);
+    let off = mean - cosine * here;
+    let turns = length2 > LEAST_TURNED * LEAST_TURNED && cosine > LEAST_COSINE
+        && dot(off, off) < OFF_TURN * OFF_TURN * length2;
+    let half_angle = sqrt(0.5 + 0.5 * clamp(cosine, LEAST_COSINE, 1.0));    // its cosine
+    return select(1.0, 2.0 / (half_angle * (1.0 + half_angle)), turns);
 }
 
 /// Half the acceleration in a neighbouring frame of what is displaced by `step` [px] up to it.
