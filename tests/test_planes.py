@@ -174,6 +174,19 @@ def test_one_picture_averaged_is_itself(device, name):
         assert np.abs(plane.astype(int) - want).max() <= allowed
 
 
+@pytest.mark.parametrize("full_range", [False, True])
+@pytest.mark.parametrize("matrix", [1, 5, 8, 9])
+def test_every_colour_of_8_bits_averaged_with_itself_is_itself(device, matrix, full_range):
+    """Those that no display has too, below black and above white."""
+    levels = np.array([0, 1, 15, 16, 17, 40, 77, 128, 180, 235, 240, 254, 255], np.uint8)
+    every = np.stack(np.meshgrid(np.arange(256), levels, levels)).reshape(3, 256, -1)
+    coding = Coding(steps=(1, 1), matrix=matrix, full_range=full_range)
+    picture = CodedPicture(tuple(p.astype(np.uint8) for p in every), coding)
+    got = Average(device)([picture] * 4, [0.1, 0.2, 0.3, 0.4], coding)
+    for want, plane in zip(picture.planes, got.planes, strict=True):
+        np.testing.assert_array_equal(plane, want)
+
+
 @pytest.mark.parametrize("count", [3, 19])
 @pytest.mark.parametrize("name", YUV)
 def test_an_average_of_planes_is_that_of_their_light(device, name, count):

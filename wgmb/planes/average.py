@@ -67,6 +67,7 @@ class Average:
             self._device,
             "planes/average.wgsl",
             CURVE=curve_of(stored),
+            PRECISE=max(stored.bits, wanted.bits) > 8,
             READ_X=stored.steps[0],
             READ_Y=stored.steps[1],
             WRITE_X=wanted.steps[0],
