@@ -9,7 +9,7 @@ from twins import flow as twin
 from wgmb import Blur, Flow, Frame, InputError
 from wgmb.flow import passes as flow_passes
 from wgmb.flow.carry import carry
-from wgmb.flow.dominant import follow_most
+from wgmb.flow.dominant import extend, follow_most
 from wgmb.flow.homography import dominant_homography
 from wgmb.flow.match import matched
 from wgmb.flow.mend import mend
@@ -178,6 +178,27 @@ def test_a_motion_of_most_that_does_not_bend_is_left_to_the_search():
     bound = matched(kit(), MIDDLE, small()[0], 0)
     for ways in (np.zeros((4, 4)), np.tile([1.3, -0.6, -1.3, 0.6], (4, 1))):
         assert follow_most(kit(), (13, 9), bound, MIDDLE, states, centres, ways) is states
+
+
+@pytest.mark.parametrize(
+    ("views", "far", "way"), [(MIDDLE, 1, (4, -2)), (Views(1, 1, 1, AROUND), 60, (0, 0))]
+)
+def test_motion_out_of_the_picture_goes_on_as_most_moves(views, far, way):
+    """On one side, where the other one agrees; on both, where the own motion matches nothing."""
+    rng = np.random.default_rng(9)
+    to_near, to_far = np.eye(3), np.eye(3)
+    to_near[:2, 2], to_far[:2, 2] = [4 * far, -2], [-3.5 * far, 2.5]
+    states = random_states(seed=10)
+    states[..., :2] = way + rng.choice([0, 0.2, 3], (9, 13, 1)) * rng.normal(0, 1, (9, 13, 2))
+    states[..., 4:] *= 0.2
+    bound = matched(kit(), views, small()[0], 0)
+    got = read(extend(kit(), (13, 9), bound, states_texture(states), (to_near, to_far)))
+    want = twin.extended(matcher(views), states, to_near, to_far)
+    same = np.abs(got - want).max(axis=2) < 1e-3
+    assert same.mean() > 0.95  # the sampler's rounding may decide
+    changed = np.abs(want - states).max(axis=2) > 1e-3
+    assert 0.1 < changed.mean() < 0.9
+    assert same[changed].mean() > 0.9
 
 
 @pytest.mark.parametrize("views", [MIDDLE, FIRST])
@@ -376,6 +397,7 @@ def test_a_turning_and_zooming_texture_is_followed(turn, zoom):
     is_seen = (ends < [54, 18, 54, 18]).all(axis=2)
     assert is_seen.mean() > 0.4
     assert np.abs(motion - want)[is_seen].mean() < 0.1
+    assert np.abs(motion - want).mean() < 0.1  # what leaves the picture goes on as the rest does
 
 
 def test_what_is_hidden_on_one_side_follows_the_other():

@@ -236,6 +236,42 @@ def full_search(matcher, reach):
     return out, sides
 
 
+def extended(matcher, states, to_near, to_far):
+    """States that lead out of the picture go on as the homographies of most of it do."""
+    out = states.copy()
+    height, width = states.shape[:2]
+
+    def leaves(x, y, way):
+        return not (0 <= x + way[0] <= width - 1 and 0 <= y + way[1] <= height - 1)
+
+    def displaced(matrix, x, y):
+        goal = matrix @ [x + 0.5, y + 0.5, 1]
+        return goal[:2] / goal[2] - [x + 0.5, y + 0.5]
+
+    for y in range(height):
+        for x in range(width):
+            near, far = states[y, x, :2], matcher.factor * states[y, x, :2] + states[y, x, 2:4]
+            most_near, most_far = displaced(to_near, x, y), displaced(to_far, x, y)
+            bend = most_far - matcher.factor * most_near
+            if leaves(x, y, most_near) and leaves(x, y, most_far):
+                if matcher.cost(x, y, states[y, x]) > 0.06:
+                    slope = [
+                        displaced(to_near, x + i, y + j) - displaced(to_near, x - i, y - j)
+                        for i, j in ((0.5, 0), (0, 0.5))
+                    ]
+                    out[y, x] = [*most_near, *bend, *np.array(slope).T.ravel()]
+            elif leaves(x, y, near) and not leaves(x, y, far):
+                if np.linalg.norm(far - most_far) < 1:
+                    out[y, x, :4] = [*(far - bend) / matcher.factor, *bend]
+            elif (
+                leaves(x, y, far)
+                and not leaves(x, y, near)
+                and np.linalg.norm(near - most_near) < 1
+            ):
+                out[y, x, 2:4] = bend
+    return out
+
+
 def carried(matcher, states, along, turn):
     """States of a frame seen from its neighbour; the cheapest of those that land on a pixel."""
     out, least = np.zeros_like(states), np.full(states.shape[:2], np.inf)

@@ -77,11 +77,30 @@ def _bends(views: Views, most: tuple[np.ndarray, np.ndarray], centres, ways) -> 
     return bool(half and np.median(np.hypot(bend[:, 0], bend[:, 1])) >= LEAST_BEND)
 
 
+def extend(
+    passes: Passes,
+    size: tuple[int, int],
+    matched: dict,
+    states: wgpu.GPUTexture,
+    most: tuple[np.ndarray, np.ndarray],
+) -> wgpu.GPUTexture:
+    """States, those that lead out of the picture going on as most of it moves.
+
+    `most`: the homographies of most of the picture to the near frame and to the far one.
+    """
+    output = passes.take(size, STATES)
+    _run(passes, "extend", size, most, states=states, output=output, **matched)
+    return output
+
+
+def columns(homography: np.ndarray) -> np.ndarray:
+    """A (3, 3) homography as WGSL takes it: columns of a matrix of 4 x 4."""
+    whole = np.eye(4)
+    whole[:3, :3] = homography
+    return whole.T  # row i in numpy is column i in WGSL
+
+
 def _run(passes: Passes, entry: str, size, most: tuple[np.ndarray, np.ndarray], **bound) -> None:
-    values = {}
-    for name, matrix in zip(("to_near", "to_far"), most, strict=True):
-        whole = np.eye(4)
-        whole[:3, :3] = matrix
-        values[name] = whole.T  # row i in numpy is column i in WGSL
+    values = dict(zip(("to_near", "to_far"), map(columns, most), strict=True))
     uniform = passes.uniform("dominant.wgsl", "Dominant", **values)
     passes.run("dominant.wgsl", entry, size, dominant=uniform, **bound)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import wgpu
 
+from .dominant import columns, extend
 from .homography import dominant_homography
 from .passes import Passes
 from .views import AROUND, Views
@@ -27,8 +28,13 @@ def result(
     size: tuple[int, int],
     views: Views,
     states: wgpu.GPUTexture,
+    matched: dict | None = None,
 ) -> Motion:
-    """Motion and depth from the states of a frame."""
+    """Motion and depth from the states of a frame.
+
+    With `matched`, the bindings of match.wgsl, motion that leaves the picture goes on as most of
+    the picture moves.
+    """
     motion, depth = (passes.take(size, (k, 1)) for k in ("rgba32float", "r32float"))
     apart = passes.scratch(size, "rgba32float", "apart")
     spacing = max(1, round(max(size) / ACROSS))
@@ -41,6 +47,8 @@ def result(
     spare_depth = passes.scratch((1, 1), "r32float", "spare depth")
     none = passes.scratch((1, 1), "rgba32float", "none")
 
+    extended = None
+
     def run(entry, size, read=none, read_apart=none, **written: wgpu.GPUTexture):
         outputs: dict = {"motion_out": spare, "apart_out": spare, "depth_out": spare_depth}
         outputs |= written
@@ -49,7 +57,7 @@ def result(
             entry,
             size,
             result=passes.uniform("motion.wgsl", "Result", **values),
-            states=states,
+            states=extended or states,
             motion=read,
             apart=read_apart,
             **outputs,
@@ -59,22 +67,24 @@ def result(
     few = -(-size[0] // spacing), -(-size[1] // spacing)
     thin = passes.scratch(few, "rgba32float", "thin")
     run("thin", few, motion, apart_out=thin)
-    values |= _homographies(passes, thin, size, spacing)
+    to_prev, to_next = _homographies(passes, thin, size, spacing)
+    if values["around"] and matched:
+        extended = extend(passes, size, matched, states, (to_next, to_prev))
+        run("write_motion", size, motion_out=motion)
+        passes.give(extended)
+    values |= {"to_prev": columns(to_prev), "to_next": columns(to_next)}
     run("find_apart", size, motion, apart_out=apart)
     run("write_depth", size, read_apart=apart, depth_out=depth)
     return Motion(motion, depth)
 
 
-def _homographies(passes: Passes, thin: wgpu.GPUTexture, size, spacing: int) -> dict:
-    """The motion of most of the picture to both sides, as motion.wgsl takes it."""
+def _homographies(passes: Passes, thin: wgpu.GPUTexture, size, spacing: int) -> list[np.ndarray]:
+    """The motion of most of the picture to the previous frame and to the next one."""
     some = passes.images.download(passes.device.create_command_encoder(), thin)
     y, x = np.mgrid[: some.shape[0], : some.shape[1]]
     last = np.array(size) - 1
     points = np.minimum(np.stack([x, y], axis=-1) * spacing + spacing // 2, last) + 0.5
-    found = {}
-    for name, channels in (("to_prev", slice(0, 2)), ("to_next", slice(2, 4))):
-        motion = some[..., channels].reshape(-1, 2)
-        matrix = np.eye(4)
-        matrix[:3, :3] = dominant_homography(points.reshape(-1, 2), motion, max(size))
-        found[name] = matrix.T  # row i in numpy is column i in WGSL
-    return found
+    return [
+        dominant_homography(points.reshape(-1, 2), some[..., k : k + 2].reshape(-1, 2), max(size))
+        for k in (0, 2)
+    ]

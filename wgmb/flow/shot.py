@@ -200,8 +200,9 @@ class Shot:
             return made
         is_swept = self._effort.sweeps(0, len(self._sizes)) > 0
         states = (self._mended if is_swept else self._searched)(number, 0)
-        states = self._polished(states, self._sizes[0], self._matched(views, 0))
-        made = result(self._passes, self._sizes[0], views, states)
+        bound = self._matched(views, 0)
+        states = self._polished(states, self._sizes[0], bound)
+        made = result(self._passes, self._sizes[0], views, states, bound)
         self._passes.give(states)
         self._forget(number)
         return made

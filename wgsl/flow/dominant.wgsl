@@ -15,6 +15,8 @@ struct Dominant {
 const SAME_WAY: f32 = 1.0;      // what moves so much like most of the picture on one side [px] does so on the other
                                 // too, rather than being hidden there
 
+const UNSEEN_PRICE: f32 = 0.06; // for leaving the picture on both sides as most of it does
+
 fn displaced(homography: mat4x4f, x: vec2f) -> vec2f {
     let at = homography * vec4f(x, 1.0, 0.0);
     return at.xy / at.z - x;
@@ -62,4 +64,36 @@ fn follow(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
         textureStore(output, id, 0, vec4f(state.flow, state.bend));
         textureStore(output, id, 1, state.slope);
     }
+}
+
+/// Motion out of the picture, where there is nothing to match: on as most of the picture moves. A pixel that moves like it
+/// on the side where it is seen keeps that side.
+@compute @workgroup_size(WG_X, WG_Y)
+fn extend(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    let px = vec2i(min(id, frame.size - 1u));
+    load_patch(px);
+    var state = load_state(states, px);
+    let way = way_to_far(state);
+    let most = dominant_state(px);
+    let most_way = way_to_far(most);
+    let near_leaves = leaves(state.flow);
+    let far_leaves = leaves(way.flow);
+    if leaves(most.flow) && leaves(most_way.flow) {
+        if match_cost(state, OUTSIDE) > UNSEEN_PRICE { state = most; }
+    } else if near_leaves && !far_leaves && length(way.flow - most_way.flow) < SAME_WAY {
+        state.flow = (way.flow - most.bend) / view.far_factor;
+        state.bend = most.bend;
+    } else if far_leaves && !near_leaves && length(state.flow - most.flow) < SAME_WAY {
+        state.bend = most.bend;
+    }
+    if all(id < frame.size) {
+        textureStore(output, id, 0, vec4f(state.flow, state.bend));
+        textureStore(output, id, 1, state.slope);
+    }
+}
+
+fn leaves(flow: vec2f) -> bool {
+    let at = centre + flow;
+    return any(at < vec2f(0.0)) || any(at > vec2f(frame.size) - 1.0);
 }
