@@ -163,8 +163,8 @@ def silhouettes(frame: Frame, layers: Layers) -> None:
 
 def motions(frame: Frame, live: np.ndarray, layers: Layers) -> None:
     """The motions that may reach every tile, as streaks of the exposure through its middle."""
-    header = layers.read("tile candidates", 0)
-    paths = [layers.read("tile candidates", 4 + k) for k in range(4)]
+    header = layers.read("tile candidates", 0).view("f4")
+    velocities = layers.read("tile candidates", 3).view("f2")  # of the first motion, of the second
     left, top, across, down, scale = 12, 3, 12, 8, 5  # tiles, pixels of the drawing per pixel
     corner, size = (tile() * left, tile() * top), (tile() * across, tile() * down)
     grey = levels(0.45 + 0.55 * display(frame.color).mean(axis=2))
@@ -178,7 +178,7 @@ def motions(frame: Frame, live: np.ndarray, layers: Layers) -> None:
         )
     for y, x in np.argwhere(live[top : top + down, left : left + across]):
         for k in range(int(header[y + top, x + left, 0])):
-            way = scale * paths[k][y + top, x + left, :2]
+            way = scale * velocities[y + top, x + left, 2 * k : 2 * k + 2].astype(float)
             middle = side * (np.array([x, y]) + 0.5)
             start, end = (middle + t * way for t in (-0.25, 0.25))
             draw.line([tuple(start), tuple(end)], fill=colors[k], width=3)

@@ -345,7 +345,7 @@ def miss(frame, own, x, y, u):
     """How far from the pixel the search along a path ends [px]."""
     height, width = frame.edgeless.shape
     centre, d, residual = np.array([x + 0.5, y + 0.5]), moved(own, u), np.inf
-    for _ in range(8):
+    for _ in range(6):
         q = centre - d
         if not (0 <= q[0] < width and 0 <= q[1] < height):
             return np.inf
@@ -422,7 +422,7 @@ def resolve_visibility(layers, tiles, x, y, t):
 def iterate_fixed_point(paths, centre, seed, u, first):
     """Fixed point of d = displacement(centre - d): d, the last step, pixel; None: from 0."""
     height, width = paths.shape[:2]
-    d, steps = (np.zeros(2), 9) if seed is None else (seed, 7)
+    d, steps = (np.zeros(2), 7) if seed is None else (seed, 5)
     residual, pixel = np.inf, None
     if first is not None and (np.abs(d - first[0]) < 0.75).all():
         return d, residual, pixel
@@ -493,14 +493,20 @@ def fetch(frame, s):
 def cubic(image, x, y):
     """Catmull-Rom: the line between texels, bent by the second differences of the nearest one.
 
-    Never less than half of the line.
+    Slopes are at most twice the lesser of the two texels.
     """
+
+    def slope(a, b):
+        most = 2 * np.minimum(np.abs(a), np.abs(b))
+        return np.clip(b - a, -most, most)
+
     height, width = image.shape[:2]
     i, j = int(np.clip(x, 0, width - 1)), int(np.clip(y, 0, height - 1))
     left, right = image[j, max(i - 1, 0)], image[j, min(i + 1, width - 1)]
     above, below = image[max(j - 1, 0), i], image[min(j + 1, height - 1), i]
-    across, down = (left - 2 * image[j, i] + right), (above - 2 * image[j, i] + below)
+    here = image[j, i]
+    across = slope(here, right) - slope(left, here)
+    down = slope(here, below) - slope(above, here)
     f, g = (x - 0.5) % 1, (y - 0.5) % 1
     line = bilinear(image, x, y)
-    bent = line - (f * (1 - f) * across + g * (1 - g) * down) / 2
-    return np.maximum(bent, line - np.abs(line) / 2)
+    return line - (f * (1 - f) * across + g * (1 - g) * down) / 2

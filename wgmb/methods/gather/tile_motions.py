@@ -24,7 +24,7 @@ class TileMotions:
         """The candidates of all tiles in `count` frames."""
         layers = int(wgsl.load("methods/gather/surface.wgsl").constant("CANDIDATE_LAYERS"))
         grid = grid_of(size)
-        texture = self._images.texture("tile candidates", grid, "rgba32float", layers * count)
+        texture = self._images.texture("tile candidates", grid, "rgba32uint", layers * count)
         return self._images.view_of(texture, dimension="2d-array")
 
     def encode(self, encoder, inputs, index: int, front_surface, worklists):

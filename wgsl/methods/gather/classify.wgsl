@@ -47,8 +47,7 @@ fn main(@builtin(local_invocation_index) local: u32,
             let layer = 2u * f;
             let handicap = select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u);
             let candidates = candidates_of(f, candidates0, candidates1, candidates2);
-            let dx = displacements_x(candidates, u);
-            let dy = displacements_y(candidates, u);
+            let starts = seeds_at(candidates, u, vec4<bool>(false));
             let start = displacement5(unpack_trajectory(textureLoad(surfaces, low, layer, 0)), u);
             let visible_depth = deepest;
             var n = 0u;
@@ -60,7 +59,7 @@ fn main(@builtin(local_invocation_index) local: u32,
                 let wanted = may_be_visible(candidates, u, select(visible_depth, z, f == 0u) / handicap);
                 let is_there = found.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
                 is_single = is_single && z > 0.0 && is_there && z >= visible_depth;
-                var seeds = Seeds(wanted & !are_solution(dx, dy, found.d), dx, dy);
+                var seeds = Seeds(wanted & !are_solution(starts, found.d), starts.x, starts.y);
                 loop {
                     let is_pending = any(seeds.pending);
                     let converges = converges_to(x, next_seed(&seeds), found.d, u, layer);

@@ -9,6 +9,8 @@
 @group(1) @binding(2) var second_differences: Differences;  // across, down, in half floats; 0 where not smooth
 @group(1) @binding(3) var<storage, read> worklist: WorkList;
 
+const MOST_SLOPE: f32 = 2.0;    // from a texel to the next, as a share of the lesser of the two
+
 alias Differences = texture_storage_2d<rgba32uint, write>;
 
 fn color_at(px: vec2i) -> vec4f {
@@ -21,13 +23,16 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let px = vec2i(pixel_in_strip(worklist.cells[k], group, local));
     if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
     let wanted = is_smooth(textureLoad(front_surface, px, 0));
-    let twice = 2.0 * color_at(px);
-    let across = select(vec4f(0.0), color_at(px - vec2i(1, 0)) - twice + color_at(px + vec2i(1, 0)), wanted);
-    let down = select(vec4f(0.0), color_at(px - vec2i(0, 1)) - twice + color_at(px + vec2i(0, 1)), wanted);
+    let here = color_at(px);
+    let across = slope(here, color_at(px + vec2i(1, 0))) - slope(color_at(px - vec2i(1, 0)), here);
+    let down = slope(here, color_at(px + vec2i(0, 1))) - slope(color_at(px - vec2i(0, 1)), here);
     textureStore(second_differences, px, vec4u(
-        pack_halves(across.xy), pack_halves(across.zw), pack_halves(down.xy), pack_halves(down.zw)));
+        pack_halves(across.xy), pack_halves(across.zw), pack_halves(down.xy), pack_halves(down.zw)) * u32(wanted));
 }
 
-fn pack_halves(v: vec2f) -> u32 {
-    return pack2x16float(clamp(v, vec2f(-HALF_MAX), vec2f(HALF_MAX)));
+/// From one texel to the next. It is limited, because splines swing far below 0 beside a lamp; and it is the slopes that are,
+/// not what is interpolated, so that what one texel gains the other loses: no light is made.
+fn slope(a: vec4f, b: vec4f) -> vec4f {
+    let most = MOST_SLOPE * min(abs(a), abs(b));
+    return clamp(b - a, -most, most);
 }

@@ -110,29 +110,34 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
         todo = ~single & valid;
         var unresolved = 0u;
         loop {              // all others
-            let t = time_in(times, first, todo);
-            let visible = resolve_visibility(x, trajectory, t, candidates0, candidates1, candidates2);
-            let result = composite_front_to_back(visible, t, duration_in(times, first, todo));
-            let is_covered = result.coverage > 0.5;
-            if todo != 0u && is_covered {
-                add(&sum, result, share / result.coverage);
-                accepted += 1.0;
+            if todo != 0u {     // where it is 0, the loops within end at once
+                let t = time_in(times, first, todo);
+                let visible = resolve_visibility(x, trajectory, t, candidates0, candidates1, candidates2);
+                let result = composite_front_to_back(visible, t, duration_in(times, first, todo));
+                let is_covered = result.coverage > 0.5;
+                if is_covered {
+                    add(&sum, result, share / result.coverage);
+                    accepted += 1.0;
+                } else {
+                    unresolved |= todo & (~todo + 1u);
+                }
             }
-            if !is_covered { unresolved |= todo & (~todo + 1u); }
             todo &= todo - 1u;
             if todo == 0u { break; }
         }
         loop {              // of them, those at which no frame shows anything: a tap along the pixel's own trajectory
-            let t = time_in(times, first, unresolved);
-            let p = x - displacement5(trajectory, t);
-            let is_hidden = is_far_from_all(x, trajectory, t);
-            if unresolved != 0u && is_hidden { hidden += 1.0; }
-            if unresolved != 0u && !is_hidden {
-                var one = tap(p);
-                if MOVING_LIGHT { one.color += moving_light(p, 0u, t, duration_in(times, first, unresolved)); }
-                add(&sum, one, share);
+            if unresolved != 0u {
+                let t = time_in(times, first, unresolved);
+                let p = x - displacement5(trajectory, t);
+                if is_far_from_all(x, trajectory, t) {
+                    hidden += 1.0;
+                } else {
+                    var one = tap(p);
+                    if MOVING_LIGHT { one.color += moving_light(p, 0u, t, duration_in(times, first, unresolved)); }
+                    add(&sum, one, share);
+                }
+                if !is_inside(p) { left_image += 1.0; }
             }
-            if unresolved != 0u && !is_inside(p) { left_image += 1.0; }
             unresolved &= unresolved - 1u;
             if unresolved == 0u { break; }
         }
@@ -262,7 +267,7 @@ struct Found {          // where an iteration ended
 /// tile's candidates that may be nearer than what is visible already.
 fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candidates: Candidates) {
     let is_front = query.layer % 2u == 0u;
-    var seeds = Seeds(vec4<bool>(is_front), displacements_x(candidates, query.u), displacements_y(candidates, query.u));
+    var seeds = seeds_at(candidates, query.u, vec4<bool>(is_front));
     var first = Found(WarpState(vec4u(0u), vec2f(INFINITE), INFINITE), false);      // from the own trajectory
     var is_first = true;
     loop {
@@ -270,7 +275,7 @@ fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candi
         if is_first { first = found; }
         if found.is_there { record(visible, query, found.state); }
         let wanted = may_be_visible(candidates, query.u, (*visible).opaque.depth / query.handicap);
-        seeds.pending = seeds.pending & wanted & !are_solution(seeds.x, seeds.y, first.state.d);
+        seeds.pending = seeds.pending & wanted & !are_solution(seeds, first.state.d);
         is_first = false;
         if !any(seeds.pending) { break; }
     }
@@ -503,5 +508,5 @@ fn resampled(at: vec2f, layer: u32, is_own: bool) -> vec4f {
     let down = vec4f(unpack2x16float(differences.z), unpack2x16float(differences.w));
     let share = select(vec2f(0.0), 0.5 * f * (1.0 - f), is_own);
     let line = textureSampleLevel(layer_colors, linear, at / vec2f(frame.size), layer, 0.0);
-    return max(line - share.x * across - share.y * down, line - 0.5 * abs(line));
+    return line - share.x * across - share.y * down;
 }

@@ -15,9 +15,9 @@ struct SourceFrames {
 
 @group(1) @binding(0) var<uniform> sources: SourceFrames;
 @group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // see pack_surface(); front, back of the frame itself, front, back of the next one, ...
-@group(1) @binding(2) var tile_candidates: texture_2d_array<f32>;   // CANDIDATE_LAYERS per frame
+@group(1) @binding(2) var tile_candidates: texture_2d_array<u32>;   // CANDIDATE_LAYERS per frame
 
-const MAX_ITERATIONS: u32 = 8u; // from the pixel's own trajectory
+const MAX_ITERATIONS: u32 = 6u; // from the pixel's own trajectory
 const CONVERGED: f32 = 0.5;     // a step shorter than this [px] ends the iteration
 const MAX_RESIDUAL: f32 = 1.0;  // a sample that is farther than this [px] from the pixel is not there
 const SOLUTION_TOLERANCE: f32 = 0.75;   // displacements closer than this [px] in x and y are the same solution
@@ -31,33 +31,21 @@ const TIMES_PER_WORD: u32 = 32u;
 struct Candidates {     // motions that may bring something of one frame into a tile, the nearest first
     header: vec4f,      // see CANDIDATE_LAYERS
     min_depth: vec4f,
-    t_enter: vec4f,     // since that frame's instant [frame intervals]
-    t_exit: vec4f,
-    vx: vec4f,          // velocities
-    vy: vec4f,
-    ax: vec4f,          // half accelerations
-    ay: vec4f,
+    times: vec4u,       // pairs of half floats: t_enter, t_exit, since that frame's instant [frame intervals]
+    velocities: vec4u,
+    half_accelerations: vec4u,
 }
 
 fn load_candidates(tile: vec2u, f: u32) -> Candidates {
-    let none = vec4f(0.0);
-    if f >= sources.count {
-        return Candidates(none, vec4f(INFINITE), vec4f(INFINITE), vec4f(-INFINITE), none, none, none, none);
-    }
+    let none = vec4u(0u);
+    if f >= sources.count { return Candidates(vec4f(0.0), vec4f(INFINITE), none, none, none); }
     let first = f * CANDIDATE_LAYERS;
-    let a = textureLoad(tile_candidates, tile, first + 4u, 0);
-    let b = textureLoad(tile_candidates, tile, first + 5u, 0);
-    let c = textureLoad(tile_candidates, tile, first + 6u, 0);
-    let d = textureLoad(tile_candidates, tile, first + 7u, 0);
     return Candidates(
-        textureLoad(tile_candidates, tile, first, 0),
-        textureLoad(tile_candidates, tile, first + 1u, 0),
+        bitcast<vec4f>(textureLoad(tile_candidates, tile, first, 0)),
+        bitcast<vec4f>(textureLoad(tile_candidates, tile, first + 1u, 0)),
         textureLoad(tile_candidates, tile, first + 2u, 0),
         textureLoad(tile_candidates, tile, first + 3u, 0),
-        vec4f(a.x, b.x, c.x, d.x),
-        vec4f(a.y, b.y, c.y, d.y),
-        vec4f(a.z, b.z, c.z, d.z),
-        vec4f(a.w, b.w, c.w, d.w),
+        textureLoad(tile_candidates, tile, first + 4u, 0),
     );
 }
 
@@ -71,22 +59,30 @@ fn candidates_of(f: u32, a: Candidates, b: Candidates, c: Candidates) -> Candida
 
 /// Which candidates may be in the tile at the time `u` and nearer than `depth`.
 fn may_be_visible(candidates: Candidates, u: f32, depth: f32) -> vec4<bool> {
-    return (candidates.min_depth < vec4f(depth)) & (candidates.t_enter <= vec4f(u)) & (vec4f(u) <= candidates.t_exit);
-}
-
-/// Displacements by the time `u` along the candidate motions, x and y [px].
-fn displacements_x(candidates: Candidates, u: f32) -> vec4f {
-    return (candidates.vx + candidates.ax * u) * u;
-}
-
-fn displacements_y(candidates: Candidates, u: f32) -> vec4f {
-    return (candidates.vy + candidates.ay * u) * u;
+    let a = unpack2x16float(candidates.times.x);
+    let b = unpack2x16float(candidates.times.y);
+    let c = unpack2x16float(candidates.times.z);
+    let d = unpack2x16float(candidates.times.w);
+    let entered = vec4f(a.x, b.x, c.x, d.x) <= vec4f(u);
+    let is_left = vec4f(a.y, b.y, c.y, d.y) < vec4f(u);
+    return (candidates.min_depth < vec4f(depth)) & entered & !is_left;
 }
 
 struct Seeds {          // displacements to start from [px]
     pending: vec4<bool>,
     x: vec4f,
     y: vec4f,
+}
+
+/// The displacements by the time `u` along the candidate motions.
+fn seeds_at(candidates: Candidates, u: f32, pending: vec4<bool>) -> Seeds {
+    let v = candidates.velocities;
+    let a = candidates.half_accelerations;
+    let p = (unpack2x16float(v.x) + unpack2x16float(a.x) * u) * u;
+    let q = (unpack2x16float(v.y) + unpack2x16float(a.y) * u) * u;
+    let r = (unpack2x16float(v.z) + unpack2x16float(a.z) * u) * u;
+    let s = (unpack2x16float(v.w) + unpack2x16float(a.w) * u) * u;
+    return Seeds(pending, vec4f(p.x, q.x, r.x, s.x), vec4f(p.y, q.y, r.y, s.y));
 }
 
 /// The first pending seed, which is pending no more.
@@ -131,9 +127,9 @@ fn same_solution(a: vec2f, b: vec2f) -> bool {
     return all(abs(a - b) < vec2f(SOLUTION_TOLERANCE));
 }
 
-/// Which of the displacements are the solution `d`.
-fn are_solution(x: vec4f, y: vec4f, d: vec2f) -> vec4<bool> {
-    return (abs(x - d.x) < vec4f(SOLUTION_TOLERANCE)) & (abs(y - d.y) < vec4f(SOLUTION_TOLERANCE));
+/// Which of the seeds are the solution `d`.
+fn are_solution(seeds: Seeds, d: vec2f) -> vec4<bool> {
+    return (abs(seeds.x - d.x) < vec4f(SOLUTION_TOLERANCE)) & (abs(seeds.y - d.y) < vec4f(SOLUTION_TOLERANCE));
 }
 
 struct WarpState {

@@ -7,10 +7,11 @@ const INFINITE: f32 = 3e38;     // over all depths, distances and times: those o
 const HALF_MAX: f32 = 65504.0;  // largest finite f16
 
 // The candidate motions of a tile: those which may bring something into it while the shutter is open. Per frame they
-// are layers of one texture: header, min_depth, t_enter, t_exit, then the trajectories. The header is
-// their number, which is smaller where further ones would resemble these or standing still; 1 if an edge may come;
-// the greatest displacement [px]; 0.
-const CANDIDATE_LAYERS: u32 = 8u;
+// are layers of one texture of bits: header, min_depth; in half floats, as searches only start from them, the times at
+// which they enter and leave the tile, velocities, half accelerations. The header is their number, which is smaller where
+// further ones would resemble these or standing still; 1 if an edge may come; the greatest displacement [px]; 0.
+const CANDIDATE_LAYERS: u32 = 5u;
+const TIME_SLACK: f32 = 0.002;  // for rounding: they enter so much earlier and leave so much later [frame intervals]
 
 /// Tiles across and down an image.
 fn tiles_of(size: vec2u) -> vec2u {
@@ -23,15 +24,19 @@ fn tiles_of(size: vec2u) -> vec2u {
 /// one weight in its 3 x 3. Back layer: depth is 0 if there is none; LAST_BIT says that it was seen, not inferred.
 /// KINK and CUBIC are of the trajectory: of a cubic the last THIRD_BITS bits of both velocities are its third term.
 fn pack_surface(trajectory: Trajectory5, depth: f32, last_bit: bool) -> vec4u {
-    let half_acceleration = clamp(trajectory.half_acceleration, vec2f(-HALF_MAX), vec2f(HALF_MAX));
     let third = vec2i(round(clamp(trajectory.third / THIRD_STEP, vec2f(-THIRD_MAX), vec2f(THIRD_MAX))));
     let is_cubic = any(third != vec2i(0));
     let flags = select(0u, LAST_BIT, last_bit) | select(0u, KINK, trajectory.has_kink) | select(0u, CUBIC, is_cubic);
     let mask = (1u << THIRD_BITS) - 1u;
     let velocity = bitcast<vec2u>(trajectory.velocity);
     let rounded = ((velocity + (1u << (THIRD_BITS - 1u))) & vec2u(~mask)) | (bitcast<vec2u>(third) & vec2u(mask));
-    return vec4u(select(velocity, rounded, is_cubic), pack2x16float(half_acceleration),
+    return vec4u(select(velocity, rounded, is_cubic), pack_halves(trajectory.half_acceleration),
                  (bitcast<u32>(depth) & ~FLAGS) | flags);
+}
+
+/// Two half floats, as near as finite ones get.
+fn pack_halves(v: vec2f) -> u32 {
+    return pack2x16float(clamp(v, vec2f(-HALF_MAX), vec2f(HALF_MAX)));
 }
 
 const LAST_BIT: u32 = 1u;

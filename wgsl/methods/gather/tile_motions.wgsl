@@ -17,7 +17,7 @@ struct SourceFrame {
 @group(1) @binding(1) var front_surface: texture_2d<u32>;   // see pack_surface()
 @group(1) @binding(2) var tile_motions: texture_2d_array<f32>;      // what `cluster_motions` wrote
 @group(1) @binding(3) var tile_motions_out: Layers;     // of every tile's own pixels, MOTION_LAYERS
-@group(1) @binding(4) var tile_candidates: Layers;      // of all that may come into it, CANDIDATE_LAYERS per frame
+@group(1) @binding(4) var tile_candidates: Packed;      // of all that may come into it, CANDIDATE_LAYERS per frame
 @group(1) @binding(5) var<storage, read_write> max_displacement: atomic<u32>;   // bits of the greatest of all tiles [px]
 @group(1) @binding(6) var<storage, read> active_cells: WorkList;
 @group(1) @binding(7) var<storage, read> static_cells: WorkList;
@@ -25,6 +25,7 @@ struct SourceFrame {
 @group(1) @binding(9) var coarse_boxes_out: Boxes;      // around the boxes of COARSE x COARSE tiles
 
 alias Layers = texture_storage_2d_array<rgba32float, write>;
+alias Packed = texture_storage_2d_array<rgba32uint, write>;
 alias Boxes = texture_storage_2d<rgba32float, write>;
 
 // Layers of `tile_motions`, after the MOTIONS trajectories.
@@ -245,12 +246,20 @@ fn gather_candidates(@builtin(local_invocation_index) local: u32,
         }
     }
     let duration = window.y - window.x;
-    let none = min_depth >= vec4f(INFINITE);
-    textureStore(tile_candidates, id, source.first, vec4f(f32(count), has_edge, longest, 0.0));
-    textureStore(tile_candidates, id, source.first + 1u, min_depth);
-    textureStore(tile_candidates, id, source.first + 2u, select(window.x + duration * t_enter, vec4f(INFINITE), none));
-    textureStore(tile_candidates, id, source.first + 3u, select(window.x + duration * t_exit, vec4f(-INFINITE), none));
-    for (var k = 0u; k < MOTIONS; k++) { textureStore(tile_candidates, id, source.first + 4u + k, motions[k]); }
+    var times = vec4u();
+    var velocities = vec4u();
+    var half_accelerations = vec4u();
+    for (var k = 0u; k < MOTIONS; k++) {
+        let interval = vec2f(window.x + duration * t_enter[k] - TIME_SLACK, window.x + duration * t_exit[k] + TIME_SLACK);
+        times[k] = pack_halves(select(interval, vec2f(INFINITE, -INFINITE), min_depth[k] >= INFINITE));
+        velocities[k] = pack_halves(motions[k].xy);
+        half_accelerations[k] = pack_halves(motions[k].zw);
+    }
+    textureStore(tile_candidates, id, source.first, bitcast<vec4u>(vec4f(f32(count), has_edge, longest, 0.0)));
+    textureStore(tile_candidates, id, source.first + 1u, bitcast<vec4u>(min_depth));
+    textureStore(tile_candidates, id, source.first + 2u, times);
+    textureStore(tile_candidates, id, source.first + 3u, velocities);
+    textureStore(tile_candidates, id, source.first + 4u, half_accelerations);
 }
 
 /// The tile that follows another one, row by row of those from `first` to `last`.
