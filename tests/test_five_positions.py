@@ -7,6 +7,7 @@ import wgmb
 from images import frame_of
 from twins import gather as gather_twin
 from twins import reproject as reproject_twin
+from twins import tap as tap_twin
 from wgmb import Shutter
 
 SIZE = (60, 110)
@@ -53,11 +54,11 @@ def shot(path, t, size=SIZE):
     return mean(color), mean(motion), np.where(box, 4.0, 9.0)[2::fine, 2::fine].astype("f4")
 
 
-def decibel(frame, path, method="gather"):
+def decibel(frame, way, method="gather", **options):
     """PSNR of a method's frame at 360 degrees."""
-    got = wgmb.Blur(method, shutter=360, samples=16)(frame)
+    got = wgmb.Blur(method, shutter=360, samples=16, **options)(frame)
     times = Shutter(360).sample_times(16).astype(float)
-    truth = np.mean([shot(path, t)[0] for t in times], axis=0)
+    truth = np.mean([shot(way, t)[0] for t in times], axis=0)
     return -10 * np.log10(np.mean((got - truth) ** 2))
 
 
@@ -109,3 +110,24 @@ def test_methods_are_their_twins_on_such_paths(method, path, frames):
     else:
         want, _ = reproject_twin.reproject(sources, times)
     assert (np.abs(got - want) > 1e-3).any(axis=2).mean() < 0.01
+
+
+@pytest.mark.parametrize("path", [swings, circles, starts])
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_taps_through_five_positions_are_their_twin(path, frames):
+    sources = [(t, *shot(path, t, (32, 56))) for t in (0, -1, 1)[:frames]]
+    own, *near = [wgmb.Frame(c, motion=m, depth=d) for _, c, m, d in sources]
+    frame = own.between(*near, *[None] * (2 - len(near)))
+    got = wgmb.Blur("tap", samples=4, shutter=360, path="five")(frame)
+    want = tap_twin.through_five(sources, Shutter(360).sample_times(4).astype(float))
+    assert (np.abs(got - want) > 1e-3).any(axis=2).mean() < 0.01
+
+
+def test_taps_through_five_positions_follow_a_start():
+    """The neighbours are read where the option asks for them alone."""
+    frame = frame_of([shot(starts, t) for t in (0, -1, 1)])
+    assert decibel(frame, starts, "tap", path="five") > decibel(frame, starts, "tap") + 5
+    assert "neighbours" not in wgmb.Blur("tap").method.uses
+    alone = wgmb.Frame(frame.color, motion=frame.motion, depth=frame.depth)
+    pictures = [wgmb.Blur("tap", path=path)(alone) for path in ("curved", "five")]
+    assert np.array_equal(*pictures)

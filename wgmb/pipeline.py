@@ -125,7 +125,7 @@ class Blur:
             getattr(method, "spread", "along"),
             self.max_blur,
             getattr(method, "margin", lambda height: 0),
-            getattr(method, "bend", 0.0),
+            getattr(self.method, "bend", 0.0),
         )
 
     @property

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from twins.five_positions import bend, moved, valid
+
 
 def displacement(motion, t):
     """Where the parabola through previous, this and next place is at time t, or a column of t."""
@@ -65,4 +67,19 @@ def published(color, to_prev, samples):
             for i in range(samples):
                 at = here + velocity * (i / samples)
                 out[y, x] += bilinear(color, *at) / samples
+    return out
+
+
+def through_five(frames, times):
+    """Taps along paths through five positions; `frames`: as `sources` of reproject."""
+    at = {one[0]: one for one in frames}
+    _, color, motion, depth = frames[0]
+    color, motion, z = color.astype(float), motion.astype(float), valid(depth)
+    out = np.zeros(color.shape)
+    for y, x in np.ndindex(z.shape):
+        back, ahead = motion[y, x, :2], motion[y, x, 2:]
+        bent = np.float16(bend(motion[y, x], z[y, x], y, x, at.get(-1), at.get(1)))
+        path = np.concatenate([(ahead - back) / 2, (ahead + back) / 2, bent])
+        for t in times:
+            out[y, x] += bilinear(color, *(np.array([x, y]) + 0.5 + moved(path, -t))) / len(times)
     return out

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from .. import gpu
 from ..gpu.textures import TexturePool
-from .contract import Inputs, View
+from .contract import Inputs, PreparedFrame, View
 
 
 class Bends:
@@ -13,12 +15,12 @@ class Bends:
     def __init__(self, device):
         self._device, self._images = device, TexturePool(device)
 
-    def encode(self, encoder, inputs: Inputs) -> list[View]:
-        """Record the bends of all frames; returns them in the frames' order."""
+    def encode(self, encoder, inputs: Inputs, frames: Sequence[PreparedFrame]) -> list[View]:
+        """Record the bends of these frames of the inputs; returns them in the same order."""
         kernel = gpu.kernel(self._device, "methods/bends.wgsl")
         by_offset = {frame.offset: frame for frame in inputs.frames}
         made = []
-        for frame in inputs.frames:
+        for frame in frames:
             bends = self._images.view(f"bends {frame.offset}", inputs.bindings.size, "r32uint")
             around = {"prev": by_offset.get(frame.offset - 1),
                       "next": by_offset.get(frame.offset + 1)}  # fmt: skip

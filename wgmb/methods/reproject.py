@@ -107,7 +107,7 @@ class Reproject:
         )
         bends = [self._bends.unbound]
         if len(sources) > 1:
-            bends = self._bends.encode(encoder, inputs)
+            bends = self._bends.encode(encoder, inputs, sources)
         width, height = inputs.bindings.size
         pixels = width * height
         bits = int(kernel.source.constant("BLOCK_BITS"))

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from .. import gpu
+from ..gpu import wgsl
 from ..reach import Spread
+from .bends import Bends
 from .options import MethodOptions
 
 
@@ -15,7 +17,8 @@ class Tap:
 
     Taps divide the exposure into equal shares along the path.
     `path`: "curved" goes through the pixel's places in the previous, this and the next
-    frame; "straight" takes their mean velocity.
+    frame; "five" through those in the second frames before and after too, as the neighbours' own
+    vectors lead on: it reads the neighbours, and needs depth; "straight" takes the mean velocity.
     `variant`: "published" is the chapter's own: velocity is half the difference between this
     and the previous position, equal taps go from the pixel along it, the shutter is ignored.
 
@@ -34,8 +37,9 @@ class Tap:
         """Tap path and variant."""
 
         path: Annotated[
-            Literal["curved", "straight"],
-            "through the positions in three frames, or along the mean velocity",
+            Literal["curved", "straight", "five"],
+            "through the positions in three frames, along the mean velocity, or through those in "
+            "five frames, by the neighbours' vectors",
         ] = "curved"
         variant: Annotated[
             Literal["shutter", "published"],
@@ -45,16 +49,26 @@ class Tap:
     def __init__(self, device, options: Options, *, output="rgba32float"):
         self._device, self._output = device, output
         published = options.variant == "published"
-        self._constants = {"CURVED": options.path == "curved", "PUBLISHED": published}
+        self._is_five = options.path == "five" and not published
+        if self._is_five:
+            self.needs, self.uses = self.needs | {"depth"}, frozenset({"neighbours"})
+            self.bend = float(wgsl.load("common/path.wgsl").constant("MOST_BEND"))
+        self._bends = Bends(device)
+        self._constants = {"CURVED": options.path != "straight", "PUBLISHED": published}
 
     def encode(self, encoder, inputs, output):
-        """Record the one pass."""
+        """Record the one pass, after that for the paths through five positions."""
+        five = self._is_five and len(inputs.frames) > 1
+        bends = self._bends.unbound
+        if five:
+            (bends,) = self._bends.encode(encoder, inputs, inputs.frames[:1])
         kernel = gpu.kernel(
             self._device,
             "methods/tap.wgsl",
             {"Output": self._output},
             BOX_SHUTTER=inputs.even,
             ADAPTIVE=inputs.auto,
+            FIVE_POSITIONS=five,
             WEIGHTED=inputs.frame.weight is not None,
             **self._constants,
         )
@@ -66,5 +80,6 @@ class Tap:
             motion=inputs.frame.motion,
             weight=inputs.frame.weight or inputs.unbound,
             linear=inputs.linear,
+            bends=bends,
             output=output,
         )

@@ -1,7 +1,7 @@
 // The mean colour along each pixel's own trajectory (Rosado 2007, GPU Gems 3, chapter 27).
+//#include common/five_positions.wgsl
 //#include common/frame.wgsl
 //#include common/noise.wgsl
-//#include common/path.wgsl
 //#include common/shutter.wgsl
 
 @group(1) @binding(0) var color: texture_2d<f32>;       // linear, premultiplied by alpha and by weight
@@ -9,8 +9,10 @@
 @group(1) @binding(2) var weight: texture_2d<f32>;      // 0: stays out of its neighbours' blur
 @group(1) @binding(3) var linear: sampler;
 @group(1) @binding(4) var output: Output;
+@group(1) @binding(5) var bends: texture_2d<u32>;       // see bends.wgsl
 
 override CURVED: bool = true;       // the parabola through three positions; else a line along their mean velocity
+override FIVE_POSITIONS: bool = false;  // read `bends`; else no path leaves its parabola
 override WEIGHTED: bool = false;    // read `weight`
 override PUBLISHED: bool = false;   // Rosado's own: equal taps along half the displacement from the previous frame
 
@@ -39,12 +41,20 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
     let backwards = Trajectory(-trajectory.velocity * texel, trajectory.half_acceleration * texel);    // in time, in uv
+    var bent = trajectory5_from(backwards);
+    if FIVE_POSITIONS {
+        let told = trajectory_with(vec4f(0.0), textureLoad(bends, id.xy, 0).x);
+        bent.third = -told.third * texel;
+        bent.has_kink = told.has_kink;
+    }
     var sum = vec4f(0.0);
     var total = 0.0;
     for (var i = 0u; i < count; i++) {
         var t = shutter_time(times, i);
         if PUBLISHED { t = -0.5 * f32(i) * share; }
-        let at = uv + displacement(backwards, t);
+        var moved = displacement(backwards, t);
+        if FIVE_POSITIONS { moved = displacement5(bent, t); }
+        let at = uv + moved;
         sum += share * textureSampleLevel(color, linear, at, 0.0);
         if WEIGHTED { total += share * textureSampleLevel(weight, linear, at, 0.0).x; }
     }
