@@ -3,6 +3,7 @@
 import collections
 import contextlib
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -71,6 +72,11 @@ class Future:
         self.released = True
 
 
+class LostResult(Future):
+    def result(self, timeout=None):
+        raise OSError("connection refused")
+
+
 class Client:
     """Workers by name; `behave(name, numbers)` gives an Outcome, an error, or None: it dies."""
 
@@ -102,6 +108,10 @@ class Client:
             self._born[name] += 1
             self.states[f"{name}#{self._born[name]}"] = state
             return Future("pending", None)
+        if found == "died with its result":
+            self.states[address] = OSError("connection refused")
+            self.states[address + "#1"] = GOOD
+            return LostResult("finished", None)
         if found == "gone":
             self.status = "connecting"
             return Future("cancelled", None)
@@ -202,6 +212,21 @@ def test_a_worker_that_dies_once_costs_nothing(drive):
     assert len(client.given) == 4
 
 
+def test_a_worker_that_dies_with_its_result_is_given_nothing_else(drive):
+    """The scheduler may still list it for a moment."""
+    died = []
+
+    def behave(name, chosen):
+        if not died:
+            died.append(chosen)
+            return "died with its result"
+        return well(chosen)
+
+    outcome, client, *_ = drive({"a": GOOD}, behave)
+    assert (len(outcome.report.done), outcome.report.failed) == (COUNT, {})
+    assert [address for address, _ in client.given] == ["a", "a#1", "a#1", "a#1"]
+
+
 def test_a_part_that_cannot_be_begun_is_tried_again_and_a_worker_that_never_can_is_left_out(drive):
     def behave(name, chosen):
         return well(chosen) if name == "a" else InputError("no such folder")
@@ -280,6 +305,20 @@ def test_outcomes_of_parts_are_those_of_the_whole():
     assert (whole.notes, whole.rest) == ({"deep": [1, 2, 3]}, 0)
 
 
+@pytest.mark.fast
+def test_numbers_of_another_process_take_no_memory_of_their_own():
+    mine = list(range(1000, 1004))
+    sent = Outcome(4, (1000, 1003), "", False, [], BatchReport(done=list(mine)))
+    sent.notes, sent.sizes = {"deep": [1002]}, {(64, 48): list(mine), (8, 8): [5000]}
+    whole = pickle.loads(pickle.dumps(sent))
+    assert whole.report.done[0] is not mine[0]
+    whole.share(mine)
+    assert whole == sent
+    for got in (whole.report.done, whole.sizes[64, 48]):
+        assert all(a is b for a, b in zip(got, mine, strict=True))
+    assert whole.notes["deep"][0] is mine[2]
+
+
 # ---- workers that are real ------------------------------------------------------------------
 
 
@@ -355,6 +394,17 @@ def test_workers_have_the_environment_of_today(shot, whole, tmp_path, monkeypatc
     monkeypatch.setenv("WGMB_ADAPTER", "")
     assert not Farm(workers=1).blur(job).report.failed
     assert contents(tmp_path / "out") == whole
+
+
+@DASK_LEAVES_SOCKETS
+def test_a_worker_that_is_named_is_so_in_the_words_of_the_command_line(
+    shot, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setenv("VK_ICD_FILENAMES", os.devnull)
+    code, _, err = make.inside(capsys, *words(shot, tmp_path / "out", "--workers", 1))
+    assert code == 3
+    assert "worker 0 on" in err
+    assert "`device=" not in err
 
 
 def begun(line, has_begun) -> subprocess.Popen:

@@ -324,14 +324,18 @@ class Driver:
             try:
                 self._took(worker, part, future.result(timeout=30))
             except (OSError, TimeoutError):  # it died with its result
-                worker.part = part
-                self._gone(worker)
+                self._vanished(worker, part)
         elif future.status == "error":
             self._fault(worker, part, future.exception(timeout=30))
         else:  # cancelled: the worker, or the scheduler, is gone
-            worker.part = part
-            self._gone(worker)
+            self._vanished(worker, part)
         future.release()
+
+    def _vanished(self, worker: _Worker, part: _Part) -> None:
+        """A worker died before the scheduler noticed; given another part, it would die twice."""
+        del self._workers[worker.address]
+        worker.part = part
+        self._gone(worker)
 
     def _took(self, worker: _Worker, part: _Part, outcome: Outcome) -> None:
         report = outcome.report
@@ -349,6 +353,7 @@ class Driver:
                 report.failed = dict.fromkeys(rest, report.stopped)
             else:
                 self._parts.append(_Part(rest, refused_by={worker.address}))
+        outcome.share(part.numbers)
         self.outcome.add(outcome)
         for number in (*done, *report.failed):
             self._tick(number, "failed" if number in report.failed else "done")

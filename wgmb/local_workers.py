@@ -24,13 +24,15 @@ _QUIET: dict[str, Any] = {
     "distributed.scheduler.work-stealing": False,
     "distributed.scheduler.active-memory-manager.start": False,
     "distributed.diagnostics.nvml": False,
+    # Logs of messages, for each worker.
+    "distributed.admin.low-level-log-length": 20,
+    "distributed.diagnostics.computations.max-history": 1,
     # Its way with memory, which returns every page to the system and fetches it again, is slower.
     "distributed.nanny.pre-spawn-environ": {},
     # Workers wait for each other's locks of the folder for data, which is this run's own.
     "distributed.worker.use-file-locking": False,
     # A machine that is busy with starting many workers answers late.
-    "distributed.comm.timeouts.connect": "5 minutes",
-    "distributed.comm.timeouts.tcp": "5 minutes",
+    "distributed.comm.timeouts.connect": "1 minute",
 }
 _LOADED_ONCE = ["distributed", "wgpu.backends.wgpu_native", "wgmb.farm_worker"]
 _CLOSING = 5.0  # seconds

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from .batch import BatchReport
@@ -55,6 +55,16 @@ class Outcome:
         for number in report.done:
             made.sizes.setdefault(clip.sizes[number], []).append(number)
         return made
+
+    def share(self, numbers: Iterable[int]) -> None:
+        """Refer to these objects where a frame has such a number.
+
+        An outcome from another process has numbers of its own, four times as large as a reference.
+        """
+        known = {number: number for number in numbers}
+        report = self.report
+        for mine in (report.done, report.skipped, *self.notes.values(), *self.sizes.values()):
+            mine[:] = [known.get(number, number) for number in mine]
 
     def add(self, other: Outcome) -> None:
         """Take in what became of other frames of the same sequence."""

@@ -187,7 +187,11 @@ def blur_on_farm(
     for text in () if quiet else job.remarks:
         note(as_options(text))
     job = as_farm_job(job)
-    farm = Farm(cluster, workers, adapter, note, note if verbose else lambda text: None)
+
+    def say(text: str) -> None:
+        note(as_options(text))
+
+    farm = Farm(cluster, workers, adapter, say, say if verbose else lambda text: None)
     started = time.perf_counter()
     with progress(len(job.numbers), quiet) as tick, muted():
         outcome = farm.blur(job, tick)
