@@ -60,6 +60,7 @@ class Process:
         self._pool.shutdown(wait=True, cancel_futures=True)
         if self._popen is not None:
             self._ended(self._popen)
+            self._popen = None
 
     def _answer(self, request: dict[str, Any]) -> Any:
         line = b""

@@ -142,3 +142,10 @@ def test_gpus_are_listed_and_none_is_no_fault(monkeypatch, capsys):
     assert settings.adapters() == ()
     assert "Cannot start" in capsys.readouterr().out
     settings.adapters.cache_clear()
+
+
+def test_one_that_is_at_rest_may_be_closed_twice():
+    one = Process()
+    one.ask("frames", text="1").result()
+    one.close()
+    one.close()
