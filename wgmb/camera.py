@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -107,6 +108,10 @@ class Reprojections:
         """
         bodies = [int(k) for k in self.indices[1:]]
         world = self.world_from_pixel()
+        if not bodies:  # a third of the time, for those who blur live
+            none = np.zeros((4, 4))
+            around = [t and np.asarray(t.clip_from_world) @ world for t in (self.prev, self.next)]
+            return np.array([[none if one is None else one for one in around]])
         own = np.array([self.here.bodies[k] for k in bodies], np.float64).reshape(-1, 4, 4)
         inverse = np.linalg.inv(own)
         made = np.zeros((1 + len(bodies), 2, 4, 4))
@@ -169,6 +174,10 @@ class Reprojections:
 
     def world_from_pixel(self) -> np.ndarray:
         """World position from (x d, y d, d, 1), or (x, y, d, 1) without perspective."""
+        return self._world_from_pixel
+
+    @cached_property
+    def _world_from_pixel(self) -> np.ndarray:
         clip = np.asarray(self.here.clip_from_world, np.float64)
         if self.depth_kind == "clip":
             return np.linalg.inv(clip)

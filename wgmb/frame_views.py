@@ -105,11 +105,11 @@ class FrameViews:
 
         `whose`: begins the names in the errors of a neighbouring frame.
         """
-        for f in fields(self):
-            view = getattr(self, f.name)
-            if isinstance(view, View):
-                check_view(whose + f.name, view, device, size)
-                _check_readable(whose + f.name, view, f.metadata.get("format", "filterable"))
+        for name, like in _LIKE.items():
+            view = getattr(self, name)
+            if view is not None:
+                check_view(whose + name, view, device, size)
+                _check_readable(whose + name, view, like)
         if self.camera is not None and self.depth is None:
             raise InputError(f"{whose}camera: motion from a camera needs depth")
         if self.motion is not None and not (self.to_next is None and self.to_prev is None):
@@ -118,6 +118,7 @@ class FrameViews:
 
 TEXTURES = {f.name: f.metadata for f in fields(FrameViews) if "format" in f.metadata}
 """The per-pixel inputs beside `color`: `format` and `if_used` by name."""
+_LIKE = {"color": "filterable"} | {name: data["format"] for name, data in TEXTURES.items()}
 
 
 def check_view(name: str, view: View, device: wgpu.GPUDevice, size: tuple[int, int]) -> None:

@@ -143,6 +143,7 @@ class Blur:
                 raise InputError(f"shutter must be {wanted}, got {shutter!r}") from None
             shutter = Shutter(degrees)
         self._shutter = shutter
+        self._bound: tuple[tuple[Any, ...], gpu.FrameBindings] | None = None  # of the last frame
         data = np.zeros((), wgsl.load("common/shutter.wgsl").dtype("Shutter"))
         opens, closes = self._shutter.span
         data["span"] = opens, closes
@@ -410,13 +411,18 @@ class Blur:
     ) -> gpu.FrameBindings:
         """Return the bindings shared by all passes: frame, shutter, times of the samples."""
         window = window or (0, 0, *size)
+        told = size, number, window, self.samples, self.jitter, self.max_blur
+        if self._bound is not None and self._bound[0] == told:
+            return self._bound[1]
         data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
         data["size"], data["samples"], data["jitter"] = size, self.samples, self.jitter
         data["index"] = number % 2**32
         data["origin"], data["display"] = window[:2], window[2:]
         data["max_blur"] = np.inf if self.max_blur is None else self.max_blur
         frame = gpu.constant(self.device, "frame", data)
-        return gpu.FrameBindings(size, {"frame": frame, **self._group0}, window, self._groups)
+        bound = gpu.FrameBindings(size, {"frame": frame, **self._group0}, window, self._groups)
+        self._bound = told, bound
+        return bound
 
 
 def checked(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache, partial
+
 import numpy as np
 import wgpu
 
 from . import gpu
-from .camera import Reprojections
+from .camera import Reprojections, Window
 from .frame_views import FrameViews, View
 from .gpu import wgsl
 
@@ -14,10 +16,16 @@ FILE = "velocity.wgsl"
 
 
 class VelocityPass:
-    """Records wgsl/velocity.wgsl; keeps nothing but the device and two empty textures."""
+    """Records wgsl/velocity.wgsl; keeps the device, two empty textures, and `in_place` a buffer.
+
+    `in_place`: matrices are written into one buffer, so that its bind groups stay. Only for callers
+    that submit each recording before they make the next one.
+    """
 
     def __init__(self, device: wgpu.GPUDevice, none: View, no_object: View):
         self._device, self._none, self._no_object = device, none, no_object
+        self.in_place = False
+        self._table: wgpu.GPUBuffer | None = None
 
     def encode(
         self,
@@ -65,28 +73,46 @@ class VelocityPass:
         table = np.zeros(1, source.dtype("Reprojection"))
         indices = np.zeros(1, np.uint32)
         if camera is not None:
-            data["viewport"] = viewport_of(camera, size)
             matrices, indices = camera.matrices(), camera.indices
+            data["viewport"], data["bodies"] = viewport_of(camera, size), len(matrices)
             table = np.zeros(len(matrices), source.dtype("Reprojection"))
-            data["bodies"] = len(matrices)
             # Row i of a matrix in numpy is column i in WGSL.
             table["prev"] = matrices[:, 0].transpose(0, 2, 1)
             table["next"] = matrices[:, 1].transpose(0, 2, 1)
-        storage = wgpu.BufferUsage.STORAGE
+        storage, constant = wgpu.BufferUsage.STORAGE, partial(gpu.constant, self._device)
         return (
-            gpu.constant(self._device, "velocity", data),
-            gpu.constant(self._device, "reprojections", table, storage),
-            gpu.constant(self._device, "indices", indices, storage),
+            constant("velocity", data),
+            self._written(table)
+            if self.in_place and camera is not None
+            else constant("reprojections", table, storage),
+            constant("indices", indices, storage),
         )
+
+    def _written(self, table: np.ndarray) -> wgpu.GPUBuffer:
+        """The buffer that is written anew for every frame."""
+        if self._table is None or self._table.size != table.nbytes:
+            usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_DST
+            self._table = self._device.create_buffer(
+                label="reprojections", size=table.nbytes, usage=usage
+            )
+        self._device.queue.write_buffer(self._table, 0, table)
+        return self._table
 
 
 def viewport_of(camera: Reprojections, size: tuple[int, int]) -> np.ndarray:
-    """The Viewport of wgsl/common/camera.wgsl for an image of `size`."""
+    """The Viewport of wgsl/common/camera.wgsl for an image of `size`; it cannot be written."""
+    if camera.depth_kind == "clip":
+        return _viewport(camera.window or (0, 0, *size), np.inf, "CLIP")
+    kind = "ORTHOGRAPHIC" if camera.here.orthographic else "PLANAR"
+    return _viewport(camera.window or (0, 0, *size), camera.far, kind)
+
+
+@lru_cache(maxsize=16)
+def _viewport(window: Window, far: float, kind: str) -> np.ndarray:
     source = wgsl.load("common/camera.wgsl")
     viewport = np.zeros((), source.dtype("Viewport"))
-    x, y, width, height = camera.window or (0, 0, *size)
+    x, y, width, height = window
     viewport["display"], viewport["origin"] = (width, height), (x, y)
-    viewport["far"] = camera.far if camera.depth_kind == "planar" else np.inf
-    kind = "ORTHOGRAPHIC" if camera.here.orthographic else "PLANAR"
-    viewport["depth_kind"] = source.constant("CLIP" if camera.depth_kind == "clip" else kind)
+    viewport["far"], viewport["depth_kind"] = far, source.constant(kind)
+    viewport.flags.writeable = False
     return viewport

@@ -72,7 +72,9 @@ class MotionBlurPass(EffectPass):
             output=FORMAT,
             **options,
         )
+        self.blur._velocity.in_place = True  # pygfx submits a frame before it draws the next one
         self._images = TexturePool(self._device)
+        self._views: dict[str, wgpu.GPUTextureView] = {}
         self._bodies = None if scene is None else Bodies(self._device, renderer, scene)
         self._before: Camera | None = None
         self._number = 0
@@ -93,8 +95,16 @@ class MotionBlurPass(EffectPass):
         self._before = here
         shown = color_tex
         if before is not None and not _same(here, before):
-            shown = self._blurred(command_encoder, color_tex, depth_tex, here, before)
+            color, depth = self._kept("color", color_tex), self._kept("depth", depth_tex)
+            shown = self._blurred(command_encoder, color, depth, here, before)
         super(EffectPass, self).render(command_encoder, colorTex=shown, targetTex=target_tex)
+
+    def _kept(self, name: str, view: wgpu.GPUTextureView) -> wgpu.GPUTextureView:
+        """The view, or one like it from before: pygfx makes one a frame, and each needs groups."""
+        kept = self._views.get(name)
+        if kept is None or kept.texture is not view.texture:
+            kept = self._views[name] = view
+        return kept
 
     def _camera_now(self) -> Camera:
         camera: Any = self.camera
