@@ -14,10 +14,12 @@ import farm_stubs
 import pytest
 
 import make_frames as make
-from wgmb import BatchReport, DeviceError, InputError
+from wgmb import BatchReport, DeviceError, InputError, farm_driver
 from wgmb import farm as farming
 from wgmb.color_settings import ColorSettings
-from wgmb.farm import Driver, Farm, as_farm_job, size_of_part
+from wgmb.farm import Farm, as_farm_job
+from wgmb.farm_crew import size_of_part
+from wgmb.farm_driver import Driver
 from wgmb.farm_worker import WorkerState
 from wgmb.io.settled import numbers
 from wgmb.job import Asked, settle
@@ -130,7 +132,7 @@ NO_GPU = WorkerState("1", "there", 2, "no GPU adapter", lacks_gpu=True)
 @pytest.fixture
 def drive(shot, tmp_path, monkeypatch):
     """Runs a job on such workers; returns the outcome, the client, what was said and ticked."""
-    monkeypatch.setattr(farming, "_LOOK", 0.0)
+    monkeypatch.setattr(farm_driver, "_LOOK", 0.0)
 
     def run(states, behave, patience=0.3, cluster="tcp://x"):
         notes, ticks = [], []

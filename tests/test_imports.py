@@ -36,7 +36,8 @@ LAYERS = [
     {"outcome"},
     {"job"},
     {"job_file", "video_pictures"},
-    {"farm_worker", "local_workers"},
+    {"farm_worker", "farm_crew", "local_workers"},
+    {"farm_driver"},
     {"farm"},
     {"video_batch", "hosts", "perceived_video"},
     {"lab", "viewer"},  # never each other
