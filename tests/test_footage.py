@@ -10,8 +10,10 @@ from av.video.reformatter import VideoReformatter
 import make_clips as clips
 from wgmb import InputError
 from wgmb.coding import Coding
+from wgmb.io.decoding import decoded
 from wgmb.io.footage import Footage
 from wgmb.io.pixels import frame_of, layout, pixel_format, planes_of
+from wgmb.io.timeline import Timeline, Times
 
 pytestmark = pytest.mark.fast
 
@@ -239,6 +241,53 @@ def test_a_rate_that_is_rounded_to_milliseconds_is_known_again(tmp_path, rate, w
     assert float(footage.rate) == pytest.approx(float(Fraction(want)), rel=2e-4)
     assert want == "37" or footage.rate == Fraction(want)
     assert not footage.is_variable
+
+
+def test_steps_of_two_lengths_alone_have_a_rate():
+    """RealVideo 2: the middle of the lengths is near to neither."""
+    ticks = np.array([1, 82, 83, 164, 165], np.int64)
+    timeline = Timeline(
+        Times(ticks, Fraction(1, 1000)), ticks[:1], False, False, Fraction(1), ""
+    )  # fmt: skip
+    assert timeline.rate == pytest.approx(4 / 0.164, rel=0.001)
+    assert timeline.is_variable
+
+
+def test_pictures_whose_times_are_those_of_decoding_are_counted(tmp_path):
+    """As in files of VC-1 and RealVideo: B-frames come before, with later times."""
+    plain = clips.write(tmp_path / "in.mp4", options={"bf": "2", "b_strategy": "0", "qp": "8"})
+    path = tmp_path / "c.mkv"
+    with av.open(str(plain)) as source, av.open(str(path), "w") as target:
+        stream = target.add_stream_from_template(source.streams.video[0], opaque=True)
+        for n, packet in enumerate(p for p in source.demux() if p.size):
+            packet.stream, packet.time_base = stream, Fraction(1, 24)
+            packet.pts = packet.dts = n
+            target.mux_one(packet)
+    with av.open(str(path)) as container:
+        raw = [frame.pts for frame in container.decode(video=0)]
+    assert raw != sorted(raw)
+    footage, wanted = Footage(path), Footage(plain)
+    assert shown(footage) == shown(wanted)
+    assert footage.loss() == ""
+    assert footage.rate == 24
+
+
+def test_packets_without_data_do_not_end_a_stream():
+    """PMP has them for pictures that repeat the one before."""
+
+    class Packet:
+        def __init__(self, size):
+            self.size = size
+
+    class Stream:
+        def decode(self, packet):
+            return [packet.size] if packet is not None else ["the end"]
+
+    class Container:
+        def demux(self, stream):
+            return iter([Packet(3), Packet(0), Packet(5), Packet(0)])
+
+    assert list(decoded(Container(), Stream())) == [3, 5, "the end"]
 
 
 def test_what_an_edit_list_leaves_out_is_left_out(tmp_path):

@@ -101,14 +101,16 @@ def decoded(
             if key is not None and packet.pts > key:
                 return
             waiting = False
+        if packet is not None and not packet.size:
+            continue  # a repeated picture (PMP), or PyAV's sign of the end, after which comes None
         try:
-            yield from stream.decode(packet if packet is not None and packet.size else None)
+            yield from stream.decode(packet)
         except EOFError:
             return
         except FFmpegError:
             if not careful:
                 raise _DamagedError from None
-        if packet is None or not packet.size:
+        if packet is None:
             return
 
 

@@ -13,6 +13,7 @@ import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import cast
 
@@ -38,6 +39,7 @@ from .timeline import Times, scanned
 from .turn import turn_of
 
 _OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
+_REORDERED = 12  # pictures that are looked at to tell times of decoding from times of showing
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,12 @@ class Footage:
             raise InputError(f"{self.path}: is encrypted")
         with opened(self.path) as container:
             stream = cast(VideoStream, container.streams[self.index])
-            frame = next(decoded(container, stream), None)
+            frames = decoded(container, stream)
+            frame = next(frames, None)
+            if self._packets.ascends:
+                shown = [one.pts for one in islice(frames, _REORDERED) if one.pts is not None]
+                if shown != sorted(shown):  # as in VC-1 and RealVideo: times of decoding
+                    self._packets = self._packets.counted()
         if frame is None:
             raise InputError(f"{self.path}: none of its pictures can be decoded ({self.codec})")
         self.pixels = frame.format.name

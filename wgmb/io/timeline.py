@@ -78,6 +78,8 @@ class Timeline:
     """Why the pass ended before the file did, or ''."""
     lacks: Fraction = Fraction(0)
     """How much more the file should hold, by what its header states [s]."""
+    ascends: bool = False
+    """No packet is shown before the one before it, though pictures are reordered."""
 
     @property
     def steps(self) -> np.ndarray:
@@ -96,6 +98,7 @@ class Timeline:
             return Fraction(24)
         middle = np.median(steps)
         usual = steps[(steps > 0.5 * middle) & (steps < 1.5 * middle)]
+        usual = usual if len(usual) else steps  # of two lengths, with the middle in neither
         exact = Fraction(len(usual), int(usual.sum())) / self.times.base
         rounding = 0.5 / (float(middle) * len(usual) ** 0.5) if usual.min() < usual.max() else 0
         off = {known: abs(float(known / exact) - 1) for known in KNOWN_RATES}
@@ -124,6 +127,10 @@ class Timeline:
             return []
         base = float(self.times.base)
         return [(int(self.times.ticks[n]) * base, int(self.steps[n]) * base) for n in uneven]
+
+    def counted(self) -> Timeline:
+        """The same where times are those of decoding: pictures are counted."""
+        return replace(self, in_order=True, ascends=False)
 
     def from_picture(self, number: int) -> Timeline:
         """The same without the pictures before `number`."""
@@ -168,7 +175,12 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
     timeline = Timeline(
         Times(_sorted(shown), base), _sorted(found.keys), in_order, is_assumed, end, problem
     )
-    return replace(timeline, lacks=_lacking(container, stream, timeline, found.read))
+    reorders = bool(stream.codec_context.has_b_frames)
+    return replace(
+        timeline,
+        lacks=_lacking(container, stream, timeline, found.read),
+        ascends=found.ascends and not in_order and reorders,
+    )
 
 
 class _Packets:
@@ -177,6 +189,7 @@ class _Packets:
     def __init__(self, codec: str):
         self.shown, self.decoded, self.keys = array("q"), array("q"), array("q")
         self.count = self.read = 0  # of pictures that are shown, of packets
+        self.ascends = True  # the time at which each is shown
         self._hides = _HIDES.get(codec)
 
     def add(self, packet: Packet[Any]) -> None:
@@ -186,6 +199,7 @@ class _Packets:
             return
         self.count += 1
         if packet.pts is not None:
+            self.ascends = self.ascends and (not self.shown or packet.pts >= self.shown[-1])
             self.shown.append(packet.pts)
             if packet.is_keyframe:
                 self.keys.append(packet.pts)
