@@ -63,8 +63,8 @@ def decibel(frame, way, method="gather", **options):
 
 
 @pytest.mark.parametrize("method, path, gain", [
-    ("gather", swings, 12), ("gather", circles, 16), ("gather", starts, 12),
-    ("gather", bounces, 8), ("reproject", swings, 3), ("reproject", circles, 5),
+    ("gather", swings, 12), ("gather", circles, 16), ("gather", starts, 20),
+    ("gather", bounces, 18), ("reproject", swings, 3), ("reproject", circles, 5),
     ("reproject", starts, 7), ("reproject", bounces, 6),
 ])  # fmt: skip
 def test_a_path_bends_as_five_positions_say(method, path, gain):
@@ -83,9 +83,13 @@ def test_a_path_bends_as_five_positions_say(method, path, gain):
     assert known > decibel(frame_of(parabola), path, method) + gain
 
 
-def test_a_circle_and_a_swing_are_nearly_exact():
-    """A cubic through five positions reaches 44.6 dB on the circle and 49.3 dB on the swing."""
-    for path, least in ((circles, 50), (swings, 52)):
+def test_circles_swings_and_kinks_are_nearly_exact():
+    """A cubic through five positions reaches 44.6 dB on the circle and 49.3 dB on the swing.
+
+    Before backgrounds that the frame itself shows were trusted, a neighbour's body went on straight
+    beyond the kink and was seen there: 45.7 dB on the start, 39.1 dB on the bounce.
+    """
+    for path, least in ((circles, 50), (swings, 52), (starts, 52), (bounces, 49)):
         assert decibel(frame_of([shot(path, t) for t in (0, -1, 1)]), path) > least
 
 
@@ -95,7 +99,7 @@ def test_a_parabola_stays_one(method, least):
     assert decibel(frame_of(sources), falls, method) > least
 
 
-@pytest.mark.parametrize("path", [swings, circles, starts])
+@pytest.mark.parametrize("path", [swings, circles, starts, bounces])
 @pytest.mark.parametrize("frames", [2, 3])
 @pytest.mark.parametrize("method", ["gather", "reproject"])
 def test_methods_are_their_twins_on_such_paths(method, path, frames):

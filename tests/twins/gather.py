@@ -213,9 +213,11 @@ def coverage_by_color(own, front, back, at_middle):
 # ---- tiles ----------------------------------------------------------------------------------
 
 
-def parabola(paths):
-    """The paths without what leaves the parabola."""
-    return np.concatenate([paths[..., :4], np.zeros((*paths.shape[:-1], 3))], axis=-1)
+def parabola(paths, longest):
+    """The paths without what leaves the parabola; of a kink, a parabola of alike lengths."""
+    closer = np.where(paths[..., 6:] > 0, 1.25 / max(longest, 0.01), 1.0) * paths[..., 2:4]
+    rest = np.zeros((*paths.shape[:-1], 3))
+    return np.concatenate([paths[..., :2], closer, rest], axis=-1)
 
 
 def trajectory_distance(a, b, u):
@@ -225,7 +227,7 @@ def trajectory_distance(a, b, u):
 
 def cluster(paths, u):
     """The longest, then always the one that is most unlike those chosen and standing still."""
-    paths = parabola(np.reshape(paths, (-1, 7)))
+    paths = parabola(np.reshape(paths, (-1, 7)), u)
     chosen, longest = [], 0.0
     for _ in range(MOTIONS):
         distances = np.min(
@@ -256,7 +258,7 @@ def tile_candidates(frame, span):
     for j in range(rows):
         for i in range(columns):
             box = np.s_[j * TILE : (j + 1) * TILE, i * TILE : (i + 1) * TILE]
-            paths = parabola(frame.trajectory[0][box].reshape(-1, 7))
+            paths = parabola(frame.trajectory[0][box].reshape(-1, 7), u)
             z = frame.depth[0][box].ravel()
             chosen, longest = cluster(paths, u)
             depths = [np.inf] * len(chosen)
@@ -402,7 +404,8 @@ def resolve_visibility(layers, tiles, x, y, t):
                 search_layer(f, False, moved(path, u), own)
 
     def inferred():
-        return np.isinf(seen[0].depth) or (seen[0].frame, seen[0].back) == (0, True)
+        own_back = (seen[0].frame, seen[0].back) == (0, True)
+        return np.isinf(seen[0].depth) or (own_back and layers[0].inferred[seen[0].pixel])
 
     search_front(0)
     hidden = np.isinf(seen[0].depth)

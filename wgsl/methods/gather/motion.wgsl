@@ -5,9 +5,13 @@
 
 const MAX_MOTION: f32 = 1e5;    // motion beyond this [px] is taken for an error
 const MAX_TILE_RADIUS: i32 = 16;    // tiles over which a motion is followed, to every side
+const KINK_AS_PARABOLA: f32 = 1.25; // t^2 times this misses |t| by a quarter at most, for |t| up to 1
+const LEAST_TIME: f32 = 0.01;       // [frame intervals]
 
+/// Of a kink, which the frame itself alone may have, the parabola that is near it while the frame is exposed.
 fn as_vec4(trajectory: Trajectory5) -> vec4f {
-    return vec4f(trajectory.velocity, trajectory.half_acceleration);
+    let closer = select(1.0, KINK_AS_PARABOLA / max(max_abs_time(0.0), LEAST_TIME), trajectory.has_kink);
+    return vec4f(trajectory.velocity, closer * trajectory.half_acceleration);
 }
 
 /// Displacement by the time `u` [px].

@@ -239,7 +239,7 @@ fn resolve_visibility(x: vec2f, trajectory: Trajectory5, t: f32,
 /// where it still is and no edge is before it.
 fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool) -> u32 {
     let none = visible.opaque.depth >= INFINITE;
-    let inferred = none || visible.opaque.layer == 1u;
+    let inferred = none || (visible.opaque.layer == OWN_BACK && visible.opaque.depth > visible.opaque.true_depth);
     let try_back = hidden && has_edge;
     let try_neighbours_back = try_back && inferred && (none || visible.front_edge.depth >= INFINITE);
     var next = last + 1u;
