@@ -264,3 +264,25 @@ def test_without_a_display_it_says_so(tmp_path):
     )
     assert done.returncode == 3
     assert done.stderr.startswith("wgmb: no display") and done.stderr.count("\n") == 1
+
+
+CONTEXT = """
+import glfw
+from wgmb import gpu
+glfw.init()
+glfw.window_hint(glfw.VISIBLE, 0)
+window = glfw.create_window(64, 64, "host", None, None)
+glfw.make_context_current(window)
+assert gpu.adapters() and gpu.adapters()
+gpu.open_device()
+assert glfw.get_current_context()
+print("alive")
+"""
+
+
+def test_a_host_that_draws_with_opengl_lives(display):
+    """wgpu looks for OpenGL adapters too, and ends a process whose context is in its way."""
+    env = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
+    line = [sys.executable, "-c", CONTEXT]
+    done = subprocess.run(line, env=env, capture_output=True, text=True, timeout=120)
+    assert done.stdout == "alive\n", done.stderr[-2000:]

@@ -6,12 +6,14 @@ of raising, so `submit` is the only place that does.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import tempfile
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 
 import wgpu
+from wgpu.backends.wgpu_native.extras import set_instance_extras
 
 from ..errors import DeviceError, GpuMemoryError, InputError
 from .c_types import quicken_wgpu
@@ -22,7 +24,14 @@ _PREFERENCE = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", SOFTWARE
 
 
 def adapters() -> list[wgpu.GPUAdapter]:
-    """Every adapter wgpu finds, OpenGL last, the fastest kind first."""
+    """Every adapter wgpu finds, OpenGL last, the fastest kind first.
+
+    OpenGL is left out where this thread draws into a window with it: wgpu's own use of it would end
+    the process.
+    """
+    if _draws_with_opengl():
+        with suppress(RuntimeError):  # wgpu has been used already, and it is too late
+            set_instance_extras(backends=["Vulkan", "Metal", "DX12"])
     with _runtime_folder():
         found = wgpu.gpu.enumerate_adapters_sync()
 
@@ -31,6 +40,20 @@ def adapters() -> list[wgpu.GPUAdapter]:
         return _is_opengl(adapter), _PREFERENCE.index(kind) if kind in _PREFERENCE else 3
 
     return sorted(found, key=rank)
+
+
+def _draws_with_opengl() -> bool:
+    """Return True if an OpenGL context of X is current in this thread."""
+    for name in ("libGLX.so.0", "libGL.so.1"):
+        try:
+            library = ctypes.CDLL(name, mode=getattr(os, "RTLD_NOLOAD", 0))
+            current = library.glXGetCurrentContext
+        except (OSError, AttributeError):  # not loaded, so nobody uses it
+            continue
+        current.restype = ctypes.c_void_p
+        if current():
+            return True
+    return False
 
 
 @contextmanager
