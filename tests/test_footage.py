@@ -1,10 +1,12 @@
 """Videos are read as they are: every sample, every time, what colours mean, which way is up."""
 
+import struct
 from fractions import Fraction
 
 import av
 import numpy as np
 import pytest
+from av.sidedata.sidedata import Type
 from av.video.reformatter import VideoReformatter
 
 import make_clips as clips
@@ -270,6 +272,21 @@ def test_pictures_whose_times_are_those_of_decoding_are_counted(tmp_path):
     assert shown(footage) == shown(wanted)
     assert footage.loss() == ""
     assert footage.rate == 24
+
+
+@pytest.mark.parametrize(
+    ("profile", "full_range", "want"),
+    [(0, 1, "its colours come out wrong"), (1, 0, "those of its base layer"),
+     (0, 0, "those of its base layer")],
+)  # fmt: skip
+def test_dolby_vision_without_a_base_layer_is_said(
+    tmp_path, monkeypatch, profile, full_range, want
+):
+    """The header as FFmpeg has it: of three offsets first, then two kinds, the profile, ..."""
+    header = struct.pack("=BxHBBBBBBB", 2, 18, profile, 0, 0, 0, 23, 1, full_range)
+    data = struct.pack("=3Q", 48, 0, 0).ljust(48, b"\0") + header
+    monkeypatch.setattr("wgmb.io.footage._side_data", lambda frame: {Type.DOVI_METADATA: data})
+    assert any(want in note for note in Footage(clips.write(tmp_path / "c.mp4")).notes)
 
 
 def test_packets_without_data_do_not_end_a_stream():

@@ -12,12 +12,13 @@ from pathlib import Path
 import av
 import numpy as np
 
-from .processes import WGMB, environment, use, wgmb
+from .processes import WGMB, Ended, environment, use, wgmb
 from .table import Line, Tally, Trial, row
 
 _MOST_GROWN = 20.0  # MiB after the first pictures
 _FIRST = 0.25  # of a run, after which memory counts: modules are loaded, encoders have filled
 _PATIENCE = 3600.0
+_WORDS = "--flow", "none", "-q"
 
 
 def flat(path: Path, count: int, size: tuple[int, int], fps: int = 240, tone: float = 0) -> Path:
@@ -91,49 +92,70 @@ def _times_and_sums(path: Path) -> tuple[list[float], list[int]]:
 
 def _sound(path: Path) -> list[bytes]:
     with av.open(str(path)) as container:
+        if not container.streams.audio:
+            return []
         return [bytes(p) for p in container.demux(audio=0) if p.size]
 
 
-@row(quick=2, full=20)
+@row(full=20, quick=2)
 def resumed_videos(trial: Trial) -> Iterator[Line]:
     """`kill -9` at a random moment, then --resume: the bytes of an unbroken run with --resume.
 
-    Those have the times and the sound of a run without, and its pictures but for what encoders
-    round otherwise at the beginning of a segment.
+    With sound and without. They have the times and the sound of a run without --resume, and its
+    pictures but for what encoders round otherwise at the beginning of a segment.
     """
-    source = flat(trial.folder / "in.mp4", 240, (96, 64), fps=4, tone=60)
-    plain, whole = trial.folder / "plain.mp4", trial.folder / "whole.mp4"
-    words = ["--flow", "none", "-q"]
-    ended = wgmb("blur", source, "-o", whole, *words, "--resume")
-    simple = wgmb("blur", source, "-o", plain, *words)
-    if ended.code or simple.code:
-        raise RuntimeError(ended.wrong(0) or simple.wrong(0))
+    made = [_unbroken(trial.folder / name, tone) for name, tone in (("sound", 60), ("mute", 0))]
     tally = Tally("video, --resume, beside one run without", "videos")
-    other = "" if _sound(whole) == _sound(source) else "its sound is another"
-    tally.note("whole", _apart(plain, whole) or other)
+    for source, plain, whole, _ in made:
+        other = "" if _sound(whole) == _sound(source) else "its sound is another"
+        tally.note(source.parent.name, _apart(plain, whole) or other)
     yield tally.line()
     tally, midway = Tally("video, `kill -9`, then --resume", "runs"), 0
-    rng, lasts = np.random.default_rng(trial.seed), ended.seconds
+    rng = np.random.default_rng(trial.seed)
     for number in range(trial.count):
-        out = trial.folder / f"out {number}.mp4"
-        line = [*WGMB, "blur", str(source), "-o", str(out), *words, "--resume"]
-        quiet = subprocess.DEVNULL
-        process = subprocess.Popen(line, stdout=quiet, stderr=quiet, env=environment())
-        segments = out.with_name(f"{out.name}.segments")
-        while number % 4 and process.poll() is None and not segments.is_dir():
-            time.sleep(0.01)
-        time.sleep(rng.uniform(0, 0.5) * lasts)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        midway += segments.is_dir()
-        again = wgmb(*line[len(WGMB) :], seconds=_PATIENCE)
+        source, _, whole, lasts = made[number % 2]
+        out = source.with_name(f"out {number}.mp4")
+        midway += _killed(source, out, number // 2 % 4 == 0, rng.uniform(0, 0.5) * lasts)
+        again = _blurred(source, out, "--resume", seconds=_PATIENCE)
         begins = (".", f"{out.name}.")
-        left = [p.name for p in trial.folder.iterdir() if p.name.startswith(begins)]
+        left = [p.name for p in source.parent.iterdir() if p.name.startswith(begins)]
         wrong = again.wrong(0) or (f"left over: {left[0]}" if left else "")
         if not wrong and out.read_bytes() != whole.read_bytes():
             wrong = _apart(whole, out) or "its bytes are others"
-        tally.note(f"run {number}", wrong)
+        tally.note(f"run {number}, {source.parent.name}", wrong)
     yield tally.line(f"{midway} died with segments begun")
+
+
+def _unbroken(folder: Path, tone: float) -> tuple[Path, Path, Path, float]:
+    """A video, what it becomes without --resume and with it, and how long that took [s]."""
+    folder.mkdir()
+    source = flat(folder / "in.mp4", 240, (96, 64), fps=4, tone=tone)
+    plain, whole = folder / "plain.mp4", folder / "whole.mp4"
+    simple, ended = _blurred(source, plain), _blurred(source, whole, "--resume")
+    if ended.code or simple.code:
+        raise RuntimeError(ended.wrong(0) or simple.wrong(0))
+    return source, plain, whole, ended.seconds
+
+
+def _blurred(source: Path, out: Path, *more: str, **how: float) -> Ended:
+    return wgmb("blur", source, "-o", out, *_WORDS, *more, **how)
+
+
+def _killed(source: Path, out: Path, at_once: bool, wait: float) -> bool:
+    """Kill a run after `wait` seconds from its first segment on, or `at_once` from its beginning.
+
+    Returns whether segments were begun.
+    """
+    line = [*WGMB, "blur", str(source), "-o", str(out), *_WORDS, "--resume"]
+    quiet = subprocess.DEVNULL
+    process = subprocess.Popen(line, stdout=quiet, stderr=quiet, env=environment())
+    segments = out.with_name(f"{out.name}.segments")
+    while not at_once and process.poll() is None and not segments.is_dir():
+        time.sleep(0.01)
+    time.sleep(wait)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    return segments.is_dir()
 
 
 def _apart(one: Path, other: Path) -> str:

@@ -33,7 +33,7 @@ from .container import opened, picture_stream
 from .decoding import Decoder, decoded
 from .deinterlace import Fields
 from .encoders import Facts
-from .hdr10 import LightLevel, Mastering
+from .hdr10 import LightLevel, Mastering, is_base_layer
 from .pixels import Layout, is_transparent, layout, planes_of
 from .timeline import Times, scanned
 from .turn import turn_of
@@ -160,7 +160,11 @@ class Footage:
         if self._packets.is_assumed:
             self.notes.append(f"does not say when its pictures are shown: {float(self.rate):g} a "
                               "second assumed")  # fmt: skip
-        if Type.DOVI_METADATA in side or Type.DOVI_RPU_BUFFER in side:
+        if not is_base_layer(side.get(Type.DOVI_METADATA, b"")):
+            self.notes.append(
+                "is Dolby Vision without a base layer (profile 5): its colours come out wrong"
+            )
+        elif Type.DOVI_METADATA in side or Type.DOVI_RPU_BUFFER in side:
             self.notes.append("Dolby Vision data is not used: pictures are those of its base layer")
         if Type.DYNAMIC_HDR_PLUS in side:
             self.notes.append("HDR10+ data is not kept")

@@ -1,8 +1,9 @@
-"""What an HDR10 video says about the display it was graded on (SMPTE ST 2086, CTA-861.3)."""
+"""What an HDR video says: the display it was graded on (SMPTE ST 2086, CTA-861.3), Dolby Vision."""
 
 from __future__ import annotations
 
 import struct
+from contextlib import suppress
 from dataclasses import dataclass
 
 _RATIONALS = struct.Struct("=20i2i")  # AVMasteringDisplayMetadata of FFmpeg
@@ -78,3 +79,15 @@ class LightLevel:
     def __str__(self) -> str:
         """As x265 and SVT-AV1 take it."""
         return f"{self.max_cll},{self.max_fall}"
+
+
+def is_base_layer(dolby_vision: bytes) -> bool:
+    """Return True if pictures with this AVDOVIMetadata have colours of their own.
+
+    Those of profile 5 are in coordinates (IPT) that only Dolby Vision's data makes colours of.
+    """
+    with suppress(struct.error):
+        (header,) = struct.unpack_from("=Q", dolby_vision)  # where AVDOVIRpuDataHeader begins
+        profile, full_range = struct.unpack_from("=B5xB", dolby_vision, header + 4)
+        return not (profile == 0 and full_range)  # as FFmpeg tells profile 5
+    return True
