@@ -34,11 +34,11 @@ class Layers:
 
     def __init__(self, blur: Blur):
         """Of a Blur that has not been used yet."""
-        self._device, self._images = blur.device, blur.method._images
+        self._device, self._images = blur.device, blur.method._layers._images
         usage = wgpu.BufferUsage
         kinds = usage.STORAGE | usage.INDIRECT | usage.COPY_DST | usage.COPY_SRC
         self._lists = blur.device.create_buffer(size=_ROOM, usage=kinds)
-        blur.method._lists._buffer = self._lists  # one that can be read back
+        blur.method._tiles._lists._buffer = self._lists  # one that can be read back
 
     def read(self, label: str, layer: int) -> np.ndarray:
         """(height, width, channels) of one layer of a texture."""

@@ -106,8 +106,9 @@ def separate(offset, color, motion, depth, prev=None, next=None):
 
 
 def trajectories(motion):
-    """Velocity; half acceleration in half precision; third term in steps; whether it has a kink."""
-    velocity = (motion[..., 2:4] - motion[..., :2]) / 2
+    """Velocity of 14 bits; half acceleration in halves; third term in steps; 1 if it has a kink."""
+    velocity = ((motion[..., 2:4] - motion[..., :2]) / 2).astype("f4")
+    velocity = ((velocity.view("u4") + 512) & 0xFFFFFC00).astype("u4").view("f4").astype(float)
     half_acceleration = (motion[..., 2:4] + motion[..., :2]) / 2
     third = np.clip(np.round(motion[..., 4:6] * 32), -511, 511) / 32
     half_acceleration = half_acceleration.astype("f2").astype(float)
@@ -321,7 +322,7 @@ def instant(layers, tiles, x, y, t, color):
 
     None: something that all frames hide.
     """
-    opaque, front_edge, back_edge = resolve_visibility(layers, tiles, x, y, t)
+    (opaque, front_edge, back_edge), miss = resolve_visibility(layers, tiles, x, y, t)
     shown = []
     if is_before(front_edge, opaque):
         shown.append(front_edge)
@@ -336,26 +337,10 @@ def instant(layers, tiles, x, y, t, color):
         clear *= 1 - cover
     if clear < 0.5:
         return sum_ / (1 - clear)
-    own = layers[0].trajectory[0][y, x]
-    if min(miss(frame, own, x, y, t - frame.offset) for frame in layers) > 8:
+    if miss > 8:
         return None
-    way = moved(own, t)
+    way = moved(layers[0].trajectory[0][y, x], t)
     return bilinear(color, x + 0.5 - way[0], y + 0.5 - way[1])
-
-
-def miss(frame, own, x, y, u):
-    """How far from the pixel the search along a path ends [px]."""
-    height, width = frame.edgeless.shape
-    centre, d, residual = np.array([x + 0.5, y + 0.5]), moved(own, u), np.inf
-    for _ in range(6):
-        q = centre - d
-        if not (0 <= q[0] < width and 0 <= q[1] < height):
-            return np.inf
-        step = moved(frame.trajectory[0][int(q[1]), int(q[0])], u)
-        residual, d = np.hypot(*(step - d)), step
-        if residual < 0.5:
-            break
-    return residual
 
 
 def hidden(frame, x, y, color):
@@ -376,10 +361,13 @@ def hidden(frame, x, y, color):
 
 
 def resolve_visibility(layers, tiles, x, y, t):
-    """The nearest opaque sample at the pixel at time `t`, the nearest two at silhouettes."""
+    """The nearest opaque sample at the pixel at time `t`, the nearest two at silhouettes.
+
+    And how far from the pixel the nearest of the searches along its own path ended [px].
+    """
     centre = np.array([x + 0.5, y + 0.5])
     order = [0, 2, 1] if len(layers) == 3 and t > 0 else list(range(len(layers)))
-    seen = [Sample(), Sample(), Sample()]
+    seen, misses = [Sample(), Sample(), Sample()], []
 
     def search_layer(f, back, seed, first):
         """One search; where it led, and whether something is there."""
@@ -388,6 +376,8 @@ def resolve_visibility(layers, tiles, x, y, t):
             frame.trajectory[int(back)], centre, seed, u, first
         )
         is_there = pixel is not None and residual <= 1.0
+        if first is None and not back:
+            misses.append(residual)
         again = first is not None and first[1] and (np.abs(d - first[0]) < 0.75).all()
         if is_there and not again and frame.depth[int(back)][pixel] > 0:
             z = frame.depth[int(back)][pixel]
@@ -419,13 +409,13 @@ def resolve_visibility(layers, tiles, x, y, t):
         for f in order[1:]:
             if behind and inferred() and (np.isinf(seen[0].depth) or np.isinf(seen[1].depth)):
                 search_layer(f, True, None, None)
-    return seen
+    return seen, min(misses)
 
 
 def iterate_fixed_point(paths, centre, seed, u, first):
     """Fixed point of d = displacement(centre - d): d, the last step, pixel; None: from 0."""
     height, width = paths.shape[:2]
-    d, steps = (np.zeros(2), 7) if seed is None else (seed, 5)
+    d, steps = (np.zeros(2), 7) if seed is None else (seed, 4)
     residual, pixel = np.inf, None
     if first is not None and (np.abs(d - first[0]) < 0.75).all():
         return d, residual, pixel

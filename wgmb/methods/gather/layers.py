@@ -78,6 +78,8 @@ class Layers:
             "methods/gather/layers.wgsl",
             {"Color": gpu.texel(self._device, 4)},
             WEIGHTED=frame.weight is not None,
+            HAS_PREV=around["prev"] is not None,
+            HAS_NEXT=around["next"] is not None,
         )
         flags = self._images.view("edge flags", size, "r32uint")
         unbound = self._images.view("no edge flags", size, "r32uint")

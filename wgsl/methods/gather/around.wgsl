@@ -1,5 +1,5 @@
 // What the frames before and after a frame tell of it: where a surface goes beyond them, and backgrounds that it hides.
-// Where there is no such frame its textures are empty: their depth is 0.
+// Where there is no such frame its textures are empty, and not read.
 //#include common/depth.wgsl
 //#include common/five_positions.wgsl
 //#include common/frame.wgsl
@@ -14,11 +14,15 @@
 @group(1) @binding(19) var next_weight: texture_2d<f32>;
 
 override WEIGHTED: bool = false;        // read weights
+override HAS_PREV: bool = true;         // there is a frame before, and one after
+override HAS_NEXT: bool = true;
 
 /// The trajectory of the surface at the centre of `px` with these vectors, as far as the frames around tell.
 fn trajectory_around(px: vec2i, motion: vec4f, z: f32) -> Trajectory5 {
-    let before = acceleration_in(prev_motion, prev_depth, px, motion.xy, z, false);
-    let after = acceleration_in(next_motion, next_depth, px, motion.zw, z, true);
+    var before = Acceleration(vec2f(0.0), false);
+    var after = before;
+    if HAS_PREV { before = acceleration_in(prev_motion, prev_depth, px, motion.xy, z, false); }
+    if HAS_NEXT { after = acceleration_in(next_motion, next_depth, px, motion.zw, z, true); }
     return trajectory_between(motion, before, after);
 }
 
@@ -33,8 +37,8 @@ const BACKGROUND_RETURNS: f32 = 1.0;        // [px], see RETURNS
 /// The background at the centre of `px`, of these vectors and this depth, as the frames around show it.
 fn background_around(px: vec2i, motion: vec4f, z: f32) -> Background {
     var sum = Background(vec4f(0.0), 0.0);
-    look(&sum, prev_color, prev_motion, prev_depth, prev_weight, px, motion.xy, z, false);
-    look(&sum, next_color, next_motion, next_depth, next_weight, px, motion.zw, z, true);
+    if HAS_PREV { look(&sum, prev_color, prev_motion, prev_depth, prev_weight, px, motion.xy, z, false); }
+    if HAS_NEXT { look(&sum, next_color, next_motion, next_depth, next_weight, px, motion.zw, z, true); }
     return sum;
 }
 
@@ -45,11 +49,14 @@ fn look(sum: ptr<function, Background>, color_there: texture_2d<f32>, motion_the
     let is_inside = all(at >= vec2f(0.5)) && all(at <= vec2f(frame.size) - 0.5);
     let there = vec2i(clamp(at, vec2f(0.0), vec2f(frame.size) - 1.0));
     var is_clear = is_inside;
-    for (var i = 0; i < 9; i++) {
+    var i = 0;
+    loop {
         let near = clamp(there + vec2i(i % 3, i / 3) - 1, vec2i(0), vec2i(frame.size) - 1);
         let given = textureLoad(depth_there, near, 0).x;
         let ratio = valid_depth(given) / z;
         is_clear = is_clear && given > 0.0 && ratio < BACKGROUND_DEPTH_RATIO && ratio > 1.0 / BACKGROUND_DEPTH_RATIO;
+        i++;
+        if !is_clear || i >= 9 { break; }
     }
     let vectors = textureLoad(motion_there, there, 0);
     let off = select(vectors.zw, vectors.xy, is_next) + step;

@@ -211,8 +211,14 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= NO_DEPTH);    // depth of neither
     var front_place = Place(px, INFINITE);
     var back_place = Place(px, INFINITE);
+    var front_bits = 0u;        // of the 5 x 5, all that are in front
+    var back_bits = 0u;
+    var pure_bits = 0u;         // those that show one surface
     for (var i = 0; i < 25; i++) {
         let there = neighbour(px, i, between);
+        front_bits |= select(0u, 1u << u32(i), there.counts && there.is_front);
+        back_bits |= select(0u, 1u << u32(i), there.counts && !there.is_front);
+        pure_bits |= select(0u, 1u << u32(i), there.is_pure);
         if there.counts && there.is_pure && there.is_front && there.distance2 < front_place.distance2 {
             front_place = Place(there.at, there.distance2);
         }
@@ -220,20 +226,22 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
             back_place = Place(there.at, there.distance2);
         }
     }
-    let thin = front_place.distance2 >= INFINITE;               // no pure pixel is in front: a wire
-    let no_pure_background = back_place.distance2 >= INFINITE;
+    let thin = (front_bits & pure_bits) == 0u;                  // no pure pixel is in front: a wire
+    let no_pure_background = (back_bits & pure_bits) == 0u;
     var front_side = Side();
     var back_side = Side();
-    for (var i = 0; i < 25; i++) {
-        let there = neighbour(px, i, between);
-        let wanted = there.counts && (there.is_pure || select(no_pure_background, thin, there.is_front));
-        let motion_there = select(vec4f(0.0), textureLoad(motion, clamped(there.at), 0), wanted);
-        let color_there = select(vec4f(0.0), color_at(there.at), wanted);
+    var todo = (front_bits & (pure_bits | select(0u, ~0u, thin))) | (back_bits & (pure_bits | select(0u, ~0u, no_pure_background)));
+    loop {
+        let there = neighbour(px, i32(min(firstTrailingBit(todo), 24u)), between);
+        let motion_there = textureLoad(motion, clamped(there.at), 0);
+        let color_there = color_at(there.at);
         // The farther away, the smaller the share.
-        let share = select(0.0, 1.0 / (1.0 + there.distance2 * there.distance2), wanted);
+        let share = select(0.0, 1.0 / (1.0 + there.distance2 * there.distance2), todo != 0u);
         let weight_there = weight_at(there.at);
         add(&front_side, select(0.0, share, there.is_front), motion_there, there.z, color_there, weight_there);
         add(&back_side, select(share, 0.0, there.is_front), motion_there, there.z, color_there, weight_there);
+        todo &= todo - 1u;
+        if todo == 0u { break; }
     }
     let background_motion = back_side.motion / back_side.total;
     var foreground_motion = select(front_side.motion / front_side.total, background_motion, thin);

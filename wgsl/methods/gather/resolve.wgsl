@@ -24,10 +24,10 @@ override WEIGHTED: bool = false;    // read `own_weight`
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 
 const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: what one showed is preferred
-const ITERATIONS_SAVED: u32 = 2u;       // from a tile's motion, compared with a start from nothing
+const ITERATIONS_SAVED: u32 = 3u;       // from a tile's motion, compared with a start from nothing
 const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
 
-const MAX_MISS: f32 = 8.0;              // if no path comes nearer than this [px], what is there is hidden
+const MAX_MISS: f32 = 8.0;              // if no search along the pixel's own path comes nearer than this [px], what is there is hidden
 const FILL_DIRECTIONS: u32 = 8u;
 const FILL_STEPS: u32 = 13u;            // to every side, each FILL_GROWTH times as far as the one before: 64 px
 const FILL_GROWTH: f32 = 1.414213562;
@@ -46,6 +46,7 @@ struct Visible {        // the nearest samples of each kind
     opaque: Sample,
     front_edge: Sample,
     back_edge: Sample,  // behind the front edge
+    miss2: f32,         // least squared distance from the pixel at which a front layer's first search ended [px^2]
 }
 
 // Loops are left from their end, and what is rare has a loop of its own over bits of times: see lavapipe.md.
@@ -62,6 +63,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let candidates2 = load_candidates(tile, 2u);
     let front = 0u;
     let trajectory = unpack_trajectory(textureLoad(surfaces, id, front, 0));
+    let starts = Starts(trajectory, surface_at(id, 2u), surface_at(id, 3u), surface_at(id, 4u), surface_at(id, 5u));
     let block_trajectory = unpack_trajectory(textureLoad(surfaces, id / BLOCK * BLOCK, front, 0));  // as classified
     let shift = frame.jitter * (pixel_noise(id) - 0.5);
     let times = sample_times(x, shift, candidates0, candidates1, candidates2);
@@ -109,17 +111,20 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
         }
         todo = ~single & valid;
         var unresolved = 0u;
+        var far = 0u;       // of them, those at which no search came near
         loop {              // all others
             if todo != 0u {     // where it is 0, the loops within end at once
                 let t = time_in(times, first, todo);
-                let visible = resolve_visibility(x, trajectory, t, candidates0, candidates1, candidates2);
+                let visible = resolve_visibility(x, starts, t, candidates0, candidates1, candidates2);
                 let result = composite_front_to_back(visible, t, duration_in(times, first, todo));
                 let is_covered = result.coverage > 0.5;
                 if is_covered {
                     add(&sum, result, share / result.coverage);
                     accepted += 1.0;
                 } else {
-                    unresolved |= todo & (~todo + 1u);
+                    let bit = todo & (~todo + 1u);
+                    unresolved |= bit;
+                    far |= select(0u, bit, visible.miss2 > MAX_MISS * MAX_MISS);
                 }
             }
             todo &= todo - 1u;
@@ -129,7 +134,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
             if unresolved != 0u {
                 let t = time_in(times, first, unresolved);
                 let p = x - displacement5(trajectory, t);
-                if is_far_from_all(x, trajectory, t) {
+                if (far & unresolved & (~unresolved + 1u)) != 0u {
                     hidden += 1.0;
                 } else {
                     var one = tap(p);
@@ -215,10 +220,10 @@ const OTHER_BACK: u32 = 5u;
 const SEARCHES: u32 = 6u;
 
 /// The nearest samples that are at `x` [px] by the time `t` [frame intervals], by the candidates of all frames.
-fn resolve_visibility(x: vec2f, trajectory: Trajectory5, t: f32,
+fn resolve_visibility(x: vec2f, starts: Starts, t: f32,
                       a: Candidates, b: Candidates, c: Candidates) -> Visible {
     let has_edge = max(a.header.y, max(b.header.y, c.header.y)) > 0.0;
-    var visible = Visible(nothing(), nothing(), nothing());
+    var visible = Visible(nothing(), nothing(), nothing(), INFINITE);
     var hidden = false;             // the front layer of the frame itself shows nothing opaque
     var search = OWN_FRONT;
     loop {
@@ -226,7 +231,7 @@ fn resolve_visibility(x: vec2f, trajectory: Trajectory5, t: f32,
         let is_back = search == OWN_BACK || search > OTHER_FRONT;
         let u = t - offset_of(f);
         let query = Query(x, u, 2u * f + u32(is_back), select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u));
-        search_layer(&visible, query, displacement5(trajectory, u), candidates_of(f, a, b, c));
+        search_layer(&visible, query, start_of(starts, query), candidates_of(f, a, b, c));
         if search == OWN_FRONT { hidden = visible.opaque.depth >= INFINITE; }
         search = next_search(search, visible, t, hidden, has_edge);
         if search >= SEARCHES { break; }
@@ -258,6 +263,27 @@ struct Query {          // what is searched, and where
     handicap: f32,      // factor of the layer's depths
 }
 
+struct Starts {         // whose trajectories the first searches of a pixel start from, read once
+    own: Trajectory5,
+    front1: vec4u,      // what is at the pixel's place in the layers of neighbouring frames, see pack_surface()
+    back1: vec4u,
+    front2: vec4u,
+    back2: vec4u,
+}
+
+fn surface_at(px: vec2u, layer: u32) -> vec4u {
+    return textureLoad(surfaces, px, min(layer, 2u * sources.count - 1u), 0);
+}
+
+/// Displacement from which the first search of a layer starts: along the pixel's own trajectory, in that frame [px].
+fn start_of(starts: Starts, query: Query) -> vec2f {
+    let is_back = query.layer % 2u == 1u;
+    let first = select(starts.front1, starts.back1, is_back);
+    let second = select(starts.front2, starts.back2, is_back);
+    let there = displacement5(unpack_trajectory(select(first, second, query.layer > 3u)), query.u);
+    return select(there, displacement5(starts.own, query.u), query.layer < 2u);
+}
+
 struct Found {          // where an iteration ended
     state: WarpState,
     is_there: bool,     // a surface is at the pixel by the time
@@ -273,6 +299,7 @@ fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candi
     loop {
         let found = find_surface(&seeds, query, own, is_first, first, (*visible).opaque.depth);
         if is_first { first = found; }
+        if is_first && is_front { (*visible).miss2 = min((*visible).miss2, found.state.residual2); }
         if found.is_there { record(visible, query, found.state); }
         let wanted = may_be_visible(candidates, query.u, (*visible).opaque.depth / query.handicap);
         seeds.pending = seeds.pending & wanted & !are_solution(seeds, first.state.d);
@@ -284,10 +311,8 @@ fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candi
 /// Iterate from `own` at first; after that from pending seeds, one after the other until one leads to a surface. A seed
 /// is given up if it leads to the first solution, to something that is not nearer than `limit`, or astray.
 fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first: bool, first: Found, limit: f32) -> Found {
-    // In a neighbouring frame one more step, from standing still, leads to the pixel's own trajectory.
-    let in_own_frame = query.layer < 2u;
-    var state = WarpState(vec4u(0u), select(vec2f(0.0), own, in_own_frame), INFINITE);
-    var n = u32(in_own_frame);
+    var state = WarpState(vec4u(0u), own, INFINITE);
+    var n = 1u;
     if !is_first {
         state.d = next_seed(seeds);
         n = ITERATIONS_SAVED;
@@ -352,19 +377,6 @@ fn tap(p: vec2f) -> Composite {
     var counts = 1.0;
     if WEIGHTED { counts = textureSampleLevel(own_weight, linear, p / vec2f(frame.size), 0.0).x; }
     return Composite(textureSampleLevel(own_color, linear, p / vec2f(frame.size), 0.0), counts, 1.0, 0.0, 0.0);
-}
-
-/// Whether the searches along the pixel's own trajectory end farther than MAX_MISS from it, in all frames.
-fn is_far_from_all(x: vec2f, trajectory: Trajectory5, t: f32) -> bool {
-    var least2 = INFINITE;
-    var f = 0u;
-    loop {
-        let u = t - offset_of(f);
-        least2 = min(least2, iterate_fixed_point(x, displacement5(trajectory, u), u, 2u * f).residual2);
-        f++;
-        if f >= sources.count { break; }
-    }
-    return least2 > MAX_MISS * MAX_MISS;
 }
 
 /// Add what is hidden behind the pixel in all frames: the nearest surfaces behind its own, in FILL_DIRECTIONS

@@ -19,18 +19,17 @@ fn tiles_of(size: vec2u) -> vec2u {
 }
 
 /// All that the search needs to know of a pixel's front or back layer, as rgba32uint: velocity, half acceleration in
-/// half floats, depth. The sign of the depth and its last four bits are flags.
+/// half floats, depth. The last THIRD_BITS bits of both velocities are the trajectory's third term; they are known to
+/// 1/16,000 of themselves. The sign of the depth and its last three bits are flags.
 /// Front layer: depth is negative if an edge is within a pixel; LAST_BIT says that it is smooth, one surface of
 /// one weight in its 3 x 3. Back layer: depth is 0 if there is none; LAST_BIT says that it was seen, not inferred.
-/// KINK and CUBIC are of the trajectory: of a cubic the last THIRD_BITS bits of both velocities are its third term.
+/// KINK is of the trajectory.
 fn pack_surface(trajectory: Trajectory5, depth: f32, last_bit: bool) -> vec4u {
     let third = vec2i(round(clamp(trajectory.third / THIRD_STEP, vec2f(-THIRD_MAX), vec2f(THIRD_MAX))));
-    let is_cubic = any(third != vec2i(0));
-    let flags = select(0u, LAST_BIT, last_bit) | select(0u, KINK, trajectory.has_kink) | select(0u, CUBIC, is_cubic);
+    let flags = select(0u, LAST_BIT, last_bit) | select(0u, KINK, trajectory.has_kink);
     let mask = (1u << THIRD_BITS) - 1u;
-    let velocity = bitcast<vec2u>(trajectory.velocity);
-    let rounded = ((velocity + (1u << (THIRD_BITS - 1u))) & vec2u(~mask)) | (bitcast<vec2u>(third) & vec2u(mask));
-    return vec4u(select(velocity, rounded, is_cubic), pack_halves(trajectory.half_acceleration),
+    let velocity = (bitcast<vec2u>(trajectory.velocity) + (1u << (THIRD_BITS - 1u))) & vec2u(~mask);
+    return vec4u(velocity | (bitcast<vec2u>(third) & vec2u(mask)), pack_halves(trajectory.half_acceleration),
                  (bitcast<u32>(depth) & ~FLAGS) | flags);
 }
 
@@ -41,19 +40,16 @@ fn pack_halves(v: vec2f) -> u32 {
 
 const LAST_BIT: u32 = 1u;
 const KINK: u32 = 2u;
-const CUBIC: u32 = 4u;
-const AROUND: u32 = 8u;         // of a back layer, set by the separation: its colour is that of neighbouring frames
-const FLAGS: u32 = 15u;
+const AROUND: u32 = 4u;         // of a back layer, set by the separation: its colour is that of neighbouring frames
+const FLAGS: u32 = 7u;
 const THIRD_BITS: u32 = 10u;
 const THIRD_STEP: f32 = 0.03125;        // [px]: up to 0.39 of it are seen within a frame interval
 const THIRD_MAX: f32 = 511.0;
 
 fn unpack_trajectory(surface: vec4u) -> Trajectory5 {
-    let is_cubic = (surface.w & CUBIC) != 0u;
-    let mask = select(0u, (1u << THIRD_BITS) - 1u, is_cubic);
     let unused = 32u - THIRD_BITS;
-    let third = vec2f(bitcast<vec2i>((surface.xy & vec2u(mask)) << vec2u(unused)) >> vec2u(unused)) * THIRD_STEP;
-    let velocity = bitcast<vec2f>(surface.xy & vec2u(~mask));
+    let third = vec2f(bitcast<vec2i>(surface.xy << vec2u(unused)) >> vec2u(unused)) * THIRD_STEP;
+    let velocity = bitcast<vec2f>(surface.xy & vec2u(~((1u << THIRD_BITS) - 1u)));
     return Trajectory5(velocity, unpack2x16float(surface.z), third, (surface.w & KINK) != 0u);
 }
 
