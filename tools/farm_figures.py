@@ -125,7 +125,7 @@ def share(folder: Path) -> None:
 
 def work(folder: Path) -> None:
     """More work a worker."""
-    for count in (60, 240):
+    for count in (60, 320):
         base = folder / str(count)
         pattern = shot(base / "in", count, scale=6)
         compare(f"work   {count} frames 384 x 288, gather", base, pattern, "gather")
