@@ -7,6 +7,7 @@ import numpy as np
 from wgmb.color import srgb
 
 LUMA = np.array([0.299, 0.587, 0.114])
+PATCH = [(j, i) for j in range(-2, 3) for i in range(-2, 3) if (i + j) % 2 == 0]
 WEIGHTS = np.array([1, 1, 1, 1, 1, 0.25, 0.25])  # of the features, as they are stored
 
 
@@ -74,7 +75,7 @@ class Matcher:
         goal = np.array([x, y]) + flow
         if not (0 <= goal[0] <= self.width - 1 and 0 <= goal[1] <= self.height - 1):
             return 2.0
-        j, i = np.mgrid[-2:3, -2:3] * self.stride
+        j, i = np.transpose(PATCH) * self.stride
         px, py = x + i, y + j
         inside = (px >= 0) & (py >= 0) & (px < self.width) & (py < self.height)
         own = self.here[np.where(inside, py, y), np.where(inside, px, x)]
@@ -163,7 +164,7 @@ def refined(matcher, states, x, y):
 def inverse_step(matcher, other, x, y, flow, slope):
     """Where inverse search moves a patch in one frame [px]; 0 if that is too far."""
     square, product = np.eye(2) * 1e-5, np.zeros(2)
-    places = [(i * matcher.stride, j * matcher.stride) for j in range(-2, 3) for i in range(-2, 3)]
+    places = [(i * matcher.stride, j * matcher.stride) for j, i in PATCH]
     total = sum(_weight(matcher, x, y, i, j) for i, j in places)
     for i, j in places:
         weight = _weight(matcher, x, y, i, j) / total

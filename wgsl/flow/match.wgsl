@@ -21,7 +21,7 @@ const ONE: u32 = 1u;                // one beside it
 const AROUND: u32 = 2u;             // those before and after it
 const BESIDE: u32 = 3u;             // the two nearest on one side
 
-const SIDE: u32 = 5u;           // samples along a patch
+const SIDE: u32 = 5u;           // places along a patch; every second one is a sample, as on a chessboard
 const ROW_ORDER: u32 = 2u;      // rows are taken this far apart
 const MOST_DIFFERENCE: f32 = 0.6;   // of a sample: what differs more is something else
 const BESIDE_CENTRE: f32 = 0.0009765625;    // [px]; hardware filters in steps of 1/256
@@ -40,6 +40,11 @@ fn row_offset(k: u32) -> f32 {
     return view.stride * (f32((k * ROW_ORDER + SIDE / 2u) % SIDE) - f32(SIDE / 2u));
 }
 
+/// Where the samples of a row begin.
+fn first_column(row: u32) -> u32 {
+    return (row * ROW_ORDER + SIDE / 2u) % SIDE % 2u;
+}
+
 fn column_offset(k: u32) -> f32 {
     return view.stride * (f32(k) - f32(SIDE / 2u));
 }
@@ -55,7 +60,7 @@ fn load_patch(px: vec2i) {
     centre_color = textureLoad(here, px, 0, 0).rgb;
     var total = 0.0;
     for (var row = 0u; row < SIDE; row++) {
-        for (var column = 0u; column < SIDE; column++) {
+        for (var column = first_column(row); column < SIDE; column += 2u) {
             let at = px + vec2i(vec2f(column_offset(column), row_offset(row)));
             total += sample_weight(at, textureLoad(here, at, 0, 0).rgb);
         }
@@ -93,7 +98,7 @@ fn sample_cost(offset: vec2f, found0: vec4f, found1: vec4f) -> f32 {
 fn near_cost(to: Target) -> f32 {
     var sum = 0.0;
     for (var row = 0u; row < SIDE && sum <= to.limit; row++) {
-        for (var column = 0u; column < SIDE; column++) {
+        for (var column = first_column(row); column < SIDE; column += 2u) {
             let offset = vec2f(column_offset(column), row_offset(row));
             let at = sample_place(to, offset);
             sum += sample_cost(offset, textureSampleLevel(near, linear, at, 0, 0.0),
@@ -107,7 +112,7 @@ fn near_cost(to: Target) -> f32 {
 fn far_cost(to: Target) -> f32 {
     var sum = 0.0;
     for (var row = 0u; row < SIDE && sum <= to.limit; row++) {
-        for (var column = 0u; column < SIDE; column++) {
+        for (var column = first_column(row); column < SIDE; column += 2u) {
             let offset = vec2f(column_offset(column), row_offset(row));
             let at = sample_place(to, offset);
             sum += sample_cost(offset, textureSampleLevel(far, linear, at, 0, 0.0),

@@ -43,7 +43,7 @@ fn inverse_steps(state: State) -> Steps {
     var n = Slide();
     var f = Slide();
     for (var row = 0u; row < SIDE; row++) {
-        for (var column = 0u; column < SIDE; column++) {
+        for (var column = first_column(row); column < SIDE; column += 2u) {
             let offset = vec2f(column_offset(column), row_offset(row));
             let px = vec2i(centre + offset);
             let own0 = textureLoad(here, px, 0, 0);
