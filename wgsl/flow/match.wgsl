@@ -22,6 +22,7 @@ const AROUND: u32 = 2u;             // those before and after it
 const BESIDE: u32 = 3u;             // the two nearest on one side
 
 const SIDE: u32 = 5u;           // places along a patch; every second one is a sample, as on a chessboard
+const SAMPLES: u32 = 13u;       // in a patch
 const ROW_ORDER: u32 = 2u;      // rows are taken this far apart
 const MOST_DIFFERENCE: f32 = 0.6;   // of a sample: what differs more is something else
 const BESIDE_CENTRE: f32 = 0.0009765625;    // [px]; hardware filters in steps of 1/256
@@ -33,7 +34,9 @@ const MOST_BEND_PRICE: f32 = 0.01;  // which costs no more: less than being hidd
 
 var<private> centre: vec2f;             // of the patch, in pixels whose centres are whole numbers
 var<private> centre_color: vec3f;       // its display colour
-var<private> inverse_weight: f32;       // one over the weight of all samples
+// Of every sample, loaded once. Indices are constants wherever loops are unrolled: an array in registers.
+var<private> patch0: array<vec4f, SAMPLES>;   // features
+var<private> patch1: array<vec4f, SAMPLES>;   // xyz: features; w: weight, all of them sum up to 1
 
 /// Row `k` of a patch from its centre [px]: the middle one first, then the others, far from one another.
 fn row_offset(k: u32) -> f32 {
@@ -49,6 +52,11 @@ fn column_offset(k: u32) -> f32 {
     return view.stride * (f32(k) - f32(SIDE / 2u));
 }
 
+/// The number of a sample in its array.
+fn sample_index(row: u32, column: u32) -> u32 {
+    return (row * ROW_ORDER + SIDE / 2u) % SIDE * SIDE / 2u + (column + 1u) / 2u;
+}
+
 /// Weight of a sample; 0 outside the picture.
 fn sample_weight(px: vec2i, color: vec3f) -> f32 {
     let is_inside = all(px >= vec2i(0)) && all(px < vec2i(frame.size));
@@ -62,10 +70,14 @@ fn load_patch(px: vec2i) {
     for (var row = 0u; row < SIDE; row++) {
         for (var column = first_column(row); column < SIDE; column += 2u) {
             let at = px + vec2i(vec2f(column_offset(column), row_offset(row)));
-            total += sample_weight(at, textureLoad(here, at, 0, 0).rgb);
+            let k = sample_index(row, column);
+            patch0[k] = textureLoad(here, at, 0, 0);
+            patch1[k] = vec4f(textureLoad(here, at, 1, 0).xyz, sample_weight(at, patch0[k].rgb));
+            total += patch1[k].w;
         }
     }
-    inverse_weight = 1.0 / total;
+    let inverse = 1.0 / total;
+    for (var k = 0u; k < SAMPLES; k++) { patch1[k].w *= inverse; }
 }
 
 struct Target {         // of a patch in another frame
@@ -86,40 +98,52 @@ fn sample_place(to: Target, offset: vec2f) -> vec2f {
     return (to.at + offset + sloped(to.slope, offset) + 0.5 + BESIDE_CENTRE) / vec2f(frame.size);
 }
 
-/// What a sample adds to the cost if this is found in the other frame.
-fn sample_cost(offset: vec2f, found0: vec4f, found1: vec4f) -> f32 {
-    let px = vec2i(centre + offset);
-    let own0 = textureLoad(here, px, 0, 0);
-    let d = difference(own0, textureLoad(here, px, 1, 0).xyz, found0, found1.xyz);
-    return inverse_weight * sample_weight(px, own0.rgb) * min(d, MOST_DIFFERENCE);
+/// What sample `k` adds to the cost if this is found in the other frame.
+fn sample_cost(k: u32, found0: vec4f, found1: vec4f) -> f32 {
+    let d = difference(patch0[k], patch1[k].xyz, found0, found1.xyz);
+    return patch1[k].w * min(d, MOST_DIFFERENCE);
 }
 
 /// Mean difference of the patch from the near frame; OUTSIDE if it is more than the limit.
 fn near_cost(to: Target) -> f32 {
     var sum = 0.0;
-    for (var row = 0u; row < SIDE && sum <= to.limit; row++) {
-        for (var column = first_column(row); column < SIDE; column += 2u) {
-            let offset = vec2f(column_offset(column), row_offset(row));
-            let at = sample_place(to, offset);
-            sum += sample_cost(offset, textureSampleLevel(near, linear, at, 0, 0.0),
-                               textureSampleLevel(near, linear, at, 1, 0.0));
-        }
-    }
+    if sum <= to.limit { sum = near_row(to, 0u, sum); }
+    if sum <= to.limit { sum = near_row(to, 1u, sum); }
+    if sum <= to.limit { sum = near_row(to, 2u, sum); }
+    if sum <= to.limit { sum = near_row(to, 3u, sum); }
+    if sum <= to.limit { sum = near_row(to, 4u, sum); }
     return select(OUTSIDE, sum, sum <= to.limit);
+}
+
+fn near_row(to: Target, row: u32, before: f32) -> f32 {
+    var sum = before;
+    for (var column = first_column(row); column < SIDE; column += 2u) {
+        let at = sample_place(to, vec2f(column_offset(column), row_offset(row)));
+        sum += sample_cost(sample_index(row, column), textureSampleLevel(near, linear, at, 0, 0.0),
+                           textureSampleLevel(near, linear, at, 1, 0.0));
+    }
+    return sum;
 }
 
 /// The same of the far frame.
 fn far_cost(to: Target) -> f32 {
     var sum = 0.0;
-    for (var row = 0u; row < SIDE && sum <= to.limit; row++) {
-        for (var column = first_column(row); column < SIDE; column += 2u) {
-            let offset = vec2f(column_offset(column), row_offset(row));
-            let at = sample_place(to, offset);
-            sum += sample_cost(offset, textureSampleLevel(far, linear, at, 0, 0.0),
-                               textureSampleLevel(far, linear, at, 1, 0.0));
-        }
-    }
+    if sum <= to.limit { sum = far_row(to, 0u, sum); }
+    if sum <= to.limit { sum = far_row(to, 1u, sum); }
+    if sum <= to.limit { sum = far_row(to, 2u, sum); }
+    if sum <= to.limit { sum = far_row(to, 3u, sum); }
+    if sum <= to.limit { sum = far_row(to, 4u, sum); }
     return select(OUTSIDE, sum, sum <= to.limit);
+}
+
+fn far_row(to: Target, row: u32, before: f32) -> f32 {
+    var sum = before;
+    for (var column = first_column(row); column < SIDE; column += 2u) {
+        let at = sample_place(to, vec2f(column_offset(column), row_offset(row)));
+        sum += sample_cost(sample_index(row, column), textureSampleLevel(far, linear, at, 0, 0.0),
+                           textureSampleLevel(far, linear, at, 1, 0.0));
+    }
+    return sum;
 }
 
 /// What a state costs in itself.

@@ -45,19 +45,17 @@ fn inverse_steps(state: State) -> Steps {
     for (var row = 0u; row < SIDE; row++) {
         for (var column = first_column(row); column < SIDE; column += 2u) {
             let offset = vec2f(column_offset(column), row_offset(row));
-            let px = vec2i(centre + offset);
-            let own0 = textureLoad(here, px, 0, 0);
-            let own1 = textureLoad(here, px, 1, 0);
-            let gradient = 0.5 * (vec2f(own0.w, own1.x) - 0.5);
-            let weight = inverse_weight * sample_weight(px, own0.rgb);
+            let k = sample_index(row, column);
+            let gradient = 0.5 * (vec2f(patch0[k].w, patch1[k].x) - 0.5);
+            let weight = patch1[k].w;
             let at_near = sample_place(to_near, offset);
             let near0 = textureSampleLevel(near, linear, at_near, 0, 0.0);
             let near1 = textureSampleLevel(near, linear, at_near, 1, 0.0);
-            n = slid(n, gradient, weight, own0, near0, difference(own0, own1.xyz, near0, near1.xyz));
+            n = slid(n, gradient, weight, patch0[k], near0, difference(patch0[k], patch1[k].xyz, near0, near1.xyz));
             let at_far = sample_place(to_far, offset);
             let far0 = textureSampleLevel(far, linear, at_far, 0, 0.0);
             let far1 = textureSampleLevel(far, linear, at_far, 1, 0.0);
-            f = slid(f, gradient, weight, own0, far0, difference(own0, own1.xyz, far0, far1.xyz));
+            f = slid(f, gradient, weight, patch0[k], far0, difference(patch0[k], patch1[k].xyz, far0, far1.xyz));
         }
     }
     let by = view.far_factor;
