@@ -57,16 +57,25 @@ fn whole_cost(other: texture_2d_array<f32>, at: vec2i, most: f32) -> f32 {
     let is_outside = any(at < vec2i(0)) || any(at > last);
     let limit = select(most, -1.0, is_outside);
     var sum = 0.0;
-    for (var row = 0; row < SEARCH_SIDE && sum <= limit; row++) {
-        for (var column = 0; column < SEARCH_SIDE; column++) {
-            let k = SEARCH_SIDE * row + column;
-            let px = clamp(at + search_offset(k), vec2i(0), last);
-            let found0 = textureLoad(other, px, 0, 0);
-            let d = difference(own0[k], own1[k].xyz, found0, textureLoad(other, px, 1, 0).xyz);
-            sum += own1[k].w * min(d, MOST_DIFFERENCE);
-        }
-    }
+    if sum <= limit { sum = search_row(other, at, 0, sum); }
+    if sum <= limit { sum = search_row(other, at, 1, sum); }
+    if sum <= limit { sum = search_row(other, at, 2, sum); }
+    if sum <= limit { sum = search_row(other, at, 3, sum); }
     return select(sum, OUTSIDE, is_outside);
+}
+
+/// The sum with the samples of a row, whose number is a constant: see match.wgsl on arrays.
+fn search_row(other: texture_2d_array<f32>, at: vec2i, row: i32, before: f32) -> f32 {
+    let last = vec2i(frame.size) - 1;
+    var sum = before;
+    for (var column = 0; column < SEARCH_SIDE; column++) {
+        let k = SEARCH_SIDE * row + column;
+        let px = clamp(at + search_offset(k), vec2i(0), last);
+        let found0 = textureLoad(other, px, 0, 0);
+        let d = difference(own0[k], own1[k].xyz, found0, textureLoad(other, px, 1, 0).xyz);
+        sum += own1[k].w * min(d, MOST_DIFFERENCE);
+    }
+    return sum;
 }
 
 fn cheaper(found: vec4f, by: vec2f, cost: f32) -> vec4f {

@@ -69,7 +69,7 @@ fn mend(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let px = vec2i(min(id, frame.size - 1u));
     var state = load_state(states, px);
     let tries = select(0u, RINGS * DIRECTIONS, textureLoad(lost, px, 0).x != 0u);
-    load_patch(px);
+    if tries > 0u { load_patch(px); }
     var best = OUTSIDE;
     for (var k = 0u; k < tries; k++) {
         let radius = FIRST_RING * pow(RING_GROWTH, f32(k / DIRECTIONS));
