@@ -10,10 +10,13 @@ import pytest
 import make_clips as clips
 import make_frames as make
 from wgmb import Blur, InputError, Shutter, gpu
+from wgmb.cli.app import main
 from wgmb.flow.dis import Dis
 from wgmb.gpu.textures import TexturePool
+from wgmb.io import stills
 from wgmb.io.clock import Clock
 from wgmb.io.footage import Footage
+from wgmb.io.video_masks import holdout_of
 from wgmb.video_batch import FootageBlur, moments
 from wgmb.video_pictures import VideoPictures
 from wgmb.viewer import State, controls, motion_maker, offscreen
@@ -92,11 +95,15 @@ def settled(viewer):
     raise AssertionError(viewer.stage.report)
 
 
-def command_line(clip, number, fps=None, method="tap", motion=True, **shutter):
+def command_line(
+    clip, number, fps=None, method="tap", motion=True, masks=(), speed=Fraction(1), **shutter
+):
     """The picture that `wgmb blur` makes for the time of an input picture."""
-    footage, blur = Footage(clip), Blur(method, samples=8)
-    run = FootageBlur(footage, blur, Dis("best") if motion else None)
-    wanted = [m for m in moments(footage, Clock(), Fraction(fps or 48)) if m.time * 48 == number]
+    footage, blur, clock = Footage(clip), Blur(method, samples=8), Clock(speed=speed)
+    held_out = holdout_of(masks, footage)
+    run = FootageBlur(footage, blur, Dis("best") if motion else None, clock=clock, holdout=held_out)
+    of_all = moments(footage, clock, Fraction(fps or 48))
+    wanted = [m for m in of_all if clock.back(m.time) * 48 == number]
     for _, exposure in run.exposures(Shutter(**shutter), wanted):
         encoder = blur.device.create_command_encoder()
         return TexturePool(blur.device).download(encoder, exposure.light())[..., :3]
@@ -111,8 +118,19 @@ def command_line(clip, number, fps=None, method="tap", motion=True, **shutter):
         ({"method": "gather"}, {"method": "gather"}),
         ({"fps": 12.0, "shutter": 360.0, "frame": 8.0}, {"fps": 12, "degrees": 360}),
         ({"fps": 12.0, "flow": "none"}, {"fps": 12, "motion": False}),
+        ({"pace": "0.5"}, {"speed": Fraction(1, 2)}),
+        ({"pace": "4"}, {"speed": Fraction(4)}),
     ],
-    ids=["own rate", "into the next", "four in one", "neighbours", "up to the cut", "averaged"],
+    ids=[
+        "own rate",
+        "into the next",
+        "four in one",
+        "neighbours",
+        "up to the cut",
+        "averaged",
+        "slow",
+        "quick",
+    ],
 )
 def test_it_shows_what_the_command_line_makes(clip, changes, made):
     changes = {"flow": "dis", "frame": 4.0} | changes
@@ -120,6 +138,58 @@ def test_it_shows_what_the_command_line_makes(clip, changes, made):
     want = command_line(clip, int(changes["frame"]), **made)
     np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
     viewer.stage.choices.close()
+
+
+def test_what_is_held_out_stays_sharp_as_by_the_command_line(clip, tmp_path):
+    matte = tmp_path / "matte.png"
+    mask = np.zeros((SIZE[1], SIZE[0], 3), np.float32)
+    mask[:, : SIZE[0] // 4] = 1
+    matte.write_bytes(stills.encode(mask, ".png", 8, ""))
+    given = (("holdout", (str(matte), "static")),)
+    viewer = opened(clip, flow="dis", frame=4.0, given=given)
+    got = settled(viewer)
+    want = command_line(clip, 4, masks=(str(matte), "static"))
+    np.testing.assert_allclose(got, want, atol=2e-5)
+    sharp = VideoPictures(Footage(clip), gpu.open_device()).at(4)
+    kept = np.abs(got - sharp)[:, : SIZE[0] // 4 - 2]
+    assert kept.max() < 1e-3 < 0.02 < np.abs(got - command_line(clip, 4)).max()
+    viewer.stage.choices.close()
+
+
+@pytest.mark.parametrize(
+    ("mask", "said"), [("Layer", "must be static, or an image file"), ("small.png", "96 x 64")]
+)
+def test_a_holdout_that_cannot_be_is_refused(clip, tmp_path, monkeypatch, mask, said):
+    monkeypatch.chdir(tmp_path)
+    small = stills.encode(np.ones((8, 8, 3), np.float32), ".png", 8, "")
+    (tmp_path / "small.png").write_bytes(small)
+    with pytest.raises(InputError, match=said):
+        frame(opened(clip, given=(("holdout", (mask,)),)))
+
+
+def test_the_speed_of_the_output_is_saved_and_played(clip):
+    state = replace(State().opened(str(clip)), pace="0.5", speed=2.0)
+    words = state.command("b.mp4")
+    assert words[words.index("--speed") + 1] == "0.5"
+    assert State.of_toml(state.toml()) == state
+    assert controls.played(replace(state, speed=1.0), 0.125).frame == pytest.approx(3)
+    assert "--speed" not in replace(state, pace="1").command("b.mp4")
+    with pytest.raises(InputError, match=r"`speed` must be 0\.01 to 100"):
+        State.of_toml(state.toml().replace('speed = "0.5"', 'speed = "0"'))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (["wheel", "--speed", "0.5"], "--speed is for videos"),
+        (["wheel", "--keep", "static"], "--holdout is for frames and videos"),
+        (["CLIP", "--speed", "0"], "--speed must be 0.01 to 100"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused_before_a_window_opens(clip, capsys, changes, said):
+    words = [str(clip) if word == "CLIP" else word for word in changes]
+    assert main(["view", *words]) == 2
+    assert said in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("changes", [{"frame": 4.0}, {"frame": 4.0, "method": "gather"}])

@@ -10,19 +10,14 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from .._version import __version__
-from ..color import srgb
 from ..errors import InputError
 from ..highlights import check as check_highlights
-from ..io import stills
 from ..io.clock import Clock
 from ..io.cut_list import CutList
 from ..io.footage import Footage
-from ..io.frame_file import size_text
 from ..io.frame_numbers import frame_numbers
-from ..io.overlay import overlay_of
+from ..io.video_masks import holdout_of
 from ..motion_source import MotionSource
 from ..pipeline import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
@@ -31,9 +26,6 @@ from ..video_settings import VideoSettings
 from .exit_codes import DONE, SOME_FAILED
 from .terminal import note, progress
 from .video_output import write
-
-STATIC = "static"  # as a holdout: what never changes while all around it does
-
 
 Tell = Callable[..., None]
 """What `terminal.progress` gives."""
@@ -153,7 +145,7 @@ def blurred(plan: Plan, wish: Wish, tell: Tell) -> tuple[FootageBlur, list[str]]
         wish.blur,
         wish.motion,
         clock=plan.clock,
-        holdout=_holdout(wish.look.holdout, footage),
+        holdout=holdout_of(wish.look.holdout, footage),
         fill=video.duplicates == "fill",
         cuts=cuts.is_search,
         known_cuts=cuts.frames(0),
@@ -194,21 +186,3 @@ def clock_of(footage: Footage, given: InputSettings, video: VideoSettings) -> Cl
         end = None if numbers[-1] + 1 == len(footage) else footage.times[numbers[-1] + 1]
     origin = start if first is None else Fraction(0)
     return Clock(first or start, video.pace, origin, first, end)
-
-
-def _holdout(masks: tuple[str, ...], footage: Footage) -> np.ndarray | None:
-    """(height, width) of all masks together; None without any."""
-    whole: np.ndarray | None = None
-    for mask in masks:
-        if mask == STATIC:
-            plane = overlay_of(footage)
-        elif Path(mask).suffix.lower() in stills.SUFFIXES:
-            plane = srgb(stills.read(mask)[..., 0])
-        else:
-            known = f"{STATIC}, or an image file {' '.join(stills.SUFFIXES)}"
-            raise InputError(f"holdout of a video must be {known}; got {mask!r}")
-        if plane.shape[::-1] != footage.size:
-            expected = "{} x {}".format(*footage.size)
-            raise InputError(f"{mask} must be {expected} like the video, got {size_text(plane)}")
-        whole = plane if whole is None else np.maximum(whole, plane)
-    return whole

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..color_settings import ColorSettings
-from ..errors import DeviceError
+from ..errors import DeviceError, InputError
 from ..extras import needed_by
 from ..settings import rate_of, size_of
 from ..video_settings import FlowSettings
@@ -34,6 +34,7 @@ def view(
     *,
     config: Path | None = None,
     fps: str | None = None,
+    speed: str | None = None,
     window: str = "1280x720",
     adapter: str | None = None,
 ) -> int:
@@ -42,6 +43,7 @@ def view(
     Example: wgmb view wheel
     Example: wgmb view 'shot.####.exr' --method reproject
     Example: wgmb view clip.mp4 --flow dis --fps 60
+    Example: wgmb view game.mp4 --speed 0.5 --keep static
 
     Parameters
     ----------
@@ -51,6 +53,8 @@ def view(
         TOML file saved by the viewer: start with its settings.
     fps
         Frames per second; of videos those of the output, whose interval the shutter is in.
+    speed
+        Of a video: speed of the output, such as 0.5 for slow motion.
     window
         Window size, WIDTHxHEIGHT.
     adapter
@@ -72,6 +76,13 @@ def view(
     state = state.told(vars(given) | vars(look) | vars(when) | vars(color) | vars(motion))
     if fps is not None:
         state = replace(state, fps=float(rate_of(fps)))
+    if speed is not None:
+        if not state.is_video:
+            raise InputError(f"--speed is for videos, not for {state.source}")
+        state = replace(state, pace=speed)
+        _ = state.tempo  # says what is wrong with it
+    if state.is_scene and look.holdout:
+        raise InputError(f"--holdout is for frames and videos, {state.source} is a scene")
     if color.remark:
         note(color.remark)
     viewer.view(state, adapter=adapter, size=size_of(window))

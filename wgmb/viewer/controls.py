@@ -156,7 +156,7 @@ def stepped(state: State, frames: float) -> State:
 def played(state: State, seconds: float) -> State:
     """Return the state `seconds` later."""
     first, last = state.span
-    moved = seconds * state.rate * state.speed
+    moved = seconds * state.rate * state.tempo * state.speed
     return replace(state, frame=first + (state.frame + moved - first) % (last - first + 1))
 
 

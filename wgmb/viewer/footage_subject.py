@@ -17,6 +17,7 @@ from ..gpu.textures import TexturePool
 from ..gpu.timing import TimestampClock
 from ..io import limits
 from ..io.footage import Footage
+from ..io.video_masks import STATIC, holdout_of
 from ..methods import METHODS
 from ..pipeline import Blur
 from ..shutter import Shutter
@@ -41,21 +42,26 @@ class FootageSubject:
 
     def __init__(self, device: wgpu.GPUDevice, state: State):
         given: dict[str, Any] = dict(state.given)
-        max_mb = given.pop("max_mb", limits.MAX_MB)
+        max_mb, masks = given.pop("max_mb", limits.MAX_MB), given.pop("holdout", ())
+        if "cuts" in given:
+            raise InputError(
+                "--cuts is for `wgmb blur`: the viewer finds the cuts of videos itself"
+            )
         if given:
             option = next(iter(given)).replace("_", "-")
-            raise InputError(
-                f"--{option} is for rendered frames, the viewer shows videos as they are"
-            )
+            raise InputError(f"--{option} is for rendered frames, a video has no layers")
         self._device, self._images = device, TexturePool(device)
         self._footage = Footage(state.source, max_mb=max_mb)
         self._pictures = VideoPictures(self._footage, device)
         self._times = self._footage.times.seconds
         asked: dict[str, Any] = {"flow": state.flow, "flow_quality": state.flow_quality}
         settings = FlowSettings(**asked)
-        self._maker = MotionMaker(self._footage.path, max_mb, settings, device)
+        holdout_of([mask for mask in masks if mask != STATIC], self._footage)  # says what is wrong
+        self._maker = MotionMaker(self._footage.path, max_mb, settings, device, masks)
         self._moves = settings.flow != "none"
         self.finding = f"motion: {self._maker.how}"
+        if masks and not self._moves:
+            self.finding += "; averages hold nothing out"
         self._colors: OrderedDict[int, np.ndarray] = OrderedDict()
         self._frames: OrderedDict[int, tuple[Known | None, Frame]] = OrderedDict()
         self._sums: dict[int, CellSum] = {}
@@ -92,7 +98,7 @@ class FootageSubject:
         The motion that lacks is asked for, and while playing also that of the pictures to come.
         """
         number = self._number(state)
-        first, last = self._reach(number, 1 / state.fps, shutter)
+        first, last = self._reach(number, state.tempo / state.fps, shutter)
         beside = 1 if neighbours and self._moves else 0
         near = sorted(range(first - beside, last + beside + 1), key=lambda n: abs(n - number))
         wanted = [n for n in near if 0 <= n < len(self._footage)]
@@ -145,7 +151,7 @@ class FootageSubject:
         self, state: State, size: tuple[int, int], antialias: int, eye: str | None = None
     ) -> None:
         """What the next draws are of."""
-        self._now, self._interval = self._number(state), 1 / state.fps
+        self._now, self._interval = self._number(state), state.tempo / state.fps
 
     def passes(self) -> dict[str, wgpu.GPUTexture]:
         """The sharp picture and what lies under it; 0 everywhere as long as it is not known."""
@@ -246,7 +252,9 @@ class FootageSubject:
         motion = known.motion
         if (back, ahead) != (1.0, 1.0):
             motion = motion * np.array([back, back, ahead, ahead], np.float32)
-        return Frame(color, motion=motion, depth=known.depth, number=number).locked()
+        held_out = known.holdout
+        made = Frame(color, motion=motion, depth=known.depth, holdout=held_out, number=number)
+        return made.locked()
 
     def _color(self, number: int) -> np.ndarray:
         """A picture; the nearest one before, if it cannot be decoded."""

@@ -22,6 +22,7 @@ from ..flow.dis import Dis
 from ..glance import Glance, is_cut
 from ..io.footage import Footage
 from ..io.picture_motion import FAR
+from ..io.video_masks import holdout_of
 from ..motion_source import MotionSource
 from ..reel import FLASH, LONGEST
 from ..video_pictures import VideoPictures
@@ -45,12 +46,21 @@ class Known:
     """No motion leads from it to the next picture."""
     begins_shot: bool
     ends_shot: bool
+    holdout: np.ndarray | None = None
+    """(height, width): 1 stays sharp; of pictures with motion."""
 
 
 class _Finder:
     """Motion and cuts of a video's pictures, from those around each in its own shot."""
 
-    def __init__(self, footage: Footage, device: wgpu.GPUDevice, motion: MotionSource | None):
+    def __init__(
+        self,
+        footage: Footage,
+        device: wgpu.GPUDevice,
+        motion: MotionSource | None,
+        masks: tuple[str, ...],
+    ):
+        self._holdout = holdout_of(masks, footage) if motion is not None else None
         self._pictures, self._count = VideoPictures(footage, device), len(footage)
         self._times = footage.times.seconds
         self._kept: OrderedDict[int, Glance | None] = OrderedDict()
@@ -66,9 +76,11 @@ class _Finder:
                 self._shot = self._motion.shot(self._load)
             self._anchor = number
             motion, depth = self._shot(number) or (None, None)
-        parts = [self._begins(n) for n in (number, number + 1)]
-        shots = [begins and not self._is_flash(number + n) for n, begins in enumerate(parts)]
-        return Known(motion, depth, *parts, *shots)
+        begins, ends = (self._begins(n) for n in (number, number + 1))
+        begins_shot = begins and not self._is_flash(number)
+        ends_shot = ends and not self._is_flash(number + 1)
+        holdout = None if motion is None else self._holdout
+        return Known(motion, depth, begins, ends, begins_shot, ends_shot, holdout)
 
     def _load(self, number: int) -> np.ndarray | None:
         if not self._same_shot(self._anchor, number):
@@ -130,11 +142,19 @@ class _Finder:
 class MotionMaker:
     """Makes the motion of the pictures that are wanted, the first of them first.
 
-    `how`: where motion comes from, in words. `problem`: why there will be no more.
+    `masks`: what stays sharp (see io/video_masks.py), found before the first motion. `how`: where
+    motion comes from, in words. `problem`: why there will be no more.
     """
 
-    def __init__(self, path: Path, max_mb: float, settings: FlowSettings, device: wgpu.GPUDevice):
-        self._path, self._max_mb = path, max_mb
+    def __init__(
+        self,
+        path: Path,
+        max_mb: float,
+        settings: FlowSettings,
+        device: wgpu.GPUDevice,
+        masks: tuple[str, ...] = (),
+    ):
+        self._path, self._max_mb, self._masks = path, max_mb, masks
         beside = gpu.second_device(device)
         motion, self.how = settings.source(beside)
         self.problem = ""
@@ -175,7 +195,8 @@ class MotionMaker:
 
     def _work(self, device: wgpu.GPUDevice, motion: MotionSource | None) -> None:
         try:
-            find = _Finder(Footage(self._path, max_mb=self._max_mb), device, motion)
+            footage = Footage(self._path, max_mb=self._max_mb)
+            find = _Finder(footage, device, motion, self._masks)
             for number in self._to_do():
                 known = find(number)
                 with self._lock:

@@ -22,11 +22,11 @@ from ..settings import (
     rate_of,
 )
 from ..settings_toml import parse
-from ..video_settings import FlowSettings
+from ..video_settings import FlowSettings, VideoSettings
 
 GROUPS = (
     BlurSettings, ShutterSettings, SceneSettings, OutputSettings, InputSettings, ColorSettings,
-    FlowSettings,
+    VideoSettings,
 )  # fmt: skip
 INPUTS = frozenset({*(f.name for f in fields(InputSettings)), "holdout", "scale"})
 """Options that say what frames on disk hold."""
@@ -74,7 +74,7 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
     known = _hints(*GROUPS) | {"fps": str | float}
     own = {f.name for f in fields(state)} & known.keys() - set(VIEW)
     own -= set() if on_disk else FLOW
-    allowed = own | {"set", *METHOD_OPTIONS} | (INPUTS if on_disk else set())
+    allowed = own | {"set", *METHOD_OPTIONS} | (INPUTS | {"speed"} if on_disk else set())
     allowed |= COLORS if on_disk else COLORS - {"from_"}
     found: dict[str, Any] = {}
     pairs: dict[str, list] = {"settings": [], "options": [], "given": [], "color": []}
@@ -83,7 +83,9 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
         if name not in allowed or word == "from_":
             raise InputError(f"settings: unknown name {word!r}")
         fit = typed(name, value, known[name])
-        if name == "set":
+        if name == "speed":  # of the output; in [view] it is that of the playing
+            found["pace"] = fit
+        elif name == "set":
             pairs["settings"] = [_setting(text) for text in fit]
         elif name in own:
             found[name] = float(rate_of(str(fit))) if name == "fps" else fit

@@ -16,6 +16,7 @@ from ..ocio import installed
 from ..pipeline import SAMPLES
 from ..scene import builtin
 from ..shutter import CURVES, PHASES, ROLLING
+from ..video_settings import VideoSettings
 from .renderer import shutter_of
 from .state import BOTH_EYES, COMPARE, FLOWS, QUALITIES, REFERENCE, TONES, State
 from .theme import ACCENT, COLORS, DIM, packed
@@ -43,6 +44,7 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
             state = replace(state, flow=ui.combo("flow", state.flow, FLOWS))
             quality = ui.combo("quality", state.flow_quality, QUALITIES)
             state = replace(state, flow_quality=quality)
+            return replace(state, pace=ui.text("output speed", state.pace, _pace))
         return state
     known = inspect.signature(builtin.SCENES[state.source]).parameters
     defaults = {name: parameter.default for name, parameter in known.items()}
@@ -58,6 +60,11 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
         if ui.button("reset", 46):
             state = state.unmoved()
     return state
+
+
+def _pace(text: str) -> None:
+    """InputError if that is no speed of a video's output."""
+    _ = VideoSettings(speed=text).pace
 
 
 def _parameter(ui: Widgets, name: str, value, default):

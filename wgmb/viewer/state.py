@@ -24,6 +24,7 @@ from ..methods import METHODS
 from ..scene import builtin
 from ..settings import METHOD_OPTIONS, ShutterSettings
 from ..settings_toml import text_of
+from ..video_settings import VideoSettings
 from . import saved
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
@@ -60,6 +61,8 @@ class State:
     flow: str = "auto"
     """Of a video: where motion comes from (FlowSettings)."""
     flow_quality: str = "best"
+    pace: str = "1"
+    """Of a video: the speed of the output, such as "0.5" for slow motion."""
 
     method: str = "gather"
     samples: int | str | None = None
@@ -108,6 +111,11 @@ class State:
     def rate(self) -> float:
         """Frames a second that are played at full speed."""
         return float(_video(self.source)[1]) if self.is_video else self.fps
+
+    @property
+    def tempo(self) -> float:
+        """Seconds of a video that pass in a second of the output; InputError if there is none."""
+        return float(VideoSettings(speed=self.pace).pace)
 
     @property
     def sampling(self) -> int | str | None:
@@ -164,6 +172,7 @@ class State:
             raise InputError(f"no such file or scene: {source!r}; scenes: {known}")
         color = _changed(self.color, "from_", None)
         state = replace(self.unmoved(), source=source, settings=(), given=(), color=color)
+        state = replace(state, pace="1")
         before, after = self.suited(), state.suited()
         for name, value in after.items():  # what was as the last scene asks for follows the new one
             if getattr(self, name) == before[name]:
@@ -258,7 +267,7 @@ class State:
             **dict(self.color),
         }
         if self.is_video:
-            look |= {"flow": self.flow, "flow_quality": self.flow_quality}
+            look |= {"flow": self.flow, "flow_quality": self.flow_quality, "speed": self.pace}
             if self.fps == self.rate:
                 del look["fps"]
         if not self.is_scene:
@@ -339,6 +348,7 @@ class State:
         if "fps" not in given and state.is_video:
             state = replace(state, fps=state.rate)
         Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
+        _ = state.tempo
         for name, value, known in (
             ("method", state.method, METHODS),
             ("compare", state.compare, COMPARE),
