@@ -69,9 +69,10 @@ def device():
 class Stages:
     """All that the passes of one kind of light wrote."""
 
-    def __init__(self, device, pulled):
+    def __init__(self, device, pulled, whole=None):
         pool, light = TexturePool(device), MovingLight(device)
-        whole = around(glossy=pulled)
+        whole = whole or around(glossy=pulled)
+        self.pulled = pulled
         assert whole.prev is not None and whole.next is not None
         self.frames, seen = {}, {}
         for offset, frame in ((0, whole), (-1, whole.prev), (1, whole.next)):
@@ -119,9 +120,7 @@ class Stages:
 
 @pytest.fixture(scope="module", params=[False, True], ids=["shadows", "reflections"])
 def stages(request, device):
-    made = Stages(device, request.param)
-    made.pulled = request.param
-    return made
+    return Stages(device, request.param)
 
 
 def test_what_changes_is_its_twin(stages, close):
@@ -201,27 +200,34 @@ def test_trust_is_its_twin(stages, close):
             close(stages[f"explained {side}"][..., :2], want, 2e-3)
 
 
+def change_by_twin(stages, time):
+    """The change of light at a node, and how sure it is."""
+    own, side, share = stages["values 0"], -1 if time < 0 else 1, abs(time)
+    before, after = (stages[f"changes {i}"][..., :3] for i in (-1, 1))
+    other = stages[f"values {side}"]
+    flows = [stages[f"flow {name} {side}"] for name in ("ahead", "back")]
+    trusts = [flow[..., 2] for flow in flows]
+    if stages.pulled:
+        change, trusted = twin.pulled(
+            own[..., :3], other[..., :3], [f[..., :2] for f in flows], trusts, share
+        )
+    else:
+        a = twin.pushed(own, flows[0][..., :2], trusts[0], share)
+        b = twin.pushed(other, flows[1][..., :2], trusts[1], 1 - share)
+        guard = stages[f"explained {side}"]
+        change, trusted = twin.from_pushed(a, b, own, other, trusts, guard, share)
+    sure = twin.sure(own, other, flows, trusted, stages.pulled)
+    return twin.clamped(change, before, after), sure
+
+
 def test_what_is_added_is_its_twin(stages, close):
     before, after = (stages[f"changes {side}"][..., :3] for side in (-1, 1))
-    here, own = stages.frames[0], stages["values 0"]
+    here = stages.frames[0]
     moved = 0.0
     for i, time in enumerate(stages.times):
-        side = -1 if time < 0 else 1
-        other, share = stages[f"values {side}"], abs(time)
-        flows = [stages[f"flow {name} {side}"] for name in ("ahead", "back")]
-        trusts = [flow[..., 2] for flow in flows]
-        if stages.pulled:
-            change = twin.pulled(
-                own[..., :3], other[..., :3], [f[..., :2] for f in flows], trusts, share
-            )
-        else:
-            a = twin.pushed(own, flows[0][..., :2], trusts[0], share)
-            b = twin.pushed(other, flows[1][..., :2], trusts[1], 1 - share)
-            guard = stages[f"explained {side}"]
-            change = twin.from_pushed(a, b, own[..., :3], other[..., :3], trusts, guard, share)
-        change = twin.clamped(change, before, after)
+        change, sure = change_by_twin(stages, time)
         want = twin.added(change, here["light"], stages.albedo, stages.pulled)
-        close(stages.layer(i)[..., :3], want, 2e-2)
+        close(stages.layer(i), np.dstack([want, sure]), 2e-2)
         moved = max(moved, np.abs(want).max())
     assert moved > 0.1
     for i, change in enumerate((before, after)):
@@ -323,8 +329,55 @@ def test_wrong_light_is_no_light():
     assert np.isfinite(got).all() and got.min() >= 0 and got.max() < 3
 
 
-def test_confidence_is_without_light():
-    frame = around()
+def accepted(frame, shading="auto", **how):
+    return Blur("gather", shading=shading, **how).with_confidence(frame)[1]["accepted"]
+
+
+def flash(pan=(0.0, 0.0), glossy=False):
+    """A spot of shadow in the middle one of three frames alone, where light rests otherwise."""
+    lit = around(pan=pan, glossy=glossy, still=True)
+    x, y = twin.centres(SIZE)
+    spot = 1 - 0.8 / (1 + np.exp(2 * (np.hypot(x - 52, y - 30) - 5)))[..., None]
+    name = "glossy_light" if glossy else "diffuse_light"
+    light = (getattr(lit, name) * spot).astype("f4")
+    dark = replace(lit, color=(lit.color * spot).astype("f4"), **{name: light})
+    return dark.between(lit.prev, lit.next), spot[..., 0] < 0.6
+
+
+@pytest.mark.parametrize("pulled", [False, True], ids=["shadows", "reflections"])
+def test_what_is_not_followed_is_as_sure_as_its_twin(device, close, pulled):
+    stages = Stages(device, pulled, flash(glossy=pulled)[0])
+    for i, time in enumerate(stages.times):
+        _, sure = change_by_twin(stages, time)
+        close(stages.layer(i)[..., 3], sure, 2e-2)
+        assert sure.min() < 0.1 < 0.8 < np.mean(sure > 0.95)
+
+
+@pytest.mark.parametrize("glossy", [False, True], ids=["shadow", "reflection"])
+@pytest.mark.parametrize("pan", [(0.0, 0.0), PAN], ids=["still", "pan"])
+def test_confidence_tells_where_light_could_not_be_followed(pan, glossy):
+    moving = around(pan=pan, glossy=glossy)
+    lost, changes = flash(pan, glossy)
+    for frame in (moving, lost):
+        assert accepted(frame, "off")[8:-8, 8:-8].min() > 0.999
+    sure = accepted(lost)
+    assert sure[changes].mean() < 0.3
+    assert sure[8:-8, 8:35].min() > 0.99  # nothing changes there
+    assert accepted(moving)[17:33, 26:42].mean() > (0.5 if glossy else 0.8)  # followed
+
+
+def test_confidence_tells_of_a_side_without_a_neighbour():
+    frame = around(pan=(0, 0))
+    alone = frame.between(None, frame.next)
+    after, before = (accepted(alone, shutter=Shutter(180, at)) for at in ("start", "end"))
+    changes = np.abs(scene(1, (0, 0)).diffuse_light - frame.diffuse_light).max(2)
+    assert after[changes > 0.3].mean() > 0.8
+    assert before[changes > 0.3].max() < 0.2
+    assert before[changes == 0].min() > 0.99
+
+
+def test_confidence_of_light_that_rests_changes_no_bit():
+    frame = around(still=True)
     with_, without = (Blur("gather", shading=s).with_confidence(frame)[1] for s in ("auto", "off"))
     for name in with_:
         np.testing.assert_array_equal(with_[name], without[name])

@@ -278,7 +278,12 @@ def smooth(x, half):
 
 
 def from_pushed(a, b, own, other, trusts, guard, time):
-    """The change of the logarithm of light, from what came from here (a) and from there (b)."""
+    """The change of the logarithm of light, from what came from here (a) and from there (b).
+
+    Beside it, the share of the darkness of both frames (own, other: with how much) that is trusted.
+    """
+    amounts = own[..., 3], other[..., 3]
+    own, other = own[..., :3], other[..., :3]
     late = smooth(time, 0.3)
     n = (1 - late) * np.minimum(a[..., 3], 1) + late * np.minimum(b[..., 3], 1)
     mean = sum(
@@ -293,11 +298,12 @@ def from_pushed(a, b, own, other, trusts, guard, time):
     ] * other
     share = np.clip((0.85 - guard[..., 0] / np.maximum(guard[..., 1], 1e-4)) / 0.25, 0, 1)
     dark_ = np.log(np.maximum(1 - moved - rests, 0.005)) - np.log(np.maximum(1 - own, 0.005))
-    return share[..., None] * dark_
+    trusted = sum(t * n for t, n in zip(trusts, amounts, strict=True))
+    return share[..., None] * dark_, share * trusted / np.maximum(sum(amounts), 1e-3)
 
 
 def pulled(own, other, flows, trusts, time):
-    """The change of the logarithm of light that has come along both flows."""
+    """The change of the logarithm of light that has come along both flows, and how sure it is."""
     x, y = centres(own.shape[:2])
     places = []
     for (flow, trusted), part in zip(
@@ -315,7 +321,8 @@ def pulled(own, other, flows, trusts, time):
         for share, level, (at, _) in zip(shares, (own, other), places, strict=True)
     )
     total = shares[0] + shares[1]
-    return come * (np.minimum(total / 0.3, 1) / np.maximum(total, 1e-3))[..., None]
+    trusted = np.minimum(total / 0.3, 1)
+    return come * (trusted / np.maximum(total, 1e-3))[..., None], trusted
 
 
 def clamped(change, before, after):
@@ -325,6 +332,26 @@ def clamped(change, before, after):
     low = np.min([shifted(low, *by) for by in near], 0)
     high = np.max([shifted(high, *by) for by in near], 0)
     return np.clip(change, low, high)
+
+
+def sure(own, other, flows, trusted, pulled=False):
+    """How sure light is: the share of its change that flow explains, as far as it is trusted."""
+
+    def levels(found):
+        return found[..., :3] if pulled else np.log(np.maximum(1 - found[..., :3], 0.005))
+
+    def unlike(a, b):
+        return np.abs(levels(a) - levels(b)).max(2)
+
+    x, y = centres(own.shape[:2])
+    ahead, back = ((x + flow[..., 0], y + flow[..., 1]) for flow in flows)
+    missed = np.maximum(
+        unlike(sampled(other, *ahead), own),
+        unlike(sampled(own, *back), other),
+    )
+    differs = unlike(own, other)
+    explains = 1 - np.minimum(missed / np.maximum(differs, 0.1), 1)
+    return 1 - np.minimum(differs / 0.1, 1) * (1 - trusted * explains)
 
 
 def added(change, light, albedo, pulled=False):

@@ -29,8 +29,8 @@ class Gather:
     colours. The nearest sample is visible, the frame's own unless a neighbouring frame's is clearly
     nearer; what all frames hide is filled from the surfaces around and behind.
     `show`: "confidence" gives, instead of colour, the share of times at which a sample was
-    accepted, the share that neighbouring frames gave (backgrounds included), the mean residual [px]
-    and the share of times whose path left the picture, as r, g, b, a.
+    accepted and its light followed, the share that neighbouring frames gave (backgrounds included),
+    the mean residual [px] and the share of times whose path left the picture, as r, g, b, a.
 
     `shading`: light that moves over surfaces, as shadows and reflections do, is followed too, where
     the passes of light of the frame and of a neighbour tell it from what it falls on (see
@@ -66,7 +66,7 @@ class Gather:
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
         images, confidence = TexturePool(device), options.show == "confidence"
-        self._shading: Shading = "off" if confidence else options.shading
+        self._shading: Shading = options.shading
         if self._shading in ("off", "frames"):
             self.uses = frozenset({"neighbours"})
         self._light = MovingLight(device)

@@ -12,7 +12,7 @@ struct LightNodes {
 
 @group(1) @binding(9) var linear: sampler;
 @group(1) @binding(12) var<uniform> light_nodes: LightNodes;
-@group(1) @binding(13) var added_light: texture_2d_array<f32>;  // premultiplied by weight; a of the last two layers: seen there
+@group(1) @binding(13) var added_light: texture_2d_array<f32>;  // premultiplied by weight; a: how sure it is; of the last two layers: seen there
 
 override MOVING_LIGHT: bool = false;    // whether there is any
 
@@ -28,7 +28,7 @@ fn sample_duration(times: SampleTimes, i: u32) -> f32 {
 
 /// For a sample `at` [px] of a layer, around the time `t`, for as long as `duration`.
 fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
-    if layer == 0u { return vec4f(light_during(at, t, duration), 0.0); }
+    if layer == 0u { return vec4f(light_during(at, t, duration).rgb, 0.0); }
     let f = layer / 2u;
     let offset = offset_of(min(f, 2u));
     let surface = textureLoad(surfaces, vec2i(floor(at)), min(layer, 5u), 0);
@@ -38,12 +38,22 @@ fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
     let node = light_nodes.count + select(0u, 1u, offset > 0.0);
     let there = textureSampleLevel(added_light, linear, here / vec2f(frame.size), node, 0.0);
     let same = layer % 2u == 0u && layer < 6u && is_inside(here) && dot(back, back) < SAME_SURFACE * SAME_SURFACE;
-    let change = light_during(here, t, duration) - there.rgb;
+    let change = light_during(here, t, duration).rgb - there.rgb;
     return vec4f(select(vec3f(0.0), there.a * change, same), 0.0);
 }
 
-/// What is added on a place of this frame [px]: the mean over a time.
-fn light_during(at: vec2f, t: f32, duration: f32) -> vec3f {
+/// How far the light of such a sample is not known, from 0 to 1.
+fn light_unknown(at: vec2f, layer: u32, t: f32, duration: f32) -> f32 {
+    var here = at;
+    if layer > 0u {
+        let surface = textureLoad(surfaces, vec2i(floor(at)), min(layer, 5u), 0);
+        here += displacement5(unpack_trajectory(surface), -offset_of(min(layer / 2u, 2u)));
+    }
+    return select(0.0, 1.0 - light_during(here, t, duration).a, is_inside(here));
+}
+
+/// What is added on a place of this frame [px]: the mean over a time. a: how sure it is.
+fn light_during(at: vec2f, t: f32, duration: f32) -> vec4f {
     let uv = at / vec2f(frame.size);
     let last = f32(light_nodes.count) - 1.0;
     let half = max(0.5 * duration / light_nodes.step, 0.5);
@@ -51,12 +61,12 @@ fn light_during(at: vec2f, t: f32, duration: f32) -> vec3f {
     // A node stands for half a step to either side.
     let first = clamp(ceil(u - half - 0.5), 0.0, last);
     let count = i32(clamp(ceil(2.0 * half), 1.0, last + 1.0)) + 1;
-    var sum = vec3f(0.0);
+    var sum = vec4f(0.0);
     var total = 0.0;
     for (var k = 0; k < count; k++) {
         let node = first + f32(k);
         let share = max(min(node + 0.5, u + half) - max(node - 0.5, u - half), 0.0);
-        sum += share * textureSampleLevel(added_light, linear, uv, u32(min(node, last)), 0.0).rgb;
+        sum += share * textureSampleLevel(added_light, linear, uv, u32(min(node, last)), 0.0);
         total += share;
     }
     return sum / max(total, 1e-6);

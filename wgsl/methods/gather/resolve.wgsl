@@ -102,7 +102,11 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
                 var color = resampled(x - found.d, front, true);
                 if MOVING_LIGHT { color += moving_light(x - found.d, 0u, t, duration_in(times, first, todo)); }
                 let residual = min(sqrt(found.residual2), HALF_MAX);    // a wild motion may end it anywhere
-                add(&sum, Composite(color, counts, 1.0, residual, 0.0), share);
+                var one = Composite(color, counts, 1.0, residual, 0.0, 0.0);
+                if CONFIDENCE && MOVING_LIGHT {
+                    one.unlit = light_unknown(x - found.d, 0u, t, duration_in(times, first, todo));
+                }
+                add(&sum, one, share);
                 accepted += 1.0;
             }
             if !is_even { single &= ~(1u << firstTrailingBit(todo)); }
@@ -154,7 +158,8 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     if is_static || sum.weight <= 0.0 { result = static_color(id); }
     if CONFIDENCE {
         let share_accepted = max(accepted * share, 1e-9);
-        result = vec4f(accepted * share, sum.neighbours, sum.residual / share_accepted, left_image * share);
+        if is_static { sum.unlit = static_unlit(id); }
+        result = vec4f(max(accepted * share - sum.unlit, 0.0), sum.neighbours, sum.residual / share_accepted, left_image * share);
     }
     textureStore(output, id, result);
 }
@@ -166,7 +171,7 @@ fn copy_static(@builtin(local_invocation_index) local: u32, @builtin(workgroup_i
     let id = pixel_in_strip(worklist.cells[k], group, local);
     if k >= worklist.count || any(id >= frame.size) { return; }
     var result = static_color(id);
-    if CONFIDENCE { result = vec4f(1.0, 0.0, 0.0, 0.0); }
+    if CONFIDENCE { result = vec4f(1.0 - static_unlit(id), 0.0, 0.0, 0.0); }
     textureStore(output, id, result);
 }
 
@@ -190,6 +195,18 @@ fn lit_color(px: vec2u) -> vec4f {
         sum += share * moving_light(x, 0u, shutter_time(times, i), sample_duration(times, i));
     }
     return max(color + sum, vec4f(0.0));
+}
+
+/// Of the frame's own pixel, the share of the exposure in which its light is not known.
+fn static_unlit(px: vec2u) -> f32 {
+    if !MOVING_LIGHT { return 0.0; }
+    let x = vec2f(px) + 0.5;
+    let times = shutter_times(x, 0.0);
+    var sum = 0.0;
+    for (var i = 0u; i < times.count; i++) {
+        sum += light_unknown(x, 0u, shutter_time(times, i), sample_duration(times, i)) / f32(times.count);
+    }
+    return sum;
 }
 
 /// Time of the lowest set bit of a word whose bit 0 is sample `first`.
@@ -376,7 +393,7 @@ fn is_before(a: Sample, b: Sample) -> bool {
 fn tap(p: vec2f) -> Composite {
     var counts = 1.0;
     if WEIGHTED { counts = textureSampleLevel(own_weight, linear, p / vec2f(frame.size), 0.0).x; }
-    return Composite(textureSampleLevel(own_color, linear, p / vec2f(frame.size), 0.0), counts, 1.0, 0.0, 0.0);
+    return Composite(textureSampleLevel(own_color, linear, p / vec2f(frame.size), 0.0), counts, 1.0, 0.0, 0.0, 0.0);
 }
 
 /// Add what is hidden behind the pixel in all frames: the nearest surfaces behind its own, in FILL_DIRECTIONS
@@ -398,7 +415,7 @@ fn add_hidden(sum: ptr<function, Composite>, id: vec2u, share: f32) {
             if is_there && is_behind {
                 let part = 1.0 / (distance * distance);
                 let counts = textureLoad(mattes, px, 0, 0).w;
-                add(&filled, Composite(textureLoad(layer_colors, px, 0, 0), counts, 1.0, 0.0, 0.0), part);
+                add(&filled, Composite(textureLoad(layer_colors, px, 0, 0), counts, 1.0, 0.0, 0.0, 0.0), part);
                 step = FILL_STEPS;
             }
             distance *= FILL_GROWTH;
@@ -425,6 +442,7 @@ struct Composite {
     coverage: f32,
     residual: f32,      // distance from the pixel of what is composited, times its coverage [px]
     neighbours: f32,    // the part of the coverage that neighbouring frames gave
+    unlit: f32,         // the part whose light moves and is not known
 }
 
 fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
@@ -433,6 +451,7 @@ fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
     (*sum).coverage += share * one.coverage;
     (*sum).residual += share * one.residual;
     (*sum).neighbours += share * one.neighbours;
+    (*sum).unlit += share * one.unlit;
 }
 
 /// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then what is opaque.
@@ -471,6 +490,9 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite
             from_around = (textureLoad(surfaces, nearest_pixel(part.at), 1, 0).w & AROUND) != 0u;
         }
         one.neighbours = select(0.0, one.coverage, from_around);
+        if CONFIDENCE && MOVING_LIGHT && n < parts {
+            one.unlit = one.coverage * light_unknown(part.at, part.layer, t, duration);
+        }
         add(&sum, one, 1.0 - sum.coverage);
         n++;
         if n >= parts { break; }
@@ -481,7 +503,8 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite
         let neighbours = select(0.0, 1.0, visible.opaque.layer > 1u);
         var color = resampled(at, layer, visible.opaque.layer == 0u);
         if MOVING_LIGHT { color += moving_light(at, visible.opaque.layer, t, duration); }
-        let one = Composite(color, counts, 1.0, sqrt(visible.opaque.residual2), neighbours);
+        var one = Composite(color, counts, 1.0, sqrt(visible.opaque.residual2), neighbours, 0.0);
+        if CONFIDENCE && MOVING_LIGHT { one.unlit = light_unknown(at, layer, t, duration); }
         add(&sum, one, 1.0 - sum.coverage);
     }
     return sum;

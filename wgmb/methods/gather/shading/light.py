@@ -56,6 +56,9 @@ class Kind:
 class Added:
     """What is added: a layer a node, then one for the previous frame and one for the next one.
 
+    The alpha of a node says how sure its light is, from 0 to 1; that of a neighbour, whether the
+    surface is seen there.
+
     `found`: a buffer whose first word is 1 if light changes anywhere; if not, the layers are
     undefined. The others are of tiles, see active.wgsl.
     """
@@ -132,7 +135,7 @@ class MovingLight:
             side, share = (-1 if time < 0 else 1), min(abs(time), 1.0)
             entry = "main" if i < times.count else "add_neighbour"
             if side not in changed:
-                entry = "add_nothing"
+                entry = "rest" if i < times.count else "add_nothing"
             way = flows.get(side, Flow(none, none, none))
             there = present.get(side, none)
             if entry == "main" and not kind.pulled:

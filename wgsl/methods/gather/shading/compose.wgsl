@@ -24,7 +24,7 @@ struct Node {
 @group(1) @binding(13) var<storage, read_write> from_here: array<u32>;   // see push.wgsl
 @group(1) @binding(14) var<storage, read_write> from_there: array<u32>;
 @group(1) @binding(15) var<storage, read> found: array<u32>;    // one word, then those of tiles: see gain.wgsl
-@group(1) @binding(16) var added: Added;                // [linear, premultiplied by weight]; a: 1
+@group(1) @binding(16) var added: Added;                // [linear, premultiplied by weight]; a: how sure it is, 0 to 1
 
 alias Added = texture_storage_2d<rgba16float, write>;
 
@@ -34,6 +34,7 @@ override ONTO: bool = false;        // add to `earlier`
 
 const LEAST_LIGHT: f32 = 0.005;     // share of the light that the darkest shadow leaves
 const MOST_ADDED: f32 = 60000.0;    // [linear]
+const COUNTS: f32 = 0.1;            // change of the logarithm of light from which on it has to be followed
 
 /// A smooth step from 0.5 - half to 0.5 + half.
 fn step_around(x: f32, half: f32) -> f32 {
@@ -44,14 +45,14 @@ fn step_around(x: f32, half: f32) -> f32 {
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let px = vec2i(id.xy);
-    var change = vec3f(0.0);
+    var change = vec4f(0.0, 0.0, 0.0, 1.0);
     if found[1u + light_tile(id.xy)] == 1u { change = moved(px); }
-    store(px, change, 1.0);
+    store(px, change.rgb, as_sure_as(px, change.a));
 }
 
-/// The change of the logarithm of light: no more than a frame showed around.
-fn moved(px: vec2i) -> vec3f {
-    var change = vec3f(0.0);
+/// The change of the logarithm of light: no more than a frame showed around; a: how sure it is, 1 where nothing changes.
+fn moved(px: vec2i) -> vec4f {
+    var change = vec4f(0.0);
     if PULLED { change = pulled(px); } else { change = pushed(px); }
     var low = vec3f(0.0);
     var high = vec3f(0.0);
@@ -62,7 +63,38 @@ fn moved(px: vec2i) -> vec3f {
         low = min(low, min(a, b));
         high = max(high, max(a, b));
     }
-    return clamp(change, low, high);
+    return vec4f(clamp(change.rgb, low, high), sure(px, change.a));
+}
+
+/// How sure the light is, as far as its flow is `trusted`: the share of the change between both frames that the flow
+/// explains, either way. 1 where nothing changes.
+fn sure(px: vec2i, trusted: f32) -> f32 {
+    let x = vec2f(px) + 0.5;
+    let scale = 1.0 / vec2f(frame.size);
+    let ahead = (x + textureLoad(flow, px, 0).xy) * scale;
+    let back = (x + textureLoad(flow_back, px, 0).xy) * scale;
+    let here = levels(textureLoad(values, px, 0));
+    let there = levels(textureLoad(values_there, px, 0));
+    let differs = most_of(there - here);
+    let missed = max(most_of(levels(textureSampleLevel(values_there, linear, ahead, 0.0)) - here),
+                     most_of(levels(textureSampleLevel(values, linear, back, 0.0)) - there));
+    let explains = 1.0 - min(missed / max(differs, COUNTS), 1.0);
+    return 1.0 - min(differs / COUNTS, 1.0) * (1.0 - trusted * explains);
+}
+
+/// Values as logarithms of light.
+fn levels(value: vec4f) -> vec3f {
+    return select(log(max(1.0 - value.rgb, vec3f(LEAST_LIGHT))), value.rgb, vec3<bool>(PULLED));
+}
+
+fn most_of(change: vec3f) -> f32 {
+    return max(abs(change.r), max(abs(change.g), abs(change.b)));
+}
+
+/// Of several kinds of light, the least sure one.
+fn as_sure_as(px: vec2i, sure: f32) -> f32 {
+    if !ONTO { return sure; }
+    return min(sure, textureLoad(earlier, px, 0).a);
 }
 
 /// What a neighbouring frame's own light adds, at the share 1 of the way to it; a: whether the surface is seen there.
@@ -73,6 +105,15 @@ fn add_neighbour(@builtin(global_invocation_id) id: vec3u) {
     store(vec2i(id.xy), change.rgb, change.a);
 }
 
+/// At a time on whose side there is no neighbour, light rests. It is not known where it changes on the other side.
+@compute @workgroup_size(WG_X, WG_Y)
+fn rest(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let px = vec2i(id.xy);
+    let change = max(most_of(textureLoad(before, px, 0).rgb), most_of(textureLoad(after, px, 0).rgb));
+    store(px, vec3f(0.0), as_sure_as(px, 1.0 - min(change / COUNTS, 1.0)));
+}
+
 /// Nothing: there is no neighbour on that side.
 @compute @workgroup_size(WG_X, WG_Y)
 fn add_nothing(@builtin(global_invocation_id) id: vec3u) {
@@ -80,7 +121,7 @@ fn add_nothing(@builtin(global_invocation_id) id: vec3u) {
     store(vec2i(id.xy), vec3f(0.0), 0.0);
 }
 
-fn store(px: vec2i, change: vec3f, seen: f32) {
+fn store(px: vec2i, change: vec3f, a: f32) {
     var surface = vec3f(1.0);
     if HAS_ALBEDO { surface = valid_light(textureLoad(albedo, px, 0)); }
     var counts = 1.0;
@@ -88,11 +129,12 @@ fn store(px: vec2i, change: vec3f, seen: f32) {
     let light = valid_light(textureLoad(light_here, px, 0)) + dark();
     var result = counts * surface * light * (exp(change) - 1.0);
     if ONTO { result += textureLoad(earlier, px, 0).rgb; }
-    textureStore(added, px, vec4f(clamp(result, vec3f(-MOST_ADDED), vec3f(MOST_ADDED)), seen));
+    textureStore(added, px, vec4f(clamp(result, vec3f(-MOST_ADDED), vec3f(MOST_ADDED)), a));
 }
 
-/// Darkness as it was pushed here from both frames, and what rests; as a change of the logarithm of light.
-fn pushed(px: vec2i) -> vec3f {
+/// Darkness as it was pushed here from both frames, and what rests; as a change of the logarithm of light. a: the share of
+/// both frames' darkness here whose flow is trusted.
+fn pushed(px: vec2i) -> vec4f {
     let first = 2u * (u32(px.y) * frame.size.x + u32(px.x));
     let a = unpack_pushed(from_here[first], from_here[first + 1u]);
     let b = unpack_pushed(from_there[first], from_there[first + 1u]);
@@ -100,22 +142,26 @@ fn pushed(px: vec2i) -> vec3f {
         from_here[first + k] = 0u;
         from_there[first + k] = 0u;
     }
-    let own = textureLoad(values, px, 0).rgb;
-    let other = textureLoad(values_there, px, 0).rgb;
+    let value = textureLoad(values, px, 0);
+    let value_there = textureLoad(values_there, px, 0);
+    let own = value.rgb;
+    let other = value_there.rgb;
+    let trusts = vec2f(textureLoad(flow, px, 0).z, textureLoad(flow_back, px, 0).z);
     let shares = vec2f(1.0 - step_around(node.time, 0.3), step_around(node.time, 0.3));
     let covered = shares * min(vec2f(a.w, b.w), vec2f(1.0));
     let mixed = (shares.x * a.rgb / max(a.w, 1.0) + shares.y * b.rgb / max(b.w, 1.0))
         / max(covered.x + covered.y, 1e-3) * min(max(a.w, b.w), 1.0);
     let late = step_around(node.time, 0.2);
-    let rests = (1.0 - late) * (1.0 - textureLoad(flow, px, 0).z) * own
-        + late * (1.0 - textureLoad(flow_back, px, 0).z) * other;
+    let rests = (1.0 - late) * (1.0 - trusts.x) * own + late * (1.0 - trusts.y) * other;
     let differs = textureLoad(explained, px, 0);
     let guard = clamp((0.85 - differs.x / max(differs.y, 1e-4)) / 0.25, 0.0, 1.0);
-    return guard * (log(max(1.0 - mixed - rests, vec3f(LEAST_LIGHT))) - log(max(1.0 - own, vec3f(LEAST_LIGHT))));
+    let change = log(max(1.0 - mixed - rests, vec3f(LEAST_LIGHT))) - log(max(1.0 - own, vec3f(LEAST_LIGHT)));
+    let trusted = dot(trusts, vec2f(value.a, value_there.a)) / max(value.a + value_there.a, 1e-3);
+    return guard * vec4f(change, trusted);
 }
 
-/// The light that has come here by then along both flows; as a change of its logarithm.
-fn pulled(px: vec2i) -> vec3f {
+/// The light that has come here by then along both flows; as a change of its logarithm. a: how far it is trusted.
+fn pulled(px: vec2i) -> vec4f {
     let x = vec2f(px) + 0.5;
     let scale = 1.0 / vec2f(frame.size);
     var ahead = textureLoad(flow, px, 0).xyz;
@@ -133,5 +179,6 @@ fn pulled(px: vec2i) -> vec3f {
     let come = shares.x * (textureSampleLevel(values, linear, at, 0.0).rgb - level)
         + shares.y * (textureSampleLevel(values_there, linear, at_there, 0.0).rgb - level);
     let total = shares.x + shares.y;
-    return come / max(total, 1e-3) * min(total / 0.3, 1.0);
+    let trusted = min(total / 0.3, 1.0);
+    return vec4f(come / max(total, 1e-3) * trusted, trusted);
 }
