@@ -208,6 +208,23 @@ def test_an_interruption_while_modules_are_loaded_is_one_line_and_130(start, num
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "wgmb: interrupted\n")
 
 
+def test_an_interruption_within_the_execution_of_a_text_ends_with_130(tmp_path):
+    """As where a dataclass is made; `python -m` itself would end by SIGINT."""
+    (tmp_path / "within.py").write_text("""
+import os, signal, time
+from wgmb.cli import app
+KILL = "os.kill(os.getpid(), signal.SIGTERM); time.sleep(9)"
+app.make_app = lambda *_: exec(KILL)
+app.run(["info"])
+""")
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "within"]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=env, capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "wgmb: interrupted\n")
+
+
 def test_the_command_of_the_package_hears_interruptions_first():
     assert '\nwgmb = "wgmb.__main__:main"\n' in (ROOT / "pyproject.toml").read_text()
 

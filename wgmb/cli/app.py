@@ -5,6 +5,7 @@ The module of a command is loaded on first use.
 
 from __future__ import annotations
 
+import atexit
 import logging
 import os
 import re
@@ -153,8 +154,21 @@ def _say_why(text: str, code: int) -> int:
 def run(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     sys.unraisablehook = terminal.hush
+    codes: list[int] = []
+    atexit.register(_insist, codes)  # before all others, so it is called after them
     code = main(arguments)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     terminal.drop_streams()
+    codes.append(code)
     sys.exit(code)
+
+
+def _insist(codes: list[int]) -> None:
+    """End an interrupted process with its exit code.
+
+    Where the interruption was raised within `exec()` of a text, as dataclasses use it, `python -m`
+    would end the process by SIGINT, although the exception was caught.
+    """
+    if codes == [INTERRUPTED]:
+        os._exit(INTERRUPTED)
