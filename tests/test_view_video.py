@@ -11,12 +11,15 @@ import make_clips as clips
 import make_frames as make
 from wgmb import Blur, InputError, Shutter, gpu
 from wgmb.cli.app import main
+from wgmb.coding import BT2020, HLG, PQ
+from wgmb.color import srgb
 from wgmb.flow.dis import Dis
 from wgmb.gpu.textures import TexturePool
 from wgmb.io import stills
 from wgmb.io.clock import Clock
 from wgmb.io.footage import Footage
 from wgmb.io.video_masks import holdout_of
+from wgmb.primaries import REC709, REC2020, conversion
 from wgmb.video_batch import FootageBlur, moments
 from wgmb.video_pictures import VideoPictures
 from wgmb.viewer import State, controls, motion_maker, offscreen
@@ -270,3 +273,37 @@ def test_pictures_are_found_in_any_order(clip):
     for number in (3, 4, 5, 9, 2, 2, 13, 0, 12):
         np.testing.assert_array_equal(pictures.at(number), want[number])
     assert pictures.at(14) is None
+
+
+def wide(path, transfer):
+    """A 10-bit video of one colour a quarter, in BT.2020 primaries; grey is white of paper."""
+    width, height = SIZE
+    rgb = np.full((height, width, 3), 0.58 if transfer == PQ else 0.75)
+    for i, color in enumerate([(0.55, 0.4, 0.4), (0.4, 0.5, 0.42), (0.35, 0.4, 0.5)]):
+        rgb[:, i * width // 4 : (i + 1) * width // 4] = color
+    luma = rgb @ [0.2627, 0.678, 0.0593]  # BT.2020, non-constant luminance
+    blue, red = (rgb[..., 2] - luma) / 1.8814, (rgb[..., 0] - luma) / 1.4746
+    found = [4 * (16 + 219 * luma)] + [4 * (128 + 224 * c[::2, ::2]) for c in (blue, red)]
+    planes = [plane.round().astype(np.uint16) for plane in found]
+    made = [clips.frame(planes, "yuv420p10le") for _ in range(2)]
+    tags = (1, BT2020, transfer, BT2020)
+    return clips.write(path, made, codec="ffv1", pixels="yuv420p10le", tags=tags)
+
+
+@pytest.mark.parametrize("transfer", [PQ, HLG], ids=["PQ", "HLG"])
+def test_hdr_is_shown_in_the_colours_of_the_display(tmp_path, transfer):
+    path = wide(tmp_path / "a.mkv", transfer)
+    assert Footage(path).coding.transfer == transfer
+    viewer = opened(path, look="sharp", flow="none")
+    for _ in range(3):
+        frame(viewer)
+    light = VideoPictures(Footage(path), gpu.open_device()).at(0).astype(np.float64)
+    if transfer == HLG:
+        light *= (light @ [0.2627, 0.678, 0.0593])[..., None] ** 0.2  # BT.2100, table 5
+    want = srgb(light @ conversion(REC2020, REC709).T)
+    got = viewer.screen.picture()
+    np.testing.assert_allclose(got, want, atol=2e-3)
+    assert got[32, -8].min() > 0.97  # white of paper is white
+    assert np.abs(srgb(light) - want).max() > 0.03  # the primaries count
+    assert np.allclose(viewer.stage.chromaticities["chromaticities"], REC2020)
+    viewer.stage.choices.close()

@@ -15,6 +15,15 @@ AP1 = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)  # Academy S-
 REC2020 = (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290)
 P3_D65 = (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290)
 XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
+H273 = {  # of videos, by their numbers in ITU-T H.273, table 2
+    1: REC709,
+    5: (0.640, 0.330, 0.290, 0.600, 0.150, 0.060, 0.3127, 0.3290),  # BT.601, 625 lines
+    6: (0.630, 0.340, 0.310, 0.595, 0.155, 0.070, 0.3127, 0.3290),  # BT.601, 525 lines
+    7: (0.630, 0.340, 0.310, 0.595, 0.155, 0.070, 0.3127, 0.3290),
+    9: REC2020,
+    11: (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.314, 0.351),  # DCI-P3
+    12: P3_D65,
+}
 _KNOWN = (REC709, AP0, AP1, REC2020, P3_D65)
 
 _BRADFORD = np.array([
@@ -34,6 +43,11 @@ def conversion(source: Sequence[float], target: Sequence[float]) -> np.ndarray:
     measured = np.allclose(source, XYZ, rtol=0, atol=1e-5)
     adapted = _adaptation(_white(REC709 if measured else source), _white(target))
     return np.linalg.solve(_to_xyz(target), adapted @ _to_xyz(source))
+
+
+def luminance(primaries: Sequence[float]) -> np.ndarray:
+    """(3,) the shares of linear red, green and blue in the luminance."""
+    return _to_xyz(primaries)[1]
 
 
 def of_matrix(to_aces: np.ndarray) -> tuple[float, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import wgpu
 
+from ..coding import Coding
 from ..display import ColorConfig, ColorSpace
 from ..errors import InputError
 from ..exposure import Cell, cells, evened
@@ -86,8 +87,13 @@ class FootageSubject:
         """Width and height of the pictures [px]."""
         return self._footage.size
 
+    @property
+    def coding(self) -> Coding:
+        """How it stores colours; its light is linear in these primaries."""
+        return self._footage.coding
+
     def space(self, config: ColorConfig) -> ColorSpace:
-        """What its colours are taken for."""
+        """What its colours are as VideoLight makes them: linear Rec. 709."""
         return config.space_of({})
 
     # ---- what is known --------------------------------------------------------------------

@@ -30,6 +30,7 @@ from .quality import Measured, Quality
 from .screen import Box, Image, fit, whole
 from .source import SceneSubject, Subject
 from .state import BOTH_EYES, REFERENCE, State
+from .video_light import VideoLight, primaries_of
 
 REFERENCE_SAMPLES = 1024
 _STEP = 0.07  # seconds of work on what converges, between two frames of the window
@@ -93,7 +94,7 @@ class Renderer:
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self.pace = Pace(5 if software else 0)
         self.report = Report()
-        self._images = TexturePool(device)
+        self._images, self._video_light = TexturePool(device), VideoLight(device)
         self._perceived = {slot: Perceived(device) for slot in ("first", "second")}
         self._past: SceneSubject | None = None
         self._blurs: dict[tuple, Blur] = {}
@@ -153,16 +154,24 @@ class Renderer:
     ) -> dict[str, Image]:
         """The images by slot, colours as the display of an OpenColorIO config shows them."""
         images = {slot: self._shown[slot].image for slot in slots}
-        displayed = self.choices.displayed
+        displayed, self.chromaticities = self.choices.displayed, {}
+        if isinstance(subject, FootageSubject):
+            self.chromaticities = {"chromaticities": primaries_of(subject.coding)}
+            for slot, image in images.items():
+                if image.kind == "COLOR" and not self._is_data(self._shown[slot], state):
+                    images[slot] = self._video_light.image(slot, image, subject.coding)
         if (display := displayed.display(state)) is None:
-            self.chromaticities = {}
             return images
         space, exposure = subject.space(display.config), 2.0**state.exposure
-        self.chromaticities = chromaticities(space)
+        self.chromaticities = self.chromaticities or chromaticities(space)
         for slot, image in images.items():
             if image.kind == "COLOR":
                 images[slot] = displayed.image(slot, image, display, space, exposure)
         return images
+
+    def _is_data(self, shown: Shown, state: State) -> bool:
+        """Whether an image is what a method tells of itself, in colours that are none of light."""
+        return shown.key[0] in self.choices.shows(state)
 
     def download(self, shown: Shown | None = None) -> np.ndarray:
         """(height, width, channels) float32 of the first image, or of another."""
