@@ -207,3 +207,29 @@ def test_colours_tell_coverage_if_neither_alpha_nor_vectors_do():
     picture, told, truth = blurred(lambda x, y: x**2 + y**2 < 26**2)
     assert error(picture, truth) < 0.003
     assert told["disocclusion"].max() > 0.2
+
+
+def waves(t):
+    """Bright waves that pass by at 3 px a frame, dark in between."""
+    y, x = np.mgrid[:40, :80] + 0.5
+    bright = 0.5 + 0.5 * np.cos(2 * np.pi * (x + 0.4 * y - 3 * t) / 10)
+    color = np.repeat((0.01 + 0.99 * bright**2)[..., None], 3, axis=2).astype("f4")
+    motion = np.broadcast_to(np.array([-3, 0, 3, 0], "f4"), (*color.shape[:2], 4))
+    return color, motion, np.full(color.shape[:2], 5, "f4")
+
+
+def test_dark_texture_beside_bright_stays_sharp():
+    shutter = Shutter(120)
+    truth = np.mean([waves(t)[0] for t in shutter.sample_times(64)], axis=0)
+    picture = wgmb.Blur("gather", shutter=shutter)(frame_of([waves(t) for t in (0, -1, 1)]))
+    inner = slice(8, -8), slice(8, -8)
+    assert np.sqrt(np.mean((picture - truth)[inner] ** 2)) < 0.003
+
+
+def test_no_dark_ring_is_beside_a_lamp():
+    color = np.full((40, 80, 3), 0.01, "f4")
+    color[14:26, 34:46] = 1000
+    motion = np.broadcast_to(np.array([-1, -1, 1, 1], "f4"), (40, 80, 4))
+    frame = wgmb.Frame(color, motion=motion, depth=np.full((40, 80), 5, "f4"))
+    half_way = wgmb.Blur("gather", shutter=Shutter(360, "start"), samples=1)(frame)
+    assert half_way.min() > 0.004

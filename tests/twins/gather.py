@@ -490,7 +490,7 @@ def cubic(image, x, y):
     """
 
     def slope(a, b):
-        most = 2 * np.minimum(np.abs(a), np.abs(b))
+        most = 4 * np.minimum(np.abs(a), np.abs(b))
         return np.clip(b - a, -most, most)
 
     height, width = image.shape[:2]

@@ -9,7 +9,7 @@
 @group(1) @binding(2) var second_differences: Differences;  // across, down, in half floats; 0 where not smooth
 @group(1) @binding(3) var<storage, read> worklist: WorkList;
 
-const MOST_SLOPE: f32 = 2.0;    // from a texel to the next, as a share of the lesser of the two
+const MOST_SLOPE: f32 = 4.0;    // from a texel to the next, as a multiple of the lesser of the two: splines stay over 0 beside a lamp
 
 alias Differences = texture_storage_2d<rgba32uint, write>;
 
