@@ -321,7 +321,8 @@ def test_slow_motion_has_slow_sound(tmp_path, capsys):
         (["-o", "b.mp4", "--begin", "9"], "no pictures in this range"),
         (["-o", "b.mp4", "--frames", "2-99"], "pictures 0 to 5"),
         (["-o", "b.mp4", "--rolling", "down"], "rolling"),
-        (["-o", "b.mp4", "--holdout", "Layer"], "static"),
+        (["-o", "b.mp4", "--holdout", "Layer", "--flow", "dis"], "static"),
+        (["-o", "b.mp4", "--holdout", "static"], "--holdout needs motion"),
         (["-o", "b.mp4", "--confidence"], "--confidence is for rendered frames"),
     ],
 )
@@ -331,7 +332,8 @@ def test_what_does_not_fit_is_one_line_and_leaves_nothing(
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "a.mp4", grey_frames(range(40, 46)))
     (tmp_path / "there.mp4").write_bytes(b"mine")
-    text = run(capsys, "blur", "a.mp4", *words, "--flow", "none", "-q", code=2)
+    words += [] if "--flow" in words else ["--flow", "none"]
+    text = run(capsys, "blur", "a.mp4", *words, "-q", code=2)
     assert said in text and text.count("\n") == 1
     assert make.names_in(tmp_path) == ["a.mp4", "there.mp4"]
     assert (tmp_path / "there.mp4").read_bytes() == b"mine"

@@ -114,6 +114,8 @@ def make_wish(
     """The settings of a run, with what is opened once for all its videos."""
     check_fits(given, look)
     check_highlights(video.highlights)
+    if look.holdout and video.flow == "none":
+        raise InputError("--holdout needs motion; --flow none averages whole pictures")
     look = replace(look, method=look.method or video.method).for_pictures()
     blur = look.make(when.make(), adapter)
     return Wish(look, when, given, video, blur, *video.source(blur.device))
