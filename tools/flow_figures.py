@@ -73,12 +73,12 @@ def moving(turn=0.0, zoom=1.0, shift=(0.0, 0.0), grows=(0.0, 0.0), shear=0.0) ->
 
 
 def disc(radius: float) -> Callable:
-    """How far inside a disc a place is [px]."""
+    """Return the depth of places inside a disc [px]."""
     return lambda x, y: radius - np.hypot(x, y)
 
 
 def bar(wide: float, high: float) -> Callable:
-    """How far inside a bar of twice this width and height a place is [px]."""
+    """Return the depth of places inside a bar of twice this width and height [px]."""
     return lambda x, y: np.minimum(wide - np.abs(x), high - np.abs(y))
 
 
@@ -113,7 +113,7 @@ def grid() -> tuple[np.ndarray, np.ndarray]:
 
 
 def picture(time: float, texture, place: Place, *movers) -> np.ndarray:
-    """What is seen at an instant, linear."""
+    """Return the picture at an instant, linear."""
 
     def drawn(texture, place, centre=(0.0, 0.0), aside=0.0):
         matrix, shift = place(time)

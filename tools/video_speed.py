@@ -1,4 +1,4 @@
-"""What `wgmb blur --flow none` costs beside the decoder and the encoder alone.
+"""The cost of `wgmb blur --flow none` beside that of the decoder and the encoder alone.
 
     python tools/video_speed.py                     a clip made for it: 1080p, 240 to 60
     python tools/video_speed.py clip.mp4 --fps 60   another one

@@ -1,4 +1,4 @@
-"""What a farm's driver deals with: the place where it runs, its workers, parts of the frames."""
+"""The place where a farm runs, its workers, and the parts of the frames they are given."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PATIENCE = 60.0
 
 @dataclass
 class Place:
-    """Where the workers are, and what is said meanwhile.
+    """The place of the workers, and the receivers of messages.
 
     `cluster`: address of a scheduler; without, `workers` processes are started here, by default
     one for each GPU. `note`: called with a line that a user should read, `details` with those

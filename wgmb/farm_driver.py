@@ -172,7 +172,7 @@ class Driver:
         return any(worker.why_not == "" for worker in self._workers.values())
 
     def _is_hopeless(self) -> bool:
-        """Whether nobody has been able to work for too long; says so in the outcome."""
+        """Return True if no worker has been able to work for too long; the outcome says so then."""
         now = time.monotonic()
         if self._is_anybody_ready():
             return False

@@ -120,7 +120,7 @@ class _Work:
         yield 1.0, "Done"
 
     def _open(self, process: Process) -> Iterator[Step]:
-        """What cannot run is known before hours of rendering."""
+        """A machine that cannot blur is found out before hours of rendering."""
         opening = process.ask("open", setup=told(self.setup))
         yield from self._until(opening, "Opening the GPU")
         if opening.result()["is_cpu"]:

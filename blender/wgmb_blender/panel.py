@@ -41,7 +41,7 @@ class WGMB_PT_motion_blur(bpy.types.Panel):
 
 
 def draw_buttons(column: bpy.types.UILayout) -> None:
-    """What can be begun, or how far it is."""
+    """Draw the buttons that begin a run, or the progress of the one under way."""
     now = running.now()
     if now is None:
         column.operator("wgmb.render_and_blur", icon="RENDER_ANIMATION")

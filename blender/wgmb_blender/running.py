@@ -1,4 +1,4 @@
-"""What is being done now, for the panel; and that it should stop."""
+"""The run under way, for the panel, and the request that it stop."""
 
 from __future__ import annotations
 

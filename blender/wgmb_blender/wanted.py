@@ -1,4 +1,4 @@
-"""What the user asks for, and what is told afterwards."""
+"""The wishes of the user, and the report afterwards."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Step = tuple[float, str]
 """The share that is done, 0..1, and what is being done."""
 
 ERRORS = ProblemError, OSError, MemoryError
-"""What is told in a sentence; all else is a fault of ours."""
+"""Errors that are told in a sentence; all others are faults of the add-on."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What the user asks for. `frames`: by default the scene's. `samples`: a number or "auto".
+    """The wishes of the user. `frames`: by default the scene's. `samples`: a number or "auto".
 
     `handles`: render the frames around those too. `overscan`: pixels. `composited`: blur what the
     compositor makes, not what it is given. `kept`: collections that stay sharp. `sharp`: where the
@@ -41,7 +41,7 @@ class Wanted:
 
 @dataclass
 class Report:
-    """What was done: frames, those that failed and why, remarks, and files."""
+    """The result of a run: frames, those that failed and why, remarks, and files."""
 
     done: list[int] = field(default_factory=list)
     failed: dict[int, str] = field(default_factory=dict)
@@ -51,7 +51,7 @@ class Report:
 
     @property
     def lines(self) -> list[str]:
-        """What the user reads, the most important last."""
+        """The lines that the user reads, the most important last."""
         lines = list(dict.fromkeys(self.notes))
         if self.skipped:
             lines.append(f"{_count(self.skipped)} already there: Overwrite is off")

@@ -48,7 +48,7 @@ def continued(here, there):
 
 
 def turn_factor(here, mean):
-    """How much more than five positions tell is the third term of what turns or swings."""
+    """Return the factor of the third term for a path that turns or swings."""
     if here @ here <= 1:
         return 1.0
     cosine = mean @ here / (here @ here)

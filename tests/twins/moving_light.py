@@ -335,7 +335,7 @@ def clamped(change, before, after):
 
 
 def sure(own, other, flows, trusted, pulled=False):
-    """How sure light is: the share of its change that flow explains, as far as it is trusted."""
+    """Return the trust in light: the share of change that flow explains, times the trust in flow."""
 
     def levels(found):
         return found[..., :3] if pulled else np.log(np.maximum(1 - found[..., :3], 0.005))

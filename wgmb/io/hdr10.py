@@ -1,4 +1,4 @@
-"""What an HDR video says: the display it was graded on (SMPTE ST 2086, CTA-861.3), Dolby Vision."""
+"""HDR data of a video: the display it was graded on (SMPTE ST 2086, CTA-861.3), Dolby Vision."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stays sharp in a video: image files, or what never changes while all around it does."""
+"""Holdouts of a video: image files, or the pixels that never change while all around them do."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 

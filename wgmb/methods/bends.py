@@ -1,4 +1,4 @@
-"""How paths go on beyond the three positions that a frame's own vectors lead to."""
+"""Continue paths beyond the three positions that a frame's own vectors lead to."""
 
 from __future__ import annotations
 

@@ -89,11 +89,11 @@ class FootageSubject:
 
     @property
     def coding(self) -> Coding:
-        """How it stores colours; its light is linear in these primaries."""
+        """The coding of its colours; its light is linear in these primaries."""
         return self._footage.coding
 
     def space(self, config: ColorConfig) -> ColorSpace:
-        """What its colours are as VideoLight makes them: linear Rec. 709."""
+        """The colour space of the pictures that VideoLight makes: linear Rec. 709."""
         return config.space_of({})
 
     # ---- what is known --------------------------------------------------------------------

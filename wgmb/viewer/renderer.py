@@ -170,7 +170,7 @@ class Renderer:
         return images
 
     def _is_data(self, shown: Shown, state: State) -> bool:
-        """Whether an image is what a method tells of itself, in colours that are none of light."""
+        """Return True for an image of a method's own data, whose colours are no light."""
         return shown.key[0] in self.choices.shows(state)
 
     def download(self, shown: Shown | None = None) -> np.ndarray:

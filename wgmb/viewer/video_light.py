@@ -16,7 +16,7 @@ _TEXEL = "rgba32float"
 
 
 class VideoLight:
-    """What is shown of a video's light, kept as long as the picture stays."""
+    """The display light of a video's picture, kept as long as the picture stays."""
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What blurs: a process of its own, beside Blender, that knows files and no Blender.
+"""The process that blurs: it runs beside Blender, and knows files and no Blender.
 
 wgmb, its OpenEXR and its way to the GPU share no memory with Blender, which brings an OpenEXR of
 its own and draws its window with OpenGL: a fault of a driver ends this process, not Blender.

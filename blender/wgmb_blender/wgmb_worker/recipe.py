@@ -1,4 +1,4 @@
-"""What is to be blurred and how, as plain data that one process can hand to another."""
+"""The recipe of a blur, as plain data that one process can hand to another."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Picture:
         return (right - left, bottom - top) if self.is_cropped else self.size
 
     def laid(self, plane: np.ndarray) -> np.ndarray:
-        """What a sharp frame's (height, width, ...) array is in the result."""
+        """Return the part of a sharp frame's (height, width, ...) array that the result shows."""
         width, height = self.rendered
         if plane.shape[:2] != (height, width):
             raise ProblemError(
@@ -107,7 +107,7 @@ class Setup:
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is blurred. `layers`: the view layers, or the composite, whose pictures are.
+    """The subject of the blur. `layers`: the view layers, or the composite, whose pictures are.
 
     `rendered`: frames that may be neighbours; None: all on disk. `kept`: names of objects that
     stay sharp. `folder`: for the blurred files, which are `is_whole` if they have all passes.

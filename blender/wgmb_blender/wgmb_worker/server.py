@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Desk:
-    """What is asked for, and what stays open between two requests."""
+    """The requests that the process answers, and all that stays open between two of them."""
 
     def __init__(self) -> None:
         self._setup: Setup | None = None
