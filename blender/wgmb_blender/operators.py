@@ -40,7 +40,7 @@ class Running:
         return self.steps(context.scene, self._report, render)
 
     def steps(self, scene: bpy.types.Scene, report: Report, render: Render) -> Iterator[Step]:
-        """What this operator does."""
+        """Yield the steps of this operator."""
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:

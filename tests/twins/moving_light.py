@@ -335,7 +335,7 @@ def clamped(change, before, after):
 
 
 def sure(own, other, flows, trusted, pulled=False):
-    """Return the trust in light: the share of change that flow explains, times the trust in flow."""
+    """Return the trust in light: the share of change that flow explains, times that in flow."""
 
     def levels(found):
         return found[..., :3] if pulled else np.log(np.maximum(1 - found[..., :3], 0.005))

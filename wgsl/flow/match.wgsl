@@ -125,7 +125,8 @@ fn near_row(to: Target, row: u32, before: f32) -> f32 {
     return sum;
 }
 
-/// The same of the far frame.
+/// The same of the far frame, in functions of its own: a texture that is sampled by its name in the text is bound with a
+/// filter (kernels.py), an argument is not.
 fn far_cost(to: Target) -> f32 {
     var sum = 0.0;
     if sum <= to.limit { sum = far_row(to, 0u, sum); }
