@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from .hosts.notebook import explore
     from .io.camera_file import CameraFile
     from .io.clip import Clip, Passes
-    from .io.output import Output, Result
+    from .io.output import Output
+    from .io.result import Result
     from .io.vector_output import VectorOutput
     from .io.vectors import Vectors
     from .methods import METHODS
@@ -88,7 +89,8 @@ _PLACES = {
     "hosts.notebook": ("explore",),
     "io.camera_file": ("CameraFile",),
     "io.clip": ("Clip", "Passes"),
-    "io.output": ("Output", "Result"),
+    "io.output": ("Output",),
+    "io.result": ("Result",),
     "io.vector_output": ("VectorOutput",),
     "io.vectors": ("Vectors",),
     "methods": ("METHODS",),

@@ -22,7 +22,7 @@ from .exposure import Cell, cells
 from .io.clip import Clip
 from .io.frame_file import FrameFile
 from .io.frame_numbers import frame_list
-from .io.output import Result
+from .io.result import Result
 from .io.windows import Placement, laid, union
 from .pipeline import Blur
 from .shutter import Shutter

@@ -20,7 +20,7 @@ from .frame import Frame
 from .highlights import compressed
 from .io.clip import Clip
 from .io.frame_file import FrameFile
-from .io.output import Result
+from .io.result import Result
 from .io.windows import Placement
 from .pipeline import Blur
 

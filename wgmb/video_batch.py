@@ -27,7 +27,8 @@ from .io.clock import Clock
 from .io.coded_video import CodedVideo
 from .io.footage import Footage
 from .io.frame_file import FrameFile
-from .io.output import Output, Result
+from .io.output import Output
+from .io.result import Result
 from .io.segments import Segment
 from .motion_source import MotionSource
 from .pipeline import Blur

@@ -19,7 +19,7 @@ from ..io.clip import Clip
 from ..io.frame_file import FrameFile, is_video
 from ..io.frame_numbers import frame_list
 from ..io.input_space import space_of
-from ..io.output import refuse_inputs
+from ..io.output_names import refuse_inputs
 from ..pipeline import Blur
 from .exit_codes import DONE
 from .options import Colors, Given, InputOptions

@@ -20,7 +20,7 @@ from ..io.atomic import write_file
 from ..io.clip import Clip
 from ..io.frame_file import FrameFile, is_video, size_text
 from ..io.frame_numbers import frame_numbers
-from ..io.output import Result
+from ..io.result import Result
 from ..io.windows import Placement, laid, union
 from ..lab.shutter_study import best_shutter, compare, perception_charts
 from ..observer import Observer

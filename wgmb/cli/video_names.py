@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..io import stills
 from ..io.frame_file import is_video
 from ..io.frame_numbers import is_pattern
-from ..io.output import refuse_inputs
+from ..io.output_names import refuse_inputs
 from ..io.suffixes import VIDEOS
 
 NAME = "{name}"

@@ -16,7 +16,7 @@ from ..io.coded_video import CodedVideo
 from ..io.encoders import SUFFIXES, Facts, chosen
 from ..io.footage import Footage
 from ..io.other_streams import OtherStreams
-from ..io.output import refuse_inputs
+from ..io.output_names import refuse_inputs
 from ..io.segments import Segment, Segments, remove_left
 from ..settings import OutputSettings
 from ..video_batch import FramesSink, Moment, Sink, VideoSink

@@ -7,7 +7,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,53 +17,20 @@ from ..color import ToDisplay, to_display
 from ..display import Display
 from ..errors import InputError, check_choice
 from ..extras import needed_by
-from . import atomic, exr, record, stills, views
+from . import atomic, exr, record, stills
+from .exr_result import with_results
 from .frame_file import FrameFile, about
 from .frame_numbers import frame_path, has_view, in_view, is_pattern
-from .input_space import chromaticities, relabelled, space_of
+from .input_space import space_of
+from .output_names import prepare, refuse_inputs, that_exist
+from .result import Result
 from .suffixes import STILLS, VIDEOS
-from .windows import Placement, Window, laid, result_window, union
 
 if TYPE_CHECKING:
     from .video import Video
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
-    """One view of a frame, to be written."""
-
-    source: FrameFile
-    picture: np.ndarray
-    confidence: Mapping[str, np.ndarray] = field(default_factory=dict)
-    placement: Placement | None = None  # None: it fills the source's data window
-    is_converted: bool = False  # to another rate: the source's time and rate are not its own
-
-    @property
-    def canvas(self) -> Window:
-        """The window that the picture fills."""
-        if self.placement is not None:
-            return self.placement.canvas
-        if self.source.part is not None:
-            return self.source.part.data_window
-        return 0, 0, self.picture.shape[1] - 1, self.picture.shape[0] - 1
-
-    @property
-    def window(self) -> Window:
-        """The source's data window, and as much more as the picture takes."""
-        if self.placement is None or self.canvas == self.source.data_window:
-            return self.canvas
-        return result_window(self.picture, self.placement, self.source.data_window)
-
-    @property
-    def displayed(self) -> np.ndarray:
-        """The picture in the display window."""
-        if self.placement is None:
-            return self.picture
-        return laid(self.picture, self.canvas, self.source.display_window)
-
-
 WINDOWS = ("grow", "keep")
-_OF_TIME = "framesPerSecond", "timeCode", "keyCode"  # attributes of EXR files
 
 
 class Output:
@@ -153,11 +119,11 @@ class Output:
             names.setdefault(pattern.parent, []).extend(path.name for path in paths)
         there: list[Path] = []
         for folder in names:
-            existing = _that_exist(folder, names[folder])
+            existing = that_exist(folder, names[folder])
             refuse_inputs(folder, names[folder], existing, inputs)
             there += existing
         for folder in names:
-            _prepare(folder)
+            prepare(folder)
         if folders := [p for p in there if not p.is_file()]:
             raise InputError(f"output {folders[0]} exists and is not a file")
         if there and not (self._overwrite or self._resume):
@@ -273,7 +239,7 @@ class Output:
         """The file at `path`, with the record's text."""
         if path.suffix.lower() == ".exr":
             only_picture = self._layers == "picture"
-            content = _with_results(results, view, text, only_picture, self._grows)
+            content = with_results(results, view, text, only_picture, self._grows)
             return exr.encode(content, self._compression)
         shown = self._shown(results[0])
         return stills.encode(results[0].displayed, path.suffix, self.bits, text, shown)
@@ -305,141 +271,8 @@ class Output:
             self._under_way.unlink(missing_ok=True)
 
 
-def _prepare(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"output folder {folder}: {error.strerror}") from None
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"output folder {folder}: not writable")
-
-
-def _that_exist(folder: Path, names: Iterable[str]) -> list[Path]:
-    """The files of these names that there are in `folder`."""
-    try:
-        existing = set(os.listdir(folder))
-    except OSError:  # not there yet, or said when it is prepared
-        return []
-    return [folder / name for name in names if name in existing]
-
-
-def refuse_inputs(
-    folder: Path, names: Iterable[str], there: Iterable[Path], inputs: Iterable[Path]
-) -> None:
-    """InputError where an output, NAME in `folder`, is one of `inputs`.
-
-    By the folder itself, however it is reached; and, for `there`, the outputs that exist, by the
-    file itself, whatever links lead to it.
-    """
-    place, wanted, folders = _identity(folder), set(names), {}
-    outputs = {_identity(path): path for path in there}
-    for path in inputs:
-        if path.parent not in folders:
-            folders[path.parent] = _identity(path.parent)
-        same = place is not None and folders[path.parent] == place and path.name in wanted
-        if same or (outputs and (own := _identity(path)) is not None and own in outputs):
-            written = folder / path.name if same else outputs[_identity(path)]
-            raise InputError(f"output {written} is the input {path}; choose another name or folder")
-
-
-def _identity(path: Path) -> tuple[int, int] | None:
-    """Device and number of a file or folder; None where there is none."""
-    try:
-        found = os.stat(path)
-    except OSError:
-        return None
-    return found.st_dev, found.st_ino
-
-
 def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> None:
     check_choice("layers", layers, ("all", "picture"))
     exr.check_compression(compression)
     if compression != "zip" and Path(pattern).suffix.lower() != ".exr":
         raise InputError(f"compression {compression} needs an .exr output, got {pattern}")
-
-
-def _with_results(
-    results: Sequence[Result], view: str | None, text: str, only_picture: bool, grows: bool
-) -> exr.Exr:
-    """The source's file with its pictures replaced, confidence and the record's text added.
-
-    `view`: without what belongs to other views. `only_picture`: without all other layers, and
-    without what describes Cryptomattes. `grows`: parts with a picture have a data window that
-    holds it.
-    """
-    source = results[0].source
-    if source.file is None:
-        made = exr.new(results[0].picture, chromaticities(source.space) | {record.KEY: text})
-        made.parts[0].channels |= _told(results[0], made.parts[0])
-        return made
-    parts = [_twin(part, results if grows else ()) for part in source.file.parts]
-    twins = dict(zip(map(id, source.file.parts), parts, strict=True))
-    new: set[tuple[int, str]] = set()
-    for result in results:
-        home, space = result.source.part, result.source.space
-        assert home is not None
-        if space is not None and result.source.made_linear:
-            twins[id(home)].attributes = relabelled(twins[id(home)].attributes, space)
-        written = {full: i for i, full in enumerate(result.source.color) if full}
-        for full, i in written.items():
-            part, name = _place(result.source, full)
-            kind = result.source.channels[full].dtype
-            plane = laid(result.picture[..., i], result.canvas, twins[id(part)].data_window)
-            plane = exr.to_half(plane) if kind == np.float16 else plane.astype(kind)
-            twins[id(part)].channels[name] = plane
-            new.add((id(twins[id(part)]), name))
-    if any(result.is_converted for result in results):
-        for part in parts:
-            for name in _OF_TIME:
-                part.attributes.pop(name, None)
-    if only_picture:
-        _keep(parts, new)
-        for part in parts:
-            for name in [n for n in part.attributes if n.startswith("cryptomatte/")]:
-                del part.attributes[name]
-    elif view is not None:
-        _keep(parts, {(id(twins[id(part)]), name) for part, name in source.origin.values()} | new)
-    for result in results:
-        home = twins[id(result.source.part)]
-        home.channels |= _told(result, home)
-    if view is not None:
-        for part in parts:
-            views.leave_only(part, view)
-    parts = [part for part in parts if part.channels]
-    parts[0].attributes[record.KEY] = text
-    return exr.Exr(source.path, parts)
-
-
-def _place(source: FrameFile, channel: str) -> tuple[exr.Part, str]:
-    """The part that a channel of the picture is in, and its name there."""
-    assert source.part is not None
-    return source.origin.get(channel, (source.part, channel))
-
-
-def _twin(part: exr.Part, results: Sequence[Result]) -> exr.Part:
-    """A copy of `part` whose window holds the pictures that are in it."""
-    windows = [
-        result.window
-        for result in results
-        if any(_place(result.source, name)[0] is part for name in result.source.color)
-    ]
-    onto = union([part.data_window, *windows])
-    channels = {k: laid(plane, part.data_window, onto) for k, plane in part.channels.items()}
-    return replace(part, channels=channels, attributes=dict(part.attributes), data_window=onto)
-
-
-def _told(result: Result, part: exr.Part) -> dict[str, np.ndarray]:
-    """Confidence as channels of `part`."""
-    view = result.source.view or ""
-    return {
-        views.joined("confidence", view, name, part): exr.to_half(
-            laid(plane, result.canvas, part.data_window)
-        )
-        for name, plane in result.confidence.items()
-    }
-
-
-def _keep(parts: list[exr.Part], wanted: set[tuple[int, str]]) -> None:
-    """Drop all other channels; `wanted`: ids of parts, and names in them."""
-    for part in parts:
-        part.channels = {k: v for k, v in part.channels.items() if (id(part), k) in wanted}

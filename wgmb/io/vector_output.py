@@ -14,7 +14,8 @@ from ..errors import InputError, check_choice
 from . import exr, record, stills
 from .frame_file import FrameFile
 from .frame_numbers import has_view
-from .output import Output, Result
+from .output import Output
+from .result import Result
 from .windows import laid
 
 PROGRAMS = ("nuke", "rsmb", "blender", "plain")

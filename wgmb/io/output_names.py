@@ -1,0 +1,58 @@
+"""The names of outputs: which exist, and which must not be written."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from ..errors import InputError
+
+
+def refuse_inputs(
+    folder: Path, names: Iterable[str], there: Iterable[Path], inputs: Iterable[Path]
+) -> None:
+    """InputError where an output, NAME in `folder`, is one of `inputs`.
+
+    By the folder itself, however it is reached; and, for `there`, the outputs that exist, by the
+    file itself, whatever links lead to it.
+    """
+    place, wanted, folders = _identity(folder), set(names), {}
+    outputs = {_identity(path): path for path in there}
+    for path in inputs:
+        if path.parent not in folders:
+            folders[path.parent] = _identity(path.parent)
+        same = place is not None and folders[path.parent] == place and path.name in wanted
+        if same or (outputs and (own := _identity(path)) is not None and own in outputs):
+            written = folder / path.name if same else outputs[_identity(path)]
+            raise InputError(f"output {written} is the input {path}; choose another name or folder")
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Device and number of a file or folder; None where there is none."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
+
+
+def that_exist(folder: Path, names: Iterable[str]) -> list[Path]:
+    """The files of these names that there are in `folder`."""
+    try:
+        existing = set(os.listdir(folder))
+    except OSError:  # not there yet, or said when it is prepared
+        return []
+    return [folder / name for name in names if name in existing]
+
+
+def prepare(folder: Path) -> None:
+    """Make the folder of an output; InputError where it cannot be, or cannot be written to."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"output folder {folder}: {error.strerror}") from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"output folder {folder}: not writable")

@@ -1,0 +1,47 @@
+"""A result on its way to a file."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .frame_file import FrameFile
+from .windows import Placement, Window, laid, result_window
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """One view of a frame, to be written."""
+
+    source: FrameFile
+    picture: np.ndarray
+    confidence: Mapping[str, np.ndarray] = field(default_factory=dict)
+    placement: Placement | None = None  # None: it fills the source's data window
+    is_converted: bool = False  # to another rate: the source's time and rate are not its own
+
+    @property
+    def canvas(self) -> Window:
+        """The window that the picture fills."""
+        if self.placement is not None:
+            return self.placement.canvas
+        if self.source.part is not None:
+            return self.source.part.data_window
+        return 0, 0, self.picture.shape[1] - 1, self.picture.shape[0] - 1
+
+    @property
+    def window(self) -> Window:
+        """The source's data window, and as much more as the picture takes."""
+        if self.placement is None or self.canvas == self.source.data_window:
+            return self.canvas
+        return result_window(self.picture, self.placement, self.source.data_window)
+
+    @property
+    def displayed(self) -> np.ndarray:
+        """The picture in the display window."""
+        if self.placement is None:
+            return self.picture
+        return laid(self.picture, self.canvas, self.source.display_window)
