@@ -429,7 +429,7 @@ def test_frames_of_different_sizes_do_not_make_a_video_of_stretched_ones(tmp_pat
 def test_a_clip_holds_no_more_than_a_few_frames(shot):
     clip = Clip(shot)
     for _ in clip:
-        assert len(clip._kept) <= 3
+        assert len(clip._stored._kept) <= 3
 
 
 def test_the_folder_of_the_output_is_made(tmp_path, capsys, shot):

@@ -8,13 +8,15 @@ import contextlib
 from collections import OrderedDict
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import InputError, check_choice
 from ..frame import Frame
 from ..reach import Reach
 from .cuts import is_cut, jumps, still, straightened
 from .frame_file import FrameFile
+from .frame_maker import FrameMaker
+from .stored_frames import StoredFrames
 from .windows import (
     OUTSIDE,
     Placement,
@@ -30,9 +32,6 @@ from .windows import (
     unknown,
 )
 
-if TYPE_CHECKING:
-    from .clip import Clip
-
 _SIDES = "left", "top", "right", "bottom"
 
 
@@ -42,16 +41,16 @@ def extras(normal: bool, light: bool) -> frozenset[str]:
 
 
 class Neighbours:
-    """The frames of a clip as a blur takes them.
+    """The frames in `stored` as a blur takes them, made by `maker`.
 
-    `known_cuts`: frames that begin a new shot; `is_search`: others are looked for. `outside`: what
-    lies beyond a data window, in OUTSIDE. `cuts`: those found so far, and those known.
+    `is_search`: cuts that nobody told of are looked for. `cuts`: those found so far, and those
+    known.
     """
 
-    def __init__(self, clip: Clip, known_cuts: frozenset[int], is_search: bool, outside: str):
-        check_choice("outside", outside, OUTSIDE)
-        self._clip, self._known_cuts, self._outside = clip, known_cuts, outside
-        self._is_search = is_search
+    def __init__(self, stored: StoredFrames, maker: FrameMaker, is_search: bool):
+        check_choice("outside", stored.passes.outside, OUTSIDE)
+        self._stored, self._maker, self._is_search = stored, maker, is_search
+        self._outside = stored.passes.outside
         self.cuts: set[int] = set()
         self._alone: OrderedDict[
             tuple[int, str | None], tuple[FrameFile, frozenset[str], Frame]
@@ -86,8 +85,8 @@ class Neighbours:
 
     def frame(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
         """The Frame of `source` in its own window, without motion that leads across a cut."""
-        frame = self._clip.passes_of(source, picture, also)
-        if all(self.is_known_cut(source.number, side) for side in (-1, 1)):
+        frame = self._maker.made(source, picture, also)
+        if all(self._stored.is_known_cut(source.number, side) for side in (-1, 1)):
             self.cuts |= {source.number, source.number + 1}
             return still(frame)
         for side in self._sides_cut(source, frame):
@@ -114,13 +113,13 @@ class Neighbours:
         """
         frames = {0: (source, self._locked(source, also))}
         for side in (-1, 1):
-            other = self._clip.neighbour(source, side)
+            other = self._stored.neighbour(source, side)
             if other is None or other.display_window != source.display_window:
                 continue
             try:
                 near = self._locked(other, also)
             except InputError:  # its turn to fail comes
-                self._clip.unread.add(other.number)
+                self._stored.unread.add(other.number)
                 continue
             if self._is_cut(source, frames[0][1], near, side, also):
                 self.cuts.add(source.number + (side > 0))
@@ -157,26 +156,22 @@ class Neighbours:
         return result
 
     def _make_room(self, kept: OrderedDict[tuple[int, str | None], Any]) -> None:
-        while len(kept) >= 3 * max(len(self._clip.views), 1):
+        while len(kept) >= 3 * max(len(self._stored.views), 1):
             kept.popitem(last=False)
 
     # ---- cuts ------------------------------------------------------------------------------
 
-    def is_known_cut(self, number: int, side: int) -> bool:
-        """True if the user said that a cut lies between a frame and its neighbour on `side`."""
-        return number + (side > 0) in self._known_cuts
-
     def _sides_cut(self, source: FrameFile, frame: Frame) -> list[int]:
         """Sides of a frame on which its motion leads across a cut, by that of the default view."""
         number = source.number
-        if source.view is not None and source.view != self._clip.leader(number).view:
+        if source.view is not None and source.view != self._stored.leader(number).view:
             with contextlib.suppress(InputError):  # then this view decides
                 if number not in self._jumps:
-                    self.frame(self._clip.leader(number), False, frozenset())
+                    self.frame(self._stored.leader(number), False, frozenset())
                 return self._jumps[number]
         sides: list[int] = []
         for side in (-1, 1):
-            if self.is_known_cut(number, side) or (self._is_search and jumps(frame, side)):
+            if self._stored.is_known_cut(number, side) or (self._is_search and jumps(frame, side)):
                 sides.append(side)
                 frame = straightened(frame, side)
         if source.view is not None:
@@ -193,10 +188,10 @@ class Neighbours:
             return is_cut(frame, near, side)
         key = source.number, side
         if key not in self._cuts_to:
-            leader = self._clip.leader(source.number)
+            leader = self._stored.leader(source.number)
             if leader.view != source.view:
                 with contextlib.suppress(InputError, OSError):  # then this view decides
-                    other = self._clip.neighbour(leader, side)
+                    other = self._stored.neighbour(leader, side)
                     if other is not None and other.display_window == leader.display_window:
                         frame, near = self._locked(leader, also), self._locked(other, also)
             self._cuts_to[key] = is_cut(frame, near, side)
@@ -259,12 +254,12 @@ class Neighbours:
         if self._outside != "auto":
             edge = self._outside == "edge"
             return edge, edge, edge, edge
-        there = self._clip.on_disk
+        there = self._stored.files.on_disk
         places: list[set[int]] = [set(), set(), set(), set()]
         closed, within = [True] * 4, [True] * 4
         for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
             try:
-                source = self._clip.leader(number)
+                source = self._stored.leader(number)
                 rgba = source.rgba
             except (InputError, OSError):  # its turn to fail comes
                 continue
@@ -286,5 +281,5 @@ class Neighbours:
                 f"the picture goes on beyond the data window ({where}): what lies there is taken "
                 "as unknown; `outside='nothing'` takes it as empty"
             )
-            self._clip.notes[text] = list(self._clip.numbers)
+            self._stored.notes[text] = list(self._stored.numbers)
         return found

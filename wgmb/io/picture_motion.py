@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,22 +12,20 @@ from ..errors import InputError
 from ..motion_source import MotionSource
 from .cuts import pictures_differ
 from .frame_file import FrameFile
-
-if TYPE_CHECKING:
-    from .clip import Clip
+from .stored_frames import StoredFrames
 
 Found = tuple[np.ndarray, np.ndarray]
 FAR = 5  # frames around one that its motion may depend on
 
 
 class PictureMotion:
-    """Motion (height, width, 4) [px] and depth order of a clip's frames by a source of motion.
+    """Motion (height, width, 4) [px] and depth order of frames by a source of motion.
 
     A frame's motion depends on pictures of its own shot alone, and of its own size and window.
     """
 
-    def __init__(self, clip: Clip, motion: MotionSource):
-        self._clip, self._motion = clip, motion
+    def __init__(self, stored: StoredFrames, motion: MotionSource):
+        self._stored, self._motion = stored, motion
         self._cuts: dict[tuple[int, str | None], bool] = {}
         self._shots: dict[str | None, tuple[int, Callable[[int], Found | None]]] = {}
 
@@ -70,15 +67,15 @@ class PictureMotion:
             while len(self._cuts) > 8 * FAR:
                 self._cuts.pop(next(iter(self._cuts)))
             before, after = (self._source(n, view) for n in (number - 1, number))
-            lacking = before is None or after is None or self._clip.begins_shot(number)
+            lacking = before is None or after is None or self._stored.is_known_cut(number, -1)
             self._cuts[key] = lacking or pictures_differ(before.rgba, after.rgba)  # pyright: ignore
         return self._cuts[key]
 
     def _source(self, number: int, view: str | None) -> FrameFile | None:
-        if not self._clip.is_there(number):
+        if not self._stored.files.is_there(number):
             return None
         try:
-            found = self._clip.source(number, view)
+            found = self._stored.source(number, view)
             return found if found.beside is not None else None
         except (InputError, OSError):  # its turn to fail comes
             return None
