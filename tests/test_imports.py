@@ -35,7 +35,7 @@ LAYERS = [
     {"batch"},
     {"outcome"},
     {"job"},
-    {"job_file", "video_pictures"},
+    {"job_file", "video_pictures", "moments"},
     {"farm_worker", "farm_crew", "local_workers"},
     {"farm_driver"},
     {"farm"},

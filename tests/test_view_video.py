@@ -16,17 +16,21 @@ from wgmb.color import srgb
 from wgmb.flow.dis import Dis
 from wgmb.gpu.textures import TexturePool
 from wgmb.io import stills
-from wgmb.io.clock import Clock
+from wgmb.io.cut_list import CutList
 from wgmb.io.footage import Footage
 from wgmb.io.video_masks import holdout_of
+from wgmb.moments import clock_of, moments
+from wgmb.observer import Observer
 from wgmb.primaries import REC709, REC2020, conversion
-from wgmb.video_batch import FootageBlur, moments
+from wgmb.video_batch import FootageBlur
 from wgmb.video_pictures import VideoPictures
-from wgmb.viewer import State, controls, motion_maker, offscreen
+from wgmb.video_settings import FlowSettings, VideoSettings
+from wgmb.viewer import State, controls, offscreen, video_time
 from wgmb.viewer.window import frame
 
 SIZE = 96, 64
 WINDOW = 96, 64  # of the picture alone
+BY_DIS = VideoSettings(flow="dis")
 
 
 @pytest.fixture(scope="module")
@@ -41,10 +45,10 @@ def flash(tmp_path_factory):
     return passing(tmp_path_factory.mktemp("flash") / "a.mp4", white=5)
 
 
-def passing(path, white=None):
+def passing(path, white=None, repeats=(), times=None):
     width, height = SIZE
     y, x = np.mgrid[:height, :width].astype(np.float32)
-    frames = []
+    frames, last = [], None
     for n in range(14):
         at = 12 + 3.0 * n
         inside = (abs(x - at) < 12) & (abs(y - 32) < 14)
@@ -53,9 +57,11 @@ def passing(path, white=None):
         tone = tone if n < 10 else 1 - tone[::-1] ** 3
         tone = np.ones_like(tone) if n == white else tone
         luma = np.clip(16 + 219 * tone, 16, 235).round().astype(np.uint8)
+        luma = last if n in repeats else luma
+        last = luma
         chroma = np.full((height // 2, width // 2), 128, np.uint8)
         frames.append(clips.frame([luma, chroma, chroma], "yuv420p"))
-    return clips.write(path, frames, [Fraction(n, 48) for n in range(14)])
+    return clips.write(path, frames, times or [Fraction(n, 48) for n in range(14)])
 
 
 class Held:
@@ -80,13 +86,13 @@ class Held:
 @pytest.fixture
 def held(monkeypatch):
     source = Held()
-    monkeypatch.setattr(motion_maker.FlowSettings, "source", lambda self, device: (source, "held"))
+    monkeypatch.setattr(FlowSettings, "source", lambda self, device: (source, "held"))
     return source
 
 
 def opened(clip, **changes):
     state = replace(State().opened(str(clip)), panel=False, method="tap", samples=8)
-    return offscreen(replace(state, **changes), WINDOW)
+    return offscreen(replace(state, **changes).settled(), WINDOW)
 
 
 def settled(viewer):
@@ -99,17 +105,29 @@ def settled(viewer):
 
 
 def command_line(
-    clip, number, fps=None, method="tap", motion=True, masks=(), speed=Fraction(1), **shutter
+    clip, number, fps=48, method="tap", masks=(), frames=None, cuts="", video=BY_DIS, **shutter
 ):
-    """The picture that `wgmb blur` makes for the time of an input picture."""
-    footage, blur, clock = Footage(clip), Blur(method, samples=8), Clock(speed=speed)
-    held_out = holdout_of(masks, footage)
-    run = FootageBlur(footage, blur, Dis("best") if motion else None, clock=clock, holdout=held_out)
-    of_all = moments(footage, clock, Fraction(fps or 48))
-    wanted = [m for m in of_all if clock.back(m.time) * 48 == number]
-    for _, exposure in run.exposures(Shutter(**shutter), wanted):
-        encoder = blur.device.create_command_encoder()
-        return TexturePool(blur.device).download(encoder, exposure.light())[..., :3]
+    """The output frame of that number that `wgmb blur` makes; `fps` None: at the video's times."""
+    footage, blur = Footage(clip), Blur(method, samples=8)
+    clock = clock_of(footage, frames, video)
+    cut_list = CutList(cuts)
+    run = FootageBlur(
+        footage,
+        blur,
+        Dis("best") if video.flow != "none" else None,
+        clock=clock,
+        holdout=holdout_of(masks, footage),
+        fill=video.duplicates == "fill",
+        cuts=cut_list.is_search,
+        known_cuts=cut_list.frames(0),
+        highlights=video.highlights,
+    )
+    wanted = moments(footage, clock, fps and Fraction(fps))
+    for moment, exposure in run.exposures(Shutter(**shutter), wanted):
+        if moment.number == number:
+            encoder = blur.device.create_command_encoder()
+            return TexturePool(blur.device).download(encoder, exposure.light())[..., :3]
+    raise AssertionError(f"{len(wanted)} frames")
 
 
 @pytest.mark.parametrize(
@@ -117,12 +135,23 @@ def command_line(
     [
         ({}, {}),
         ({"shutter": 360.0, "phase": "start"}, {"degrees": 360, "phase": "start"}),
-        ({"fps": 12.0}, {"fps": 12}),
+        ({"fps": 12.0, "frame": 1.0}, {"fps": 12}),
         ({"method": "gather"}, {"method": "gather"}),
-        ({"fps": 12.0, "shutter": 360.0, "frame": 8.0}, {"fps": 12, "degrees": 360}),
-        ({"fps": 12.0, "flow": "none"}, {"fps": 12, "motion": False}),
-        ({"pace": "0.5"}, {"speed": Fraction(1, 2)}),
-        ({"pace": "4"}, {"speed": Fraction(4)}),
+        ({"fps": 12.0, "shutter": 360.0, "frame": 2.0}, {"fps": 12, "degrees": 360}),
+        ({"fps": 12.0, "flow": "none", "frame": 1.0}, {"fps": 12}),
+        ({"pace": "0.5", "frame": 8.0}, {}),
+        ({"pace": "0.5", "frame": 9.0}, {}),
+        ({"pace": "0.4", "fps": 60.0, "frame": 13.0, "method": "gather"},
+         {"fps": 60, "method": "gather"}),
+        ({"pace": "0.4", "fps": 60.0, "frame": 34.0, "shutter": 360.0},
+         {"fps": 60, "degrees": 360}),
+        ({"pace": "4", "frame": 1.0}, {}),
+        ({"video": (("begin", "0.05"), ("end", "0.2")), "frame": 3.0}, {}),
+        ({"frames": "3-9", "pace": "0.3", "frame": 0.0}, {"frames": "3-9"}),
+        ({"frames": "3-9", "pace": "0.3", "frame": 22.0}, {"frames": "3-9"}),
+        ({"video": (("highlights", 8.0),), "frame": 4.0}, {}),
+        ({"given": (("cuts", "3,5"),), "shutter": 720.0}, {"cuts": "3,5", "degrees": 720}),
+        ({"given": (("cuts", "only:5"),), "frame": 9.0}, {"cuts": "only:5"}),
     ],
     ids=[
         "own rate",
@@ -131,15 +160,49 @@ def command_line(
         "neighbours",
         "up to the cut",
         "averaged",
-        "slow",
+        "slow, at a picture",
+        "slow, in between",
+        "slow at another rate",
+        "slow, across the cut",
         "quick",
+        "a part by times",
+        "the beginning of a part",
+        "the end of a part",
+        "highlights",
+        "cuts by hand",
+        "no cuts",
     ],
-)
+)  # fmt: skip
 def test_it_shows_what_the_command_line_makes(clip, changes, made):
-    changes = {"flow": "dis", "frame": 4.0} | changes
-    viewer = opened(clip, **changes)
-    want = command_line(clip, int(changes["frame"]), **made)
+    viewer = opened(clip, **{"flow": "dis", "frame": 4.0} | changes)
+    state = viewer.state
+    want = command_line(clip, int(state.frame), video=video_time.settings_of(state), **made)
     np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
+    viewer.stage.choices.close()
+
+
+TIMES = [Fraction(n, 48) for n in (0, 1, 2, 4, 5, 7, 8, 9, 12, 13, 14, 16, 17, 18)]
+
+
+@pytest.mark.parametrize("speed", ["1", "0.4"])
+@pytest.mark.parametrize("own_times", [False, True])
+@pytest.mark.parametrize("fill", ["keep", "fill"])
+def test_variable_rates_and_repeats_are_as_by_the_command_line(tmp_path, speed, own_times, fill):
+    clip = passing(tmp_path / "a.mp4", repeats=(4, 5, 8), times=TIMES)
+    viewer = opened(
+        clip, flow="dis", pace=speed, own_times=own_times, video=(("duplicates", fill),),
+        method="gather", shutter=300.0,
+    )  # fmt: skip
+    fps = None if own_times else video_time.rate(viewer.state)
+    settings = video_time.settings_of(viewer.state)
+    assert settings.duplicates == fill
+    count = len(video_time.output(viewer.state).moments)
+    assert own_times == (count == 14)
+    for number in (count - 1, 5, 4, 8, 0):
+        made = {"fps": fps, "method": "gather", "degrees": 300}
+        want = command_line(clip, number, video=settings, **made)
+        viewer.state = replace(viewer.state, frame=float(number))
+        np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
     viewer.stage.choices.close()
 
 
@@ -175,7 +238,7 @@ def test_the_speed_of_the_output_is_saved_and_played(clip):
     words = state.command("b.mp4")
     assert words[words.index("--speed") + 1] == "0.5"
     assert State.of_toml(state.toml()) == state
-    assert controls.played(replace(state, speed=1.0), 0.125).frame == pytest.approx(3)
+    assert controls.played(replace(state, speed=1.0), 0.125).frame == pytest.approx(6)
     assert "--speed" not in replace(state, pace="1").command("b.mp4")
     with pytest.raises(InputError, match=r"`speed` must be 0\.01 to 100"):
         State.of_toml(state.toml().replace('speed = "0.5"', 'speed = "0"'))
@@ -195,13 +258,13 @@ def test_options_that_do_not_fit_are_refused_before_a_window_opens(clip, capsys,
     assert said in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("changes", [{"frame": 4.0}, {"frame": 4.0, "method": "gather"}])
+@pytest.mark.parametrize("changes", [{"frame": 1.0}, {"frame": 1.0, "method": "gather"}])
 def test_it_shows_a_flash_as_the_command_line_does(clip, flash, changes):
     made = {"fps": 12, "degrees": 360, "method": changes.get("method", "tap")}
     viewer = opened(flash, flow="dis", fps=12.0, shutter=360.0, **changes)
-    want = command_line(flash, 4, **made)
+    want = command_line(flash, 1, **made)
     np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
-    assert want.mean() > command_line(clip, 4, **made).mean() + 0.1
+    assert want.mean() > command_line(clip, 1, **made).mean() + 0.1
     viewer.stage.choices.close()
 
 
@@ -245,9 +308,10 @@ def test_motion_is_made_once_whatever_changes(clip, held):
 
 def test_it_plays_at_its_own_rate_and_steps_from_picture_to_picture(clip):
     state = State().opened(str(clip))
-    assert (state.frames, state.frame, state.fps, state.rate) == ("0-13", 0.0, 48.0, 48.0)
+    assert (state.frames, state.frame, state.fps) == ("0-13", 0.0, 48.0)
     assert controls.stepped(state, 1).frame == 1
-    assert controls.played(replace(state, fps=12.0), 0.125).frame == pytest.approx(6)
+    assert controls.played(state, 0.125).frame == pytest.approx(6)
+    assert controls.played(replace(state, fps=12.0), 0.125).frame == pytest.approx(1.5)
 
 
 def test_what_it_is_set_to_is_what_the_command_line_is_told(clip):
@@ -306,4 +370,46 @@ def test_hdr_is_shown_in_the_colours_of_the_display(tmp_path, transfer):
     assert got[32, -8].min() > 0.97  # white of paper is white
     assert np.abs(srgb(light) - want).max() > 0.03  # the primaries count
     assert np.allclose(viewer.stage.chromaticities["chromaticities"], REC2020)
+    viewer.stage.choices.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "frame_shown"),
+    [
+        ({"shutter": 0.0, "flow": "none", "own_times": True}, 13.0),
+        ({"shutter": 0.0, "flow": "none", "own_times": True}, 6.0),
+        ({"flow": "dis", "pace": "0.5", "fps": 24.0}, 11.0),
+    ],
+    ids=["as wgmb perceive", "near the beginning", "of slow motion"],
+)
+def test_a_video_is_perceived_by_output_frames_held_until_the_next(tmp_path, changes, frame_shown):
+    clip = passing(tmp_path / "a.mp4", times=TIMES)
+    viewer = opened(clip, look="perceived", frame=frame_shown, **changes)
+    state = viewer.state
+    moments, fps = video_time.output(state).moments, None
+    if not state.own_times:
+        fps = video_time.rate(state)
+    observer = Observer(100, state.eye, device=viewer.stage.device)
+    for number in range(int(frame_shown) + 1):
+        settings = video_time.settings_of(state)
+        made = {"fps": fps, "video": settings, "degrees": state.shutter}
+        observer.present(command_line(clip, number, **made), video_time.held_for(state, number))
+    assert len(moments) > frame_shown
+    got = settled(viewer)
+    np.testing.assert_allclose(got, observer.perceived()[..., :3], atol=1e-3)  # it holds halves
+    assert np.abs(got - command_line(clip, int(frame_shown), **made)).max() > 0.05
+    assert viewer.stage.report.labels[0].endswith("perceived")
+    viewer.stage.choices.close()
+
+
+def test_what_is_perceived_waits_for_the_motion_of_all_its_frames(clip, held):
+    held.free = False
+    viewer = opened(clip, look="perceived", frame=7.0)
+    for _ in range(3):
+        frame(viewer)
+    assert viewer.stage.report.busy and "is being found" in viewer.stage.report.waiting
+    blurry = viewer.stage.download()
+    held.free = True
+    assert np.abs(settled(viewer) - blurry[..., :3]).max() > 1e-3
+    assert set(held.made) == set(range(8)) and not viewer.stage.report.waiting
     viewer.stage.choices.close()

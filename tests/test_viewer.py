@@ -20,8 +20,8 @@ from wgmb.methods import METHODS, default_method
 from wgmb.scene import builtin
 from wgmb.viewer import State, actions, controls, offscreen, renderer
 from wgmb.viewer.adaptive import Pace
+from wgmb.viewer.blurs import shutter_of
 from wgmb.viewer.capabilities import Choices
-from wgmb.viewer.renderer import shutter_of
 from wgmb.viewer.screen import key_box
 from wgmb.viewer.source import SceneSubject
 from wgmb.viewer.state import LOOKS
@@ -443,6 +443,8 @@ def test_keys(hand):
         ("ArrowDown", "frame", 1.0),
         ("ArrowLeft", "frame", 0.0),
         ("ArrowLeft", "frame", 11.0),  # round
+        ("Home", "frame", 0.0),
+        ("End", "frame", 11.0),
         ("h", "help", True),
         ("h", "help", False),
         ("Tab", "panel", False),
@@ -473,8 +475,8 @@ def test_an_arrow_that_is_held_down_repeats(hand):
 def test_every_key_of_the_help_does_something():
     layout = controls.Layout((0, 0, 9, 9), (0, 0, 9, 9), tuple(METHODS), ("result", "sharp"),
                              ("off", "wipe"), ("left", "pair"))  # fmt: skip
-    names = {"space": " ", "left, right": "ArrowLeft", "up, down": "ArrowUp", "1 - 9": "2",
-             "Esc": "Escape", "r": "R"}  # fmt: skip
+    names = {"space": " ", "left, right": "ArrowLeft", "home, end": "End", "up, down": "ArrowUp",
+             "1 - 9": "2", "Esc": "Escape", "r": "R"}  # fmt: skip
     moved = replace(PLAIN, orbit=(5.0, 5.0))
     for name in controls.KEYS:
         state, action = controls.key(moved, layout, names.get(name, name))

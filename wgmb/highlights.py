@@ -11,8 +11,11 @@ brightest colour of a pixel, and the others keep their ratio to it, so that hues
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
+from .coding import HLG, PQ, Coding
 from .errors import InputError
 from .gpu import wgsl
 
@@ -24,6 +27,12 @@ def check(highlights: float) -> None:
     """InputError unless white can count as so many times white."""
     if not 1 <= highlights <= MOST:
         raise InputError(f"`highlights` must be 1 to {MOST:.0f} times white, got {highlights:g}")
+
+
+def check_coding(highlights: float, path: Path, coding: Coding) -> None:
+    """InputError for a video that holds light above white."""
+    if highlights != 1 and coding.transfer in (PQ, HLG):
+        raise InputError(f"{path}: `highlights` is for videos that end at white, not for HDR")
 
 
 def expanded(rgba: np.ndarray, highlights: float) -> np.ndarray:

@@ -77,6 +77,21 @@ class Reel(Generic[T]):
         """A picture that is kept; KeyError for others."""
         return self._kept[index]
 
+    @property
+    def kept(self) -> range:
+        """Indices of the pictures that are kept."""
+        return range(min(self._kept, default=0), max(self._kept, default=-1) + 1)
+
+    def at(self, time: float, behind: int = _TO_KEEP) -> int:
+        """The index of the picture that is shown at `time`; some after it are kept, too.
+
+        Asked for in the order of time, or as far back as is kept: `behind` pictures.
+        """
+        self._read_beyond(time)
+        here = self._index_at(time)
+        self._forget_before(here - behind)
+        return here
+
     def cells(self, at: float, interval: float, shutter: Shutter) -> list[Cell]:
         """The cells of an output frame (see exposure.cells); their indices are the reel's.
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -17,12 +16,12 @@ import wgpu
 from . import gpu
 from .background import Behind, ahead
 from .batch import Progress
-from .coding import HLG, PQ, CodedPicture, Coding
-from .errors import InputError
+from .coding import CodedPicture, Coding
 from .exposer import Exposer
 from .exposure import Cell
 from .glance import Glance, is_cut, is_double
 from .gpu.textures import TexturePool
+from .highlights import check_coding
 from .io.clock import Clock
 from .io.coded_video import CodedVideo
 from .io.footage import Footage
@@ -30,6 +29,7 @@ from .io.frame_file import FrameFile
 from .io.output import Output
 from .io.result import Result
 from .io.segments import Segment
+from .moments import Moment
 from .motion_source import MotionSource
 from .pipeline import Blur
 from .planes import Average, Planes, averages
@@ -37,41 +37,8 @@ from .reel import FLASH, Picture, Reel
 from .reel_views import ReelViews
 from .shutter import Shutter
 
-_SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
 _READ_AHEAD = 2  # coded pictures
 _BEFORE = 10  # pictures decoded before the first exposure, which its motion may depend on
-
-
-@dataclass(frozen=True)
-class Moment:
-    """An output frame: its number from 0 on; its time and interval [s], on the output's clock."""
-
-    number: int
-    time: Fraction
-    interval: Fraction
-
-
-def moments(footage: Footage, clock: Clock, fps: Fraction | None) -> list[Moment]:
-    """The output frames of a video: at `fps`, or at the times of its own pictures.
-
-    From the first picture that `clock` lets through to the end of the last one.
-    """
-    times = footage.times
-    chosen = [t for t in times if _within(t, clock)]
-    if not chosen:
-        raise InputError(f"{footage.path}: has no pictures in this range")
-    begin = clock.out(chosen[0])
-    if fps is None:
-        step = 1 / footage.rate / clock.speed
-        return [Moment(k, clock.out(t), step) for k, t in enumerate(chosen)]
-    last = times[-1] + 1 / footage.rate
-    end = clock.out(min(last, clock.end) if clock.end is not None else last)
-    count = max(1, math.ceil((end - begin) * fps - _SPARE))
-    return [Moment(k, begin + k / fps, 1 / fps) for k in range(count)]
-
-
-def _within(time: Fraction, clock: Clock) -> bool:
-    return (clock.first is None or time >= clock.first) and (clock.end is None or time < clock.end)
 
 
 class FootageBlur:
@@ -97,15 +64,12 @@ class FootageBlur:
         known_cuts: Collection[int] = (),
         highlights: float = 1.0,
     ):
-        if highlights != 1 and footage.coding.transfer in (PQ, HLG):
-            raise InputError(
-                f"{footage.path}: `highlights` is for videos that end at white, not for HDR"
-            )
+        check_coding(highlights, footage.path, footage.coding)
         self._highlights = highlights
         self.footage, self.clock, self._holdout = footage, clock, holdout
         self._blur, self._motion = blur, motion
         self._exposer, self._planes = Exposer(blur), Planes(blur.device, highlights)
-        self._average = Average(blur.device)
+        self._average, self._images = Average(blur.device), TexturePool(blur.device)
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
         self.reel: Reel[Glance] | None = None
 
@@ -136,9 +100,10 @@ class FootageBlur:
         if self._highlights == 1:
             return light
         encoder = self.device.create_command_encoder(label="compress")
-        light = self._planes.compress(encoder, light.create_view())
+        output = self._images.texture("compressed", self.footage.size, "rgba32float")
+        self._planes.compress(encoder, light.create_view(), output.create_view())
         gpu.submit(self.device, encoder)
-        return light
+        return output
 
     def coded(
         self, reel: Reel[Glance], views: ReelViews, cells: Sequence[Cell], coding: Coding

@@ -20,10 +20,13 @@ _NEAR = 48  # pictures that are decoded rather than sought
 
 
 class VideoPictures:
-    """Decodes a video's pictures, and makes them linear on the GPU."""
+    """Decodes a video's pictures, and makes them linear on the GPU.
 
-    def __init__(self, footage: Footage, device: wgpu.GPUDevice):
-        self.footage, self.planes = footage, Planes(device)
+    `highlights`: times white that white becomes (see highlights.py); 1 is off.
+    """
+
+    def __init__(self, footage: Footage, device: wgpu.GPUDevice, highlights: float = 1.0):
+        self.footage, self.planes = footage, Planes(device, highlights)
         self._device, self._images = device, TexturePool(device)
         self._going: Iterator[tuple[int, CodedPicture]] = iter(())
         self._reached = len(footage)  # number of the picture that `_going` gave last

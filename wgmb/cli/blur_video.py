@@ -6,7 +6,6 @@ import json
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +15,12 @@ from ..highlights import check as check_highlights
 from ..io.clock import Clock
 from ..io.cut_list import CutList
 from ..io.footage import Footage
-from ..io.frame_numbers import frame_numbers
 from ..io.video_masks import holdout_of
+from ..moments import Moment, clock_of, moments
 from ..motion_source import MotionSource
 from ..pipeline import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings, plain
-from ..video_batch import FootageBlur, Moment, Sink, blur_footage, moments
+from ..video_batch import FootageBlur, Sink, blur_footage
 from ..video_settings import VideoSettings
 from .exit_codes import DONE, SOME_FAILED
 from .terminal import note, progress
@@ -133,7 +132,7 @@ def tell_how(wish: Wish, quiet: bool, verbose: bool) -> None:
 def planned(path: str | Path, output: OutputSettings, wish: Wish) -> Plan:
     """Open a video; InputError if it cannot be read or has no pictures in the range."""
     footage = Footage(path, max_mb=wish.given.max_mb)
-    clock = clock_of(footage, wish.given, wish.video)
+    clock = clock_of(footage, wish.given.frames, wish.video)
     fps = None if output.fps == "source" else output.rate_or(footage.rate)
     return Plan(footage, output, clock, moments(footage, clock, fps))
 
@@ -169,22 +168,3 @@ def check_fits(given: InputSettings, look: BlurSettings) -> None:
             raise InputError(f"--{option} is for rendered frames, a video has no layers")
     if look.scale:
         raise InputError("--scale is for rendered frames, a video has no layers")
-
-
-def clock_of(footage: Footage, given: InputSettings, video: VideoSettings) -> Clock:
-    """The clock of the part that is asked for; InputError if there is no such part."""
-    start, (first, end) = footage.times[0], video.range
-    first, end = (None if t is None else start + t for t in (first, end))
-    if given.frames is not None:
-        if video.begin or video.end:
-            raise InputError("choose either --frames or --begin and --end")
-        numbers = frame_numbers(given.frames)
-        there = f"{footage.path} has pictures 0 to {len(footage) - 1}"
-        if not 0 <= numbers[0] <= numbers[-1] < len(footage):
-            raise InputError(f"frames {given.frames}: {there}")
-        if numbers != list(range(numbers[0], numbers[-1] + 1)):
-            raise InputError(f"frames of a video must be one range, got {given.frames}")
-        first = footage.times[numbers[0]]
-        end = None if numbers[-1] + 1 == len(footage) else footage.times[numbers[-1] + 1]
-    origin = start if first is None else Fraction(0)
-    return Clock(first or start, video.pace, origin, first, end)

@@ -12,13 +12,14 @@ from ..background import Behind
 from ..cone import Cone
 from ..errors import InputError
 from ..io.footage import Footage
+from ..moments import Moment, clock_of, moments
 from ..observer import Observer
 from ..perceived_video import Watched, densest_rate
 from ..settings import BlurSettings, InputSettings, OutputSettings
-from ..video_batch import Moment, Sink, moments
+from ..video_batch import Sink
 from ..video_pictures import VideoPictures
 from ..video_settings import VideoSettings
-from .blur_video import check_fits, clock_of
+from .blur_video import check_fits
 from .exit_codes import DONE, SOME_FAILED
 from .terminal import note, progress
 from .video_output import write
@@ -38,7 +39,7 @@ def perceive_video(
     if output.fps is not None:
         raise InputError("`fps` is for frames, the pictures of a video have their own times")
     footage = Footage(path, max_mb=given.max_mb)
-    clock = clock_of(footage, given, VideoSettings())
+    clock = clock_of(footage, given.frames, VideoSettings())
     wanted = moments(footage, clock, None)
     device = gpu.open_device(adapter)
     observer = Observer(densest_rate(footage, cone), cone, device=device)

@@ -18,8 +18,9 @@ from ..io.footage import Footage
 from ..io.other_streams import OtherStreams
 from ..io.output_names import refuse_inputs
 from ..io.segments import Segment, Segments, remove_left
+from ..moments import Moment
 from ..settings import OutputSettings
-from ..video_batch import FramesSink, Moment, Sink, VideoSink
+from ..video_batch import FramesSink, Sink, VideoSink
 from ..video_settings import VideoSettings
 
 FIRST = 1  # number of the first frame, where they are image files

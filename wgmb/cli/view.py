@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from ..color_settings import ColorSettings
-from ..errors import DeviceError, InputError
+from ..errors import DeviceError
 from ..extras import needed_by
-from ..settings import rate_of, size_of
-from ..video_settings import FlowSettings
+from ..settings import size_of
+from ..video_settings import VideoSettings
 from .exit_codes import DONE
 from .options import (
     BlurOptions,
@@ -17,8 +16,8 @@ from .options import (
     Given,
     InputOptions,
     Look,
-    Motions,
     ShutterOptions,
+    Videos,
     When,
 )
 from .terminal import note
@@ -30,11 +29,10 @@ def view(
     look: Look = BlurOptions(),
     when: When = ShutterOptions(),
     color: Colors = ColorSettings(),
-    motion: Motions = FlowSettings(),
+    video: Videos = VideoSettings(),
     *,
     config: Path | None = None,
     fps: str | None = None,
-    speed: str | None = None,
     window: str = "1280x720",
     adapter: str | None = None,
 ) -> int:
@@ -52,9 +50,8 @@ def view(
     config
         TOML file saved by the viewer: start with its settings.
     fps
-        Frames per second; of videos those of the output, whose interval the shutter is in.
-    speed
-        Of a video: speed of the output, such as 0.5 for slow motion.
+        Frames per second; of videos those of the output, whose interval the shutter is in, or
+        source: a frame for each picture of the video, at its time.
     window
         Window size, WIDTHxHEIGHT.
     adapter
@@ -72,17 +69,10 @@ def view(
     if config is not None:
         state = viewer.State.read(config)
     if what is not None:
-        state = state.opened(what)
-    state = state.told(vars(given) | vars(look) | vars(when) | vars(color) | vars(motion))
+        state = state.opened(what, given.max_mb)
+    state = state.told(vars(given) | vars(look) | vars(when) | vars(color) | vars(video))
     if fps is not None:
-        state = replace(state, fps=float(rate_of(fps)))
-    if speed is not None:
-        if not state.is_video:
-            raise InputError(f"--speed is for videos, not for {state.source}")
-        state = replace(state, pace=speed)
-        _ = state.tempo  # says what is wrong with it
-    if state.is_scene and look.holdout:
-        raise InputError(f"--holdout is for frames and videos, {state.source} is a scene")
+        state = viewer.at_rate(state, fps)
     if color.remark:
         note(color.remark)
     viewer.view(state, adapter=adapter, size=size_of(window))

@@ -95,11 +95,13 @@ class Planes:
         return self._packed.read(encoder, places, coding)
 
     def compress(
-        self, encoder: wgpu.GPUCommandEncoder, light: wgpu.GPUTextureView
-    ) -> wgpu.GPUTexture:
-        """Record the way of light with `highlights` to light without, rgba32float."""
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        light: wgpu.GPUTextureView,
+        output: wgpu.GPUTextureView,
+    ) -> None:
+        """Record the way of light with `highlights` into `output` without them, rgba32float."""
         size = light.size[0], light.size[1]
-        output = self._images.texture("compressed", size, "rgba32float")
         kernel = gpu.kernel(
             self._device,
             "planes/compress.wgsl",
@@ -107,8 +109,7 @@ class Planes:
             HIGHLIGHTS=self._highlights,
         )
         frame = frame_of(self._device, size)
-        kernel.run(encoder, "main", frame, light=light, output=output.create_view())
-        return output
+        kernel.run(encoder, "main", frame, light=light, output=output)
 
     def _pack(
         self,

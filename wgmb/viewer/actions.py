@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
 
 import glfw
@@ -21,6 +20,7 @@ from ..io.video import Video
 from .renderer import Renderer
 from .screen import Screen
 from .state import State
+from .video_time import rate
 
 
 class Actions:
@@ -47,6 +47,7 @@ class Actions:
             "load": lambda: self._load(Path(what)),
             "screenshot": lambda: self._screenshot(state),
             "record": lambda: self._record(state),
+            "say": lambda: self._say(what),
             "copy": lambda: self._copy(what),
             "export": lambda: self._start_export(what, state),
             "fullscreen": self._fullscreen,
@@ -82,8 +83,8 @@ class Actions:
 
     def _record(self, state: State) -> None:
         if self._video is None:
-            path, rate = _free(".mp4"), Fraction(state.fps).limit_denominator(1001)
-            self._video = Video(path, temporary_name(path), rate, state.toml())
+            path = _free(".mp4")
+            self._video = Video(path, temporary_name(path), rate(state), state.toml())
             return
         self.close()
 

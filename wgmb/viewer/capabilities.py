@@ -10,8 +10,10 @@ from ..methods import METHODS
 from ..methods.options import Option, options_of
 from .displayed import Displayed
 from .footage_subject import FootageSubject
+from .on_disk import footage_of
 from .source import ClipSubject, SceneSubject, Subject
 from .state import BOTH_EYES, LOOKS, REFERENCE, State
+from .video_time import most_mb, settings_of
 
 
 class Choices:
@@ -27,8 +29,7 @@ class Choices:
         if state.is_scene:
             self._scene = self._scene or SceneSubject(self._device)
             return self._scene
-        flow = (state.flow, state.flow_quality) if state.is_video else ()
-        key = (state.source, state.given, state.read_as, flow)
+        key = (state.source, state.given, state.read_as, _motion_of(state))
         if self._clip is None or self._clip[0] != key:
             self._clip = key, self._opened(state)
         return self._clip[1]
@@ -68,7 +69,7 @@ class Choices:
         can = {
             "result": blurred,
             "sharp": "color" in has,
-            "perceived": blurred and not state.is_video,
+            "perceived": blurred,
             "depth": "depth" in has,
             "velocity": "motion" in has,
             "error": blurred and "distributed" in methods,
@@ -115,3 +116,12 @@ class Choices:
         if state.against not in (rivals := self.rivals(state)):
             state = replace(state, against=rivals[0])
         return state
+
+
+def _motion_of(state: State) -> tuple:
+    """What the motion of a video depends on; none of other files."""
+    if not state.is_video:
+        return ()
+    settings = settings_of(state)
+    file = footage_of(state.source, most_mb(state))  # another object once it has changed
+    return file, settings.flow, settings.flow_quality, settings.duplicates

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from ..scene import builtin
 from .state import State
+from .video_time import passed
 
 Box = tuple[float, float, float, float]  # x, y, width, height [logical px]
 
@@ -26,7 +27,8 @@ _SUB = 0.1  # a step within a frame
 KEYS = {
     "space": "play or pause",
     "left, right": "one frame back, forward",
-    "up, down": "a tenth of a frame forward, back",
+    "up, down": "a tenth of a frame forward, back (scenes)",
+    "home, end": "first frame, last frame",
     "1 - 9": "method",
     "c": "next comparison",
     "l": "next view",
@@ -122,6 +124,9 @@ def key(state: State, layout: Layout, name: str) -> tuple[State, str | None]:
     steps = {"arrowleft": -1.0, "arrowright": 1.0, "arrowup": _SUB, "arrowdown": -_SUB}
     if low in steps:
         return stepped(replace(state, playing=False), steps[low]), None
+    ends = dict(zip(("home", "end"), state.span, strict=True))
+    if low in ends:
+        return replace(state, frame=float(ends[low]), playing=False), None
     if name.isdigit() and 1 <= int(name) <= len(layout.methods):
         return state.with_method(layout.methods[int(name) - 1]), None
     if low == " ":
@@ -156,8 +161,8 @@ def stepped(state: State, frames: float) -> State:
 def played(state: State, seconds: float) -> State:
     """Return the state `seconds` later."""
     first, last = state.span
-    moved = seconds * state.rate * state.tempo * state.speed
-    return replace(state, frame=first + (state.frame + moved - first) % (last - first + 1))
+    frame = passed(state, seconds * state.speed)
+    return replace(state, frame=first + (frame - first) % (last - first + 1))
 
 
 def _own_camera(state: State) -> tuple[float, float] | None:

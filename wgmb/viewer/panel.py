@@ -10,9 +10,11 @@ from imgui_bundle import imgui
 from ..display import Display
 from ..methods.options import Option
 from . import overlay, sections
+from .command_line import for_shell
 from .controls import Box
-from .renderer import Report
-from .state import State, command_line
+from .report import Report
+from .state import State
+from .video_time import moment, output
 from .widgets import Widgets
 
 WIDTH = 320.0  # of the panel [logical px]
@@ -66,7 +68,7 @@ class Panel:
 
         `area` is the picture's, `key` where its colours are explained [logical px].
         """
-        self._ui.places, self.actions = {}, []
+        self._ui.places, self._ui.refused, self.actions = {}, "", []
         report, (x, y, wide, _) = info.report, area
         overlay.name_images(state, report.labels, info.flicked, x, y + 12, wide)
         if key is not None:
@@ -83,12 +85,14 @@ class Panel:
             imgui.begin("panel", None, fixed | flags.no_nav | flags.no_bring_to_front_on_focus)
             state = self._sections(state, info, window[1])
             imgui.end()
+        if self._ui.refused:
+            self.actions.append(("say", self._ui.refused))
         self.active = imgui.is_any_item_active()
         return state
 
     def _sections(self, state: State, info: Info, height: float) -> State:
         self._header(info)
-        state = self._transport(state)
+        state = self._transport(state, info)
         for title, section, opened in (
             (_subject(state), sections.scene, True),
             ("Blur", sections.blur, True),
@@ -118,7 +122,7 @@ class Panel:
             text += f"   {1 / max(float(np.median(times[-12:])), 1e-4):.0f} fps"
         self._ui.right(text)
 
-    def _transport(self, state: State) -> State:
+    def _transport(self, state: State, info: Info) -> State:
         first, last = state.span
         if self._ui.button("Pause" if state.playing else "Play", 64, "play"):
             state = replace(state, playing=not state.playing)
@@ -127,7 +131,10 @@ class Panel:
         form = "frame %.1f" if state.is_scene else "frame %.0f"
         changed, frame = imgui.slider_float("##frame", state.frame, first, max(last, first), form)
         self._ui.keep("frame")
-        return replace(state, frame=frame, playing=False) if changed else state
+        state = replace(state, frame=frame, playing=False) if changed else state
+        if state.is_video:
+            self._ui.dim(made_of(state, info.report.made_of))
+        return state
 
     def _files_section(self, ui: Widgets, state: State, info: Info) -> State:
         self._file("settings")
@@ -144,7 +151,7 @@ class Panel:
             self.actions.append(("record", ""))
         imgui.spacing()
         self._file("output")
-        command = command_line(state.command(self._files["output"]))
+        command = for_shell(state.command(self._files["output"]))
         ui.dim(command)
         ui.keep("command")
         if ui.button("Copy", half):
@@ -167,3 +174,12 @@ class Panel:
 def _subject(state: State) -> str:
     """What is seen, as the title of its section."""
     return "Scene" if state.is_scene else "Video" if state.is_video else "Frames"
+
+
+def made_of(state: State, pictures: tuple[int, ...]) -> str:
+    """Which output frame of a video is shown, and which of its pictures it is made of."""
+    now = moment(state)
+    since = float(now.time - output(state).moments[0].time)
+    numbers = " - ".join(str(n) for n in dict.fromkeys((min(pictures), max(pictures))))
+    word = "pictures" if len(pictures) > 1 else "picture"
+    return f"output frame {now.number}, {since:.3f} s: {word} {numbers}"

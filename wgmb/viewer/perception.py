@@ -15,12 +15,13 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..cone import Cone
+from ..cone import MOST_HELD, Cone
 from ..gpu.timing import TimestampClock
 from ..observer import WeightedSum
 from ..pipeline import Blur
 from .source import Subject
 from .state import State
+from .video_time import held_for
 
 
 @dataclass
@@ -28,7 +29,25 @@ class _Held:
     """One frame, and how many of its samples are in it."""
 
     texture: wgpu.GPUTexture
+    known: tuple = ()
+    """What was known of a video's motion."""
     done: int = 0
+
+
+def seen_frames(state: State) -> list[State]:
+    """The state at each frame that counts in what is perceived, the newest first."""
+    newest = math.floor(state.frame + 0.5)
+    if not state.is_video:
+        count = state.eye.frames_needed(state.fps) if state.eye else 1
+        return [replace(state, frame=float(n)) for n in range(newest, newest - count, -1)]
+    found, passed, memory = [], 0.0, state.eye.memory if state.eye else 0.0
+    newest = min(newest, state.span[1])
+    while newest >= len(found) and passed <= memory + 2 * held_for(state, newest - len(found)):
+        found.append(replace(state, frame=float(newest - len(found))))
+        passed += held_for(state, int(found[-1].frame))
+        if len(found) == MOST_HELD:
+            break
+    return found
 
 
 class Perceived:
@@ -51,17 +70,21 @@ class Perceived:
         antialias: int,
         seconds: float,
         timing: TimestampClock | None,
+        known: list[tuple],
     ) -> int:
         """Draw frames that are missing, the newest first, for about `seconds`; how many are done.
 
         `output`, rgba32float, is what is seen; the oldest frame stands for those before it.
+        `known`: of a video, what is known of the motion of each of `seen_frames`.
         """
         width, height, _ = output.size
         alike = (replace(state.picture, frame=0.0), view, (width, height), antialias, blur)
         if alike != self._alike:
             self._frames, self._alike = {}, alike
-        newest, count = math.floor(state.frame + 0.5), eye.frames_needed(state.fps)
-        numbers = range(newest, newest - count, -1)
+        seen = seen_frames(state)
+        numbers = [int(one.frame) for one in seen]
+        newest = numbers[0]
+        stamps = dict(zip(numbers, known or [()] * len(seen), strict=True))
         spare = [self._frames.pop(n).texture for n in [*self._frames] if n not in numbers]
         end = time.perf_counter() + seconds
         for number in numbers:
@@ -69,6 +92,8 @@ class Perceived:
             if held is None:
                 held = _Held(spare.pop() if spare else self._texture(blur, width, height))
                 self._frames[number] = held
+            if held.known != stamps[number]:
+                held.known, held.done = stamps[number], 0
             if held.done == blur.samples:
                 continue
             self._forget_unfinished(held, blur)
@@ -83,8 +108,7 @@ class Perceived:
         subject.look_at(state, (width, height), antialias, view)
         drawn = {n: held.texture for n in numbers if (held := self._frames.get(n)) and held.done}
         weights = dict.fromkeys(drawn, 0.0)
-        after = (state.frame - newest) / state.fps
-        for number, weight in zip(numbers, eye.shares(count, state.fps, after), strict=True):
+        for number, weight in zip(numbers, _shares(state, eye, numbers), strict=True):
             # A frame that is missing: the one before it is held for longer.
             weights[next((n for n in drawn if n <= number), min(drawn))] += weight
         encoder = self._device.create_command_encoder(label="perceive")
@@ -107,3 +131,12 @@ class Perceived:
         for held in self._frames.values():
             if held is not but and held.done != blur.samples:
                 held.done = 0
+
+
+def _shares(state: State, eye: Cone, numbers: list[int]) -> np.ndarray:
+    """The weights of frames, the newest first."""
+    after = state.frame - numbers[0]
+    if not (state.is_video and state.own_times):
+        return eye.shares(len(numbers), state.fps, after / state.fps)
+    held = np.array([held_for(state, number) for number in numbers])
+    return eye.shares_held(held, after * held[0])

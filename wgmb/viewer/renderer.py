@@ -7,7 +7,6 @@ is still the picture is drawn in full, and what converges (rays, the reference) 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,70 +18,23 @@ from ..gpu.textures import TexturePool
 from ..gpu.timing import TimestampClock
 from ..io.input_space import chromaticities
 from ..methods import METHODS
-from ..pipeline import SAMPLES, Blur
-from ..settings import ShutterSettings
-from ..shutter import Shutter
-from .adaptive import QUICK, Pace
+from .adaptive import Pace
+from .blurs import Blurs, shutter_of
 from .capabilities import Choices
 from .footage_subject import FootageSubject
-from .perception import Perceived
+from .perception import Perceived, seen_frames
 from .quality import Measured, Quality
+from .report import Report, Shown
 from .screen import Box, Image, fit, whole
 from .source import SceneSubject, Subject
 from .state import BOTH_EYES, REFERENCE, State
 from .video_light import VideoLight, primaries_of
 
-REFERENCE_SAMPLES = 1024
 _STEP = 0.07  # seconds of work on what converges, between two frames of the window
 _QUICK_STEP = 0.03  # while something moves
 _SETTLE = 0.35  # seconds of stillness before antialiasing
 _SHORT = 0.02  # seconds
-_BLURS_KEPT = 12
 _PASSES = {"sharp": "color", "depth": "depth", "velocity": "motion"}
-
-
-@dataclass
-class Shown:
-    """One image and how far it has come."""
-
-    label: str = ""
-    key: tuple = ()  # what is drawn
-    fine: tuple = ()  # how finely: width and height, rays, level while moving
-    name: str = ""  # of its texture
-    kind: str = "COLOR"
-    texture: wgpu.GPUTexture | None = None
-    done: int = 0
-    total: int = 1
-
-    @property
-    def ready(self) -> bool:
-        """True if the image is complete."""
-        return self.texture is not None and self.done >= self.total
-
-    @property
-    def image(self) -> Image:
-        """For the screen."""
-        return Image(self.texture, self.kind, (self.key, self.fine, self.done))
-
-
-@dataclass
-class Report:
-    """Result of one update, for the panel."""
-
-    full: tuple[int, int] = (0, 0)
-    place: Box = (0, 0, 0, 0)
-    area: Box = (0, 0, 0, 0)
-    moving: bool = False
-    size: tuple[int, int] = (0, 0)
-    seconds: dict[str, float] = field(default_factory=dict)  # on the clock
-    passes: dict[str, float] = field(default_factory=dict)  # on the GPU, where it tells
-    labels: tuple[str, str] = ("", "")
-    kind: str = "COLOR"
-    reference: tuple[int, int] = (0, 1)  # samples done, of how many
-    measured: Measured | None = None
-    waiting: str = ""  # what is shown meanwhile, and what for
-    busy: bool = False
-    changed: bool = False
 
 
 class Renderer:
@@ -97,7 +49,7 @@ class Renderer:
         self._images, self._video_light = TexturePool(device), VideoLight(device)
         self._perceived = {slot: Perceived(device) for slot in ("first", "second")}
         self._past: SceneSubject | None = None
-        self._blurs: dict[tuple, Blur] = {}
+        self._blurs = Blurs(device, self.choices, self.pace)
         self._shown = {"first": Shown(), "second": Shown()}
         self._coming = dict(self._shown)  # takes the place of what is shown
         self._seen: dict[str, Image] = {}
@@ -132,9 +84,11 @@ class Renderer:
         self._seen = self._displayed(slots, state, subject)
         unfinished = not all(self._coming[slot].ready for slot in slots)
         report.busy = moving or unfinished or self._level > 0
-        if isinstance(subject, FootageSubject) and any(name != "sharp" for name, _ in names):
-            report.waiting = subject.waiting
-            report.busy |= subject.busy
+        if isinstance(subject, FootageSubject):
+            report.made_of = subject.made_of(state, shutter_of(state))
+            if any(name != "sharp" for name, _ in names):
+                report.waiting = subject.waiting
+                report.busy |= subject.busy
         if names[-1][0] == REFERENCE:
             report.reference = last.done, last.total
             report.measured = measured = self._measure(first, last)
@@ -239,7 +193,8 @@ class Renderer:
         shown, coming = self._shown[slot], self._coming[slot]
         eye = state.eye if name in ("perceived", REFERENCE) else None
         known = self._known(name, state, subject, full)
-        key = (name, view, state.picture, eye, state.frame if name == "perceived" else None, known)
+        frame = state.frame if name == "perceived" else None
+        key = (name, view, state.picture, eye, frame, tuple(known))
         fine = (size, antialias, self._level if quick else None)
         if (coming.key, coming.fine) != (key, fine):
             if self._level and shown.key == key and not _coarser(shown.fine, fine):
@@ -253,7 +208,7 @@ class Renderer:
         started = time.perf_counter()
         seconds = float("inf") if full else _QUICK_STEP if quick else _STEP
         subject.look_at(state, size, antialias, view)
-        self._draw(coming, slot, name, view, state, subject, seconds, quick)
+        self._draw(coming, slot, name, view, state, subject, seconds, quick, known)
         if self._timing:
             report.passes |= self._timing.read()
         self.device.queue.read_buffer(self._token)  # waits
@@ -262,12 +217,16 @@ class Renderer:
         report.changed = True
         report.seconds[coming.label] = time.perf_counter() - started
 
-    def _known(self, name: str, state: State, subject: Subject, full: bool) -> tuple:
-        """What is known of a video's motion, all that is needed if `full`."""
+    def _known(self, name: str, state: State, subject: Subject, full: bool) -> list[tuple]:
+        """What is known of a video's motion, all that is needed if `full`.
+
+        One entry for each output frame that is needed, the present one first.
+        """
         if not isinstance(subject, FootageSubject) or name == "sharp":
-            return ()
+            return []
         method = METHODS[name if name in METHODS else state.method]
-        asked = state, shutter_of(state), "neighbours" in method.uses
+        states = seen_frames(state) if name == "perceived" else [state]
+        asked = states, shutter_of(state), "neighbours" in method.uses
         known = subject.stamp(*asked)
         while full and subject.busy:
             time.sleep(_SHORT)
@@ -275,7 +234,16 @@ class Renderer:
         return known
 
     def _draw(
-        self, coming, slot, name, view, state, subject: Subject, seconds: float, quick: bool
+        self,
+        coming,
+        slot,
+        name,
+        view,
+        state,
+        subject: Subject,
+        seconds: float,
+        quick: bool,
+        known: list[tuple],
     ) -> None:
         size, antialias, _ = coming.fine
         volumes = state.is_scene and "volume" in self.choices.methods(state)
@@ -286,14 +254,15 @@ class Renderer:
             coming.texture, coming.done = passes[_PASSES[name]], 1
             coming.kind = {"depth": "DEPTH", "velocity": "MOTION"}.get(name, "COLOR")
             return
-        blur = self._blur(slot, name, state, quick)
+        blur = self._blurs(slot, name, state, self._level if quick else None)
         coming.texture = self._images.texture(coming.name, size, blur.output)
         if name == "perceived" and (eye := state.eye):
             if state.is_scene:  # of its own, so that what else is drawn keeps its moment
                 subject = self._past = self._past or SceneSubject(self.device)
-            coming.total = eye.frames_needed(state.fps)
+            coming.total = len(seen_frames(state))
+            by = view, blur, antialias
             coming.done = self._perceived[slot].draw(
-                coming.texture, state, eye, subject, view, blur, antialias, seconds, self._timing
+                coming.texture, state, eye, subject, *by, seconds, self._timing, known
             )
             return
         budget = coming.done, float("inf") if quick else seconds
@@ -309,45 +278,6 @@ class Renderer:
             return "nature, perceived"
         return f"{state.method}: {name}" if name in self.choices.shows(state) else name
 
-    def _blur(self, slot: str, name: str, state: State, quick: bool) -> Blur:
-        """The compiled method called `name`, kept for the next time it is asked for."""
-        options: dict[str, Any] = dict(state.options)
-        method, samples, shutter = state.method, state.sampling, shutter_of(state)
-        if name == REFERENCE:
-            options, method, samples = {}, self.choices.reference(state), REFERENCE_SAMPLES
-            shutter = state.eye.shutter(state.fps) if state.eye else shutter
-        elif name in self.choices.shows(state):
-            options["show"] = name
-        elif name == "sharp":
-            options, method, shutter = {}, "volume", Shutter(0)
-        elif name not in ("result", "perceived", state.method):
-            options, method = {}, name
-            samples = state.with_method(name).sampling
-        if method not in (allowed := self.choices.methods(state)):
-            raise InputError(f"method {method!r} is not available here; use {', '.join(allowed)}")
-        if quick:
-            count = samples if isinstance(samples, int) else SAMPLES
-            traced = "progress" in METHODS[method].uses
-            fewer = min(count, QUICK) if traced else self.pace.samples(self._level, count)
-            samples = fewer if fewer < count else samples
-        kept = slot, name == "perceived"  # each has the sums of a picture of its own
-        key = (kept, method, samples, state.jitter, state.max_blur, *options.items())
-        if key not in self._blurs:
-            while len(self._blurs) >= _BLURS_KEPT:
-                del self._blurs[next(iter(self._blurs))]
-            self._blurs[key] = Blur(
-                method,
-                samples=samples,
-                jitter=state.jitter,
-                max_blur=state.max_blur,
-                device=self.device,
-                **options,
-            )
-        blur = self._blurs[key] = self._blurs.pop(key)
-        if blur.shutter != shutter:
-            blur.shutter = shutter
-        return blur
-
     def _measure(self, first: Shown, last: Shown) -> Measured | None:
         """Return the difference between the first image and the reference, once both are ready."""
         key = (first.key, first.fine, last.key, last.fine)
@@ -356,17 +286,6 @@ class Renderer:
                 key, last.done, last.total, lambda: [self.download(s) for s in (first, last)]
             )
         return self.quality.found(key)
-
-
-def shutter_of(state: State) -> Shutter:
-    """The Shutter that the state describes."""
-    return ShutterSettings(
-        shutter=state.shutter,
-        phase=state.phase,
-        curve=state.curve,
-        rolling=state.rolling,  # pyright: ignore[reportArgumentType]
-        rolling_duration=state.rolling_duration,
-    ).make()
 
 
 def _coarser(a: tuple, b: tuple) -> bool:

@@ -6,6 +6,7 @@ import json
 import math
 import types
 import typing
+from collections.abc import Collection
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, Literal
@@ -22,18 +23,15 @@ from ..settings import (
     rate_of,
 )
 from ..settings_toml import parse
-from ..video_settings import FlowSettings, VideoSettings
+from ..video_settings import VideoSettings
+from .fitting import INPUTS, VIDEO
 
 GROUPS = (
     BlurSettings, ShutterSettings, SceneSettings, OutputSettings, InputSettings, ColorSettings,
     VideoSettings,
 )  # fmt: skip
-INPUTS = frozenset({*(f.name for f in fields(InputSettings)), "holdout", "scale"})
-"""Options that say what frames on disk hold."""
 COLORS = frozenset(f.name for f in fields(ColorSettings))
 """Options of colours; of scenes all but `from_`, as files write `from`."""
-FLOW = frozenset(f.name for f in fields(FlowSettings))
-"""Options of videos."""
 VIEW = (
     "frames", "frame", "look", "eyes", "compare", "against", "wipe", "gain", "fastest", "middle",
     "exposure", "tone", "cone_rate", "cone_peak", "zoom", "center", "playing", "speed", "panel",
@@ -73,11 +71,11 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
     """Fields of the dataclass `state` from what the tables [render], or [blur], and [view] hold."""
     known = _hints(*GROUPS) | {"fps": str | float}
     own = {f.name for f in fields(state)} & known.keys() - set(VIEW)
-    own -= set() if on_disk else FLOW
-    allowed = own | {"set", *METHOD_OPTIONS} | (INPUTS | {"speed"} if on_disk else set())
+    own -= set() if on_disk else VIDEO
+    allowed = own | {"set", *METHOD_OPTIONS} | (INPUTS | VIDEO if on_disk else set())
     allowed |= COLORS if on_disk else COLORS - {"from_"}
     found: dict[str, Any] = {}
-    pairs: dict[str, list] = {"settings": [], "options": [], "given": [], "color": []}
+    pairs: dict[str, list] = {"settings": [], "options": [], "given": [], "color": [], "video": []}
     for word, value in given.items():
         name = "from_" if word == "from" else word
         if name not in allowed or word == "from_":
@@ -87,17 +85,25 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
             found["pace"] = fit
         elif name == "set":
             pairs["settings"] = [_setting(text) for text in fit]
+        elif name == "fps" and fit == "source" and on_disk:
+            found["own_times"] = True
         elif name in own:
             found[name] = float(rate_of(str(fit))) if name == "fps" else fit
         else:
-            group = "options" if name in METHOD_OPTIONS else "color" if name in COLORS else "given"
-            pairs[group].append((name, fit))
+            pairs[_group(name)].append((name, fit))
     hints = _hints(state)
     for name, value in view.items():
         if name not in VIEW:
             raise InputError(f"settings: [view] has no {name!r}; available: {', '.join(VIEW)}")
         found[name] = typed(name, value, hints[name])
     return found | {name: tuple(some) for name, some in pairs.items()}
+
+
+def _group(name: str) -> str:
+    """The field of a State that keeps an option."""
+    if name in METHOD_OPTIONS:
+        return "options"
+    return "color" if name in COLORS else "video" if name in VIDEO else "given"
 
 
 def _setting(text: str) -> tuple[str, float | str]:
@@ -161,3 +167,10 @@ def _shown(value: object) -> str:
     except (ValueError, RecursionError):  # a number of thousands of digits, or lists as deep
         return f"this {type(value).__name__}"
     return text if len(text) <= 60 else f"{text[:60]}..."
+
+
+def check_words(state: object, **known: Collection[str]) -> None:
+    """InputError for a field whose value is none of those that are known."""
+    for name, words in known.items():
+        if (value := getattr(state, name)) not in words:
+            raise InputError(f"settings: {name} must be one of {', '.join(words)}, got {value!r}")

@@ -10,16 +10,16 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ..display import Display
-from ..io.frame_numbers import frame_numbers
 from ..methods import METHODS
 from ..ocio import installed
 from ..pipeline import SAMPLES
 from ..scene import builtin
 from ..shutter import CURVES, PHASES, ROLLING
-from ..video_settings import VideoSettings
-from .renderer import shutter_of
-from .state import BOTH_EYES, COMPARE, FLOWS, QUALITIES, REFERENCE, TONES, State
+from .blurs import shutter_of
+from .state import BOTH_EYES, COMPARE, REFERENCE, TONES, State
 from .theme import ACCENT, COLORS, DIM, packed
+from .video_section import video
+from .video_time import in_frames
 from .widgets import LOG, Widgets, plain
 
 if TYPE_CHECKING:
@@ -40,12 +40,7 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
     if not state.is_scene:
         if info.finding:
             ui.dim(info.finding)
-        if state.is_video:
-            state = replace(state, flow=ui.combo("flow", state.flow, FLOWS))
-            quality = ui.combo("quality", state.flow_quality, QUALITIES)
-            state = replace(state, flow_quality=quality)
-            return replace(state, pace=ui.text("output speed", state.pace, _pace))
-        return state
+        return video(ui, state, info) if state.is_video else state
     known = inspect.signature(builtin.SCENES[state.source]).parameters
     defaults = {name: parameter.default for name, parameter in known.items()}
     for name, value in (defaults | dict(state.settings)).items():
@@ -60,11 +55,6 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
         if ui.button("reset", 46):
             state = state.unmoved()
     return state
-
-
-def _pace(text: str) -> None:
-    """InputError if that is no speed of a video's output."""
-    _ = VideoSettings(speed=text).pace
 
 
 def _parameter(ui: Widgets, name: str, value, default):
@@ -85,9 +75,10 @@ def _parameter(ui: Widgets, name: str, value, default):
 
 def animation(ui: Widgets, state: State, info: Info) -> State:
     """Frames, frame rate and playback speed."""
-    state = replace(state, frames=ui.text("frames", state.frames, frame_numbers))
-    state = ui.slide(state, "fps", 1, 120, "%.0f", log=True)
-    return ui.slide(state, "speed", 0.02, 4, "x %.2f", log=True)
+    state = ui.text(state, "frames", state.frames, lambda text: in_frames(state, text))
+    if not state.is_video:
+        state = ui.slide(state, "fps", 1, 120, "%.0f", log=True)
+    return ui.slide(state, "speed", 0.02, 4, "x %.2f", log=True, label="playback")
 
 
 # ---- how it is blurred ----------------------------------------------------------------------

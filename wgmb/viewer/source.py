@@ -24,6 +24,7 @@ from ..render import Render
 from ..scene import builtin
 from ..scene.scene import Scene
 from ..settings import InputSettings, SceneSettings, size_of
+from .command_line import set_words
 from .footage_subject import FootageSubject
 from .state import BOTH_EYES, State
 
@@ -85,7 +86,7 @@ class SceneSubject:
         seen = (state.source, state.settings, state.orbit, state.pan, state.dolly)
         if seen != self._seen:
             given = SceneSettings(
-                set=state.set_arguments(),
+                set=set_words(state.settings),
                 orbit=state.orbit,
                 pan=state.pan,
                 dolly=state.dolly,

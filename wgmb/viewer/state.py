@@ -6,26 +6,23 @@
 from __future__ import annotations
 
 import math
-import os
-import shlex
 from dataclasses import dataclass, fields, replace
-from fractions import Fraction
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..color_settings import ColorSettings, option_name
+from ..color_settings import ColorSettings
 from ..cone import Cone
 from ..errors import InputError, did_you_mean
-from ..io import frame_numbers
-from ..io.footage import Footage
-from ..io.frame_file import about, is_video
+from ..io import frame_numbers, limits
+from ..io.frame_file import about
 from ..methods import METHODS
 from ..scene import builtin
 from ..settings import METHOD_OPTIONS, ShutterSettings
 from ..settings_toml import text_of
-from ..video_settings import VideoSettings
-from . import saved
+from . import saved, video_time
+from .command_line import DEFAULTS, no_option, set_words, words_of
+from .fitting import INPUTS, VIDEO, check_said
+from .on_disk import frames_of, is_video_file
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
 BOTH_EYES = ("pair", "red-cyan")
@@ -33,8 +30,6 @@ LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")
 TONES = ("clip", "soft")
 FLOWS, QUALITIES = ("auto", "search", "dis", "none"), ("best", "fast")
 REFERENCE = "reference"
-DEFAULTS = {f.name: f.default for group in saved.GROUPS for f in fields(group)}
-"""Defaults of the command line's options."""
 
 
 @dataclass(frozen=True)
@@ -46,23 +41,29 @@ class State:
     settings: tuple[tuple[str, float | str], ...] = ()
     """The scene's parameters that differ from their defaults."""
     given: tuple[tuple[str, object], ...] = ()
-    """InputSettings, holdout and scale of frames on disk that differ from their defaults."""
+    """InputSettings, holdout and scale of files that differ from their defaults."""
     color: tuple[tuple[str, object], ...] = ()
     """ColorSettings that differ from their defaults."""
     orbit: tuple[float, float] = (0.0, 0.0)  # degrees to the right, up
     pan: tuple[float, float] = (0.0, 0.0)  # scene units to the right, up
     dolly: float = 1.0
     frames: str = "0-11"
-    frame: float = 0.0  # the moment [frame intervals]
+    """Of a video: its pictures that the output is made from."""
+    frame: float = 0.0
+    """The moment [frame intervals]; of a video the output frame, from 0 on."""
     size: str = "1280x720"
     antialias: int = 2
     fps: float = 24.0
     """Of a video: of the output, whose interval the shutter is in."""
+    own_times: bool = False
+    """Of a video: `fps` is "source", an output frame for each picture, at its time."""
     flow: str = "auto"
     """Of a video: where motion comes from (FlowSettings)."""
     flow_quality: str = "best"
     pace: str = "1"
     """Of a video: the speed of the output, such as "0.5" for slow motion."""
+    video: tuple[tuple[str, object], ...] = ()
+    """The other VideoSettings that differ from their defaults."""
 
     method: str = "gather"
     samples: int | str | None = None
@@ -105,17 +106,7 @@ class State:
     @property
     def is_video(self) -> bool:
         """True if `source` is a video."""
-        return not self.is_scene and _is_video(self.source)
-
-    @property
-    def rate(self) -> float:
-        """Frames a second that are played at full speed."""
-        return float(_video(self.source)[1]) if self.is_video else self.fps
-
-    @property
-    def tempo(self) -> float:
-        """Seconds of a video that pass in a second of the output; InputError if there is none."""
-        return float(VideoSettings(speed=self.pace).pace)
+        return not self.is_scene and is_video_file(self.source)
 
     @property
     def sampling(self) -> int | str | None:
@@ -130,9 +121,7 @@ class State:
 
     @property
     def mode(self) -> str:
-        """Comparison of two images: one of COMPARE, or what chooses both itself: "error", or one
-        of BOTH_EYES.
-        """
+        """Comparison of two images: one of COMPARE, or of BOTH_EYES, or "error"."""
         if self.look == "error":
             return "error"
         return self.eyes if self.eyes in BOTH_EYES else self.compare
@@ -159,12 +148,17 @@ class State:
 
     @property
     def span(self) -> tuple[int, int]:
-        """First and last frame of `frames`."""
+        """First and last frame of `frames`; of a video, of the output."""
+        if self.is_video:
+            return 0, len(video_time.output(self).moments) - 1
         numbers = frame_numbers.frame_numbers(self.frames)
         return min(numbers), max(numbers)
 
-    def opened(self, source: str) -> State:
-        """The same state with another scene or other frames, seen anew."""
+    def opened(self, source: str, max_mb: float = limits.MAX_MB) -> State:
+        """The same state with another scene or other files, seen anew.
+
+        `max_mb`: see InputSettings.
+        """
         if source not in builtin.SCENES and not (
             frame_numbers.readable(Path(source)) or frame_numbers.is_pattern(source)
         ):
@@ -172,7 +166,9 @@ class State:
             raise InputError(f"no such file or scene: {source!r}; scenes: {known}")
         color = _changed(self.color, "from_", None)
         state = replace(self.unmoved(), source=source, settings=(), given=(), color=color)
-        state = replace(state, pace="1")
+        state = replace(state, pace="1", video=(), own_times=False)
+        if max_mb != limits.MAX_MB:
+            state = replace(state, given=(("max_mb", max_mb),))
         before, after = self.suited(), state.suited()
         for name, value in after.items():  # what was as the last scene asks for follows the new one
             if getattr(self, name) == before[name]:
@@ -186,8 +182,9 @@ class State:
                 return replace(state, frames=f"0-{last}", frame=0.0, speed=1.0)
             return replace(state, frames=plain.frames, frame=0.0, speed=plain.speed)
         if state.is_video:
-            state = replace(state, fps=float(_video(source)[1]))
-        return replace(state, frames=_on_disk(source), frame=math.nan, speed=1.0).settled()
+            state = replace(state, fps=float(video_time.own_rate(state)))
+        frames = frames_of(source, max_mb)
+        return replace(state, frames=frames, frame=math.nan, speed=1.0).settled()
 
     def suited(self) -> dict[str, Any]:
         """Method, shutter and curve that the scene asks for; else those that are usual."""
@@ -203,13 +200,18 @@ class State:
         frame = min(max(self.frame, first), last) if math.isfinite(self.frame) else float(first)
         return replace(self, frame=frame)
 
+    def with_video(self, name: str, value: object) -> State:
+        """The same with another of the VideoSettings, at the same time in the video."""
+        value = None if value == DEFAULTS[name] else value
+        return video_time.retimed(self, video=_changed(self.video, name, value))
+
     def unmoved(self) -> State:
         """The same, seen from where the scene's own camera is."""
         return replace(self, orbit=(0.0, 0.0), pan=(0.0, 0.0), dolly=1.0, zoom=1.0,
                        center=(0.5, 0.5))  # fmt: skip
 
     def with_setting(self, name: str, value: float | str) -> State:
-        """The same with a parameter of the scene changed."""
+        """The same with another parameter of the scene."""
         return replace(self, settings=_changed(self.settings, name, value))
 
     def with_option(self, name: str, value: object) -> State:
@@ -230,22 +232,28 @@ class State:
     def told(self, given: dict[str, object]) -> State:
         """The same with options of the command line, those that are not their defaults."""
         said = {name: value for name, value in given.items() if value != DEFAULTS[name]}
-        own = {f.name for f in fields(self)} - {"frames"} - saved.COLORS
-        state = replace(self, **{n: v for n, v in said.items() if n in own})
+        check_said(self, said)
+        state = replace(self, pace=str(said.pop("speed", self.pace)))
+        own = {f.name for f in fields(self)} - saved.COLORS
+        state = replace(state, **{n: v for n, v in said.items() if n in own})
         if not self.is_scene:
-            found = tuple((n, v) for n, v in said.items() if n in saved.INPUTS)
-            state = replace(state, given=found, frames=str(said.get("frames", state.frames)))
-        elif "frames" in said:
-            state = replace(state, frames=str(said["frames"]))
+            found = {n: v for n, v in said.items() if n in INPUTS}
+            state = replace(state, given=tuple((dict(state.given) | found).items()))
+        for name in VIDEO - own:
+            if name in said:
+                state = replace(state, video=_changed(state.video, name, said[name]))
         of_files = () if self.is_scene else ("from_",)
         shown = [name for name in saved.COLORS if not name.endswith("_") or name in of_files]
         state = state.with_color(**{name: said[name] for name in sorted(shown) if name in said})
         for name in METHOD_OPTIONS:
             if name in said:
                 state = state.with_option(name, said[name])
+        if state.is_video and "flow" in said and "method" not in said:
+            state = state.with_method(video_time.settings_of(state).method)
         if state.method not in METHODS:
             known = f"available: {', '.join(METHODS)}{did_you_mean(state.method, METHODS)}"
             raise InputError(f"unknown method {state.method!r}; {known}")
+        video_time.check(state)
         return state.settled()
 
     # ---- what the command line is told ---------------------------------------------------
@@ -263,18 +271,19 @@ class State:
             "curve": self.curve,
             "rolling": self.rolling,
             "rolling_duration": self.rolling_duration,
-            "fps": f"{self.fps:g}",
+            "fps": video_time.SOURCE if self.own_times else str(video_time.rate(self)),
             **dict(self.color),
         }
         if self.is_video:
             look |= {"flow": self.flow, "flow_quality": self.flow_quality, "speed": self.pace}
-            if self.fps == self.rate:
+            look |= dict(self.video)
+            if not self.own_times and video_time.rate(self) == video_time.own_rate(self):
                 del look["fps"]
         if not self.is_scene:
             return {"pattern": self.source, **dict(self.given), **look}
         return {
             "scene": self.source,
-            "set": self.set_arguments(),
+            "set": set_words(self.settings),
             "size": self.size,
             "antialias": self.antialias,
             "orbit": list(self.orbit),
@@ -283,38 +292,17 @@ class State:
             **look,
         }
 
-    def set_arguments(self) -> tuple[str, ...]:
-        """The scene's parameters as --set takes them."""
-        return tuple(
-            f"{name}={value}" if isinstance(value, str) else f"{name}={value:g}"
-            for name, value in self.settings
-        )
-
     def command(self, output: str) -> list[str]:
         """The words after `wgmb` that make `output` of all `frames` as they are seen here."""
         given = self.arguments()
         source = str(given.pop("scene" if self.is_scene else "pattern"))
         words = ["render" if self.is_scene else "blur", no_option(source)]
         words += ["-o", no_option(output)]
-        if self.is_scene or self.frames != _on_disk(source):
+        if self.is_scene or self.frames != frames_of(source, video_time.most_mb(self)):
             words += ["--frames", self.frames]
-        for name, value in given.items():
-            default = DEFAULTS[name]
-            plain = list(value) if isinstance(value, (list, tuple)) else value
-            if plain == (list(default) if isinstance(default, tuple) else default):
-                continue
-            flag = option_name(name)
-            repeated = name in ("set", "also", "holdout", "scale")
-            if repeated:
-                for item in value:  # pyright: ignore[reportGeneralTypeIssues]
-                    words += _said(flag, str(item))
-            elif value is True:
-                words += [flag]
-            elif isinstance(plain, list):
-                words += [flag, *(f"{x:g}" for x in plain)]
-            else:
-                words += _said(flag, f"{value:g}" if isinstance(value, float) else str(value))
-        return words
+        if self.is_video:  # which keeps its own colours
+            given = {name: value for name, value in given.items() if name not in saved.COLORS}
+        return words + words_of(given)
 
     # ---- TOML ----------------------------------------------------------------------------
 
@@ -345,19 +333,11 @@ class State:
             raise InputError(f"settings: {source!r} is {'' if on_disk else 'not '}a built-in scene")
         given.pop("time", None)
         state = State(source, **saved.values(given, tables.get("view", {}), State, on_disk=on_disk))
-        if "fps" not in given and state.is_video:
-            state = replace(state, fps=state.rate)
+        if state.is_video and ("fps" not in given or state.own_times):
+            state = replace(state, fps=float(video_time.own_rate(state)))
         Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
-        _ = state.tempo
-        for name, value, known in (
-            ("method", state.method, METHODS),
-            ("compare", state.compare, COMPARE),
-            ("tone", state.tone, TONES),
-        ):
-            if value not in known:
-                raise InputError(
-                    f"settings: {name} must be one of {', '.join(known)}, got {value!r}"
-                )
+        video_time.check(state)
+        saved.check_words(state, method=METHODS, compare=COMPARE, tone=TONES)
         return state.settled()
 
 
@@ -367,41 +347,3 @@ _SHOWING = (*(name for name in saved.VIEW if name != "frame"), "help")
 def _changed(pairs: tuple, name: str, value: object) -> tuple:
     kept = tuple(pair for pair in pairs if pair[0] != name)
     return kept if value is None else (*kept, (name, value))
-
-
-@lru_cache(maxsize=64)
-def _is_video(source: str) -> bool:
-    return is_video(source)
-
-
-def _video(source: str) -> tuple[int, Fraction]:
-    """The number of pictures of a video, and how many there are a second."""
-    return _counted(source, os.stat(source).st_mtime_ns)
-
-
-@lru_cache(maxsize=8)
-def _counted(source: str, changed: int) -> tuple[int, Fraction]:
-    footage = Footage(source)
-    return len(footage), footage.rate
-
-
-def _on_disk(source: str) -> str:
-    if _is_video(source):
-        return f"0-{_video(source)[0] - 1}"
-    if not frame_numbers.is_pattern(source):
-        return str(frame_numbers.number_in(Path(source)))
-    return frame_numbers.frame_range(frame_numbers.numbers_on_disk(source))
-
-
-def no_option(name: str) -> str:
-    """A file's name as a command line takes it, although it may begin with -."""
-    return f"./{name}" if name.startswith("-") else name
-
-
-def _said(flag: str, text: str) -> list[str]:
-    return [f"{flag}={text}"] if text.startswith("-") else [flag, text]
-
-
-def command_line(words: list[str]) -> str:
-    """For a shell."""
-    return shlex.join(["wgmb", *words])

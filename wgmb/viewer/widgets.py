@@ -19,10 +19,14 @@ _LABEL = 96.0  # of the words before a slider [logical px]
 
 
 class Widgets:
-    """Draws them; `places` says where each is, by name [logical px]."""
+    """Draws them; `places` says where each is, by name [logical px].
+
+    `refused`: why a value that was typed is not taken, '' if all were.
+    """
 
     def __init__(self):
         self.places: dict[str, Box] = {}
+        self.refused = ""
 
     def keep(self, name: str) -> None:
         """The last item drawn is called so."""
@@ -73,13 +77,18 @@ class Widgets:
 
     def slide(self, state: State, name: str, low, high, form: str, *, log=False, label="") -> State:
         """The state with its field `name` as the slider stands."""
-        self.label(label or name)
-        flags = LOG if log else 0
-        changed, value = imgui.slider_float(
-            f"##{name}", getattr(state, name), low, high, form, flags
-        )
-        self.keep(name)
+        now = getattr(state, name)
+        changed, value = self.slider(name, now, low, high, form, log=log, label=label)
         return replace(state, **{name: value}) if changed else state
+
+    def slider(
+        self, name: str, now: float, low, high, form: str, *, log=True, label=""
+    ) -> tuple[bool, float]:
+        """Draw a slider; returns whether it was moved, and its value."""
+        self.label(label or name)
+        changed, value = imgui.slider_float(f"##{name}", now, low, high, form, LOG if log else 0)
+        self.keep(name)
+        return changed, value
 
     def number(self, name: str, value, default: bool | int | float) -> tuple[bool, object]:
         """Draw a control for a number; returns whether it was changed, and its value."""
@@ -95,18 +104,25 @@ class Widgets:
         self.keep(name)
         return changed, value
 
-    def text(self, name: str, now: str, check: Callable[[str], object]) -> str:
-        """Words, once Enter is pressed and `check` has nothing against them."""
-        self.label(name)
+    def text(
+        self, state: State, name: str, now: str, change: Callable[[str], State], label: str = ""
+    ) -> State:
+        """Words: the state that `change` makes of them once Enter is pressed.
+
+        Where it raises InputError the state stays, and `refused` says why.
+        """
+        self.label(label or name)
         changed, text = imgui.input_text(f"##{name}", now, imgui.InputTextFlags_.enter_returns_true)
         self.keep(name)
-        if not changed:
-            return now
+        return self.tried(state, lambda: change(text.strip())) if changed else state
+
+    def tried(self, state: State, change: Callable[[], State]) -> State:
+        """The state that `change` makes; `refused` says why if there is none."""
         try:
-            check(text)
-        except InputError:
-            return now
-        return text
+            return change()
+        except InputError as error:
+            self.refused = str(error)
+            return state
 
     def plot(self, name: str, seconds: np.ndarray) -> None:
         """Times as a line, the last one in words."""

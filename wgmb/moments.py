@@ -1,0 +1,115 @@
+"""The output frames of a video: which part of it they are made from, and when each is shown."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import overload
+
+from .errors import InputError
+from .io.clock import Clock
+from .io.footage import Footage
+from .io.frame_numbers import frame_numbers
+from .video_settings import VideoSettings
+
+_SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
+
+
+@dataclass(frozen=True)
+class Moment:
+    """An output frame: its number from 0 on; its time and interval [s], on the output's clock."""
+
+    number: int
+    time: Fraction
+    interval: Fraction
+
+
+class Moments(Sequence[Moment]):
+    """The output frames of a video: at `fps`, or at the times of its own pictures where it is None.
+
+    From the first picture that `clock` lets through to the end of the last one. InputError if it
+    lets none through.
+    """
+
+    def __init__(self, footage: Footage, clock: Clock, fps: Fraction | None):
+        times = footage.times
+        first = 0 if clock.first is None else _count_before(times, clock.first)
+        last = len(times) if clock.end is None else _count_before(times, clock.end)
+        if first >= last:
+            raise InputError(f"{footage.path}: has no pictures in this range")
+        self._clock, self._own = clock, None if fps is not None else times[first:last]
+        self._begin = clock.out(times[first])
+        self._step = 1 / (fps or footage.rate * clock.speed)
+        self._count = last - first
+        if fps is not None:
+            end = times[-1] + 1 / footage.rate
+            end = clock.out(min(end, clock.end) if clock.end is not None else end)
+            self._count = max(1, math.ceil((end - self._begin) * fps - _SPARE))
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> Moment: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Moment]: ...
+    def __getitem__(self, index: int | slice) -> Moment | list[Moment]:
+        numbers = range(self._count)[index]
+        return (
+            [self._moment(k) for k in numbers]
+            if isinstance(numbers, range)
+            else self._moment(numbers)
+        )
+
+    def nearest(self, time: Fraction) -> int:
+        """The number of the output frame whose time is nearest to `time` [s], on its clock."""
+        if self._own is None:
+            return min(max(round((time - self._begin) / self._step), 0), self._count - 1)
+        after = _count_before(self._own, self._clock.back(time))
+        near = {min(max(n, 0), self._count - 1) for n in (after - 1, after)}
+        return min(near, key=lambda n: (abs(self[n].time - time), n))
+
+    def _moment(self, number: int) -> Moment:
+        if self._own is None:
+            return Moment(number, self._begin + number * self._step, self._step)
+        return Moment(number, self._clock.out(self._own[number]), self._step)
+
+
+def _count_before(times: Sequence[Fraction], time: Fraction) -> int:
+    """How many of the ascending times are before one."""
+    low, high = 0, len(times)
+    while low < high:
+        middle = (low + high) // 2
+        low, high = (middle + 1, high) if times[middle] < time else (low, middle)
+    return low
+
+
+def moments(footage: Footage, clock: Clock, fps: Fraction | None) -> list[Moment]:
+    """All Moments of a video."""
+    return list(Moments(footage, clock, fps))
+
+
+def clock_of(footage: Footage, frames: str | None, video: VideoSettings) -> Clock:
+    """The clock of the part that is asked for; InputError if there is no such part.
+
+    `frames`: numbers of its pictures, such as 120-480.
+    """
+    start, (first, end) = footage.times[0], video.range
+    first, end = (None if t is None else start + t for t in (first, end))
+    if frames is not None:
+        if video.begin or video.end:
+            raise InputError("choose either `frames`, or `begin` and `end`")
+        numbers = frame_numbers(frames)
+        there = f"{footage.path} has pictures 0 to {len(footage) - 1}"
+        if not 0 <= numbers[0] <= numbers[-1] < len(footage):
+            raise InputError(f"frames {frames}: {there}")
+        if numbers != list(range(numbers[0], numbers[-1] + 1)):
+            raise InputError(f"frames of a video must be one range, got {frames}")
+        first = footage.times[numbers[0]]
+        end = None if numbers[-1] + 1 == len(footage) else footage.times[numbers[-1] + 1]
+    origin = start if first is None else Fraction(0)
+    return Clock(first or start, video.pace, origin, first, end)

@@ -1,0 +1,55 @@
+"""What is shown in a slot, and what one update of it reports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import wgpu
+
+from .quality import Measured
+from .screen import Box, Image
+
+
+@dataclass
+class Shown:
+    """One image and how far it has come."""
+
+    label: str = ""
+    key: tuple = ()  # what is drawn
+    fine: tuple = ()  # how finely: width and height, rays, level while moving
+    name: str = ""  # of its texture
+    kind: str = "COLOR"
+    texture: wgpu.GPUTexture | None = None
+    done: int = 0
+    total: int = 1
+
+    @property
+    def ready(self) -> bool:
+        """True if the image is complete."""
+        return self.texture is not None and self.done >= self.total
+
+    @property
+    def image(self) -> Image:
+        """For the screen."""
+        return Image(self.texture, self.kind, (self.key, self.fine, self.done))
+
+
+@dataclass
+class Report:
+    """Result of one update, for the panel."""
+
+    full: tuple[int, int] = (0, 0)
+    place: Box = (0, 0, 0, 0)
+    area: Box = (0, 0, 0, 0)
+    moving: bool = False
+    size: tuple[int, int] = (0, 0)
+    seconds: dict[str, float] = field(default_factory=dict)  # on the clock
+    passes: dict[str, float] = field(default_factory=dict)  # on the GPU, where it tells
+    labels: tuple[str, str] = ("", "")
+    kind: str = "COLOR"
+    reference: tuple[int, int] = (0, 1)  # samples done, of how many
+    measured: Measured | None = None
+    waiting: str = ""  # what is shown meanwhile, and what for
+    made_of: tuple[int, ...] = ()  # pictures that share the exposure of a video's output frame
+    busy: bool = False
+    changed: bool = False
