@@ -193,7 +193,13 @@ def separate_pixel(color, motion, z, edges, y, x, bends, around_it):
         return 0.0, path(before, nearer), mean(z, front), 0.0, color[y, x], own, back_depth, False
     whole = coverage > 0.98
     coverage = 1.0 if whole else coverage
-    front_color = np.maximum(color[y, x] - (1 - coverage) * back_color, 0)
+    rest = color[y, x] - (1 - coverage) * back_color
+    brightest = np.max([color[p] for p in [*front, (y, x)]], axis=0)
+    front_color = np.maximum(
+        rest if seen is not None else np.minimum(rest, 2 * coverage * brightest), 0
+    )
+    if not whole:
+        back_color = back_color + (rest - front_color) / (1 - coverage)
     front_path = path(motion[y, x] if whole else before, nearer)
     behind = path(behind, farther)
     front_depth = z[y, x] if whole and z[y, x] < between else mean(z, front)

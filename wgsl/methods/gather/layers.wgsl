@@ -44,6 +44,7 @@ const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and
 const BETWEEN: f32 = 0.4;       // a vector from 0.1 to 0.9 of the way between two is a mixture of them
 const LEAST_CONTRAST: f32 = 0.05;   // of two colours that tell coverage
 const OFF_AXIS: f32 = 0.25;     // distance of a mixed colour from the line between them, as a share of its length
+const MOST_CONTRAST: f32 = 2.0; // of a front layer to the brightest pixel of it around, which may be half background
 const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
 
 fn clamped(px: vec2i) -> vec2i {
@@ -230,6 +231,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     let no_pure_background = (back_bits & pure_bits) == 0u;
     var front_side = Side();
     var back_side = Side();
+    var brightest = own_color / max(counts, 1e-9);
     var todo = (front_bits & (pure_bits | select(0u, ~0u, thin))) | (back_bits & (pure_bits | select(0u, ~0u, no_pure_background)));
     loop {
         let there = neighbour(px, i32(min(firstTrailingBit(todo), 24u)), between);
@@ -238,6 +240,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
         // The farther away, the smaller the share.
         let share = select(0.0, 1.0 / (1.0 + there.distance2 * there.distance2), todo != 0u);
         let weight_there = weight_at(there.at);
+        if todo != 0u && there.is_front { brightest = max(brightest, color_there / max(weight_there, 1e-9)); }
         add(&front_side, select(0.0, share, there.is_front), motion_there, there.z, color_there, weight_there);
         add(&back_side, select(share, 0.0, there.is_front), motion_there, there.z, color_there, weight_there);
         todo &= todo - 1u;
@@ -284,8 +287,12 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
                 z = front_side.depth / front_side.total;
             } else {
                 coverage = select(measured, 1.0, measured > FULL);
-                back = background;
-                front = max(own_color - (1.0 - coverage) * counts * back, vec4f(0.0));
+                // Together they are the pixel's colour: what would be less than black in front, or too bright, is behind.
+                let behind = (1.0 - coverage) * counts;
+                let rest = own_color - behind * background;
+                let most = select(MOST_CONTRAST * coverage * counts * brightest, vec4f(INFINITE), seen_around);
+                front = max(min(rest, most), vec4f(0.0));
+                back = background + select(vec4f(0.0), (rest - front) / max(behind, 1e-6), behind > 0.0);
                 back_motion = background_motion;
                 if measured <= FULL { front_motion = foreground_motion; }
                 if measured <= FULL || z >= between { z = front_side.depth / front_side.total; }
