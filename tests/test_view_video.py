@@ -48,7 +48,7 @@ def flash(tmp_path_factory):
 def passing(path, white=None, repeats=(), times=None):
     width, height = SIZE
     y, x = np.mgrid[:height, :width].astype(np.float32)
-    frames, last = [], None
+    frames, last = [], np.zeros((height, width), np.uint8)
     for n in range(14):
         at = 12 + 3.0 * n
         inside = (abs(x - at) < 12) & (abs(y - 32) < 14)
@@ -122,7 +122,7 @@ def command_line(
         known_cuts=cut_list.frames(0),
         highlights=video.highlights,
     )
-    wanted = moments(footage, clock, fps and Fraction(fps))
+    wanted = moments(footage, clock, None if fps is None else Fraction(fps))
     for moment, exposure in run.exposures(Shutter(**shutter), wanted):
         if moment.number == number:
             encoder = blur.device.create_command_encoder()

@@ -12,6 +12,7 @@ from wgmb.cli.app import main
 from wgmb.cone import Cone
 from wgmb.io.clock import Clock
 from wgmb.io.footage import Footage
+from wgmb.io.timeline import Times
 from wgmb.moments import Moment, Moments, clock_of
 from wgmb.video_settings import VideoSettings
 from wgmb.viewer import State, controls, video_time
@@ -129,14 +130,9 @@ def test_frames_that_are_perceived_begin_with_the_first_one(state):
 # ---- what an output frame is made of --------------------------------------------------------
 
 
-class Times(list):
-    """48 pictures a second, as of a file."""
-
-    base = Fraction(1, 48)
-
-    def __init__(self, ticks):
-        super().__init__(Fraction(t, 48) for t in ticks)
-        self.ticks = np.array(ticks)
+def shown_at(ticks):
+    """Times on a clock of 48 ticks a second."""
+    return Times(np.array(ticks), Fraction(1, 48))
 
 
 def chain(numbers, cuts=(), without=()):
@@ -157,7 +153,7 @@ def chain(numbers, cuts=(), without=()):
 
 def made(known, frame, fps=48, degrees=180, speed=Fraction(1), count=20):
     moment = Moment(frame, Fraction(frame, fps), Fraction(1, fps))
-    return exposed(Times(range(count)), Clock(speed=speed), moment, Shutter(degrees), known)
+    return exposed(shown_at(range(count)), Clock(speed=speed), moment, Shutter(degrees), known)
 
 
 def test_an_exposure_is_made_of_the_pictures_whose_cells_it_meets():
@@ -190,7 +186,7 @@ def test_what_is_not_known_yet_is_asked_for():
 
 
 def test_the_picture_at_a_time_is_found_exactly():
-    times = Times(range(0, 40, 2))
+    times = shown_at(range(0, 40, 2))
     for frame, want in [(0, 0), (1, 0), (2, 1), (3, 1), (39, 19)]:
         assert picture_at(times, Clock(), Moment(frame, Fraction(frame, 48), Fraction(1))) == want
 
@@ -217,5 +213,5 @@ def test_the_picture_at_a_time_is_found_exactly():
 )
 def test_options_that_do_not_fit_are_refused_in_one_line(clip, capsys, words, said):
     places = {"CLIP": str(clip), "SHOT": "sample/crossing.####.exr"}
-    assert main(["view", *(places.get(word, word) for word in words)]) == 2
+    assert main(["view", *[places.get(word) or word for word in words]]) == 2
     assert said in (line := capsys.readouterr().err) and line.count("\n") == 1
