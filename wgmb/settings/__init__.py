@@ -1,0 +1,30 @@
+"""User settings as plain values: one dataclass per group, convertible to library objects.
+
+The command line, the viewer and the laboratory share them. The string under a field is its help.
+"""
+
+from pathlib import Path
+
+from .blur import METHOD_OPTIONS, BlurSettings
+from .input import InputSettings
+from .output import OutputSettings, rate_of
+from .scene import SceneSettings, parameters_of, size_of
+from .shutter import ShutterSettings
+
+__all__ = [
+    "METHOD_OPTIONS",
+    "BlurSettings",
+    "InputSettings",
+    "OutputSettings",
+    "SceneSettings",
+    "ShutterSettings",
+    "parameters_of",
+    "plain",
+    "rate_of",
+    "size_of",
+]
+
+
+def plain(options) -> dict:
+    """The options by name, as JSON can hold them."""
+    return {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items()}

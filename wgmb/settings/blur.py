@@ -1,0 +1,104 @@
+"""Settings of the blur: the method, and the options of all methods."""
+
+from dataclasses import dataclass, replace
+from typing import Literal, Self, TypeVar
+
+from ..io.clip import Clip
+from ..methods import METHODS, default_method
+from ..methods.options import Option, options_of
+from ..pipeline import Blur, checked
+from ..scene.scene import Scene
+from ..shutter import Shutter
+
+
+def _method_options() -> dict[str, tuple[object, object, str]]:
+    """Type, default and help of every option that a method has, by name."""
+    merged: dict[str, list[tuple[str, Option]]] = {}
+    for method in METHODS.values():
+        for name, option in options_of(method.Options).items():
+            merged.setdefault(name, []).append((method.name, option))
+    return {name: _merged(options) for name, options in merged.items()}
+
+
+def _merged(options: list[tuple[str, Option]]) -> tuple[object, object, str]:
+    """Return one option for all methods that share its name, with the union of their choices."""
+    kind: object = options[0][1].kind
+    if choices := dict.fromkeys(choice for _, option in options for choice in option.choices):
+        kind = Literal[tuple(choices)]
+    help_ = "; ".join(f"{method}: {option.help}" for method, option in options)
+    return (bool, False, help_) if kind is bool else (kind | None, None, help_)  # pyright: ignore
+
+
+METHOD_OPTIONS = _method_options()
+"""(type, default, help) of the options that only some methods have, by name."""
+
+
+_Class = TypeVar("_Class", bound=type)
+
+
+def _with_method_options(settings: _Class) -> _Class:
+    """Add METHOD_OPTIONS to the fields of a class that is to be a dataclass."""
+    for name, (kind, default, _) in METHOD_OPTIONS.items():
+        settings.__annotations__[name] = kind
+        setattr(settings, name, default)
+    return settings
+
+
+@dataclass(frozen=True, kw_only=True)
+@_with_method_options
+class BlurSettings:
+    """Blur method and options; the fields of METHOD_OPTIONS are added."""
+
+    method: str | None = None
+    "Blur method; by default gather if there is depth or motion is searched, else tap."
+    samples: int | Literal["auto"] | None = None
+    """Taps, images or rays per pixel: 16 (fusion: 8), or auto for motion from pictures;
+    auto: 1 per pixel of blur length, at most 64.
+    """
+    jitter: float = 0.0
+    "Jitter of the sample times, 0 to 1: trades banding for noise."
+    holdout: tuple[str, ...] = ()
+    "Pixels to keep sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or an image file."
+    scale: tuple[str, ...] = ()
+    "Motion scale: a LAYER or image file that multiplies it, or LAYER=VALUE:AMOUNT for an object."
+    max_blur: float | None = None
+    "Maximum blur length in pixels."
+
+    def resolved(self, scene: Scene | None = None, clip: Clip | None = None) -> Self:
+        """Return a copy; an unset method is chosen by the scene or the passes in the files."""
+        suited = "gather" if clip is None else default_method(clip.has)
+        if scene is not None and scene.has_volumes:
+            suited = "volume"
+        return replace(self, method=self.method or suited)
+
+    def for_pictures(self) -> Self:
+        """Return a copy for motion found in pictures, after `resolved`: unset samples are auto."""
+        adaptive = self.method in METHODS and getattr(METHODS[self.method], "adaptive", False)
+        return replace(self, samples="auto") if adaptive and self.samples is None else self
+
+    def make(self, shutter_: Shutter, adapter: str | None) -> Blur:
+        """Return the Blur these settings describe; an option of another method is an error."""
+        return Blur(
+            self.method or default_method({"motion", "depth"}),
+            shutter=shutter_,
+            samples=self.samples,
+            jitter=self.jitter,
+            max_blur=self.max_blur,
+            device=adapter,
+            **self._method_options(),
+        )
+
+    def _method_options(self) -> dict:
+        """The method's own options that are set."""
+        own = {name: getattr(self, name) for name in METHOD_OPTIONS}
+        return {k: v for k, v in own.items() if v is not None and v is not False}
+
+    def settled_samples(self) -> int | str:
+        """The samples of the Blur, for a record: a number, or "auto".
+
+        InputError as from `make`, but for what depends on the device; none is opened.
+        """
+        method, options = self.method or "", self._method_options()
+        samples, auto = checked(method, self.samples, self.jitter, self.max_blur, options=options)
+        METHODS[method].Options(**options)
+        return "auto" if auto else samples

@@ -1,0 +1,110 @@
+"""Settings of the input frames."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from ..display import ColorSpace
+from ..io import limits, vectors
+from ..io.clip import Clip, Passes
+from ..io.frame_numbers import is_pattern, readable
+from ..io.masks import is_file, with_amount
+from ..io.settled import Settled
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputSettings:
+    """Input frames, layers and conventions."""
+
+    frames: str | None = None
+    "Frame numbers, such as 1-100x2 or 1,3,5-8; by default all existing frames."
+    layer: str | None = None
+    "Colour layer, if it cannot be found by name."
+    vectors: str = "auto"
+    "Motion vector convention: auto (detected), none, or a name."
+    vector_layer: str | None = None
+    "Motion vector layer, if it cannot be found by name."
+    vector_scale: float = 1.0
+    "Factor applied to the motion vectors."
+    vector_offset: float | None = None
+    "Value that encodes zero motion, subtracted before scaling (vray, rsmb: 0.5)."
+    vector_flip: Literal["x", "y", "xy"] | None = None
+    "Reverses the motion vectors along an axis."
+    vector_mask: str | None = None
+    "Layer that is 1 where the vectors are valid, or none; default: MV_Alpha, or rsmb's alpha."
+    object_motion: bool = False
+    "The vectors hold object motion only; the camera's motion is added from --camera."
+    camera: Path | None = None
+    "JSON file with a camera per frame: gives motion from depth where vectors are missing."
+    depth: str | None = None
+    "Depth layer, if it cannot be found by name."
+    depth_kind: Literal["planar", "inverse", "clip"] = "planar"
+    "Depth convention: distance along the view axis, its inverse (Nuke), or z after projection."
+    far: float = 1e9
+    "Depth from which a pixel counts as empty (sky)."
+    object_layer: str | None = None
+    "Object index layer that identifies the objects of the camera file."
+    also: tuple[str, ...] = ()
+    "Pattern of files with additional layers of the same frames; may be repeated."
+    outside: Literal["auto", "nothing", "edge"] = "auto"
+    "Beyond a data window that ends within the image: nothing, or edge (unknown: its edge goes on)."
+    cuts: str | None = None
+    "Frames that begin a shot: 101,155, cut.edl[@FPS] or cut.otio; only:101,155 detects no others."
+    view: str | None = None
+    "The only view of stereo frames to use, such as left; by default all are blurred."
+    skip_missing: bool = False
+    "Skip missing frames instead of stopping with an error."
+    max_mb: float = limits.MAX_MB
+    "Largest allowed decoded size of an image file in megabytes (as 32-bit floats)."
+
+    def open(
+        self,
+        pattern: str,
+        holdout: tuple[str, ...] = (),
+        scale: tuple[str, ...] = (),
+        space: ColorSpace | None = None,
+        settled: Settled | None = None,
+    ) -> Clip:
+        """Return the Clip these settings describe; `space` of its pictures (ColorSettings.space).
+
+        `settled`: what was found out about the sequence before (Clip.settle). InputError if a file
+        is not readable, or a mask names what no Cryptomatte has.
+        """
+        files = [name for name in (*holdout, *(with_amount(s)[0] for s in scale)) if is_file(name)]
+        for name in (*files, *self.also):
+            if Path(name).suffix and not is_pattern(name):
+                readable(Path(name))
+        passes = Passes(
+            color=self.layer,
+            vectors=vectors.Vectors(
+                self.vectors,
+                self.vector_layer,
+                self.vector_scale,
+                self.vector_offset,
+                self.vector_flip or "",
+                self.vector_mask,
+            ),
+            depth=self.depth,
+            depth_kind=self.depth_kind,
+            far=self.far,
+            camera=self.camera,
+            object_layer=self.object_layer,
+            object_motion=self.object_motion,
+            holdout=holdout,
+            scale=scale,
+            also=self.also,
+            outside=self.outside,
+        )
+        clip = Clip(
+            pattern,
+            frames=self.frames,
+            passes=passes,
+            skip_missing=self.skip_missing,
+            cuts=self.cuts,
+            view=self.view,
+            space=space,
+            max_mb=self.max_mb,
+            settled=settled,
+        )
+        clip.check_names()
+        return clip
