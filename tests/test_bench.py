@@ -10,7 +10,7 @@ import make_frames as make
 from wgmb.cli import app
 from wgmb.errors import InputError
 from wgmb.gpu import timing
-from wgmb.lab import bench, bench_report, report
+from wgmb.lab import bench, bench_figures, bench_report, report
 from wgmb.lab.cases import Candidate
 from wgmb.methods import METHODS
 
@@ -48,7 +48,7 @@ def test_a_copy_has_a_bandwidth(run):
 
 def test_figures_are_kept_and_compared(run, tmp_path):
     run.save(tmp_path / "kept.json")
-    kept = bench.Bench.load(tmp_path / "kept.json")
+    kept = bench_figures.Bench.load(tmp_path / "kept.json")
     assert kept == run
     table = bench_report.against(run, kept)
     assert len(table.rows) == len(run.figures)
@@ -58,11 +58,11 @@ def test_figures_are_kept_and_compared(run, tmp_path):
 def test_what_was_not_kept_is_refused(run, tmp_path):
     (tmp_path / "x.json").write_text('{"figures": 3}')
     with pytest.raises(InputError, match=r"x\.json"):
-        bench.Bench.load(tmp_path / "x.json")
+        bench_figures.Bench.load(tmp_path / "x.json")
 
 
 def test_another_run_with_nothing_in_common_says_so(run):
-    table = bench_report.against(run, bench.Bench({}, 1.0, []))
+    table = bench_report.against(run, bench_figures.Bench({}, 1.0, []))
     assert not table.rows and "in common" in table.note
 
 
@@ -84,7 +84,7 @@ def test_wrong_usage_is_said_before_the_work(tmp_path, monkeypatch, capsys, argu
 
 def test_slower_is_over_one(run):
     slow = [replace(f, gpu=2 * f.gpu) for f in run.figures]
-    table = bench_report.against(bench.Bench(run.machine, run.copy, slow), run)
+    table = bench_report.against(bench_figures.Bench(run.machine, run.copy, slow), run)
     assert all(row[-2] == 2.0 for row in table.rows)
 
 
@@ -157,7 +157,7 @@ def test_every_method_has_its_passes(run):
 
 @pytest.mark.parametrize("usable", [True, False])
 def test_both_clocks_tell_the_same_passes(device, monkeypatch, usable):
-    monkeypatch.setattr(bench.TimestampClock, "usable", staticmethod(lambda device: usable))
+    monkeypatch.setattr(timing.TimestampClock, "usable", staticmethod(lambda device: usable))
     several = [Candidate(m) for m in ("tap", "tiles", "gather", "accumulate")]
     run = bench.bench(device, several, SIZES[:1], (3,), 1)
     assert run.clock == ("timestamps" if usable else "wall clock")
@@ -251,7 +251,7 @@ def test_ctrl_c_writes_what_there_is_and_ends_with_130(tmp_path, capsys, monkeyp
     assert code == 130
     assert "64 x 36, tap, 2 samples" in out and "tap, 4 samples" not in out
     assert err.splitlines()[-1] == "wgmb: interrupted"
-    assert len(bench.Bench.load(tmp_path / "a.json").figures) == 1
+    assert len(bench_figures.Bench.load(tmp_path / "a.json").figures) == 1
 
 
 def test_all_methods_are_timed_when_all_are_asked_for(tmp_path, capsys):
@@ -260,5 +260,5 @@ def test_all_methods_are_timed_when_all_are_asked_for(tmp_path, capsys):
         "--quiet", "--save", tmp_path / "a.json",
     )  # fmt: skip
     assert (code, err) == (0, "")
-    run = bench.Bench.load(tmp_path / "a.json")
+    run = bench_figures.Bench.load(tmp_path / "a.json")
     assert [f.method for f in run.figures] == list(METHODS)

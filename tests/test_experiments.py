@@ -11,7 +11,11 @@ import pytest
 from wgmb.errors import InputError
 from wgmb.lab import compare, experiments, report, results
 from wgmb.lab.cases import Case
+from wgmb.lab.chen import ALPHAS
 from wgmb.lab.results import Entry, Report
+from wgmb.lab.rosado import TAPS
+from wgmb.lab.taylor import _worth
+from wgmb.methods import METHODS
 from wgmb.metrics import METRICS
 
 ROOT = Path(__file__).parent.parent
@@ -111,7 +115,7 @@ def test_chen_compares_rates_faces_and_alphas(chen):
         assert min(rows, key=lambda name: rows[name][0]) == "noise floor"
     for scene in ("scaling", "crossing"):
         (figure,) = (t for t in found.tables if t.title == f"Figure 5, {scene}: alpha")
-        assert len(figure.rows) == 2 * len(experiments.ALPHAS)
+        assert len(figure.rows) == 2 * len(ALPHAS)
         faces = next(t for t in found.tables if t.title.startswith(f"{scene}: front and back"))
         assert len({row[2] for row in faces.rows}) > 1  # telling faces apart changes the blur
         assert faces.columns[-2:] == [
@@ -167,7 +171,7 @@ def test_the_page_of_experiments_takes_its_tables_from_reports(chen):
 
 
 def test_chen_without_fusion_says_so(lab, monkeypatch):
-    monkeypatch.delitem(experiments.METHODS, "fusion")
+    monkeypatch.delitem(METHODS, "fusion")
     with pytest.raises(InputError, match="needs the method fusion"):
         made(lab, "chen")
 
@@ -179,7 +183,7 @@ def test_rosado_finds_that_the_mask_or_the_velocity_buffer_helps(lab):
     assert error["velocity buffer"] < error["camera only"]
     assert error["velocity buffer, mask"] < error["velocity buffer"]
     (plot,) = found.plots
-    assert [n for n, _ in plot.curves["velocity buffer"]] == sorted({*experiments.TAPS, 16})
+    assert [n for n, _ in plot.curves["velocity buffer"]] == sorted({*TAPS, 16})
 
 
 @pytest.mark.parametrize(("limit", "rays"), [(0.2, 4.0), (0.1, 16.0), (0.05, "> 16")])
@@ -190,8 +194,6 @@ def test_worth_in_rays_is_read_off_the_curve(limit, rays):
                for n in (1, 2, 8, 16)]  # fmt: skip
     entries += [Entry("x", "reproject, variant published", "samples", {"flip": error}, n, 0.001 * n)
                 for n, error in ((1, 2 * limit), (8, 1.01 * limit), (16, limit))]  # fmt: skip
-    ((_, _, best, after, enough, _),) = experiments._worth(
-        Report("", "", {}, 1, entries=entries), case, "flip"
-    )
+    ((_, _, best, after, enough, _),) = _worth(Report("", "", {}, 1, entries=entries), case, "flip")
     assert (best, after) == (round(1.01 * limit, 4), 8.0)  # the first that is nearly its best
     assert enough == (pytest.approx(rays, rel=0.03) if rays != "> 16" else rays)

@@ -70,8 +70,8 @@ def bench(
         Hide the progress.
     """
     from ..lab import baselines, bench_report
-    from ..lab.bench import Bench
     from ..lab.bench import bench as measure
+    from ..lab.bench_figures import Bench
 
     device, sizes = gpu.open_device(adapter), [size_of(text) for text in size or ["1920x1080"]]
     if article:

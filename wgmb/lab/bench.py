@@ -6,19 +6,14 @@ Candidates take turns, and medians are reported.
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import itertools
-import json
 import math
 import os
 import statistics
 import sys
 import time
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field, replace
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 import wgpu
@@ -26,94 +21,18 @@ import wgpu
 from .. import gpu
 from ..errors import InputError
 from ..frame import Frame
-from ..frame_views import FrameViews
 from ..gpu import timing
-from ..gpu.textures import TexturePool, numpy_of
-from ..gpu.timing import TimestampClock
-from ..io.atomic import write_file
-from ..pipeline import Blur
-from ..scene import builtin
 from ..shutter import Shutter
 from .baselines import numba_tap
-from .cases import Candidate, SceneFrame, Tell
+from .bench_figures import Bench, Figure
+from .cases import Candidate, Tell
 from .results import machine
+from .timed import TimedFrame, TimedScene
 
 MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
 _COPY = 64 << 20  # bytes, of the copy that tells the machine's bandwidth
 _HEAVY = 3  # parts of a figure that draw a whole frame: work, passes, call
 _MEMORY = 0.75  # share of the machine's memory that textures and buffers may take
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One method at one size with one number of samples; milliseconds."""
-
-    method: str
-    width: int
-    height: int
-    samples: int
-    gpu: float
-    """All passes, from recording to the end of the work."""
-    call: float | None = None
-    """Arrays in, array out."""
-    upload: float | None = None
-    readback: float | None = None
-    passes: dict[str, float] = field(default_factory=dict)
-    """Every pass, by name; those of one name together."""
-    counts: dict[str, int] = field(default_factory=dict)
-    """Number of passes by name."""
-    bytes: int = 0
-    """Of all inputs and the output, each once: the least that must be moved."""
-    numba: float | None = None
-    """The tap blur on the CPU with as many samples, in the same rounds."""
-    memory: int = 0
-    """Of all textures and buffers that the method holds, inputs and output too [bytes]."""
-    peak: int = 0
-    """The process's largest memory so far [bytes]."""
-
-    @property
-    def key(self) -> tuple:
-        """Key by which figures of two runs are matched."""
-        return self.method, self.width, self.height, self.samples
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width, height [px]."""
-        return self.width, self.height
-
-    @property
-    def bandwidth(self) -> float:
-        """`bytes` over `gpu` [GB/s]."""
-        return self.bytes / self.gpu / 1e6
-
-
-@dataclass(frozen=True)
-class Bench:
-    """A run's figures, and the copy bandwidth [GB/s] that went with them."""
-
-    machine: dict[str, str]
-    copy: float
-    figures: list[Figure]
-    clock: str = TimestampClock.name
-    """Clock of the passes: "timestamps" of the GPU, or "wall clock" around each one."""
-    empty: float = 0.0
-    """Milliseconds of an empty submission, taken from every pass that wall clock timed."""
-    notes: list[str] = field(default_factory=list)
-    """Skipped runs, with the reasons."""
-
-    def save(self, path: Path) -> None:
-        """As JSON, for `load`."""
-        write_file(path, (json.dumps(asdict(self), indent=1) + "\n").encode())
-
-    @classmethod
-    def load(cls, path: Path) -> Bench:
-        """Load a file written by `save`; errors name the file."""
-        try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            figures = [Figure(**f) for f in data["figures"]]
-            return cls(**data | {"copy": float(data["copy"]), "figures": figures})
-        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-            raise InputError(f"{path}: not a saved bench: {error}") from None
 
 
 def synthetic_frame(width: int, height: int) -> Frame:
@@ -207,10 +126,11 @@ class _Matrix:
             blur, name = c.blur(samples, Shutter(180), self.device), c.label
             try:
                 self._check(name, size, samples, sum(t.memory for t in timed.values()))
-                make = (
-                    partial(_Traced, size=size) if c.needs_scene else partial(_Filter, frame=frame)
+                timed[name] = one = (
+                    TimedScene(blur, self.clock, size)
+                    if c.needs_scene
+                    else TimedFrame(blur, self.clock, frame)
                 )
-                timed[name] = one = make(blur, self.clock)
             except (InputError, wgpu.GPUError) as error:
                 self.note(f"{_what(size, samples)}: {name} skipped: {error}")
                 continue
@@ -261,89 +181,6 @@ class _Matrix:
         )  # fmt: skip
 
 
-class _Timed:
-    """One method in the parts that are timed; has drawn one frame when it is made."""
-
-    parts: tuple[str, ...] = ("work", "passes")
-    bytes = 0
-
-    def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
-        self.blur, self.clock, self._held = blur, clock, _held()
-        self.images = TexturePool(blur.device)
-        self.output = self.images.texture("output", size, blur.output)
-        self.memory, self.runs, self.counts = 0, [], {}
-
-    def draw(self, encoder, clock: timing.Clock | None) -> None:
-        """One frame, as the method draws it."""
-        raise NotImplementedError
-
-    def work(self) -> None:
-        """All passes at once."""
-        timing.work(self.blur.device, lambda encoder: self.draw(encoder, None))
-        self.memory = self.memory or _held() - self._held
-
-    def passes(self) -> None:
-        """All passes, each timed by itself."""
-        timing.work(self.blur.device, lambda encoder: self.draw(encoder, self.clock))
-        self.runs.append(self.clock.read())
-        self.counts = self.clock.counts
-
-
-class _Traced(_Timed):
-    """A method of scenes, on the first of two that it can draw: bodies, or volumes."""
-
-    def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
-        super().__init__(blur, clock, size)
-        for name in ("crossing", "torusphere"):
-            self._render = SceneFrame(builtin.make(name), size=size).render(blur)
-            with contextlib.suppress(InputError):
-                self.work()
-                return
-        raise InputError(f"method {blur.method.name!r} cannot draw any of the benchmark scenes")
-
-    def draw(self, encoder, clock):
-        self._render.draw(self.output.create_view(), 0.0, timing=clock)
-
-
-class _Filter(_Timed):
-    """A method of pictures, on one frame."""
-
-    parts = ("work", "passes", "call", "upload", "readback")
-
-    def __init__(self, blur: Blur, clock: timing.Clock, frame: Frame):
-        super().__init__(blur, clock, frame.size)
-        self.frame = frame
-        if "neighbours" in blur.method.uses:
-            near = {"prev": replace(frame, number=-1), "next": replace(frame, number=1)}
-            self.frame = replace(frame, **near)
-        self.views = blur.upload(self.frame)
-        self.bytes = _bytes(self.views, self.output)
-        self.work()
-
-    def draw(self, encoder, clock):
-        output = self.output.create_view()
-        self.blur.encode(encoder, output=output, timing=clock, **self.views)
-
-    def call(self) -> None:
-        """Arrays in, array out."""
-        self.blur(self.frame)
-
-    def upload(self) -> None:
-        """The frame's arrays as textures."""
-        self.blur.upload(self.frame)
-        timing.work(self.blur.device, lambda encoder: None)
-
-    def readback(self) -> None:
-        """The result as an array."""
-        self.images.download(self.blur.device.create_command_encoder(), self.output)
-
-
-def _held() -> int:
-    """Return the size of all textures and buffers of the process [bytes]."""
-    counts = wgpu.diagnostics.object_counts  # pyright: ignore[reportAttributeAccessIssue]
-    return counts.get_dict()["total"]["resource_mem"]
-
-
 def _memory() -> int:
     """The machine's memory [bytes]; infinite where the system does not tell."""
     try:
@@ -360,17 +197,6 @@ def _peak() -> int:
         return 0
     unit = 1 if sys.platform == "darwin" else 1024
     return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-
-
-def _bytes(views: dict, output: wgpu.GPUTexture) -> int:
-    """Return the size of the textures of `encode`'s inputs and the output [bytes]."""
-    every = [v for one in views.values() if isinstance(one, FrameViews) for v in vars(one).values()]
-    read = [v.texture for v in every if isinstance(v, wgpu.GPUTextureView)]
-    total = 0
-    for texture in (*read, output):
-        kind, channels = numpy_of(texture.format)
-        total += texture.size[0] * texture.size[1] * channels * kind.itemsize
-    return total
 
 
 def copy_bandwidth(device: wgpu.GPUDevice, rounds: int = 7) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..gpu.timing import TimestampClock
-from .bench import Bench, Figure
+from .bench_figures import Bench, Figure
 from .results import Plot, Report, Table
 
 

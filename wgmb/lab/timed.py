@@ -1,0 +1,113 @@
+"""A method in the parts that a bench times: whole frames, passes and transfers."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+
+import wgpu
+
+from ..errors import InputError
+from ..frame import Frame
+from ..frame_views import FrameViews
+from ..gpu import timing
+from ..gpu.textures import TexturePool, numpy_of
+from ..pipeline import Blur
+from ..scene import builtin
+from .cases import SceneFrame
+
+
+class Timed:
+    """One method in the parts that are timed; has drawn one frame when it is made."""
+
+    parts: tuple[str, ...] = ("work", "passes")
+    bytes = 0
+
+    def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
+        self.blur, self.clock, self._held = blur, clock, _held()
+        self.images = TexturePool(blur.device)
+        self.output = self.images.texture("output", size, blur.output)
+        self.memory, self.runs, self.counts = 0, [], {}
+
+    def draw(self, encoder, clock: timing.Clock | None) -> None:
+        """One frame, as the method draws it."""
+        raise NotImplementedError
+
+    def work(self) -> None:
+        """All passes at once."""
+        timing.work(self.blur.device, lambda encoder: self.draw(encoder, None))
+        self.memory = self.memory or _held() - self._held
+
+    def passes(self) -> None:
+        """All passes, each timed by itself."""
+        timing.work(self.blur.device, lambda encoder: self.draw(encoder, self.clock))
+        self.runs.append(self.clock.read())
+        self.counts = self.clock.counts
+
+
+class TimedScene(Timed):
+    """A method of scenes, on the first of two that it can draw: bodies, or volumes."""
+
+    def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
+        super().__init__(blur, clock, size)
+        for name in ("crossing", "torusphere"):
+            self._render = SceneFrame(builtin.make(name), size=size).render(blur)
+            with contextlib.suppress(InputError):
+                self.work()
+                return
+        raise InputError(f"method {blur.method.name!r} cannot draw any of the benchmark scenes")
+
+    def draw(self, encoder, clock):
+        """One frame of the scene."""
+        self._render.draw(self.output.create_view(), 0.0, timing=clock)
+
+
+class TimedFrame(Timed):
+    """A method of pictures, on one frame."""
+
+    parts = ("work", "passes", "call", "upload", "readback")
+
+    def __init__(self, blur: Blur, clock: timing.Clock, frame: Frame):
+        super().__init__(blur, clock, frame.size)
+        self.frame = frame
+        if "neighbours" in blur.method.uses:
+            near = {"prev": replace(frame, number=-1), "next": replace(frame, number=1)}
+            self.frame = replace(frame, **near)
+        self.views = blur.upload(self.frame)
+        self.bytes = _bytes(self.views, self.output)
+        self.work()
+
+    def draw(self, encoder, clock):
+        """One frame, from its textures."""
+        output = self.output.create_view()
+        self.blur.encode(encoder, output=output, timing=clock, **self.views)
+
+    def call(self) -> None:
+        """Arrays in, array out."""
+        self.blur(self.frame)
+
+    def upload(self) -> None:
+        """The frame's arrays as textures."""
+        self.blur.upload(self.frame)
+        timing.work(self.blur.device, lambda encoder: None)
+
+    def readback(self) -> None:
+        """The result as an array."""
+        self.images.download(self.blur.device.create_command_encoder(), self.output)
+
+
+def _held() -> int:
+    """Return the size of all textures and buffers of the process [bytes]."""
+    counts = wgpu.diagnostics.object_counts  # pyright: ignore[reportAttributeAccessIssue]
+    return counts.get_dict()["total"]["resource_mem"]
+
+
+def _bytes(views: dict, output: wgpu.GPUTexture) -> int:
+    """Return the size of the textures of `encode`'s inputs and the output [bytes]."""
+    every = [v for one in views.values() if isinstance(one, FrameViews) for v in vars(one).values()]
+    read = [v.texture for v in every if isinstance(v, wgpu.GPUTextureView)]
+    total = 0
+    for texture in (*read, output):
+        kind, channels = numpy_of(texture.format)
+        total += texture.size[0] * texture.size[1] * channels * kind.itemsize
+    return total
