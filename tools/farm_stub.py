@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import make_frames as make
-from wgmb.batch import BatchReport
+from wgmb.batch_report import BatchReport
 from wgmb.color_settings import ColorSettings
 from wgmb.farm_worker import Blurring
 from wgmb.io.settled import Settled

@@ -13,7 +13,8 @@ from ._version import __version__ as __version__
 
 TYPE_CHECKING = False  # typing's own, without the time that loading it takes
 if TYPE_CHECKING:
-    from .batch import BatchReport, blur_sequence, vectors_sequence
+    from .batch import blur_sequence, vectors_sequence
+    from .batch_report import BatchReport
     from .camera import Camera, Reprojections
     from .cone import Cone
     from .display import ColorConfig, ColorSpace, Display
@@ -78,7 +79,8 @@ __all__ = [
 ]
 
 _PLACES = {
-    "batch": ("BatchReport", "blur_sequence", "vectors_sequence"),
+    "batch": ("blur_sequence", "vectors_sequence"),
+    "batch_report": ("BatchReport",),
     "camera": ("Camera", "Reprojections"),
     "cone": ("Cone",),
     "display": ("ColorConfig", "ColorSpace", "Display"),

@@ -1,4 +1,4 @@
-"""Whole sequences: rendered frames through a Blur into files, and scenes into files.
+"""Whole sequences: rendered frames through a Blur into files.
 
 Three threads read, blur and write concurrently. At most IN_FLIGHT frames are in memory,
 however long the sequence. A failing frame is reported and skipped.
@@ -10,67 +10,19 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from html import escape
-from pathlib import Path
 
+from .batch_report import BatchReport, Progress
 from .errors import Error, GpuMemoryError, InputError
-from .frame import Frame
-from .io import exr
 from .io.clip import Clip
-from .io.frame_file import FrameFile
-from .io.frame_numbers import frame_list, has_view
+from .io.frame_numbers import has_view
 from .io.output import Output
 from .io.vector_output import VectorOutput
 from .pipeline import Blur
 from .rates import Conversion, ConversionStages
-from .render import Render
 from .stages import IN_FLIGHT, Handover, MotionStages, ReadFrame, Stages, StopError, reason
 
-
-@dataclass
-class BatchReport:
-    """Result of a run."""
-
-    done: list[int] = field(default_factory=list)
-    skipped: list[int] = field(default_factory=list)  # already there (resume)
-    failed: dict[int, str] = field(default_factory=dict)
-    stopped: str = ""  # why the rest was not tried, or there is no video
-    bad: dict[int, dict[str, int]] = field(default_factory=dict)  # pixels not finite, by input
-    absent: list[str] = field(default_factory=list)  # masks that no frame has; see Clip.absent
-
-    def __repr__(self) -> str:
-        counts = {"done": self.done, "already there": self.skipped, "failed": self.failed}
-        told = [f"{len(numbers)} {word}" for word, numbers in counts.items() if numbers]
-        why = f", stopped: {self.stopped[:200]}" if self.stopped else ""
-        return f"BatchReport({', '.join(told) or 'nothing done'}{why})"
-
-    def _repr_html_(self) -> str:
-        rows = [("done", frame_list(self.done)), ("already there", frame_list(self.skipped))]
-        failed = sorted(self.failed.items())
-        rows += [(f"frame {number} failed", why) for number, why in failed[:MOST_ROWS]]
-        if more := failed[MOST_ROWS:]:
-            rows.append(("failed too", frame_list([number for number, _ in more])))
-        for number, counts in sorted(self.bad.items())[:MOST_ROWS]:
-            what = ", ".join(f"{count} of {name}" for name, count in counts.items())
-            rows.append((f"frame {number}: pixels that are not finite", what))
-        rows += [("stopped", self.stopped)] + [("in no frame", name) for name in self.absent]
-        told = [(head, text) for head, text in rows if text]
-        return "<table>{}</table>".format(
-            "".join(
-                f'<tr><th style="text-align:left">{escape(head)}</th>'
-                f'<td style="text-align:left">{escape(text)}</td></tr>'
-                for head, text in told or [("done", "nothing")]
-            )
-        )
-
-
-MOST_ROWS = 20  # of a report in a notebook, of a kind
 HOPELESS = 3  # frames one after the other that cannot be written for the same reason
 ON_REQUEST = "on request"  # why a run stopped whose `stop` was set
-
-Progress = Callable[[int, str], None]
-"""Called with a frame's number and "done", "skipped" or "failed"."""
 
 
 def blur_sequence(
@@ -307,60 +259,3 @@ def vectors_sequence(
     """
     stages = MotionStages(clip, blur or Blur("tap"), all_views=output.takes_views)
     return _Pipeline(stages, output, resume, progress, stop).run()
-
-
-def render_frames(
-    render: Render,
-    moments: dict[int, float],
-    output: Output,
-    sharp: bool,
-    passes: bool,
-    confidence: bool,
-    resume: bool,
-    progress: Progress | None,
-) -> int:
-    """Render every moment into `output`; returns how many were there already (`resume`).
-
-    `sharp`: without blur. `passes`: EXR with all that `wgmb blur` can use. `confidence`: EXR
-    with how sure the method is.
-    """
-    progress, skipped = progress or (lambda number, state: None), 0
-    for number, time in moments.items():
-        if resume and output.done(number):
-            skipped += 1
-            progress(number, "skipped")
-            continue
-        seen = render.frame(time, number, light=True) if passes else None
-        planes = {}
-        if confidence:
-            result, planes = render.with_confidence(time, number)
-        else:
-            result = render.sharp(time) if sharp else render(time, number)
-        source = (
-            _with_passes(render, seen, number)
-            if passes and seen
-            else FrameFile(number, Path(), None, {}, {})
-        )
-        output.write(result, source, planes)
-        progress(number, "done")
-    output.close()
-    return skipped
-
-
-def _with_passes(render: Render, frame: Frame, number: int) -> FrameFile:
-    """A frame's passes as layers that io/clip.py finds by their names."""
-    motion = render.blur.motion(frame)
-    assert frame.depth is not None and frame.normal is not None and frame.object_id is not None
-    channels = {name: frame.color[..., i] for i, name in enumerate("RGBA")}
-    channels |= {"Z": frame.depth, "object_id.X": frame.object_id}
-    channels |= {f"normal.{c}": frame.normal[..., i] for i, c in enumerate("XYZ")}
-    names = ("to_prev.x", "to_prev.y", "to_next.x", "to_next.y")
-    channels |= {name: motion[..., i] for i, name in enumerate(names)}
-    for layer, light in (("DiffDir", frame.diffuse_light), ("DiffCol", frame.diffuse_color)):
-        if light is not None:
-            channels |= {f"{layer}.{c}": light[..., i] for i, c in enumerate("RGB")}
-    width, height = frame.size
-    window = (0, 0, width - 1, height - 1)
-    part = exr.Part("", channels, {}, window, window)
-    file, origin = exr.Exr(Path(), [part]), {name: (part, name) for name in channels}
-    return FrameFile(number, Path(), file, channels, {}, part=part, origin=origin)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .batch import Progress
+from .batch_report import Progress
 from .errors import InputError
 from .extras import needed_by
 from .farm_crew import SMALLEST, Place, hardware_adapters

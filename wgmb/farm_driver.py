@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from .batch import ON_REQUEST, Progress
+from .batch import ON_REQUEST
+from .batch_report import Progress
 from .errors import DeviceError, Error, InputError
 from .farm_crew import Part, Place, Worker, size_of_part
 from .io.frame_numbers import frame_list

@@ -18,7 +18,7 @@ from typing import Any
 from distributed import Worker, WorkerPlugin, get_worker
 
 from ._version import __version__
-from .batch import Progress
+from .batch_report import Progress
 from .errors import DeviceError, Error
 from .io.settled import Range, numbers
 from .job_file import of_text

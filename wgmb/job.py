@@ -15,7 +15,8 @@ from typing import Any
 
 from . import gpu
 from ._version import __version__
-from .batch import Progress, blur_sequence, convert_sequence
+from .batch import blur_sequence, convert_sequence
+from .batch_report import Progress
 from .color_settings import ColorSettings, color_record
 from .display import ColorSpace, Display
 from .errors import InputError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from .batch import BatchReport
+from .batch_report import BatchReport
 from .io.clip import Clip
 
 

@@ -15,7 +15,7 @@ import wgpu
 
 from . import gpu
 from .background import Behind, ahead
-from .batch import Progress
+from .batch_report import Progress
 from .coding import CodedPicture, Coding
 from .exposer import Exposer
 from .exposure import Cell

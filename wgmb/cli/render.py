@@ -9,11 +9,11 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from .._version import __version__
-from ..batch import render_frames
 from ..color_settings import DisplaySettings, color_record
 from ..errors import InputError
 from ..job import check_confidence
 from ..render import Render
+from ..scene_batch import render_frames
 from ..settings import SceneSettings, plain, size_of
 from .exit_codes import DONE
 from .options import BlurOptions, Look, Moments, SceneName, Shown, ShutterOptions, Target, When
