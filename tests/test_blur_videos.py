@@ -91,7 +91,7 @@ def test_finished_videos_are_kept_with_resume(folder, capsys):
         (["in/*.mpg", "-o", "o/"], "in/*.mpg: no such files"),
         (["other", "-o", "o/"], "other: a folder without videos"),
         (["in", "-o", "there/"], "there/b.mkv exists; --overwrite"),
-        (["-o", "o/"], "what is to be blurred"),
+        (["-o", "o/"], "no input"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_before_any_work(folder, capsys, words, said):

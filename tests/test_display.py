@@ -206,7 +206,8 @@ def test_a_config_without_the_role_is_understood_by_names_that_tell(tmp_path):
 def test_a_config_that_says_nothing_of_its_primaries_is_one_line(tmp_path):
     config = ColorConfig(film_config(tmp_path, name="scene", alias="ours"))
     with pytest.raises(
-        InputError, match=r"no role aces_interchange.*by chromaticities; `space` names it"
+        InputError,
+        match=r"neither the role aces_interchange.*`space` names their space",
     ):
         config.space_of({"chromaticities": AP1})
     assert config.space("ours").is_linear

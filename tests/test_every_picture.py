@@ -380,7 +380,7 @@ def test_volumes_are_said_to_be_points(tmp_path):
 
 def test_channels_with_other_numbers_of_samples_are_damage():
     channels = one_pixel(R=(1, 2), Z=(1,))
-    with pytest.raises(InputError, match="R and Z have not the same samples"):
+    with pytest.raises(InputError, match="R and Z do not have the same samples"):
         deep.flatten(channels)
 
 

@@ -213,11 +213,11 @@ def test_light_above_white_is_refused(tmp_path, capsys):
     make.write_exr(tmp_path / "a.1.exr", make.frame(1))
     words = ["-o", tmp_path / "b.1.exr", "--highlights", 8]
     text = run(capsys, "blur", tmp_path / "a.1.exr", *words, code=2)
-    assert "--highlights is for pictures that end at white" in text and text.count("\n") == 1
+    assert "--highlights is for pictures clipped at white" in text and text.count("\n") == 1
     pq = clips.write(tmp_path / "a.mp4", tags=(1, 9, 16, 9))
     words = ["-o", tmp_path / "b.mp4", "--flow", "none", "--highlights", 8, "-q"]
     text = run(capsys, "blur", pq, *words, code=2)
-    assert "--highlights is for videos that end at white, not for HDR" in text
+    assert "--highlights is for videos clipped at white, not for HDR" in text
     assert make.names_in(tmp_path) == ["a.1.exr", "a.mp4"]
     with pytest.raises(InputError, match=r"up to 1\.5 times white"):
         expanded(np.full((2, 2, 3), 1.5, "f4"), 8.0)

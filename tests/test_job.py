@@ -216,7 +216,7 @@ def own(desk, capsys):
         (lambda f: (f / "shot.0005.exr").write_bytes(b""), "4", "shot.0005.exr has changed"),
         (lambda f: (f / "shot.0003.exr").unlink(), "2-3", "shot.0003.exr is gone"),
         (lambda f: os.utime(f / "shot.0008.exr", (0, 0)), "3", "shot.0008.exr has changed"),
-        (lambda f: shutil.copy(f / "shot.0001.exr", f / "shot.0009.exr"), "8", "0009.exr was not"),
+        (lambda f: shutil.copy(f / "shot.0001.exr", f / "shot.0009.exr"), "8", "0009.exr did not"),
     ],
     ids=["frame", "neighbour", "cut off", "gone", "looked at", "new neighbour"],
 )  # fmt: skip
@@ -270,11 +270,11 @@ def test_a_curve_that_changes_is_told(desk, capsys, shot):
     [
         ("--job none.json", "none.json: no such file"),
         ("--job shot.json --frames 8-12", "9-12 are not in the job, which has 1-8"),
-        ("--job shot.json --shutter 90", "--job has all settings"),
-        ("--job shot.json -o x.####.exr", "--job has all settings"),
-        ("in/shot.####.exr --job shot.json", "--job has all settings"),
+        ("--job shot.json --shutter 90", "--job holds all settings"),
+        ("--job shot.json -o x.####.exr", "--job holds all settings"),
+        ("in/shot.####.exr --job shot.json", "--job holds all settings"),
         ("in/shot.####.exr", "--output is missing"),
-        ("-o x.####.exr", "what is to be blurred?"),
+        ("-o x.####.exr", "no input"),
     ],
 )
 def test_words_that_do_not_go_with_a_job_are_one_line(own, capsys, words, says):

@@ -308,8 +308,11 @@ def test_times_of_the_input_do_not_stay_in_headers(tmp_path, capsys):
         ("--fps-in 0 --fps 60", "--fps-in must be 0.001 to 1000"),
         ("--fps-in 240 --fps 60 --frames 1-9x2", "--fps-in needs frames that follow each other"),
         ("--fps-in 240 --fps 60 --rolling down", "a rolling shutter needs frames of the output's"),
-        ("--fps-in 240 --fps 60 --confidence", "--confidence is of single frames"),
-        ("--fps-in 240 --fps 60 --workers 2", "--fps-in does not go with --workers or --cluster"),
+        ("--fps-in 240 --fps 60 --confidence", "--confidence cannot be combined with --fps-in"),
+        (
+            "--fps-in 240 --fps 60 --workers 2",
+            "--fps-in cannot be combined with --workers or",
+        ),
     ],
 )
 def test_what_does_not_go_together_is_refused_in_one_line(tmp_path, capsys, quick, options, why):
@@ -327,8 +330,8 @@ def test_videos_and_jobs_have_no_rate_of_their_frames(tmp_path, capsys):
     assert "--fps-in is for rendered frames" in err
     code, _, err = make.inside(capsys, "blur", "--job", tmp_path / "j.json", "--fps-in", "240")
     assert (code, err.count("\n")) == (2, 1)
-    assert "--job has all settings" in err
+    assert "--job holds all settings" in err
     words = "job", tmp_path / "x.####.exr", "-o", tmp_path / "o.####.exr", "-j", tmp_path / "j.json"
     code, _, err = make.inside(capsys, *words, "--fps-in", "240", "--fps", "60")
     assert (code, err.count("\n")) == (2, 1)
-    assert "--fps-in does not go into job files" in err and "wgmb blur" in err
+    assert "job files do not support --fps-in" in err and "wgmb blur" in err

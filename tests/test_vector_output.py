@@ -209,11 +209,11 @@ def test_of_stereo_frames_one_view_goes_into_a_file(tmp_path, capsys):
         line = ("vectors", pattern, "-o", tmp_path / f"{name}.####.exr", "--as", "nuke", *more)
         code, _, err = make.inside(capsys, *line)
         assert code == 0
-        assert ("only of view right" in err) == (not more)
+        assert ("only view right" in err) == (not more)
     line = ("vectors", pattern, "-o", tmp_path / "%V.####.exr", "--as", "nuke")
     code, _, err = make.inside(capsys, *line)
     assert code == 0
-    assert "only of view" not in err
+    assert "only view" not in err
     for name, view in (("d", "right"), ("l", "left"), ("right", "right"), ("left", "left")):
         path = tmp_path / f"{name}.0002.exr"
         got = vectors.read(make.plain_read(path), Vectors("nuke"))

@@ -120,7 +120,7 @@ def test_the_same_channel_of_two_views_is_no_clash():
     [
         ([part_of("", "R right.R G", multiView=["right", "left"])], "R and right.R are both R"),
         ([part_of("", "a.left.Z left.a.Z", multiView=NUKE)], "a.left.Z and left.a.Z are both a.Z"),
-        ([part_of("x", "R"), part_of("y", "R", view="left")], "'x', must say .*: left"),
+        ([part_of("x", "R"), part_of("y", "R", view="left")], "'x', must name its view.*: left"),
         ([part_of("", "R a.b.R", multiView=["right", "a.b"])], "no periods or blanks.*'a.b'"),
         ([part_of("", "R", multiView=["right", "le ft"])], "no periods or blanks.*'le ft'"),
     ],

@@ -133,7 +133,7 @@ class ColorConfig:
     def scene_linear(self) -> ColorSpace:
         """The space of the role scene_linear, which pictures in other spaces are blurred in."""
         if not self._config.hasRole("scene_linear"):
-            raise InputError(f"{self.name} has no role scene_linear to make pictures linear in")
+            raise InputError(f"{self.name} has no role scene_linear, in which pictures are blurred")
         name = self._config.getColorSpace("scene_linear").getName()
         return ColorSpace(self, name, "the role scene_linear")
 
@@ -256,9 +256,9 @@ class ColorConfig:
                 return ColorSpace(self, found.getName(), why)
         if self._interchange is None:
             raise InputError(
-                f"{self.name} has no role aces_interchange, nor a space whose name tells its "
-                f"primaries (ACEScg, lin_rec709, ...), to tell what a picture means by {why}; "
-                "`space` names it"
+                f"{self.name} has neither the role aces_interchange nor a space of known primaries "
+                f"(ACEScg, lin_rec709, ...), so the colours cannot be found by {why}; `space` "
+                "names their space"
             )
         name, known = self._interchange
         matrix = conversion(primaries, known)

@@ -32,7 +32,7 @@ def check(highlights: float) -> None:
 def check_coding(highlights: float, path: Path, coding: Coding) -> None:
     """InputError for a video that holds light above white."""
     if highlights != 1 and coding.transfer in (PQ, HLG):
-        raise InputError(f"{path}: `highlights` is for videos that end at white, not for HDR")
+        raise InputError(f"{path}: `highlights` is for videos clipped at white, not for HDR")
 
 
 def expanded(rgba: np.ndarray, highlights: float) -> np.ndarray:
@@ -43,7 +43,9 @@ def expanded(rgba: np.ndarray, highlights: float) -> np.ndarray:
     brightest = _brightest(rgba)
     if np.any(brightest > _WHITE):
         most = float(brightest.max())
-        raise InputError(f"holds light up to {most:.3g} times white, so `highlights` is not for it")
+        raise InputError(
+            f"holds light up to {most:.3g} times white, so `highlights` does not apply"
+        )
     knee, bend = _curve(highlights)
     over = np.maximum(brightest - knee, 0)
     bent = np.minimum(over, 1 - knee)

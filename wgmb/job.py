@@ -72,7 +72,7 @@ class Asked:
         if made.step == 1:
             return None
         if self.confidence:
-            raise InputError("`confidence` is of single frames; it does not go with `fps_in`")
+            raise InputError("`confidence` cannot be combined with `fps_in`")
         if self.when.make().rolling is not None:
             raise InputError("a rolling shutter needs frames of the output's own rate")
         return made
@@ -270,11 +270,11 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
         check_highlights(video.highlights)
         if Path(asked.pattern).suffix.lower() not in STILLS:
             raise InputError(
-                f"{asked.pattern}: `highlights` is for pictures that end at white, such as PNG; "
+                f"{asked.pattern}: `highlights` is for pictures clipped at white, such as PNG; "
                 "EXR holds light above it"
             )
         if asked.color.space(shown) is not None:
-            raise InputError("`highlights` is for sRGB pictures, not for those with `from_`")
+            raise InputError("`highlights`, for sRGB pictures, cannot be combined with `from_`")
         settings["highlights"] = video.highlights
     if how:
         settings["flow"] = how

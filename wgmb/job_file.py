@@ -53,7 +53,7 @@ class Stored:
         for number in sorted(_needed(self.job, chosen)):
             if number not in there:
                 if is_pattern(clip.pattern) and (new := clip.files(number)[0]).is_file():
-                    raise InputError(f"{new} was not there when {name} was written; {_AGAIN}")
+                    raise InputError(f"{new} did not exist when {name} was written; {_AGAIN}")
                 continue
             known = self.inputs.get(number, [])
             for i, path in enumerate(clip.files(number)):

@@ -63,7 +63,7 @@ def _blenders_config() -> Path:
     found = [file for folder in folders for file in sorted(Path(folder).glob(_BLENDER))]
     if not found:
         raise InputError(
-            "config blender: neither the module bpy nor the program blender is here; name the "
+            "config blender: neither the module bpy nor the program blender was found; name the "
             "file datafiles/colormanagement/config.ocio in Blender's folder instead"
         )
     return found[-1]

@@ -175,7 +175,7 @@ class _Sum:
         mine, its = self._source, result.source
         if its.display_window != mine.display_window or len(its.color) != len(mine.color):
             raise InputError(
-                f"{its.path}: its size or channels are not those of {mine.path.name}, "
+                f"{its.path}: its size or channels differ from those of {mine.path.name}, "
                 "with which it shares an exposure"
             )
         placement = result.placement or Placement(result.canvas, result.canvas)

@@ -19,12 +19,12 @@ from .motion_source import MotionSource
 
 @dataclass(frozen=True, kw_only=True)
 class FlowSettings:
-    """Where the motion of pictures comes from."""
+    """Source of the motion of pictures."""
 
     flow: Literal["auto", "search", "dis", "none"] = "auto"
-    "Where motion comes from: search (best), dis (quick, OpenCV), none (pictures are averaged)."
+    "Source of the motion: search (best), dis (quick, OpenCV), none (pictures are averaged)."
     flow_quality: Literal["best", "fast"] = "best"
-    "Motion: best, or fast."
+    "Quality of the motion: best or fast."
 
     @property
     def method(self) -> str:
@@ -73,15 +73,15 @@ class VideoSettings(FlowSettings):
     streams: Literal["all", "video"] = "all"
     "Streams of the output: all (sound, subtitles, chapters are copied), or the video alone."
     duplicates: Literal["keep", "fill"] = "keep"
-    "Repeated pictures: keep, or fill (motion goes on over them)."
+    "Repeated pictures: keep, or fill (motion continues over them)."
     highlights: float = 1.0
-    "Of videos and 8-bit pictures: times white that white counts as in the blur, such as 8; 1: off."
+    "Videos, 8-bit pictures: brightness of white in the blur, in multiples of white, 1 (off) to 32."
     codec: str | None = None
-    "Codec of the video: h264, h265, av1, vp9, prores, ffv1; default: by the name's suffix."
+    "Codec of the video: h264, h265, av1, vp9, prores, ffv1; default: by the suffix of the name."
     quality: int | None = None
-    "The encoder's number of constant quality: smaller is better and larger."
+    "Constant quality on the encoder's scale: a smaller number is a better and larger video."
     encoder: Literal["nvenc", "qsv", "amf"] | None = None
-    "Encode in hardware; software by default."
+    "Hardware encoder; by default the encoding is done in software."
 
     @property
     def pace(self) -> Fraction:

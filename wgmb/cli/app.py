@@ -25,16 +25,16 @@ from . import terminal
 from .exit_codes import DONE, INTERRUPTED, NO_DEVICE, SOME_FAILED, USAGE
 
 COMMANDS = {
-    "blur": "Blur rendered frames, or videos.",
+    "blur": "Blur rendered frames or videos.",
     "job": "Write a job file, from which any machine can blur any part of a sequence.",
     "render": "Render a built-in scene with motion blur.",
     "view": "View a scene, frames or a video interactively.",
-    "info": "Describe a frame: layers, sizes, motion vector convention, speeds.",
-    "vectors": "Write the motion of frames as other programs store it.",
-    "devices": "List the GPUs that --adapter (or WGMB_ADAPTER) can choose; * is the default.",
+    "info": "Describe a frame or a video: layers, sizes, motion vector convention, speeds.",
+    "vectors": "Write the motion of frames in the form of another program.",
+    "devices": "List the GPUs for --adapter (or WGMB_ADAPTER); * is the default.",
     "compare": "Score and time methods against a ground truth; write an HTML, JSON and CSV report.",
-    "bench": "Time methods on this machine: median milliseconds per frame; transfers separately.",
-    "perceive": "Simulate what a viewer perceives: each frame is held, and earlier ones fade.",
+    "bench": "Time methods on this machine: median milliseconds per frame, transfers apart.",
+    "perceive": "Simulate a viewer's perception: each frame is held, and earlier ones fade.",
     "shutter": "Draw a shutter: its curve, its integral, and the sum of neighbouring windows.",
 }
 """Every command, wgmb/cli/NAME.py, and the first line of its help."""
@@ -48,15 +48,24 @@ def make_app(*whole: str) -> cyclopts.App:
     app = cyclopts.App(
         name="wgmb",
         version=__version__,
-        help="GPU motion blur for rendered frames.\n\n"
+        help="Motion blur on the GPU, for rendered frames and videos.\n\n"
         "Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180",
         result_action="return_value",
         suppress_keyboard_interrupt=False,
-        default_parameter=Parameter(negative=()),
+        default_parameter=Parameter(negative=(), show_default=_default),
     )
     for name, line in COMMANDS.items():
         app.command(f"wgmb.cli.{name}:{name}", name=name, help=None if name in whole else line)
     return app
+
+
+def _default(value: object) -> str | None:
+    """A default as the help shows it; None for flags, empty lists and options without one."""
+    if value is None or value == () or isinstance(value, bool):
+        return None
+    if isinstance(value, tuple):
+        return " ".join(f"{part:g}" for part in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -34,7 +34,7 @@ def bench(
     adapter: str | None = None,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
-    """Time methods on this machine: median milliseconds per frame; transfers separately.
+    """Time methods on this machine: median milliseconds per frame, transfers apart.
 
     Example: wgmb bench --methods tap,reproject --size 960x540 1920x1080 --samples 4,16,64
 

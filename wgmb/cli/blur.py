@@ -1,4 +1,4 @@
-"""`wgmb blur`: rendered frames."""
+"""`wgmb blur`: rendered frames and videos."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def blur(
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
-    """Blur rendered frames, or videos.
+    """Blur rendered frames or videos.
 
     Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180 --frames 1-100
 
@@ -72,17 +72,17 @@ def blur(
     Parameters
     ----------
     patterns
-        Frames to blur: shot.####.exr, shot.%04d.exr, or one file. Or videos: files, folders, or
-        patterns such as 'clips/*.mp4'; for several, the output is a folder, or a name with {name}.
+        Frames: shot.####.exr, shot.%04d.exr, or one file. Or videos: files, folders, or patterns
+        such as 'clips/*.mp4'; for several, the output is a folder, or a name with {name}.
     job
-        Job file of `wgmb job`, which has all settings; --frames takes a part of it.
+        Job file of `wgmb job`, which holds all settings; --frames selects a part of the frames.
     workers
-        Processes that share the frames on this machine; auto: one for each GPU.
+        Number of processes on this machine that share the frames; auto: one for each GPU.
     cluster
         Scheduler of dask.distributed whose workers share the frames, such as tcp://farm:8786.
     fps_in
-        Frames per second of rendered frames that become --fps: each is blurred by its own vectors
-        over its share of an exposure. Output numbers count from the first input frame on.
+        Frames per second of the rendered frames, if --fps is another rate: each is blurred by its
+        own vectors over its share of an exposure. Output numbers begin with the first input number.
     confidence
         Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config
@@ -100,12 +100,12 @@ def blur(
         plain = InputOptions(), BlurOptions(), ShutterOptions(), ColorSettings(), VideoSettings()
         if patterns or confidence or fps_in or config or rest != (*plain, None):
             raise InputError(
-                "--job has all settings; only --frames, --workers, --cluster, --adapter, --verbose "
-                "and --quiet go with it"
+                "--job holds all settings; only --frames, --workers, --cluster, --adapter, "
+                "--verbose and --quiet can be combined with it"
             )
         return blur_job(job, given.frames, crew, adapter, verbose, quiet)
     if not patterns:
-        raise InputError("what is to be blurred? name frames such as 'shot.####.exr', or a video")
+        raise InputError("no input: name frames such as 'shot.####.exr', or a video")
     if output is None:
         raise InputError("--output is missing, such as -o 'blurred.####.exr'")
     when, pattern = when.resolved(), patterns[0]
@@ -134,7 +134,7 @@ def blur(
         fps_in=fps_in,
     )
     if crew and asked.conversion:
-        raise InputError("--fps-in does not go with --workers or --cluster")
+        raise InputError("--fps-in cannot be combined with --workers or --cluster")
     made = settle(asked, adapter)
     if crew:
         return blur_on_farm(made, *crew, adapter, verbose, quiet)

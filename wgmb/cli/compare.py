@@ -101,7 +101,7 @@ def compare(
     Parameters
     ----------
     scene
-        Built-in scenes, NAME[:SETTING=VALUE]...
+        Built-in scenes, NAME[:PARAMETER=VALUE]...
     output
         Report file, .html; JSON and CSV files are written next to it.
     size
@@ -112,7 +112,7 @@ def compare(
         Antialiasing of the scenes' sharp frames: rays per pixel side.
     truth
         Ground truth of the blurred frame: one file, or two rendered with half the samples and
-        different seeds; their mean is the truth, their difference gives its noise floor.
+        different seeds, whose mean is the truth and whose difference gives the noise floor.
     inputs
         Rendered frames: a pattern, or the files of the frame before, this one and the next.
     frame

@@ -9,7 +9,7 @@ from .terminal import out
 
 
 def devices() -> int:
-    """List the GPUs that --adapter (or WGMB_ADAPTER) can choose; * is the default.
+    """List the GPUs for --adapter (or WGMB_ADAPTER); * is the default.
 
     Example: WGMB_ADAPTER=llvmpipe wgmb devices
     """

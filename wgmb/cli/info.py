@@ -37,15 +37,15 @@ def info(
     output: Annotated[Path | None, Parameter(alias="-o")] = None,
     overwrite: bool = False,
 ) -> int:
-    """Describe a frame: layers, sizes, motion vector convention, speeds.
+    """Describe a frame or a video: layers, sizes, motion vector convention, speeds.
 
     Example: wgmb info 'shot.####.exr' --frames 10 -o motion.png
 
     Parameters
     ----------
     pattern
-        File or pattern; describes the first frame and tests its vectors against the neighbours. Or
-        a video: its streams, times and colours.
+        File or pattern, whose first frame is described, its vectors tested on the neighbours; or a
+        video, whose streams, times and colours are described.
     output
         Draw the motion as an image: hue is direction, brightness is speed.
     overwrite

@@ -67,11 +67,11 @@ def job(
     pattern
         Frames to blur, as for `wgmb blur`.
     file
-        The job file to write, .json; another job is replaced.
+        The job file to write, .json; an older job file is replaced.
     chunk
-        Frames that one machine does at a time.
+        Number of frames in a part.
     openjd
-        Also write an OpenJD template, .yaml, in the folder of the job file.
+        Also write an OpenJD template, .yaml, into the folder of the job file or one above it.
     slurm
         Also write a script for sbatch, .sh.
     confidence
@@ -79,7 +79,7 @@ def job(
     config
         TOML file with options in its table [blur], as saved by `wgmb view`.
     adapter
-        GPU by which --flow auto chooses, if the frames hold no motion.
+        GPU for the choice of --flow auto, if the frames hold no motion.
     quiet
         Print errors only.
     """
@@ -87,7 +87,7 @@ def job(
         raise InputError(f"{pattern}: a video is read by one process; `wgmb blur` blurs it")
     if fps_in is not None:
         raise InputError(
-            "`fps_in` does not go into job files: `wgmb blur` makes frames of another rate"
+            "job files do not support `fps_in`; use `wgmb blur` for frames of another rate"
         )
     if chunk < 1:
         raise InputError(f"--chunk must be 1 frame or more, got {chunk}")

@@ -44,8 +44,8 @@ class BlurOptions(BlurSettings):
         tuple[str, ...],
         Parameter(
             alias="--keep",
-            help="Pixels to keep sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte; "
-            "names may have wildcards) or an image file; may be repeated.",
+            help="Pixels that stay sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte; "
+            "names may have wildcards), an image file, or static (videos); may be repeated.",
         ),
     ] = ()
 
@@ -60,8 +60,7 @@ class BlurOptions(BlurSettings):
     method: Annotated[
         str | None,
         Parameter(
-            help=f"{', '.join(METHODS)}; default: gather if there is depth or motion is searched, "
-            "else tap."
+            help=f"{', '.join(METHODS)}; default: gather with depth or searched motion, else tap."
         ),
     ] = None
 
@@ -73,8 +72,8 @@ class ShutterOptions(ShutterSettings):
     phase: Annotated[
         str,
         Parameter(
-            help=f"Part of the exposure at the frame's time: {', '.join(PHASES)}; "
-            "or the time of its middle in frame intervals."
+            help=f"Position of the frame's instant in the exposure: {', '.join(PHASES)}; "
+            "or the time of the exposure's middle in frame intervals."
         ),
     ] = "centre"
     curve: Annotated[

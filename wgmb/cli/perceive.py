@@ -1,4 +1,4 @@
-"""`wgmb perceive`: simulate what a viewer perceives."""
+"""`wgmb perceive`: simulate a viewer's perception."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def perceive(
     adapter: str | None = None,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
-    """Simulate what a viewer perceives: each frame is held, and earlier ones fade.
+    """Simulate a viewer's perception: each frame is held, and earlier ones fade.
 
     A scene name instead of files simulates continuous time, at --nature images per second. The
     pictures of a video are held for their own times.
@@ -97,7 +97,7 @@ def perceive(
             raise InputError(f"--report takes no input, got {pattern!r}")
         return _report(output, who, speed, quiet)
     if pattern is None:
-        raise InputError("perceive needs frames, a scene, or --report")
+        raise InputError("perceive needs frames, a video, a scene, or --report")
     if speed is not None:
         raise InputError("--speed needs --report")
     if output.resume:

@@ -32,9 +32,9 @@ def shutter(
     Parameters
     ----------
     output
-        An .svg file.
+        Name of the drawing, .svg.
     overwrite
-        Replace it if it exists.
+        Replace an existing file.
     """
     if output.suffix.lower() != ".svg":
         raise InputError(f"output {output}: the name must end in .svg")

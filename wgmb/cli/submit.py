@@ -27,8 +27,8 @@ def openjd(template: Path, job_file: Path, numbers: Sequence[int], chunk: int) -
         path = job_file.resolve().relative_to(template.parent.resolve())
     except ValueError:
         raise InputError(
-            f"{template} must lie in the folder of {job_file}, or above it, as OpenJD looks for "
-            "files from there on"
+            f"{template} must lie in the folder of {job_file}, or above it, because "
+            "OpenJD looks for files from there"
         ) from None
     found = ranges(sorted(numbers))
     frames = openjd_ranges(found)

@@ -26,7 +26,7 @@ def vectors(
     *,
     output: Annotated[str, Parameter(alias="-o")],
     program: Annotated[
-        str, Parameter(name="--as", help=f"Program that will read them: {', '.join(PROGRAMS)}.")
+        str, Parameter(name="--as", help=f"Form of the vectors: {', '.join(PROGRAMS)}.")
     ],
     max_displace: float | None = None,
     overwrite: bool = False,
@@ -35,7 +35,7 @@ def vectors(
     verbose: Annotated[bool, Parameter(alias="-v")] = False,
     quiet: Annotated[bool, Parameter(alias="-q")] = False,
 ) -> int:
-    """Write the motion of frames as other programs store it.
+    """Write the motion of frames in the form of another program.
 
     Example: wgmb vectors 'shot.####.exr' -o 'mv.####.exr' --as rsmb
 
@@ -46,11 +46,11 @@ def vectors(
     output
         Pattern or file: .exr (32-bit floats); rsmb also .png or .tif of 16 bits.
     max_displace
-        rsmb: motion in pixels that 0 and 1 stand for; default: 2048.
+        rsmb: motion in pixels that 0 and 1 encode; default: 2048.
     overwrite
         Replace existing files.
     resume
-        Keep finished frames; write those again whose settings or inputs have changed.
+        Keep finished frames; write frames with changed settings or inputs again.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     verbose
@@ -87,6 +87,6 @@ def vectors(
         for number, count in sorted(files.clipped.items()):
             note(f"frame {number}: clipped {count} pixels that move over --max-displace")
         if len(clip.chosen) > 1 and not files.takes_views:
-            note(f"only of view {clip.chosen[0]}; %V in the output's name writes a file of each")
+            note(f"wrote only view {clip.chosen[0]}; %V in the output's name makes a file for each")
     took = f"{time.perf_counter() - started:.1f} s"
     return conclude(Outcome.of(clip, report), files.pattern, took, quiet, verbose)

@@ -39,8 +39,11 @@ def view(
     """View a scene, frames or a video interactively.
 
     Example: wgmb view wheel
+
     Example: wgmb view 'shot.####.exr' --method reproject
+
     Example: wgmb view clip.mp4 --flow dis --fps 60
+
     Example: wgmb view game.mp4 --speed 0.5 --keep static
 
     Parameters

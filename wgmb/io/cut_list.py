@@ -114,7 +114,7 @@ def _read_edl(path: Path, fps: float | None) -> set[int]:
             if int(frames) >= nominal:
                 raise InputError(
                     f"{path}: timecode {hours}:{minutes}:{seconds}{mark}{frames} is not one of "
-                    f"{nominal} frames per second; {path}@25 would say 25"
+                    f"{nominal} frames per second; {path}@25 sets 25"
                 )
             passed = 3600 * int(hours) + 60 * int(minutes) + int(seconds)
             edges.add(nominal * passed + int(frames))

@@ -47,7 +47,7 @@ def flatten(channels: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         if name == first:
             counts[filled] = lengths
         elif not np.array_equal(lengths, counts[filled]):
-            raise InputError(f"channels {first} and {name} have not the same samples")
+            raise InputError(f"channels {first} and {name} do not have the same samples")
         values[name] = np.concatenate(there) if there else np.empty(0, np.float32)
     starts = np.cumsum(counts) - counts
     orders: dict[str | None, np.ndarray] = {}

@@ -96,7 +96,7 @@ class Footage:
     def _check_size(self, stream: VideoStream, max_mb: float) -> None:
         width, height = stream.codec_context.width, stream.codec_context.height
         if not (width and height):
-            raise InputError(f"{self.path}: does not tell the size of its pictures: is it cut off?")
+            raise InputError(f"{self.path}: its pictures have no size; it may be cut off")
         if not (0 < width <= limits.MOST_PIXELS_A_SIDE and 0 < height <= limits.MOST_PIXELS_A_SIDE):
             raise InputError(
                 f"{self.path}: pictures of {width} x {height}, expected 1 to "

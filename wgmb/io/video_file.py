@@ -192,7 +192,7 @@ def _why(path: Path, encoding: Encoding, error: Exception) -> Exception:
     kind = encoding.encoder.name.rsplit("_", 1)[-1]
     if "avcodec_open" in str(getattr(error, "filename", "")) and kind in HARDWARE:
         return InputError(
-            f"encoder {encoding.encoder.name} does not start: it needs its maker's graphics "
-            "hardware and driver; one of software needs none"
+            f"encoder {encoding.encoder.name} does not start: it needs the "
+            "hardware and the driver of its maker; a software encoder needs neither"
         )
     return atomic.about(path, error)

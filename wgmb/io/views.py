@@ -81,12 +81,12 @@ def names_of(file: Exr) -> tuple[str, ...]:
             found[name] = None
             if view is None and (not name or "." in name or name != "".join(name.split())):
                 raise InputError(
-                    f"{file.path}: the name of a view has no periods or blanks, got {name!r}"
+                    f"{file.path}: the name of a view must have no periods or blanks, got {name!r}"
                 )
     if found and _view(file.parts[0]) is None and not _multi(file.parts[0]):
         raise InputError(
-            f"{file.path}: the first part, {file.parts[0].name!r}, must say of which view it is, "
-            f"as others do: {', '.join(found)}"
+            f"{file.path}: the first part, {file.parts[0].name!r}, must name its view, "
+            f"as the others do: {', '.join(found)}"
         )
     return tuple(found)
 

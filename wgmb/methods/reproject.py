@@ -64,7 +64,7 @@ class Reproject:
             "the blurred image, or the share of slices that reached a pixel",
         ] = "color"
         facing: Annotated[
-            bool, "published: drop surfaces facing away from the interpolated camera"
+            bool, "published: drop surfaces that face away from the interpolated camera"
         ] = False
         depth_test: Annotated[bool, "published: keep only the nearest sample per pixel"] = False
         splat: Annotated[

@@ -38,8 +38,8 @@ class Tap:
 
         path: Annotated[
             Literal["curved", "straight", "five"],
-            "through the positions in three frames, along the mean velocity, or through those in "
-            "five frames, by the neighbours' vectors",
+            "path through three positions (curved), along the mean velocity (straight), or through "
+            "five positions, with the neighbours' vectors (five)",
         ] = "curved"
         variant: Annotated[
             Literal["shutter", "published"],

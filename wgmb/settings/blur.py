@@ -50,7 +50,7 @@ class BlurSettings:
     """Blur method and options; the fields of METHOD_OPTIONS are added."""
 
     method: str | None = None
-    "Blur method; by default gather if there is depth or motion is searched, else tap."
+    "Blur method; by default gather with depth or searched motion, else tap."
     samples: int | Literal["auto"] | None = None
     """Taps, images or rays per pixel: 16 (fusion: 8), or auto for motion from pictures;
     auto: 1 per pixel of blur length, at most 64.
@@ -58,7 +58,7 @@ class BlurSettings:
     jitter: float = 0.0
     "Jitter of the sample times, 0 to 1: trades banding for noise."
     holdout: tuple[str, ...] = ()
-    "Pixels to keep sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or an image file."
+    "Pixels that stay sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte) or image file."
     scale: tuple[str, ...] = ()
     "Motion scale: a LAYER or image file that multiplies it, or LAYER=VALUE:AMOUNT for an object."
     max_blur: float | None = None

@@ -29,13 +29,13 @@ class InputSettings:
     vector_offset: float | None = None
     "Value that encodes zero motion, subtracted before scaling (vray, rsmb: 0.5)."
     vector_flip: Literal["x", "y", "xy"] | None = None
-    "Reverses the motion vectors along an axis."
+    "Axes along which the motion vectors are reversed."
     vector_mask: str | None = None
     "Layer that is 1 where the vectors are valid, or none; default: MV_Alpha, or rsmb's alpha."
     object_motion: bool = False
     "The vectors hold object motion only; the camera's motion is added from --camera."
     camera: Path | None = None
-    "JSON file with a camera per frame: gives motion from depth where vectors are missing."
+    "JSON file with a camera per frame, for motion from depth where vectors are missing."
     depth: str | None = None
     "Depth layer, if it cannot be found by name."
     depth_kind: Literal["planar", "inverse", "clip"] = "planar"
@@ -47,11 +47,11 @@ class InputSettings:
     also: tuple[str, ...] = ()
     "Pattern of files with additional layers of the same frames; may be repeated."
     outside: Literal["auto", "nothing", "edge"] = "auto"
-    "Beyond a data window that ends within the image: nothing, or edge (unknown: its edge goes on)."
+    "Picture beyond a data window that ends within the image: nothing, or edge (pixels repeat)."
     cuts: str | None = None
     "Frames that begin a shot: 101,155, cut.edl[@FPS] or cut.otio; only:101,155 detects no others."
     view: str | None = None
-    "The only view of stereo frames to use, such as left; by default all are blurred."
+    "One view of stereo frames, such as left; by default all are blurred."
     skip_missing: bool = False
     "Skip missing frames instead of stopping with an error."
     max_mb: float = limits.MAX_MB

@@ -25,7 +25,7 @@ class OutputSettings:
     overwrite: bool = False
     "Replace existing files."
     resume: bool = False
-    "Keep finished frames; render those again whose settings or inputs have changed."
+    "Keep finished frames; make frames with changed settings or inputs again."
     layers: Literal["all", "picture"] = "all"
     "EXR to EXR: copy all layers of the input, or write the picture only (faster)."
     compression: str = "zip"

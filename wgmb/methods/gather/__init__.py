@@ -34,8 +34,9 @@ class Gather:
 
     `shading`: light that moves over surfaces, as shadows and reflections do, is followed too, where
     the passes of light of the frame and of a neighbour tell it from what it falls on (see
-    Frame.diffuse_light). "auto" and "passes": by these, where they are; "frames": shadows by the
-    colours alone, which is less sure; "off": shading stays that of the frame.
+    Frame.diffuse_light). "auto": by these, if the frame has them; "passes": the same, and an
+    InputError if it has none; "frames": shadows by the colours alone, which is less sure; "off":
+    shading stays that of the frame.
 
     Strong: the closest to the truth. Reveals hidden surfaces, blurs across silhouettes.
     Artefacts: without passes of light, shading is that of one frame; surfaces hidden in all three
@@ -60,8 +61,8 @@ class Gather:
         ] = "color"
         shading: Annotated[
             Shading,
-            "shadows and reflections that move: auto, passes: followed by passes of light, where "
-            "there are any; frames: shadows by the colours alone; off: as in the frame",
+            "moving shadows and reflections: followed by the passes of light, if available (auto) "
+            "or required (passes), or shadows by the colours (frames); off: as in the frame",
         ] = "auto"
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
