@@ -145,10 +145,10 @@ def silhouettes(frame: Frame, layers: Layers) -> None:
     """One edge as it was rendered, and its two layers."""
     place = 0
     near, far = layers.read("layer colors", 2 * place), layers.read("layer colors", 2 * place + 1)
-    surface = layers.read("mattes", place)
-    split = surface[..., 1] > 0
+    matte, source = layers.read("mattes", place)[..., 0], wgsl.load("methods/gather/surface.wgsl")
+    split = (matte & int(source.constant("HAS_BACK"))) != 0
     grey = np.full_like(near[..., :3], 0.5)
-    coverage = surface[..., 2]
+    coverage = (matte & int(source.constant("WHOLE"))) / source.constant("WHOLE")
     over = display(near) + (1 - coverage[..., None]) * grey
     behind = np.where(split[..., None], display(far), 0.5)
     sheet = {

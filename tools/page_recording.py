@@ -52,16 +52,18 @@ class Recorder:
 
     @contextmanager
     def listening(self, device: wgpu.GPUDevice) -> Iterator[None]:
-        """Notice buffers, views, uploads, cleared buffers and kernels of `device`."""
+        """Notice buffers, views, uploads, cleared buffers, copies and kernels of `device`."""
         forget_constants()  # so that those that are kept are made, and noticed, again
         usage = wgpu.TextureUsage.TEXTURE_BINDING
         probe = device.create_texture(size=(1, 1, 1), format=OUTPUT, usage=usage)
+        encoder = type(device.create_command_encoder())
         with ExitStack() as stack:
             for owner, name, note in (
                 (type(device), "create_buffer_with_data", self._noted_data),
                 (type(probe), "create_view", self._noted_view),
                 (type(device.queue), "write_texture", self._noted_upload),
-                (type(device.create_command_encoder()), "clear_buffer", self._noted_clear),
+                (encoder, "clear_buffer", self._noted_clear),
+                (encoder, "copy_texture_to_texture", self._noted_copy),
                 (kernels.Kernel, "run", self._noted_run),
             ):
                 stack.enter_context(_watched(owner, name, note))
@@ -87,6 +89,11 @@ class Recorder:
 
     def _noted_clear(self, made, encoder, buffer, offset=0, size=None) -> None:
         self.passes.append({"clear": self._buffer(buffer), "offset": offset, "size": size})
+
+    def _noted_copy(self, made, encoder, source, destination, size) -> None:
+        ends = [{"texture": self.texture(e["texture"]), "origin": list(e["origin"])}
+                for e in (source, destination)]  # fmt: skip
+        self.passes.append({"copy": ends, "size": list(size)})
 
     def _noted_run(self, made, kernel, encoder, entry, bindings, groups=None, /, **own) -> None:
         resources = bindings.resources | own

@@ -95,6 +95,11 @@ export class Replay {
       this.steps[i] = (encoder) => encoder.clearBuffer(buffer, row.offset, row.size ?? undefined);
       return;
     }
+    if ('copy' in row) {
+      const [source, target] = row.copy.map((end) => ({ ...end, texture: this.#find('textures', end.texture) }));
+      this.steps[i] = (encoder) => encoder.copyTextureToTexture(source, target, row.size);
+      return;
+    }
     const kernel = await kernels.get(row.kernel);
     const said = Object.entries(row.resources).map(([name, one]) => [name, this.#resource(one)]);
     const groups = bindGroups(this.device, kernel, Object.fromEntries(said));

@@ -187,6 +187,7 @@ def separate_pixel(color, motion, z, edges, y, x, bends, around_it):
         coverage = np.clip((color[y, x, 3] - clear) / (opaque - clear), 0, 1)
     elif not thin and not any(0.1 < share < 0.9 for share in shares):
         coverage = coverage_by_color(color[y, x], mean(color, front), back_color, coverage)
+    coverage = np.round(511 * coverage) / 511
     if coverage < 1 - 0.98:
         back_depth = z[y, x] if z[y, x] >= between else back_depth
         own = path(motion[y, x], farther)

@@ -159,6 +159,11 @@ class _OneByOne:
         encoder.clear_buffer(buffer, offset, size)
         submit(self._clock.device, encoder)
 
+    def copy_texture_to_texture(self, source, destination, size) -> None:
+        encoder = self._clock.device.create_command_encoder()
+        encoder.copy_texture_to_texture(source, destination, size)
+        submit(self._clock.device, encoder)
+
 
 class _Alone:
     """A compute pass that runs as soon as it ends."""

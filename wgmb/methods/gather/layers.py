@@ -41,17 +41,20 @@ class Layers:
         return {
             "colors": both(self.textures["layer_colors"]),
             "surfaces": both(self.textures["surfaces"]),
-            "matte": layer_view(self._images, self.textures["mattes"], slot),
+            "mattes": layer_view(self._images, self.textures["mattes"], slot),
         }
 
     def encode(self, encoder, inputs, worklists: dict[str, dict]) -> None:
         """Record the layers of all frames, where something moves near."""
         size, count = inputs.bindings.size, len(inputs.frames)
-        color = gpu.texel(self._device, 4)
+        color = inputs.frame.color.texture.format
+        if color not in ("rgba16float", "rgba32float"):
+            color = gpu.texel(self._device, 4)
+        matte = "r32uint" if inputs.frame.weight is None else "rg32uint"
         self.textures = {
             "layer_colors": self._images.texture("layer colors", size, color, 2 * count),
             "surfaces": self._images.texture("surfaces", size, "rgba32uint", 2 * count),
-            "mattes": self._images.texture("mattes", size, "rgba32float", count),
+            "mattes": self._images.texture("mattes", size, matte, count),
         }
         by_offset = {frame.offset: frame for frame in inputs.frames}
         for slot, frame in enumerate(inputs.frames):
@@ -59,11 +62,13 @@ class Layers:
                 "prev": by_offset.get(frame.offset - 1),
                 "next": by_offset.get(frame.offset + 1),
             }
-            self._separate(encoder, inputs, frame, around, self._views(slot), worklists)
+            self._separate(encoder, inputs, slot, frame, around, worklists)
 
-    def _separate(self, encoder, inputs, frame, around, views, worklists):
+    def _separate(self, encoder, inputs, slot: int, frame, around, worklists):
         """Record the layers of a frame, `around` which others may show what it does not."""
-        size = inputs.bindings.size
+        size, colors = inputs.bindings.size, self.textures["layer_colors"]
+        if copied := _is_like(frame.color.texture, colors):
+            _copy(encoder, (frame.color.texture, 0), (colors, 2 * slot))
         groups = {"buffer": self._edge_groups.at_least(16), "offset": 0, "size": 16}
         cells = {
             "copy_motion_only": worklists["motion_only"],
@@ -76,8 +81,9 @@ class Layers:
         kernel = gpu.kernel(
             self._device,
             "methods/gather/layers.wgsl",
-            {"Color": gpu.texel(self._device, 4)},
+            {"Color": colors.format, "Mattes": self.textures["mattes"].format},
             WEIGHTED=frame.weight is not None,
+            COPIED=copied,
             HAS_PREV=around["prev"] is not None,
             HAS_NEXT=around["next"] is not None,
         )
@@ -106,6 +112,28 @@ class Layers:
                 edge_flags_out=flags if detecting else unbound,
                 edges=edges,
                 edge_groups=groups if entry == "size_dispatch" else self._spare.at_least(16),
-                **views,
+                **self._views(slot),
                 **others,
             )
+            if entry == "write_single_layer":
+                surfaces = self.textures["surfaces"]
+                _copy(encoder, (surfaces, 2 * slot), (surfaces, 2 * slot + 1))
+
+
+def _is_like(image: wgpu.GPUTexture, layers: wgpu.GPUTexture) -> bool:
+    """Return True if all of `image` can be copied into a layer: then no shader need store it."""
+    readable = bool(image.usage & wgpu.TextureUsage.COPY_SRC)
+    single = image.mip_level_count == image.size[2] == image.sample_count == 1
+    same = image.format == layers.format and image.size[:2] == layers.size[:2]
+    return readable and single and same
+
+
+def _copy(encoder, source: tuple[wgpu.GPUTexture, int], target: tuple[wgpu.GPUTexture, int]):
+    """Record a copy of one layer of a texture into one of another, or of the same."""
+    texture, layer = source
+    into, number = target
+    encoder.copy_texture_to_texture(
+        {"texture": texture, "origin": (0, 0, layer)},
+        {"texture": into, "origin": (0, 0, number)},
+        (*texture.size[:2], 1),
+    )

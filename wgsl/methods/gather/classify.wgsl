@@ -47,24 +47,24 @@ fn main(@builtin(local_invocation_index) local: u32,
             let layer = 2u * f;
             let handicap = select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u);
             let candidates = candidates_of(f, candidates0, candidates1, candidates2);
-            let starts = seeds_at(candidates, u, vec4<bool>(false));
+            let starts = seeds_at(candidates, u, 0u);
             let start = displacement5(unpack_trajectory(textureLoad(surfaces, low, layer, 0)), u);
             let visible_depth = deepest;
             var n = 0u;
             loop {      // the corners
                 let x = vec2f(select(low, high, vec2<bool>(n % 2u == 1u, n / 2u == 1u))) + 0.5;
                 let found = iterate_fixed_point(x, start, u, layer);
-                let z = unpack_depth(found.surface) * handicap;
+                let z = depth_in(found.word) * handicap;
                 deepest = max(deepest, z);
                 let wanted = may_be_visible(candidates, u, select(visible_depth, z, f == 0u) / handicap);
                 let is_there = found.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
                 is_single = is_single && z > 0.0 && is_there && z >= visible_depth;
-                var seeds = Seeds(wanted & !are_solution(starts, found.d), starts.x, starts.y);
+                var seeds = Seeds(wanted & ~are_solution(starts, found.d), starts.x, starts.y);
                 loop {
-                    let is_pending = any(seeds.pending);
+                    let is_pending = seeds.pending != 0u;
                     let converges = converges_to(x, next_seed(&seeds), found.d, u, layer);
                     is_single = is_single && (!is_pending || converges);
-                    if !is_single || !any(seeds.pending) { break; }
+                    if !is_single || seeds.pending == 0u { break; }
                 }
                 n++;
                 if !is_single || n >= 4u { break; }
@@ -88,5 +88,5 @@ fn main(@builtin(local_invocation_index) local: u32,
 /// Whether one step from the displacement `start` leads to the `solution`, not by way of an edge; or leaves the image.
 fn converges_to(x: vec2f, start: vec2f, solution: vec2f, u: f32, layer: u32) -> bool {
     let state = warp_step(x, start, u, layer);
-    return state.residual2 >= INFINITE || (unpack_depth(state.surface) > 0.0 && same_solution(state.d, solution));
+    return state.residual2 >= INFINITE || (depth_in(state.word) > 0.0 && same_solution(state.d, solution));
 }

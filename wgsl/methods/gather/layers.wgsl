@@ -15,7 +15,7 @@
 @group(1) @binding(5) var edge_flags_out: Flags;
 @group(1) @binding(6) var colors: Color;                // FRONT, premultiplied by coverage too, and BACK
 @group(1) @binding(7) var surfaces: Packed;             // FRONT and BACK, see pack_surface()
-@group(1) @binding(8) var matte: Matte;                 // front depth; back depth, 0 if there is none; coverage; weight
+@group(1) @binding(8) var mattes: Mattes;               // see pack_matte()
 @group(1) @binding(9) var<storage, read> worklist: WorkList;
 @group(1) @binding(10) var<storage, read_write> edges: EdgeList;
 @group(1) @binding(11) var<storage, read_write> edge_groups: array<u32>;    // workgroups of `separate_layers`, for an indirect dispatch
@@ -28,7 +28,9 @@ struct EdgeList {       // the edge pixels, which may show two surfaces
 alias Flags = texture_storage_2d<r32uint, write>;
 alias Color = texture_storage_2d_array<rgba32float, write>;
 alias Packed = texture_storage_2d_array<rgba32uint, write>;
-alias Matte = texture_storage_2d<rgba32float, write>;
+alias Mattes = texture_storage_2d<r32uint, write>;  // rg32uint if WEIGHTED
+
+override COPIED: bool = false;      // `colors` has the frame's pixels already
 
 const FRONT: u32 = 0u;          // layers of an array
 const BACK: u32 = 1u;
@@ -55,12 +57,22 @@ fn depth_at(px: vec2i) -> f32 {
     return valid_depth(textureLoad(depth, clamped(px), 0).x);
 }
 
+/// Of a pixel and the ones to its left and right. Written out, as is what works on 3 x 3 pixels: lavapipe unrolls no loop.
+fn three_depths(px: vec2i) -> vec3f {
+    return vec3f(depth_at(px - vec2i(1, 0)), depth_at(px), depth_at(px + vec2i(1, 0)));
+}
+
 fn color_at(px: vec2i) -> vec4f {
     return textureLoad(color, clamped(px), 0);
 }
 
 fn flags_at(px: vec2i) -> u32 {
     return textureLoad(edge_flags, clamped(px), 0).x;
+}
+
+/// Those of a pixel and of the ones to its left and right together.
+fn three_flags(px: vec2i) -> u32 {
+    return flags_at(px - vec2i(1, 0)) | flags_at(px) | flags_at(px + vec2i(1, 0));
 }
 
 fn is_edge(flags: u32) -> bool {
@@ -84,13 +96,13 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
     let k = worklist_index(group);
     let px = vec2i(pixel_in_strip(worklist.cells[k], group, local));
     if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
-    var nearest = NO_DEPTH;
-    var farthest = 0.0;
-    for (var i = 0; i < 9; i++) {
-        let z = depth_at(px + vec2i(i % 3, i / 3) - 1);
-        nearest = min(nearest, z);
-        farthest = max(farthest, z);
-    }
+    let above = three_depths(px - vec2i(0, 1));
+    let here = three_depths(px);
+    let below = three_depths(px + vec2i(0, 1));
+    let least = min(min(above, here), below);
+    let most = max(max(above, here), below);
+    let nearest = min(min(least.x, least.y), least.z);
+    let farthest = max(max(most.x, most.y), most.z);
     let own = textureLoad(motion, px, 0);
     var difference2 = 0.0;
     let beyond = farthest - nearest;
@@ -102,31 +114,31 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
     }
     let share = clamp(APART_MOTION * inverseSqrt(max(difference2, 1e-12)), LEAST_SHARE, 1.0);
     let is_there = difference2 > EDGE_MOTION * EDGE_MOTION && beyond > share * apart;
-    textureStore(edge_flags_out, px, vec4u((bitcast<u32>(depth_at(px)) & ~EDGE) | select(0u, EDGE, is_there)));
+    textureStore(edge_flags_out, px, vec4u((bitcast<u32>(here.y) & ~EDGE) | select(0u, EDGE, is_there)));
 }
 
-/// Second pass: every pixel as one layer, and the list of edge pixels, which `separate_layers` corrects.
+/// Second pass: every pixel as one layer, which is copied to BACK after it, and the list of edge pixels, which
+/// `separate_layers` corrects. Stores are what costs in this pass.
 @compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
 fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let k = worklist_index(group);
     let px = vec2i(pixel_in_strip(worklist.cells[k], group, local));
     if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
     let counts = weight_at(px);
-    var near_edge = false;
-    var smooth_here = true;     // one surface of one weight in the 3 x 3
     let here = flags_at(px);
-    for (var i = 0; i < 9; i++) {
-        let at = px + vec2i(i % 3, i / 3) - 1;
-        let flags = flags_at(at);
-        smooth_here = smooth_here && !is_edge(flags) && weight_at(at) == counts;
-        near_edge = near_edge || is_edge(flags);
+    let near_edge = is_edge(three_flags(px - vec2i(0, 1)) | three_flags(px) | three_flags(px + vec2i(0, 1)));
+    var smooth_here = !near_edge;   // one surface of one weight in the 3 x 3
+    if WEIGHTED {
+        for (var i = 0; i < 9; i++) {
+            smooth_here = smooth_here && weight_at(px + vec2i(i % 3, i / 3) - 1) == counts;
+        }
     }
     let z = flagged_depth(here);
     let trajectory = trajectory_around(px, textureLoad(motion, px, 0), z);
-    textureStore(colors, px, FRONT, textureLoad(color, px, 0));
-    textureStore(surfaces, px, FRONT, pack_surface(trajectory, select(z, -z, near_edge), smooth_here));
-    textureStore(surfaces, px, BACK, pack_surface(trajectory, 0.0, false));
-    textureStore(matte, px, vec4f(z, 0.0, 1.0, counts));
+    if !COPIED { textureStore(colors, px, FRONT, textureLoad(color, px, 0)); }
+    let flags = SINGLE | select(0u, SMOOTH, smooth_here);
+    textureStore(surfaces, px, FRONT, pack_surface(trajectory, select(z, -z, near_edge), flags));
+    textureStore(mattes, px, pack_matte(Matte(z, false, 1.0, counts)));
     if is_edge(here) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
 }
 
@@ -277,6 +289,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
                 measured = coverage_by_color(own_color / counts, front_side.color / max(front_side.weight, 1e-9), background,
                                              measured);
             }
+            measured = round(measured * f32(WHOLE)) / f32(WHOLE);
             if measured < 1.0 - FULL {      // all background, whatever the one sample of the depth says
                 back_seen = true;
                 coverage = 0.0;
@@ -303,12 +316,12 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     let front_path = with_bend_of(front_place.at, front_motion);
     let back_path = with_bend_of(back_place.at, back_motion);
     textureStore(colors, px, FRONT, front);
-    textureStore(surfaces, px, FRONT, pack_surface(front_path, -z, false));
-    if back_depth > 0.0 { textureStore(colors, px, BACK, back); }     // else nobody reads it
-    var back_surface = pack_surface(back_path, max(back_depth, 0.0), back_seen);
-    if seen_around && !back_seen { back_surface.w |= AROUND; }
-    textureStore(surfaces, px, BACK, back_surface);
-    textureStore(matte, px, vec4f(z, back_depth, coverage, coverage * counts));
+    let has_back = back_depth > 0.0;
+    let told = select(select(0u, AROUND, seen_around), SEEN, back_seen);
+    textureStore(surfaces, px, FRONT, pack_surface(front_path, -z, 0u));
+    if has_back { textureStore(colors, px, BACK, back); }     // else nobody reads it
+    textureStore(surfaces, px, BACK, pack_surface(back_path, max(back_depth, 0.0), select(SINGLE, told, has_back)));
+    textureStore(mattes, px, pack_matte(Matte(z, has_back, coverage, coverage * counts)));
 }
 
 /// Whether some vector of the 3 x 3 is between those of the two surfaces: the renderer has filtered them.
@@ -348,6 +361,5 @@ fn copy_motion_only(@builtin(local_invocation_index) local: u32, @builtin(workgr
     if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
     let trajectory = trajectory5_from(trajectory_from(textureLoad(motion, px, 0)));
     let z = flagged_depth(bitcast<u32>(depth_at(px)));
-    textureStore(surfaces, px, FRONT, pack_surface(trajectory, z, false));
-    textureStore(surfaces, px, BACK, pack_surface(trajectory, 0.0, false));
+    textureStore(surfaces, px, FRONT, pack_surface(trajectory, z, SINGLE));
 }

@@ -13,7 +13,7 @@
 
 @group(1) @binding(3) var single_layer_mask: texture_2d_array<u32>; // bits of times, see the classification
 @group(1) @binding(4) var layer_colors: texture_2d_array<f32>;  // front, back per frame; premultiplied by alpha, coverage, weight
-@group(1) @binding(5) var mattes: texture_2d_array<f32>;    // per frame: front depth, back depth, coverage, weight
+@group(1) @binding(5) var mattes: texture_2d_array<u32>;    // per frame, see pack_matte()
 @group(1) @binding(6) var second_differences: texture_2d<u32>;  // of the frame's own front colours
 @group(1) @binding(7) var own_color: texture_2d<f32>;       // the frame as it came
 @group(1) @binding(8) var own_weight: texture_2d<f32>;
@@ -96,7 +96,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
             var counts = 1.0;
             if WEIGHTED {
                 is_even = is_smooth(textureLoad(surfaces, px, front, 0));
-                counts = textureLoad(mattes, px, front / 2u, 0).w;
+                counts = matte_at(px, front / 2u).weight;
             }
             if todo != 0u && is_even {
                 var color = resampled(x - found.d, front, true);
@@ -220,6 +220,11 @@ fn duration_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
     return sample_duration(times, min(first + firstTrailingBit(bits), times.count - 1u));
 }
 
+/// The matte of a pixel of frame `f`.
+fn matte_at(px: vec2u, f: u32) -> Matte {
+    return unpack_matte(textureLoad(mattes, px, f, 0), WEIGHTED);
+}
+
 /// The pixel of the image nearest to a position [px].
 fn nearest_pixel(p: vec2f) -> vec2u {
     return vec2u(clamp(p, vec2f(0.0), vec2f(frame.size) - 1.0));
@@ -301,8 +306,8 @@ fn start_of(starts: Starts, query: Query) -> vec2f {
     return select(there, displacement5(starts.own, query.u), query.layer < 2u);
 }
 
-struct Found {          // where an iteration ended
-    state: WarpState,
+struct First {          // where the first search of a layer led
+    d: vec2f,           // [px]
     is_there: bool,     // a surface is at the pixel by the time
 }
 
@@ -310,53 +315,56 @@ struct Found {          // where an iteration ended
 /// tile's candidates that may be nearer than what is visible already.
 fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candidates: Candidates) {
     let is_front = query.layer % 2u == 0u;
-    var seeds = seeds_at(candidates, query.u, vec4<bool>(is_front));
-    var first = Found(WarpState(vec4u(0u), vec2f(INFINITE), INFINITE), false);      // from the own trajectory
+    var seeds = seeds_at(candidates, query.u, select(0u, ~0u, is_front));
+    var first = First(vec2f(INFINITE), false);
     var is_first = true;
     loop {
-        let found = find_surface(&seeds, query, own, is_first, first, (*visible).opaque.depth);
-        if is_first { first = found; }
-        if is_first && is_front { (*visible).miss2 = min((*visible).miss2, found.state.residual2); }
-        if found.is_there { record(visible, query, found.state); }
+        let state = find_surface(&seeds, query, own, is_first, first, (*visible).opaque.depth);
+        let is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
+        if is_first { first = First(state.d, is_there); }
+        if is_first && is_front { (*visible).miss2 = min((*visible).miss2, state.residual2); }
+        if is_there { record(visible, query, state); }
         let wanted = may_be_visible(candidates, query.u, (*visible).opaque.depth / query.handicap);
-        seeds.pending = seeds.pending & wanted & !are_solution(seeds, first.state.d);
+        seeds.pending &= wanted & ~are_solution(seeds, first.d);
         is_first = false;
-        if !any(seeds.pending) { break; }
+        if seeds.pending == 0u { break; }
     }
 }
 
 /// Iterate from `own` at first; after that from pending seeds, one after the other until one leads to a surface. A seed
-/// is given up if it leads to the first solution, to something that is not nearer than `limit`, or astray.
-fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first: bool, first: Found, limit: f32) -> Found {
-    var state = WarpState(vec4u(0u), own, INFINITE);
+/// is given up if it leads to the first solution, to something that is not nearer than `limit`, or astray: its
+/// residual is INFINITE then.
+fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first: bool, first: First, limit: f32) -> WarpState {
+    var state = WarpState(0u, own, INFINITE);
     var n = 1u;
     if !is_first {
         state.d = next_seed(seeds);
         n = ITERATIONS_SAVED;
     }
-    var is_there = false;
     loop {              // a turn is a step
-        let back = state.d - first.state.d;
+        let back = state.d - first.d;
         state = warp_step(query.x, state.d, query.u, query.layer);
         n++;
-        let again = same_solution(state.d, first.state.d);
-        let farther = !is_first && unpack_depth(state.surface) * query.handicap >= limit;
+        let again = same_solution(state.d, first.d);
+        let farther = !is_first && depth_in(state.word) * query.handicap >= limit;
         let astray = !is_first && state.residual2 > MAX_STEP_RATIO * MAX_STEP_RATIO * dot(back, back);
         let ended = has_ended(state) || n > MAX_ITERATIONS || again || farther || astray;
-        is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL && !(again && first.is_there) && !farther;
-        if ended && (is_first || is_there || !any((*seeds).pending)) { break; }
+        if (again && first.is_there) || farther { state.residual2 = INFINITE; }
+        let is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
+        if ended && (is_first || is_there || (*seeds).pending == 0u) { break; }
         if ended {
             state.d = next_seed(seeds);
             n = ITERATIONS_SAVED;
         }
     }
-    return Found(state, is_there);
+    return state;
 }
 
 /// Keep a surface if it is the nearest of its kind.
 fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
-    let z = unpack_depth(state.surface);
-    let is_inferred = query.layer % 2u == 1u && !was_seen(state.surface);
+    let is_back = query.layer % 2u == 1u;
+    let z = select(depth_in(state.word), back_depth_in(state.word), is_back);
+    let is_inferred = is_back && (state.word & SEEN) == 0u;
     let depth = abs(z) * query.handicap * select(1.0, INFERRED_DEPTH_BIAS, is_inferred);
     let found = Sample(depth, abs(z), state.residual2, query.x - state.d, query.layer);
     if z > 0.0 && found.depth < (*visible).opaque.depth { (*visible).opaque = found; }
@@ -414,7 +422,7 @@ fn add_hidden(sum: ptr<function, Composite>, id: vec2u, share: f32) {
             let is_behind = unpack_depth(textureLoad(surfaces, px, 0, 0)) > z * FILL_DEPTH_RATIO;
             if is_there && is_behind {
                 let part = 1.0 / (distance * distance);
-                let counts = textureLoad(mattes, px, 0, 0).w;
+                let counts = matte_at(vec2u(px), 0u).weight;
                 add(&filled, Composite(textureLoad(layer_colors, px, 0, 0), counts, 1.0, 0.0, 0.0, 0.0), part);
                 step = FILL_STEPS;
             }
@@ -499,7 +507,7 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite
     }
     if filtered {
         var counts = 1.0;
-        if WEIGHTED { counts = textureLoad(mattes, nearest_pixel(at), layer / 2u, 0).w; }
+        if WEIGHTED { counts = matte_at(nearest_pixel(at), layer / 2u).weight; }
         let neighbours = select(0.0, 1.0, visible.opaque.layer > 1u);
         var color = resampled(at, layer, visible.opaque.layer == 0u);
         if MOVING_LIGHT { color += moving_light(at, visible.opaque.layer, t, duration); }
@@ -519,18 +527,17 @@ fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32) {
     let step = vec2f(vec2u(i & 1u, i >> 1u));
     let px = nearest_pixel(corner + step);
     let shares = mix(1.0 - share, share, step);
-    let matte = textureLoad(mattes, px, front / 2u, 0);
-    let has_back = matte.y > 0.0;
-    let from_back = is_back && has_back;
-    let z = matte.x;
+    let matte = matte_at(px, front / 2u);
+    let from_back = is_back && matte.has_back;
+    let z = matte.depth;
     // Of a front layer: what is not behind it. Of a back layer: the other back layers, and what lies as deep.
     let is_beyond = z > sample.true_depth * SURFACE_DEPTH_RATIO;
     let is_before = is_back && z < sample.true_depth / SURFACE_DEPTH_RATIO;
     let belongs = from_back || !(is_beyond || is_before);
     let amount = select(0.0, shares.x * shares.y, belongs);
     (*sum).color += amount * textureLoad(layer_colors, px, front + u32(from_back), 0);
-    (*sum).weight += amount * select(matte.w, 1.0, from_back);
-    (*sum).coverage += amount * select(matte.z, 1.0, is_back);
+    (*sum).weight += amount * select(matte.weight, 1.0, from_back);
+    (*sum).coverage += amount * select(matte.coverage, 1.0, is_back);
 }
 
 /// Catmull-Rom interpolation where the frame's own texel is smooth, bilinear elsewhere. Between two texels the cubic

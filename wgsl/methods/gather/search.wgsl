@@ -57,25 +57,30 @@ fn candidates_of(f: u32, a: Candidates, b: Candidates, c: Candidates) -> Candida
     return result;
 }
 
-/// Which candidates may be in the tile at the time `u` and nearer than `depth`.
-fn may_be_visible(candidates: Candidates, u: f32, depth: f32) -> vec4<bool> {
+/// Which candidates, a bit each, may be in the tile at the time `u` and nearer than `depth`.
+fn may_be_visible(candidates: Candidates, u: f32, depth: f32) -> u32 {
     let a = unpack2x16float(candidates.times.x);
     let b = unpack2x16float(candidates.times.y);
     let c = unpack2x16float(candidates.times.z);
     let d = unpack2x16float(candidates.times.w);
     let entered = vec4f(a.x, b.x, c.x, d.x) <= vec4f(u);
     let is_left = vec4f(a.y, b.y, c.y, d.y) < vec4f(u);
-    return (candidates.min_depth < vec4f(depth)) & entered & !is_left;
+    return bits_of((candidates.min_depth < vec4f(depth)) & entered & !is_left);
+}
+
+fn bits_of(flags: vec4<bool>) -> u32 {
+    let bits = select(vec4u(0u), vec4u(1u, 2u, 4u, 8u), flags);
+    return bits.x | bits.y | bits.z | bits.w;
 }
 
 struct Seeds {          // displacements to start from [px]
-    pending: vec4<bool>,
+    pending: u32,       // a bit each
     x: vec4f,
     y: vec4f,
 }
 
 /// The displacements by the time `u` along the candidate motions.
-fn seeds_at(candidates: Candidates, u: f32, pending: vec4<bool>) -> Seeds {
+fn seeds_at(candidates: Candidates, u: f32, pending: u32) -> Seeds {
     let v = candidates.velocities;
     let a = candidates.half_accelerations;
     let p = (unpack2x16float(v.x) + unpack2x16float(a.x) * u) * u;
@@ -88,9 +93,9 @@ fn seeds_at(candidates: Candidates, u: f32, pending: vec4<bool>) -> Seeds {
 /// The first pending seed, which is pending no more.
 fn next_seed(seeds: ptr<function, Seeds>) -> vec2f {
     let s = *seeds;
-    (*seeds).pending = s.pending & vec4<bool>(false, s.pending.x, any(s.pending.xy), any(s.pending.xyz));
-    let later = select(vec2f(s.x.w, s.y.w), vec2f(s.x.z, s.y.z), s.pending.z);
-    return select(select(later, vec2f(s.x.y, s.y.y), s.pending.y), vec2f(s.x.x, s.y.x), s.pending.x);
+    (*seeds).pending = s.pending & (s.pending - 1u);
+    let later = select(vec2f(s.x.w, s.y.w), vec2f(s.x.z, s.y.z), (s.pending & 4u) != 0u);
+    return select(select(later, vec2f(s.x.y, s.y.y), (s.pending & 2u) != 0u), vec2f(s.x.x, s.y.x), (s.pending & 1u) != 0u);
 }
 
 /// The neighbouring frame on the side of `t`, or the only one; the `second`: the other one.
@@ -127,13 +132,13 @@ fn same_solution(a: vec2f, b: vec2f) -> bool {
     return all(abs(a - b) < vec2f(SOLUTION_TOLERANCE));
 }
 
-/// Which of the seeds are the solution `d`.
-fn are_solution(seeds: Seeds, d: vec2f) -> vec4<bool> {
-    return (abs(seeds.x - d.x) < vec4f(SOLUTION_TOLERANCE)) & (abs(seeds.y - d.y) < vec4f(SOLUTION_TOLERANCE));
+/// Which of the seeds, a bit each, are the solution `d`.
+fn are_solution(seeds: Seeds, d: vec2f) -> u32 {
+    return bits_of((abs(seeds.x - d.x) < vec4f(SOLUTION_TOLERANCE)) & (abs(seeds.y - d.y) < vec4f(SOLUTION_TOLERANCE)));
 }
 
 struct WarpState {
-    surface: vec4u,     // see pack_surface(): whose displacement it is
+    word: u32,          // the last one of the surface whose displacement it is, see pack_surface()
     d: vec2f,           // [px]; x - d is the next point of the iteration, and the solution when it has ended
     residual2: f32,     // squared distance from x of where that surface is at the time `u` [px^2]
 }
@@ -144,7 +149,7 @@ fn warp_step(x: vec2f, d: vec2f, u: f32, layer: u32) -> WarpState {
     let surface = textureLoad(surfaces, vec2i(floor(p)), layer, 0);
     let next = displacement5(unpack_trajectory(surface), u);
     let step = next - d;
-    return WarpState(surface, next, select(INFINITE, dot(step, step), is_inside(p)));
+    return WarpState(surface.w, next, select(INFINITE, dot(step, step), is_inside(p)));
 }
 
 /// Whether the iteration has converged, or left the image.
@@ -154,7 +159,7 @@ fn has_ended(state: WarpState) -> bool {
 
 /// The fixed point to which the iteration leads from the displacement `start`.
 fn iterate_fixed_point(x: vec2f, start: vec2f, u: f32, layer: u32) -> WarpState {
-    var state = WarpState(vec4u(0u), start, INFINITE);
+    var state = WarpState(0u, start, INFINITE);
     var n = 0u;
     loop {
         state = warp_step(x, state.d, u, layer);

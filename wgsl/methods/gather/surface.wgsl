@@ -20,13 +20,11 @@ fn tiles_of(size: vec2u) -> vec2u {
 
 /// All that the search needs to know of a pixel's front or back layer, as rgba32uint: velocity, half acceleration in
 /// half floats, depth. The last THIRD_BITS bits of both velocities are the trajectory's third term; they are known to
-/// 1/16,000 of themselves. The sign of the depth and its last three bits are flags.
-/// Front layer: depth is negative if an edge is within a pixel; LAST_BIT says that it is smooth, one surface of
-/// one weight in its 3 x 3. Back layer: depth is 0 if there is none; LAST_BIT says that it was seen, not inferred.
-/// KINK is of the trajectory.
-fn pack_surface(trajectory: Trajectory5, depth: f32, last_bit: bool) -> vec4u {
+/// 1/16,000 of themselves. The sign of the depth and its last four bits are flags.
+/// Front layer: depth is negative if an edge is within a pixel. A pixel of one layer is the same in both.
+fn pack_surface(trajectory: Trajectory5, depth: f32, own_flags: u32) -> vec4u {
     let third = vec2i(round(clamp(trajectory.third / THIRD_STEP, vec2f(-THIRD_MAX), vec2f(THIRD_MAX))));
-    let flags = select(0u, LAST_BIT, last_bit) | select(0u, KINK, trajectory.has_kink);
+    let flags = own_flags | select(0u, KINK, trajectory.has_kink);
     let mask = (1u << THIRD_BITS) - 1u;
     let velocity = (bitcast<vec2u>(trajectory.velocity) + (1u << (THIRD_BITS - 1u))) & vec2u(~mask);
     return vec4u(velocity | (bitcast<vec2u>(third) & vec2u(mask)), pack_halves(trajectory.half_acceleration),
@@ -38,10 +36,12 @@ fn pack_halves(v: vec2f) -> u32 {
     return pack2x16float(clamp(v, vec2f(-HALF_MAX), vec2f(HALF_MAX)));
 }
 
-const LAST_BIT: u32 = 1u;
-const KINK: u32 = 2u;
-const AROUND: u32 = 4u;         // of a back layer, set by the separation: its colour is that of neighbouring frames
-const FLAGS: u32 = 7u;
+const SMOOTH: u32 = 1u;         // of a front layer: one surface of one weight in its 3 x 3
+const SEEN: u32 = 1u;           // of a back layer: it was seen, not inferred
+const KINK: u32 = 2u;           // of the trajectory
+const AROUND: u32 = 4u;         // of a back layer: its colour is that of neighbouring frames
+const SINGLE: u32 = 8u;         // nothing is behind: a back layer is empty here
+const FLAGS: u32 = 15u;
 const THIRD_BITS: u32 = 10u;
 const THIRD_STEP: f32 = 0.03125;        // [px]: up to 0.39 of it are seen within a frame interval
 const THIRD_MAX: f32 = 511.0;
@@ -54,15 +54,44 @@ fn unpack_trajectory(surface: vec4u) -> Trajectory5 {
 }
 
 fn unpack_depth(surface: vec4u) -> f32 {
-    return bitcast<f32>(surface.w & ~FLAGS);
+    return depth_in(surface.w);
+}
+
+/// The depth in a surface's last word.
+fn depth_in(word: u32) -> f32 {
+    return bitcast<f32>(word & ~FLAGS);
 }
 
 /// Of a front layer.
 fn is_smooth(surface: vec4u) -> bool {
-    return (surface.w & LAST_BIT) != 0u;
+    return (surface.w & SMOOTH) != 0u;
 }
 
-/// Of a back layer.
-fn was_seen(surface: vec4u) -> bool {
-    return (surface.w & LAST_BIT) != 0u;
+/// The depth in the last word of a back layer's surface, 0 where it is empty.
+fn back_depth_in(word: u32) -> f32 {
+    return select(depth_in(word), 0.0, (word & SINGLE) != 0u);
+}
+
+struct Matte {          // how much of a pixel its front layer covers
+    depth: f32,         // of the front layer, known to 1/16,000 of itself
+    has_back: bool,     // a back layer is there
+    coverage: f32,      // of the front layer, in steps of 1 / WHOLE
+    weight: f32,        // times the coverage
+}
+
+const WHOLE: u32 = 511u;        // a coverage of 1
+const HAS_BACK: u32 = 512u;
+const MATTE_BITS: u32 = 10u;    // the last bits, which are not of the depth
+
+fn pack_matte(matte: Matte) -> vec4u {
+    let depth = (bitcast<u32>(matte.depth) << 1u) & ~((1u << MATTE_BITS) - 1u);    // without its sign
+    let coverage = u32(round(matte.coverage * f32(WHOLE)));
+    return vec4u(depth | coverage | select(0u, HAS_BACK, matte.has_back), bitcast<u32>(matte.weight), 0u, 0u);
+}
+
+/// `bits`: what pack_matte() gave; without the weight, that of pixels that all count alike.
+fn unpack_matte(bits: vec4u, is_weighted: bool) -> Matte {
+    let coverage = f32(bits.x & WHOLE) / f32(WHOLE);
+    let depth = bitcast<f32>((bits.x >> MATTE_BITS) << (MATTE_BITS - 1u));
+    return Matte(depth, (bits.x & HAS_BACK) != 0u, coverage, select(coverage, bitcast<f32>(bits.y), is_weighted));
 }
