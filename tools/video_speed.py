@@ -4,15 +4,17 @@
     python tools/video_speed.py clip.mp4 --fps 60   another one
     python tools/video_speed.py --rounds 5          medians of so many rounds; 3 by default
 
-Codecs alone: PyAV decodes every picture of the clip, and encodes the pictures of wgmb's result,
-which lie in memory, with wgmb's settings. Start: wgmb with four pictures. Kernel: the shader that
-averages, alone, with its pictures on the device; without a GPU it runs on the CPU. All in turns, in
-processes of their own. CPU is user and system time; wall times depend on what else is running.
+Codecs alone: PyAV decodes every picture of the clip, and encodes the same pictures as wgmb, which
+lie in memory, with its settings. Start: wgmb with four pictures. Without the start: the difference
+of the two. Kernel: the shader that averages, alone, with its pictures on the device; without a GPU
+it runs on the CPU. All in turns, in processes of their own. CPU is user and system time; wall times
+depend on what else is running.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import resource
 import statistics
 import subprocess
@@ -29,6 +31,9 @@ import av  # noqa: E402
 import numpy as np  # noqa: E402
 
 SIZE, RATE, COUNT = (1920, 1080), 240, 240
+# Python keeps what it compiled, as where wgmb is installed.
+ENVIRONMENT = {name: value for name, value in os.environ.items()
+               if name != "PYTHONDONTWRITEBYTECODE"}  # fmt: skip
 
 
 def main() -> None:
@@ -51,23 +56,25 @@ def main() -> None:
 
 def compare(clip: Path, folder: Path, given: argparse.Namespace) -> None:
     """Time everything in turns."""
-    wanted, scratch = folder / "wgmb.mp4", folder / "scratch.mp4"
+    exact, scratch = folder / "exact.mkv", folder / "scratch.mp4"
     blur = ["-m", "wgmb", "blur", clip, "--flow", "none", "--shutter", "360", "--fps", given.fps]
     blur += ["--overwrite", "--quiet", "-o"]
     me = Path(__file__)
     lines = {
-        "wgmb": [*blur, wanted],
-        "codecs alone": [me, "--alone", clip, wanted, scratch],
+        "wgmb": [*blur, folder / "wgmb.mp4"],
+        "codecs alone": [me, "--alone", clip, exact, scratch],
         "start": [*blur, scratch, "--frames", "0-3"],
         "kernel": [me, "--kernel", clip, given.fps],
     }
+    timed([sys.executable, *blur, exact, "--codec", "ffv1"])
     taken: dict[str, list[tuple[float, float]]] = {name: [] for name in lines}
     for _ in range(given.rounds):
         for name, line in lines.items():
             taken[name].append(timed([sys.executable, *line]))
     found = {name: [statistics.median(t) for t in zip(*one, strict=True)]
              for name, one in taken.items()}  # fmt: skip
-    alone = found["codecs alone"]
+    alone, whole, start = (found[name] for name in ("codecs alone", "wgmb", "start"))
+    found["without the start"] = [one - other for one, other in zip(whole, start, strict=True)]
     bits = clip.stat().st_size * 8 / float(length(clip)) / 1e6
     print(
         f"{bits:.0f} Mbit/s\n\n| | CPU [s] | wall [s] | CPU beside codecs | wall |\n"
@@ -80,7 +87,9 @@ def compare(clip: Path, folder: Path, given: argparse.Namespace) -> None:
 def timed(line: list[object]) -> tuple[float, float]:
     """CPU and wall time of a process [s]; what it prints as numbers instead, if it does."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    run = subprocess.run(list(map(str, line)), cwd=ROOT, check=True, capture_output=True, text=True)
+    run = subprocess.run(
+        list(map(str, line)), cwd=ROOT, env=ENVIRONMENT, check=True, capture_output=True, text=True
+    )
     wall, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
     if run.stdout:
         cpu, wall = map(float, run.stdout.split())
@@ -99,13 +108,13 @@ def length(clip: Path) -> Fraction:
         return Fraction(container.duration or 1, av.time_base)
 
 
-def codecs_alone(clip: Path, wanted: Path, scratch: Path) -> None:
-    """Decode the clip, and encode the pictures of `wanted`, which were decoded before."""
+def codecs_alone(clip: Path, exact: Path, scratch: Path) -> None:
+    """Decode the clip, and encode the pictures of `exact`, which were decoded before."""
     from wgmb.io.coded_video import CodedVideo
     from wgmb.io.encoders import chosen
     from wgmb.io.footage import Footage
 
-    footage = Footage(wanted)
+    footage = Footage(exact)
     pictures = [picture for _, picture in footage]
     writer = CodedVideo(
         scratch, scratch.with_suffix(".part.mp4"), chosen(scratch), footage.coding, footage.size,
@@ -129,19 +138,25 @@ def codecs_alone(clip: Path, wanted: Path, scratch: Path) -> None:
 
 
 def kernel_alone(clip: Path, fps: int) -> None:
-    """Average as many pictures as the clip's result has, which stay on the device."""
+    """Average as many pictures as the clip's result has, which stay on the device.
+
+    An exposure begins and ends in the middle of a picture where a frame has an even number.
+    """
     from wgmb import gpu
     from wgmb.io.footage import Footage
     from wgmb.planes import Average
 
     footage = Footage(clip)
     count = max(1, round(float(footage.rate) / fps))
-    pictures = [picture for _, picture in footage.pictures(0, count - 1)]
+    pictures = [picture for _, picture in footage.pictures(0, count - count % 2)]
+    shares = [1 / count] * len(pictures)
+    if count % 2 == 0:
+        shares[0] = shares[-1] = 0.5 / count
     average = Average(gpu.open_device(None))
-    average(pictures, [1 / count] * count, footage.coding)
+    average(pictures, shares, footage.coding)
     before, began = resource.getrusage(resource.RUSAGE_SELF), time.perf_counter()
     for _ in range(round(len(footage) / count)):
-        average(pictures, [1 / count] * count, footage.coding)
+        average(pictures, shares, footage.coding)
     after = resource.getrusage(resource.RUSAGE_SELF)
     print(cpu_of(after) - cpu_of(before), time.perf_counter() - began)
 

@@ -39,7 +39,8 @@ class CodedPicture:
     """One decoded picture, as it is stored."""
 
     planes: tuple[np.ndarray, ...]
-    """(height, width) uint8 or uint16 each, C order; chroma smaller by Coding.steps, rounded up."""
+    """(height, width) uint8 or uint16 each; chroma smaller by Coding.steps, rounded up.
+    Perhaps read-only, with gaps between their rows."""
     coding: Coding
 
     @property

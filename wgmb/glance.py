@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
-from .coding import HLG, LINEAR, PQ, CodedPicture
+from .coding import HLG, LINEAR, PQ, CodedPicture, Coding
 from .color import srgb
 from .io.cuts import SAMPLED, SMALL, copies, smalls_differ
 from .planes.matrices import from_samples
@@ -74,12 +74,18 @@ class Glance:
     def _display(self, planes: list[np.ndarray]) -> np.ndarray:
         """Display values of samples, those of HDR up to the white of text."""
         coding = self.coded.coding
-        samples = np.stack(planes if len(planes) == 3 else [planes[0]] * 3, axis=-1)
-        rows = from_samples(coding).astype(np.float32)
-        signal = samples.astype(np.float32) @ rows[:, :3].T + rows[:, 3]
+        samples = np.array(planes if len(planes) == 3 else [planes[0]] * 3, np.float32)
+        rows = _rows(coding)
+        signal = np.einsum("cp,pyx->yxc", rows[:, :3], samples) + rows[:, 3]
         if coding.transfer == LINEAR:
             return srgb(signal)
         return np.clip(signal / _WHITE.get(coding.transfer, 1.0), 0, 1)
+
+
+@cache
+def _rows(coding: Coding) -> np.ndarray:
+    """See from_samples."""
+    return from_samples(coding).astype(np.float32)
 
 
 def _means(
@@ -96,16 +102,30 @@ def _means(
     many columns, or, where `whole`, all of them.
     """
     across, down = size
-    some = (np.arange(count) * step + step // 2) // count
-    y, x = ((np.arange(n)[:, None] * step + some).ravel() for n in (down, across))
-    rows = plane[y // coarse[1]]
-    if whole:
-        columns, rows = step, rows[:, : across * step]
-    else:
-        columns, rows = count, np.take(rows, x // coarse[0], axis=1)
+    some = [(n * step + step // 2) // count for n in range(count)]
     deep = np.uint32 if plane.dtype == np.uint16 else np.uint16
-    sums = rows.reshape(down, count, -1).sum(axis=1, dtype=deep).reshape(down, across, columns)
-    return sums.sum(axis=2, dtype=np.uint32) / np.float32(count * columns)
+    rows = [plane[_places(i, step, down, coarse[1])] for i in some]
+    if whole:
+        total = _sum([row[:, : across * step] for row in rows], deep).reshape(down, across, step)
+        return np.einsum("yxi->yx", total, dtype=np.uint32) / np.float32(count * step)
+    columns = [_places(i, step, across, coarse[0]) for i in some]
+    return _sum([row[:, x] for row in rows for x in columns], deep) / np.float32(count * count)
+
+
+def _places(first: int, step: int, count: int, coarse: int) -> slice | np.ndarray:
+    """Where the samples of every `step`th pixel are, of `count` from the pixel `first` on."""
+    if step % coarse:
+        return (first + step * np.arange(count)) // coarse
+    begin, every = first // coarse, step // coarse
+    return slice(begin, begin + every * (count - 1) + 1, every)
+
+
+def _sum(parts: list[np.ndarray], kind: type) -> np.ndarray:
+    """The sum of arrays as numbers of this kind."""
+    total = parts[0].astype(kind)
+    for part in parts[1:]:
+        total += part
+    return total
 
 
 def is_cut(before: Glance, after: Glance) -> bool:

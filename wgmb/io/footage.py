@@ -108,7 +108,7 @@ class Footage:
 
     def _look(self) -> None:
         """Decode one picture: what it says of itself counts more than what the header says."""
-        if self._is_encrypted():  # some of its noise may be taken for pictures
+        if self._packets.is_encrypted:  # some of its noise may be taken for pictures
             raise InputError(f"{self.path}: is encrypted")
         with opened(self.path) as container:
             stream = cast(VideoStream, container.streams[self.index])
@@ -143,11 +143,6 @@ class Footage:
         self._decoder = Decoder(self.path, self.index, self._packets)
         self._timeline = self._packets.doubled() if self.is_interlaced else self._packets
         self._note(side)
-
-    def _is_encrypted(self) -> bool:
-        with opened(self.path) as container:
-            packet = next(container.demux(container.streams[self.index]), None)
-            return packet is not None and packet.has_sidedata("encryption_info")
 
     def _note(self, side: dict[Type, bytes]) -> None:
         if self.assumed:

@@ -105,7 +105,8 @@ def is_transparent(frame: av.VideoFrame) -> bool:
 def planes_of(frame: av.VideoFrame, into: Layout, by: VideoReformatter) -> tuple[np.ndarray, ...]:
     """The samples of a frame: Y, Cb, Cr or R, G, B or grey, then alpha; (height, width) each.
 
-    `by` is best the same for all frames of a video.
+    They are the frame's own, not to be written to, with gaps between their rows. `by` is
+    best the same for all frames of a video.
     """
     if into.via and frame.format.name != into.name:
         frame = by.reformat(frame, format=into.via, threads=THREADS)
@@ -116,7 +117,7 @@ def planes_of(frame: av.VideoFrame, into: Layout, by: VideoReformatter) -> tuple
 
 
 def _samples(frame: av.VideoFrame, index: int, bits: int) -> np.ndarray:
-    """A copy of one plane."""
+    """One plane of a frame, which stays in memory as long as this does."""
     plane = frame.planes[index]
     kind = np.dtype(np.uint8 if bits == 8 else "<u2")
     stride = abs(plane.line_size) // kind.itemsize
@@ -124,7 +125,9 @@ def _samples(frame: av.VideoFrame, index: int, bits: int) -> np.ndarray:
     rows = rows.reshape(plane.height, stride)
     if plane.line_size < 0:  # the last row comes first
         rows = rows[::-1]
-    return np.array(rows[:, : plane.width], dtype=kind, order="C")
+    samples = rows[:, : plane.width]
+    samples.flags.writeable = False
+    return samples
 
 
 def frame_of(planes: tuple[np.ndarray, ...], name: str) -> av.VideoFrame:

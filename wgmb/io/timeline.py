@@ -78,6 +78,8 @@ class Timeline:
     """Why the pass ended before the file did, or ''."""
     lacks: Fraction = Fraction(0)
     """How much more the file should hold, by what its header states [s]."""
+    is_encrypted: bool = False
+    """Its packets cannot be decoded without a key."""
     ascends: bool = False
     """No packet is shown before the one before it, though pictures are reordered."""
 
@@ -180,6 +182,7 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
         timeline,
         lacks=_lacking(container, stream, timeline, found.read),
         ascends=found.ascends and not in_order and reorders,
+        is_encrypted=found.is_encrypted,
     )
 
 
@@ -190,10 +193,13 @@ class _Packets:
         self.shown, self.decoded, self.keys = array("q"), array("q"), array("q")
         self.count = self.read = 0  # of pictures that are shown, of packets
         self.ascends = True  # the time at which each is shown
+        self.is_encrypted = False
         self._hides = _HIDES.get(codec)
 
     def add(self, packet: Packet[Any]) -> None:
         """Take note of a packet, unless an edit list leaves it out, or it shows nothing."""
+        if not self.read:
+            self.is_encrypted = packet.has_sidedata("encryption_info")
         self.read += 1
         if packet.is_discard or (self._hides is not None and self._hides(memoryview(packet))):
             return

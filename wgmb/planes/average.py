@@ -17,6 +17,7 @@ from .uniforms import curve_of, frame_of, reading, writing
 
 EIGHT = 8  # pictures that one pass takes, and that are kept on the GPU
 _BLOCK = 16, 2  # columns and rows of pixels that an invocation makes
+_MOST_GROUPS = 65535  # of a dispatch, across (WebGPU)
 _SUMS = 512  # bytes of a block's sums
 _KINDS = {8: "rg32uint", 16: "rgba32uint"}  # of texels, by their bytes
 _BAND = 4 << 20  # bytes that are uploaded at once
@@ -87,7 +88,7 @@ class Average:
         kernel.run(
             encoder,
             "main",
-            frame_of(self._device, grid),
+            frame_of(self._device, _invocations(grid[0] * grid[1], kernel.workgroup)),
             stored=reading(self._device, stored),
             wanted=writing(self._device, wanted),
             average=self._device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM),
@@ -125,23 +126,44 @@ class Average:
             texture = self._layered(index, picture)
             if over := -plane.shape[1] % _samples(index, picture.coding):
                 plane = np.pad(plane, ((0, 0), (0, over)), "edge")
+            plane = _in_rows(plane)
             width, height, _ = texture.size
-            row = plane.shape[1] * plane.itemsize
-            band = max(1, _BAND // row)
+            pitch = plane.strides[0]
+            band = max(1, _BAND // pitch)
             for top in range(0, height, band):
                 rows = plane[top : top + band]
                 self._device.queue.write_texture(
                     {"texture": texture, "origin": (0, top, layer)},
-                    rows,
-                    {"bytes_per_row": row, "rows_per_image": len(rows)},
+                    _memory(rows),
+                    {"bytes_per_row": pitch, "rows_per_image": len(rows)},
                     (width, len(rows), 1),
                 )
         gpu.submit(self._device)  # what is written is held in memory until a submit
 
 
+def _invocations(count: int, workgroup: tuple[int, int]) -> tuple[int, int]:
+    """Across and down, as whole workgroups: at least so many."""
+    groups = -(-count // (workgroup[0] * workgroup[1]))
+    across = min(groups, _MOST_GROUPS)
+    return across * workgroup[0], -(-groups // across) * workgroup[1]
+
+
 def _bytes(coding: Coding) -> int:
     """Of a sample."""
     return 2 if coding.bits > 8 else 1
+
+
+def _in_rows(plane: np.ndarray) -> np.ndarray:
+    """The plane, copied unless its rows lie one after the other, gaps between them or none."""
+    row = plane.shape[1] * plane.itemsize
+    fits = plane.strides[1] == plane.itemsize and plane.strides[0] >= row
+    return plane if fits else np.ascontiguousarray(plane)
+
+
+def _memory(rows: np.ndarray) -> np.ndarray:
+    """The bytes from the first sample to the last one, with the gaps between rows."""
+    length = rows.strides[0] * (len(rows) - 1) + rows.shape[1] * rows.itemsize
+    return np.lib.stride_tricks.as_strided(rows.view(np.uint8), (length,), (1,), writeable=False)
 
 
 def _samples(index: int, coding: Coding) -> int:

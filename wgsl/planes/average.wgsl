@@ -55,7 +55,14 @@ var<private> green_row: vec4f;
 var<private> blue_row: vec4f;
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn main(@builtin(global_invocation_id) id: vec3u) {
+fn main(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    // Blocks in the order of rows, whatever the workgroup's shape, so that none of its rows ends outside.
+    let place = (group.y * groups.x + group.x) * WG_X * WG_Y + local;
+    let id = vec2u(place % average.blocks, place / average.blocks);
     let turns = turns_of(average.count, id.x);
     // Below the last row stands the last row again.
     let rows = vec2u(2u * id.y, min(2u * id.y + 1u, average.luma.y - 1u));
@@ -71,8 +78,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let above = vec2u(id.x, rows.x / READ_Y);
         let blue = chroma(blues, above, layer);
         let red = chroma(reds, above, layer);
-        upper = add(upper, weight, sixteen(lumas, vec2u(id.x, rows.x), layer), blue, red);
+        let high = sixteen(lumas, vec2u(id.x, rows.x), layer);
         let luma = sixteen(lumas, vec2u(id.x, rows.y), layer);
+        upper = add(upper, weight, high, blue, red);
         if READ_Y == 2u {
             lower = add(lower, weight, luma, blue, red);
         } else {
@@ -82,15 +90,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         n++;
         if n >= turns { break; }
     }
-    if rows.x > rows.y || id.x >= average.blocks { return; }    // outside; not before the loop, see lavapipe.md
-    let place = 8u * (id.y * average.blocks + id.x);
+    if rows.x > rows.y { return; }      // outside; not before the loop, see lavapipe.md
     if !FIRST {
-        upper = with_sums(upper, place);
-        lower = with_sums(lower, place + 4u);
+        upper = with_sums(upper, 8u * place);
+        lower = with_sums(lower, 8u * place + 4u);
     }
     if !LAST {
-        keep(upper, place);
-        keep(lower, place + 4u);
+        keep(upper, 8u * place);
+        keep(lower, 8u * place + 4u);
         return;
     }
     write_quads(2u * id.x, id.y, rows, upper.a, upper.b, lower.a, lower.b);
