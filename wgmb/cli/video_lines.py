@@ -8,19 +8,35 @@ _KINDS = {"yuv": "Y'CbCr", "rgb": "RGB", "grey": "grey"}
 _STEPS = {(2, 2): " 4:2:0", (2, 1): " 4:2:2", (1, 1): " 4:4:4"}
 
 
+_MATRICES = {0: "RGB", 1: "BT.709", 5: "BT.601", 6: "BT.601", 9: "BT.2020"}
+_PRIMARIES = {1: "BT.709", 5: "BT.601 (625 lines)", 6: "BT.601", 9: "BT.2020", 11: "DCI-P3"}
+_PRIMARIES |= {12: "Display P3"}
+_TRANSFERS = {1: "BT.709", 4: "gamma 2.2", 5: "gamma 2.8", 6: "BT.601", 8: "linear", 13: "sRGB"}
+_TRANSFERS |= {14: "BT.2020", 15: "BT.2020", 16: "HDR (PQ)", 18: "HDR (HLG)"}
+
+
+def _named(number: int, names: dict[int, str], what: str) -> str:
+    """What a number of ITU-T H.273 is called."""
+    return names.get(number, f"{what} {number} of H.273")
+
+
 def describe_video(footage: Footage) -> list[tuple[str, str]]:
     """(name, text) lines about a video."""
     coding = footage.coding
     kind = _KINDS[coding.model] + (_STEPS.get(coding.steps, "") if coding.model == "yuv" else "")
     extent = "full" if coding.full_range else "limited"
-    numbers = f"matrix {coding.matrix}, transfer {coding.transfer}, primaries {coding.primaries}"
+    tags = dict.fromkeys((
+        _named(coding.primaries, _PRIMARIES, "primaries"),
+        _named(coding.transfer, _TRANSFERS, "transfer"),
+        _named(coding.matrix, _MATRICES, "matrix"),
+    ))  # fmt: skip
     lines = [
         ("file", str(footage.path)),
         ("video", f"{footage.codec} in {footage.container}"),
         ("size", "{} x {}".format(*footage.size)),
         ("pictures", f"{len(footage)} in {float(footage.duration):.2f} s"),
         ("rate", _rate(footage)),
-        ("colour", f"{kind}, {coding.bits} bits, {extent} range, {numbers} (ITU-T H.273)"),
+        ("colour", f"{', '.join(tags)}; {kind}, {coding.bits} bits, {extent} range"),
     ]
     if coding.alpha:
         lines.append(("alpha", "straight"))

@@ -38,7 +38,7 @@ class FootageSubject:
     """A video: its output frames, as `wgmb blur` makes them.
 
     Where the motion of a picture is not known yet the picture is shown as it is; `stamp` changes
-    when more is known. `finding`: where motion comes from.
+    when more is known. `finding`: where motion comes from, and what is odd about the file.
     """
 
     def __init__(self, device: wgpu.GPUDevice, state: State):
@@ -52,7 +52,7 @@ class FootageSubject:
         wish = Wish(masks, settings.duplicates == "fill", given.get("cuts") or "")
         self._maker = MotionMaker(self._footage.path, max_mb, settings, device, wish)
         self._moves = settings.flow != "none"
-        self.finding = f"motion: {self._maker.how}"
+        self.finding = "\n".join([f"motion: {self._maker.how}", *self._footage.notes])
         self._frames = FootageFrames(self._footage, device, self._maker.known, 1.0)
         self._sums: dict[int, CellSum] = {}
         self._state = state
@@ -76,6 +76,12 @@ class FootageSubject:
     def size(self, state: State) -> tuple[int, int]:
         """Width and height of the pictures [px]."""
         return self._footage.size
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """Width and height in square pixels, as a picture is shown."""
+        width, height = self._footage.size
+        return width * float(self._footage.pixel_aspect), height
 
     @property
     def coding(self) -> Coding:
@@ -135,7 +141,9 @@ class FootageSubject:
         if self._maker.problem:
             return f"sharp: {self._maker.problem}"
         making = self._maker.making
-        number, took = making or (self._lacking[0], 0.0)
+        if making is None or making[0] not in self._lacking:
+            making = self._lacking[0], 0.0
+        number, took = making
         what = "the motion" if self._moves else "the shot"
         since = f" since {took:.0f} s" if took >= 1 else ""
         here = self._exposed and self._exposed.here

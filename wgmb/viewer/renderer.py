@@ -67,7 +67,8 @@ class Renderer:
         started = time.perf_counter()
         subject = self.choices.subject(state)
         shape = subject.size(state)
-        place = fit(shape, area, state)
+        is_video = isinstance(subject, FootageSubject)
+        place = fit(subject.shape if is_video else shape, area, state)
         size, antialias = self._quality(state, shape, place, now, moving, full)
         report = Report(shape if not state.is_scene else whole(place), place, area, moving)
         quick = moving and not full

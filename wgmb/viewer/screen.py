@@ -135,7 +135,7 @@ class Screen:
         )
 
 
-def fit(shape: tuple[int, int], area: Box, state: State) -> Box:
+def fit(shape: tuple[float, float], area: Box, state: State) -> Box:
     """Return the box of an image of that shape: fitted and centred in the area, then zoomed."""
     x, y, width, height = area
     scale = min(width / shape[0], height / shape[1]) * state.zoom

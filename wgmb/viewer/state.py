@@ -187,12 +187,13 @@ class State:
         return replace(state, frames=frames, frame=math.nan, speed=1.0).settled()
 
     def suited(self) -> dict[str, Any]:
-        """Method, shutter and curve that the scene asks for; else those that are usual."""
+        """Method, shutter, curve and tone that the source asks for; else those that are usual."""
         scene = builtin.make(self.source) if self.is_scene else None
         when = ShutterSettings().resolved(scene, self.fps)
         volumes = scene is not None and scene.has_volumes
         method = "volume" if volumes else "gather"  # where frames have no depth: tap
-        return {"method": method, "shutter": when.shutter, "curve": when.curve}
+        tone = "soft" if self.is_video and video_time.is_hdr(self) else "clip"
+        return {"method": method, "shutter": when.shutter, "curve": when.curve, "tone": tone}
 
     def settled(self) -> State:
         """The same, its moment within its frames."""

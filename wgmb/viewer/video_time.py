@@ -7,6 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
+from ..coding import HLG, PQ
 from ..highlights import check as check_highlights
 from ..io import limits
 from ..io.frame_numbers import frame_numbers
@@ -45,6 +46,11 @@ def most_mb(state: State) -> float:
 def own_rate(state: State) -> Fraction:
     """Pictures a second of the video."""
     return footage_of(state.source, most_mb(state)).rate
+
+
+def is_hdr(state: State) -> bool:
+    """Return True if the video holds light above white."""
+    return footage_of(state.source, most_mb(state)).coding.transfer in (PQ, HLG)
 
 
 def rate(state: State) -> Fraction:
