@@ -1,5 +1,6 @@
 """The viewer shows videos: pictures at once, their blur as soon as their motion is known."""
 
+import os
 import time
 from dataclasses import replace
 from fractions import Fraction
@@ -26,6 +27,7 @@ from wgmb.video_batch import FootageBlur
 from wgmb.video_pictures import VideoPictures
 from wgmb.video_settings import FlowSettings, VideoSettings
 from wgmb.viewer import State, controls, offscreen, video_time
+from wgmb.viewer.footage_subject import FootageSubject
 from wgmb.viewer.window import frame
 
 SIZE = 96, 64
@@ -413,4 +415,44 @@ def test_what_is_perceived_waits_for_the_motion_of_all_its_frames(clip, held):
     held.free = True
     assert np.abs(settled(viewer) - blurry[..., :3]).max() > 1e-3
     assert set(held.made) == set(range(8)) and not viewer.stage.report.waiting
+    viewer.stage.choices.close()
+
+
+def test_a_file_that_vanishes_while_it_plays_is_said_and_the_picture_stays(tmp_path):
+    clip = passing(tmp_path / "a.mp4")
+    viewer = opened(clip, flow="none", shutter=0.0, frame=3.0)
+    shown = settled(viewer)
+    clip.unlink()
+    subject = viewer.stage.choices.subject(viewer.state)
+    assert isinstance(subject, FootageSubject)
+    subject._frames._colors.clear()  # as if there had been many more
+    for frame_wanted in (12.0, 0.0, 13.0):
+        viewer.state = replace(viewer.state, frame=frame_wanted, playing=True)
+        for _ in range(3):
+            frame(viewer)
+    assert str(clip) in viewer.message[0] or "sharp: " in viewer.stage.report.waiting
+    assert shown.shape == viewer.stage.download()[..., :3].shape
+    viewer.stage.choices.close()
+
+
+def test_a_file_that_changes_is_read_anew(tmp_path):
+    clip = passing(tmp_path / "a.mp4")
+    viewer = opened(clip, flow="none", shutter=0.0, frame=3.0)
+    before = settled(viewer)
+    passing(tmp_path / "a.mp4", white=3)
+    os.utime(clip, (1, 1))
+    assert np.abs(settled(viewer) - before).max() > 0.2
+    viewer.stage.choices.close()
+
+
+def test_pixels_that_are_not_square_are_shown_in_their_shape(tmp_path):
+    def wide(stream):
+        stream.codec_context.sample_aspect_ratio = Fraction(2)
+
+    frames = [clips.frame(clips.planes(n, SIZE), "yuv420p") for n in range(3)]
+    clip = clips.write(tmp_path / "a.mp4", frames, setup=wide)
+    viewer = opened(clip, look="sharp")
+    frame(viewer)
+    assert viewer.stage.report.place == (0, 16, 96, 32)
+    assert viewer.stage.download().shape[:2] == (64, 96)
     viewer.stage.choices.close()

@@ -207,6 +207,13 @@ def test_the_picture_at_a_time_is_found_exactly():
         (["CLIP", "--scale", "a.png"], "--scale is for rendered frames"),
         (["CLIP", "--begin", "9"], "has no pictures in this range"),
         (["CLIP", "--highlights", "90"], "--highlights must be 1 to 32"),
+        (["CLIP", "--workers", "3"], "--workers is for `wgmb blur`: the viewer writes no files"),
+        (
+            ["CLIP", "--fps-in", "3"],
+            "--fps-in is for `wgmb blur`: the viewer shows frames at their",
+        ),
+        (["CLIP", "--nonsense", "3"], "Unknown option: --nonsense"),
+        (["CLIP", "--fps"], "view needs --fps and its value"),
         (["CLIP", "--frames", "5-99"], "0 to 23"),
         (["CLIP", "--begin", "0.1", "--frames", "5-9"], "choose either --frames, or --begin"),
     ],

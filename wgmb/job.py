@@ -247,7 +247,7 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
         asked = replace(asked, output=replace(asked.output, layers="picture"))
     video, how = _motion(clip, asked.video, adapter)
     if how:
-        look = replace(asked.look, method=asked.look.method or asked.video.method).for_pictures()
+        look = replace(asked.look, method=asked.look.method or video.method).for_pictures()
     else:
         look = asked.look.resolved(clip=clip)
     asked = replace(asked, look=look, video=video)

@@ -28,7 +28,10 @@ class FlowSettings:
 
     @property
     def method(self) -> str:
-        """The blur method that suits this motion: dense inverse search is to be quick."""
+        """The blur method that suits this motion: dense inverse search is to be quick.
+
+        Of settings that are `settled`, as "auto" may become either.
+        """
         return "gather" if self.flow in ("auto", "search") else "tap"
 
     def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
@@ -49,12 +52,11 @@ class FlowSettings:
         if self.flow == "none":
             return self, "none: pictures are averaged"
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        if self.flow == "dis" or (self.flow == "auto" and software and is_installed("cv2")):
-            why = "" if self.flow == "dis" else ", as there is no GPU"
-            return replace(self, flow="dis"), f"dense inverse search{why}"
         quality, why = self.flow_quality, ""
         if self.flow == "auto" and software:
             quality, why = "fast", ", the fast one, as there is no GPU"
+        if self.flow == "dis" or (self.flow == "auto" and software and is_installed("cv2")):
+            return replace(self, flow="dis", flow_quality=quality), f"dense inverse search{why}"
         return replace(self, flow="search", flow_quality=quality), f"search{why}"
 
 

@@ -49,7 +49,8 @@ def make_app(*whole: str) -> cyclopts.App:
         name="wgmb",
         version=__version__,
         help="Motion blur on the GPU, for rendered frames and videos.\n\n"
-        "Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180",
+        "Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180\n\n"
+        "Example: wgmb blur in.mp4 -o out.mp4 --shutter 180 --fps 60",
         result_action="return_value",
         suppress_keyboard_interrupt=False,
         default_parameter=Parameter(negative=(), show_default=_default),
@@ -84,6 +85,8 @@ def main(arguments: list[str] | None = None) -> int:
         result = app(words, exit_on_error=False, print_error=False)
         terminal.flush()
         return result if isinstance(result, int) else DONE
+    except cyclopts.UnknownOptionError as error:
+        return _say_why(f"{_elsewhere(words, error) or error}{_hint(words)}", USAGE)
     except cyclopts.CycloptsError as error:
         return _say_why(f"{_plainly(str(error))}{_hint(words)}", USAGE)
     except DeviceError as error:
@@ -117,7 +120,12 @@ def _check_text(words: list[str]) -> None:
 
 
 def _plainly(text: str) -> str:
-    """The message about a value of another type, in words: a number, not int|None."""
+    """The message about a value of another type, in words: a number, not int|None; about a
+    missing option, how to give it.
+    """
+    if missing := re.fullmatch(r'Command "(.*)" parameter (--?\S+) requires an argument\.', text):
+        option = "--output (-o)" if missing[2] in ("--output", "-o") else missing[2]
+        return f"{missing[1]} needs {option} and its value; `wgmb {missing[1]} --help` tells more"
     m = re.fullmatch(r'(.*): unable to convert "(.*)" into (.*)\.', text, re.DOTALL)
     if m is None:
         return text
@@ -125,6 +133,21 @@ def _plainly(text: str) -> str:
     choices = [word for kind in kinds for word in re.findall(r"(?<=Literal\[)[^\]]*", kind)]
     known = [_KINDS.get(kind, kind) for kind in kinds if not kind.startswith("Literal")] + choices
     return f"{m[1]}: {m[2]!r} is not {' or '.join(known)}{did_you_mean(m[2], choices)}"
+
+
+def _elsewhere(words: list[str], error: cyclopts.UnknownOptionError) -> str:
+    """The message about an option that `wgmb view` lacks and `wgmb blur` has; '' for others."""
+    name = error.token.keyword or error.token.value if error.token else ""
+    if words[:1] != ["view"]:
+        return ""
+    known = {
+        n for one in make_app("blur")["blur"].assemble_argument_collection() for n in one.names
+    }
+    if name not in known:
+        return ""
+    why = "the viewer shows frames at their own rate"
+    why = why if name == "--fps-in" else "the viewer writes no files by options"
+    return f"{name} is for `wgmb blur`: {why}"
 
 
 _KINDS = {"int": "a whole number", "float": "a number", "str": "text", "Path": "a path"}

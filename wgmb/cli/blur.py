@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..color_settings import ColorSettings
+from ..color_settings import ColorSettings, option_name
 from ..errors import InputError
 from ..extras import needed_by
 from ..io.frame_file import is_video
@@ -107,7 +107,8 @@ def blur(
     if not patterns:
         raise InputError("no input: name frames such as 'shot.####.exr', or a video")
     if output is None:
-        raise InputError("--output is missing, such as -o 'blurred.####.exr'")
+        such = "out.mp4" if is_video(patterns[0]) else "'blurred.####.exr'"
+        raise InputError(f"--output is missing, such as -o {such}")
     when, pattern = when.resolved(), patterns[0]
     if is_batch(patterns, output.output) or is_video(pattern):
         with needed_by(pattern, "video"):
@@ -118,6 +119,7 @@ def blur(
             if crew and not (confidence or fps_in):
                 option = "--workers" if workers else "--cluster"
             raise InputError(f"{option} is for rendered frames")
+        _tell_unused(color)
         settings = look, when, given, video, adapter, quiet, verbose
         if is_batch(patterns, output.output):
             return blur_videos(patterns, output, *settings)
@@ -139,6 +141,15 @@ def blur(
     if crew:
         return blur_on_farm(made, *crew, adapter, verbose, quiet)
     return blur_frames(made, adapter, verbose, quiet)
+
+
+def _tell_unused(color: ColorSettings) -> None:
+    """Say which colour options have no part in the blur of videos."""
+    plain = ColorSettings()
+    used = [f.name for f in fields(plain) if getattr(color, f.name) != getattr(plain, f.name)]
+    if used:
+        options = ", ".join(map(option_name, used))
+        note(f"videos keep their own colours: {options} not used")
 
 
 Crew = tuple[int | None, str | None]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from .. import gpu
 from .._version import __version__
 from ..errors import InputError
 from ..highlights import check as check_highlights
@@ -115,9 +116,10 @@ def make_wish(
     check_highlights(video.highlights)
     if look.holdout and video.flow == "none":
         raise InputError("--holdout needs motion; --flow none averages whole pictures")
-    look = replace(look, method=look.method or video.method).for_pictures()
+    settled, how = video.settled(gpu.open_device(adapter))
+    look = replace(look, method=look.method or settled.method).for_pictures()
     blur = look.make(when.make(), adapter)
-    return Wish(look, when, given, video, blur, *video.source(blur.device))
+    return Wish(look, when, given, video, blur, settled.source(blur.device)[0], how)
 
 
 def tell_how(wish: Wish, quiet: bool, verbose: bool) -> None:

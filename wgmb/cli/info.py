@@ -41,6 +41,8 @@ def info(
 
     Example: wgmb info 'shot.####.exr' --frames 10 -o motion.png
 
+    Example: wgmb info clip.mp4
+
     Parameters
     ----------
     pattern

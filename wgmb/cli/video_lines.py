@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..coding import Coding
 from ..io.footage import Footage
 
 _KINDS = {"yuv": "Y'CbCr", "rgb": "RGB", "grey": "grey"}
@@ -15,9 +16,17 @@ _TRANSFERS = {1: "BT.709", 4: "gamma 2.2", 5: "gamma 2.8", 6: "BT.601", 8: "line
 _TRANSFERS |= {14: "BT.2020", 15: "BT.2020", 16: "HDR (PQ)", 18: "HDR (HLG)"}
 
 
-def _named(number: int, names: dict[int, str], what: str) -> str:
-    """What a number of ITU-T H.273 is called."""
-    return names.get(number, f"{what} {number} of H.273")
+def _colors(coding: Coding) -> str:
+    """Primaries, and where their names differ transfer and matrix, of a video (ITU-T H.273)."""
+    primaries = _PRIMARIES.get(coding.primaries, f"primaries {coding.primaries} of H.273")
+    transfer = _TRANSFERS.get(coding.transfer, f"{coding.transfer} of H.273")
+    matrix = _MATRICES.get(coding.matrix, f"{coding.matrix} of H.273")
+    words = [primaries]
+    if transfer != primaries:
+        words.append(transfer if transfer.startswith("HDR") else f"transfer {transfer}")
+    if not primaries.startswith(matrix) and coding.model == "yuv":
+        words.append(f"matrix {matrix}")
+    return ", ".join(words)
 
 
 def describe_video(footage: Footage) -> list[tuple[str, str]]:
@@ -25,18 +34,13 @@ def describe_video(footage: Footage) -> list[tuple[str, str]]:
     coding = footage.coding
     kind = _KINDS[coding.model] + (_STEPS.get(coding.steps, "") if coding.model == "yuv" else "")
     extent = "full" if coding.full_range else "limited"
-    tags = dict.fromkeys((
-        _named(coding.primaries, _PRIMARIES, "primaries"),
-        _named(coding.transfer, _TRANSFERS, "transfer"),
-        _named(coding.matrix, _MATRICES, "matrix"),
-    ))  # fmt: skip
     lines = [
         ("file", str(footage.path)),
         ("video", f"{footage.codec} in {footage.container}"),
         ("size", "{} x {}".format(*footage.size)),
         ("pictures", f"{len(footage)} in {float(footage.duration):.2f} s"),
         ("rate", _rate(footage)),
-        ("colour", f"{', '.join(tags)}; {kind}, {coding.bits} bits, {extent} range"),
+        ("colour", f"{_colors(coding)}; {kind}, {coding.bits} bits, {extent} range"),
     ]
     if coding.alpha:
         lines.append(("alpha", "straight"))

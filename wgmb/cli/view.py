@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from .. import gpu
 from ..color_settings import ColorSettings
 from ..errors import DeviceError
 from ..extras import needed_by
@@ -74,6 +75,9 @@ def view(
     if what is not None:
         state = state.opened(what, given.max_mb)
     state = state.told(vars(given) | vars(look) | vars(when) | vars(color) | vars(video))
+    if state.is_video and config is None and look.method is None:
+        settled, _ = video.settled(gpu.open_device(adapter))
+        state = state.with_method(settled.method)
     if fps is not None:
         state = viewer.at_rate(state, fps)
     if color.remark:

@@ -66,6 +66,7 @@ class OtherStreams:
     def attach(self, to: OutputContainer) -> list[str]:
         """Add the streams and chapters; return what is left out, in words."""
         said: list[str] = []
+        unknown: list[int] = []
         for stream in self._container.streams:
             if stream.index == self._pictures:
                 texts = stream.metadata
@@ -75,10 +76,16 @@ class OtherStreams:
             if self._is_of_chapters(stream):
                 stream.discard = Discard.all
                 continue
+            if stream.type == "data" and stream.codec_context is None:
+                unknown.append(stream.index)
+                stream.discard = Discard.all
+                continue
             why = self._why_not(stream) or self._add(stream, to)
             if why:
                 stream.discard = Discard.all
                 said.append(f"{_named(stream)} is left out: {why}")
+        if unknown:
+            said.append(_of_no_known_kind(unknown))
         chapters = list(_moved(self._container.chapters(), self._clock))
         if chapters and to.format.name == "gif":
             said.append(f"{len(chapters)} chapters are left out: a GIF holds none")
@@ -99,8 +106,6 @@ class OtherStreams:
         """Why a stream is not worth a try, or ''."""
         if stream.type == "video" and not stream.disposition & Disposition.attached_pic:
             return "only one stream of pictures is written"
-        if stream.type == "data" and stream.codec_context is None:
-            return "data of a kind that is not known"
         if stream.type in ("audio", "subtitle") and stream.codec_context is None:
             return "its codec is not known"
         return ""
@@ -270,6 +275,13 @@ def _named(stream: Stream) -> str:
     language = stream.metadata.get("language", "und")
     text = f"stream {stream.index} ({kind}"
     return text + (f", {language})" if language != "und" else ")")
+
+
+def _of_no_known_kind(indices: list[int]) -> str:
+    """That streams are left out of which nothing is known, in words; phones write several."""
+    several = len(indices) > 1
+    numbers = f"streams {', '.join(map(str, indices))}" if several else f"stream {indices[0]}"
+    return f"{numbers} (data of unknown kind) {'are' if several else 'is'} left out"
 
 
 def _moved(chapters: list[Chapter], clock: Clock) -> Iterator[Chapter]:

@@ -249,8 +249,6 @@ class State:
         for name in METHOD_OPTIONS:
             if name in said:
                 state = state.with_option(name, said[name])
-        if state.is_video and "flow" in said and "method" not in said:
-            state = state.with_method(video_time.settings_of(state).method)
         if state.method not in METHODS:
             known = f"available: {', '.join(METHODS)}{did_you_mean(state.method, METHODS)}"
             raise InputError(f"unknown method {state.method!r}; {known}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..coding import HLG, PQ
 from ..highlights import check as check_highlights
+from ..highlights import check_coding
 from ..io import limits
 from ..io.frame_numbers import frame_numbers
 from ..moments import Moment
@@ -34,6 +35,9 @@ def check(state: State) -> None:
     """InputError for options that make no sense."""
     settings = settings_of(state)
     check_highlights(settings.highlights)
+    if settings.highlights != 1:
+        footage = footage_of(state.source, most_mb(state))
+        check_coding(settings.highlights, footage.path, footage.coding)
     _ = settings.pace, settings.range
 
 
