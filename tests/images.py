@@ -46,6 +46,24 @@ def crossing(size, offset, seed=0, wall=True):
     return mean(color), motion, depth
 
 
+def blades(size, offset):
+    """Blades of grass, a pixel wide, each at a depth of its own, that go two ways."""
+    height, width = size
+    rng = np.random.default_rng(5)
+    color, depth = np.zeros((height, width, 4)), np.full((height, width), 30.0)
+    motion = np.zeros((height, width, 4))
+    color[:] = 0.2, 0.1, 0.0, 1.0
+    for _ in range(3 * width):
+        x, top, z = rng.uniform(0, width), rng.uniform(0, height), rng.uniform(2, 12)
+        speed, tone = rng.choice((-6.0, 3.0)), rng.uniform(0, 1, 3)
+        i, tip = int(x + speed * offset), int(top)
+        if 0 <= i < width:
+            shown = depth[tip:, i] > z
+            color[tip:, i, :3][shown], depth[tip:, i][shown] = tone, z
+            motion[tip:, i][shown] = -speed, 0, speed, 0
+    return color.astype("f4"), motion.astype("f4"), depth.astype("f4")
+
+
 def frame_of(sources):
     """The first of (color, motion, depth) with the other two before and after it."""
     own, prev, after = (wgmb.Frame(c, motion=m, depth=d) for c, m, d in sources)

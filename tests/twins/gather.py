@@ -20,7 +20,8 @@ class Layers:
     depth: list  # back: 0 where there is none
     coverage: np.ndarray
     inferred: np.ndarray  # the back layer was not seen
-    edgeless: np.ndarray  # no edge in the 3 x 3
+    edgeless: np.ndarray  # no edge that is separated in the 3 x 3
+    smooth: np.ndarray  # no edge at all
 
 
 @dataclass
@@ -75,7 +76,7 @@ def separate(offset, color, motion, depth, prev=None, next=None):
     height, width = depth.shape
     color, motion = color.astype(float), motion.astype(float)
     z = valid(depth)
-    edges = np.zeros((height, width), bool)
+    edges, shows_third = np.zeros((2, height, width), bool)
     for y in range(height):
         for x in range(width):
             near = list(around(height, width, y, x, 1))
@@ -83,6 +84,11 @@ def separate(offset, color, motion, depth, prev=None, next=None):
             apart = np.sqrt(max(np.sum((motion[p] - motion[y, x]) ** 2) for p in near))
             beyond = (1.05**2 - 1) * min(1, max(0.1, 4 / max(apart, 1e-6)))
             edges[y, x] = apart > 0.5 and max(depths) > (1 + beyond) * min(depths)
+            k = 1.05**2
+            shows_third[y, x] = edges[y, x] and any(
+                min(depths) * k < d < max(depths) / k for d in depths
+            )
+    separated = edges & ~in_crowd(shows_third)
     bends = np.zeros((height, width, 3))
     for y in range(height):
         for x in range(width):
@@ -91,18 +97,31 @@ def separate(offset, color, motion, depth, prev=None, next=None):
     found = [color.copy(), own.copy(), z.copy(), np.ones((height, width))]
     back = [np.zeros_like(color), own.copy(), np.zeros((height, width))]
     inferred = np.zeros((height, width), bool)
-    for y, x in np.argwhere(edges):
-        separated = separate_pixel(color, motion, z, edges, y, x, bends, (prev, next))
-        if separated:
-            for array, value in zip([*found, *back, inferred], separated, strict=True):
+    for y, x in np.argwhere(separated):
+        parts = separate_pixel(color, motion, z, edges, y, x, bends, (prev, next))
+        if parts:
+            for array, value in zip([*found, *back, inferred], parts, strict=True):
                 array[y, x] = value
-    edgeless = np.ones((height, width), bool)
+    edgeless, smooth = np.ones((2, height, width), bool)
     for y in range(height):
         for x in range(width):
-            edgeless[y, x] = not any(edges[p] for p in around(height, width, y, x, 1))
+            near = list(around(height, width, y, x, 1))
+            edgeless[y, x] = not any(separated[p] for p in near)
+            smooth[y, x] = not any(edges[p] for p in near)
     paths = [trajectories(found[1]), trajectories(back[1])]
     depths = [found[2], back[2]]
-    return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred, edgeless)
+    return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred, edgeless, smooth)
+
+
+def in_crowd(shows_third):
+    """Where over a fifth of the pixels in the 7 x 7 tiles around show three surfaces."""
+    out = np.zeros_like(shows_third)
+    for top in range(0, shows_third.shape[0], TILE):
+        for left in range(0, shows_third.shape[1], TILE):
+            low = max(top - 3 * TILE, 0), max(left - 3 * TILE, 0)
+            share = shows_third[low[0] : top + 4 * TILE, low[1] : left + 4 * TILE].mean()
+            out[top : top + TILE, left : left + TILE] = share > 0.2
+    return out
 
 
 def trajectories(motion):
@@ -149,6 +168,14 @@ def separate_pixel(color, motion, z, edges, y, x, bends, around_it):
     nearer = [p for p in outer if z[p] < between]
     # The corners are too far away for a background.
     farther = [(j, i) for j, i in outer if z[j, i] >= between and abs((j - y) * (i - x)) < 4]
+    # What is behind is as deep as the pixel itself, or as the nearest background beside it.
+    beside = [(j, i) for j, i in inner if abs(j - y) + abs(i - x) == 1]
+    behind_z = min(
+        [z[p] for p in [(y, x)] if z[p] >= between] or [z[p] for p in beside if z[p] >= between],
+        default=None,
+    )
+    if behind_z:
+        farther = [p for p in farther if max(z[p], behind_z) <= 1.1 * min(z[p], behind_z)]
     front = [p for p in nearer if not edges[p]]
     thin = not front
     front = front or nearer
@@ -468,7 +495,7 @@ def is_before(edge, opaque):
 def fetch(frame, s):
     """Colour and coverage of a sample, from the texels of its own surface."""
     if not s.back and frame.edgeless[s.pixel]:
-        if frame.offset == 0:
+        if frame.offset == 0 and frame.smooth[s.pixel]:
             return cubic(frame.color[0], *s.at), 1.0
         return bilinear(frame.color[0], *s.at), 1.0
     height, width = frame.edgeless.shape

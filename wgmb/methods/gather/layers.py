@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import wgpu
 
 from ... import gpu
 from ...gpu.textures import ScratchBuffer, TexturePool
+from .active_tiles import grid_of
 
 
 def layer_view(images: TexturePool, texture: wgpu.GPUTexture, index: int) -> wgpu.GPUTextureView:
@@ -23,7 +25,8 @@ class Layers:
 
     def __init__(self, device: wgpu.GPUDevice, images: TexturePool):
         self._device, self._images = device, images
-        self._edges, self._edge_groups, self._spare = (ScratchBuffer(device) for _ in range(3))
+        self._edges, self._crowds = ScratchBuffer(device), ScratchBuffer(device)
+        self._edge_groups, self._spare = ScratchBuffer(device), ScratchBuffer(device)
         self.textures: dict[str, wgpu.GPUTexture] = {}
 
     def front_surface(self, slot: int) -> wgpu.GPUTextureView:
@@ -73,6 +76,7 @@ class Layers:
         cells = {
             "copy_motion_only": worklists["motion_only"],
             "detect_edges": worklists["flagged"],
+            "find_crowds": worklists["flagged"],
             "write_single_layer": worklists["separated"],
         }
         passes: dict[str, tuple[dict | None, dict]] = {k: (c, c) for k, c in cells.items()}
@@ -91,6 +95,8 @@ class Layers:
         unbound = self._images.view("no edge flags", size, "r32uint")
         edges = self._edges.at_least(4 + 4 * size[0] * size[1])
         encoder.clear_buffer(edges, 0, 4)
+        crowds = self._crowds.at_least(8 * math.prod(grid_of(size)))
+        encoder.clear_buffer(crowds)
         others = {
             f"{side}_{name}": getattr(other, name, None) or inputs.unbound
             for side, other in around.items()
@@ -111,6 +117,7 @@ class Layers:
                 edge_flags=unbound if detecting else flags,
                 edge_flags_out=flags if detecting else unbound,
                 edges=edges,
+                crowds=crowds,
                 edge_groups=groups if entry == "size_dispatch" else self._spare.at_least(16),
                 **self._views(slot),
                 **others,

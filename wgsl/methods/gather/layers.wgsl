@@ -6,6 +6,7 @@
 //#include methods/gather/worklist.wgsl
 //#include methods/gather/surface.wgsl
 //#include methods/gather/around.wgsl
+//#include methods/gather/crowd.wgsl
 
 @group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
 @group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
@@ -114,11 +115,33 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
     }
     let share = clamp(APART_MOTION * inverseSqrt(max(difference2, 1e-12)), LEAST_SHARE, 1.0);
     let is_there = difference2 > EDGE_MOTION * EDGE_MOTION && beyond > share * apart;
+<<<<<<< HEAD
     textureStore(edge_flags_out, px, vec4u((bitcast<u32>(here.y) & ~EDGE) | select(0u, EDGE, is_there)));
 }
 
 /// Second pass: every pixel as one layer, which is copied to BACK after it, and the list of edge pixels, which
 /// `separate_layers` corrects. Stores are what costs in this pass.
+=======
+    var shows_third = false;
+    for (var i = 0; i < select(0, 9, is_there); i++) {
+        let z = depth_at(px + vec2i(i % 3, i / 3) - 1);
+        shows_third = shows_third || (z > nearest + apart && z < farthest / (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO));
+    }
+    if shows_third { count_in_crowd(px); }
+    textureStore(edge_flags_out, px, vec4u((bitcast<u32>(depth_at(px)) & ~EDGE) | select(0u, EDGE, is_there)));
+}
+
+/// Between the first and the second pass: which tiles are in a crowd. An invocation is a tile of a cell.
+@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
+fn find_crowds(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = worklist_index(group);
+    let tile = unpack_cell(worklist.cells[k]) * vec2u(CELL_TILES, 1u) + vec2u(local, 0u);
+    if k >= worklist.count || group.y > 0u || local >= CELL_TILES || any(tile >= tiles_of(frame.size)) { return; }
+    find_crowd(tile);
+}
+
+/// Second pass: every pixel as one layer, and the list of edge pixels, which `separate_layers` corrects.
+>>>>>>> 806ac38 (Grass, where a pixel shows many blades, is blurred without parting them, and beats reproject)
 @compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
 fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let k = worklist_index(group);
@@ -126,6 +149,7 @@ fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(work
     if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
     let counts = weight_at(px);
     let here = flags_at(px);
+<<<<<<< HEAD
     let near_edge = is_edge(three_flags(px - vec2i(0, 1)) | three_flags(px) | three_flags(px + vec2i(0, 1)));
     var smooth_here = !near_edge;   // one surface of one weight in the 3 x 3
     if WEIGHTED {
@@ -140,6 +164,21 @@ fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(work
     textureStore(surfaces, px, FRONT, pack_surface(trajectory, select(z, -z, near_edge), flags));
     textureStore(mattes, px, pack_matte(Matte(z, false, 1.0, counts)));
     if is_edge(here) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
+=======
+    for (var i = 0; i < 9; i++) {
+        let at = px + vec2i(i % 3, i / 3) - 1;
+        let flags = flags_at(at);
+        smooth_here = smooth_here && !is_edge(flags) && weight_at(at) == counts;
+        near_edge = near_edge || (is_edge(flags) && !is_in_crowd(clamped(at)));
+    }
+    let z = flagged_depth(here);
+    let trajectory = trajectory_around(px, textureLoad(motion, px, 0), z);
+    textureStore(colors, px, FRONT, textureLoad(color, px, 0));
+    textureStore(surfaces, px, FRONT, pack_surface(trajectory, select(z, -z, near_edge), smooth_here));
+    textureStore(surfaces, px, BACK, pack_surface(trajectory, 0.0, false));
+    textureStore(matte, px, vec4f(z, 0.0, 1.0, counts));
+    if is_edge(here) && !is_in_crowd(px) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
+>>>>>>> 806ac38 (Grass, where a pixel shows many blades, is blurred without parting them, and beats reproject)
 }
 
 /// Third pass: workgroups for the list of edge pixels.
@@ -222,13 +261,21 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     var seen_around = false;    // its colour is that of neighbouring frames
 
     let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= NO_DEPTH);    // depth of neither
+    // What is behind is as deep as the pixel itself, or as the nearest background beside it, above or below.
+    var behind_z = select(INFINITE, z, z >= between);
+    for (var i = 1; i < select(0, 9, behind_z >= INFINITE); i += 2) {
+        let z_there = flagged_depth(flags_at(px + vec2i(i % 3, i / 3) - 1));
+        behind_z = min(behind_z, select(INFINITE, z_there, z_there >= between));
+    }
     var front_place = Place(px, INFINITE);
     var back_place = Place(px, INFINITE);
     var front_bits = 0u;        // of the 5 x 5, all that are in front
     var back_bits = 0u;
     var pure_bits = 0u;         // those that show one surface
     for (var i = 0; i < 25; i++) {
-        let there = neighbour(px, i, between);
+        var there = neighbour(px, i, between);
+        let is_another = max(there.z, behind_z) > BACKGROUND_DEPTH_RATIO * min(there.z, behind_z);
+        there.counts = there.counts && (there.is_front || behind_z >= INFINITE || !is_another);
         front_bits |= select(0u, 1u << u32(i), there.counts && there.is_front);
         back_bits |= select(0u, 1u << u32(i), there.counts && !there.is_front);
         pure_bits |= select(0u, 1u << u32(i), there.is_pure);
