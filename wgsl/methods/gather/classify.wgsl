@@ -58,13 +58,8 @@ fn main(@builtin(local_invocation_index) local: u32,
                 deepest = max(deepest, z);
                 let wanted = may_be_visible(candidates, u, select(visible_depth, z, f == 0u) / handicap);
                 let is_there = found.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
-<<<<<<< HEAD
-                is_single = is_single && z > 0.0 && is_there && z >= visible_depth;
+                is_single = is_single && (found.word & SMOOTH) != 0u && is_there && z >= visible_depth;
                 var seeds = Seeds(wanted & ~are_solution(starts, found.d), starts.x, starts.y);
-=======
-                is_single = is_single && is_smooth(found.surface) && is_there && z >= visible_depth;
-                var seeds = Seeds(wanted & !are_solution(starts, found.d), starts.x, starts.y);
->>>>>>> 806ac38 (Grass, where a pixel shows many blades, is blurred without parting them, and beats reproject)
                 loop {
                     let is_pending = seeds.pending != 0u;
                     let converges = converges_to(x, next_seed(&seeds), found.d, u, layer);

@@ -115,20 +115,16 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
     }
     let share = clamp(APART_MOTION * inverseSqrt(max(difference2, 1e-12)), LEAST_SHARE, 1.0);
     let is_there = difference2 > EDGE_MOTION * EDGE_MOTION && beyond > share * apart;
-<<<<<<< HEAD
+    if is_there {
+        let low = nearest + apart;
+        let high = farthest / (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO);
+        if any(are_between(above, low, high) | are_between(here, low, high) | are_between(below, low, high)) { count_in_crowd(px); }
+    }
     textureStore(edge_flags_out, px, vec4u((bitcast<u32>(here.y) & ~EDGE) | select(0u, EDGE, is_there)));
 }
 
-/// Second pass: every pixel as one layer, which is copied to BACK after it, and the list of edge pixels, which
-/// `separate_layers` corrects. Stores are what costs in this pass.
-=======
-    var shows_third = false;
-    for (var i = 0; i < select(0, 9, is_there); i++) {
-        let z = depth_at(px + vec2i(i % 3, i / 3) - 1);
-        shows_third = shows_third || (z > nearest + apart && z < farthest / (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO));
-    }
-    if shows_third { count_in_crowd(px); }
-    textureStore(edge_flags_out, px, vec4u((bitcast<u32>(depth_at(px)) & ~EDGE) | select(0u, EDGE, is_there)));
+fn are_between(z: vec3f, low: f32, high: f32) -> vec3<bool> {
+    return (z > vec3f(low)) & (z < vec3f(high));
 }
 
 /// Between the first and the second pass: which tiles are in a crowd. An invocation is a tile of a cell.
@@ -140,8 +136,8 @@ fn find_crowds(@builtin(local_invocation_index) local: u32, @builtin(workgroup_i
     find_crowd(tile);
 }
 
-/// Second pass: every pixel as one layer, and the list of edge pixels, which `separate_layers` corrects.
->>>>>>> 806ac38 (Grass, where a pixel shows many blades, is blurred without parting them, and beats reproject)
+/// Second pass: every pixel as one layer, which is copied to BACK after it, and the list of edge pixels, which
+/// `separate_layers` corrects. Stores are what costs in this pass.
 @compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
 fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let k = worklist_index(group);
@@ -149,36 +145,34 @@ fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(work
     if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
     let counts = weight_at(px);
     let here = flags_at(px);
-<<<<<<< HEAD
-    let near_edge = is_edge(three_flags(px - vec2i(0, 1)) | three_flags(px) | three_flags(px + vec2i(0, 1)));
+    var near_edge = is_edge(three_flags(px - vec2i(0, 1)) | three_flags(px) | three_flags(px + vec2i(0, 1)));
     var smooth_here = !near_edge;   // one surface of one weight in the 3 x 3
     if WEIGHTED {
         for (var i = 0; i < 9; i++) {
             smooth_here = smooth_here && weight_at(px + vec2i(i % 3, i / 3) - 1) == counts;
         }
     }
+    if near_edge { near_edge = is_near_separated(px); }
     let z = flagged_depth(here);
     let trajectory = trajectory_around(px, textureLoad(motion, px, 0), z);
     if !COPIED { textureStore(colors, px, FRONT, textureLoad(color, px, 0)); }
     let flags = SINGLE | select(0u, SMOOTH, smooth_here);
     textureStore(surfaces, px, FRONT, pack_surface(trajectory, select(z, -z, near_edge), flags));
     textureStore(mattes, px, pack_matte(Matte(z, false, 1.0, counts)));
-    if is_edge(here) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
-=======
-    for (var i = 0; i < 9; i++) {
-        let at = px + vec2i(i % 3, i / 3) - 1;
-        let flags = flags_at(at);
-        smooth_here = smooth_here && !is_edge(flags) && weight_at(at) == counts;
-        near_edge = near_edge || (is_edge(flags) && !is_in_crowd(clamped(at)));
-    }
-    let z = flagged_depth(here);
-    let trajectory = trajectory_around(px, textureLoad(motion, px, 0), z);
-    textureStore(colors, px, FRONT, textureLoad(color, px, 0));
-    textureStore(surfaces, px, FRONT, pack_surface(trajectory, select(z, -z, near_edge), smooth_here));
-    textureStore(surfaces, px, BACK, pack_surface(trajectory, 0.0, false));
-    textureStore(matte, px, vec4f(z, 0.0, 1.0, counts));
     if is_edge(here) && !is_in_crowd(px) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
->>>>>>> 806ac38 (Grass, where a pixel shows many blades, is blurred without parting them, and beats reproject)
+}
+
+/// Whether an edge of the 3 x 3 is separated, where there are edges: all are, but in crowds.
+fn is_near_separated(px: vec2i) -> bool {
+    let low = clamped(px - 1);
+    let high = clamped(px + 1);
+    let has_crowd = is_in_crowd(low) || is_in_crowd(high) || is_in_crowd(vec2i(low.x, high.y)) || is_in_crowd(vec2i(high.x, low.y));
+    var result = !has_crowd;
+    for (var i = 0; i < select(0, 9, has_crowd); i++) {
+        let at = clamped(px + vec2i(i % 3, i / 3) - 1);
+        result = result || (is_edge(flags_at(at)) && !is_in_crowd(at));
+    }
+    return result;
 }
 
 /// Third pass: workgroups for the list of edge pixels.
