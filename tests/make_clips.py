@@ -61,8 +61,9 @@ def write(
     kind: str | None = None,
     muxing: dict[str, str] | None = None,
     tick: Fraction = TICK,
+    rate: Fraction = Fraction(RATE),
 ) -> Path:
-    """A clip; `times` [s] of its frames, by default RATE a second.
+    """A clip; `times` [s] of its frames, by default `rate` a second, which the file states.
 
     `tags`: range, matrix, transfer, primaries. `tone`: seconds of sound; or `sound`: codec,
     rate and samples. `gap`: where it pauses, and for how long [s]. `late`: how much later
@@ -70,9 +71,9 @@ def write(
     container before and `also` after they are written.
     """
     made = list(frames) if frames is not None else [frame(planes(n), pixels) for n in range(12)]
-    shown = [late + t for t in (times or [Fraction(n, RATE) for n in range(len(made))])]
+    shown = [late + t for t in (times or [n / rate for n in range(len(made))])]
     with av.open(str(path), "w", format=kind, container_options=muxing or {}) as out:
-        stream = out.add_stream(codec, rate=RATE, options=options or lossless(codec))
+        stream = out.add_stream(codec, rate=rate, options=options or lossless(codec))
         stream.width, stream.height, stream.pix_fmt = made[0].width, made[0].height, pixels
         stream.codec_context.time_base = tick
         if tags is not None:

@@ -245,6 +245,28 @@ def test_a_rate_that_is_rounded_to_milliseconds_is_known_again(tmp_path, rate, w
     assert not footage.is_variable
 
 
+@pytest.mark.parametrize("rate", ["30", "30000/1001", "60000/1001", "120000/1001"])
+@pytest.mark.parametrize("count", [3, 8, 44])
+def test_a_few_times_of_milliseconds_have_the_rate_that_the_file_states(tmp_path, rate, count):
+    """Rounded, those of 29.97 and 30 are the same for long."""
+    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(count)]
+    path = clips.write(tmp_path / "c.mkv", frames, rate=Fraction(rate))
+    with av.open(str(path)) as container:
+        assert container.streams.video[0].time_base == Fraction(1, 1000)
+    footage = Footage(path)
+    assert footage.rate == Fraction(rate) and not footage.is_variable
+
+
+def test_a_rate_that_the_times_do_not_keep_is_not_believed(tmp_path):
+    """Matroska states one whatever the times are."""
+    times = [Fraction(n, 24) for n in range(20)]
+    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(20)]
+    path = clips.write(tmp_path / "c.mkv", frames, times, rate=Fraction(60))
+    with av.open(str(path)) as container:
+        assert container.streams.video[0].average_rate == 60
+    assert Footage(path).rate == 24
+
+
 def test_steps_of_two_lengths_alone_have_a_rate():
     """RealVideo 2: the middle of the lengths is near to neither."""
     ticks = np.array([1, 82, 83, 164, 165], np.int64)
@@ -255,15 +277,20 @@ def test_steps_of_two_lengths_alone_have_a_rate():
     assert timeline.is_variable
 
 
-def test_pictures_whose_times_are_those_of_decoding_are_counted(tmp_path):
-    """As in files of VC-1 and RealVideo: B-frames come before, with later times."""
-    plain = clips.write(tmp_path / "in.mp4", options={"bf": "2", "b_strategy": "0", "qp": "8"})
-    path = tmp_path / "c.mkv"
+@pytest.mark.parametrize(
+    ("suffix", "keys"), [(".mkv", 0), (".mp4", 1)], ids=["VC-1 and RealVideo", "CAVS"]
+)
+def test_pictures_whose_times_are_those_of_decoding_are_counted(tmp_path, suffix, keys):
+    """B-frames come before, with later times. `keys`: by how much those of key frames are later."""
+    options = {"bf": "2", "b_strategy": "0", "qp": "8", "g": "12"}
+    plain = clips.write(tmp_path / "in.mp4", options=options)
+    path = tmp_path / f"c{suffix}"
     with av.open(str(plain)) as source, av.open(str(path), "w") as target:
         stream = target.add_stream_from_template(source.streams.video[0], opaque=True)
         for n, packet in enumerate(p for p in source.demux() if p.size):
             packet.stream, packet.time_base = stream, Fraction(1, 24)
             packet.pts = packet.dts = n
+            packet.pts += keys if packet.is_keyframe else 0
             target.mux_one(packet)
     with av.open(str(path)) as container:
         raw = [frame.pts for frame in container.decode(video=0)]

@@ -114,10 +114,10 @@ class Footage:
             stream = cast(VideoStream, container.streams[self.index])
             frames = decoded(container, stream)
             frame = next(frames, None)
-            if self._packets.ascends:
+            if (counted := self._packets.counted) is not None:
                 shown = [one.pts for one in islice(frames, _REORDERED) if one.pts is not None]
                 if shown != sorted(shown):  # as in VC-1 and RealVideo: times of decoding
-                    self._packets = self._packets.counted()
+                    self._packets = counted
         if frame is None:
             raise InputError(f"{self.path}: none of its pictures can be decoded ({self.codec})")
         self.pixels = frame.format.name

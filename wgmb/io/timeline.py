@@ -32,6 +32,8 @@ KNOWN_RATES = tuple(
     )
 )  # fmt: skip
 _NEAR = 1e-3  # of a rate: it is taken for the known one
+_ROUNDED = 1.001  # ticks by which times differ at most from those of a rate
+_STATED = 1e-4  # the same of a rate that the file states
 _UNEVEN = 0.02  # of a step: more is a variable rate
 _SELDOM = 0.05  # of the steps: if more are uneven, the rate varies
 _FINEST = 1_001_000  # denominator of a rate
@@ -80,8 +82,11 @@ class Timeline:
     """How much more the file should hold, by what its header states [s]."""
     is_encrypted: bool = False
     """Its packets cannot be decoded without a key."""
-    ascends: bool = False
-    """No packet is shown before the one before it, though pictures are reordered."""
+    stated: Fraction | None = None
+    """The known rate that the file states."""
+    counted: Timeline | None = None
+    """What holds where decoded pictures are not in the order of their times, which are then those
+    of decoding: pictures are counted. None where that cannot be."""
 
     @property
     def steps(self) -> np.ndarray:
@@ -92,12 +97,14 @@ class Timeline:
     def rate(self) -> Fraction:
         """Pictures a second, by the mean of the steps without gaps and hitches.
 
-        The nearest known rate if it is within 0.1 %, or within what the clock's rounding makes of a
-        few steps.
+        The rate that the file states if all times are those of it, rounded; else the nearest known
+        rate if it is within 0.1 %, or within what the clock's rounding makes of a few steps.
         """
         steps = self.steps
         if not len(steps):
             return Fraction(24)
+        if self.stated is not None and self._keeps(self.stated):
+            return self.stated
         middle = np.median(steps)
         usual = steps[(steps > 0.5 * middle) & (steps < 1.5 * middle)]
         usual = usual if len(usual) else steps  # of two lengths, with the middle in neither
@@ -110,6 +117,14 @@ class Timeline:
         if near := [known for known in off if off[known] < rounding]:
             return min(near, key=lambda known: (known.denominator, off[known]))
         return exact.limit_denominator(_FINEST)
+
+    def _keeps(self, rate: Fraction) -> bool:
+        """Return True if all times are those of a rate, rounded to ticks alike."""
+        step = float(1 / (rate * self.times.base))
+        since = self.times.ticks - self.times.ticks[0]
+        places = np.rint(since / step)
+        off = since - places * step
+        return bool(np.median(np.diff(places)) == 1 and off.max() - off.min() < _ROUNDED)
 
     @property
     def is_variable(self) -> bool:
@@ -130,10 +145,6 @@ class Timeline:
         base = float(self.times.base)
         return [(int(self.times.ticks[n]) * base, int(self.steps[n]) * base) for n in uneven]
 
-    def counted(self) -> Timeline:
-        """The same where times are those of decoding: pictures are counted."""
-        return replace(self, in_order=True, ascends=False)
-
     def from_picture(self, number: int) -> Timeline:
         """The same without the pictures before `number`."""
         return replace(self, times=self.times[number:])
@@ -143,7 +154,8 @@ class Timeline:
         ticks, step = 2 * self.times.ticks, round(2 / (self.rate * self.times.base))
         after = np.append(ticks[1:], ticks[-1] + step)
         both = np.stack([ticks, (ticks + after) // 2], 1).ravel()
-        return replace(self, times=Times(both, self.times.base / 2), keys=2 * self.keys)
+        times, stated = Times(both, self.times.base / 2), self.stated and 2 * self.stated
+        return replace(self, times=times, keys=2 * self.keys, stated=stated)
 
 
 def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
@@ -177,13 +189,36 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
     timeline = Timeline(
         Times(_sorted(shown), base), _sorted(found.keys), in_order, is_assumed, end, problem
     )
-    reorders = bool(stream.codec_context.has_b_frames)
-    return replace(
+    timeline = replace(
         timeline,
         lacks=_lacking(container, stream, timeline, found.read),
-        ascends=found.ascends and not in_order and reorders,
         is_encrypted=found.is_encrypted,
+        stated=_known(stream.average_rate),
     )
+    if in_order:
+        return timeline
+    return replace(
+        timeline, counted=_counted(timeline, found, bool(stream.codec_context.has_b_frames))
+    )
+
+
+def _known(rate: Fraction | None) -> Fraction | None:
+    """The known rate that is meant, if any: files round the length of a picture."""
+    near = (known for known in KNOWN_RATES if rate and abs(rate / known - 1) < _STATED)
+    return next(near, None)
+
+
+def _counted(timeline: Timeline, found: _Packets, reorders: bool) -> Timeline | None:
+    """See Timeline.counted."""
+    times = timeline.times
+    if len(times) < found.count:  # times that repeat: some pictures have that of decoding instead
+        decoded = _sorted(found.decoded)
+        if len(decoded) < found.count:
+            return None
+        return replace(
+            timeline, in_order=True, times=Times(decoded - decoded[0] + times.ticks[0], times.base)
+        )
+    return replace(timeline, in_order=True) if found.ascends and reorders else None
 
 
 class _Packets:
