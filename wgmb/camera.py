@@ -15,9 +15,8 @@ from .errors import InputError
 MOST_BODIES = 65535
 MAX_INDEX = 2**32 - 1
 Window = tuple[int, int, int, int]
-"""Where an image lies in the display window: x, y of its first pixel; then the display window's
-width and height [px].
-"""
+"""Position of an image in the display window: x, y of its first pixel, then the display window's
+width and height [px]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""How a video codes colour: planes, bits, range, matrix, transfer, primaries (ITU-T H.273)."""
+"""Colour coding of a video: planes, bits, range, matrix, transfer, primaries (ITU-T H.273)."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -18,7 +18,7 @@ SRGB, LINEAR, PQ, HLG = 13, 8, 16, 18  # transfers
 
 @dataclass(frozen=True)
 class Coding:
-    """How the pixels of a video are stored; the numbers are those of H.273, none UNSPECIFIED."""
+    """Storage of a video's pixels; the numbers are those of H.273, none UNSPECIFIED."""
 
     model: Literal["yuv", "rgb", "grey"] = "yuv"
     """Planes: Y, Cb, Cr; or R, G, B; or grey alone. Alpha comes last."""

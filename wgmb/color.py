@@ -21,7 +21,7 @@ def srgb(light: np.ndarray) -> np.ndarray:
 
 
 class ToDisplay(Protocol):
-    """How pictures become integers for people to look at: `to_display`, or a Display's."""
+    """Conversion of pictures to integers for a display: `to_display`, or that of a Display."""
 
     def __call__(self, rgba: np.ndarray, bits: int, over_black: bool = False) -> np.ndarray:
         """See `to_display`."""

@@ -12,7 +12,7 @@ from .ocio import installed
 
 @dataclass(frozen=True, kw_only=True)
 class DisplaySettings:
-    """How PNG, JPEG, TIFF, videos and the viewer show colours."""
+    """Display of colours in PNG, JPEG, TIFF, videos and the viewer."""
 
     ocio: str | None = None
     "OpenColorIO config: builtin (ACES), studio, blender, a file, or off (sRGB); default: $OCIO."
@@ -47,7 +47,7 @@ class DisplaySettings:
 
     @property
     def remark(self) -> str | None:
-        """What users should know whose $OCIO cannot be followed."""
+        """A remark for users whose $OCIO cannot be used; None otherwise."""
         if self.ocio is not None or not os.environ.get("OCIO") or installed():
             return None
         return "$OCIO is ignored, as OpenColorIO is not installed: pip install 'wgmb[ocio]'"
@@ -55,7 +55,7 @@ class DisplaySettings:
 
 @dataclass(frozen=True, kw_only=True)
 class ColorSettings(DisplaySettings):
-    """What the input's colours are, and how PNG, JPEG, TIFF, videos and the viewer show them."""
+    """Colour space of the input, and display of colours in PNG, JPEG, TIFF, videos and the viewer."""
 
     from_: str | None = None
     "Colour space of the input, such as acescg; default: by its attributes, else linear Rec.709."
@@ -75,7 +75,7 @@ def option_name(field: str) -> str:
 def color_record(
     display: Display | None, output: str, space: ColorSpace | None = None, pattern: str = ""
 ) -> dict[str, str | None]:
-    """What of the colours changes the contents of `output`, for its record; nothing for sRGB.
+    """Colour settings that change the contents of `output`, for its record; nothing for sRGB.
 
     `space`: of the input `pattern`, where it is given.
     """

@@ -30,7 +30,7 @@ _MOST = 65504.0  # brighter than any display: largest half float
 
 @dataclass(frozen=True)
 class ColorSpace:
-    """What the numbers of a picture mean, in the words of a config.
+    """A colour space of a config: the meaning of a picture's numbers.
 
     `name` is a space of the config. Where `matrix` is given (9 numbers, row by row), RGB must be
     multiplied by it first. `why` says how the space was found.
@@ -138,7 +138,8 @@ class ColorConfig:
         return ColorSpace(self, name, "the role scene_linear")
 
     def chromaticities(self, space: ColorSpace) -> tuple[float, ...] | None:
-        """What an EXR in that linear space says of its primaries; None if nobody knows."""
+        """Chromaticities of that linear space for an EXR: x, y of red, green, blue and white; None
+        if unknown."""
         if self._interchange is None:
             return None
         onto, primaries = self._interchange
@@ -181,7 +182,7 @@ class ColorConfig:
     def display(
         self, display: str | None = None, view: str | None = None, look: str | None = None
     ) -> Display:
-        """How the config shows pictures; what is None is the config's default.
+        """A display and view of the config; None stands for the config's default.
 
         `look`: instead of the view's own looks. InputError lists the names there are.
         """
@@ -277,7 +278,7 @@ class Display:
 
     @property
     def settings(self) -> dict[str, str | None]:
-        """What it is, for the record of a file."""
+        """Names of config, display, view and look, for the record of a file."""
         config = f"{self.config.name} ({self.config.version})"
         return {"ocio": config, "display": self.display, "view_transform": self.view,
                 "look": self.look}  # fmt: skip
@@ -288,7 +289,8 @@ class Display:
         return self.config.names_of(self.display, self.view)
 
     def of(self, space: ColorSpace) -> ToDisplay:
-        """What `color.to_display` is for sRGB, for linear premultiplied pictures in `space`."""
+        """Conversion of linear premultiplied pictures in `space` to the display, as
+        `color.to_display` for sRGB."""
         space.check_linear()
         return partial(self._to_display, space)
 

@@ -1,4 +1,4 @@
-"""What runs in a worker of dask.distributed: a plugin that opens the GPU, and blurs parts of a job.
+"""Worker side of dask.distributed: a plugin that opens the GPU and blurs parts of a job.
 
 A worker that cannot do the job says why and is given nothing.
 """
@@ -34,13 +34,13 @@ def plugin_name(run: str) -> str:
 
 @dataclass(frozen=True)
 class WorkerState:
-    """What a worker says of itself."""
+    """A worker's report on itself."""
 
     name: str
     host: str
     process: int
     why_not: str = ""
-    """Why it can do nothing; "" if it can."""
+    """The reason why it cannot work; "" if it can."""
     lacks_gpu: bool = False
 
 
@@ -139,7 +139,7 @@ def blur_part(run: str, ranges: Sequence[Range]) -> Outcome:
 
 
 def state_of(run: str, dask_worker: Worker) -> WorkerState | None:
-    """What a worker says of itself; None: it is not ready yet."""
+    """A worker's report on itself; None until it is ready."""
     plugin = dask_worker.plugins.get(plugin_name(run))
     return getattr(plugin, "state", None)
 

@@ -59,9 +59,9 @@ class Frame:
     depth: np.ndarray | None = None
     """(height, width) float [scene units], required if motion comes from `camera`."""
     window: Window | None = None
-    """Where the image lies in the display window, of which it may hold a part, or more: x, y of
-    its first pixel, and the display window's width and height [px]. None: the camera's, or the
-    image is all of it."""
+    """Position of the image in the display window, of which it may hold a part, or more: x, y of
+    its first pixel, and the display window's width and height [px]. None: the camera's window, or
+    the image is the whole display window."""
     camera: Reprojections | None = None
     """Camera and body motion around this frame; gives motion from depth."""
     object_id: np.ndarray | None = None

@@ -49,7 +49,7 @@ _NO_LOOK = "frames", "skip_missing", "max_mb"  # of InputSettings: they change n
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """What `wgmb blur` is asked to do with rendered frames."""
+    """Request to blur rendered frames, as `wgmb blur` receives it."""
 
     pattern: str
     output: OutputSettings
@@ -86,7 +86,7 @@ class Asked:
         return given.open(self.pattern, *masks, space, settled), shown
 
     def color_record(self, shown: Display | None) -> dict[str, str | None]:
-        """What of the colours changes the contents of the files."""
+        """Colour settings that change the contents of the files."""
         space = self.color.space(shown)
         return color_record(shown, self.output.output, space, self.pattern)
 
@@ -131,7 +131,7 @@ class Job:
 
     @cached_property
     def settled(self) -> Settled:
-        """What the sequence says of all frames."""
+        """The findings about the whole sequence."""
         return self.findings or self.clip.settle()
 
     def _check_machine(self, shown: Display | None) -> None:
@@ -317,7 +317,7 @@ def _check_space(clip: Clip, shown: Display | None) -> str:
 
 
 def _motion(clip: Clip, video: VideoSettings, adapter: str | None) -> tuple[VideoSettings, str]:
-    """How motion comes from the pictures of frames that hold none, settled, and in words."""
+    """Source of the motion for frames without vectors, decided, and in words."""
     if video.flow == "none" or len(clip.on_disk) < 2:
         return video, ""
     has = clip.has

@@ -118,7 +118,7 @@ def stored(job: Job, chunk: int, *, frames: Sequence[int] | None = None) -> Stor
 
 
 def _with_config(job: Job) -> Asked:
-    """What was asked, with the config of OpenColorIO that $OCIO names here."""
+    """The request, with the config of OpenColorIO that $OCIO names here."""
     color = job.asked.color
     if color.ocio is None:
         color = replace(color, ocio=os.environ["OCIO"] if job.is_shown else "off")

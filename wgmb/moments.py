@@ -80,7 +80,7 @@ class Moments(Sequence[Moment]):
 
 
 def _count_before(times: Sequence[Fraction], time: Fraction) -> int:
-    """How many of the ascending times are before one."""
+    """Number of the ascending times before one."""
     low, high = 0, len(times)
     while low < high:
         middle = (low + high) // 2

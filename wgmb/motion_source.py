@@ -1,4 +1,4 @@
-"""Where motion comes from, if frames bring none."""
+"""Source of motion for frames without vectors."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 

@@ -49,7 +49,7 @@ def told(about: str) -> Iterator[None]:
 
 
 def config_file(config: str) -> str:
-    """What OpenColorIO calls the config "builtin", "studio", "blender", or the given file."""
+    """OpenColorIO's name of the config "builtin", "studio", "blender", or of the given file."""
     if config == "blender":
         return str(_blenders_config())
     return _BUILT_IN.get(config, config)

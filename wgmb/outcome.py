@@ -23,7 +23,7 @@ class Outcome:
     report: BatchReport = field(default_factory=BatchReport)
     cuts: set[int] = field(default_factory=set)
     notes: dict[str, list[int]] = field(default_factory=dict)
-    """What a user should know, with the frames that were done of which it is true."""
+    """Messages for the user, each with the finished frames to which it applies."""
     unseen: list[str] = field(default_factory=list)
     absent: list[str] = field(default_factory=list)
     """Masks that none of the frames read so far has; see Clip.absent."""
@@ -84,7 +84,7 @@ class Outcome:
             self.sizes.setdefault(size, []).extend(numbers)
 
     def be_a_part(self) -> None:
-        """What these frames do not have, others may."""
+        """Count masks that these frames lack as unseen, as other frames may have them."""
         self.unseen += self.report.absent
         self.report.absent = []
 

@@ -29,11 +29,12 @@ class Watched:
 
     @property
     def device(self) -> wgpu.GPUDevice:
-        """Where the pictures are."""
+        """The device that holds the pictures."""
         return self.observer.device
 
     def light(self) -> wgpu.GPUTexture:
-        """What is seen in the middle of the last picture's time, as linear light (rgba32float)."""
+        """The perceived image in the middle of the last picture's time, as linear light
+        (rgba32float)."""
         return self.observer.texture()
 
     def coded(self, coding: Coding) -> CodedPicture:

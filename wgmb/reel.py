@@ -32,7 +32,7 @@ class Picture(Generic[T]):
     """One picture of a reel."""
 
     time: float
-    """When it is shown first [s]."""
+    """Time at which it is first shown [s]."""
     content: T
     """The picture itself: whatever the reel's tests for cuts and repeats take."""
     number: int = 0
@@ -110,12 +110,12 @@ class Reel(Generic[T]):
         return [replace(cell, index=first + cell.index) for cell in found]
 
     def same_shot(self, index: int, other: int) -> bool:
-        """Whether two pictures are kept, and no cut lies between them."""
+        """True if two pictures are kept, and no cut lies between them."""
         between = self._up_to(index, other)
         return between is not None and not any(picture.begins_shot for picture in between)
 
     def moves_on(self, index: int, other: int) -> bool:
-        """Whether two pictures are kept, and neither a cut nor a flash parts their motion."""
+        """True if two pictures are kept, and neither a cut nor a flash lies between them."""
         between = self._up_to(index, other)
         return between is not None and not any(picture.breaks_motion for picture in between)
 
@@ -164,7 +164,7 @@ class Reel(Generic[T]):
     def _end_of_flash(
         self, before: Picture[T], begins: Picture[T], is_cut: Callable[[T, T], bool]
     ) -> float | None:
-        """When the first picture is shown that goes on as `before` did; None if none does soon."""
+        """Time of the first picture that continues `before`; None if none does soon."""
         for ahead in range(LONGEST):
             picture = self._ahead(ahead)
             if picture is None or picture.number in self._known_cuts:

@@ -44,9 +44,9 @@ class BlurredFrame:
     number: int
     views: list[Result] = field(default_factory=list)
     made_of: dict[str, Any] = field(default_factory=dict)
-    """What it depends on (see Clip.made_of), for Output.write_views."""
+    """Files and facts on which it depends (see Clip.made_of), for Output.write_views."""
     failed: str = ""
-    """Why it could not be read or blurred; then it has no views."""
+    """The reason why it could not be read or blurred; then it has no views."""
     bad: dict[str, int] = field(default_factory=dict)
     """Pixels that are not finite, by input."""
 
@@ -74,7 +74,7 @@ class Handover:
 
 
 class Stages:
-    """What is done with a frame: `read` and `blur`, each in one thread at a time."""
+    """Stages of a frame: `read` and `blur`, each in one thread at a time."""
 
     def __init__(self, clip: Clip, blur: Blur, confidence: bool = False, all_views: bool = True):
         self.clip, self._blur = clip, blur
@@ -83,7 +83,7 @@ class Stages:
         self.numbers = clip.numbers
 
     def made_of(self, number: int) -> dict[str, Any]:
-        """What a frame depends on."""
+        """Files and facts on which a frame depends."""
         return self.clip.made_of(number, self.neighbours)
 
     def read(self, number: int, made_of: dict[str, Any]) -> ReadFrame:

@@ -166,10 +166,10 @@ class Seen(Protocol):
 
 
 class Sink(Protocol):
-    """Where exposures go: `take` on the main thread, then `put` in a thread of its own."""
+    """Destination of exposures: `take` on the main thread, then `put` in a thread of its own."""
 
     def take(self, moment: Moment, exposure: Seen) -> Any:
-        """What is to be written of a picture."""
+        """The data of a picture that will be written."""
         ...
 
     def put(self, taken: Any) -> None:

@@ -35,7 +35,7 @@ class FlowSettings:
         return "gather" if self.flow in ("auto", "search") else "tap"
 
     def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
-        """Where motion comes from, and the same in words."""
+        """The source of the motion, and its description in words."""
         settled, how = self.settled(device)
         if settled.flow == "none":
             return None, how

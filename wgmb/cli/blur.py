@@ -153,7 +153,7 @@ def _tell_unused(color: ColorSettings) -> None:
 
 
 Crew = tuple[int | None, str | None]
-"""How many workers are started here, None for as many as suit; or the scheduler of others."""
+"""Number of workers to start here, None for a suitable one; or the scheduler of other workers."""
 
 
 def _crew(workers: int | Literal["auto"] | None, cluster: str | None) -> Crew | None:

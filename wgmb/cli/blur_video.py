@@ -28,12 +28,12 @@ from .terminal import note, progress
 from .video_output import write
 
 Tell = Callable[..., None]
-"""What `terminal.progress` gives."""
+"""A function that `terminal.progress` yields."""
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What all videos of a run have in common."""
+    """Settings that all videos of a run share, and the objects made of them."""
 
     look: BlurSettings
     when: ShutterSettings
@@ -45,7 +45,7 @@ class Wish:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What a result depends on, as it is written into a video."""
+        """Settings on which a result depends, for the record of a video."""
         found = {"wgmb": __version__} | plain(self.look) | plain(self.when) | plain(self.video)
         return found | {"curve": self.when.curve_read()}
 

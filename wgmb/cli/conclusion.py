@@ -1,4 +1,4 @@
-"""What the commands say about rendered frames at the end of a run."""
+"""Messages about rendered frames at the end of a run."""
 
 from __future__ import annotations
 

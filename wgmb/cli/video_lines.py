@@ -1,4 +1,4 @@
-"""What `wgmb info` says of a video."""
+"""Lines of `wgmb info` about a video."""
 
 from __future__ import annotations
 

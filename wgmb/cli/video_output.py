@@ -28,7 +28,7 @@ _RECORD = "comment", "description", "synopsis"  # texts of a video; the first th
 
 
 class Made(Protocol):
-    """What makes pictures of a video: FootageBlur is one."""
+    """Maker of the pictures of a video, such as FootageBlur."""
 
     @property
     def footage(self) -> Footage:
@@ -37,12 +37,12 @@ class Made(Protocol):
 
     @property
     def clock(self) -> Clock:
-        """When what was at an input time is in the output."""
+        """The clock that gives output times by input times."""
         ...
 
     @property
     def device(self) -> Any:
-        """Where the pictures are."""
+        """The device that holds the pictures."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""What a video says about its colours, and what is assumed where it says nothing."""
+"""Colour tags of a video, and the assumptions where tags are missing."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 

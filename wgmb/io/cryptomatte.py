@@ -30,7 +30,7 @@ class NoSuchNameError(InputError):
 
 
 def find(attributes: Mapping, layer: str) -> Attributes | None:
-    """What the `attributes` of a file say about the Cryptomatte called `layer`, if there is one."""
+    """Metadata of the Cryptomatte called `layer` in the `attributes` of a file; None without one."""
     found: dict[str, dict[str, str]] = {}
     for name, value in attributes.items():
         m = re.fullmatch(r"cryptomatte/([^/]+)/(\w+)", name)

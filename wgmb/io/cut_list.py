@@ -98,7 +98,7 @@ def _rate(text: str | None, whole: str) -> float | None:
 
 
 def _read_edl(path: Path, fps: float | None) -> set[int]:
-    """Where the events of an edit decision list (CMX 3600) begin and end, in frames."""
+    """Begins and ends of the events of an edit decision list (CMX 3600), in frames."""
     nominal = round(fps or _FPS)  # timecode counts whole frames
     edges: set[int] = set()
     for line in path.read_bytes().decode("utf-8-sig", "replace").splitlines():
@@ -135,7 +135,7 @@ def _dropped(path: Path) -> InputError:
 
 
 def _read_otio(path: Path, fps: float | None) -> set[int]:
-    """Where the clips of all video tracks of a timeline begin and end, in frames."""
+    """Begins and ends of the clips on all video tracks of a timeline, in frames."""
     text = path.read_bytes().decode("utf-8", "replace")
     if _depth(text) > _DEEPEST:  # the library would crash
         raise InputError(f"{path}: lists are nested over {_DEEPEST} deep, too deep for an edit")
@@ -156,7 +156,7 @@ def _read_otio(path: Path, fps: float | None) -> set[int]:
 
 
 def _depth(json: str) -> int:
-    """How deeply lists and objects are nested."""
+    """Nesting depth of lists and objects."""
     bare = re.sub(r'"(?:[^"\\]|\\.)*"', "", json, flags=re.DOTALL).encode()
     marks = np.frombuffer(bare, np.uint8)
     steps = np.isin(marks, list(b"[{")).astype(int) - np.isin(marks, list(b"]}"))
@@ -164,7 +164,7 @@ def _depth(json: str) -> int:
 
 
 def _edges(otio: Any, track: Any) -> Iterator[Any]:
-    """Where the clips of a track, and those within its clips, begin and end."""
+    """Begins and ends of a track's clips, and of the clips within them."""
     for item in track:
         if isinstance(item, (otio.schema.Gap, otio.schema.Transition)) or not item.enabled:
             continue

@@ -111,7 +111,7 @@ def _order(depth: np.ndarray | None, counts: np.ndarray) -> np.ndarray:
 
 
 def _seen(alpha: np.ndarray, starts: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """What every sample's nearer ones let through of it, 0 to 1."""
+    """Transmittance of the samples in front of each sample, 0 to 1."""
     clear = np.clip(1 - alpha.astype(np.float64), 0, None)
     seen = np.ones(len(alpha))
     pixels, rank = np.flatnonzero(counts > 1), 1

@@ -1,4 +1,4 @@
-"""What the numbers of motion vectors really mean: found out by warping the neighbouring frames.
+"""Meaning of the numbers of motion vectors, tested by warping the neighbouring frames.
 
 A reading of the vectors is a flip of their axes and a scale. The right one puts the colours of the
 neighbouring frames where those of the frame are. Up to _PROBES moving pixels are compared, over
@@ -51,7 +51,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What one frame has to say about its vectors."""
+    """Test of one frame's vectors."""
 
     lookups: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = field(
         default_factory=list
@@ -63,7 +63,7 @@ class Evidence:
     differs: bool = False
     """The picture differs from a neighbour by more than noise."""
     doubt: str = ""
-    """Why it cannot be tested."""
+    """The reason why it cannot be tested."""
 
     @property
     def count(self) -> int:
@@ -190,7 +190,7 @@ def _search(tested: Sequence[Evidence], probes: _Probes) -> list[tuple[str, floa
 
 
 def _golden(difference: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function of one valley is least."""
+    """Argument at which a function with one minimum is least."""
     inner = [high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)]
     values = [difference(s) for s in inner]
     for _ in range(_STEPS):

@@ -29,7 +29,7 @@ HARDWARE = ("nvenc", "qsv", "amf")
 
 @dataclass(frozen=True)
 class Facts:
-    """What a video says of its pictures besides their coding."""
+    """Facts about a video's pictures besides their coding."""
 
     pixel_aspect: Fraction = Fraction(1)
     """Width of a pixel to its height."""
@@ -136,7 +136,7 @@ CODECS = {
 
 @dataclass(frozen=True)
 class Encoding:
-    """How a video is to be encoded: what `chosen` returns."""
+    """Encoding of a video, as `chosen` returns it."""
 
     suffix: str
     codec: str
@@ -175,7 +175,7 @@ class Encoding:
         return {self.encoder.parameters: ":".join(said)} if said else {}
 
     def left_out(self, facts: Facts) -> list[str]:
-        """What of the facts the file cannot hold, in words."""
+        """Facts that the file cannot hold, in words."""
         said = []
         if (facts.mastering or facts.light_level) and not self.encoder.parameters:
             said.append(f"{self.encoder.name} keeps no HDR10 data (mastering display, light level)")
@@ -229,7 +229,7 @@ def chosen(
     quality: int | None = None,
     encoder: str | None = None,
 ) -> Encoding:
-    """How to encode the video `path`.
+    """Encoding for the video `path`.
 
     `codec`: a name in CODECS, by default the first that the suffix is for. `quality`: instead of
     the codec's own. `encoder`: a kind of HARDWARE; None is software. InputError for what does not
@@ -302,7 +302,7 @@ def _of(coding: Coding) -> _Held:
 
 
 def _distance(held: _Held, wanted: Coding) -> tuple[int, ...]:
-    """How far a format is from what is wanted: first what it loses, then what it wastes."""
+    """Distance of a format from the wanted one: first its losses, then its waste."""
     model, bits, steps, alpha = held
     order = {"rgb": ("rgb", "yuv"), "grey": ("grey", "yuv"), "yuv": ("yuv",)}[wanted.model]
     area, asked = steps[0] * steps[1], wanted.steps[0] * wanted.steps[1]

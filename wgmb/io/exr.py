@@ -259,9 +259,8 @@ def _open(path: Path, *, header_only: bool):
 
 
 def _short_of_memory(heard: list[str], needed: int) -> bool:
-    """Whether pixels could not be read for want of memory: the library says so of arrays, but not
-    of its own rooms, which are smaller.
-    """
+    """True if pixels could not be read for lack of memory: the library reports this for arrays, but
+    not for its own smaller buffers."""
     if "MemoryError" in "".join(heard):
         return True
     try:

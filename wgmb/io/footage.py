@@ -181,7 +181,7 @@ class Footage:
 
     @property
     def times(self) -> Times:
-        """When each picture is shown [s]: Fractions that ascend."""
+        """Times of the pictures [s]: ascending Fractions."""
         return self._timeline.times
 
     @property
@@ -219,7 +219,7 @@ class Footage:
 
     @property
     def facts(self) -> Facts:
-        """What it says of its pictures besides their coding."""
+        """Facts about the pictures besides their coding."""
         return Facts(self.pixel_aspect, self.mastering, self.light_level)
 
     @property
@@ -228,7 +228,7 @@ class Footage:
         return self._turn.degrees
 
     def loss(self) -> str:
-        """What of the pictures asked for could not be read, in one line; '' if nothing."""
+        """Requested pictures that could not be read, in one line; '' if there are none."""
         said = []
         if self.missing:
             at = float(self.times[min(self.missing)])
@@ -294,7 +294,7 @@ class Footage:
 
 
 def _side_data(frame: av.VideoFrame) -> dict[Type, bytes]:
-    """What is told beside a frame; nothing if PyAV does not know all its kinds."""
+    """Side data of a frame; nothing if PyAV does not know all their kinds."""
     with contextlib.suppress(ValueError):
         data = cast(Iterable[SideData], frame.side_data)
         return {one.type: bytes(one) for one in data}  # pyright: ignore[reportArgumentType]

@@ -173,7 +173,7 @@ def read(
 
 @dataclass
 class _Content:
-    """What one file holds: channels by view."""
+    """Contents of one file: channels by view."""
 
     path: Path
     file: exr.Exr | None  # None: a still
@@ -209,7 +209,7 @@ class _Files:
         self._read: dict[Path, _Content] = {}
 
     def content(self, path: Path, space: ColorSpace | None) -> _Content:
-        """What the file holds; `space`: of a still."""
+        """Contents of the file; `space`: of a still."""
         if path not in self._read:
             self._read[path] = self._content(path, space)
         return self._read[path]
@@ -294,7 +294,7 @@ def _noted(found: tuple[FrameFile, ...], empty: Sequence[str]) -> tuple[FrameFil
 
 
 def _remarks(frame: FrameFile) -> list[str]:
-    """What a view's picture lacks, if anything."""
+    """Remarks on channels that a view's picture lacks."""
     if frame.beside is None:
         return [_NO_PICTURE.format(frame.view)]
     lacks = ", ".join(c for c, name in zip("RGB", frame.color, strict=False) if not name)

@@ -1,4 +1,4 @@
-"""Which files the results of a sequence's frames are made of."""
+"""Files on which the results of a sequence's frames depend."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class Light:
 
 @dataclass(frozen=True)
 class LightPasses:
-    """What was found: kinds of light, and a line about what there is in vain."""
+    """The passes found: kinds of light, and a line about passes that cannot be used."""
 
     lights: tuple[Light, ...] = ()
     lacking: str | None = None

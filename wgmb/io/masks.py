@@ -178,7 +178,7 @@ def with_amount(scale: str) -> tuple[str, float | None]:
 
 
 def joined(planes: Iterable[np.ndarray]) -> np.ndarray | None:
-    """What any of the masks holds out: 1 - product of (1 - mask); None if there are none."""
+    """Union of the masks: 1 - product of (1 - mask); None if there are none."""
     whole: np.ndarray | None = None
     for plane in planes:
         if whole is not None:

@@ -1,4 +1,4 @@
-"""What the vectors of a sequence mean: settled once for all of its frames."""
+"""Meaning of a sequence's vectors, decided once for all of its frames."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 

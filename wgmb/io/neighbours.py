@@ -181,7 +181,7 @@ class Neighbours:
     def _is_cut(
         self, source: FrameFile, frame: Frame, near: Frame, side: int, also: frozenset[str]
     ) -> bool:
-        """Whether a cut lies between `frame` and `near`, as is settled on the default view."""
+        """True if a cut lies between `frame` and `near`, as decided on the default view."""
         if not self._is_search:  # known ones are not asked
             return False
         if source.view is None:

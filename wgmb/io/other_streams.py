@@ -1,4 +1,4 @@
-"""What a video holds besides its pictures, put beside other pictures.
+"""Streams of a video besides its pictures, copied beside other pictures.
 
 Sound, subtitles, covers and attachments are copied packet for packet, with languages, titles and
 dispositions; chapters and the file's own texts and dates come along. What the new container cannot
@@ -103,7 +103,7 @@ class OtherStreams:
         return stream.type == "data" and 0 < stream.frames == len(self._container.chapters())
 
     def _why_not(self, stream: Stream) -> str:
-        """Why a stream is not worth a try, or ''."""
+        """The reason why a stream cannot be copied, or ''."""
         if stream.type == "video" and not stream.disposition & Disposition.attached_pic:
             return "only one stream of pictures is written"
         if stream.type in ("audio", "subtitle") and stream.codec_context is None:

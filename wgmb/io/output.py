@@ -245,7 +245,7 @@ class Output:
         return stills.encode(results[0].displayed, path.suffix, self.bits, text, shown)
 
     def _shown(self, result: Result) -> ToDisplay:
-        """How the picture becomes display values."""
+        """Conversion of the picture to display values."""
         if self._display is None:
             return to_display
         with about(result.source.name):

@@ -1,4 +1,4 @@
-"""What never changes in a video while all around it does: a head-up display, a logo, borders."""
+"""Static areas of a video whose surroundings change: a head-up display, a logo, borders."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 

@@ -1,4 +1,4 @@
-"""Which layers of a sequence's files are read, and what they mean."""
+"""Layers of a sequence's files, and their conventions."""
 
 from __future__ import annotations
 

@@ -55,13 +55,13 @@ class PictureMotion:
         return load
 
     def _same_shot(self, a: int, b: int, view: str | None) -> bool:
-        """Whether no cut lies between two frames; those far apart are taken for other shots."""
+        """True if no cut lies between two frames; frames far apart count as different shots."""
         if abs(a - b) > 2 * FAR:
             return False
         return not any(self._is_cut(n, view) for n in range(min(a, b) + 1, max(a, b) + 1))
 
     def _is_cut(self, number: int, view: str | None) -> bool:
-        """Whether a cut, or a gap, lies before a frame."""
+        """True if a cut, or a gap, lies before a frame."""
         key = number, view
         if key not in self._cuts:
             while len(self._cuts) > 8 * FAR:

@@ -174,9 +174,8 @@ class Segments:
         return order
 
     def _tick(self, number: int) -> int:
-        """When a picture is shown, in ticks; also of numbers before the first and after the last,
-        as if the rate went on.
-        """
+        """Time of a picture in ticks; numbers before the first and after the last continue the
+        rate."""
         inside = min(max(number, 0), len(self._times) - 1)
         return round((self._times[inside] + (number - inside) / self._rate) / self._base)
 
@@ -234,7 +233,7 @@ class Segments:
 
 
 def folder_of(path: Path) -> Path:
-    """Where the segments of a video are."""
+    """Folder of the segments of a video."""
     return path.with_name(f"{path.name}.segments")
 
 

@@ -1,4 +1,4 @@
-"""Which frames of a sequence are on disk, in which files, and the views that these hold."""
+"""Frames of a sequence on disk, their files, and the views in them."""
 
 from __future__ import annotations
 

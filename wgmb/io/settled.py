@@ -1,4 +1,4 @@
-"""What is settled once by looking at a whole sequence, so that parts of it can be blurred apart.
+"""Decisions about a whole sequence, made once, so that parts of it can be blurred apart.
 
 Everything here is plain values that JSON can hold.
 """
@@ -23,13 +23,13 @@ class Settled:
     views: tuple[str, ...]
     """Names of the views, the default one first."""
     finding: Finding
-    """What the vectors mean."""
+    """Meaning of the vectors."""
     cuts: tuple[int, ...]
     """Frames that begin a shot, as the user or an edit says."""
     beyond: Sides
     """Sides of the data window beyond which the picture is unknown: left, top, right, bottom."""
     notes: tuple[str, ...] = ()
-    """What a user should know about all frames."""
+    """Messages for the user about all frames."""
 
     def plain(self) -> dict[str, Any]:
         """As JSON can hold it."""

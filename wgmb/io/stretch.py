@@ -81,7 +81,7 @@ class Stretch:
         return ready
 
     def _place(self) -> int:
-        """Where in the input the next piece begins."""
+        """Position in the input at which the next piece begins."""
         out = self._pieces * self._hop
         centre = round(out * self._speed)
         least, most = centre - self._reach, centre + self._reach
@@ -178,7 +178,7 @@ class Onsets:
 
 
 def _best(area: np.ndarray, want: np.ndarray) -> int:
-    """Where in `area` the samples are most like `want`; the middle if all are alike."""
+    """Position in `area` whose samples are most like `want`; the middle if all are alike."""
     likeness = np.correlate(area, want, "valid")
     sums = np.cumsum(np.concatenate([[0.0], area.astype(np.float64) ** 2]))
     power = sums[len(want) :] - sums[: -len(want)]

@@ -1,4 +1,4 @@
-"""When the pictures of a video are shown: one pass over its packets, without decoding.
+"""Times of the pictures of a video: one pass over its packets, without decoding.
 
 Times are those in the file, on the clock that all its streams share: with edit lists, late starts
 and variable rates. The number of a picture says nothing about its time.
@@ -75,11 +75,11 @@ class Timeline:
     is_assumed: bool
     """The file does not say when its pictures are shown: the rate is a guess."""
     end: Fraction
-    """When the last packet of any stream ends [s]."""
+    """End of the last packet of any stream [s]."""
     problem: str
-    """Why the pass ended before the file did, or ''."""
+    """The reason why the pass ended before the file, or ''."""
     lacks: Fraction = Fraction(0)
-    """How much more the file should hold, by what its header states [s]."""
+    """Duration that the file lacks, by its header [s]."""
     is_encrypted: bool = False
     """Its packets cannot be decoded without a key."""
     stated: Fraction | None = None
@@ -137,7 +137,7 @@ class Timeline:
 
     @property
     def gaps(self) -> list[tuple[float, float]]:
-        """Where a steady rate pauses, and how long the steps there are [s]; none if it varies."""
+        """Gaps of a steady rate: begin and length of each [s]; none if the rate varies."""
         uneven = np.flatnonzero(self._uneven())
         usual = float(1 / (self.rate * self.times.base))
         if len(uneven) > _SELDOM * len(self.steps) or (self.steps[uneven] < 1.5 * usual).any():
@@ -222,7 +222,7 @@ def _counted(timeline: Timeline, found: _Packets, reorders: bool) -> Timeline | 
 
 
 class _Packets:
-    """What the packets of a stream of pictures say."""
+    """Facts in the packets of a stream of pictures."""
 
     def __init__(self, codec: str):
         self.shown, self.decoded, self.keys = array("q"), array("q"), array("q")
@@ -270,7 +270,7 @@ def _sorted(ticks: array[int]) -> np.ndarray:
 def _lacking(
     container: InputContainer, stream: VideoStream, timeline: Timeline, read: int
 ) -> Fraction:
-    """How much of a file its packets leave missing [s]."""
+    """Duration that the packets of a file lack [s]."""
     name, stated = container.format.name, Fraction(0)
     if name == "avi":
         stated = stream.frames * (stream.time_base or Fraction(0))

@@ -14,7 +14,7 @@ _MATRIX = struct.Struct("=9i")  # of a display, in 1/65536
 
 @dataclass(frozen=True)
 class Turn:
-    """How stored pictures become upright: perhaps transposed, then mirrored."""
+    """Turn of stored pictures: transposed or not, then mirrored."""
 
     swaps: bool = False
     flips: tuple[bool, bool] = (False, False)  # vertically, horizontally

@@ -139,7 +139,7 @@ class Video:
 
 
 def _coding(display: Collection[str], lossless: bool) -> Coding:
-    """What pictures for this display are coded as, if the encoder can."""
+    """Coding of pictures for this display, if the encoder supports it."""
     known = [_DISPLAYS[name] for name in sorted(display) if name in _DISPLAYS]
     primaries, transfer = known[0] if known else (UNSPECIFIED, UNSPECIFIED)
     if lossless:

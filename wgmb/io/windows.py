@@ -32,7 +32,7 @@ _EMPTY = {"depth": np.inf, "scale": 1.0}  # what is outside; the rest is 0
 
 @dataclass(frozen=True)
 class Placement:
-    """Where the pixels of a frame lie, and how far the window of its result may grow."""
+    """Position of a frame's pixels, and the limits to which the window of its result may grow."""
 
     canvas: Window
     bounds: Window
@@ -50,7 +50,7 @@ def union(windows: Iterable[Window]) -> Window:
 
 
 def common(one: Window, other: Window) -> Window | None:
-    """What two windows share; None if that is nothing."""
+    """Intersection of two windows; None if it is empty."""
     left, top = max(one[0], other[0]), max(one[1], other[1])
     right, bottom = min(one[2], other[2]), min(one[3], other[3])
     return (left, top, right, bottom) if left <= right and top <= bottom else None
@@ -123,7 +123,7 @@ def canvas(needed: Window, limit: Window, windows: Iterable[Window], display: Wi
 
 
 def near_enough(one: Window, other: Window) -> bool:
-    """Whether a canvas may hold two windows."""
+    """True if a canvas may hold two windows."""
     return _area(union([one, other])) <= _MOST_AREA * (_area(one) + _area(other))
 
 

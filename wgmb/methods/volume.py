@@ -257,7 +257,7 @@ def tile_kinds(
 
 
 def _meets(origin, direction, bounds, slabs, spread, wide=0.0) -> np.ndarray:
-    """Whether lines of unit direction, thickened, are in a bound's sphere and slab at once.
+    """True where lines of unit direction, thickened, are in a bound's sphere and slab at once.
 
     They are `wide` at their origin and spread by the tangent `spread`.
     """

@@ -38,7 +38,7 @@ def to_samples(coding: Coding) -> np.ndarray:
 
 
 def _range(coding: Coding) -> tuple[np.ndarray, np.ndarray]:
-    """What a sample is multiplied by, and what is added then, for each plane."""
+    """Factor and offset of the samples, for each plane."""
     most, unit = 2**coding.bits - 1, 2 ** (coding.bits - 8)
     if coding.full_range:
         scale, black, middle = np.full(3, 1 / most), 0.0, 2 ** (coding.bits - 1)

@@ -1,4 +1,4 @@
-"""What the passes over planes are told: sizes, and what samples mean."""
+"""Uniforms of the passes over planes: sizes, and the meaning of samples."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 

@@ -1,4 +1,4 @@
-"""Which kinds of light of a frame can be followed: those that it and a neighbour have apart."""
+"""Kinds of light of a frame that can be followed: those that it and a neighbour hold apart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the light on a frame's surfaces differs in its neighbours."""
+"""Changes of the light on a frame's surfaces from frame to frame."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ View = wgpu.GPUTextureView
 
 @dataclass(frozen=True)
 class Seen:
-    """What passes read of one frame: its light, without its albedo, and where surfaces are."""
+    """Inputs of the passes from one frame: its light, without its albedo, and its surfaces."""
 
     light: View
     depth: View

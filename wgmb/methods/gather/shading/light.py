@@ -1,4 +1,4 @@
-"""What moving light adds to a frame's colours, at a few times of its exposure."""
+"""Light that moves, as an addition to a frame's colours at a few times of its exposure."""
 
 from __future__ import annotations
 
@@ -54,7 +54,8 @@ class Kind:
 
 @dataclass(frozen=True)
 class Added:
-    """What is added: a layer a node, then one for the previous frame and one for the next one.
+    """The addition: a layer for each node, then one for the previous frame and one for the next
+    one.
 
     The alpha of a node says how sure its light is, from 0 to 1; that of a neighbour, whether the
     surface is seen there.

@@ -1,4 +1,4 @@
-"""What moves over a frame's surfaces, in the frame and in its neighbours."""
+"""Values that move over a frame's surfaces, in the frame and in its neighbours."""
 
 from __future__ import annotations
 
