@@ -19,11 +19,17 @@ class BatchReport:
     """Result of a run."""
 
     done: list[int] = field(default_factory=list)
-    skipped: list[int] = field(default_factory=list)  # already there (resume)
+    """Numbers of the frames that were written, in the order in which they were finished."""
+    skipped: list[int] = field(default_factory=list)
+    """Numbers of the frames that were finished before (`resume`)."""
     failed: dict[int, str] = field(default_factory=dict)
-    stopped: str = ""  # why the rest was not tried, or there is no video
-    bad: dict[int, dict[str, int]] = field(default_factory=dict)  # pixels not finite, by input
-    absent: list[str] = field(default_factory=list)  # masks that no frame has; see Clip.absent
+    """Reasons, by the numbers of the frames that failed."""
+    stopped: str = ""
+    """The reason why the run ended early, or has no video; "" otherwise."""
+    bad: dict[int, dict[str, int]] = field(default_factory=dict)
+    """Number of pixels that are not finite, by frame number and input (see Frame.bad)."""
+    absent: list[str] = field(default_factory=list)
+    """Masks by index or id that no frame has (see Clip.absent); empty unless all were read."""
 
     def __repr__(self) -> str:
         counts = {"done": self.done, "already there": self.skipped, "failed": self.failed}

@@ -21,13 +21,17 @@ width and height [px]."""
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """One frame's camera: 4 x 4 matrices for column vectors, OpenGL clip space (y up)."""
+    """One frame's camera: 4 x 4 matrices for column vectors, OpenGL clip space (y up).
+
+    InputError for matrices that are not finite, and for bodies that cannot be inverted.
+    """
 
     clip_from_world: np.ndarray
+    """(4, 4): the product of projection and view matrix."""
     view_from_world: np.ndarray | None = None
-    """Required for orthographic projections; the camera looks along -z."""
+    """(4, 4), required for orthographic projections; the camera looks along -z."""
     bodies: dict[int, np.ndarray] = field(default_factory=dict)
-    """`world_from_object` of every moving body, by object index."""
+    """(4, 4) world from object of every moving body, by object index, 1 to 4294967295."""
 
     def __post_init__(self) -> None:
         for name, matrix in (
@@ -48,8 +52,10 @@ class Camera:
             raise InputError(f"{len(self.bodies)} bodies; at most {MOST_BODIES}")
 
     def toward(self, other: Camera, share: float) -> Camera:
-        """The camera on the way to another: position and projection linear, orientation turned
-        at constant speed (spherical linear interpolation). Both need `view_from_world`.
+        """The camera at a `share`, 0 to 1, of the way to another.
+
+        Position and projection are interpolated linearly, the orientation at constant speed
+        (spherical linear interpolation). InputError unless both have `view_from_world`.
         """
         own, others = self.view_from_world, other.view_from_world
         if own is None or others is None:

@@ -55,7 +55,7 @@ class DisplaySettings:
 
 @dataclass(frozen=True, kw_only=True)
 class ColorSettings(DisplaySettings):
-    """Colour space of the input, and display of colours in PNG, JPEG, TIFF, videos and the viewer."""
+    """Colour space of the input, and display in PNG, JPEG, TIFF, videos and the viewer."""
 
     from_: str | None = None
     "Colour space of the input, such as acescg; default: by its attributes, else linear Rec.709."

@@ -53,7 +53,7 @@ def needed_by(what: str, extra: str = "") -> Iterator[None]:
 
 
 def reason(error: ImportError, extra: str = "") -> str:
-    """The package and the extra to install, if an extra's package is missing or too old; else ""."""
+    """The package and extra to install, if an extra's package is missing or too old; else ""."""
     package = (error.name or "").partition(".")[0]
     if package not in EXTRAS:
         return ""

@@ -65,9 +65,10 @@ class WeightedSum:
 class Observer:
     """Simulates the perception of successive images, on the GPU.
 
-    `rate`: images per second, each held until the next, unless it is said how long each is held;
-    as many are remembered as count at this rate. The first one counts as shown for ever.
-    `device`: your own wgpu device, the name of an adapter, or None for the best one.
+    `rate`: images per second, over 0, each held until the next unless `present` sets another time;
+    as many are kept as contribute at this rate. The first image counts as shown since ever.
+    `cone`: the cone cell, by default Cone(). `device`: your own wgpu device, the name of an
+    adapter, or None for the best one.
     """
 
     def __init__(
@@ -86,9 +87,10 @@ class Observer:
         self._lock = threading.RLock()
 
     def present(self, picture: np.ndarray, held: float | None = None) -> None:
-        """Show one more: (height, width, 3 or 4), linear light; `held` [s], 1 / `rate` if None.
+        """Show another image: (height, width, 3 or 4) floats, linear light, for `held` [s].
 
-        Of images that are held for different times, each needs its own.
+        `held` is 1 / `rate` if None; if images are held for different times, each needs its own.
+        InputError for another shape than before.
         """
         if picture.ndim != 3 or picture.shape[2] not in (3, 4):
             raise InputError(f"picture must be (height, width, 3 or 4), got {picture.shape}")
@@ -108,7 +110,7 @@ class Observer:
             self._held_for.appendleft(held)
 
     def perceived(self, after: float = 0.0) -> np.ndarray:
-        """(height, width, 4) float32: what is seen `after` [s] the middle of the last picture."""
+        """(height, width, 4) float32: the perceived image `after` [s] the last one's middle."""
         output = self.texture(after)
         with self._lock, gpu.reported(self._size):
             return self._images.download(
@@ -116,7 +118,7 @@ class Observer:
             )
 
     def texture(self, after: float = 0.0) -> wgpu.GPUTexture:
-        """The same as a texture, rgba32float, which the next call overwrites."""
+        """The perceived image as a texture, rgba32float, which the next call overwrites."""
         if not self._shown:
             raise InputError("no image has been shown yet")
         with self._lock, gpu.reported(self._size):

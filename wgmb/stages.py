@@ -39,10 +39,11 @@ class ReadFrame:
 
 @dataclass
 class BlurredFrame:
-    """One frame of `blurred`: a Result for every view, the default one first."""
+    """One frame of `blurred`."""
 
     number: int
     views: list[Result] = field(default_factory=list)
+    """A Result for every view, the default one first."""
     made_of: dict[str, Any] = field(default_factory=dict)
     """Files and facts on which it depends (see Clip.made_of), for Output.write_views."""
     failed: str = ""

@@ -35,7 +35,10 @@ class CameraFile:
         return sorted(self._frames)
 
     def around(self, number: int, **options: Any) -> Reprojections:
-        """The reprojections from frame `number` to its neighbours, which the file must have."""
+        """The reprojections from frame `number` to its neighbours; `options` as for Reprojections.
+
+        InputError unless the file has the frame and a neighbour.
+        """
         if number not in self._frames:
             raise InputError(f"{self.path}: no camera for frame {number}")
         near = {k: self._camera(number + k) for k in (-1, 0, 1) if number + k in self._frames}

@@ -30,7 +30,7 @@ class NoSuchNameError(InputError):
 
 
 def find(attributes: Mapping, layer: str) -> Attributes | None:
-    """Metadata of the Cryptomatte called `layer` in the `attributes` of a file; None without one."""
+    """Metadata of the Cryptomatte called `layer` in a file's `attributes`; None without one."""
     found: dict[str, dict[str, str]] = {}
     for name, value in attributes.items():
         m = re.fullmatch(r"cryptomatte/([^/]+)/(\w+)", name)

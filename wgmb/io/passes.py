@@ -21,11 +21,12 @@ class Passes:
     `object_layer`: index layer that identifies the camera file's objects. `object_motion`:
     vectors exclude the camera's motion. `holdout`, `scale`: masks, each a layer, `LAYER=VALUE`,
     or an image file or pattern; VALUE is an index, or a name (with wildcards) or id of a
-    Cryptomatte. Held out is what any of the masks has. The scales multiply; `MASK:AMOUNT`
+    Cryptomatte. The holdout is the union of all masks. The scales multiply; `MASK:AMOUNT`
     stands for 1 + (AMOUNT - 1) * mask. `also`: patterns of files with additional layers of the
-    same frames. In the names of files, %V stands for the view (see Clip.views). `outside`: what
-    lies beyond a data window that ends within the display window: "nothing", "edge" (unknown: the
-    pixels at its edge stand for it) or "auto" (unknown if it cuts through the picture).
+    same frames. In the names of files, %V stands for the view (see Clip.views). `far`: depth from
+    which a pixel counts as empty. `outside`: the picture beyond a data window that ends within the
+    display window: "nothing", "edge" (unknown: the pixels at its edge are repeated) or "auto"
+    (unknown if the window cuts through the picture).
     """
 
     color: str | None = None
@@ -43,7 +44,7 @@ class Passes:
 
     @property
     def layers(self) -> tuple[str, ...]:
-        """Names of layers that are asked for, other than the picture's."""
+        """Names of the requested layers, other than the picture's."""
         masks = (mask.partition("=")[0] for mask in (*self.holdout, *self.scale))
         named = self.vectors.layer, self.depth, self.object_layer, *masks
         return tuple(name for name in named if name)

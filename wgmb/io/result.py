@@ -18,10 +18,15 @@ class Result:
     """One view of a frame, to be written."""
 
     source: FrameFile
+    """The frame as stored, whose other layers and attributes an EXR keeps."""
     picture: np.ndarray
+    """(height, width, 3 or 4) float32, linear, premultiplied alpha."""
     confidence: Mapping[str, np.ndarray] = field(default_factory=dict)
-    placement: Placement | None = None  # None: it fills the source's data window
-    is_converted: bool = False  # to another rate: the source's time and rate are not its own
+    """(height, width) float32, by the names of `Blur.confidence`; empty without confidence."""
+    placement: Placement | None = None
+    """Position of the picture; None: it fills the source's data window."""
+    is_converted: bool = False
+    """True at another rate: the time code and the rate of the source do not apply."""
 
     @property
     def canvas(self) -> Window:
@@ -34,14 +39,14 @@ class Result:
 
     @property
     def window(self) -> Window:
-        """The source's data window, and as much more as the picture takes."""
+        """The source's data window, grown as far as the picture needs."""
         if self.placement is None or self.canvas == self.source.data_window:
             return self.canvas
         return result_window(self.picture, self.placement, self.source.data_window)
 
     @property
     def displayed(self) -> np.ndarray:
-        """The picture in the display window."""
+        """The picture, cropped or padded to the display window."""
         if self.placement is None:
             return self.picture
         return laid(self.picture, self.canvas, self.source.display_window)

@@ -72,7 +72,7 @@ def _words(places: list[Place]) -> int:
 
 
 def places_of(size: tuple[int, int], coding: Coding) -> list[Place]:
-    """Positions of the planes of a picture of `size` (width, height), in the order of its planes."""
+    """Positions of the planes of a picture of `size` (width, height), in their order."""
     per, found, first = (2 if coding.bits > 8 else 4), [], 0
     for component, step in _components(coding):
         width, height = (-(-n // s) for n, s in zip(size, step, strict=True))

@@ -22,25 +22,32 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CameraPath:
-    """A camera over time: position, target and zoom as functions of seconds."""
+    """A camera over time: position, rotation and zoom as functions of (n,) times [s].
+
+    It looks along -z with y up, turned by roll, then pitch, then yaw.
+    """
 
     position: Callable[[np.ndarray], tuple[ArrayLike, ArrayLike, ArrayLike]]
+    """x, y and z [scene units], each a number or (n,)."""
     yaw: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
+    """Rotation about y [rad], positive to the left."""
     pitch: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
+    """Rotation about x [rad], positive upwards."""
     roll: Callable[[np.ndarray], np.ndarray] = lambda t: 0 * t
+    """Rotation about z [rad]."""
     zoom: Callable[[np.ndarray], np.ndarray] = lambda t: 1.6 + 0 * t
-    """Focal length in halves of the picture's height."""
+    """Focal length in halves of the picture's height, over 0."""
     orbit: tuple[float, float] = (0.0, 0.0)
-    """Orbit of the camera around the pivot: to the right, and up [radians]."""
+    """Orbit of the camera around the pivot: to the right, and up [rad]."""
     pan: tuple[float, float] = (0.0, 0.0)
     """Camera movement after the orbit: to the right, and up [scene units]."""
     dolly: float = 1.0
-    """Scale of the camera's distance to the pivot."""
+    """Scale of the camera's distance to the pivot, over 0."""
     pivot: float = 5.0
     """Distance of the pivot in front of the camera [scene units]."""
 
     def world_from_camera(self, t: ArrayLike) -> np.ndarray:
-        """(n, 4, 4); the camera looks along -z, y up."""
+        """(n, 4, 4) world from camera at the (n,) times `t` [s]."""
         t = times_of(t)
         x, y, z = self.position(t)
         turned = rotation("y", self.yaw(t), t) @ rotation("x", self.pitch(t), t)
@@ -58,7 +65,11 @@ class CameraPath:
     def clip_from_camera(
         self, t: ArrayLike, aspect: float, near: float = 0.05, far: float = 1000.0
     ) -> np.ndarray:
-        """(n, 4, 4) OpenGL projections."""
+        """(n, 4, 4) OpenGL projections at the (n,) times `t` [s].
+
+        `aspect`: width over height of the picture. `near`, `far`: distances of the clip planes
+        [scene units].
+        """
         zoom = np.broadcast_to(self.zoom(times_of(t)), times_of(t).shape)
         m = np.zeros((len(zoom), 4, 4))
         m[:, 0, 0], m[:, 1, 1] = zoom / aspect, zoom
@@ -84,12 +95,15 @@ class Scene:
     bodies: tuple[Body, ...]
     camera: CameraPath
     sun: tuple[float, float, float, float] = (0.45, 0.8, 0.5, 0.95)
-    """Direction towards it (any length) and its strength."""
+    """Direction towards the sun (any length but 0), and its strength."""
     sky: tuple[float, float, float, float] = (0.22, 0.42, 0.78, 0.32)
-    """Colour at the zenith; strength of the ambient light."""
+    """Linear colour at the zenith, and the strength of the ambient light."""
     horizon: Color = (0.62, 0.72, 0.82)
+    """Linear colour at the horizon."""
     volumes: tuple[Volume, ...] | Callable[[float], Instant] = ()
+    """At most 16 of OrbitingSphere and Torus, or a function of the time [s]."""
     backdrop: Backdrop | None = None
+    """Surroundings of the volumes; None: a default Backdrop, if there are volumes."""
     density: str = "exact"
     exposure: tuple[float, str] | None = None
     """Default shutter of the scene: seconds, curve."""
@@ -124,7 +138,7 @@ class Scene:
         return bool(self.volumes) or self.figure is not None
 
     def instant(self, time: float) -> Instant:
-        """Its volumes and their backdrop around `time` [s]; phases are the angles at it."""
+        """The volumes and their backdrop around `time` [s]; phases are the angles at that time."""
         if callable(self.volumes):
             return self.volumes(time)
         turned = tuple(
@@ -135,7 +149,7 @@ class Scene:
     def solid(self, time: float) -> Scene:
         """The scene around `time` [s], its volumes turned into bodies.
 
-        Of volumes that are blended into one another, the densest is there.
+        Of volumes that are blended into one another, only the densest becomes a body.
         """
         volumes, backdrop = self.instant(time)
         if not volumes:
@@ -148,7 +162,7 @@ class Scene:
     def seen_from(
         self, orbit: tuple[float, float], pan: tuple[float, float], dolly: float
     ) -> Scene:
-        """The same scene, its camera moved as `CameraPath.orbit`, `pan` and `dolly` say."""
+        """The same scene with another `orbit`, `pan` and `dolly` of its camera (see CameraPath)."""
         values = (*orbit, *pan, dolly)
         if not _all_finite(values) or not 0 < dolly <= 1000:
             raise InputError(f"orbit, pan and dolly must be finite, dolly over 0, got {values}")

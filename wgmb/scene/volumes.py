@@ -18,9 +18,9 @@ class OrbitingSphere:
     """A sphere of `radius` whose centre runs on a circle of radius `orbit` about an axis along y.
 
     `phase`: its angle at time 0 [rad], right-handed from +x. `speed`: [rad/s], any size and sign.
-    `opacity`: multiplies its density; more than 1 makes fast ones visible, as what is seen goes
-    with the square of density. `facing`: how much it counts in the normals of all the volumes
-    that are blended; None: as much as its density at the place.
+    `opacity`: factor of its density, 0 or more; more than 1 makes fast spheres visible, because
+    visibility goes with the square of density. `facing`: its weight in the normals of all blended
+    volumes; None: its density at the place. `centre` and radii are in scene units.
     """
 
     radius: float
@@ -63,8 +63,8 @@ class Torus:
     """A torus whose ring lies in xz at angle 0 and that turns about z.
 
     `phase`: its angle at time 0 [rad], right-handed. `speed`: [rad/s], any size and sign.
-    `opacity`, `facing`: as for OrbitingSphere; `swell`: its normals are those of a torus so much
-    smaller.
+    `opacity`, `facing`: as for OrbitingSphere. `swell`: its normals are those of a torus smaller by
+    this factor, over 0. `minor_radius` must not exceed `major_radius`; both are in scene units.
     """
 
     minor_radius: float
