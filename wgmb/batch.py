@@ -37,16 +37,17 @@ def blur_sequence(
 ) -> BatchReport:
     """Blur every frame of `clip` into `output`; `confidence` adds confidence layers.
 
-    Of stereo frames every view is blurred, or the one that the clip was opened for; an output that
-    holds one picture gets the default view.
+    `resume` skips frames that are finished (see Output.done). `progress` is called with each
+    frame's number and "done", "skipped" or "failed". All views of a stereo frame are blurred, or
+    the one for which the clip was opened; an output of one picture gets the default view.
 
-    Frames that cannot be read, blurred or written are in the report's `failed`, with the
-    reason; the others are done. Where frame after frame cannot be written for the same reason (a
-    full disk, a folder that is gone), or a video cannot go on, the run stops and `stopped`
-    says why. Once `stop` is set, no other frame is begun; those that are blurred are written, and
-    `stopped` is "on request". Interrupted, nothing half written is left and the interruption goes
-    on. InputError, before any frame is blurred, where a mask names an object that no Cryptomatte
-    has. What has no name is known at the end: `absent`, if every frame was read.
+    Frames that cannot be read, blurred or written are in the report's `failed`, with the reason;
+    the others are finished. If several successive frames cannot be written for the same reason (a
+    full disk, a removed folder), or a video cannot continue, the run stops, and the report's
+    `stopped` gives the reason. Once `stop` is set, no further frame is begun; blurred frames are
+    written, and `stopped` is "on request". An interruption leaves no half-written file and is
+    raised again. InputError, before any frame is blurred, if a mask names an object that no
+    Cryptomatte has. Masks by index or id can be checked at the end only: `absent`.
     """
     _check_names(clip, output)
     stages = Stages(clip, blur, confidence, output.takes_views)
@@ -65,7 +66,7 @@ def convert_sequence(
 ) -> BatchReport:
     """Blur `clip` into `output` at another rate; numbers are those of the output's frames.
 
-    Everything else is as for `blur_sequence`; see rates.py for what an output frame is made of.
+    Everything else is as for `blur_sequence`; see rates.py for the inputs of an output frame.
     """
     _check_names(clip, output)
     stages = ConversionStages(clip, blur, conversion, output.takes_views)
@@ -253,9 +254,9 @@ def vectors_sequence(
 ) -> BatchReport:
     """Write the motion of every frame of `clip` into `output`, in the form of another program.
 
-    It is the motion that `blur_sequence` follows: of vectors in any convention, or of depth and
-    cameras. Frames without motion are in the report's `failed`; everything else is as there.
-    `blur`: gives the device, and may limit the motion (`max_blur`).
+    It is the motion that `blur_sequence` follows: from vectors in any convention, or from depth and
+    cameras. Frames without motion are in the report's `failed`; everything else is as for
+    `blur_sequence`. `blur`: its device is used, and its `max_blur` limits the motion.
     """
     stages = MotionStages(clip, blur or Blur("tap"), all_views=output.takes_views)
     return _Pipeline(stages, output, resume, progress, stop).run()

@@ -1,4 +1,4 @@
-"""OpenColorIO: what a picture's numbers mean, and how they are shown on a display.
+"""OpenColorIO: colour spaces of pictures, and their conversion for a display.
 
 The package is optional (`pip install wgmb[ocio]`) and loaded when a ColorConfig is made.
 """
@@ -48,7 +48,7 @@ class ColorSpace:
 
     @property
     def text(self) -> str:
-        """The space in words."""
+        """The name of the space and the reason for it, in words."""
         by_matrix = "linear Rec.709" if self.why == "default" else "linear RGB"
         return f"{self.name if self.matrix is None else by_matrix} (by {self.why})"
 
@@ -61,7 +61,7 @@ class ColorSpace:
             )
 
     def linear(self, rgba: np.ndarray) -> np.ndarray:
-        """RGB, or premultiplied RGBA, in this space -> in `config.scene_linear`; new float32."""
+        """Convert RGB or premultiplied RGBA of this space to `config.scene_linear`; new float32."""
         rgb, alpha = rgba[..., :3], rgba[..., 3:].astype(np.float32, copy=False)
         if self.is_linear or not alpha.shape[2]:
             return np.concatenate([self.config.linearised(rgb, self.name), alpha], axis=2)
@@ -122,7 +122,7 @@ class ColorConfig:
         return self._by_primaries(REC709, "default")
 
     def unknown(self, attributes: Mapping[str, Any]) -> str:
-        """The name of a colour space in the attributes that the config has not; '' if none."""
+        """A colour space that the attributes name and the config lacks; '' if there is none."""
         for key in _NAMED_BY:
             value = attributes.get(key)
             if isinstance(value, str) and value:
@@ -131,7 +131,7 @@ class ColorConfig:
 
     @cached_property
     def scene_linear(self) -> ColorSpace:
-        """The space of the role scene_linear, which pictures in other spaces are blurred in."""
+        """The space of the role scene_linear, in which pictures of other spaces are blurred."""
         if not self._config.hasRole("scene_linear"):
             raise InputError(f"{self.name} has no role scene_linear, in which pictures are blurred")
         name = self._config.getColorSpace("scene_linear").getName()
@@ -160,14 +160,14 @@ class ColorConfig:
             return data or self._config.isColorSpaceLinear(name, scene)
 
     def linearised(self, rgb: np.ndarray, name: str) -> np.ndarray:
-        """RGB (height, width, 3) in the space of that name -> `scene_linear`; new float32."""
+        """Convert (height, width, 3) RGB of the named space to `scene_linear`; new float32."""
         with ocio.told(f"{name} in {self.name}"):
             processor = self._config.getProcessor(name, self.scene_linear.name)
             return ocio.applied(self._lossless(processor), np.array(rgb, np.float32, order="C"))
 
     @property
     def displays(self) -> list[str]:
-        """Names of its displays."""
+        """Names of the config's displays."""
         return list(self._config.getDisplaysAll())
 
     def views(self, display: str) -> list[str]:
@@ -176,7 +176,7 @@ class ColorConfig:
 
     @property
     def looks(self) -> list[str]:
-        """Names of its looks."""
+        """Names of the config's looks."""
         return list(self._config.getLookNames())
 
     def display(
@@ -270,7 +270,7 @@ class ColorConfig:
 
 
 class Display:
-    """A display and a view of a config: pictures as they look there (ColorConfig.display)."""
+    """A display and a view of a config; see ColorConfig.display."""
 
     def __init__(self, config: ColorConfig, display: str, view: str, look: str | None):
         self.config, self.display, self.view, self.look = config, display, view, look
@@ -295,7 +295,7 @@ class Display:
         return partial(self._to_display, space)
 
     def shown(self, rgba: np.ndarray, space: ColorSpace, over_black: bool = False) -> np.ndarray:
-        """Linear premultiplied (height, width, 3 or 4) -> RGB on the display, 0..1; float32.
+        """Convert linear premultiplied (height, width, 3 or 4) to RGB on the display, float32 0..1.
 
         The colour is unassociated for the transform, and stays so unless it is to lie
         `over_black`. Where alpha is 0, it is light that is added: it has a colour over black only.

@@ -32,9 +32,9 @@ Progress = Callable[[int, int], None]
 class Render:
     """Renders a scene with motion blur; keeps its GPU resources between images.
 
-    `size` (width, height) [px]; `fps`: frames per second, which define the frame interval;
-    `antialias`: antialiasing of the sharp images for image methods, in rays per pixel side.
-    Several threads may call one Render: they take turns.
+    `size` (width, height) [px]; `fps`: frames per second, over 0 to 100000, which define the frame
+    interval; `antialias`: antialiasing of the sharp images for image methods, in rays per pixel
+    side, 1 to 8. Several threads may call one Render: they take turns.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Render:
     def __call__(
         self, time: float, number: int = 0, progress: Progress | None = None
     ) -> np.ndarray:
-        """(height, width, 4) float32, linear: the frame whose instant is `time` [s]."""
+        """The blurred frame whose instant is `time` [s]: (height, width, 4) float32, linear."""
         with self._working():
             output = self._images.texture("output", self.size, self.blur.output)
             self.draw(output.create_view(), time, number, progress=progress)
@@ -83,7 +83,7 @@ class Render:
     def with_confidence(
         self, time: float, number: int = 0
     ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """Return that frame and its confidence; see Blur.with_confidence."""
+        """Return the blurred frame at `time` [s] and its confidence; see Blur.with_confidence."""
         names = self.blur.confidence
         with self._working():
             textures = [
@@ -107,7 +107,7 @@ class Render:
         progress: Progress | None = None,
         timing: Clock | None = None,
     ) -> None:
-        """Draw that frame into a texture of yours, of `size` and the blur's `output` format.
+        """Draw the blurred frame into your texture of `size` and the blur's `output` format.
 
         `blur`: used instead of the Render's own, on the same device. Blurs of the same time share
         the sharp images. `confidence`: a texture like the output, for image methods with
@@ -233,7 +233,7 @@ class Render:
         return found
 
     def sharp(self, time: float) -> np.ndarray:
-        """(height, width, 4) float32, linear: the picture at `time` [s] without any blur."""
+        """The sharp picture at `time` [s]: (height, width, 4) float32, linear."""
         if not self.scene.has_volumes:
             return self.frame(time).color
         still = Blur("volume", shutter=0, device=self.blur.device)

@@ -65,7 +65,7 @@ ROLLING = {"down": (0, 1), "up": (0, -1), "right": (1, 0), "left": (-1, 0)}
 class Shutter:
     """Exposure of a frame: shutter angle, phase and curve.
 
-    `degrees`: shutter angle, 360 = one frame interval; may exceed 360.
+    `degrees`: shutter angle, 0 to 36000; 360 is one frame interval.
     `phase`: "start" opens at the frame's instant, "centre" is centred on it, "end" closes
     at it; a number is the time of the exposure's middle [frame intervals].
     `curve`: a name in CURVES, or a function of x in 0 (opens) to 1 (closes), at any scale,

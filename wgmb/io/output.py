@@ -36,15 +36,17 @@ WINDOWS = ("grow", "keep")
 class Output:
     """Output files: an image sequence, a single image, or a video.
 
-    `settings`: written into the record of every file (see record.py), and compared when a run is
-    resumed. `inputs`: the files that are read; an output that is one of them is refused, always.
-    `overwrite` replaces any file that exists, `resume` only what wgmb wrote and is not done.
-    `layers`: "all" that an EXR input holds go into the EXR output, or those of the "picture"
-    only. `compression` of EXR: a name in exr.COMPRESSIONS, or "same" as the input's. `views`: the
-    names of views that %V in the pattern stands for, which makes a file or video of each.
-    `display`: how PNG, JPEG, TIFF and videos show the light; sRGB by default. `window`: the data
-    window of an EXR may "grow" with streaks that lead out of it, or "keep" its size; stills and
-    videos hold the display window. `since`: a file that is older [ns since 1970] is not done.
+    `pattern`: a name, with `####` for several frames. `numbers`: of the frames. `bits`: 8 or 16 per
+    sample of PNG and TIFF. `fps`: rate of a video. `settings`: written into the record of every
+    file (see record.py), and compared when a run is resumed. `inputs`: the files that are read; an
+    output that is one of them is always refused. `overwrite` replaces any file, `resume` only
+    unfinished ones of wgmb. `layers`: "all" layers of an EXR input are copied to the EXR output, or
+    only those of the "picture". `compression` of EXR: a name in exr.COMPRESSIONS, or "same" as the
+    input's. `views`: names of the views for which %V in the pattern stands; each has its own file
+    or video. `display`: the display for PNG, JPEG, TIFF and videos; sRGB by default. `window`: the
+    data window of an EXR may "grow" with the streaks, or "keep" its size; stills and videos hold
+    the display window. `since`: older files [ns since 1970] count as unfinished. InputError for a
+    name or a setting that does not fit, and for existing files.
     """
 
     def __init__(
@@ -141,11 +143,11 @@ class Output:
 
     @property
     def takes_views(self) -> bool:
-        """True if it holds more than one view of a frame."""
+        """True if the output holds more than one view of a frame."""
         return self.pattern.suffix.lower() == ".exr" or has_view(self.pattern)
 
     def why_hopeless(self, error: BaseException) -> str:
-        """The reason, if an error in writing one frame will meet the next ones too, else ""."""
+        """The reason, if an error in writing one frame will also affect the next ones; else ""."""
         if not isinstance(error, OSError):
             return ""
         if self._videos:
@@ -154,15 +156,15 @@ class Output:
         return f"{self.pattern.parent}: {what}"
 
     def path(self, number: int, view: str | None = None) -> Path:
-        """The file that frame `number` goes to; its `view` where %V makes a file of each."""
+        """The file of frame `number`, and of its `view` if %V is in the pattern."""
         pattern = in_view(self.pattern, view)
         return pattern if self._videos else frame_path(pattern, number)
 
     def done(self, number: int, made_of: dict[str, Any] | None = None) -> bool:
         """Return True if frame `number` exists and is complete, with the same settings and inputs.
 
-        `made_of`: what the frame depends on (see Clip.made_of). The file is read whole and
-        its checksum compared. Raises InputError if another program wrote it.
+        `made_of`: the frame's inputs (see Clip.made_of). The whole file is read and its checksum
+        compared. Raises InputError if another program wrote it.
         """
         return all(self._is_done(self.path(number, view), made_of) for view in self._views)
 
@@ -196,12 +198,13 @@ class Output:
         self.write_views([Result(source, result, confidence or {})], made_of)
 
     def write_views(self, results: Sequence[Result], made_of: dict[str, Any] | None = None) -> None:
-        """Write one frame: into an EXR with all other layers and views of its file, if it is one.
+        """Write the views of one frame.
 
-        Other files hold the first view, and with %V in their names there is one for each.
-        Confidence, from Blur.with_confidence, becomes channels `confidence.NAME` of an EXR.
-        `made_of`: what the frame depends on (see Clip.made_of), for its record. Where runs
-        are resumed, a frame that another process has finished meanwhile is left as it is.
+        An EXR also gets all other layers and views of the input file. Other files hold the first
+        view; with %V in the name, each view gets a file. Confidence, from Blur.with_confidence,
+        becomes channels `confidence.NAME` of an EXR. `made_of`: the frame's inputs (see
+        Clip.made_of), for its record. In a resumed run, a frame that another process has finished
+        meanwhile is not replaced.
         """
         if self._abandoned:
             return
@@ -252,7 +255,7 @@ class Output:
             return self._display.of(space_of(result.source, self._display.config))
 
     def close(self) -> None:
-        """Finish a video (OSError if it cannot be); pictures are finished one by one."""
+        """Finish a video; OSError if that fails. Files of single frames are finished already."""
         for one in self._videos.values():
             try:
                 if not self._overwrite and one.path.exists():
@@ -263,7 +266,7 @@ class Output:
                 raise atomic.about(one.path, error) from None
 
     def abandon(self) -> None:
-        """After an interruption or an error: leave no unfinished file."""
+        """Remove unfinished files, after an interruption or an error."""
         self._abandoned = True
         for one in self._videos.values():
             one.abandon()
