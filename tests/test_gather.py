@@ -1,6 +1,7 @@
 """What gather alone promises: the neighbouring frames show what the frame itself hides."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import wgmb
 from images import crossing, frame_of
 from wgmb import Shutter, gpu
+from wgmb.gpu import kernels
 from wgmb.gpu.textures import TexturePool
 
 SIZE = (54, 96)
@@ -164,6 +166,18 @@ def test_the_short_cut_of_plain_times_shows_the_same(degrees, alone):
     apart = np.abs(short - long).max(axis=2)
     assert (apart > 2e-3).mean() < 0.005
     assert apart.max() < 0.05
+
+
+def test_textures_that_are_read_as_storage_show_the_same(sources, monkeypatch):
+    """As lavapipe reads them, and as all other drivers do."""
+    shown = []
+    for as_storage in (True, False):
+        monkeypatch.setattr(kernels, "reads_storage", lambda device, there=as_storage: there)
+        monkeypatch.setattr(kernels, "_kernel", lru_cache(kernels._kernel.__wrapped__))
+        shown.append(wgmb.Blur("gather", shutter=360, samples=5)(frame_of(sources)))
+        made = kernels.kernel(gpu.open_device(), "methods/gather/cubic.wgsl").source.text
+        assert ("<rgba32uint, read>" in made) == as_storage
+    np.testing.assert_array_equal(*shown)
 
 
 def test_a_software_adapter_takes_no_more_samples_than_its_loops_have_turns(sources):

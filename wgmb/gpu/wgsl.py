@@ -77,11 +77,30 @@ class WgslSource:
         return re.findall(r"@compute\s+@workgroup_size\([^)]*\)\s+fn (\w+)", self.text)
 
     def with_texels(self, **formats: str) -> WgslSource:
-        """The same shader with other texel formats in its aliases, as `Output="rgba16float"`."""
+        """The same shader with other texel formats in its aliases, as `Output="rgba16float"`.
+
+        Or in its marks "stored as FORMAT", by the name of the binding.
+        """
         text = self.text
         for alias, texel in formats.items():
-            pattern = rf"^(alias {alias} = texture_storage_2d(?:_array)?<)\w+"
-            text = re.sub(pattern, rf"\g<1>{texel}", text, flags=re.M)
+            declared = rf"alias {alias} = texture_storage_2d(?:_array)?<"
+            marked = rf".* var {alias}: .*// stored as "
+            text = re.sub(rf"^({declared}|{marked})\w+", rf"\g<1>{texel}", text, flags=re.M)
+        return WgslSource(text, self.files)
+
+    def reading_storage(self) -> WgslSource:
+        """The same shader, with textures marked "stored as FORMAT" bound as storage textures.
+
+        Their one textureLoad() names the level 0, which storage textures do not have.
+        """
+
+        def declared(mark: re.Match) -> str:
+            return f"{mark[1]}texture_storage_{mark[2]}<{mark[4]}, read>{mark[3]}{mark[4]}"
+
+        pattern = r"(var \w+: )texture_(2d|2d_array)<u32>(; *// stored as )(\w+)"
+        text = re.sub(pattern, declared, self.text)
+        for name in re.findall(r"var (\w+): texture_storage_\w+<\w+, read>", text):
+            text = re.sub(rf"(textureLoad\({name}(?:, \w+)+), 0\)", r"\1)", text)
         return WgslSource(text, self.files)
 
 

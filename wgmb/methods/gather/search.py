@@ -64,7 +64,7 @@ class Search:
                 kernel = gpu.kernel(
                     self._device,
                     "methods/gather/resolve.wgsl",
-                    {"Output": self._output},
+                    {"Output": self._output, "mattes": layers["mattes"].format},
                     WEIGHTED=inputs.frame.weight is not None,
                     CONFIDENCE=self._confidence,
                     MOVING_LIGHT=lit is not None,

@@ -48,7 +48,7 @@ fn main(@builtin(local_invocation_index) local: u32,
             let handicap = select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u);
             let candidates = candidates_of(f, candidates0, candidates1, candidates2);
             let starts = seeds_at(candidates, u, 0u);
-            let start = displacement5(unpack_trajectory(textureLoad(surfaces, low, layer, 0)), u);
+            let start = displacement5(unpack_trajectory(surface_of(vec2i(low), layer)), u);
             let visible_depth = deepest;
             var n = 0u;
             loop {      // the corners

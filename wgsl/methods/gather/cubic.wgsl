@@ -5,7 +5,7 @@
 //#include methods/gather/surface.wgsl
 
 @group(1) @binding(0) var color: texture_2d<f32>;       // premultiplied by alpha and weight
-@group(1) @binding(1) var front_surface: texture_2d<u32>;   // see pack_surface()
+@group(1) @binding(1) var front_surface: texture_2d<u32>;   // stored as rgba32uint: see pack_surface()
 @group(1) @binding(2) var second_differences: Differences;  // across, down, in half floats; 0 where not smooth
 @group(1) @binding(3) var<storage, read> worklist: WorkList;
 

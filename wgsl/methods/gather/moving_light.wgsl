@@ -31,9 +31,9 @@ fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
     if layer == 0u { return vec4f(light_during(at, t, duration).rgb, 0.0); }
     let f = layer / 2u;
     let offset = offset_of(min(f, 2u));
-    let surface = textureLoad(surfaces, vec2i(floor(at)), min(layer, 5u), 0);
+    let surface = surface_of(vec2i(floor(at)), min(layer, 5u));
     let here = at + displacement5(unpack_trajectory(surface), -offset);
-    let own = textureLoad(surfaces, vec2i(floor(here)), 0u, 0);
+    let own = surface_of(vec2i(floor(here)), 0u);
     let back = here + displacement5(unpack_trajectory(own), offset) - at;
     let node = light_nodes.count + select(0u, 1u, offset > 0.0);
     let there = textureSampleLevel(added_light, linear, here / vec2f(frame.size), node, 0.0);
@@ -46,7 +46,7 @@ fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
 fn light_unknown(at: vec2f, layer: u32, t: f32, duration: f32) -> f32 {
     var here = at;
     if layer > 0u {
-        let surface = textureLoad(surfaces, vec2i(floor(at)), min(layer, 5u), 0);
+        let surface = surface_of(vec2i(floor(at)), min(layer, 5u));
         here += displacement5(unpack_trajectory(surface), -offset_of(min(layer / 2u, 2u)));
     }
     return select(0.0, 1.0 - light_during(here, t, duration).a, is_inside(here));

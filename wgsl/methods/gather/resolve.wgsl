@@ -13,8 +13,8 @@
 
 @group(1) @binding(3) var single_layer_mask: texture_2d_array<u32>; // bits of times, see the classification
 @group(1) @binding(4) var layer_colors: texture_2d_array<f32>;  // front, back per frame; premultiplied by alpha, coverage, weight
-@group(1) @binding(5) var mattes: texture_2d_array<u32>;    // per frame, see pack_matte()
-@group(1) @binding(6) var second_differences: texture_2d<u32>;  // of the frame's own front colours
+@group(1) @binding(5) var mattes: texture_2d_array<u32>;    // stored as r32uint, rg32uint if WEIGHTED: per frame, see pack_matte()
+@group(1) @binding(6) var second_differences: texture_2d<u32>;  // stored as rgba32uint: of the frame's own front colours
 @group(1) @binding(7) var own_color: texture_2d<f32>;       // the frame as it came
 @group(1) @binding(8) var own_weight: texture_2d<f32>;
 @group(1) @binding(10) var output: Output;
@@ -62,9 +62,9 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let candidates1 = load_candidates(tile, 1u);
     let candidates2 = load_candidates(tile, 2u);
     let front = 0u;
-    let trajectory = unpack_trajectory(textureLoad(surfaces, id, front, 0));
+    let trajectory = unpack_trajectory(surface_of(vec2i(id), front));
     let starts = Starts(trajectory, surface_at(id, 2u), surface_at(id, 3u), surface_at(id, 4u), surface_at(id, 5u));
-    let block_trajectory = unpack_trajectory(textureLoad(surfaces, id / BLOCK * BLOCK, front, 0));  // as classified
+    let block_trajectory = unpack_trajectory(surface_of(vec2i(id / BLOCK * BLOCK), front));  // as classified
     let shift = frame.jitter * (pixel_noise(id) - 0.5);
     let times = sample_times(x, shift, candidates0, candidates1, candidates2);
     let share = 1.0 / f32(times.count);     // applied before adding, so that no sum of finite colours overflows
@@ -95,7 +95,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
             var is_even = true;     // of one weight
             var counts = 1.0;
             if WEIGHTED {
-                is_even = is_smooth(textureLoad(surfaces, px, front, 0));
+                is_even = is_smooth(surface_of(vec2i(px), front));
                 counts = matte_at(px, front / 2u).weight;
             }
             if todo != 0u && is_even {
@@ -294,7 +294,7 @@ struct Starts {         // whose trajectories the first searches of a pixel star
 }
 
 fn surface_at(px: vec2u, layer: u32) -> vec4u {
-    return textureLoad(surfaces, px, min(layer, 2u * sources.count - 1u), 0);
+    return surface_of(vec2i(px), min(layer, 2u * sources.count - 1u));
 }
 
 /// Displacement from which the first search of a layer starts: along the pixel's own trajectory, in that frame [px].
@@ -407,7 +407,7 @@ fn tap(p: vec2f) -> Composite {
 /// Add what is hidden behind the pixel in all frames: the nearest surfaces behind its own, in FILL_DIRECTIONS
 /// directions, weighted by the inverse square of their distances.
 fn add_hidden(sum: ptr<function, Composite>, id: vec2u, share: f32) {
-    let z = abs(unpack_depth(textureLoad(surfaces, id, 0, 0)));
+    let z = abs(unpack_depth(surface_of(vec2i(id), 0u)));
     let count = select(0u, FILL_DIRECTIONS, share > 0.0);
     var filled = Composite();
     var direction = 0u;
@@ -419,7 +419,7 @@ fn add_hidden(sum: ptr<function, Composite>, id: vec2u, share: f32) {
         loop {
             let px = vec2i(floor(vec2f(id) + 0.5 + distance * along));
             let is_there = step < FILL_STEPS && all(px >= vec2i(0)) && all(px < vec2i(frame.size));
-            let is_behind = unpack_depth(textureLoad(surfaces, px, 0, 0)) > z * FILL_DEPTH_RATIO;
+            let is_behind = unpack_depth(surface_of(px, 0u)) > z * FILL_DEPTH_RATIO;
             if is_there && is_behind {
                 let part = 1.0 / (distance * distance);
                 let counts = matte_at(vec2u(px), 0u).weight;
@@ -471,7 +471,7 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite
     let at = visible.opaque.at;
     let layer = visible.opaque.layer;
     var filtered = opaque && visible.opaque.layer % 2u == 0u;   // as a whole, not texel by texel
-    if WEIGHTED { filtered = filtered && is_smooth(textureLoad(surfaces, nearest_pixel(at), layer, 0)); }
+    if WEIGHTED { filtered = filtered && is_smooth(surface_of(vec2i(nearest_pixel(at)), layer)); }
     let parts = u32(front_edge) + u32(back_edge) + u32(opaque && !filtered);
     var sum = Composite();
     var n = 0u;
@@ -495,7 +495,7 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite
         one.residual = one.coverage * sqrt(part.residual2);
         var from_around = part.layer > 1u;
         if CONFIDENCE && part.layer == 1u {
-            from_around = (textureLoad(surfaces, nearest_pixel(part.at), 1, 0).w & AROUND) != 0u;
+            from_around = (surface_of(vec2i(nearest_pixel(part.at)), 1u).w & AROUND) != 0u;
         }
         one.neighbours = select(0.0, one.coverage, from_around);
         if CONFIDENCE && MOVING_LIGHT && n < parts {
@@ -545,7 +545,8 @@ fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32) {
 /// of the line: beside a lamp it would swing far below 0.
 fn resampled(at: vec2f, layer: u32, is_own: bool) -> vec4f {
     let f = fract(at - 0.5);
-    let differences = textureLoad(second_differences, nearest_pixel(at), 0);
+    let px = nearest_pixel(at);
+    let differences = textureLoad(second_differences, px, 0);
     let across = vec4f(unpack2x16float(differences.x), unpack2x16float(differences.y));
     let down = vec4f(unpack2x16float(differences.z), unpack2x16float(differences.w));
     let share = select(vec2f(0.0), 0.5 * f * (1.0 - f), is_own);

@@ -14,7 +14,7 @@ struct SourceFrames {
 }
 
 @group(1) @binding(0) var<uniform> sources: SourceFrames;
-@group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // see pack_surface(); front, back of the frame itself, front, back of the next one, ...
+@group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // stored as rgba32uint: see pack_surface(); front, back of the frame itself, front, back of the next one, ...
 @group(1) @binding(2) var tile_candidates: texture_2d_array<u32>;   // CANDIDATE_LAYERS per frame
 
 const MAX_ITERATIONS: u32 = 6u; // from the pixel's own trajectory
@@ -143,10 +143,15 @@ struct WarpState {
     residual2: f32,     // squared distance from x of where that surface is at the time `u` [px^2]
 }
 
+/// The surface of a pixel in a layer.
+fn surface_of(px: vec2i, layer: u32) -> vec4u {
+    return textureLoad(surfaces, px, layer, 0);
+}
+
 /// One step d <- displacement at (x - d) in a layer, `u` after its frame's instant. INFINITE residual outside the image.
 fn warp_step(x: vec2f, d: vec2f, u: f32, layer: u32) -> WarpState {
     let p = x - d;
-    let surface = textureLoad(surfaces, vec2i(floor(p)), layer, 0);
+    let surface = surface_of(vec2i(floor(p)), layer);
     let next = displacement5(unpack_trajectory(surface), u);
     let step = next - d;
     return WarpState(surface.w, next, select(INFINITE, dot(step, step), is_inside(p)));

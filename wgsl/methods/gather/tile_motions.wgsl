@@ -14,7 +14,7 @@ struct SourceFrame {
 }
 
 @group(1) @binding(0) var<uniform> source: SourceFrame;
-@group(1) @binding(1) var front_surface: texture_2d<u32>;   // see pack_surface()
+@group(1) @binding(1) var front_surface: texture_2d<u32>;   // stored as rgba32uint: see pack_surface()
 @group(1) @binding(2) var tile_motions: texture_2d_array<f32>;      // what `cluster_motions` wrote
 @group(1) @binding(3) var tile_motions_out: Layers;     // of every tile's own pixels, MOTION_LAYERS
 @group(1) @binding(4) var tile_candidates: Packed;      // of all that may come into it, CANDIDATE_LAYERS per frame
@@ -36,6 +36,11 @@ const MOTION_LAYERS: u32 = 7u;
 
 const COARSE: i32 = 4;          // tiles per side of a coarse box
 const MERGE_DISTANCE: f32 = 0.5;    // motions closer than this [px] are one
+
+/// The foreground's surface of a pixel.
+fn front_at(px: vec2u) -> vec4u {
+    return textureLoad(front_surface, px, 0);
+}
 
 /// Squared distance [px^2] to the nearest of the clusters' motions. Those not found yet are 0, standing still, so that
 /// static content needs no cluster.
@@ -84,7 +89,7 @@ fn cluster_motions(@builtin(local_invocation_index) local: u32,
         var found = vec4f(0.0);
         for (var i = 0u; i < pixels; i++) {
             let px = min(corner + vec2u(i % TILE, i / TILE), end);
-            let trajectory = as_vec4(unpack_trajectory(textureLoad(front_surface, px, 0)));
+            let trajectory = as_vec4(unpack_trajectory(front_at(px)));
             let distance2 = distance2_to_clusters(trajectory, clusters, u);
             if distance2 > farthest && distance2 < MAX_MOTION * MAX_MOTION {
                 farthest = distance2;
@@ -104,7 +109,7 @@ fn cluster_motions(@builtin(local_invocation_index) local: u32,
     var has_edge = 0.0;
     var min_depth = vec4f(INFINITE);
     for (var i = 0u; i < pixels; i++) {
-        let surface = textureLoad(front_surface, min(corner + vec2u(i % TILE, i / TILE), end), 0);
+        let surface = front_at(min(corner + vec2u(i % TILE, i / TILE), end));
         let z = abs(unpack_depth(surface));
         if unpack_depth(surface) < 0.0 { has_edge = 1.0; }
         let is_nearest = nearest_cluster(as_vec4(unpack_trajectory(surface)), motions, u);
