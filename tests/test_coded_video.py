@@ -1,5 +1,6 @@
 """Pictures go into a video as they are coded, at the times they are given, or not at all."""
 
+import sys
 from dataclasses import replace
 from fractions import Fraction
 
@@ -57,9 +58,11 @@ def write(path, coding, codec=None, times=None, made=None, quality=None, facts=N
 @pytest.mark.parametrize("codec", CODECS)
 def test_the_table_names_what_the_encoders_have(codec):
     found = CODECS[codec]
-    for encoder in (found.software, *dict(found.hardware).values()):
+    for kind, encoder in (("", found.software), *found.hardware):
+        if kind == "videotoolbox" and sys.platform != "darwin":
+            continue  # only Apple's builds have it
         formats = {form.name for form in av.Codec(encoder.name, "w").video_formats or []}
-        assert set(encoder.pixels) <= formats
+        assert set(encoder.pixels) <= formats or (kind == "v4l2m2m" and not formats)
         context = av.CodecContext.create(encoder.name, "w")
         options = {o.name for o in context.supported_options.private}
         generic = {o.name for o in context.supported_options.generic}
@@ -98,7 +101,13 @@ def test_every_coding_has_a_nearest_one_and_losses_are_told(codec):
         ("a.mov", {"quality": 3}, "codec prores has no quality"),
         ("a.mp4", {"quality": 52}, "quality of h264 must be 0 to 51"),
         ("a.mp4", {"encoder": "nvenk"}, "did you mean 'nvenc'"),
-        ("a.mov", {"encoder": "qsv"}, "encoder qsv is not for prores; it is for h264, h265, av1"),
+        (
+            "a.mov",
+            {"encoder": "qsv"},
+            "encoder qsv is not for prores; it is for h264, h265, av1, vp9",
+        ),
+        ("a.mp4", {"encoder": "v4l2m2m", "quality": 9}, "h264_v4l2m2m has no quality to choose"),
+        ("a.mp4", {"encoder": "videotoolbox", "codec": "av1"}, "is for h264, h265"),
     ],
 )
 def test_what_does_not_fit_together_is_refused(path, options, said):
@@ -106,18 +115,37 @@ def test_what_does_not_fit_together_is_refused(path, options, said):
         chosen(path, **options)
 
 
-def test_an_encoder_that_is_not_there_is_named(monkeypatch, tmp_path):
+def test_an_encoder_that_is_not_there_is_named(monkeypatch):
     monkeypatch.setitem(CODECS, "av1", encoders.Codec((".mp4",), encoders.Encoder("x", ())))
-    with pytest.raises(InputError, match="encoder x is not in this build"):
+    with pytest.raises(InputError, match=r"encoder x is not in this build of PyAV$"):
         chosen("a.mp4", "av1")
-    encoding = chosen("a.mp4", encoder="nvenc")
-    path = tmp_path / "a.mp4"
-    coding, _ = encoding.coding(Coding())
+
+
+HARDWARE = [(codec, kind) for codec, one in CODECS.items() for kind, _ in one.hardware]
+
+
+@pytest.mark.parametrize(("codec", "kind"), HARDWARE)
+def test_a_hardware_encoder_opens_or_says_why_not(tmp_path, codec, kind):
+    path = tmp_path / f"a{CODECS[codec].suffixes[0]}"
     try:
-        CodedVideo(path, tmp_path / "part", encoding, coding, (256, 256), RATE, 1 / RATE).abandon()
-    except InputError as error:  # no such hardware here
-        assert "h264_nvenc does not start: it needs" in str(error)
+        encoding = chosen(path, codec, encoder=kind)
+        coding, _ = encoding.coding(Coding())
+        part = tmp_path / "part"
+        CodedVideo(path, part, encoding, coding, (256, 256), RATE, 1 / RATE).abandon()
+    except InputError as error:
+        name = dict(CODECS[codec].hardware)[kind].name
+        why = str(error).removeprefix(f"encoder {name} ")
+        assert why.startswith(
+            ("does not start: it needs", "is not in this build of PyAV, which has")
+        )
     assert list(tmp_path.iterdir()) == []
+
+
+def test_apples_encoder_counts_its_quality_the_other_way():
+    """From 1 to 100, the best, in units of which 118 are one."""
+    apple = dict(CODECS["h265"].hardware)["videotoolbox"]
+    asked = [int(apple.of_quality(quality)["global_quality"]) for quality in (0, 18, 51)]
+    assert asked == [11800, 64 * 118, 118]
 
 
 # ---- samples, colours, times ----------------------------------------------------------------

@@ -82,7 +82,7 @@ class VideoSettings(FlowSettings):
     "Codec of the video: h264, h265, av1, vp9, prores, ffv1; default: by the suffix of the name."
     quality: int | None = None
     "Constant quality on the encoder's scale: a smaller number is a better and larger video."
-    encoder: Literal["nvenc", "qsv", "amf"] | None = None
+    encoder: Literal["nvenc", "qsv", "amf", "videotoolbox", "v4l2m2m"] | None = None
     "Hardware encoder; by default the encoding is done in software."
 
     @property

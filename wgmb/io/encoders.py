@@ -24,7 +24,8 @@ from .suffixes import VIDEOS as SUFFIXES
 
 CONTAINERS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska", ".webm": "webm", ".gif": "gif"}
 """FFmpeg's names of the containers, by suffix; the first codec that has one is its default."""
-HARDWARE = ("nvenc", "qsv", "amf")
+HARDWARE = ("nvenc", "qsv", "amf", "videotoolbox", "v4l2m2m")
+_LAMBDA = 118  # FFmpeg's units of a global quality to one of `-q` (FF_QP2LAMBDA)
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,15 @@ class Encoder:
     even: bool = False
     """Sizes must be multiples of a sample of chroma."""
 
+    def of_quality(self, quality: int | None) -> dict[str, str]:
+        """The options that ask for a quality, if it has any."""
+        if quality is None or not self.quality:
+            return {}
+        if self.name.endswith("_videotoolbox"):  # it counts from 1, the worst, to 100
+            return {"flags": "+qscale", self.quality: str(_LAMBDA * max(1, 100 - 2 * quality))}
+        more = {"qp_p": str(quality)} if self.name.endswith("_amf") else {}
+        return {self.quality: str(quality)} | more
+
     @property
     def vui(self) -> bool:
         """Return True if the stream itself tells the shape of its pixels."""
@@ -80,17 +90,27 @@ def _planar(names: str, depths: Iterable[int]) -> tuple[str, ...]:
 
 
 def _hardware(
-    family: str, amf: bool = True, ten: bool = True, p444: bool = True
+    family: str, others: bool = True, ten: bool = True, p444: bool = True
 ) -> tuple[tuple[str, Encoder], ...]:
-    """The hardware encoders of a codec family; `ten`: with 10 bits, `p444`: with 4:4:4 (nvenc)."""
+    """The hardware encoders of a codec family.
+
+    `ten`: with 10 bits, `p444`: with 4:4:4 (nvenc); `others`: also Apple's and Linux's (V4L2),
+    which has no constant quality.
+    """
     nv = ("yuv420p", *(("p010le",) * ten), *(("yuv444p",) * p444))
     nvidia = Encoder(f"{family}_nvenc", nv, "cq", (("rc", "vbr"), ("b", "0"), ("preset", "p5")),
                      even=True)  # fmt: skip
     two = ("nv12", *(("p010le",) * ten))
-    found = [("nvenc", nvidia), ("qsv", Encoder(f"{family}_qsv", two, "global_quality", even=True))]
-    if amf:
-        found.append(("amf", Encoder(f"{family}_amf", two, "qp_i", (("rc", "cqp"),), even=True)))
-    return tuple(found)
+    found = {
+        "nvenc": nvidia,
+        "qsv": Encoder(f"{family}_qsv", two, "global_quality", even=True),
+        "amf": Encoder(f"{family}_amf", two, "qp_i", (("rc", "cqp"),), even=True),
+    }
+    if others:
+        apple = Encoder(f"{family}_videotoolbox", two, "global_quality", even=True)
+        linux = Encoder(f"{family}_v4l2m2m", ("yuv420p",), "", (("b", "20M"),), even=True)
+        found |= {"videotoolbox": apple, "v4l2m2m": linux}
+    return tuple(found.items())
 
 
 CODECS = {
@@ -110,13 +130,13 @@ CODECS = {
         (".mp4", ".mkv", ".webm"),
         Encoder("libsvtav1", _planar("yuv420p", (8, 10)), "crf", (("preset", "7"),),
                 "svtav1-params"),
-        20, 63, _hardware("av1", p444=False),
+        20, 63, _hardware("av1", others=False, p444=False),
     ),
     "vp9": Codec(
         (".webm", ".mp4", ".mkv"),
         Encoder("libvpx-vp9", _planar("yuv420p yuv422p yuv444p", (8,)), "crf",
                 (("b", "0"), ("row-mt", "1"))),
-        24, 63,
+        24, 63, (("qsv", Encoder("vp9_qsv", ("nv12", "p010le"), "global_quality", even=True)),),
     ),
     "prores": Codec(
         (".mov", ".mkv"),
@@ -150,11 +170,7 @@ class Encoding:
 
     def options(self, coding: Coding, facts: Facts) -> dict[str, str]:
         """For the encoder, by name."""
-        found = dict(self.encoder.options)
-        if self.quality is not None:
-            found[self.encoder.quality] = str(self.quality)
-            if self.encoder.name.endswith("_amf"):
-                found["qp_p"] = str(self.quality)
+        found = dict(self.encoder.options) | self.encoder.of_quality(self.quality)
         if self.codec == "prores":
             found["profile"] = "4" if coding.steps == (1, 1) else "3"
         if self.encoder.parameters:
@@ -250,6 +266,7 @@ def chosen(
         raise InputError(
             f"output {path}: {codec} goes into {', '.join(found.suffixes)}; {suffix} takes {able}"
         )
+    asked = quality is not None
     if quality is None:
         quality = found.quality
     elif found.quality is None:
@@ -258,7 +275,10 @@ def chosen(
         raise InputError(
             f"quality of {codec} must be 0 to {found.most} (smaller is better), got {quality}"
         )
-    return Encoding(suffix, codec, _encoder(codec, encoder), quality)
+    by = _encoder(codec, encoder)
+    if asked and not by.quality:
+        raise InputError(f"encoder {by.name} has no quality to choose, got {quality}")
+    return Encoding(suffix, codec, by, quality)
 
 
 _OF_RGB = ("ffv1", "prores", "gif")  # others make 4:2:0 of RGB, which all players take
@@ -279,11 +299,19 @@ def _encoder(codec: str, kind: str | None) -> Encoder:
         raise InputError(f"encoder {kind} is not for {codec}; it is for {able}")
     else:
         encoder = dict(found.hardware)[kind]
+    if not _is_there(encoder):
+        there = [name for name, other in found.hardware if _is_there(other)]
+        others = f", which has {', '.join(there)}" if there else ""
+        raise InputError(f"encoder {encoder.name} is not in this build of PyAV{others}")
+    return encoder
+
+
+def _is_there(encoder: Encoder) -> bool:
     try:
         av.Codec(encoder.name, "w")
     except UnknownCodecError:
-        raise InputError(f"encoder {encoder.name} is not in this build of PyAV") from None
-    return encoder
+        return False
+    return True
 
 
 _Held = tuple[str, int, tuple[int, int], bool]  # model, bits, steps, alpha
