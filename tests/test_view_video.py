@@ -276,7 +276,7 @@ def test_the_sharp_picture_comes_first_and_says_so(clip, held):
     for _ in range(3):
         frame(viewer)
     report = viewer.stage.report
-    assert report.waiting.startswith("sharp: the motion of picture 5 is being found")
+    assert report.waiting.startswith("sharp: finding the motion of picture 5")
     sharp = VideoPictures(Footage(clip), gpu.open_device()).at(5)
     np.testing.assert_allclose(viewer.stage.download()[..., :3], sharp, atol=1e-6)
     held.free = True
@@ -410,7 +410,7 @@ def test_what_is_perceived_waits_for_the_motion_of_all_its_frames(clip, held):
     viewer = opened(clip, look="perceived", frame=7.0)
     for _ in range(3):
         frame(viewer)
-    assert viewer.stage.report.busy and "is being found" in viewer.stage.report.waiting
+    assert viewer.stage.report.busy and "finding the motion" in viewer.stage.report.waiting
     blurry = viewer.stage.download()
     held.free = True
     assert np.abs(settled(viewer) - blurry[..., :3]).max() > 1e-3

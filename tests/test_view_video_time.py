@@ -21,6 +21,7 @@ from wgmb.viewer.finder import Known
 from wgmb.viewer.panel import made_of
 from wgmb.viewer.perception import seen_frames
 from wgmb.viewer.video_section import at_pace, in_part
+from wgmb.viewer.widgets import shortened
 
 pytestmark = pytest.mark.fast
 
@@ -222,3 +223,16 @@ def test_options_that_do_not_fit_are_refused_in_one_line(clip, capsys, words, sa
     places = {"CLIP": str(clip), "SHOT": "sample/crossing.####.exr"}
     assert main(["view", *[places.get(word) or word for word in words]]) == 2
     assert said in (line := capsys.readouterr().err) and line.count("\n") == 1
+
+
+def test_settings_written_by_hand_are_of_the_whole_video(clip):
+    text = f'[blur]\npattern = "{clip}"\nfps = "60000/1001"\nbegin = "0.5"\n[view]\nframe = 3\n'
+    state = State.of_toml(text)
+    assert state.frames == "0-23" and state.span == (0, 29) and state.frame == 3
+    assert video_time.rate(state) == Fraction(60000, 1001)
+
+
+def test_long_names_lose_their_middle():
+    assert shortened("clip.mp4", lambda text: len(text) <= 8) == "clip.mp4"
+    assert shortened("Meridian-ProRes-HDR10.mp4", lambda text: len(text) <= 15) == "Meridia..10.mp4"
+    assert shortened("abc", lambda text: False) == "abc"

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import ImageGrab
 
+import make_clips as clips
 from wgmb.viewer import State, offscreen
 from wgmb.viewer.window import frame
 
@@ -235,6 +236,31 @@ def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     it.do("key", "Escape")
     code, said = it.end()
     assert (code, said) == (0, "")
+
+
+def test_a_video_plays_and_is_scrubbed_to_its_ends(desk, tmp_path):
+    clip = tmp_path / "a.mp4"
+    x = np.mgrid[:96, :160][1]
+    tones = [np.where(abs(x - 10 - 12 * n) < 9, 220, 60).astype(np.uint8) for n in range(12)]
+    grey = np.full((48, 80), 128, np.uint8)
+    clips.write(clip, [clips.frame([tone, grey, grey], "yuv420p") for tone in tones])
+    flow = ["--flow", "none", "--speed", "0.5", "--shutter", "360"]
+    it = desk("-m", "wgmb", "view", str(clip), *flow, "--window", "{}x{}".format(*SIZE))
+    it.wait_for_window()
+    it.plays()
+    it.do("key", "End")
+    last = it.settled()
+    it.do("key", "Left", "key", "Left")  # half of the last picture, and half of the one before
+    assert it.shows_other_than(last)
+    it.do("key", "Right", "key", "Right")
+    assert it.shows_again(last)
+    it.do("key", "Home")
+    assert it.shows_other_than(last)
+    clip.unlink()
+    it.do("key", "space")
+    time.sleep(1.5)
+    it.do("key", "Escape")
+    assert it.end() == (0, "")
 
 
 def test_closing_the_window_ends_the_program(desk):

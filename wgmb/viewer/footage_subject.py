@@ -145,10 +145,10 @@ class FootageSubject:
             making = self._lacking[0], 0.0
         number, took = making
         what = "the motion" if self._moves else "the shot"
-        since = f" since {took:.0f} s" if took >= 1 else ""
+        since = f" ({took:.0f} s)" if took >= 1 else ""
         here = self._exposed and self._exposed.here
         sharp = "sharp: " if here in self._lacking else ""
-        return f"{sharp}{what} of picture {number} is being found{since}"
+        return f"{sharp}finding {what} of picture {number}{since}"
 
     def made_of(self, state: State, shutter: Shutter) -> tuple[int, ...]:
         """Numbers of the pictures that share the exposure of the present output frame."""

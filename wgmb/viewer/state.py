@@ -334,6 +334,8 @@ class State:
         state = State(source, **saved.values(given, tables.get("view", {}), State, on_disk=on_disk))
         if state.is_video and ("fps" not in given or state.own_times):
             state = replace(state, fps=float(video_time.own_rate(state)))
+        if state.is_video and "frames" not in {*given, *tables.get("view", {})}:
+            state = replace(state, frames=frames_of(source, video_time.most_mb(state)))
         Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
         video_time.check(state)
         saved.check_words(state, method=METHODS, compare=COMPARE, tone=TONES)

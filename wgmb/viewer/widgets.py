@@ -65,7 +65,9 @@ class Widgets:
         start, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
         self.places[name] = (start.x, start.y, wide, imgui.get_frame_height())
         whole = imgui.ComboFlags_.height_largest
-        opened = imgui.begin_combo(f"##{name}", shown or now, whole)
+        room = wide - imgui.get_frame_height() - 2 * imgui.get_style().frame_padding.x
+        text = shortened(shown or now, lambda text: imgui.calc_text_size(text).x <= room)
+        opened = imgui.begin_combo(f"##{name}", text, whole)
         if opened:
             for item in names:
                 picked, _ = imgui.selectable(plain(item), item == now)
@@ -138,6 +140,16 @@ class Widgets:
             graph_size=ImVec2(imgui.get_content_region_avail().x, 44),
         )
         self.keep(f"{name} times")
+
+
+def shortened(text: str, fits: Callable[[str], bool]) -> str:
+    """The text without as much of its middle as it takes to fit; the end tells files apart."""
+    for left_out in range(len(text) - 2):
+        kept = len(text) - left_out
+        shorter = text if not left_out else f"{text[: kept - kept // 2]}..{text[-(kept // 2) :]}"
+        if fits(shorter):
+            return shorter
+    return text
 
 
 def plain(source: str) -> str:
