@@ -1,4 +1,4 @@
-"""How Sphinx builds these pages: `./run docs` writes them to build/docs."""
+"""Sphinx's configuration: `./run docs` writes these pages to build/docs."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the tests share: a device, pictures, a comparison that shows its failures, their order."""
+"""Fixtures of the tests: a device, pictures, a comparison that shows its failures, their order."""
 
 import json
 import os

@@ -71,12 +71,12 @@ def batches(folder: Path) -> dict[str, np.ndarray]:
 
 
 def shown() -> dict[str, np.ndarray]:
-    """What a notebook shows of a frame: the bytes of a PNG."""
+    """The display of a frame in a notebook: the bytes of a PNG."""
     return {"png": np.frombuffer(wgmb.Frame(make.picture(1))._repr_png_(), np.uint8)}
 
 
 def said(folder: Path) -> dict[str, str]:
-    """What is said where each extra is missing."""
+    """Messages about each missing extra."""
     asked = {
         "png": lambda: stills.read(_some_png(folder)),
         "png output": lambda: wgmb.Output("o.####.png", numbers=[1, 2]),

@@ -181,7 +181,7 @@ def inside(capsys, *arguments) -> tuple[int, str, str]:
 
 
 def names_in(folder: Path) -> list[str]:
-    """What lies in a folder."""
+    """Names of the files in a folder."""
     return sorted(p.name for p in folder.iterdir())
 
 

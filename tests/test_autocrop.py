@@ -83,7 +83,7 @@ def blurred(pattern, folder, method, shutter=180, frames=None, window="grow", **
 
 
 def rgba(part, onto=DISPLAY):
-    """What was written, in the window `onto`."""
+    """The written picture, in the window `onto`."""
     picture = np.stack([part.channels[c] for c in "RGBA"], axis=2)
     return windows.laid(picture, part.data_window, onto, (False,) * 4)
 

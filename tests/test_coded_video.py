@@ -26,7 +26,7 @@ P3 = ((0.68, 0.32), (0.265, 0.69), (0.15, 0.06), (0.3127, 0.329))
 
 
 def pictures(coding: Coding, count=5, size=(clips.WIDTH, clips.HEIGHT)) -> list[CodedPicture]:
-    """What make_clips paints, as `coding` has it."""
+    """The picture of make_clips, as `coding` has it."""
     found = []
     for n in range(count):
         y, u, v, a = clips.planes(n, size, coding.steps, coding.bits, alpha=True)

@@ -1,4 +1,4 @@
-"""How sure the result is, beside it: in Python and as layers of EXR files."""
+"""Confidence beside the result: in Python and as layers of EXR files."""
 
 import numpy as np
 import pytest

@@ -20,7 +20,7 @@ PYTHON = ROOT / "build/core/bin/python"
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory):
-    """What the core says and makes alone: said.json and results.npz."""
+    """Messages and results of the core alone: said.json and results.npz."""
     if not PYTHON.exists():
         if os.environ.get("WGMB_CORE") == "required":
             pytest.fail(f"{PYTHON} is missing")

@@ -1,4 +1,4 @@
-"""What the numbers of vectors mean is found out on the neighbouring frames, and doubt is said."""
+"""The vector convention is found on the neighbouring frames, and doubt is reported."""
 
 from dataclasses import replace
 
@@ -14,12 +14,12 @@ pytestmark = pytest.mark.fast
 
 
 def found_of(color, motion, prev, next_, wanted):
-    """What is found of one frame."""
+    """The finding of one frame."""
     return detect.decide(wanted, [detect.gathered(color, motion, prev, next_)])
 
 
 def tried(convention, n=5, velocity=make.VELOCITY, wrong=None, sides=("prev", "next"), **given):
-    """What is found of vectors that were read as `given` says, after `wrong` damaged them."""
+    """The finding about vectors that were read as `given`, after `wrong` damaged them."""
     to_prev, to_next = make.motion(n, velocity)
     if wrong is not None:
         to_prev, to_next = wrong(to_prev), wrong(to_next)
@@ -147,7 +147,7 @@ def test_vectors_of_any_part_of_a_frame_are_found_out(frames, flip):
 
 @pytest.mark.parametrize("frames", [0.9, 1.0, 1.1])
 def test_a_scale_that_is_hardly_better_than_1_is_not_invented(frames):
-    """Where noise hides what a tenth more or less would do."""
+    """Noise hides the effect of a tenth more or less."""
     rng = np.random.default_rng(0)
     pictures = [
         make.picture(n) + rng.normal(0, 0.15, (make.HEIGHT, make.WIDTH, 4)) for n in (4, 5, 6)

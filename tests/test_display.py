@@ -44,7 +44,7 @@ def aces():
 
 
 def by_ocio(config, source: str, display: str, view: str, rgb: np.ndarray) -> np.ndarray:
-    """What OpenColorIO's own processor makes of straight colours."""
+    """The result of OpenColorIO's own processor for straight colours."""
     processor = config.getProcessor(source, display, view, TRANSFORM_DIR_FORWARD)
     shown = np.array(rgb, np.float32, order="C")
     processor.getDefaultCPUProcessor().applyRGB(shown)

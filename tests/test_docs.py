@@ -1,4 +1,4 @@
-"""What the documentation shows works as it stands: Python, command lines, options, links."""
+"""The examples of the documentation work: Python, command lines, options, links."""
 
 import re
 import shlex

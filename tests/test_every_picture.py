@@ -16,7 +16,7 @@ AP1 = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
 
 
 def blur(capsys, path, out, *options) -> str:
-    """What `wgmb blur` says of one frame that it blurs."""
+    """Messages of `wgmb blur` about one frame that it blurs."""
     code, _, err = make.inside(capsys, "blur", path, "-o", out, *options)
     assert code == 0, err
     return err

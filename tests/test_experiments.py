@@ -59,7 +59,7 @@ def test_taylor_has_two_budgets_and_his_findings(taylor):
 
 @pytest.mark.parametrize("metric", ["flip", "psnr"])
 def test_taylors_verdicts_are_those_of_the_figures(taylor, metric):
-    """Which way they go depends on how quick the machine is; that they are true does not."""
+    """The verdicts depend on the speed of the machine; their truth does not."""
 
     def error(name, budget):
         (entry,) = taylor.of("rotation", label=name, kind="time", budget=budget)

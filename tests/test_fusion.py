@@ -1,4 +1,4 @@
-"""What sets fusion apart: leading faces stay sharper, by depth or by normals."""
+"""Leading faces stay sharper in fusion, by depth or by normals."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def square():
 
 
 def change(square, **more):
-    """How much the trailing left and the leading right half of a ball change."""
+    """Change of the trailing left and the leading right half of a ball."""
     out = wgmb.blur(square, right(square), method="fusion", **more)
     apart = np.abs(out - square).mean(axis=2)
     return apart[20:44, 8:28].mean(), apart[20:44, 36:56].mean()

@@ -1,4 +1,4 @@
-"""What gather alone promises: the neighbouring frames show what the frame itself hides."""
+"""Gather finds in the neighbouring frames the surfaces that the frame itself hides."""
 
 from dataclasses import replace
 from functools import lru_cache

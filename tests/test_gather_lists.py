@@ -1,4 +1,4 @@
-"""What gather passes over: still parts of the picture that nothing moves near."""
+"""Gather skips still parts of the picture near which nothing moves."""
 
 from functools import cache, lru_cache
 

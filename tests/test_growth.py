@@ -27,7 +27,7 @@ SIZE = 96, 54
 
 
 class Allocated(ctypes.Structure):
-    """What glibc's mallinfo2 tells, in bytes."""
+    """Memory in use by glibc's mallinfo2, in bytes."""
 
     _fields_ = [
         (name, ctypes.c_size_t)

@@ -135,7 +135,7 @@ def listed(requirements) -> set[str]:
 
 
 def name_of(package: str) -> str:
-    """What the package index calls what Python imports."""
+    """The package index's name of an imported module."""
     return OTHER_NAMES.get(package, package).lower().replace("_", "-")
 
 

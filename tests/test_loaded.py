@@ -1,4 +1,4 @@
-"""What `wgmb blur` loads: neither flow nor PyAV, unless a run needs them."""
+"""Neither flow nor PyAV is loaded by `wgmb blur`, unless a run needs them."""
 
 import subprocess
 import sys

@@ -134,7 +134,7 @@ MANIFEST = {
 
 
 def of(names: dict[str, int]) -> dict[str, str]:
-    """What a file says about a Cryptomatte of these objects."""
+    """The metadata of a Cryptomatte of these objects."""
     text = json.dumps({name: f"{number:08x}" for name, number in names.items()})
     return {"name": "CryptoObject", "manifest": text}
 
@@ -276,7 +276,7 @@ def test_the_amount_is_the_number_after_the_last_colon(text, mask, amount):
 
 
 def test_the_blur_of_one_object_is_halved(tmp_path):
-    """What the mask covers moves half as far; the rest as before."""
+    """Pixels of the mask move half as far, the rest as before."""
     color = np.zeros((40, 60, 3), "f4")
     color[5:15, 20:30] = color[25:35, 20:30] = 1
     index = np.zeros((40, 60), "f4")

@@ -25,7 +25,7 @@ def picture():
 
 
 def worse(name: str, got: float) -> float:
-    """How far from perfect, 0 and up; for PSNR the error itself."""
+    """Distance from perfect, 0 and up; for PSNR the error itself."""
     if "psnr" in name:
         return 10 ** (-got / 20)
     return abs(got - SAME[name])

@@ -51,7 +51,7 @@ def around(**how):
 
 
 def truth(shutter, **how):
-    """What a shutter would see: the mean over its time."""
+    """The mean over the shutter's time."""
     times = shutter.sample_times(64).astype(float)
     return np.mean([scene(t, **how).color for t in times], 0)
 

@@ -1,4 +1,4 @@
-"""What neighbouring frames may not bring into this one: what is kept there, and bad pixels."""
+"""Neighbouring frames bring no holdouts and no bad pixels into this one."""
 
 from dataclasses import replace
 

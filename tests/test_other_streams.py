@@ -54,7 +54,7 @@ def copied(source, path, clock=None, keeps_pitch=True, others=True) -> list[str]
 
 
 def flash_and_click(path) -> tuple[float, float]:
-    """When the white picture is shown, and when the click sounds [s]."""
+    """Times of the white picture and of the click [s]."""
     with av.open(str(path)) as container:
         shown = [f.time for f in container.decode(video=0) if np.mean(f.to_ndarray()[:48]) > 120]
     with av.open(str(path)) as container:

@@ -1,4 +1,4 @@
-"""What a viewer's cones make of frames: against time itself, the article's claim, the command."""
+"""Perception by cone cells: against time itself, the article's claim, the command."""
 
 import numpy as np
 import pytest

@@ -117,7 +117,7 @@ def test_with_motion_it_is_the_sum_of_blurs_over_the_cells():
 
 
 def test_exposures_that_overlap_and_reach_back_are_the_same_as_alone():
-    """What is kept on the GPU for the one before does no harm."""
+    """Pictures kept on the GPU for the frame before do no harm."""
     blur, shutter = Blur("gather", samples=4), Shutter(720)
     after = Exposed(Reel(pictures(24)), blur, Known())
     for k in range(3):

@@ -112,7 +112,7 @@ def test_a_moving_edge_is_the_shutters_integral(curve):
 
 
 def test_a_shutters_tails_are_as_long_as_they_are():
-    """Where a curve begins from nothing, a share of the exposure is long: no pixel is off."""
+    """A curve that begins at 0 has a long first share of the exposure: no pixel is off."""
     shutter = Shutter(360, "start", "cosine")
     size = (96, 96)
     got, want = rendered(edge(size), size, shutter), edge_covers(shutter, size)

@@ -1,4 +1,4 @@
-"""What sets reproject's published form apart: counts, lines, and the tests Taylor left out."""
+"""The published form of reproject: counts, lines, and the tests that Taylor left out."""
 
 import sys
 from dataclasses import replace

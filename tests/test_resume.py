@@ -1,4 +1,5 @@
-"""What is done and what is done again; and that no file is lost by it, the inputs least of all."""
+"""A resumed run skips finished frames and makes the others again; no file is lost, inputs least of
+all."""
 
 import io
 import os

@@ -92,7 +92,7 @@ def test_bricks_are_their_colour_with_mortar_between():
 
 
 def at_instant(scene, seconds, moment, span):
-    """What SceneOnGpu draws at `moment` [frame intervals] from the frame at `seconds`."""
+    """The picture of SceneOnGpu at `moment` [frame intervals] from the frame at `seconds`."""
     blur = wgmb.Blur("tap")
     images = TexturePool(blur.device)
     on_gpu = SceneOnGpu(blur.device, scene, size=SIZE, time=seconds, fps=24, span=span, antialias=1)

@@ -1,4 +1,4 @@
-"""What a notebook shows: short texts, PNGs of the pixels, drawings, tables."""
+"""Display in a notebook: short texts, PNGs of the pixels, drawings, tables."""
 
 import io
 import xml.etree.ElementTree as ET

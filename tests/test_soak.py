@@ -46,7 +46,7 @@ def test_files_that_were_cut_off_are_refused(tmp_path):
 
 @pytest.fixture(scope="module")
 def outcomes() -> dict[str, dict]:
-    """What comes of every file in tests/crashers."""
+    """The result of every file in tests/crashers."""
     return damage.replayed(CRASHERS)
 
 

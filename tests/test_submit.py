@@ -53,7 +53,7 @@ def ran(line, **env) -> str:
 
 
 def check_calls(capsys, count: int) -> None:
-    """What the program was called with makes, part by part, what one run makes."""
+    """The program's calls together make the results of one run."""
     calls = Path(os.environ["CALLS"]).read_text().split("\n\n")[:-1]
     assert len(calls) == count
     os.chdir("..")  # the machines do not run in this folder

@@ -1,4 +1,4 @@
-"""What reaches a terminal, exit codes where something is shut, and Ctrl-C while modules load."""
+"""Terminal output, exit codes with closed streams, and Ctrl-C while modules load."""
 
 import os
 import signal

@@ -38,7 +38,7 @@ def vars_of(frame):
 
 
 def dispatched(monkeypatch, blur):
-    """What really runs: every pass by name, and how often."""
+    """The passes that really run: names and counts."""
     names, run = [], gpu.Kernel.run
 
     def noted(kernel, encoder, entry, *given, **own):

@@ -15,7 +15,7 @@ BOTH = ("nuke", "blender", "plain")
 
 
 def told(program: str, max_displace: float = 2048) -> Vectors:
-    """How to read what was written for a program."""
+    """Options that read the files written for a program."""
     if program == "rsmb":
         return Vectors("rsmb", layer="", scale=2 * max_displace)
     return Vectors(program)

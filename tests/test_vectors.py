@@ -15,7 +15,7 @@ ONE = ("arnold", "vray", "rsmb", "velocity")
 
 
 def told(convention: str, **more) -> Vectors:
-    """What to say of `make.written(convention)`."""
+    """Options that read `make.written(convention)`."""
     if convention == "rsmb":
         more = {"scale": 2 * make.MAX_DISPLACE} | more
     return Vectors("plain" if convention == "velocity" else convention, **more)

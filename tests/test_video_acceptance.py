@@ -61,14 +61,14 @@ def test_sound_is_the_same_and_at_the_same_time(tmp_path, capsys, name, late, ti
 
 
 def brightest(path):
-    """When the brightest picture is shown [s]."""
+    """Time of the brightest picture [s]."""
     footage = Footage(path)
     means = [float(picture.planes[0].mean()) for _, picture in footage]
     return float(footage.times[int(np.argmax(means))])
 
 
 def sounded(path):
-    """When the click sounds [s]."""
+    """Time of the click [s]."""
     loud, heard = 0.0, 0.0
     with av.open(str(path)) as container:
         for frame in container.decode(audio=0):

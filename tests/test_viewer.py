@@ -62,7 +62,7 @@ class Hand:
         raise AssertionError("never done")
 
     def picture(self):
-        """What is shown when all is done, without the panel."""
+        """The picture when all is done, without the panel."""
         self.look_until(lambda: not self.viewer.stage.report.busy)
         return self.viewer.screen.picture()
 

@@ -56,7 +56,7 @@ def shown_by(hand) -> np.ndarray:
 
 
 def wanted(hand, space=None) -> np.ndarray:
-    """What the processor makes of the light in the viewer."""
+    """The processor's result for the light in the viewer."""
     display = hand.viewer.stage.choices.displayed.display(hand.state)
     light = hand.viewer.stage.download().astype("f4")
     light[..., :3] *= 2**hand.state.exposure

@@ -33,7 +33,7 @@ def bare(shared, frames):
 
 
 def eye(bare, view: str, **more) -> np.ndarray:
-    """What is shown of one view."""
+    """The picture of one view."""
     bare.viewer.state = replace(bare.state, eyes=view, compare="off", **more)
     return bare.picture()
 

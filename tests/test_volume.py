@@ -46,13 +46,13 @@ def points(volume, rng, count=200):
 
 
 def inside(volume, p, t):
-    """Whether the points p (n, 3) are in the solid at the time t [s], 0 the frame's instant."""
+    """True for points p (n, 3) in the solid at the time t [s], 0 the frame's instant."""
     angle = volume.phase + volume.speed * t
     return within(volume, p, np.cos(angle), np.sin(angle))
 
 
 def within(volume, p, c, s):
-    """Whether the points p are in the solid turned by angles of cosine `c` and sine `s`."""
+    """True for points p in the solid turned by angles of cosine `c` and sine `s`."""
     q = p - np.array(volume.centre)
     x, y, z = q[..., 0], q[..., 1], q[..., 2]
     if isinstance(volume, OrbitingSphere):
@@ -286,7 +286,7 @@ def test_several_volumes_are_their_twin(curve):
 
 
 def test_solids_are_where_distributed_rays_meet_them():
-    """What the density is a share of: the rays' share that meets the body converges to it."""
+    """The density converges to the share of rays that meet the body."""
     one = Scene("one", (), shots(), volumes=(Torus(minor_radius=0.2, major_radius=0.6, speed=25),))
     size, shutter = (64, 36), Shutter(360)
     still = wgmb.Render(one, wgmb.Blur("tap", shutter=0), size=size).frame(0.2)

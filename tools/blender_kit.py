@@ -1,4 +1,4 @@
-"""What Blender's scenes are made of: materials, things that move, a camera, lamps."""
+"""Parts of Blender's scenes: materials, moving objects, a camera, lamps."""
 
 import math
 from collections.abc import Callable

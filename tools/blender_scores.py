@@ -78,7 +78,7 @@ def picture(path: Path) -> np.ndarray:
 def section(
     folder: Path, truth: np.ndarray, made: dict[str, np.ndarray], errors_of: tuple[str, str]
 ) -> str:
-    """What a scene shows, at the last shutter, and two results' errors."""
+    """Pictures of a scene at the last shutter, and the errors of two results."""
     shown = [metrics.display(p[..., :3]) for p in (truth, made[SHOWN])]
     errors = [metrics.flip_colors(made[k], truth) for k in errors_of]
     strip = np.vstack([np.hstack(shown), np.hstack(errors)])

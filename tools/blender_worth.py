@@ -1,4 +1,4 @@
-"""What sharp frames and a blur are worth against the path tracer's own blur.
+"""Quality and time of sharp frames with a blur against the path tracer's own blur.
 
 PYTHONPATH=.:blender:tests/blender python tools/blender_worth.py FOLDER [--shaded]
 

@@ -102,7 +102,7 @@ def displacement() -> None:
 
 
 def exposures() -> None:
-    """Where the shutter is open about three frames, by phase."""
+    """Exposures about three frames, by phase."""
     d = Drawing(640, 236)
     left, step = 150, 150
     for row, phase in enumerate(("start", "centre", "end")):

@@ -106,7 +106,7 @@ def torusphere() -> None:
 
 
 def drawn_by_commands() -> None:
-    """What `wgmb info`, `shutter` and `perceive` draw."""
+    """Drawings of `wgmb info`, `shutter` and `perceive`."""
     motion = IMAGES / "motion.png"
     lines = [
         ["info", str(SAMPLE), "--frames", "10", "-o", str(motion)],

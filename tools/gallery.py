@@ -102,7 +102,7 @@ def _time(entry: Entry) -> str:
 
 
 def _times_tap(found: Report, entry: Entry) -> str:
-    """How many times as long as `tap` took for the same scene."""
+    """Time as a multiple of that of `tap` for the same scene."""
     tap = found.of(entry.case, label="tap", kind="samples")
     if not tap or not entry.seconds:
         return ""

@@ -30,7 +30,7 @@ SPEED = 60  # [px] speed of the moving strip in the drawing of the search
 
 
 class Layers:
-    """What `gather` left on the GPU, layer by layer."""
+    """The layers that `gather` left on the GPU."""
 
     def __init__(self, blur: Blur):
         """Of a Blur that has not been used yet."""
@@ -229,7 +229,7 @@ def fixed_point() -> None:
 
 
 def instants() -> None:
-    """What is seen at single times of the exposure, and their mean."""
+    """Pictures at single times of the exposure, and their mean."""
     frame, window = rendered("crossing", speed=1.5), ((180, 75), (130, 100))
     still, sheet = Blur("gather", samples=1), {}
     for t in (-0.25, -0.125, 0.0, 0.125, 0.25):

@@ -1,4 +1,4 @@
-"""What the scripts that make the documentation's pictures share: labels, grids, enlargements."""
+"""Parts of the documentation's pictures: labels, grids, enlargements."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ def _chosen(given: argparse.Namespace) -> list[Row]:
 
 
 def _about(given: argparse.Namespace) -> str:
-    """What was tried, on what."""
+    """The tests and the machine."""
     version = wgmb("--version").out.strip()
     adapters = wgmb("devices").out.splitlines()
     adapter = next((a.partition(": ")[2] for a in adapters if a.startswith("*")), "no adapter")

@@ -64,7 +64,7 @@ def changed(changes: Iterable[Change]) -> Iterator[None]:
 
 
 def _key(owner: Any) -> int:
-    """What tells owners apart: a scene's render settings lie where the scene does."""
+    """Key of an owner: a scene's render settings lie where the scene does."""
     return hash((owner.as_pointer(), owner.bl_rna.identifier))
 
 

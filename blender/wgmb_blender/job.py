@@ -1,4 +1,4 @@
-"""What the buttons and the command line do, as steps: no window, no event.
+"""Steps of the buttons and the command line: no window, no event.
 
 Each `next` of `steps` does a little and tells how far it is; closing the generator stops the work
 and leaves Blender as it was.

@@ -19,7 +19,7 @@ _EVERY = 0.02  # seconds between two events
 
 
 class Running:
-    """What the operators share."""
+    """Common part of the operators."""
 
     bl_options = {"REGISTER"}
     _steps: Iterator[Step] | None = None

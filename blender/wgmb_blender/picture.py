@@ -1,4 +1,4 @@
-"""Where the pixels are: the picture, the part of it that is rendered, and overscan around it."""
+"""Position of the pixels: the picture, its rendered part, and overscan around it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def picture_of(scene: bpy.types.Scene, margin: int = 0) -> Picture:
 
 
 def changes(scene: bpy.types.Scene, picture: Picture) -> Iterator[Change]:
-    """What makes Blender render the part with its margin, and no more."""
+    """Settings with which Blender renders the part with its margin, and no more."""
     render, margin = scene.render, picture.margin
     width, height = (side + 2 * margin for side in picture.size)
     if margin:
@@ -57,7 +57,7 @@ def _share(pixel: int, of: int) -> float:
 
 
 def _wider(scene: bpy.types.Scene, lens: bpy.types.Camera, picture: Picture) -> Iterator[Change]:
-    """What makes a camera see the margin too, all else where it was."""
+    """Settings with which a camera also sees the margin; everything else stays in place."""
     if lens.type == "PANO":
         raise ProblemError(f"Overscan: {lens.name} is a panoramic camera, which has no edges")
     moved = {curve.data_path for curve in _curves(lens)} & set(_LENS)

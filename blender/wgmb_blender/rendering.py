@@ -68,6 +68,6 @@ def _check(paths: Sequence[Path], began: float) -> None:
 
 
 def _sentence(error: RuntimeError) -> str:
-    """What Blender reported, in one line."""
+    """Blender's reports, in one line."""
     lines = [line.removeprefix("Error: ").strip() for line in str(error).splitlines()]
     return "Blender: " + " ".join(line for line in lines if line)

@@ -1,4 +1,4 @@
-"""What is set in the panel, and kept in the file."""
+"""Settings of the panel, stored in the file."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _devices(
 
 
 class WgmbPreferences(bpy.types.AddonPreferences):
-    """What belongs to the machine and not to the scene."""
+    """Settings of the machine, not of the scene."""
 
     bl_idname = __package__
 
@@ -135,7 +135,7 @@ def device() -> str | None:
 
 
 def wanted_of(scene: bpy.types.Scene) -> Wanted:
-    """What the panel of a scene asks for."""
+    """The request of a scene's panel."""
     own = scene.wgmb
     return Wanted(
         method=own.method,

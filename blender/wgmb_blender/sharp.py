@@ -19,7 +19,7 @@ PASSES = {"use_pass_z": "Depth", "use_pass_vector": "Vector"}
 
 
 def sharp_frames(text: str) -> SharpFrames:
-    """What the setting names, in Blender's form: `//sharp/shot_` or `//sharp/shot_####.exr`."""
+    """The pattern of the setting, in Blender's form: `//sharp/shot_` or `//sharp/shot_####.exr`."""
     if not text.strip():
         raise ProblemError("Sharp Frames is empty: choose where the sharp frames lie")
     if text.startswith("//") and not bpy.data.filepath:

@@ -33,7 +33,7 @@ DATA = {"METHODS": "The methods: classes by name."}
 
 
 def missing() -> list[str]:
-    """What `wgmb` exports and no group has."""
+    """Names that `wgmb` exports and no group has."""
     grouped = {name.partition(".")[0] for names in GROUPS.values() for name in names}
     return sorted(set(wgmb.__all__) - grouped)
 

@@ -39,7 +39,7 @@ def scene_table() -> str:
 
 
 def convention_table() -> str:
-    """What `--vectors` can be told, as Markdown."""
+    """Values of `--vectors`, as Markdown."""
     rows = ["| `--vectors` | what the numbers mean |", "|---|---|"]
     rows += [f"| `{name}` | {_plain(c.about)} |" for name, c in CONVENTIONS.items()]
     return "\n".join(rows) + "\n"
@@ -65,7 +65,7 @@ def _command(name: str, command: App) -> str:
 
 
 def _help(command: App) -> tuple[str, list[str]]:
-    """What a command does, and its examples."""
+    """Description of a command, and its examples."""
     paragraphs = inspect.getdoc(command.default_command).split("\n\n")
     about = paragraphs[: next(
         (i for i, p in enumerate(paragraphs) if p.startswith("Parameters\n")), len(paragraphs)
@@ -77,7 +77,7 @@ def _help(command: App) -> tuple[str, list[str]]:
 
 
 def _names(argument) -> list[str]:
-    """How an option is written, the long form first; a position has its name in capitals."""
+    """Names of an option, the long form first; a position has its name in capitals."""
     names = [n for n in argument.names if not n.startswith(("--no-", "--empty-"))]
     if argument.field_info.is_positional and not argument.field_info.is_keyword_only:
         return [names[0].lstrip("-").upper()]
@@ -90,7 +90,7 @@ def _usage(argument) -> str:
 
 
 def _kind(argument) -> str:
-    """What is written after an option: the words it takes, or of which kind they are."""
+    """The value of an option: its words, or their kind."""
     if not _names(argument)[0].startswith("-"):
         return ""
     hint, choices = argument.hint, argument.get_choices() or ()

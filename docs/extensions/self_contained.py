@@ -18,7 +18,7 @@ _LOADED = {"script", "img", "source", "video", "audio", "iframe", "embed", "obje
 
 
 class Page(HTMLParser):
-    """What one page of the site offers to links, what it links to, and what it loads."""
+    """Targets, links and loaded files of one page of the site."""
 
     def __init__(self, text: str):
         super().__init__()

@@ -1,4 +1,4 @@
-"""What cannot be done is a sentence in Blender's own reports, before anything is rendered."""
+"""Bad input is a sentence in Blender's own reports, before anything is rendered."""
 
 import re
 from dataclasses import replace

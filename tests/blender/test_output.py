@@ -1,4 +1,4 @@
-"""What is written is what Blender would have written: its colours, its formats, its films."""
+"""The output is what Blender would have written: its colours, its formats, its films."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -51,7 +51,7 @@ def test_a_png_has_the_colours_of_blenders_own(tmp_path, view, is_transparent):
 
 
 def test_a_still_picture_has_the_very_values_of_blenders_own(tmp_path):
-    """What goes through the files and the compositor comes out as it went in."""
+    """Pixels that pass through the files and the compositor do not change."""
     scene = scenes.crossing()
     for one in bpy.data.objects:
         one.animation_data_clear()

@@ -207,7 +207,7 @@ def test_after_nested_changes_of_the_same_things():
 
 
 class Window:
-    """What a modal operator sees of Blender's window, and what it told."""
+    """Blender's window as a modal operator sees it, and the operator's messages."""
 
     def __init__(self, scene):
         self.told, self.reports = [], []

@@ -1,4 +1,4 @@
-"""What the add-on makes of a scene against the path tracer's own blur, feature by feature.
+"""The add-on's results against the path tracer's own blur, feature by feature.
 
 The figures are PSNR in dB of sRGB values, of `gather` with 16 samples a pixel on sharp frames of 16
 samples against 128 samples of Cycles' blur, and were measured with bpy 4.5.15. A result may be
@@ -21,7 +21,7 @@ SLACK = 0.5
 
 
 def blurred(scene, folder: Path, *frames: int, **more) -> list[np.ndarray]:
-    """What the add-on makes of these frames, as linear light."""
+    """The add-on's results for these frames, as linear light."""
     scenes.output(scene, folder)
     wanted = Wanted(frames=frames, sharp=scene.wgmb.sharp, **more)
     report = Report()

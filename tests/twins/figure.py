@@ -17,7 +17,7 @@ def smoothstep(a, b, x):
 
 
 def in_disk(x, y, phi):
-    """Whether the disk, turned clockwise by `phi`, covers the places."""
+    """True at places that the disk covers, turned clockwise by `phi`."""
     return np.hypot(x - 0.2 * np.cos(np.pi - phi), y - 0.2 * np.sin(np.pi - phi)) < 0.1
 
 
@@ -28,7 +28,7 @@ def antialiased(x, y, phi, height):
 
 
 def in_section(x, y, phi, minor, major, slice_):
-    """Whether the torus, turned by `phi`, covers the places in the plane z = slice."""
+    """True at places in the plane z = slice that the torus covers, turned by `phi`."""
     u, v = x * np.cos(phi) + y * np.sin(phi), y * np.cos(phi) - x * np.sin(phi)
     return np.hypot(np.hypot(u, slice_) - major, v) < minor
 

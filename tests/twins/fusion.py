@@ -62,7 +62,7 @@ def fusion(color, motion, depth, times, middle, alphas, *, span=None, delay=(0.0
 
 
 def _instants(path, opens, closes):
-    """When the shutter opens and closes, and when between the two the path turns."""
+    """Times at which the shutter opens and closes, and at which the path turns between them."""
     velocity, half_acceleration = (path[2:] - path[:2]) / 2, (path[2:] + path[:2]) / 2
     turn = -0.5 * (velocity @ half_acceleration) / max(half_acceleration @ half_acceleration, 1e-30)
     return opens, min(max(turn, opens), closes), closes
@@ -79,7 +79,7 @@ def gaussian(image):
 
 
 def faces_motion(depth, x, y, velocity):
-    """Whether depth grows the way this pixel moves."""
+    """True if depth grows in the direction of this pixel's motion."""
     z = float(depth[y, x])
     if not np.isfinite(z) or z <= 0:
         return False

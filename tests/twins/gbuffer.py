@@ -12,7 +12,7 @@ TAU = 2 * np.pi
 
 @dataclass
 class Seen:
-    """What every ray of (..., 3) met."""
+    """The hits of all rays of (..., 3)."""
 
     depth: np.ndarray  # along the ray, FAR: nothing
     body: np.ndarray  # index into scene.bodies, -1: nothing

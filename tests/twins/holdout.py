@@ -1,4 +1,4 @@
-"""What is kept, and what is bad, before and after a method."""
+"""Holdouts and bad pixels, before and after a method."""
 
 import numpy as np
 

@@ -42,7 +42,7 @@ def dark(pulled):
 
 
 def plain(depth, motion):
-    """Where a pixel shows one surface."""
+    """True at pixels that show one surface."""
     depth = np.where(np.isfinite(depth) & (depth > 0), np.minimum(depth, NO_DEPTH), NO_DEPTH)
     near = [shifted(depth, i, j) for j in (-1, 0, 1) for i in (-1, 0, 1)]
     moved = [((shifted(motion, i, j) - motion) ** 2).sum(2) for j in (-1, 0, 1) for i in (-1, 0, 1)]
@@ -222,7 +222,7 @@ def blurred(a, sigma):
 
 
 def trust(flow, back, own, other):
-    """How far flow is to be trusted; own, other: how much there is of what moves."""
+    """Trust in the flow; own, other: the amount of what moves in either frame."""
     x, y = centres(own.shape)
     x, y = x + flow[..., 0], y + flow[..., 1]
     astray = np.hypot(*np.moveaxis(flow + sampled(back, x, y), 2, 0))
@@ -355,5 +355,5 @@ def sure(own, other, flows, trusted, pulled=False):
 
 
 def added(change, light, albedo, pulled=False):
-    """What is added to the colour."""
+    """The addition to the colour."""
     return albedo * (light + dark(pulled)) * (np.exp(change) - 1)

@@ -1,4 +1,4 @@
-"""What a cone cell makes of pictures, by time itself: every instant of the past, weighted."""
+"""Perception by a cone cell, by time itself: every instant of the past, weighted."""
 
 import numpy as np
 

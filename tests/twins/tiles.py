@@ -74,7 +74,7 @@ def _weight(far, offset, here, there, own_way, way, z, z_there):
 
 
 def _farthest(motion, span):
-    """When it is farthest from its place: at an end, or where it turns."""
+    """The time at which it is farthest from its place: at an end, or where it turns."""
     velocity, curvature = (motion[2:] - motion[:2]) / 2, (motion[2:] + motion[:2]) / 2
     bend = curvature @ curvature
     turn = _within(-0.5 * (velocity @ curvature) / max(bend, 1e-30), *span)

@@ -19,6 +19,6 @@ CRASHERS = ROOT / "tests" / "crashers"
 """Inputs that once did what none may do; tests/test_soak.py reads them all."""
 
 PATHS = [str(ROOT), str(ROOT / "tools"), str(ROOT / "tests")]
-"""Where wgmb is, that lies beside this harness, these modules, and make_frames.py."""
+"""Paths of wgmb, which lies beside this harness, of these modules, and of make_frames.py."""
 
 sys.path[:0] = [path for path in PATHS if path not in sys.path]

@@ -196,7 +196,7 @@ def replay(paths: list[str]) -> list[dict]:
 
 
 def replayed(crashers: Path) -> dict[str, dict]:
-    """What comes of every file of that folder, by its name."""
+    """Results of all files of that folder, by name."""
     paths = sorted(crashers.iterdir())
     found = _apart(replay, [str(path) for path in paths], seconds=600)
     return {path.name: outcome for path, outcome in zip(paths, found, strict=True)}

@@ -81,7 +81,7 @@ def video_memory(trial: Trial) -> Iterator[Line]:
 
 
 def _times_and_sums(path: Path) -> tuple[list[float], list[int]]:
-    """When the pictures of a video are shown, and the sum of the luma of each."""
+    """Times of the pictures of a video, and the sum of the luma of each."""
     with av.open(str(path)) as container:
         found = [
             (frame.time or 0.0, int(frame.to_ndarray(format="gray").sum(dtype=np.int64)))
@@ -159,7 +159,7 @@ def _killed(source: Path, out: Path, at_once: bool, wait: float) -> bool:
 
 
 def _apart(one: Path, other: Path) -> str:
-    """What is different in two videos of one picture size; "" where nothing is that matters."""
+    """Differences of two videos of one picture size; "" if none matters."""
     (times, sums), (also, more) = _times_and_sums(one), _times_and_sums(other)
     far = max((abs(a - b) for a, b in zip(times, also, strict=False)), default=0.0)
     if len(times) != len(also) or far > 1e-6:
@@ -169,7 +169,7 @@ def _apart(one: Path, other: Path) -> str:
 
 
 def _flash_and_click(path: Path) -> tuple[float, float]:
-    """When the brightest picture is shown, and the loudest sound is heard [s]."""
+    """Times of the brightest picture and of the loudest sound [s]."""
     with av.open(str(path)) as container:
         shown = max(
             (int(f.to_ndarray(format="gray").sum(dtype=np.int64)), -(f.time or 0.0))

@@ -14,7 +14,7 @@ HUNG, DIED = "hung", "died"
 
 
 def forked(cases: Sequence, case: Callable[[Any], Any], seconds: float = 20) -> list[Any]:
-    """What `case` (returning JSON) makes of each; {"what": "died" or "hung", "why"} where it did.
+    """Results of `case` (returning JSON) for each; {"what": "died" or "hung", "why"} where it did.
 
     The process that calls this must have no threads and no GPU device.
     """

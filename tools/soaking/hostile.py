@@ -123,7 +123,7 @@ HEADERS = {
 
 
 def _told(ended: Ended, path: Path) -> str:
-    """What is wrong with how a command took a hostile file."""
+    """The fault in a command's reaction to a hostile file."""
     if wrong := ended.wrong(0, 2, name=str(path)):
         return wrong
     if ended.peak > _PEAK:

@@ -41,12 +41,12 @@ class Kind:
 
     @property
     def is_text(self) -> bool:
-        """Whether a file that was cut off may be sound, and mean something else."""
+        """True if a truncated file may be sound, with another meaning."""
         return self.suffix in (".csv", ".edl", ".toml")
 
 
 def read(kind: str, path: Path) -> str:
-    """What the file holds, as a digest; raises what its reader raises."""
+    """A digest of the file's contents; raises the errors of its reader."""
     return KINDS[kind].read(path)
 
 

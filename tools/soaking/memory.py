@@ -94,7 +94,7 @@ def soak_command(trial: Trial) -> Iterator[Line]:
 
 
 def _watched(arguments: list[str], out) -> tuple[list[list[float]], int]:
-    """What a run holds as its files appear, and its exit code."""
+    """Memory of a run as its files appear, and its exit code."""
     quiet = subprocess.DEVNULL
     process = subprocess.Popen([*WGMB, *arguments], stdout=quiet, stderr=quiet, env=environment())
     held: list[list[float]] = []

@@ -25,7 +25,7 @@ _NUMBERS = [8, 9, 10]
 
 
 def _understood(stem: str, pad: str, folder: Path) -> str:
-    """What is wrong with how a pattern is understood: as its files, or refused with a reason."""
+    """The fault in the reading of a pattern: as its files, or refused with a reason."""
     folder.mkdir()
     pattern = f"{stem}{pad}.exr"
     names = [f"{stem}{number:0{_PADS[pad]}d}.exr" for number in _NUMBERS]

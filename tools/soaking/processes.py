@@ -41,7 +41,7 @@ class Ended:
     value: Any = None  # of a function run by `apart`
 
     def wrong(self, *codes: int, name: str = "") -> str:
-        """What is wrong with how a command ended; "" where nothing is.
+        """The fault in the end of a command; "" if there is none.
 
         Right is one of the codes, and if it is not 0, one line that holds `name`.
         """
@@ -140,7 +140,7 @@ def limits(memory: int | None = None, file: int | None = None) -> Callable[[], N
 
 @dataclass(frozen=True)
 class Use:
-    """What a process holds at a time."""
+    """Memory of a process at a time."""
 
     memory: float  # KiB of it in RAM
     files: int
@@ -148,7 +148,7 @@ class Use:
 
 
 def use(pid: int | str = "self") -> Use:
-    """What a process holds now."""
+    """Memory of a process now."""
     pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     listed = (len(os.listdir(f"/proc/{pid}/{what}")) for what in ("fd", "task"))
     return Use(pages * resource.getpagesize() / 1024, *listed)

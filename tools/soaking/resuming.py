@@ -1,4 +1,4 @@
-"""What --resume keeps and redoes, and several processes on one folder."""
+"""Resuming with --resume, and several processes on one folder."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def damaged(trial: Trial) -> Iterator[Line]:
 
 
 def _redone(pattern: str, out: Path, fresh: Path, *more: str) -> str:
-    """What is wrong with `out` after --resume, beside a fresh run's files."""
+    """The fault in `out` after --resume, beside a fresh run's files."""
     words = ["blur", pattern, "--method", "gather", "--samples", "4", *more]
     ended = wgmb(*words, "-o", out / "o.####.exr", "--resume")
     again = wgmb(*words, "-o", fresh / "o.####.exr")

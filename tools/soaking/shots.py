@@ -26,7 +26,7 @@ class Shot:
 
     @property
     def pattern(self) -> str:
-        """What stands for the frames."""
+        """The pattern of the frames."""
         return str(self.folder / "shot.####.exr")
 
     def arguments(self, out: Path, *more, target: Path | None = None) -> list[str]:
@@ -37,7 +37,7 @@ class Shot:
         return [str(word) for word in (*words, "--vectors", "blender", *more)]
 
     def whole(self, out: Path, *more) -> dict[str, bytes]:
-        """What an unbroken run writes into `out`: every file's content by its name."""
+        """Files that an unbroken run writes into `out`: contents by name."""
         ended = wgmb(*self.arguments(out, *more), seconds=600)
         found = contents(out)
         if ended.code or len(found) != self.count:
@@ -72,7 +72,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def apart_from(found: dict[str, bytes], whole: dict[str, bytes], *, all_there: bool) -> str:
-    """How files differ from those of an unbroken run; "" where they do not.
+    """Differences from the files of an unbroken run; "" if there are none.
 
     Without `all_there` some may be missing, and unfinished ones with temporary names be there.
     """

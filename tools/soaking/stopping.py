@@ -44,11 +44,11 @@ class Running:
         return True
 
     def importing(self) -> bool:
-        """Whether wgmb's own start has begun."""
+        """True if wgmb's own start has begun."""
         return self._has_loaded(_IMPORTING)
 
     def at_the_gpu(self) -> bool:
-        """Whether it has gone on to open one."""
+        """True if it has begun to open one."""
         return self._has_loaded(_DRIVER)
 
     def _has_loaded(self, name: bytes) -> bool:
@@ -58,7 +58,7 @@ class Running:
             return False
 
     def writing(self) -> bool:
-        """Whether a first picture is there."""
+        """True if a first picture exists."""
         return self.out.exists() and any(self.out.glob("o.*.exr"))
 
     def stop(self, number: signal.Signals) -> tuple[int, str, float]:
@@ -78,7 +78,7 @@ class Running:
 
 
 def _unbroken(shot: Shot, folder: Path) -> tuple[dict[str, bytes], float, float]:
-    """What an unbroken run writes; seconds of it before and after the first picture."""
+    """Files of an unbroken run; seconds of it before and after the first picture."""
     running = Running(shot, folder)
     started = time.perf_counter()
     running.until(running.writing)

@@ -73,7 +73,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Trial:
-    """What a row is given: how many, from which seed on, and where it may write."""
+    """Arguments of a row: the number of tries, the first seed, and a folder."""
 
     count: int
     seed: int
@@ -101,7 +101,7 @@ class Row:
 
     @property
     def about(self) -> str:
-        """What it does, in one line."""
+        """Its test, in one line."""
         return (self.run.__doc__ or "").splitlines()[0]
 
 

@@ -60,7 +60,7 @@ def _peak() -> float:
 
 
 def _look(path: Path, count: int, fps: Fraction) -> str:
-    """What is wrong with a video."""
+    """The fault in a video."""
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         times = [frame.time for frame in container.decode(stream)]

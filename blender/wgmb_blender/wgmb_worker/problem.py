@@ -1,4 +1,4 @@
-"""What the user is told instead of a traceback."""
+"""Messages for the user instead of tracebacks."""
 
 
 class ProblemError(Exception):
