@@ -8,7 +8,7 @@ from twins.five_positions import bend, moved, valid
 
 
 def displacement(motion, t):
-    """The point of the parabola through previous, this and next place at time t, or a column of t."""
+    """The point of the parabola through the three places at time t, or a column of t."""
     to_prev, to_next = motion[:2], motion[2:]
     return to_prev * (t * (t - 1) / 2) + to_next * (t * (t + 1) / 2)
 
