@@ -113,7 +113,7 @@ def _means(
 
 
 def _places(first: int, step: int, count: int, coarse: int) -> slice | np.ndarray:
-    """Where the samples of every `step`th pixel are, of `count` from the pixel `first` on."""
+    """Positions of the samples of every `step`th pixel, of `count`, from the pixel `first` on."""
     if step % coarse:
         return (first + step * np.arange(count)) // coarse
     begin, every = first // coarse, step // coarse

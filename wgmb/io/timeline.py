@@ -85,8 +85,8 @@ class Timeline:
     stated: Fraction | None = None
     """The known rate that the file states."""
     counted: Timeline | None = None
-    """What holds where decoded pictures are not in the order of their times, which are then those
-    of decoding: pictures are counted. None where that cannot be."""
+    """The timeline for decoded pictures that do not come in the order of their times; the times are
+    then those of decoding, and pictures are counted. None if that is impossible."""
 
     @property
     def steps(self) -> np.ndarray:

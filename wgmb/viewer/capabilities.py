@@ -119,7 +119,7 @@ class Choices:
 
 
 def _motion_of(state: State) -> tuple:
-    """What the motion of a video depends on; none of other files."""
+    """Settings on which a video's motion depends; none for other files."""
     if not state.is_video:
         return ()
     settings = settings_of(state)

@@ -14,7 +14,7 @@ from .state import State
 
 
 class Displayed:
-    """What is shown, kept as long as neither the picture nor its display changes."""
+    """The displayed picture, kept until the picture or its display changes."""
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)

@@ -16,7 +16,7 @@ from ..shutter import Shutter
 from .finder import Known
 
 Knowledge = Callable[[int], Known | None]
-"""What is known of a picture, by its number; None if nothing is yet."""
+"""The finding about a picture, by its number; None until there is one."""
 
 
 @dataclass(frozen=True)

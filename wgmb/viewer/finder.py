@@ -1,4 +1,4 @@
-"""What is known of a video's picture: its motion, and where its shot ends; as `wgmb blur` finds it.
+"""Finding of a video's picture: its motion, and the end of its shot, as in `wgmb blur`.
 
 The pictures around it go through the same Reel, so that cuts, flashes, repeated pictures and
 those that cannot be decoded mean the same. Any picture may be asked for; neighbours are quick.
@@ -32,7 +32,7 @@ _NEAR = 48  # pictures ahead that are read on to
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of a picture; `before` and `after` are the numbers of those beside it."""
+    """The finding about a picture; `before` and `after` are the numbers of its neighbours."""
 
     motion: np.ndarray | None
     """(height, width, 4) to_prev, to_next [px]; None without a source of motion, or alone."""
@@ -53,7 +53,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Wish:
-    """What the pictures' neighbours depend on, besides where motion comes from.
+    """Settings on which the pictures' neighbours depend, besides the source of the motion.
 
     `masks`: what stays sharp (see io/video_masks.py). `fill`: repeated pictures are left out.
     `cuts`: see io/cut_list.py.
@@ -80,7 +80,7 @@ class Finder:
         self._first = 0  # index of a picture of the present shot
 
     def __call__(self, number: int) -> Known:
-        """What can be known of a picture."""
+        """The finding about a picture, as far as possible."""
         reel = self._reel_around(number)
         here = reel.at(self._times[number], _BEHIND)
         near = {i: reel[i].number for i in (here - 1, here, here + 1) if i in reel.kept}

@@ -62,7 +62,7 @@ class FootageSubject:
     # ---- what can be shown -----------------------------------------------------------------
 
     def has(self, state: State) -> frozenset[str]:
-        """What a method may ask for."""
+        """Inputs that a method may ask for."""
         return _PASSES if self._moves else frozenset({"color"})
 
     def methods(self, state: State) -> list[str]:
@@ -95,7 +95,7 @@ class FootageSubject:
     # ---- what is known --------------------------------------------------------------------
 
     def stamp(self, states: Sequence[State], shutter: Shutter, neighbours: bool) -> list[tuple]:
-        """What is known of the pictures that output frames are exposed from, one entry for each.
+        """Findings about the pictures that contribute to the output frames, one entry for each.
 
         What lacks is asked for, that of the first output frame first, and while playing also that
         of the pictures to come.
@@ -135,7 +135,8 @@ class FootageSubject:
 
     @property
     def waiting(self) -> str:
-        """What is shown instead of the blur, and why; '' if all is there."""
+        """Name of the picture that is shown instead of the blur, and the reason; '' if all is
+        ready."""
         if not self._lacking:
             return ""
         if self._maker.problem:
@@ -167,7 +168,7 @@ class FootageSubject:
     def look_at(
         self, state: State, size: tuple[int, int], antialias: int, eye: str | None = None
     ) -> None:
-        """What the next draws are of."""
+        """Set the content of the next draws."""
         self._state = state
         highlights = settings_of(state).highlights
         if highlights != self._frames.highlights:

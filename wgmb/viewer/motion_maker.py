@@ -56,7 +56,7 @@ class MotionMaker:
         self._thread.start()
 
     def known(self, number: int) -> Known | None:
-        """What is known of a picture; None if nothing is yet."""
+        """The finding about a picture; None until there is one."""
         with self._lock:
             if number in self._known:
                 self._known.move_to_end(number)

@@ -172,12 +172,12 @@ class Panel:
 
 
 def _subject(state: State) -> str:
-    """What is seen, as the title of its section."""
+    """Name of the view, as the title of its section."""
     return "Scene" if state.is_scene else "Video" if state.is_video else "Frames"
 
 
 def made_of(state: State, pictures: tuple[int, ...]) -> str:
-    """Which output frame of a video is shown, and which of its pictures it is made of."""
+    """The output frame of a video on display, and the pictures that contribute to it."""
     now = moment(state)
     since = float(now.time - output(state).moments[0].time)
     numbers = " - ".join(str(n) for n in dict.fromkeys((min(pictures), max(pictures))))

@@ -30,7 +30,7 @@ class _Held:
 
     texture: wgpu.GPUTexture
     known: tuple = ()
-    """What was known of a video's motion."""
+    """The finding about a video's motion at that time."""
     done: int = 0
 
 

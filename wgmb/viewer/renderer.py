@@ -219,7 +219,7 @@ class Renderer:
         report.seconds[coming.label] = time.perf_counter() - started
 
     def _known(self, name: str, state: State, subject: Subject, full: bool) -> list[tuple]:
-        """What is known of a video's motion, all that is needed if `full`.
+        """The findings about a video's motion, all that are needed if `full`.
 
         One entry for each output frame that is needed, the present one first.
         """

@@ -1,4 +1,4 @@
-"""What is shown in a slot, and what one update of it reports."""
+"""The content of a slot, and the report of one update of it."""
 
 from __future__ import annotations
 

@@ -218,7 +218,7 @@ def view(ui: Widgets, state: State, info: Info) -> State:
 
 
 def _colors(ui: Widgets, state: State, display: Display | None) -> State:
-    """How light becomes display values: a config's display, view and look, or a tone and sRGB."""
+    """Controls of the display: a config's display, view and look, or a tone and sRGB."""
     if installed():
         now = state.colors.ocio or ("$OCIO" if display else "off")
         names = dict.fromkeys((now, "off", "builtin", "studio"))

@@ -45,7 +45,7 @@ class SceneSubject:
         self._made = self._render.scene
 
     def has(self, state: State) -> frozenset[str]:
-        """What a method may ask for; figures are flat: they have no pictures of instants."""
+        """Inputs that a method may ask for; figures are flat: they have no pictures of instants."""
         flat = self._scene(state).figure is not None
         return frozenset({"scene"} if flat else {"color", "motion", "depth", "scene"})
 
@@ -71,13 +71,13 @@ class SceneSubject:
         return size_of(state.size)
 
     def space(self, config: ColorConfig) -> ColorSpace:
-        """What its colours are."""
+        """The colour space."""
         return config.space_of({})
 
     def look_at(
         self, state: State, size: tuple[int, int], antialias: int, eye: str | None = None
     ) -> None:
-        """What the next draws are of."""
+        """Set the content of the next draws."""
         self._render.scene = self._scene(state)
         self._render.size, self._render.antialias, self._render.fps = size, antialias, state.fps
         self._time, self._number = state.frame / state.fps, int(state.frame // 1)
@@ -129,7 +129,7 @@ class ClipSubject:
         self._now = self._which(state)
 
     def has(self, state: State) -> frozenset[str]:
-        """What a method may ask for."""
+        """Inputs that a method may ask for."""
         return self._frame(self._which(state)).has
 
     def methods(self, state: State) -> list[str]:
@@ -145,7 +145,7 @@ class ClipSubject:
         return self._frame(self._which(state)).size
 
     def space(self, config: ColorConfig) -> ColorSpace:
-        """What the frame's colours are; InputError if nobody can tell."""
+        """The colour space of the frame; InputError if it is unknown."""
         self._frame(self._now)
         return space_of(self._said[self._now[:2]], config)
 
@@ -167,7 +167,7 @@ class ClipSubject:
     def look_at(
         self, state: State, size: tuple[int, int], antialias: int, eye: str | None = None
     ) -> None:
-        """What the next draws are of; `eye`: the view."""
+        """Set the content of the next draws; `eye`: the view."""
         self._now = self._which(state, eye)
 
     def _which(self, state: State, eye: str | None = None) -> _Which:
@@ -243,7 +243,7 @@ class ClipSubject:
 
 
 def _canvas(frame: Frame) -> Window:
-    """Where the pixels of a frame lie, counted from the display window's corner."""
+    """Position of a frame's pixels, counted from the display window's corner."""
     x, y = frame.window[:2] if frame.window else (0, 0)
     return x, y, x + frame.size[0] - 1, y + frame.size[1] - 1
 

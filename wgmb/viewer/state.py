@@ -136,7 +136,7 @@ class State:
 
     @property
     def colors(self) -> ColorSettings:
-        """What the input's colours are, and how pictures show them."""
+        """Colour space of the input, and display of the pictures."""
         given: dict[str, Any] = dict(self.color)
         return ColorSettings(**given)
 

@@ -79,7 +79,7 @@ def moment(state: State) -> Moment:
 
 
 def held_for(state: State, number: int) -> float:
-    """How long an output frame is shown [s]: until the next one."""
+    """Duration of an output frame [s]: until the next one."""
     moments = output(state).moments
     if number + 1 < len(moments):
         return float(moments[number + 1].time - moments[number].time)
