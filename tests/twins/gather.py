@@ -449,22 +449,34 @@ def resolve_visibility(layers, tiles, x, y, t):
 def iterate_fixed_point(paths, centre, seed, u, first):
     """Fixed point of d = displacement(centre - d): d, the last step, pixel; None: from 0."""
     height, width = paths.shape[:2]
-    d, steps = (np.zeros(2), 7) if seed is None else (seed, 4)
-    residual, pixel = np.inf, None
+    d, steps = (np.zeros(2), 9) if seed is None else (seed, 6)
+    residual, pixel, before = np.inf, None, 0j
     if first is not None and (np.abs(d - first[0]) < 0.75).all():
         return d, residual, pixel
-    for _ in range(steps):
+    for n in range(steps):
         q = centre - d
         if not (0 <= q[0] < width and 0 <= q[1] < height):
             return d, np.inf, None
         pixel = int(q[1]), int(q[0])
         step = moved(paths[pixel], u)
         back = np.inf if first is None else np.hypot(*(d - first[0])) / 2
-        residual, d = np.hypot(*(step - d)), step
+        way = complex(*(step - d))
+        residual, d = abs(way), step
         if residual < 0.5 or residual > back:  # there, or astray
             break
         if first is not None and (np.abs(d - first[0]) < 0.75).all():
             break
+        if seed is None and n == 0:  # to the pixel's own path, from which the search starts
+            continue
+        if (
+            n < steps - 1
+            and 0.5 < abs(way) / max(abs(before), 1e-6) < 2
+            and abs(before - way) > abs(before) / 4
+        ):
+            rest = way**2 / (before - way)  # of a geometric series
+            d, before = d + (rest.real, rest.imag), 0j
+        else:
+            before = way
     return d, residual, pixel
 
 

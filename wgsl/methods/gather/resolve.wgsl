@@ -337,12 +337,14 @@ fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candi
 fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first: bool, first: First, limit: f32) -> WarpState {
     var state = WarpState(0u, own, INFINITE);
     var n = 1u;
+    var before = vec2f(0.0);    // the last step, if no leap came after it
     if !is_first {
         state.d = next_seed(seeds);
         n = ITERATIONS_SAVED;
     }
     loop {              // a turn is a step
         let back = state.d - first.d;
+        let start = state.d;
         state = warp_step(query.x, state.d, query.u, query.layer);
         n++;
         let again = same_solution(state.d, first.d);
@@ -352,9 +354,14 @@ fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first:
         if (again && first.is_there) || farther { state.residual2 = INFINITE; }
         let is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
         if ended && (is_first || is_there || (*seeds).pending == 0u) { break; }
+        let step = state.d - start;
+        let further = leap(step, before);
+        state.d += further;
+        before = select(vec2f(0.0), step, all(further == vec2f(0.0)));
         if ended {
             state.d = next_seed(seeds);
             n = ITERATIONS_SAVED;
+            before = vec2f(0.0);
         }
     }
     return state;

@@ -17,7 +17,7 @@ struct SourceFrames {
 @group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // stored as rgba32uint: see pack_surface(); front, back of the frame itself, front, back of the next one, ...
 @group(1) @binding(2) var tile_candidates: texture_2d_array<u32>;   // CANDIDATE_LAYERS per frame
 
-const MAX_ITERATIONS: u32 = 6u; // from the pixel's own trajectory
+const MAX_ITERATIONS: u32 = 8u; // from the pixel's own trajectory
 const CONVERGED: f32 = 0.5;     // a step shorter than this [px] ends the iteration
 const MAX_RESIDUAL: f32 = 1.0;  // a sample that is farther than this [px] from the pixel is not there
 const SOLUTION_TOLERANCE: f32 = 0.75;   // displacements closer than this [px] in x and y are the same solution
@@ -160,6 +160,24 @@ fn warp_step(x: vec2f, d: vec2f, u: f32, layer: u32) -> WarpState {
 /// Whether the iteration has converged, or left the image.
 fn has_ended(state: WarpState) -> bool {
     return state.residual2 < CONVERGED * CONVERGED || state.residual2 >= INFINITE;
+}
+
+// An iteration is slow if a step is longer than this share of the one before it, and leads nowhere from MOST_GROWTH times it on.
+const SLOW_STEP: f32 = 0.5;
+const MOST_GROWTH: f32 = 2.0;
+const LEAST_TURN: f32 = 0.25;   // difference of the two steps, as a share of the first, that tells where they lead
+
+/// What is added after a `step` of a slow iteration, and the step `before` it, to get where they lead: steps of what turns and zooms
+/// are, as complex numbers, a geometric series (Aitken's delta-squared process). 0 where it is not slow.
+fn leap(step: vec2f, before: vec2f) -> vec2f {
+    let change = before - step;
+    let change2 = dot(change, change);
+    let ratio2 = dot(step, step) / max(dot(before, before), 1e-12);
+    let is_slow = ratio2 > SLOW_STEP * SLOW_STEP && ratio2 < MOST_GROWTH * MOST_GROWTH
+        && change2 > LEAST_TURN * LEAST_TURN * dot(before, before);
+    let square = vec2f(step.x * step.x - step.y * step.y, 2.0 * step.x * step.y);
+    let rest = vec2f(dot(square, change), square.y * change.x - square.x * change.y) / max(change2, 1e-12);
+    return select(vec2f(0.0), rest, is_slow);
 }
 
 /// The fixed point to which the iteration leads from the displacement `start`.
