@@ -64,9 +64,11 @@ class Average:
         """Record the pass over up to eight pictures; `ends`: they are the first, the last ones."""
         (width, height), stored = pictures[0].size, pictures[0].coding
         grid = -(-width // _BLOCK[0]), -(-height // _BLOCK[1])
+        planes = [self._layered(index, pictures[0]) for index in range(3)]
         kernel = gpu.kernel(
             self._device,
             "planes/average.wgsl",
+            {"blues": planes[1].format, "reds": planes[2].format},
             CURVE=curve_of(stored),
             PRECISE=max(stored.bits, wanted.bits) > 8,
             READ_X=stored.steps[0],
@@ -92,9 +94,9 @@ class Average:
             stored=reading(self._device, stored),
             wanted=writing(self._device, wanted),
             average=self._device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM),
-            lumas=self._layered(0, pictures[0]).create_view(dimension="2d-array"),
-            blues=self._layered(1, pictures[0]).create_view(dimension="2d-array"),
-            reds=self._layered(2, pictures[0]).create_view(dimension="2d-array"),
+            lumas=planes[0].create_view(dimension="2d-array"),
+            blues=planes[1].create_view(dimension="2d-array"),
+            reds=planes[2].create_view(dimension="2d-array"),
             sums=self._sums.at_least(_SUMS if all(ends) else _SUMS * grid[0] * grid[1]),
             packed=self._packed.buffer(places),
         )

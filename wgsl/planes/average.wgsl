@@ -19,9 +19,10 @@ struct Average {
 @group(1) @binding(0) var<uniform> stored: Code;
 @group(1) @binding(1) var<uniform> wanted: Code;
 @group(1) @binding(2) var<uniform> average: Average;
-@group(1) @binding(3) var lumas: texture_2d_array<u32>;         // sixteen bytes to a texel
-@group(1) @binding(4) var blues: texture_2d_array<u32>;         // the same, or eight samples if READ_X is 2
-@group(1) @binding(5) var reds: texture_2d_array<u32>;
+// Sixteen bytes to a texel of luma; of chroma the same, or eight samples if READ_X is 2.
+@group(1) @binding(3) var lumas: texture_2d_array<u32>;         // stored as rgba32uint
+@group(1) @binding(4) var blues: texture_2d_array<u32>;         // stored as rg32uint
+@group(1) @binding(5) var reds: texture_2d_array<u32>;          // stored as rg32uint
 @group(1) @binding(6) var<storage, read_write> sums: array<mat4x4f>;    // where there are more than eight pictures
 @group(1) @binding(7) var<storage, read_write> packed: array<u32>;
 
@@ -40,6 +41,12 @@ struct Row {
     b: mat4x3f,
     c: mat4x3f,
     d: mat4x3f,
+}
+
+/// Sixteen samples of a row as they are stored; the second eight in `b` if READ_BITS is 16.
+struct Words {
+    a: vec4u,
+    b: vec4u,
 }
 
 /// One component of sixteen pixels of a row.
@@ -76,16 +83,16 @@ fn main(
         let weight = average.parts[n].x;
         let layer = i32(average.parts[n].y);
         let above = vec2u(id.x, rows.x / READ_Y);
-        let blue = chroma(blues, above, layer);
-        let red = chroma(reds, above, layer);
-        let high = sixteen(lumas, vec2u(id.x, rows.x), layer);
-        let luma = sixteen(lumas, vec2u(id.x, rows.y), layer);
+        let blue = chroma(blue_at(above, layer));
+        let red = chroma(red_at(above, layer));
+        let high = sixteen(luma_at(vec2u(id.x, rows.x), layer));
+        let low = sixteen(luma_at(vec2u(id.x, rows.y), layer));
         upper = add(upper, weight, high, blue, red);
         if READ_Y == 2u {
-            lower = add(lower, weight, luma, blue, red);
+            lower = add(lower, weight, low, blue, red);
         } else {
             let below = vec2u(id.x, rows.y);
-            lower = add(lower, weight, luma, chroma(blues, below, layer), chroma(reds, below, layer));
+            lower = add(lower, weight, low, chroma(blue_at(below, layer)), chroma(red_at(below, layer)));
         }
         n++;
         if n >= turns { break; }
@@ -104,26 +111,45 @@ fn main(
     write_quads(2u * id.x + 1u, id.y, rows, upper.c, upper.d, lower.c, lower.d);
 }
 
-/// Samples of a plane for the sixteen pixels of block `at`, which has as many.
-fn sixteen(plane: texture_2d_array<u32>, at: vec2u, layer: i32) -> Samples {
-    if READ_BITS == 8u {
-        let bytes = textureLoad(plane, at, layer, 0);
-        return Samples(of_bytes(bytes.x), of_bytes(bytes.y), of_bytes(bytes.z), of_bytes(bytes.w));
-    }
-    let left = textureLoad(plane, vec2u(2u * at.x, at.y), layer, 0);
-    let right = textureLoad(plane, vec2u(2u * at.x + 1u, at.y), layer, 0);
-    return Samples(of_halves(left.xy), of_halves(left.zw), of_halves(right.xy), of_halves(right.zw));
+/// Words of luma for the sixteen pixels of block `at`, which has as many samples.
+fn luma_at(at: vec2u, layer: i32) -> Words {
+    if READ_BITS == 8u { return Words(textureLoad(lumas, at, layer, 0), vec4u()); }
+    let left = vec2u(2u * at.x, at.y);
+    let right = vec2u(2u * at.x + 1u, at.y);
+    return Words(textureLoad(lumas, left, layer, 0), textureLoad(lumas, right, layer, 0));
 }
 
-/// Samples of a plane of chroma for the same.
-fn chroma(plane: texture_2d_array<u32>, at: vec2u, layer: i32) -> Samples {
-    if READ_X == 1u { return sixteen(plane, at, layer); }
-    let texel = textureLoad(plane, at, layer, 0);
-    var left = of_bytes(texel.x);
-    var right = of_bytes(texel.y);
+/// The same of Cb, which may have eight samples.
+fn blue_at(at: vec2u, layer: i32) -> Words {
+    if READ_BITS == 8u || READ_X == 2u { return Words(textureLoad(blues, at, layer, 0), vec4u()); }
+    let left = vec2u(2u * at.x, at.y);
+    let right = vec2u(2u * at.x + 1u, at.y);
+    return Words(textureLoad(blues, left, layer, 0), textureLoad(blues, right, layer, 0));
+}
+
+/// The same of Cr.
+fn red_at(at: vec2u, layer: i32) -> Words {
+    if READ_BITS == 8u || READ_X == 2u { return Words(textureLoad(reds, at, layer, 0), vec4u()); }
+    let left = vec2u(2u * at.x, at.y);
+    let right = vec2u(2u * at.x + 1u, at.y);
+    return Words(textureLoad(reds, left, layer, 0), textureLoad(reds, right, layer, 0));
+}
+
+/// Sixteen samples.
+fn sixteen(words: Words) -> Samples {
+    let a = words.a;
+    if READ_BITS == 8u { return Samples(of_bytes(a.x), of_bytes(a.y), of_bytes(a.z), of_bytes(a.w)); }
+    return Samples(of_halves(a.xy), of_halves(a.zw), of_halves(words.b.xy), of_halves(words.b.zw));
+}
+
+/// Samples of chroma for sixteen pixels.
+fn chroma(words: Words) -> Samples {
+    if READ_X == 1u { return sixteen(words); }
+    var left = of_bytes(words.a.x);
+    var right = of_bytes(words.a.y);
     if READ_BITS == 16u {
-        left = of_halves(texel.xy);
-        right = of_halves(texel.zw);
+        left = of_halves(words.a.xy);
+        right = of_halves(words.a.zw);
     }
     return Samples(left.xxyy, left.zzww, right.xxyy, right.zzww);
 }
