@@ -10,11 +10,11 @@ import wgmb
 from wgmb import Blur, Clip, Shutter
 from wgmb.batch import blur_sequence
 from wgmb.cli.app import main as command
+from wgmb.extent import EVERYWHERE
 from wgmb.io import exr, stills, windows
 from wgmb.io.clip import Passes
 from wgmb.io.output import Output
 from wgmb.io.vectors import Vectors
-from wgmb.reach import EVERYWHERE
 
 DISPLAY = (0, 0, 319, 179)
 WIDE = (-40, -30, 359, 209)  # with overscan
@@ -243,7 +243,7 @@ def test_a_side_that_cuts_through_the_picture_is_told_once(tmp_path):
     pattern, _ = region(tmp_path / "in", True)
     clip = Clip(pattern)
     for number in clip.numbers:
-        clip.placed(clip.source(number), Blur("gather").reach, True)
+        clip.placed(clip.source(number), Blur("gather").extent, True)
     (told,) = [note for note in clip.notes if "data window" in note]
     assert "left, top, right, bottom" in told
 
@@ -298,7 +298,7 @@ def test_overscan_that_goes_on_is_not_told_as_a_region(tmp_path):
     got = blurred(str(folder / "a.####.exr"), tmp_path / "out", "gather")
     assert got[1].data_window == WIDE
     clip = Clip(str(folder / "a.####.exr"))
-    clip.placed(clip.source(1), Blur("gather").reach, True)
+    clip.placed(clip.source(1), Blur("gather").extent, True)
     assert not [note for note in clip.notes if "data window" in note]
 
 
@@ -307,14 +307,14 @@ def test_a_neighbour_with_another_display_window_is_not_used(tmp_path):
     planes, _ = ball(3)
     write(pattern.replace("####", "0003"), planes, DISPLAY, display=(0, 0, 399, 179))
     clip = Clip(pattern)
-    frame = clip.with_neighbours(clip.source(2), reach=Blur("gather").reach)
+    frame = clip.with_neighbours(clip.source(2), extent=Blur("gather").extent)
     assert frame.prev is not None and frame.next is None
     assert clip.sizes[3] == (400, 180)
 
 
 def test_the_viewer_and_perceive_show_all_of_the_display(autocropped, tmp_path):
     clip = Clip(autocropped)
-    frame = clip.with_neighbours(clip.source(2), reach=EVERYWHERE)
+    frame = clip.with_neighbours(clip.source(2), extent=EVERYWHERE)
     assert frame.size == (320, 180) and frame.window == (0, 0, 320, 180)
     words = ["perceive", autocropped, "-o", str(tmp_path / "p.####.exr"), "--fps", "60", "-q"]
     assert command(words) == 0

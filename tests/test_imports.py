@@ -21,7 +21,7 @@ LAYERS = [
     {"ocio"},
     {"gpu", "shutter", "camera", "metrics", "display"},
     {"frame", "cone", "highlights"},
-    {"frame_views", "reach", "exposure", "motion_source"},
+    {"frame_views", "extent", "exposure", "motion_source"},
     {"velocity", "holdout", "planes", "reel"},
     {"io", "scene", "observer", "flow"},
     {"methods"},

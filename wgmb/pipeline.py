@@ -17,6 +17,7 @@ import wgpu
 from . import gpu
 from .camera import Window
 from .errors import InputError, check_choice, did_you_mean
+from .extent import Extent
 from .frame import PASSES, Frame
 from .frame_views import FrameViews, View, check_output, check_view
 from .gpu import wgsl
@@ -26,7 +27,6 @@ from .holdout import HoldoutPass
 from .methods import METHODS, default_method
 from .methods.contract import Inputs, PreparedFrame
 from .methods.options import options_of
-from .reach import Reach
 from .residency import Residency
 from .scene.gbuffer import SceneOnGpu
 from .shutter import Shutter
@@ -112,14 +112,14 @@ class Blur:
         return METHODS[self.method.name](self.device, options, output=self.output)
 
     @property
-    def reach(self) -> Reach:
+    def extent(self) -> Extent:
         """How far it carries what moves, for frames that hold a part of their picture; see
         Clip.with_neighbours.
         """
         opens, closes = self._shutter.span
         late = sum(map(abs, self._shutter.delay))  # twice that of the display window's edges
         method = type(self.method)
-        return Reach(
+        return Extent(
             (opens - late, closes + late),
             (opens, closes),
             getattr(method, "spread", "along"),

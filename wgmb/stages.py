@@ -125,7 +125,7 @@ class Stages:
     def _prepared(self, source: FrameFile) -> tuple[Frame, Placement | None]:
         uses = self._blur.method.uses
         normal, light = "normal" in uses, "diffuse_light" in uses
-        return self.clip.placed(source, self._blur.reach, self.neighbours, normal, light)
+        return self.clip.placed(source, self._blur.extent, self.neighbours, normal, light)
 
     def _blurred(self, source: FrameFile, frame: Frame, placement: Placement | None) -> Result:
         confidence: dict[str, np.ndarray] = {}

@@ -12,10 +12,10 @@ from typing import Any
 
 from ..display import ColorSpace
 from ..errors import InputError
+from ..extent import Extent
 from ..frame import Frame
 from ..highlights import check as check_highlights
 from ..motion_source import MotionSource
-from ..reach import Reach
 from . import limits
 from .cut_list import CutList
 from .frame_file import FrameFile
@@ -271,29 +271,29 @@ class Clip:
         self,
         source: FrameFile,
         normal: bool = True,
-        reach: Reach | None = None,
+        extent: Extent | None = None,
         light: bool = True,
     ) -> Frame:
         """`frame`, and the same view of the frames before and after as far as they can be read.
 
         Frames whose files hold parts of the picture (data windows) come on one canvas, in
-        Frame.window; `reach`, the Blur's, makes room there for streaks that lead out of them.
+        Frame.window; `extent`, the Blur's, makes room there for streaks that lead out of them.
         Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
         Blur, once, though it is shown in three.
         """
-        return self._around.between(source, extras(normal, light), reach)[0]
+        return self._around.between(source, extras(normal, light), extent)[0]
 
     def placed(
         self,
         source: FrameFile,
-        reach: Reach,
+        extent: Extent,
         neighbours: bool,
         normal: bool = True,
         light: bool = True,
     ) -> tuple[Frame, Placement]:
-        """What a Blur of this `reach` takes: with_neighbours, or `frame`; and where that lies."""
+        """What a Blur of this `extent` takes: with_neighbours, or `frame`; and where that lies."""
         made = self._around.between if neighbours else self._around.alone
-        return made(source, extras(normal, light), reach)
+        return made(source, extras(normal, light), extent)
 
     def frame(
         self,

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 
 from ..color import srgb
+from ..extent import displacement
 from ..frame import Frame
-from ..reach import displacement
 
 _PROBES = 2000  # pixels looked at
 _CUT = (

@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import Any
 
 from ..errors import InputError, check_choice
+from ..extent import Extent
 from ..frame import Frame
-from ..reach import Reach
 from .cuts import is_cut, jumps, still, straightened
 from .frame_file import FrameFile
 from .frame_maker import FrameMaker
@@ -95,18 +95,18 @@ class Neighbours:
         return frame
 
     def alone(
-        self, source: FrameFile, also: frozenset[str], reach: Reach | None
+        self, source: FrameFile, also: frozenset[str], extent: Extent | None
     ) -> tuple[Frame, Placement]:
-        """The frame by itself, on a canvas with room for `reach`."""
+        """The frame by itself, on a canvas with room for `extent`."""
         frame = self.frame(source, True, also)
-        onto = self._canvas({0: (source, frame)}, reach)
+        onto = self._canvas({0: (source, frame)}, extent)
         frame = placed(frame, source.data_window, onto, self._edges(source, onto))
         return frame, Placement(onto, self._bounds(source))
 
     def between(
-        self, source: FrameFile, also: frozenset[str], reach: Reach | None
+        self, source: FrameFile, also: frozenset[str], extent: Extent | None
     ) -> tuple[Frame, Placement]:
-        """The frame with those before and after it, on a canvas with room for `reach`.
+        """The frame with those before and after it, on a canvas with room for `extent`.
 
         Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
         Blur, once, though it is shown in three.
@@ -125,7 +125,7 @@ class Neighbours:
                 self.cuts.add(source.number + (side > 0))
             else:
                 frames[side] = other, near
-        onto = self._canvas(frames, reach)
+        onto = self._canvas(frames, extent)
         made = {side: self._on(onto, *one) for side, one in frames.items()}
         frame = made[0].between(made.get(-1), made.get(1))
         return frame, Placement(onto, self._bounds(source))
@@ -199,22 +199,24 @@ class Neighbours:
 
     # ---- data windows ----------------------------------------------------------------------
 
-    def _canvas(self, frames: Mapping[int, tuple[FrameFile, Frame]], reach: Reach | None) -> Window:
-        """The window that the frames, by their offset, are placed on for a blur of this `reach`.
+    def _canvas(
+        self, frames: Mapping[int, tuple[FrameFile, Frame]], extent: Extent | None
+    ) -> Window:
+        """The window that the frames, by their offset, are placed on for a blur of this `extent`.
 
         It depends on them alone, so that parts of a sequence give the same pictures as the whole.
         """
         source, _ = frames[0]
         display, windows = source.display_window, [file.data_window for file, _ in frames.values()]
         held = union(windows)
-        if reach is None or held == display == source.data_window:
+        if extent is None or held == display == source.data_window:
             return held
         limit = allowed(windows, display, self._cut_through)
-        if held == limit or reach.spread == "everywhere":
+        if held == limit or extent.spread == "everywhere":
             return limit
         needed: list[Window] = []
         for offset, (file, frame) in frames.items():
-            if (box := reach.box(frame, offset)) is not None:
+            if (box := extent.box(frame, offset)) is not None:
                 needed += [file.data_window, moved_by(box, file.data_window[:2])]
         if not needed:
             return source.data_window

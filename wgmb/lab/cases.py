@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, did_you_mean
+from ..extent import EVERYWHERE
 from ..frame import Frame
 from ..io.clip import Clip
 from ..io.frame_numbers import frame_list
@@ -20,7 +21,6 @@ from ..methods import METHODS
 from ..methods.options import options_of
 from ..metrics import measure
 from ..pipeline import Blur
-from ..reach import EVERYWHERE
 from ..render import Render
 from ..scene import builtin
 from ..scene.scene import Scene
@@ -203,7 +203,7 @@ def clip_case(
         raise InputError(f"truth must be one file or two halves of it, got {len(truth)}")
     if len(inputs) == 3:
         before, here, after = (
-            clip.with_neighbours(clip.source(clip.numbers[0]), reach=EVERYWHERE)
+            clip.with_neighbours(clip.source(clip.numbers[0]), extent=EVERYWHERE)
             for clip in map(open_clip, inputs)
         )
         frame = replace(here, prev=before, next=after)
@@ -216,7 +216,7 @@ def clip_case(
         wanted = clip.numbers[0] if number is None else number
         if wanted not in clip.numbers:
             raise InputError(f"{inputs[0]} has no frame {wanted}")
-        frame = clip.with_neighbours(clip.source(wanted), reach=EVERYWHERE)
+        frame = clip.with_neighbours(clip.source(wanted), extent=EVERYWHERE)
     else:
         raise InputError(f"inputs must be a pattern, one file or three, got {len(inputs)}")
     pictures = {k: _read(path) for k, path in peers.items()}

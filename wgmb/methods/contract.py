@@ -78,7 +78,7 @@ class Method(Protocol):
     many samples as each pixel's streak needs (AUTO of wgsl/common/shutter.wgsl); `confidence`,
     what the four channels of its `show="confidence"` are called; `most_in_software`: the most
     samples it takes without a GPU, if not as many as with one. Of how far it carries what moves
-    (see reach.py): `spread`, by default "along"; `margin(height)`: pixels that it looks at beyond
+    (see extent.py): `spread`, by default "along"; `margin(height)`: pixels that it looks at beyond
     that, in pictures of this height [px]; `bend`: how far its paths leave the parabola through
     three positions, as a share of half the acceleration.
     """

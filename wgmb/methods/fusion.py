@@ -10,8 +10,8 @@ import wgpu
 
 from .. import gpu
 from ..camera import Camera, Reprojections
+from ..extent import Spread
 from ..gpu.textures import TexturePool
-from ..reach import Spread
 from .options import MethodOptions, Range
 
 

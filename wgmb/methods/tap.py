@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from .. import gpu
+from ..extent import Spread
 from ..gpu import wgsl
-from ..reach import Spread
 from .bends import Bends
 from .options import MethodOptions
 

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import numpy as np
 
 from .. import gpu
+from ..extent import Spread
 from ..gpu.textures import ScratchBuffer, TexturePool
-from ..reach import Spread
 from .options import MethodOptions
 
 LONGEST = (40, 9)  # blur to either side, and tile: so many pixels, or the height over this

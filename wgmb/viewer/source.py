@@ -11,6 +11,7 @@ import wgpu
 
 from .. import gpu
 from ..display import ColorConfig, ColorSpace, Display
+from ..extent import EVERYWHERE
 from ..frame import Frame
 from ..gpu.textures import TexturePool
 from ..gpu.timing import TimestampClock
@@ -19,7 +20,6 @@ from ..io.input_space import space_of, without_pixels
 from ..io.windows import NONE, Window, placed, union
 from ..methods import METHODS
 from ..pipeline import Blur
-from ..reach import EVERYWHERE
 from ..render import Render
 from ..scene import builtin
 from ..scene.scene import Scene
@@ -189,7 +189,7 @@ class ClipSubject:
         """A frame, by its number and view, and its neighbours."""
         if key not in self._frames:
             source = self._clip.source(*key[:2])
-            frame = self._clip.with_neighbours(source, reach=EVERYWHERE)
+            frame = self._clip.with_neighbours(source, extent=EVERYWHERE)
             self._said[key[:2]] = without_pixels(source)
             least, most = _FRAMES_KEPT
             kept = min(max(_MEMORY // (3 * _bytes(frame)), least), most)  # with its neighbours

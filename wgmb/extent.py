@@ -20,7 +20,7 @@ everywhere."""
 
 
 @dataclass(frozen=True)
-class Reach:
+class Extent:
     """How far a blur carries what moves."""
 
     times: tuple[float, float]
@@ -89,7 +89,7 @@ class Reach:
         return velocity, acceleration
 
 
-EVERYWHERE = Reach((0.0, 0.0), (0.0, 0.0), "everywhere")
+EVERYWHERE = Extent((0.0, 0.0), (0.0, 0.0), "everywhere")
 """Of those who want the whole display window, whatever is in it."""
 
 
