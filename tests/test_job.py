@@ -69,11 +69,19 @@ def check(capsys, pattern, parts, *options, suffix="exr", name="o.####"):
 
 @pytest.mark.parametrize(
     ("method", "chunk"),
-    [("tap", 1), ("gather", 3), ("gather", COUNT), ("reproject", 4), ("tiles", 7), ("fusion", 4)],
+    [
+        ("tap", 1),
+        ("gather", 3),
+        ("gather", COUNT),
+        ("gather --reach 2", 3),
+        ("reproject", 4),
+        ("tiles", 7),
+        ("fusion", 4),
+    ],
 )
 def test_parts_of_any_size_are_the_whole_with_every_method(desk, capsys, shot, method, chunk):
     parts = [f"{n}-{min(n + chunk - 1, COUNT)}" for n in range(1, COUNT + 1, chunk)]
-    check(capsys, shot, parts, "--method", method)
+    check(capsys, shot, parts, "--method", *method.split())
 
 
 def test_parts_of_a_shot_that_moves_only_at_times_read_its_vectors_alike(desk, capsys):
@@ -89,9 +97,10 @@ def test_parts_of_a_shot_that_moves_only_at_times_read_its_vectors_alike(desk, c
     assert told.count("flip y") == 3
 
 
+@pytest.mark.parametrize("reach", [1, 2])
 @pytest.mark.parametrize("cut", [5, 6, 7])
 @pytest.mark.parametrize("known", [True, False], ids=["named", "found"])
-def test_cuts_at_before_and_after_a_border_are_the_same(desk, capsys, cut, known):
+def test_cuts_at_before_and_after_a_border_are_the_same(desk, capsys, cut, known, reach):
     """Parts of 5 frames, so that the second one begins with frame 6."""
     for n in range(1, 11):
         channels = make.frame(n)
@@ -100,7 +109,8 @@ def test_cuts_at_before_and_after_a_border_are_the_same(desk, capsys, cut, known
                 channels[name] = channels[name][::-1, ::-1]
         make.write_exr(desk / "in" / f"s.{n:04d}.exr", channels)
     options = ("--cuts", f"only:{cut}") if known else ()
-    whole, told = check(capsys, "in/s.####.exr", ["1-5", "6-10"], "--method", "gather", *options)
+    options = "--method", "gather", "--reach", reach, *options
+    whole, told = check(capsys, "in/s.####.exr", ["1-5", "6-10"], *options)
     assert f"camera cut before frame {cut}" in whole
     assert f"camera cut before frame {cut}" in told
 

@@ -202,13 +202,14 @@ def test_reproject_is_its_twin(size, neighbours):
     assert wrong.mean() < 0.01
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3])
+@pytest.mark.parametrize("frames", [1, 2, 3, 5])
 @pytest.mark.parametrize("size", [(36, 52), (1, 1)])
 @pytest.mark.parametrize("degrees", [180, 400])
 @pytest.mark.parametrize("wall", [True, False])
 def test_gather_is_its_twin(size, frames, degrees, wall):
     """Samples on a texel's edge may read the next one; nearly all pixels agree."""
-    sources = [(offset, *crossing(size, offset, wall=wall)) for offset in (0, -1, 1)[:frames]]
+    offsets = (0, -1, 1, -2, 2)[:frames]
+    sources = [(offset, *crossing(size, offset, wall=wall)) for offset in offsets]
     assert differing_from_gather(sources, degrees) < 0.01
 
 
@@ -221,10 +222,10 @@ def test_gather_is_its_twin_in_a_crowd():
 
 def differing_from_gather(sources, degrees):
     """Share of the pixels at which gather and its twin differ."""
-    own, *near = [wgmb.Frame(c, motion=m, depth=d) for _, c, m, d in sources]
-    near = dict(zip(("prev", "next"), near, strict=False))
-    frame = wgmb.Frame(own.color, motion=own.motion, depth=own.depth, **near)
-    got = wgmb.Blur("gather", samples=4, shutter=degrees)(frame)
+    made = {o: wgmb.Frame(c, motion=m, depth=d) for o, c, m, d in sources}
+    near = (made.get(side) and made[side].between(made.get(-2), made.get(2)) for side in (-1, 1))
+    frame = made[0].between(*near)
+    got = wgmb.Blur("gather", samples=4, shutter=degrees, reach=2)(frame)
     want = gather_twin.gather(sources, Shutter(degrees).sample_times(4).astype(float))
     return (np.abs(got - want) > 1e-3).any(axis=2).mean()
 

@@ -266,7 +266,35 @@ def neighbours() -> None:
     save(grid(shown, 2), "gather/neighbours.jpg")
 
 
-FIGURES = (sample, fixed_point, tiles, instants, neighbours)
+def five_frames() -> None:
+    """Three bars that stand as far apart as they move in a frame; see tests/test_reach.py."""
+    height, width, step, color = 40, 112, 12, (0.9, 0.8, 0.1)
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    tones = (
+        np.sin(0.9 * x + 0.37 * y + c) * np.cos(0.53 * y - 0.29 * x + c) for c in (0, 1.3, 2.9)
+    )
+    wall = 0.5 + 0.4 * np.stack([*tones], axis=2)
+
+    def shot(t: float) -> Frame:
+        there = np.zeros((height, width), bool)
+        for bar in (-step, 0, step):
+            there |= np.abs(x + 0.5 - width / 2 - bar - step * t) < 4
+        motion = there[..., None] * np.array([-step, 0, step, 0], np.float32)
+        depth = np.where(there, 4, 9).astype(np.float32)
+        return Frame(np.where(there[..., None], color, wall), motion=motion, depth=depth)
+
+    made = {k: shot(k) for k in range(-2, 3)}
+    near = made[-1].between(made[-2], None), made[1].between(None, made[2])
+    blurs = {f"gather, {n} frames": Blur("gather", shutter=360, reach=r)
+             for n, r in (("three", 1), ("five", 2))}  # fmt: skip
+    times = Shutter(360).sample_times(16)
+    sheet = {"truth": np.mean([shot(float(t)).color for t in times], axis=0)}
+    sheet |= {name: blur(made[0].between(*near)) for name, blur in blurs.items()}
+    shown = {k: enlarged(levels(display(p)), (28, 4), (56, 32), 6) for k, p in sheet.items()}
+    save(grid(shown, 3), "gather/five_frames.jpg")
+
+
+FIGURES = (sample, fixed_point, tiles, instants, neighbours, five_frames)
 
 if __name__ == "__main__":
     for figure in FIGURES:

@@ -75,9 +75,10 @@ class Frame:
     object_motion: bool = False
     """`to_next`, `to_prev` exclude the camera's motion, which is added."""
     prev: Frame | None = None
-    """The frame before, for methods that use neighbours."""
+    """The frame before, for methods that use neighbours; its own `prev`, for those that take two
+    frames to either side."""
     next: Frame | None = None
-    """The frame after."""
+    """The frame after, and its own `next`."""
     number: int = 0
     """Frame number; varies the jitter."""
     diffuse_light: np.ndarray | None = None
@@ -177,7 +178,11 @@ class Frame:
         return locked
 
     def between(self, prev: Frame | None, next: Frame | None) -> Frame:
-        """Return the same frame with these neighbours."""
+        """Return the same frame with these neighbours, which may have neighbours of their own.
+
+        Of those, methods that take two frames to either side (gather with a `reach` of 2) read
+        `prev.prev` and `next.next`.
+        """
         frame = copy(self)
         object.__setattr__(frame, "prev", prev)
         object.__setattr__(frame, "next", next)

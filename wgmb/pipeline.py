@@ -25,7 +25,7 @@ from .gpu.textures import TexturePool
 from .gpu.timing import Clock
 from .holdout import HoldoutPass
 from .methods import METHODS, default_method
-from .methods.contract import Inputs, PreparedFrame
+from .methods.contract import Inputs, PreparedFrame, reach_of
 from .methods.options import options_of
 from .residency import Residency
 from .scene.gbuffer import SceneOnGpu
@@ -81,7 +81,7 @@ class Blur:
         self._groups = gpu.BindGroups()
         self._images = TexturePool(self.device)
         wanted = self.method.needs | self.method.uses
-        self._residency = Residency(self._images, wanted)
+        self._residency = Residency(self._images, wanted, 2 * reach_of(self.method) + 1)
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
         self._unbound = self._images.view("unbound", (1, 1), gpu.texel(self.device, 4))
         no_object = self._images.view("no object", (1, 1), "r32uint")
@@ -167,6 +167,8 @@ class Blur:
         *,
         prev: FrameViews | None = None,
         next: FrameViews | None = None,
+        prev_prev: FrameViews | None = None,
+        next_next: FrameViews | None = None,
         confidence: View | None = None,
         number: int = 0,
         timing: Clock | None = None,
@@ -182,7 +184,8 @@ class Blur:
         there is a stencil); `object_id` as r8uint, r16uint, r32uint and rg32uint; masks also as
         r8unorm. `output`: a texture of this Blur's output format with the usage STORAGE_BINDING.
         `prev`, `next`: the previous and the next frame, for methods that use neighbours,
-        with the same inputs as the frame. `confidence`: a texture like `output` for the channels
+        with the same inputs as the frame; `prev_prev`, `next_next`: those beyond them, for methods
+        that take two to either side. `confidence`: a texture like `output` for the channels
         of `with_confidence`. `number`: frame number, which varies the jitter.
 
         `timing` takes the time of every pass: `timing.clock(device)`, whose WallClock runs the
@@ -190,9 +193,10 @@ class Blur:
         """
         size = frame.size
         around = {"": (0, frame)}
-        if "neighbours" in self.method.uses:
-            near = {"prev.": (-1, prev), "next.": (1, next)}
-            around |= {whose: (o, f) for whose, (o, f) in near.items() if f is not None}
+        near = {"prev.": (-1, prev), "next.": (1, next)}
+        near |= {"prev.prev.": (-2, prev and prev_prev), "next.next.": (2, next and next_next)}
+        reach = reach_of(self.method)
+        around |= {w: (o, f) for w, (o, f) in near.items() if f is not None and abs(o) <= reach}
         for name, view in (("output", output), ("confidence", confidence)):
             if view is not None:
                 check_view(name, view, self.device, size)
@@ -393,11 +397,14 @@ class Blur:
     def _views(self, frame: Frame) -> dict[str, Any]:
         """The frame and the neighbours that the method takes, as keywords of `encode`."""
         around: dict[int, Frame] = {0: frame}
-        if "neighbours" in self.method.uses:
-            near = {-1: frame.prev, 1: frame.next}
-            needs = self.method.needs
-            around |= {o: f for o, f in near.items() if f is not None and f.has >= needs}
-        names = {0: "frame", -1: "prev", 1: "next"}
+        for side in (-1, 1):
+            beside = frame
+            for offset in range(side, side * (reach_of(self.method) + 1), side):
+                beside = beside.prev if side < 0 else beside.next
+                if beside is None or not beside.has >= self.method.needs:
+                    break
+                around[offset] = beside
+        names = {0: "frame", -1: "prev", 1: "next", -2: "prev_prev", 2: "next_next"}
         views = self._residency.views_of(around)
         return {"number": frame.number} | {names[offset]: one for offset, one in views.items()}
 

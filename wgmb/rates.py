@@ -89,7 +89,7 @@ class ConversionStages(Stages):
     def __init__(self, clip: Clip, blur: Blur, conversion: Conversion, all_views: bool = True):
         super().__init__(clip, blur, all_views=all_views)
         self.numbers = conversion.numbers(clip)
-        self.neighbours = True
+        self.reach = max(self.reach, 1)
         self._conversion, self._shutter = conversion, blur.shutter
         self._there = frozenset(clip.on_disk)
         self._known = frozenset(n for n in clip.on_disk if clip.begins_shot(n))
@@ -102,7 +102,7 @@ class ConversionStages(Stages):
         meaning: str | None = None
         with self._reading:
             for cell in self._cells(number, self._known):
-                made_of = self.clip.made_of(cell.index, self.neighbours)
+                made_of = self.clip.made_of(cell.index, self.reach)
                 files |= dict.fromkeys(map(tuple, made_of["files"]))
                 meaning = made_of["vectors_mean"]
         return {"files": [list(file) for file in files], "vectors_mean": meaning, "at": str(at)}

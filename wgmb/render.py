@@ -20,6 +20,7 @@ from .frame import Frame
 from .frame_views import FrameViews
 from .gpu.textures import TexturePool
 from .gpu.timing import Clock
+from .methods.contract import reach_of
 from .pipeline import Blur
 from .scene.gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
 from .scene.scene import Scene
@@ -132,6 +133,8 @@ class Render:
             output,
             prev=seen.get(-1),
             next=seen.get(1),
+            prev_prev=seen.get(-2),
+            next_next=seen.get(2),
             number=number,
             confidence=confidence,
             timing=timing,
@@ -287,4 +290,5 @@ class Render:
 
 def _offsets(blur: Blur) -> tuple[int, ...]:
     """The frames that the method is given [frame intervals]."""
-    return (0, -1, 1) if "neighbours" in blur.method.uses else (0,)
+    reach = reach_of(blur.method)
+    return tuple(sorted(range(-reach, reach + 1), key=abs))

@@ -22,7 +22,8 @@ from .frame import Frame
 from .frame_views import TEXTURES, FrameViews, View
 from .gpu.textures import TexturePool
 
-_PLACES = (" a", " b", " c")  # for a frame and its neighbours, by the end of their textures' names
+# For a frame, its neighbours and those beyond them, by the end of their textures' names.
+_PLACES = (" a", " b", " c", " d", " e")
 
 
 class _ResidentFrame:
@@ -46,16 +47,19 @@ class _ResidentFrame:
 
 
 class Residency:
-    """Uploads frames, those that are locked once. `wanted`: what the method needs and uses."""
+    """Uploads frames, those that are locked once.
 
-    def __init__(self, images: TexturePool, wanted: frozenset[str]):
-        self._images, self._wanted = images, wanted
+    `wanted`: what the method needs and uses; `most`: frames that it takes at once.
+    """
+
+    def __init__(self, images: TexturePool, wanted: frozenset[str], most: int):
+        self._images, self._wanted, self._most = images, wanted, most
         self._resident: dict[str, _ResidentFrame] = {}
 
     def views_of(self, frames: Mapping[int, Frame]) -> dict[int, FrameViews]:
-        """Return the views of up to three frames by the same keys; uploads missing frames."""
+        """Return the views of up to five frames by the same keys; uploads missing frames."""
         places = {key: self._place_of(frame) for key, frame in frames.items()}
-        free = [place for place in _PLACES if place not in places.values()]
+        free = [p for p in _PLACES[: self._most] if p not in places.values()]
         views: dict[int, FrameViews] = {}
         for key, frame in frames.items():
             # Looked up again, as the same frame may stand at two offsets.

@@ -22,6 +22,7 @@ from .io.clip import Clip
 from .io.frame_file import FrameFile
 from .io.result import Result
 from .io.windows import Placement
+from .methods.contract import reach_of
 from .pipeline import Blur
 
 IN_FLIGHT = 3  # frames, with all their views: one being read, one on the GPU, one being taken
@@ -80,12 +81,12 @@ class Stages:
     def __init__(self, clip: Clip, blur: Blur, confidence: bool = False, all_views: bool = True):
         self.clip, self._blur = clip, blur
         self._confidence, self._all_views = confidence, all_views
-        self.neighbours = "neighbours" in blur.method.uses
+        self.reach = reach_of(blur.method)
         self.numbers = clip.numbers
 
     def made_of(self, number: int) -> dict[str, Any]:
         """Files and facts on which a frame depends."""
-        return self.clip.made_of(number, self.neighbours)
+        return self.clip.made_of(number, self.reach)
 
     def read(self, number: int, made_of: dict[str, Any]) -> ReadFrame:
         """Read every view of a frame; InputError or OSError where one of them cannot be."""
@@ -102,13 +103,13 @@ class Stages:
         if errors:
             error, source = errors[0]
             raise _of_view(error, source, views, self._blur.method.needs)
-        if unread := sorted({number - 1, number + 1} & self.clip.unread):
+        if unread := sorted(n for n in self.clip.unread if abs(n - number) <= self.reach):
             made_of["unread"] = unread  # so that --resume asks for them again
         return ReadFrame(number, views, made_of)
 
     def forget(self, number: int) -> None:
         """Drop the files that the frames after this one do not need."""
-        self.clip.forget(number - 1 if self.neighbours else number)
+        self.clip.forget(number - self.reach)
 
     def blur(self, read: ReadFrame) -> BlurredFrame:
         """Blur every view; InputError or GpuMemoryError where one of them cannot be."""
@@ -125,7 +126,7 @@ class Stages:
     def _prepared(self, source: FrameFile) -> tuple[Frame, Placement | None]:
         uses = self._blur.method.uses
         normal, light = "normal" in uses, "diffuse_light" in uses
-        return self.clip.placed(source, self._blur.extent, self.neighbours, normal, light)
+        return self.clip.placed(source, self._blur.extent, self.reach, normal, light)
 
     def _blurred(self, source: FrameFile, frame: Frame, placement: Placement | None) -> Result:
         confidence: dict[str, np.ndarray] = {}

@@ -17,6 +17,7 @@ from . import gpu
 from .background import Behind, ahead
 from .batch_report import Progress
 from .coding import CodedPicture, Coding
+from .errors import InputError
 from .exposer import Exposer
 from .exposure import Cell
 from .glance import Glance, is_cut, is_double
@@ -29,6 +30,7 @@ from .io.frame_file import FrameFile
 from .io.output import Output
 from .io.result import Result
 from .io.segments import Segment
+from .methods.contract import reach_of
 from .moments import Moment
 from .motion_source import MotionSource
 from .pipeline import Blur
@@ -48,7 +50,8 @@ class FootageBlur:
     `holdout` (height, width): 1 stays sharp. `fill`: repeated pictures are left out, and motion
     goes on over the gap. `cuts`: whether cuts are looked for, beside
     `known_cuts`, the numbers of pictures that begin a shot. `highlights`: times white that white
-    counts as while it is blurred; InputError where the video holds light above white.
+    counts as while it is blurred; InputError where the video holds light above white, and where
+    the method takes two frames to either side.
     """
 
     def __init__(
@@ -65,6 +68,8 @@ class FootageBlur:
         highlights: float = 1.0,
     ):
         check_coding(highlights, footage.path, footage.coding)
+        if reach_of(blur.method) > 1:
+            raise InputError("a `reach` of 2 is for rendered frames, a video takes 1")
         self._highlights = highlights
         self.footage, self.clock, self._holdout = footage, clock, holdout
         self._blur, self._motion = blur, motion

@@ -40,7 +40,9 @@ class Sample:
 def gather(frames, times):
     """Mean over `times`; frames: (offset, color, motion, depth), the frame itself first."""
     at = {f[0]: f for f in frames}
-    layers = [separate(*f, prev=at.get(f[0] - 1), next=at.get(f[0] + 1)) for f in frames]
+    layers = [separate(*f, prev=at.get(f[0] - 1), next=at.get(f[0] + 1)) for f in frames[1:]]
+    far = [layer for layer in layers if abs(layer.offset) > 1]
+    layers.insert(0, separate(*frames[0], prev=at.get(-1), next=at.get(1), far=far))
     span = times[0] - (times[1] - times[0]) / 2, times[-1] + (times[1] - times[0]) / 2
     tiles = [tile_candidates(f, span) for f in layers]
     height, width = frames[0][1].shape[:2]
@@ -49,7 +51,7 @@ def gather(frames, times):
     for y in range(height):
         for x in range(width):
             here = [t[y // TILE][x // TILE] for t in tiles]
-            if max(tile["longest"] for tile in here) >= 0.01:
+            if max(tile["longest"] for tile in here[: len(layers) - len(far)]) >= 0.01:
                 seen = [instant(layers, here, x, y, t, own) for t in times]
                 if any(one is None for one in seen):
                     filled = hidden(layers[0], x, y, own)
@@ -68,10 +70,10 @@ def around(height, width, y, x, radius):
             yield j, i
 
 
-def separate(offset, color, motion, depth, prev=None, next=None):
+def separate(offset, color, motion, depth, prev=None, next=None, far=()):
     """Separate pixels that show two surfaces into a front layer and what is behind it.
 
-    `prev`, `next`: the frames around, as those of `gather`.
+    `prev`, `next`: the frames around, as those of `gather`; `far`: Layers of those beyond.
     """
     height, width = depth.shape
     color, motion = color.astype(float), motion.astype(float)
@@ -98,7 +100,7 @@ def separate(offset, color, motion, depth, prev=None, next=None):
     back = [np.zeros_like(color), own.copy(), np.zeros((height, width))]
     inferred = np.zeros((height, width), bool)
     for y, x in np.argwhere(separated):
-        parts = separate_pixel(color, motion, z, edges, y, x, bends, (prev, next))
+        parts = separate_pixel(color, motion, z, edges, y, x, bends, (prev, next), far)
         if parts:
             for array, value in zip([*found, *back, inferred], parts, strict=True):
                 array[y, x] = value
@@ -155,7 +157,25 @@ def seen_background(around_it, motion, z, y, x):
     return np.mean(found, axis=0) if found else None
 
 
-def separate_pixel(color, motion, z, edges, y, x, bends, around_it):
+def far_background(far, motion, z, y, x):
+    """The same of frames beyond the neighbours: Layers."""
+    found = []
+    for frame in far:
+        u, height, width = frame.offset, *frame.edgeless.shape
+        path = np.concatenate([(motion[2:] - motion[:2]) / 2, (motion[2:] + motion[:2]) / 2])
+        step, half_way = (path[:2] * t + path[2:] * t * t for t in (u, u / 2))
+        place = np.array([x, y]) + 0.5 + step
+        if (place < 0.5).any() or (place > np.array([width, height]) - 0.5).any():
+            continue
+        at = int(place[1]), int(place[0])
+        off = moved(frame.trajectory[0][at], -np.sign(u)) + step - half_way
+        as_deep = frame.smooth[at] and 1 / 1.1 < frame.depth[0][at] / z < 1.1
+        if as_deep and np.hypot(*off) < 1:
+            found.append(bilinear(frame.color[0], *place))
+    return np.mean(found, axis=0) if found else None
+
+
+def separate_pixel(color, motion, z, edges, y, x, bends, around_it, far):
     """Front colour, path, depth, coverage; back colour, path, depth; whether it is inferred.
 
     Paths are a motion and a bend, that of the nearest pixel that shows this surface alone.
@@ -204,6 +224,8 @@ def separate_pixel(color, motion, z, edges, y, x, bends, around_it):
 
     back_depth = mean(z, back)
     seen = seen_background(around_it, behind, back_depth, y, x)
+    if seen is None:
+        seen = far_background(far, behind, back_depth, y, x)
     back_color = mean(color, back) if seen is None else seen
     coverage = np.clip((motion[y, x] - behind) @ way / (way @ way), 0, 1)
     has_alpha = color.shape[2] == 4
@@ -400,7 +422,10 @@ def resolve_visibility(layers, tiles, x, y, t):
     And how far from the pixel the nearest of the searches along its own path ended [px].
     """
     centre = np.array([x + 0.5, y + 0.5])
-    order = [0, 2, 1] if len(layers) == 3 and t > 0 else list(range(len(layers)))
+    near = [f for f, frame in enumerate(layers) if abs(frame.offset) <= 1]
+    far = list(range(len(near), len(layers)))
+    order = [0, 2, 1] if len(near) == 3 and t > 0 else near
+    far = far[::-1] if t > 0 else far
     seen, misses = [Sample(), Sample(), Sample()], []
 
     def search_layer(f, back, seed, first):
@@ -410,14 +435,15 @@ def resolve_visibility(layers, tiles, x, y, t):
             frame.trajectory[int(back)], centre, seed, u, first
         )
         is_there = pixel is not None and residual <= 1.0
-        if first is None and not back:
+        if first is None and not back and f not in far:
             misses.append(residual)
         again = first is not None and first[1] and (np.abs(d - first[0]) < 0.75).all()
         if is_there and not again and frame.depth[int(back)][pixel] > 0:
             z = frame.depth[int(back)][pixel]
             weight = (1.1 if f else 1.0) * (1.2 if back and frame.inferred[pixel] else 1.0)
             found = Sample(z * weight, z, residual, centre - d, f, back, pixel)
-            record(seen, found, is_opaque=back or frame.edgeless[pixel])
+            if f not in far or is_hidden(layers[0], frame, found):
+                record(seen, found, is_opaque=back or frame.edgeless[pixel])
         return d, is_there
 
     def search_front(f):
@@ -433,17 +459,30 @@ def resolve_visibility(layers, tiles, x, y, t):
 
     search_front(0)
     hidden = np.isinf(seen[0].depth)
-    behind = hidden and any(tile["edges"] for tile in tiles)
+    behind = hidden and any(tiles[f]["edges"] for f in near)
     if behind:
         search_layer(0, True, None, None)
     if len(order) > 1 and (hidden or abs(t) > 0.25):
         search_front(order[1])
         if len(order) > 2 and inferred():
             search_front(order[2])
+        for f in far:
+            if np.isinf(seen[0].depth):
+                search_front(f)
         for f in order[1:]:
             if behind and inferred() and (np.isinf(seen[0].depth) or np.isinf(seen[1].depth)):
                 search_layer(f, True, None, None)
     return seen, min(misses)
+
+
+def is_hidden(own, frame, found):
+    """Whether a frame hides what another shows, at its own instant, or does not hold its place."""
+    height, width = own.edgeless.shape
+    there = np.clip(found.at, 0, (width - 1, height - 1)).astype(int)
+    here = found.at + moved(frame.trajectory[0][there[1], there[0]], -frame.offset)
+    if not (0 <= here[0] < width and 0 <= here[1] < height):
+        return True
+    return own.depth[0][int(here[1]), int(here[0])] * 1.05 < found.true_depth
 
 
 def iterate_fixed_point(paths, centre, seed, u, first):

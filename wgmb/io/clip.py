@@ -151,7 +151,7 @@ class Clip:
     def move_by(self, motion: MotionSource) -> None:
         """Take motion from the pictures (see wgmb/flow) where the files hold none."""
         self._maker.picture_motion = PictureMotion(self._stored, motion)
-        self._stored.most_kept = 2 * FAR + 3
+        self._stored.around = FAR
         self._around.forget_all()
 
     def expand_highlights(self, highlights: float) -> None:
@@ -214,15 +214,15 @@ class Clip:
         for number in self.on_disk:
             yield from self.files(number)
 
-    def made_of(self, number: int, neighbours: bool) -> dict[str, Any]:
+    def made_of(self, number: int, reach: int) -> dict[str, Any]:
         """Return the inputs of frame `number` apart from the settings, as values for JSON.
 
-        Name, size [bytes] and time of change [ns] of every file, those of the frames before and
-        after too if the method uses `neighbours`; and what the vectors were found to mean.
+        Name, size [bytes] and time of change [ns] of every file, those of up to `reach` frames
+        before and after too; and what the vectors were found to mean.
         """
         meaning = self._meaning.found.vectors
         return {
-            "files": self._ingredients.states(number, neighbours),
+            "files": self._ingredients.states(number, reach),
             "vectors_mean": str(meaning) if meaning else None,
         }
 
@@ -273,27 +273,33 @@ class Clip:
         normal: bool = True,
         extent: Extent | None = None,
         light: bool = True,
+        reach: int = 1,
     ) -> Frame:
-        """`frame`, and the same view of the frames before and after as far as they can be read.
+        """`frame`, and the same view of `reach` frames before and after it, as its `prev` and
+        `next`, and theirs, as far as they can be read; none beyond a camera cut.
 
         Frames whose files hold parts of the picture (data windows) come on one canvas, in
         Frame.window; `extent`, the Blur's, makes room there for streaks that lead out of them.
         Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
-        Blur, once, though it is shown in three.
+        Blur, once, though it is shown in three, or five.
         """
-        return self._around.between(source, extras(normal, light), extent)[0]
+        return self._around.between(source, extras(normal, light), extent, reach)[0]
 
     def placed(
         self,
         source: FrameFile,
         extent: Extent,
-        neighbours: bool,
+        reach: int,
         normal: bool = True,
         light: bool = True,
     ) -> tuple[Frame, Placement]:
-        """What a Blur of this `extent` takes: with_neighbours, or `frame`; and where that lies."""
-        made = self._around.between if neighbours else self._around.alone
-        return made(source, extras(normal, light), extent)
+        """What a Blur of this `extent` takes: with_neighbours, or `frame` for a `reach` of 0; and
+        where that lies.
+        """
+        also = extras(normal, light)
+        if not reach:
+            return self._around.alone(source, also, extent)
+        return self._around.between(source, also, extent, reach)
 
     def frame(
         self,

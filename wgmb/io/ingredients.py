@@ -19,13 +19,16 @@ class Ingredients:
         """Every file that frame `number` depends on."""
         return [*self._files.every_path(number), *self._masks.files(number), *self._others]
 
-    def states(self, number: int, neighbours: bool) -> list[list[str | int]]:
+    def states(self, number: int, reach: int) -> list[list[str | int]]:
         """Name, size [bytes] and time of change [ns] of every file that the result of frame
-        `number` depends on; those of the frames before and after are too, if `neighbours`.
+        `number` depends on; among them those of up to `reach` frames before and after it.
         """
         around = [number]
-        if neighbours and self._files.is_sequence:
-            around += [n for n in (number - 1, number + 1) if self._files.is_there(n)]
+        for side in (-1, 1) if self._files.is_sequence else ():
+            for n in range(number + side, number + side * (reach + 1), side):
+                if not self._files.is_there(n):
+                    break
+                around.append(n)
         paths = (p for n in around for p in (*self.of(n), *self._masks.manifests(n)))
         return [[path.name, *_size_and_time(path)] for path in dict.fromkeys(paths)]
 

@@ -104,34 +104,50 @@ class Neighbours:
         return frame, Placement(onto, self._bounds(source))
 
     def between(
-        self, source: FrameFile, also: frozenset[str], extent: Extent | None
+        self, source: FrameFile, also: frozenset[str], extent: Extent | None, reach: int
     ) -> tuple[Frame, Placement]:
-        """The frame with those before and after it, on a canvas with room for `extent`.
+        """The frame with `reach` before and after it, on a canvas with room for `extent`.
 
         Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
-        Blur, once, though it is shown in three.
+        Blur, once, though it is shown in three, or five.
         """
+        self._stored.reach = max(self._stored.reach, reach)
         frames = {0: (source, self._locked(source, also))}
         for side in (-1, 1):
-            other = self._stored.neighbour(source, side)
-            if other is None or other.display_window != source.display_window:
-                continue
-            try:
-                near = self._locked(other, also)
-            except InputError:  # its turn to fail comes
-                self._stored.unread.add(other.number)
-                continue
-            if self._is_cut(source, frames[0][1], near, side, also):
-                self.cuts.add(source.number + (side > 0))
-            else:
-                frames[side] = other, near
+            for offset in range(side, side * (reach + 1), side):
+                beside = self._beside(*frames[offset - side], side, also)
+                if beside is None:
+                    break
+                frames[offset] = beside
         onto = self._canvas(frames, extent)
         made = {side: self._on(onto, *one) for side, one in frames.items()}
-        frame = made[0].between(made.get(-1), made.get(1))
-        return frame, Placement(onto, self._bounds(source))
+        beside: list[Frame | None] = []
+        for side in (-1, 1):
+            near, beyond = made.get(side), made.get(2 * side)
+            if near is not None and beyond is not None:
+                near = near.between(beyond, None) if side < 0 else near.between(None, beyond)
+            beside.append(near)
+        return made[0].between(*beside), Placement(onto, self._bounds(source))
+
+    def _beside(
+        self, source: FrameFile, frame: Frame, side: int, also: frozenset[str]
+    ) -> tuple[FrameFile, Frame] | None:
+        """The frame before or after, and its file; None where there is none of the same shot."""
+        other = self._stored.neighbour(source, side)
+        if other is None or other.display_window != source.display_window:
+            return None
+        try:
+            near = self._locked(other, also)
+        except InputError:  # its turn to fail comes
+            self._stored.unread.add(other.number)
+            return None
+        if self._is_cut(source, frame, near, side, also):
+            self.cuts.add(source.number + (side > 0))
+            return None
+        return other, near
 
     def _locked(self, source: FrameFile, also: frozenset[str]) -> Frame:
-        """`frame`, made once for the three frames that it is shown in."""
+        """`frame`, made once for the three frames, or five, that it is shown in."""
         key = source.number, source.view
         made, with_also, frame = self._alone.get(key, (None, None, None))
         if frame is None or made is not source or with_also != also:
@@ -156,7 +172,7 @@ class Neighbours:
         return result
 
     def _make_room(self, kept: OrderedDict[tuple[int, str | None], Any]) -> None:
-        while len(kept) >= 3 * max(len(self._stored.views), 1):
+        while len(kept) >= (2 * self._stored.reach + 1) * max(len(self._stored.views), 1):
             kept.popitem(last=False)
 
     # ---- cuts ------------------------------------------------------------------------------

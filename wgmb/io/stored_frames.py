@@ -22,7 +22,8 @@ class StoredFrames:
 
     `numbers`: the requested ones. `known_cuts`: frames that begin a new shot. `view`: the only one
     asked for. Of the frames read so far, `sizes` has the sizes, `notes` lines that a user should
-    know, each with its frames, and `unread` the neighbours that could not be read.
+    know, each with its frames, and `unread` the neighbours that could not be read. Kept are as many
+    as a blur takes, `reach` to either side of its own, and those `around` each that it is made of.
     """
 
     def __init__(
@@ -42,8 +43,14 @@ class StoredFrames:
         self.sizes: dict[int, tuple[int, int]] = {}
         self.notes: dict[str, list[int]] = {}
         self.unread: set[int] = set()
-        self.most_kept = 3
+        self.reach = 1
+        self.around = 0
         self._kept: OrderedDict[int, tuple[FrameFile, ...]] = OrderedDict()
+
+    @property
+    def most_kept(self) -> int:
+        """Frames that are kept at once."""
+        return 2 * (self.reach + self.around) + 1
 
     @property
     def views(self) -> tuple[str, ...]:

@@ -114,10 +114,11 @@ class SceneFrame:
         return Render(self.scene, blur, size=self.size, fps=self.fps, antialias=self.antialias)
 
     def frame(self, device) -> Frame:
-        """The sharp frame with its neighbours, as image methods are given it from files."""
+        """The sharp frame between two on either side, as image methods are given it from files."""
         render = self.render(Blur("tap", device=device))
-        before, here, after = (render.frame(self.time + k / self.fps, k + 1) for k in (-1, 0, 1))
-        return replace(here, prev=before, next=after)
+        made = {k: render.frame(self.time + k / self.fps, k + 1) for k in range(-2, 3)}
+        before, after = made[-1].between(made[-2], None), made[1].between(None, made[2])
+        return made[0].between(before, after)
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,7 @@ def clip_case(
         wanted = clip.numbers[0] if number is None else number
         if wanted not in clip.numbers:
             raise InputError(f"{inputs[0]} has no frame {wanted}")
-        frame = clip.with_neighbours(clip.source(wanted), extent=EVERYWHERE)
+        frame = clip.with_neighbours(clip.source(wanted), extent=EVERYWHERE, reach=2)
     else:
         raise InputError(f"inputs must be a pattern, one file or three, got {len(inputs)}")
     pictures = {k: _read(path) for k, path in peers.items()}

@@ -71,6 +71,11 @@ class Inputs:
         return self.frames[0]
 
 
+def reach_of(method: Method) -> int:
+    """Frames to either side of the one that is blurred that a method takes."""
+    return getattr(method, "reach", 1) if "neighbours" in method.uses else 0
+
+
 class Method(Protocol):
     """Interface of a method: its name, its inputs, and the recording of its passes.
 
@@ -80,7 +85,8 @@ class Method(Protocol):
     samples it takes without a GPU, if not as many as with one. Of how far it carries what moves
     (see extent.py): `spread`, by default "along"; `margin(height)`: pixels that it looks at beyond
     that, in pictures of this height [px]; `bend`: how far its paths leave the parabola through
-    three positions, as a share of half the acceleration.
+    three positions, as a share of half the acceleration. Where it uses neighbours, `reach`: frames
+    to either side that it takes, by default 1.
     """
 
     name: str

@@ -19,6 +19,7 @@ from ..io.frame_file import FrameFile
 from ..io.input_space import space_of, without_pixels
 from ..io.windows import NONE, Window, placed, union
 from ..methods import METHODS
+from ..methods.contract import reach_of
 from ..pipeline import Blur
 from ..render import Render
 from ..scene import builtin
@@ -30,7 +31,8 @@ from .state import BOTH_EYES, State
 
 _MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
 _FRAMES_KEPT = 2, 16  # but so many at least, at most
-_Which = tuple[int, str | None, bool]  # a frame's number, its view, and if it is one of a pair
+# A frame's number, its view, if it is one of a pair, and frames that are read to either side of it.
+_Which = tuple[int, str | None, bool, int]
 Texture = wgpu.GPUTexture
 Budget = tuple[int, float]
 """Samples done before, and seconds to spend on more."""
@@ -174,14 +176,16 @@ class ClipSubject:
         number = min(self._clip.numbers, key=lambda n: abs(n - state.frame))
         default = self.eyes[0] if self.eyes else None
         eye = eye or (state.eyes if state.eyes in self.eyes else default)
-        return number, eye, state.mode in BOTH_EYES and len(self.eyes) > 1
+        reach = dict(state.options).get("reach", 1)
+        is_pair = state.mode in BOTH_EYES and len(self.eyes) > 1
+        return number, eye, is_pair, reach if isinstance(reach, int) else 1
 
     def _frame(self, which: _Which) -> Frame:
         """A frame; of a pair, on a canvas that holds both."""
-        number, eye, is_pair = which
-        frame = self._kept((number, eye, False))
+        number, eye, is_pair, reach = which
+        frame = self._kept((number, eye, False, reach))
         if is_pair and which not in self._frames:
-            both = [self._kept((number, side, False)) for side in self.sides()]
+            both = [self._kept((number, side, False, reach)) for side in self.sides()]
             self._frames[which] = _on_canvas(frame, union(map(_canvas, both)))
         return self._frames[which] if is_pair else frame
 
@@ -189,10 +193,11 @@ class ClipSubject:
         """A frame, by its number and view, and its neighbours."""
         if key not in self._frames:
             source = self._clip.source(*key[:2])
-            frame = self._clip.with_neighbours(source, extent=EVERYWHERE)
+            frame = self._clip.with_neighbours(source, extent=EVERYWHERE, reach=key[3])
             self._said[key[:2]] = without_pixels(source)
             least, most = _FRAMES_KEPT
-            kept = min(max(_MEMORY // (3 * _bytes(frame)), least), most)  # with its neighbours
+            around = 2 * key[3] + 1
+            kept = min(max(_MEMORY // (around * _bytes(frame)), least), most)
             while len(self._frames) >= kept:
                 self._frames.popitem(last=False)
             self._frames[key] = frame
@@ -201,7 +206,7 @@ class ClipSubject:
 
     def _inputs(self, blur: Blur) -> dict:
         """The frame's textures, one set for all methods that take the same."""
-        key = blur.method.needs, blur.method.uses
+        key = blur.method.needs, blur.method.uses, reach_of(blur.method)
         which, inputs = self._uploaded.get(key, (None, {}))
         if which != self._now:
             inputs = self._uploaders.setdefault(key, blur).upload(self._frame(self._now))
@@ -253,12 +258,8 @@ def _on_canvas(frame: Frame, onto: Window) -> Frame:
     window = _canvas(frame)
     if window == onto:
         return frame
-    one, prev, next_ = (
-        f and placed(replace(f, prev=None, next=None), window, onto, NONE)
-        for f in (frame, frame.prev, frame.next)
-    )
-    assert one is not None
-    return one.between(prev, next_)
+    near = (f and _on_canvas(f, onto) for f in (frame.prev, frame.next))
+    return placed(replace(frame, prev=None, next=None), window, onto, NONE).between(*near)
 
 
 def _bytes(frame: Frame) -> int:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from ...gpu import wgsl
 from ...gpu.textures import TexturePool
-from ..options import MethodOptions
+from ..options import MethodOptions, Range
 from .active_tiles import ActiveTiles
 from .kinds import PASSES, Shading, kinds_of
 from .layers import Layers
@@ -17,7 +17,7 @@ from .tile_motions import TileMotions
 
 
 class Gather:
-    """Find the surface visible at every pixel and sample time by searching up to three frames.
+    """Find the surface visible at every pixel and sample time by searching three frames or five.
 
     Fixed-point iterative warping (Bowles et al., "Iterative Image Warping", 2012) of the frame and
     its neighbours (Yang et al., "Image-Based Bidirectional Scene Reprojection", 2011) along
@@ -38,8 +38,11 @@ class Gather:
     InputError if it has none; "frames": shadows by the colours alone, which is less sure; "off":
     shading stays that of the frame.
 
+    `reach`: frames to either side that are searched. 2: those beyond the neighbours show what the
+    frame and both neighbours hide; it takes half as long again, and more memory.
+
     Strong: the closest to the truth. Reveals hidden surfaces, blurs across silhouettes.
-    Artefacts: without passes of light, shading is that of one frame; surfaces hidden in all three
+    Artefacts: without passes of light, shading is that of one frame; surfaces hidden in all frames
     are filled from their surroundings; those that move more than 256 px by a sample's time may be
     missed; costs 7 to 26 times as much as taps.
     """
@@ -64,10 +67,16 @@ class Gather:
             "moving shadows and reflections: followed by the passes of light, if available (auto) "
             "or required (passes), or shadows by the colours (frames); off: as in the frame",
         ] = "auto"
+        reach: Annotated[
+            int,
+            Range(1, 2),
+            "frames to either side that are searched: 2 also takes those beyond the neighbours",
+        ] = 1
 
     def __init__(self, device, options: Options, *, output="rgba32float"):
         images, confidence = TexturePool(device), options.show == "confidence"
         self._shading: Shading = options.shading
+        self.reach = options.reach
         if self._shading in ("off", "frames"):
             self.uses = frozenset({"neighbours"})
         self._light = MovingLight(device)

@@ -47,6 +47,23 @@ class Layers:
             "mattes": layer_view(self._images, self.textures["mattes"], slot),
         }
 
+    def _far(self, inputs, offset: int) -> dict[str, wgpu.GPUTextureView]:
+        """What the layers of a frame read of frames beyond the neighbours: the frame itself, all of
+        theirs; the others nothing.
+        """
+        near = sum(abs(frame.offset) <= 1 for frame in inputs.frames)
+        far = 0 if offset else len(inputs.frames) - near
+        views: dict[str, wgpu.GPUTextureView] = {}
+        for name, per_frame in (("layer_colors", 2), ("surfaces", 2), ("mattes", 1)):
+            texture, first, count = self.textures[name], per_frame * near, per_frame * far
+            if not far:
+                texture = self._images.texture(f"no {name}", (1, 1), texture.format)
+                first, count = 0, 1
+            views[f"far_{name}"] = self._images.view_of(
+                texture, dimension="2d-array", base_array_layer=first, array_layer_count=count
+            )
+        return views
+
     def encode(self, encoder, inputs, worklists: dict[str, dict]) -> None:
         """Record the layers of all frames, where something moves near."""
         size, count = inputs.bindings.size, len(inputs.frames)
@@ -60,7 +77,7 @@ class Layers:
             "mattes": self._images.texture("mattes", size, matte, count),
         }
         by_offset = {frame.offset: frame for frame in inputs.frames}
-        for slot, frame in enumerate(inputs.frames):
+        for slot, frame in reversed(list(enumerate(inputs.frames))):  # the farthest ones first
             around = {
                 "prev": by_offset.get(frame.offset - 1),
                 "next": by_offset.get(frame.offset + 1),
@@ -90,6 +107,8 @@ class Layers:
             COPIED=copied,
             HAS_PREV=around["prev"] is not None,
             HAS_NEXT=around["next"] is not None,
+            HAS_FAR_PREV=not frame.offset and any(f.offset == -2 for f in inputs.frames),
+            HAS_FAR_NEXT=not frame.offset and any(f.offset == 2 for f in inputs.frames),
         )
         flags = self._images.view("edge flags", size, "r32uint")
         unbound = self._images.view("no edge flags", size, "r32uint")
@@ -120,6 +139,7 @@ class Layers:
                 crowds=crowds,
                 edge_groups=groups if entry == "size_dispatch" else self._spare.at_least(16),
                 **self._views(slot),
+                **self._far(inputs, frame.offset),
                 **others,
             )
             if entry == "write_single_layer":

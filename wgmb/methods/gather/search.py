@@ -28,10 +28,13 @@ class Search:
     def encode(self, encoder, inputs, layers, candidates, worklists, output, added: Added | None):
         """Record the classification of blocks, then all pixels. `added`: moving light."""
         timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
+        timed["FAR"] = any(abs(frame.offset) > 1 for frame in inputs.frames)
         classify = gpu.kernel(self._device, "methods/gather/classify.wgsl", **timed)
         data = np.zeros((), classify.source.dtype("SourceFrames"))
-        data["offsets"][: len(inputs.frames)] = [frame.offset for frame in inputs.frames]
-        data["count"] = len(inputs.frames)
+        near = [frame.offset for frame in inputs.frames if abs(frame.offset) <= 1]
+        far = [frame.offset for frame in inputs.frames[len(near) :]]
+        data["offsets"][: len(near)], data["far_offsets"][: len(far)] = near, far
+        data["count"], data["far_count"] = len(near), len(far)
         array = partial(self._images.view_of, dimension="2d-array")
         arrays = {name: array(texture) for name, texture in layers.items()}
         searched = {

@@ -3,6 +3,7 @@
 //#include common/depth.wgsl
 //#include common/five_positions.wgsl
 //#include common/frame.wgsl
+//#include methods/gather/surface.wgsl
 
 @group(1) @binding(12) var prev_color: texture_2d<f32>;
 @group(1) @binding(13) var prev_motion: texture_2d<f32>;
@@ -13,9 +14,16 @@
 @group(1) @binding(18) var next_depth: texture_2d<f32>;
 @group(1) @binding(19) var next_weight: texture_2d<f32>;
 
+// The layers of the frames beyond the neighbours, of each its FRONT and BACK.
+@group(1) @binding(21) var far_layer_colors: texture_2d_array<f32>;
+@group(1) @binding(22) var far_surfaces: texture_2d_array<u32>;
+@group(1) @binding(23) var far_mattes: texture_2d_array<u32>;
+
 override WEIGHTED: bool = false;        // read weights
 override HAS_PREV: bool = true;         // there is a frame before, and one after
 override HAS_NEXT: bool = true;
+override HAS_FAR_PREV: bool = false;    // there is a frame beyond the one before, and beyond the one after
+override HAS_FAR_NEXT: bool = false;
 
 /// The trajectory of the surface at the centre of `px` with these vectors, as far as the frames around tell.
 fn trajectory_around(px: vec2i, motion: vec4f, z: f32) -> Trajectory5 {
@@ -39,7 +47,39 @@ fn background_around(px: vec2i, motion: vec4f, z: f32) -> Background {
     var sum = Background(vec4f(0.0), 0.0);
     if HAS_PREV { look(&sum, prev_color, prev_motion, prev_depth, prev_weight, px, motion.xy, z, false); }
     if HAS_NEXT { look(&sum, next_color, next_motion, next_depth, next_weight, px, motion.zw, z, true); }
+    let is_seen = sum.count > 0.0;
+    if HAS_FAR_PREV && !is_seen { look_far(&sum, px, motion, z, 0u, -2.0); }
+    if HAS_FAR_NEXT && !is_seen { look_far(&sum, px, motion, z, select(0u, 1u, HAS_FAR_PREV), 2.0); }
     return sum;
+}
+
+/// The same in frame `f` of those beyond the neighbours, `u` frame intervals away.
+fn look_far(sum: ptr<function, Background>, px: vec2i, motion: vec4f, z: f32, f: u32, u: f32) {
+    let trajectory = trajectory_from(motion);
+    let step = displacement(trajectory, u);
+    let at = vec2f(px) + 0.5 + step;
+    let is_inside = all(at >= vec2f(0.5)) && all(at <= vec2f(frame.size) - 0.5);
+    let there = vec2i(clamp(at, vec2f(0.0), vec2f(frame.size) - 1.0));
+    let surface = textureLoad(far_surfaces, there, 2u * f, 0);
+    let ratio = unpack_depth(surface) / z;
+    let off = displacement5(unpack_trajectory(surface), -sign(u)) + step - displacement(trajectory, 0.5 * u);
+    let is_same = is_smooth(surface) && ratio < BACKGROUND_DEPTH_RATIO && ratio > 1.0 / BACKGROUND_DEPTH_RATIO
+        && dot(off, off) < BACKGROUND_RETURNS * BACKGROUND_RETURNS;
+    let corner = floor(at - 0.5);
+    let share = at - 0.5 - corner;
+    var color = vec4f(0.0);
+    var counts = 0.0;
+    for (var i = 0; i < select(0, 4, is_inside && is_same); i++) {
+        let near = vec2i(i % 2, i / 2);
+        let texel = clamp(vec2i(corner) + near, vec2i(0), vec2i(frame.size) - 1);
+        let shares = mix(1.0 - share, share, vec2f(near));
+        color += shares.x * shares.y * textureLoad(far_layer_colors, texel, 2u * f, 0);
+        counts += shares.x * shares.y * unpack_matte(textureLoad(far_mattes, texel, f, 0), WEIGHTED).weight;
+    }
+    if counts > 0.5 {
+        (*sum).color += color / counts;
+        (*sum).count += 1.0;
+    }
 }
 
 /// Add what a neighbouring frame shows, if all of the 3 x 3 around the place is as deep as expected.

@@ -46,7 +46,7 @@ fn main(@builtin(local_invocation_index) local: u32,
             let u = t - offset_of(f);
             let layer = 2u * f;
             let handicap = select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u);
-            let candidates = candidates_of(f, candidates0, candidates1, candidates2);
+            let candidates = candidates_of(tile, f, candidates0, candidates1, candidates2);
             let starts = seeds_at(candidates, u, 0u);
             let start = displacement5(unpack_trajectory(surface_of(vec2i(low), layer)), u);
             let visible_depth = deepest;

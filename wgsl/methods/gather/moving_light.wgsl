@@ -37,7 +37,7 @@ fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
     let back = here + displacement5(unpack_trajectory(own), offset) - at;
     let node = light_nodes.count + select(0u, 1u, offset > 0.0);
     let there = textureSampleLevel(added_light, linear, here / vec2f(frame.size), node, 0.0);
-    let same = layer % 2u == 0u && layer < 6u && is_inside(here) && dot(back, back) < SAME_SURFACE * SAME_SURFACE;
+    let same = layer % 2u == 0u && layer < 2u * sources.count && is_inside(here) && dot(back, back) < SAME_SURFACE * SAME_SURFACE;
     let change = light_during(here, t, duration).rgb - there.rgb;
     return vec4f(select(vec3f(0.0), there.a * change, same), 0.0);
 }

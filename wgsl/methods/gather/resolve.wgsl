@@ -237,9 +237,11 @@ const OWN_FRONT: u32 = 0u;          // of the frame itself
 const OWN_BACK: u32 = 1u;
 const NEIGHBOUR_FRONT: u32 = 2u;    // of the neighbouring frame on the side of the time
 const OTHER_FRONT: u32 = 3u;        // of the other neighbouring frame
-const NEIGHBOUR_BACK: u32 = 4u;
-const OTHER_BACK: u32 = 5u;
-const SEARCHES: u32 = 6u;
+const FAR_FRONT: u32 = 4u;          // of the frame beyond the neighbour on the side of the time
+const OTHER_FAR: u32 = 5u;          // of the frame beyond the other neighbour
+const NEIGHBOUR_BACK: u32 = 6u;
+const OTHER_BACK: u32 = 7u;
+const SEARCHES: u32 = 8u;
 
 /// The nearest samples that are at `x` [px] by the time `t` [frame intervals], by the candidates of all frames.
 fn resolve_visibility(x: vec2f, starts: Starts, t: f32,
@@ -249,11 +251,13 @@ fn resolve_visibility(x: vec2f, starts: Starts, t: f32,
     var hidden = false;             // the front layer of the frame itself shows nothing opaque
     var search = OWN_FRONT;
     loop {
-        let f = select(neighbour_of(t, search % 2u == 1u), 0u, search < NEIGHBOUR_FRONT);
-        let is_back = search == OWN_BACK || search > OTHER_FRONT;
+        var f = select(neighbour_of(t, search % 2u == 1u), 0u, search < NEIGHBOUR_FRONT);
+        if FAR && (search == FAR_FRONT || search == OTHER_FAR) { f = far_of(t, search == OTHER_FAR); }
+        let is_back = search == OWN_BACK || search > OTHER_FAR;
         let u = t - offset_of(f);
+        let tile = vec2u(x) / TILE;
         let query = Query(x, u, 2u * f + u32(is_back), select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u));
-        search_layer(&visible, query, start_of(starts, query), candidates_of(f, a, b, c));
+        search_layer(&visible, query, start_of(starts, query), candidates_of(tile, f, a, b, c));
         if search == OWN_FRONT { hidden = visible.opaque.depth >= INFINITE; }
         search = next_search(search, visible, t, hidden, has_edge);
         if search >= SEARCHES { break; }
@@ -262,8 +266,8 @@ fn resolve_visibility(x: vec2f, starts: Starts, t: f32,
 }
 
 /// The search after `last`. The back of the frame itself where its front is `hidden`; the neighbour there too, or far
-/// from the frame's own instant; the other neighbour if the background is at best inferred; their backs at last,
-/// where it still is and no edge is before it.
+/// from the frame's own instant; the other neighbour if the background is at best inferred; the frames beyond them if
+/// there is none; the neighbours' backs at last, where it is at best inferred and no edge is before it.
 fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool) -> u32 {
     let none = visible.opaque.depth >= INFINITE;
     let inferred = none || (visible.opaque.layer == OWN_BACK && visible.opaque.depth > visible.opaque.true_depth);
@@ -272,7 +276,9 @@ fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool
     var next = last + 1u;
     if next == OWN_BACK && !try_back { next = NEIGHBOUR_FRONT; }
     if next == NEIGHBOUR_FRONT && !(sources.count > 1u && (hidden || abs(t) > TRUSTED_TIME)) { next = SEARCHES; }
-    if next == OTHER_FRONT && !(sources.count > 2u && inferred) { next = NEIGHBOUR_BACK; }
+    if next == OTHER_FRONT && !(sources.count > 2u && inferred) { next = FAR_FRONT; }
+    if next == FAR_FRONT && !(FAR && none) { next = NEIGHBOUR_BACK; }
+    if next == OTHER_FAR && !(sources.far_count > 1u && none) { next = NEIGHBOUR_BACK; }
     if next == NEIGHBOUR_BACK && !try_neighbours_back { next = SEARCHES; }
     if next == OTHER_BACK && !(try_neighbours_back && sources.count > 2u) { next = SEARCHES; }
     return next;
@@ -302,7 +308,9 @@ fn start_of(starts: Starts, query: Query) -> vec2f {
     let is_back = query.layer % 2u == 1u;
     let first = select(starts.front1, starts.back1, is_back);
     let second = select(starts.front2, starts.back2, is_back);
-    let there = displacement5(unpack_trajectory(select(first, second, query.layer > 3u)), query.u);
+    var surface = select(first, second, query.layer > 3u);
+    if is_far(query.layer) { surface = surface_of(vec2i(query.x), query.layer); }
+    let there = displacement5(unpack_trajectory(surface), query.u);
     return select(there, displacement5(starts.own, query.u), query.layer < 2u);
 }
 
@@ -322,7 +330,7 @@ fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candi
         let state = find_surface(&seeds, query, own, is_first, first, (*visible).opaque.depth);
         let is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
         if is_first { first = First(state.d, is_there); }
-        if is_first && is_front { (*visible).miss2 = min((*visible).miss2, state.residual2); }
+        if is_first && is_front && !is_far(query.layer) { (*visible).miss2 = min((*visible).miss2, state.residual2); }
         if is_there { record(visible, query, state); }
         let wanted = may_be_visible(candidates, query.u, (*visible).opaque.depth / query.handicap);
         seeds.pending &= wanted & ~are_solution(seeds, first.d);
@@ -374,8 +382,9 @@ fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
     let is_inferred = is_back && (state.word & SEEN) == 0u;
     let depth = abs(z) * query.handicap * select(1.0, INFERRED_DEPTH_BIAS, is_inferred);
     let found = Sample(depth, abs(z), state.residual2, query.x - state.d, query.layer);
-    if z > 0.0 && found.depth < (*visible).opaque.depth { (*visible).opaque = found; }
-    if z < 0.0 {
+    let counts = !is_far(query.layer) || is_hidden(found);
+    if counts && z > 0.0 && found.depth < (*visible).opaque.depth { (*visible).opaque = found; }
+    if counts && z < 0.0 {
         let front_edge = (*visible).front_edge;
         let in_front = found.depth < front_edge.depth;
         if in_front && is_behind(front_edge, found) { (*visible).back_edge = front_edge; }
@@ -384,6 +393,15 @@ fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
         }
         if in_front { (*visible).front_edge = found; }
     }
+}
+
+/// Whether the frame itself hides a sample of a frame beyond its neighbours, or does not hold its place: else it would
+/// show it. What is far away is easily mistaken.
+fn is_hidden(found: Sample) -> bool {
+    let surface = surface_of(vec2i(nearest_pixel(found.at)), found.layer);
+    let here = found.at + displacement5(unpack_trajectory(surface), -offset_of(found.layer / 2u));
+    let own = abs(unpack_depth(surface_of(vec2i(nearest_pixel(here)), 0u)));
+    return !is_inside(here) || own * SURFACE_DEPTH_RATIO < found.true_depth;
 }
 
 fn nothing() -> Sample {

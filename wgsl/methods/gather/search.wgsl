@@ -10,12 +10,16 @@
 
 struct SourceFrames {
     offsets: vec4f,         // [frame intervals]; the first is 0, the frame itself
-    count: u32,
+    far_offsets: vec2f,     // of those beyond the neighbours, which follow them
+    count: u32,             // of the frame and its neighbours
+    far_count: u32,
 }
 
 @group(1) @binding(0) var<uniform> sources: SourceFrames;
 @group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // stored as rgba32uint: see pack_surface(); front, back of the frame itself, front, back of the next one, ...
 @group(1) @binding(2) var tile_candidates: texture_2d_array<u32>;   // CANDIDATE_LAYERS per frame
+
+override FAR: bool = false;     // there are frames beyond the neighbours
 
 const MAX_ITERATIONS: u32 = 8u; // from the pixel's own trajectory
 const CONVERGED: f32 = 0.5;     // a step shorter than this [px] ends the iteration
@@ -38,7 +42,7 @@ struct Candidates {     // motions that may bring something of one frame into a 
 
 fn load_candidates(tile: vec2u, f: u32) -> Candidates {
     let none = vec4u(0u);
-    if f >= sources.count { return Candidates(vec4f(0.0), vec4f(INFINITE), none, none, none); }
+    if f >= sources.count + sources.far_count { return Candidates(vec4f(0.0), vec4f(INFINITE), none, none, none); }
     let first = f * CANDIDATE_LAYERS;
     return Candidates(
         bitcast<vec4f>(textureLoad(tile_candidates, tile, first, 0)),
@@ -49,11 +53,12 @@ fn load_candidates(tile: vec2u, f: u32) -> Candidates {
     );
 }
 
-/// Those of frame `f`.
-fn candidates_of(f: u32, a: Candidates, b: Candidates, c: Candidates) -> Candidates {
+/// Those of frame `f`, `a` to `c` of the frame and its neighbours; those of others are rarely wanted.
+fn candidates_of(tile: vec2u, f: u32, a: Candidates, b: Candidates, c: Candidates) -> Candidates {
     var result = a;
     if f == 1u { result = b; }
     if f == 2u { result = c; }
+    if FAR && f >= sources.count { result = load_candidates(tile, f); }
     return result;
 }
 
@@ -104,7 +109,19 @@ fn neighbour_of(t: f32, second: bool) -> u32 {
 }
 
 fn offset_of(f: u32) -> f32 {
-    return select(select(sources.offsets.z, sources.offsets.y, f == 1u), 0.0, f == 0u);
+    let near = select(select(sources.offsets.z, sources.offsets.y, f == 1u), 0.0, f == 0u);
+    if !FAR || f < sources.count { return near; }
+    return select(sources.far_offsets.x, sources.far_offsets.y, f > sources.count);
+}
+
+/// Whether a layer is of a frame beyond the neighbours.
+fn is_far(layer: u32) -> bool {
+    return FAR && layer >= 2u * sources.count;
+}
+
+/// The frame beyond the neighbour on the side of `t`, or the only one; the `second`: the other one.
+fn far_of(t: f32, second: bool) -> u32 {
+    return sources.count + select(0u, 1u, sources.far_count == 2u && (t > 0.0) != second);
 }
 
 /// Whether nothing moves that may come into a tile.
