@@ -1081,7 +1081,9 @@ def test_a_picture_without_passes_is_shown_as_it_is(tmp_path, hand):
     hand.viewer.state = PLAIN.opened(str(tmp_path / "plain.png"))
     hand.look()
     assert hand.state.look == "sharp"
-    assert hand.viewer.stage.choices.looks(hand.state) == ["sharp"]
+    choices = hand.viewer.stage.choices
+    assert choices.looks(hand.state) == ["sharp"]
+    assert "`wgmb blur` finds the motion" in choices.subject(hand.state).finding
     assert np.abs(srgb(hand.viewer.stage.download()[..., :3]) - image / 255).max() < 0.01
 
 

@@ -51,7 +51,8 @@ def describe_video(footage: Footage) -> list[tuple[str, str]]:
     if footage.times[0]:
         lines.append(("begins", f"at {float(footage.times[0]):.3f} s"))
     for stream in footage.streams:
-        words = [stream.text, stream.language, stream.title]
+        language = stream.language if stream.language != "und" else ""  # undetermined
+        words = [stream.text, language, stream.title]
         lines.append(("stream", f"{stream.kind}: {', '.join(filter(None, words))}"))
     if footage.chapters:
         lines.append(("chapters", str(footage.chapters)))

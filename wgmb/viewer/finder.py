@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import wgpu
@@ -76,6 +77,8 @@ class Finder:
         self._holdout = holdout_of(wish.masks, footage) if motion is not None else None
         self._planes, self._images = Planes(device), TexturePool(device)
         self._reel: Reel[Glance] | None = None
+        self._numbers: WeakKeyDictionary[Glance, int] = WeakKeyDictionary()
+        self._told: dict[tuple[int, int], bool] = {}
         self._shot: Callable[[int], Any] | None = None
         self._first = 0  # index of a picture of the present shot
 
@@ -126,7 +129,7 @@ class Finder:
         self._shot = None
         self._reel = Reel(
             self._pictures(first),
-            is_cut=is_cut if self._cuts.is_search else None,
+            is_cut=self._is_cut if self._cuts.is_search else None,
             known_cuts=self._cuts.frames(0),
             is_double=is_double if self._fill else None,
         )
@@ -134,7 +137,16 @@ class Finder:
 
     def _pictures(self, first: int) -> Iterator[Picture[Glance]]:
         for number, coded in self._footage.pictures(first):
-            yield Picture(float(self._times[number]), Glance(coded), number)
+            glance = Glance(coded)
+            self._numbers[glance] = number
+            yield Picture(float(self._times[number]), glance, number)
+
+    def _is_cut(self, before: Glance, after: Glance) -> bool:
+        """The same as is_cut, told once for two pictures: to tell costs more than to decode."""
+        key = self._numbers[before], self._numbers[after]
+        if key not in self._told:
+            self._told[key] = is_cut(before, after)
+        return self._told[key]
 
     def _load(self, index: int) -> Any:
         """The picture of an index of the present shot, None outside it."""

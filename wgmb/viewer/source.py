@@ -129,6 +129,8 @@ class ClipSubject:
         self._uploaded: dict[tuple, tuple[_Which | None, dict]] = {}
         self.finding = f"vectors: {self._clip.finding}"
         self._now = self._which(state)
+        if "motion" not in self.has(state):
+            self.finding += "; shown sharp, `wgmb blur` finds the motion in such frames"
 
     def has(self, state: State) -> frozenset[str]:
         """Inputs that a method may ask for."""
