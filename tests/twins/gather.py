@@ -513,7 +513,7 @@ def iterate_fixed_point(paths, centre, seed, u, first):
             and abs(before - way) > abs(before) / 4
         ):
             rest = way**2 / (before - way)  # of a geometric series
-            d, before = d + (rest.real, rest.imag), 0j
+            d, before = d + np.array([rest.real, rest.imag]), 0j
         else:
             before = way
     return d, residual, pixel
