@@ -1,4 +1,4 @@
-// What the frames before and after a frame tell of its paths beyond the three positions that its own vectors lead to.
+// Bends of a frame's paths beyond the three positions of its own vectors, from the frames before and after it.
 //#include common/five_positions.wgsl
 //#include common/frame.wgsl
 

@@ -243,7 +243,7 @@ fn depth_at_step(s: Sample) -> f32 {
     return select(NO_DEPTH, clip.w / s.world.w, s.world.w > 0.0);
 }
 
-/// Whether the surface faces away from the camera of step `k`.
+/// True if the surface faces away from the camera of step `k`.
 fn faces_away(s: Sample, k: u32) -> bool {
     if !FACING { return false; }
     let eye = steps[k].eye;

@@ -9,7 +9,7 @@
 @group(1) @binding(2) var<storage, read> tiles: array<vec2u>;  // of the workgroups: their places in the image, in workgroups
 @group(1) @binding(3) var output: Output;
 
-// Which tiles a volume, or a shadow, can be in is known before the dispatch. Loop form: see lavapipe.md.
+// The tiles that a volume, or a shadow, can reach are known before the dispatch. Loop form: see lavapipe.md.
 override CLOUD: bool = true;
 override SHADOW: bool = true;
 
@@ -135,7 +135,7 @@ fn march(origin: vec3f, direction: vec3f, light: vec3f, strobe: f32, noise: f32)
     return sum;
 }
 
-/// How much of the light the volumes take from a point on the ground.
+/// The share of the light that the volumes take from a point on the ground.
 fn shadow_at(at: vec3f, light: vec3f, strobe: f32, noise: f32, there: bool) -> f32 {
     let step = 2.0 * scene.eye.w / 20.0;
     let strength = 0.47 * strobe * step / 0.05;

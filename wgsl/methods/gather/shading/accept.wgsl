@@ -1,4 +1,4 @@
-// How far flow is to be trusted: it leads back, and to what is as dark. Where it is not, that around it stands for it.
+// Trust in the flow: it leads back, and to equal darkness. Where it cannot be trusted, the flow around replaces it.
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
 

@@ -1,4 +1,4 @@
-// What is added to the colours of this frame because its light is that of another time.
+// Addition to the colours of this frame for the light of another time.
 //#include common/frame.wgsl
 //#include methods/gather/shading/active.wgsl
 //#include methods/gather/shading/light.wgsl
@@ -66,7 +66,7 @@ fn moved(px: vec2i) -> vec4f {
     return vec4f(clamp(change.rgb, low, high), sure(px, change.a));
 }
 
-/// How sure the light is, as far as its flow is `trusted`: the share of the change between both frames that the flow
+/// Confidence of the light, for flow of the trust `trusted`: the share of the change between both frames that the flow
 /// explains, either way. 1 where nothing changes.
 fn sure(px: vec2i, trusted: f32) -> f32 {
     let x = vec2f(px) + 0.5;
@@ -97,7 +97,7 @@ fn as_sure_as(px: vec2i, sure: f32) -> f32 {
     return min(sure, textureLoad(earlier, px, 0).a);
 }
 
-/// What a neighbouring frame's own light adds, at the share 1 of the way to it; a: whether the surface is seen there.
+/// Addition for a neighbouring frame's own light, at the share 1 of the way to it; a: 1 if the surface is seen there.
 @compute @workgroup_size(WG_X, WG_Y)
 fn add_neighbour(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }

@@ -1,4 +1,4 @@
-// What differs from frame to frame: with the motion that was found, and without any.
+// Differences from frame to frame: with the motion that was found, and without any.
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
 

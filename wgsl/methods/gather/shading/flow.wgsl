@@ -1,4 +1,4 @@
-// Where what moves over the surfaces is in another frame: dense inverse search (Kroeger, Timofte, Dai and Van Gool,
+// Motion of light over the surfaces to another frame: dense inverse search (Kroeger, Timofte, Dai and Van Gool,
 // "Fast Optical Flow using Dense Inverse Search", 2016) of small pictures without texture. Patches on a grid are
 // compared without their means; each starts from the coarser level, from standing still, and from its neighbours.
 //#include common/frame.wgsl
@@ -60,7 +60,7 @@ struct Compared {
     step: vec2f,
 }
 
-/// How unlike the patch is what it would have become, and the step that makes it more alike.
+/// The difference of the patch from its moved copy, and the step that reduces it.
 fn compare(one: Patch, by: vec2f, last: vec2i) -> Compared {
     let scale = 1.0 / vec2f(last + 1);
     var sum = 0.0;

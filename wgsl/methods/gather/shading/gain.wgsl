@@ -48,7 +48,7 @@ fn smooth_ratio(@builtin(global_invocation_id) id: vec3u) {
     textureStore(ratio_out, px, select(vec4f(0.0), vec4f(mean, 1.0), own.a > 0.0));
 }
 
-/// How much a change is seen.
+/// The visibility of a change.
 @compute @workgroup_size(WG_X, WG_Y)
 fn find_peaks(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
@@ -71,7 +71,7 @@ fn find_peaks(@builtin(global_invocation_id) id: vec3u) {
     textureStore(scalar_out, px, vec4f(abs(sum / total) * min(shown, 1.0)));
 }
 
-/// How far changes around are of one sign: texture that is out of register has both.
+/// The agreement in sign of the changes around: displaced texture has both signs.
 @compute @workgroup_size(WG_X, WG_Y)
 fn find_coherence(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }

@@ -1,4 +1,4 @@
-// What all passes of moving light share: how bright it is, and what is told of it from frame to frame.
+// Common parts of the passes of moving light: its brightness, and its differences from frame to frame.
 //#include common/finite.wgsl
 //#include common/frame.wgsl
 

@@ -1,4 +1,4 @@
-// How the light on every surface differs in a neighbouring frame: log(light there) - log(light here), where the same
+// Difference of the light on every surface in a neighbouring frame: log(light there) - log(light here), where the same
 // surface is seen there.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
@@ -45,7 +45,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     textureStore(ratio, px, select(vec4f(0.0), vec4f(change, 1.0), seen));
 }
 
-/// Whether the pixel and those around it show one surface.
+/// True if the pixel and those around it show one surface.
 fn is_plain(plain: texture_2d<u32>, px: vec2i) -> bool {
     var all_plain = 1u;
     for (var k = 0; k < 9; k++) { all_plain &= textureLoad(plain, inside(px + vec2i(k % 3, k / 3) - 1), 0).x; }

@@ -1,4 +1,4 @@
-// Which pixels show one surface alone: only there light can be told from what it falls on.
+// Pixels that show one surface alone: only there light can be separated from the surface.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl

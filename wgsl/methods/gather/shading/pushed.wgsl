@@ -1,4 +1,4 @@
-// What was pushed to a pixel, in two words: darkness and weight, in steps of 1 / ONE. Over 128 whole pixels would have
+// Values pushed to a pixel, in two words: darkness and weight, in steps of 1 / ONE. Over 128 whole pixels would have
 // to meet in one for a sum to overflow; the clamp of compose.wgsl holds then too.
 
 const ONE: f32 = 512.0;

@@ -1,5 +1,5 @@
-// What moves over the surfaces of this frame, in one of the three frames. Shadows: the darkness, the part of the light
-// that is missing; reflections: the logarithm of the light. a: how much there is of it.
+// Values that move over the surfaces of this frame, in one of the three frames. Shadows: the darkness, the missing part
+// of the light; reflections: the logarithm of the light. a: the weight.
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
 
