@@ -14,6 +14,7 @@ from wgmb import Blur, InputError, Shutter, gpu
 from wgmb.cli.app import main
 from wgmb.coding import BT2020, HLG, PQ
 from wgmb.color import srgb
+from wgmb.flow import Flow
 from wgmb.flow.dis import Dis
 from wgmb.gpu.textures import TexturePool
 from wgmb.io import stills
@@ -27,6 +28,7 @@ from wgmb.video_batch import FootageBlur
 from wgmb.video_pictures import VideoPictures
 from wgmb.video_settings import FlowSettings, VideoSettings
 from wgmb.viewer import State, controls, offscreen, video_time
+from wgmb.viewer.finder import Finder, Known, Wish
 from wgmb.viewer.footage_subject import FootageSubject
 from wgmb.viewer.window import frame
 
@@ -106,6 +108,13 @@ def settled(viewer):
     raise AssertionError(viewer.stage.report)
 
 
+def motion_of(video, device):
+    """A source of motion that shares nothing with that of the viewer."""
+    if video.flow == "search":
+        return Flow(quality=video.flow_quality, device=device)
+    return Dis(video.flow_quality) if video.flow == "dis" else None
+
+
 def command_line(
     clip, number, fps=48, method="tap", masks=(), frames=None, cuts="", video=BY_DIS, **shutter
 ):
@@ -116,7 +125,7 @@ def command_line(
     run = FootageBlur(
         footage,
         blur,
-        Dis("best") if video.flow != "none" else None,
+        motion_of(video, blur.device),
         clock=clock,
         holdout=holdout_of(masks, footage),
         fill=video.duplicates == "fill",
@@ -147,6 +156,7 @@ def command_line(
          {"fps": 60, "method": "gather"}),
         ({"pace": "0.4", "fps": 60.0, "frame": 34.0, "shutter": 360.0},
          {"fps": 60, "degrees": 360}),
+        ({"pace": "0.5", "frame": 11.0, "flow": "search", "flow_quality": "fast"}, {}),
         ({"pace": "4", "frame": 1.0}, {}),
         ({"video": (("begin", "0.05"), ("end", "0.2")), "frame": 3.0}, {}),
         ({"frames": "3-9", "pace": "0.3", "frame": 0.0}, {"frames": "3-9"}),
@@ -166,6 +176,7 @@ def command_line(
         "slow, in between",
         "slow at another rate",
         "slow, across the cut",
+        "slow, searched",
         "quick",
         "a part by times",
         "the beginning of a part",
@@ -456,3 +467,25 @@ def test_pixels_that_are_not_square_are_shown_in_their_shape(tmp_path):
     assert viewer.stage.report.place == (0, 16, 96, 32)
     assert viewer.stage.download().shape[:2] == (64, 96)
     viewer.stage.choices.close()
+
+
+def test_where_nothing_can_be_decoded_a_picture_is_left_out_or_the_run_says_so(
+    tmp_path, monkeypatch
+):
+    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(24)]
+    clip = clips.write(tmp_path / "a.mp4", frames)
+    decoded = Footage.pictures
+
+    def begin_only(self, first=0, last=None):
+        return ((n, picture) for n, picture in decoded(self, first, last) if n < 4)
+
+    monkeypatch.setattr(Footage, "pictures", begin_only)
+    device, footage = gpu.open_device(), Footage(clip)
+    find = Finder(footage, device, None, Wish())
+    assert find(23) == Known(None, None, None, None, is_left_out=True)
+    assert find(10).is_left_out and find(10).before == 3
+    assert not find(2).is_left_out and find(2).after == 3
+    clock = clock_of(footage, None, VideoSettings(begin="0.9"))
+    run = FootageBlur(footage, Blur("tap", device=device), None, clock=clock)
+    with pytest.raises(InputError, match=r"from 0\.[0-9]* s on can be decoded"):
+        next(run.exposures(Shutter(180), moments(footage, clock, Fraction(24))))

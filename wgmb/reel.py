@@ -85,7 +85,8 @@ class Reel(Generic[T]):
     def at(self, time: float, behind: int = _TO_KEEP) -> int:
         """The index of the picture that is shown at `time`; some after it are kept, too.
 
-        Asked for in the order of time, or as far back as is kept: `behind` pictures.
+        Asked for in the order of time, or as far back as is kept: `behind` pictures. LookupError if
+        there are no pictures.
         """
         self._read_beyond(time)
         here = self._index_at(time)
@@ -128,6 +129,8 @@ class Reel(Generic[T]):
 
     def _index_at(self, time: float) -> int:
         """The picture that is shown at `time`; before the first one, that."""
+        if not self._kept:
+            raise LookupError("no pictures")
         shown = [i for i, picture in self._kept.items() if picture.time <= time]
         return max(shown, default=min(self._kept))
 

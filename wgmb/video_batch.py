@@ -135,9 +135,15 @@ class FootageBlur:
             + Fraction(shutter.span[0]) * wanted[0].interval * self.clock.speed
         )
         first = int(np.searchsorted(times.seconds, float(opens)))
-        coded = self.footage.pictures(max(first - _BEFORE, 0))
-        for number, picture in ahead(coded, _READ_AHEAD):
+        first, none = max(first - _BEFORE, 0), True
+        for number, picture in ahead(self.footage.pictures(first), _READ_AHEAD):
+            none = False
             yield Picture(float(self.clock.out(times[number])), Glance(picture), number)
+        if none:
+            at = float(times[min(first, len(times) - 1)])
+            raise InputError(
+                f"{self.footage.path}: none of its pictures from {at:.2f} s on can be decoded"
+            )
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,10 @@ class Finder:
     def __call__(self, number: int) -> Known:
         """The finding about a picture, as far as possible."""
         reel = self._reel_around(number)
-        here = reel.at(self._times[number], _BEHIND)
+        try:
+            here = reel.at(self._times[number], _BEHIND)
+        except LookupError:  # from some pictures before it on, none can be decoded
+            return Known(None, None, None, None, is_left_out=True)
         near = {i: reel[i].number for i in (here - 1, here, here + 1) if i in reel.kept}
         if near.get(here) != number:
             beside = sorted(near.values())
