@@ -1,4 +1,4 @@
-"""How far a blur carries what moves: measured on pictures over nothing, for every method."""
+"""The extent of a blur, measured on pictures over nothing, for every method."""
 
 import numpy as np
 import pytest

@@ -150,7 +150,7 @@ def test_the_full_search_finds_the_cheapest_displacements(bend):
 
 
 def test_the_motion_of_most_is_taken_where_it_matches_better():
-    """What moves like it to one side is not hidden on the other; the others keep their states."""
+    """Pixels that move alike to one side are not hidden on the other; others keep their states."""
     size, bend = (9, 13), 2.5
     states, match = random_states(seed=8), matcher(MIDDLE, bend=bend)
     x, y = (n.ravel() for n in grid(size))

@@ -174,7 +174,7 @@ def test_a_sequence_is_its_frames_alone(shot, tmp_path, capsys):
 
 
 def beside(frame):
-    """How many frames are read before and after."""
+    """Number of frames read before and after."""
     counts = []
     for side in ("prev", "next"):
         count, one = 0, getattr(frame, side)

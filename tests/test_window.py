@@ -97,7 +97,7 @@ class Desk:
         return np.asarray(picture.convert("RGB")).astype(np.int16)
 
     def grabs(self, size=SIZE):
-        """What the window shows now, and again, for as long as one can wait."""
+        """The window's content now, and again, for as long as one can wait."""
         until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
             assert self.program.poll() is None, self.program.communicate()[1]
@@ -105,7 +105,7 @@ class Desk:
             time.sleep(0.2)
 
     def settled(self, size=SIZE):
-        """What the window shows once its picture does not change for two seconds."""
+        """The window's content once its picture does not change for two seconds."""
         last, since = None, 0.0
         for now in self.grabs(size):
             left = now[:, : size[0] - 320]
@@ -121,12 +121,12 @@ class Desk:
         assert self.shows_other_than(first)
 
     def shows_other_than(self, old):
-        """Whether the picture becomes another one than this."""
+        """True if the picture becomes another one than this."""
         old = picture_of(old)
         return any(np.abs(picture_of(now) - old).max() > 30 for now in self.grabs())
 
     def shows_again(self, old):
-        """Whether the picture becomes this one again, which may be coarser in between."""
+        """True if the picture becomes this one again, which may be coarser in between."""
         old = picture_of(old)
         return any(np.array_equal(picture_of(now), old) for now in self.grabs())
 
@@ -140,7 +140,7 @@ class Desk:
         self.do("mouseup", 1)
 
     def ask_to_close(self):
-        """What a window manager sends when its cross is clicked."""
+        """The message of a window manager when its cross is clicked."""
         words = [sys.executable, "-c", CLOSE, self.window]
         subprocess.run(words, env=self.env, check=True, timeout=PATIENCE)
 

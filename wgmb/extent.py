@@ -1,4 +1,4 @@
-"""How far the content of a frame gets: to its neighbours, and while the shutter is open."""
+"""Extent of a frame's content: to its neighbours, and while the shutter is open."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -14,14 +14,14 @@ from .frame import Frame
 
 Box = tuple[int, int, int, int]  # left, top, right, bottom [px]; the last pixels belong to it
 Spread = Literal["nowhere", "along", "around", "everywhere"]
-"""Where a method puts colour beyond a silhouette: nowhere (as far as nothing moves there), along
-the motion, at the motion's length all around, or, for those who want all of the display window,
-everywhere."""
+"""Direction in which a method puts colour beyond a silhouette: nowhere (as far as nothing moves
+there), along the motion, at the motion's length all around, or everywhere (for methods that want
+the whole display window)."""
 
 
 @dataclass(frozen=True)
 class Extent:
-    """How far a blur carries what moves."""
+    """Distance over which a blur moves colours."""
 
     times: tuple[float, float]
     """First and last instant at which any pixel is exposed [frame intervals]."""
@@ -33,8 +33,8 @@ class Extent:
     margin: Callable[[int], int] = lambda height: 0
     """Pixels that the method looks at beyond that, in pictures of this height [px]."""
     bend: float = 0.0
-    """How far its paths may leave the parabola through three positions, as a share of half the
-    acceleration."""
+    """Largest deviation of its paths from the parabola through three positions, as a share of half
+    the acceleration."""
 
     def box(self, frame: Frame, offset: int = 0) -> Box | None:
         """The pixels that content of `frame`, `offset` frame intervals away, may get to.

@@ -113,9 +113,8 @@ class Blur:
 
     @property
     def extent(self) -> Extent:
-        """How far it carries what moves, for frames that hold a part of their picture; see
-        Clip.with_neighbours.
-        """
+        """Distance over which it moves colours, for frames that hold a part of their picture; see
+        Clip.with_neighbours."""
         opens, closes = self._shutter.span
         late = sum(map(abs, self._shutter.delay))  # twice that of the display window's edges
         method = type(self.method)

@@ -162,7 +162,7 @@ def refined(matcher, states, x, y):
 
 
 def inverse_step(matcher, other, x, y, flow, slope):
-    """Where inverse search moves a patch in one frame [px]; 0 if that is too far."""
+    """Motion of a patch by inverse search in one frame [px]; 0 if that is too far."""
     square, product = np.eye(2) * 1e-5, np.zeros(2)
     places = [(i * matcher.stride, j * matcher.stride) for j, i in PATCH]
     total = sum(_weight(matcher, x, y, i, j) for i, j in places)
@@ -296,7 +296,7 @@ def carried(matcher, states, along, turn):
 
 
 def lost(states, near, far, factor, near_side, far_side):
-    """Which pixels are found again in neither neighbour."""
+    """True at pixels that are found again in neither neighbour."""
     height, width = states.shape[:2]
 
     def missed(x, y, flow, other, side):

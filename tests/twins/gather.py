@@ -26,7 +26,7 @@ class Layers:
 
 @dataclass
 class Sample:
-    """What may be seen at a pixel at a time."""
+    """A sample that may be visible at a pixel at a time."""
 
     depth: float = np.inf  # it competes with
     true_depth: float = np.inf
@@ -116,7 +116,7 @@ def separate(offset, color, motion, depth, prev=None, next=None, far=()):
 
 
 def in_crowd(shows_third):
-    """Where over a fifth of the pixels in the 7 x 7 tiles around show three surfaces."""
+    """True where over a fifth of the pixels in the 7 x 7 tiles around show three surfaces."""
     out = np.zeros_like(shows_third)
     for top in range(0, shows_third.shape[0], TILE):
         for left in range(0, shows_third.shape[1], TILE):
@@ -278,7 +278,8 @@ def parabola(paths, longest):
 
 
 def trajectory_distance(a, b, u):
-    """How far a path, or each of several, is from another by the time `u`, before or after [px]."""
+    """Distance of a path, or of each of several, from another by the time `u`, before or after
+    [px]."""
     return np.maximum(*(np.hypot(*moved(a - b, t).T) for t in (-u, u)))
 
 
@@ -306,7 +307,7 @@ def nearest_cluster(path, chosen, u):
 
 
 def tile_candidates(frame, span):
-    """What every tile may show: chosen paths, nearest first, and what is known of them."""
+    """Candidates of every tile: chosen paths, nearest first, with their times and depths."""
     height, width = frame.edgeless.shape
     u0, u1 = span[0] - frame.offset, span[1] - frame.offset
     u = max(abs(u0), abs(u1))
@@ -374,7 +375,7 @@ def tile_candidates(frame, span):
 
 
 def instant(layers, tiles, x, y, t, color):
-    """What is seen at the pixel at time `t`: edge, the edge behind it, what is opaque.
+    """The samples at the pixel at time `t`: edge, the edge behind it, the opaque one.
 
     None: something that all frames hide.
     """
@@ -476,7 +477,7 @@ def resolve_visibility(layers, tiles, x, y, t):
 
 
 def is_hidden(own, frame, found):
-    """Whether a frame hides what another shows, at its own instant, or does not hold its place."""
+    """True if a frame hides a sample of another at its own instant, or does not hold its place."""
     height, width = own.edgeless.shape
     there = np.clip(found.at, 0, (width - 1, height - 1)).astype(int)
     here = found.at + moved(frame.trajectory[0][there[1], there[0]], -frame.offset)
@@ -533,12 +534,12 @@ def record(seen, new, is_opaque):
 
 
 def is_behind(new, old):
-    """Whether it is another surface; neighbouring frames show the same one again."""
+    """True if it is another surface; neighbouring frames show the same one again."""
     return new.depth >= old.depth * 1.05 * (1.0 if new.frame == old.frame else 1.1)
 
 
 def is_before(edge, opaque):
-    """Whether an edge is of another surface, before what is opaque."""
+    """True if an edge is of another surface, before the opaque sample."""
     apart = np.hypot(*np.subtract(edge.at, opaque.at)) > 2 and edge.frame == opaque.frame
     return edge.depth < opaque.depth / (1.0 if apart else 1.05)
 

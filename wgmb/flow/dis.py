@@ -94,7 +94,7 @@ class Dis:
         return self._flow.calc(here, other, None)
 
     def _depth(self, way: np.ndarray) -> np.ndarray:
-        """What moves otherwise than most of the picture is nearer."""
+        """Depth by motion: pixels that do not move like most of the picture are nearer."""
         height, width = way.shape[:2]
         step = max(1, max(width, height) // 40)
         y, x = np.mgrid[step // 2 : height : step, step // 2 : width : step]

@@ -66,7 +66,7 @@ def _matrices(size, views: Views, centres, ways, tolerance: float) -> tuple[np.n
 
 
 def _bends(views: Views, most: tuple[np.ndarray, np.ndarray], centres, ways) -> bool:
-    """Whether at least half of the pixels move like most, and so leave constant velocity."""
+    """True if at least half of the pixels move like most, and so leave constant velocity."""
     agree = np.ones(len(centres), bool)
     for matrix, way in zip(most, (ways[:, :2], ways[:, 2:]), strict=True):
         moved = np.concatenate([centres, np.ones((len(centres), 1))], axis=1) @ matrix.T

@@ -66,7 +66,7 @@ def _least_squares(here: np.ndarray, there: np.ndarray) -> np.ndarray:
 
 
 def _agreement(homography, here, there, tolerance: float) -> float:
-    """How many points end where the homography moves them; those that end near it count less."""
+    """Number of points that end where the homography moves them; near ends count less."""
     return float(np.maximum(0, 1 - _apart(homography, here, there) / tolerance).sum())
 
 

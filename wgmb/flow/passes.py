@@ -1,4 +1,4 @@
-"""What all passes of flow share: group 0, textures, and submission of each pass by itself."""
+"""Common parts of the passes of flow: group 0, textures, and submission of each pass by itself."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ Load = Callable[[int], np.ndarray | wgpu.GPUTexture | None]
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is done: sweeps on the coarsest level, on those between, and on the finest.
+    """Number of sweeps: on the coarsest level, on those between, and on the finest.
 
     `polish`: how often parts of a pixel are refined and noise is removed, on every level.
     `block`: pixels along those that share a first state.

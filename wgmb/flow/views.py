@@ -1,4 +1,4 @@
-"""Which frames a frame is compared with, and how its flow continues to them."""
+"""Frames with which a frame is compared, and the continuation of its flow to them."""
 
 from __future__ import annotations
 

@@ -293,9 +293,8 @@ class Clip:
         normal: bool = True,
         light: bool = True,
     ) -> tuple[Frame, Placement]:
-        """What a Blur of this `extent` takes: with_neighbours, or `frame` for a `reach` of 0; and
-        where that lies.
-        """
+        """Input of a Blur of this `extent`: with_neighbours, or `frame` for a `reach` of 0; and its
+        placement."""
         also = extras(normal, light)
         if not reach:
             return self._around.alone(source, also, extent)

@@ -52,7 +52,7 @@ class Inputs:
 
     @property
     def exposed(self) -> tuple[float, float]:
-        """When the frame is exposed anywhere: first and last time [frame intervals].
+        """First and last time at which the frame is exposed anywhere [frame intervals].
 
         The same as exposure_window() of shutter.wgsl for the frame itself.
         """

@@ -38,7 +38,7 @@ class Gather:
     InputError if it has none; "frames": shadows by the colours alone, which is less sure; "off":
     shading stays that of the frame.
 
-    `reach`: frames to either side that are searched. 2: those beyond the neighbours show what the
+    `reach`: frames to search on either side. 2: those beyond the neighbours show what the
     frame and both neighbours hide; it takes half as long again, and more memory.
 
     Strong: the closest to the truth. Reveals hidden surfaces, blurs across silhouettes.
@@ -70,7 +70,7 @@ class Gather:
         reach: Annotated[
             int,
             Range(1, 2),
-            "frames to either side that are searched: 2 also takes those beyond the neighbours",
+            "frames to search on either side: 1, or 2 for those beyond the neighbours too",
         ] = 1
 
     def __init__(self, device, options: Options, *, output="rgba32float"):

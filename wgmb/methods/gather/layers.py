@@ -48,9 +48,8 @@ class Layers:
         }
 
     def _far(self, inputs, offset: int) -> dict[str, wgpu.GPUTextureView]:
-        """What the layers of a frame read of frames beyond the neighbours: the frame itself, all of
-        theirs; the others nothing.
-        """
+        """Inputs of a frame's layers from frames beyond the neighbours: all of them for the frame
+        itself, nothing for the others."""
         near = sum(abs(frame.offset) <= 1 for frame in inputs.frames)
         far = 0 if offset else len(inputs.frames) - near
         views: dict[str, wgpu.GPUTextureView] = {}

@@ -107,7 +107,7 @@ class Search:
         ]
 
     def _light(self, added: Added | None) -> dict:
-        """What the search binds for moving light, or for none."""
+        """Bindings of the search for moving light, or for none."""
         source = wgsl.load("methods/gather/moving_light.wgsl")
         nodes = np.zeros((), source.dtype("LightNodes"))
         if added is None:
