@@ -96,8 +96,10 @@ class Layers:
             "write_single_layer": worklists["separated"],
         }
         passes: dict[str, tuple[dict | None, dict]] = {k: (c, c) for k, c in cells.items()}
+        passes["find_crowds"] = None, cells["find_crowds"]
         edge_cells = cells["write_single_layer"]
         passes |= {"size_dispatch": (None, edge_cells), "separate_layers": (groups, edge_cells)}
+        sizes = {"find_crowds": grid_of(size), "size_dispatch": (1, 1)}
         kernel = gpu.kernel(
             self._device,
             "methods/gather/layers.wgsl",
@@ -125,7 +127,7 @@ class Layers:
             kernel.run(
                 encoder,
                 entry,
-                inputs.bindings if indirect else replace(inputs.bindings, size=(1, 1)),
+                replace(inputs.bindings, size=sizes.get(entry, size)),
                 indirect,
                 worklist=worklist,
                 color=frame.color,

@@ -10,7 +10,7 @@ import wgpu
 
 from ... import gpu
 from ...gpu import wgsl
-from ...gpu.textures import TexturePool
+from ...gpu.textures import ScratchBuffer, TexturePool
 from .active_tiles import grid_of, uniform
 from .layers import layer_view
 from .shading import Added
@@ -24,11 +24,13 @@ class Search:
     ):
         self._device, self._images = device, images
         self._confidence, self._output = confidence, output
+        self._blocks = ScratchBuffer(device)
 
     def encode(self, encoder, inputs, layers, candidates, worklists, output, added: Added | None):
         """Record the classification of blocks, then all pixels. `added`: moving light."""
         timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
         timed["FAR"] = any(abs(frame.offset) > 1 for frame in inputs.frames)
+        timed["WEIGHTED"] = inputs.frame.weight is not None
         classify = gpu.kernel(self._device, "methods/gather/classify.wgsl", **timed)
         data = np.zeros((), classify.source.dtype("SourceFrames"))
         near = [frame.offset for frame in inputs.frames if abs(frame.offset) <= 1]
@@ -52,24 +54,37 @@ class Search:
             "single-layer mask", blocks, "r32uint", -(-inputs.samples // times) + 1
         )
         mask = array(words)
-        classify.run(
-            encoder,
-            "main",
-            replace(inputs.bindings, size=blocks),
-            single_layer_mask=mask,
-            active_cells=worklists["active"],
-            **searched,
+        # Two lists: of plain blocks, and of all others.
+        size = (
+            4 * -(-(blocks[0] * blocks[1] + int(classify.source.constant("CELLS_WORD"))) // 64) * 64
         )
+        lists = {"buffer": self._blocks.at_least(2 * size), "offset": 0, "size": 2 * size}
+        encoder.clear_buffer(lists["buffer"], 0, 2 * size)
+        for entry, over in (("main", blocks), ("size_lists", (2 * classify.workgroup[0], 1))):
+            classify.run(
+                encoder,
+                entry,
+                replace(inputs.bindings, size=over),
+                single_layer_mask=mask,
+                active_cells=worklists["active"],
+                lists=lists,
+                **searched,
+            )
+        plain, others = (lists | {"offset": offset, "size": size} for offset in (0, size))
         separated = worklists["separated"]
         differences = self._differences(encoder, inputs, layers["surfaces"], separated)
-        for entry, cells in (("main", worklists["active"]), ("copy_static", worklists["static"])):
+        for entry, cells, is_plain in (
+            ("main", others, False),
+            ("main", plain, True),
+            ("copy_static", worklists["static"], True),
+        ):
             for lit, groups in self._groups(encoder, inputs, cells, added):
                 kernel = gpu.kernel(
                     self._device,
                     "methods/gather/resolve.wgsl",
                     {"Output": self._output, "mattes": layers["mattes"].format},
-                    WEIGHTED=inputs.frame.weight is not None,
                     CONFIDENCE=self._confidence,
+                    PLAIN=is_plain,
                     MOVING_LIGHT=lit is not None,
                     **timed,
                 )

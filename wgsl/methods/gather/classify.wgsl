@@ -8,10 +8,13 @@
 
 @group(1) @binding(3) var single_layer_mask: Mask;  // by block: words of bits, TIMES_PER_WORD a layer; last, 1 if all are set
 @group(1) @binding(4) var<storage, read> active_cells: WorkList;
+@group(1) @binding(5) var<storage, read_write> lists: array<atomic<u32>>;   // two WorkLists of blocks, see PLAIN; all 0 at first
+
+override WEIGHTED: bool = false;    // pixels have weights, and may show more than one in a block
 
 alias Mask = texture_storage_2d_array<r32uint, write>;
 
-/// One block. The searches of all its pixels are made from its corners: a time has a single layer if they end on
+/// One block, which joins one of the lists. The searches of all its pixels are made from its corners: a time has a single layer if they end on
 /// surfaces that no edge is near, and if all other starts lead to the same. Edges are two pixels wide, so that none
 /// hides between the corners.
 @compute @workgroup_size(WG_X, WG_Y)
@@ -83,6 +86,20 @@ fn main(@builtin(local_invocation_index) local: u32,
         if i >= samples { break; }
     }
     textureStore(single_layer_mask, id, (frame.samples - 1u) / TIMES_PER_WORD + 1u, vec4u(u32(all_single)));
+    let is_plain = is_static || (all_single && !WEIGHTED);
+    let section = select(arrayLength(&lists) / 2u, 0u, is_plain);
+    let place = atomicAdd(&lists[section + COUNT_WORD], 1u);
+    atomicStore(&lists[section + CELLS_WORD + place], pack_cell(id));
+}
+
+/// After all blocks: workgroups for both lists.
+@compute @workgroup_size(1)
+fn size_lists(@builtin(workgroup_id) group: vec3u) {
+    let section = group.x * (arrayLength(&lists) / 2u);
+    let wanted = (atomicLoad(&lists[section + COUNT_WORD]) + BLOCKS_PER_GROUP - 1u) / BLOCKS_PER_GROUP;
+    atomicStore(&lists[section], min(wanted, GROUPS_PER_ROW));
+    atomicStore(&lists[section + 1u], 1u);
+    atomicStore(&lists[section + 2u], (wanted + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW);
 }
 
 /// Whether one step from the displacement `start` leads to the `solution`, not by way of an edge; or leaves the image.

@@ -127,13 +127,10 @@ fn are_between(z: vec3f, low: f32, high: f32) -> vec3<bool> {
     return (z > vec3f(low)) & (z < vec3f(high));
 }
 
-/// Between the first and the second pass: which tiles are in a crowd. An invocation is a tile of a cell.
-@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
-fn find_crowds(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
-    let k = worklist_index(group);
-    let tile = unpack_cell(worklist.cells[k]) * vec2u(CELL_TILES, 1u) + vec2u(local, 0u);
-    if k >= worklist.count || group.y > 0u || local >= CELL_TILES || any(tile >= tiles_of(frame.size)) { return; }
-    find_crowd(tile);
+/// Between the first and the second pass: which tiles are in a crowd. An invocation is a tile; beyond the last, that one.
+@compute @workgroup_size(WG_X, WG_Y)
+fn find_crowds(@builtin(global_invocation_id) id: vec3u) {
+    find_crowd(min(id.xy, tiles_of(frame.size) - 1u));
 }
 
 /// Second pass: every pixel as one layer, which is copied to BACK after it, and the list of edge pixels, which

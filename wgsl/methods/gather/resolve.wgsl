@@ -1,6 +1,5 @@
 // The image: for every pixel and every time of the exposure, the samples of up to three frames that are there by then
 // are searched, the nearest ones composited front to back, and the results averaged.
-//#include common/angle.wgsl
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include common/noise.wgsl
@@ -22,13 +21,15 @@
 
 override WEIGHTED: bool = false;    // read `own_weight`
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
+override PLAIN: bool = false;       // the blocks have one layer at all times, or nothing moves there: one search is enough
 
 const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: what one showed is preferred
 const ITERATIONS_SAVED: u32 = 3u;       // from a tile's motion, compared with a start from nothing
 const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
 
 const MAX_MISS: f32 = 8.0;              // if no search along the pixel's own path comes nearer than this [px], what is there is hidden
-const FILL_DIRECTIONS: u32 = 8u;
+const FILL_DIRECTIONS: u32 = 8u;        // see cosine_of()
+const SQRT_HALF: f32 = 0.70710678;
 const FILL_STEPS: u32 = 13u;            // to every side, each FILL_GROWTH times as far as the one before: 64 px
 const FILL_GROWTH: f32 = 1.414213562;
 const FILL_DEPTH_RATIO: f32 = 1.1;      // of what is behind a surface
@@ -51,10 +52,12 @@ struct Visible {        // the nearest samples of each kind
 
 // Loops are left from their end, and what is rare has a loop of its own over bits of times: see lavapipe.md.
 
+/// For blocks of active cells.
 @compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
 fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
-    let k = worklist_index(group);
-    let id = pixel_in_strip(worklist.cells[k], group, local);
+    let in_block = local % (BLOCK * BLOCK);
+    let k = worklist_index(group) * BLOCKS_PER_GROUP + local / (BLOCK * BLOCK);
+    let id = unpack_cell(worklist.cells[k]) * BLOCK + vec2u(in_block % BLOCK, in_block / BLOCK);
     if k >= worklist.count || any(id >= frame.size) { return; }
     let x = vec2f(id) + 0.5;
     let tile = id / TILE;
@@ -113,47 +116,49 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
             todo &= todo - 1u;
             if todo == 0u { break; }
         }
-        todo = ~single & valid;
-        var unresolved = 0u;
-        var far = 0u;       // of them, those at which no search came near
-        loop {              // all others
-            if todo != 0u {     // where it is 0, the loops within end at once
-                let t = time_in(times, first, todo);
-                let visible = resolve_visibility(x, starts, t, candidates0, candidates1, candidates2);
-                let result = composite_front_to_back(visible, t, duration_in(times, first, todo));
-                let is_covered = result.coverage > 0.5;
-                if is_covered {
-                    add(&sum, result, share / result.coverage);
-                    accepted += 1.0;
-                } else {
-                    let bit = todo & (~todo + 1u);
-                    unresolved |= bit;
-                    far |= select(0u, bit, visible.miss2 > MAX_MISS * MAX_MISS);
+        if !PLAIN {
+            todo = ~single & valid;
+            var unresolved = 0u;
+            var far = 0u;       // of them, those at which no search came near
+            loop {              // all others
+                if todo != 0u {     // where it is 0, the loops within end at once
+                    let t = time_in(times, first, todo);
+                    let visible = resolve_visibility(x, starts, t, candidates0, candidates1, candidates2);
+                    let result = composite_front_to_back(visible, t, duration_in(times, first, todo));
+                    let is_covered = result.coverage > 0.5;
+                    if is_covered {
+                        add(&sum, result, share / result.coverage);
+                        accepted += 1.0;
+                    } else {
+                        let bit = todo & (~todo + 1u);
+                        unresolved |= bit;
+                        far |= select(0u, bit, visible.miss2 > MAX_MISS * MAX_MISS);
+                    }
                 }
+                todo &= todo - 1u;
+                if todo == 0u { break; }
             }
-            todo &= todo - 1u;
-            if todo == 0u { break; }
-        }
-        loop {              // of them, those at which no frame shows anything: a tap along the pixel's own trajectory
-            if unresolved != 0u {
-                let t = time_in(times, first, unresolved);
-                let p = x - displacement5(trajectory, t);
-                if (far & unresolved & (~unresolved + 1u)) != 0u {
-                    hidden += 1.0;
-                } else {
-                    var one = tap(p);
-                    if MOVING_LIGHT { one.color += moving_light(p, 0u, t, duration_in(times, first, unresolved)); }
-                    add(&sum, one, share);
+            loop {              // of them, those at which no frame shows anything: a tap along the pixel's own trajectory
+                if unresolved != 0u {
+                    let t = time_in(times, first, unresolved);
+                    let p = x - displacement5(trajectory, t);
+                    if (far & unresolved & (~unresolved + 1u)) != 0u {
+                        hidden += 1.0;
+                    } else {
+                        var one = tap(p);
+                        if MOVING_LIGHT { one.color += moving_light(p, 0u, t, duration_in(times, first, unresolved)); }
+                        add(&sum, one, share);
+                    }
+                    if !is_inside(p) { left_image += 1.0; }
                 }
-                if !is_inside(p) { left_image += 1.0; }
+                unresolved &= unresolved - 1u;
+                if unresolved == 0u { break; }
             }
-            unresolved &= unresolved - 1u;
-            if unresolved == 0u { break; }
         }
         first += TIMES_PER_WORD;
         if first >= samples { break; }
     }
-    add_hidden(&sum, id, hidden * share);
+    if !PLAIN { add_hidden(&sum, id, hidden * share); }
     var result = max(sum.color, vec4f(0.0)) / sum.weight;
     if is_static || sum.weight <= 0.0 { result = static_color(id); }
     if CONFIDENCE {
@@ -437,8 +442,7 @@ fn add_hidden(sum: ptr<function, Composite>, id: vec2u, share: f32) {
     var filled = Composite();
     var direction = 0u;
     loop {
-        let angle = TAU * f32(direction) / f32(FILL_DIRECTIONS);
-        let along = vec2f(cos(angle), sin(angle));
+        let along = vec2f(cosine_of(direction), cosine_of(direction + 6u));
         var distance = 1.0;
         var step = select(FILL_STEPS, 0u, direction < count);
         loop {
@@ -462,9 +466,18 @@ fn add_hidden(sum: ptr<function, Composite>, id: vec2u, share: f32) {
         if filled.coverage > 0.0 {
             add(sum, filled, share / filled.coverage);
         } else {
-            add(sum, tap(vec2f(id) + 0.5), share);
+            var counts = 1.0;
+            if WEIGHTED { counts = textureLoad(own_weight, id, 0).x; }
+            add(sum, Composite(textureLoad(own_color, id, 0), counts, 1.0, 0.0, 0.0, 0.0), share);
         }
     }
+}
+
+/// Of a number of eighths of a turn.
+fn cosine_of(eighths: u32) -> f32 {
+    let n = eighths % 8u;
+    let size = select(select(1.0, 0.0, n % 4u == 2u), SQRT_HALF, n % 2u == 1u);
+    return select(size, -size, n > 2u && n < 6u);
 }
 
 // ---- compositing ----------------------------------------------------------------------------

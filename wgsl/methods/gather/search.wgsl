@@ -7,6 +7,7 @@
 //#include common/path.wgsl
 //#include common/shutter.wgsl
 //#include methods/gather/surface.wgsl
+//#include methods/gather/worklist.wgsl
 
 struct SourceFrames {
     offsets: vec4f,         // [frame intervals]; the first is 0, the frame itself
@@ -30,6 +31,7 @@ const TRUSTED_TIME: f32 = 0.25; // up to here from its instant the frame itself 
 
 // What the classification writes: a bit per time, in words, of every block of pixels.
 const BLOCK: u32 = 4u;          // side [px]
+const BLOCKS_PER_GROUP: u32 = CELL_TILES * TILE * STRIP_HEIGHT / (BLOCK * BLOCK);   // of a workgroup of the resolve
 const TIMES_PER_WORD: u32 = 32u;
 
 struct Candidates {     // motions that may bring something of one frame into a tile, the nearest first
