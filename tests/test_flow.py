@@ -9,7 +9,7 @@ from twins import flow as twin
 from wgmb import Blur, Flow, Frame, InputError
 from wgmb.flow import passes as flow_passes
 from wgmb.flow.carry import carry
-from wgmb.flow.dominant import extend, follow_most
+from wgmb.flow.dominant import follow_most, settled
 from wgmb.flow.homography import dominant_homography
 from wgmb.flow.match import matched
 from wgmb.flow.mend import mend
@@ -192,13 +192,29 @@ def test_motion_out_of_the_picture_goes_on_as_most_moves(views, far, way):
     states[..., :2] = way + rng.choice([0, 0.2, 3], (9, 13, 1)) * rng.normal(0, 1, (9, 13, 2))
     states[..., 4:] *= 0.2
     bound = matched(kit(), views, small()[0], 0)
-    got = read(extend(kit(), (13, 9), bound, states_texture(states), (to_near, to_far)))
-    want = twin.extended(matcher(views), states, to_near, to_far)
+    got = read(settled(kit(), (13, 9), bound, states_texture(states), (to_near, to_far)))
+    want = twin.settled(matcher(views), states, to_near, to_far)
     same = np.abs(got - want).max(axis=2) < 1e-3
     assert same.mean() > 0.95  # the sampler's rounding may decide
     changed = np.abs(want - states).max(axis=2) > 1e-3
     assert 0.1 < changed.mean() < 0.9
     assert same[changed].mean() > 0.9
+
+
+def test_motion_much_like_that_of_most_becomes_it_where_it_matches_as_well():
+    """Not where it is far off, nor where it matches worse."""
+    rng = np.random.default_rng(11)
+    states, to_near, to_far = random_states(seed=12), np.eye(3), np.eye(3)
+    to_near[:2, 2], to_far[:2, 2] = [1.3, -0.6], [-1.3, 0.6]
+    states[...] = 0
+    states[..., :2] = [1.3, -0.6] + rng.choice([0.03, 0.5, 8], (9, 13, 1)) * [0.6, 0.8]
+    match, bound = matcher(MIDDLE), matched(kit(), MIDDLE, small()[0], 0)
+    got = read(settled(kit(), (13, 9), bound, states_texture(states), (to_near, to_far)))
+    want = twin.settled(match, states, to_near, to_far)
+    same = np.abs(got - want).max(axis=2) < 1e-3
+    assert same.mean() > 0.95  # the sampler's rounding may decide
+    is_taken = np.abs(want[..., :2] - [1.3, -0.6]).max(axis=2) < 1e-3
+    assert 0.5 < is_taken.mean() < 0.9
 
 
 @pytest.mark.parametrize("views", [MIDDLE, FIRST])

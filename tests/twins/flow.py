@@ -237,10 +237,13 @@ def full_search(matcher, reach):
     return out, sides
 
 
-def extended(matcher, states, to_near, to_far):
-    """States that lead out of the picture go on as the homographies of most of it do."""
+def settled(matcher, states, to_near, to_far):
+    """States that lead out of the picture, and those that much resemble the homographies of most
+    of it and match no better, follow these.
+    """
     out = states.copy()
     height, width = states.shape[:2]
+    factor = matcher.factor
 
     def leaves(x, y, way):
         return not (0 <= x + way[0] <= width - 1 and 0 <= y + way[1] <= height - 1)
@@ -251,25 +254,30 @@ def extended(matcher, states, to_near, to_far):
 
     for y in range(height):
         for x in range(width):
-            near, far = states[y, x, :2], matcher.factor * states[y, x, :2] + states[y, x, 2:4]
+            near, far = states[y, x, :2], factor * states[y, x, :2] + states[y, x, 2:4]
             most_near, most_far = displaced(to_near, x, y), displaced(to_far, x, y)
-            bend = most_far - matcher.factor * most_near
+            bend = most_far - factor * most_near
+            slope = [
+                displaced(to_near, x + i, y + j) - displaced(to_near, x - i, y - j)
+                for i, j in ((0.5, 0), (0, 0.5))
+            ]
+            most = [*most_near, *bend, *np.array(slope).T.ravel()]
             if leaves(x, y, most_near) and leaves(x, y, most_far):
                 if matcher.cost(x, y, states[y, x]) > 0.06:
-                    slope = [
-                        displaced(to_near, x + i, y + j) - displaced(to_near, x - i, y - j)
-                        for i, j in ((0.5, 0), (0, 0.5))
-                    ]
-                    out[y, x] = [*most_near, *bend, *np.array(slope).T.ravel()]
+                    out[y, x] = most
             elif leaves(x, y, near) and not leaves(x, y, far):
                 if np.linalg.norm(far - most_far) < 1:
-                    out[y, x, :4] = [*(far - bend) / matcher.factor, *bend]
+                    out[y, x, :4] = [*(far - bend) / factor, *bend]
             elif (
                 leaves(x, y, far)
                 and not leaves(x, y, near)
                 and np.linalg.norm(near - most_near) < 1
             ):
                 out[y, x, 2:4] = bend
+            near, far = out[y, x, :2], factor * out[y, x, :2] + out[y, x, 2:4]
+            apart = max(np.linalg.norm(near - most_near), np.linalg.norm(far - most_far))
+            if apart < 4 and matcher.cost(x, y, np.array(most)) < matcher.cost(x, y, out[y, x]) + 0.01:
+                out[y, x] = most
     return out
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import wgpu
 
-from .homography import dominant_homography
+from .homography import TOLERANCE, dominant_homography
 from .passes import STATES, Passes
 from .views import AROUND, Views
 
@@ -32,15 +32,15 @@ def follow_most(
     near frame and to the far one; `matched`: the bindings of match.wgsl.
     """
     bound = {"states": states} | matched
-    most = _matrices(size, views, centres, ways, WHOLE)
+    has_far = views.factor == AROUND
+    most = _matrices(size, centres, ways, WHOLE, has_far)
     if any((matrix != np.eye(3)).any() for matrix in most):
         few = min(size[0], ACROSS), min(size[1], ACROSS)
         centres, thin = spaced(few, size) + 0.5, passes.take(few, STATES)
         for _ in range(CORRECTIONS):
             _run(passes, "correct", size, most, grid=few, output=thin, **bound)
-            encoder = passes.device.create_command_encoder()
-            ways = passes.images.download(encoder, thin).reshape(-1, 4)
-            most = _matrices(size, views, centres, ways, PARTS)
+            ways = _read(passes, thin)
+            most = _matrices(size, centres, ways, PARTS, has_far)
         passes.give(thin)
     if not _bends(views, most, centres, ways):
         return states
@@ -56,12 +56,17 @@ def spaced(few: tuple[int, int], many: tuple[int, int]) -> np.ndarray:
     return ((2 * np.stack([x, y], axis=-1) + 1) * many // (2 * np.array(few))).reshape(-1, 2)
 
 
-def _matrices(size, views: Views, centres, ways, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """The homographies of most of the picture to the near frame and the far one."""
+def _matrices(
+    size, centres, ways, tolerance: float, has_far: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """The homographies of most of the picture to the near frame and the far one.
+
+    Without displacements to the far frame, it is two frames on as the near one.
+    """
     longest = max(size)
     near = dominant_homography(centres, ways[:, :2], longest, tolerance / longest)
-    if views.factor != AROUND:
-        return near, near @ near  # two frames on, as before
+    if not has_far:
+        return near, near @ near
     return near, dominant_homography(centres, ways[:, 2:], longest, tolerance / longest)
 
 
@@ -77,19 +82,39 @@ def _bends(views: Views, most: tuple[np.ndarray, np.ndarray], centres, ways) -> 
     return bool(half and np.median(np.hypot(bend[:, 0], bend[:, 1])) >= LEAST_BEND)
 
 
-def extend(
+def settle(
+    passes: Passes, size: tuple[int, int], matched: dict, views: Views, states: wgpu.GPUTexture
+) -> wgpu.GPUTexture:
+    """States of a frame, those that the picture hardly tells taken from the motion of most of it.
+
+    The given states are taken back.
+    """
+    few = min(size[0], ACROSS), min(size[1], ACROSS)
+    centres, thin = spaced(few, size) + 0.5, passes.take(few, STATES)
+    bound = {"states": states} | matched
+    _run(passes, "write_ways", size, (np.eye(3), np.eye(3)), grid=few, output=thin, **bound)
+    most = _matrices(size, centres, _read(passes, thin), TOLERANCE * max(size), views.far is not None)
+    for _ in range(CORRECTIONS):
+        _run(passes, "correct", size, most, grid=few, output=thin, **bound)
+        most = _matrices(size, centres, _read(passes, thin), PARTS, views.far is not None)
+    output = settled(passes, size, matched, states, most)
+    passes.give(thin, states)
+    return output
+
+
+def settled(
     passes: Passes,
     size: tuple[int, int],
     matched: dict,
     states: wgpu.GPUTexture,
     most: tuple[np.ndarray, np.ndarray],
 ) -> wgpu.GPUTexture:
-    """States, those that lead out of the picture going on as most of it moves.
+    """States after `settle` in dominant.wgsl.
 
     `most`: the homographies of most of the picture to the near frame and to the far one.
     """
     output = passes.take(size, STATES)
-    _run(passes, "extend", size, most, states=states, output=output, **matched)
+    _run(passes, "settle", size, most, states=states, output=output, **matched)
     return output
 
 
@@ -98,6 +123,11 @@ def columns(homography: np.ndarray) -> np.ndarray:
     whole = np.eye(4)
     whole[:3, :3] = homography
     return whole.T  # row i in numpy is column i in WGSL
+
+
+def _read(passes: Passes, thin: wgpu.GPUTexture) -> np.ndarray:
+    """(count, 4) what a pass wrote of a few pixels."""
+    return passes.images.download(passes.device.create_command_encoder(), thin).reshape(-1, 4)
 
 
 def _run(passes: Passes, entry: str, size, most: tuple[np.ndarray, np.ndarray], **bound) -> None:

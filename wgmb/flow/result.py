@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import wgpu
 
-from .dominant import columns, extend
+from .dominant import columns
 from .homography import dominant_homography
 from .passes import Passes
 from .views import AROUND, Views
@@ -28,13 +28,8 @@ def result(
     size: tuple[int, int],
     views: Views,
     states: wgpu.GPUTexture,
-    matched: dict | None = None,
 ) -> Motion:
-    """Motion and depth from the states of a frame.
-
-    With `matched`, the bindings of match.wgsl, motion that leaves the picture goes on as most of
-    the picture moves.
-    """
+    """Motion and depth from the states of a frame."""
     motion, depth = (passes.take(size, (k, 1)) for k in ("rgba32float", "r32float"))
     apart = passes.scratch(size, "rgba32float", "apart")
     spacing = max(1, round(max(size) / ACROSS))
@@ -47,8 +42,6 @@ def result(
     spare_depth = passes.scratch((1, 1), "r32float", "spare depth")
     none = passes.scratch((1, 1), "rgba32float", "none")
 
-    extended = None
-
     def run(entry, size, read=none, read_apart=none, **written: wgpu.GPUTexture):
         outputs: dict = {"motion_out": spare, "apart_out": spare, "depth_out": spare_depth}
         outputs |= written
@@ -57,7 +50,7 @@ def result(
             entry,
             size,
             result=passes.uniform("motion.wgsl", "Result", **values),
-            states=extended or states,
+            states=states,
             motion=read,
             apart=read_apart,
             **outputs,
@@ -68,10 +61,6 @@ def result(
     thin = passes.scratch(few, "rgba32float", "thin")
     run("thin", few, motion, apart_out=thin)
     to_prev, to_next = _homographies(passes, thin, size, spacing)
-    if values["around"] and matched:
-        extended = extend(passes, size, matched, states, (to_next, to_prev))
-        run("write_motion", size, motion_out=motion)
-        passes.give(extended)
     values |= {"to_prev": columns(to_prev), "to_next": columns(to_next)}
     run("find_apart", size, motion, apart_out=apart)
     run("write_depth", size, read_apart=apart, depth_out=depth)

@@ -21,7 +21,7 @@ import wgpu
 
 from ..errors import InputError
 from .carry import carry
-from .dominant import follow_most
+from .dominant import follow_most, settle
 from .match import matched
 from .mend import mend
 from .passes import STATES, Passes
@@ -202,7 +202,8 @@ class Shot:
         states = (self._mended if is_swept else self._searched)(number, 0)
         bound = self._matched(views, 0)
         states = self._polished(states, self._sizes[0], bound)
-        made = result(self._passes, self._sizes[0], views, states, bound)
+        states = settle(self._passes, self._sizes[0], bound, views, states)
+        made = result(self._passes, self._sizes[0], views, states)
         self._passes.give(states)
         self._forget(number)
         return made

@@ -16,6 +16,9 @@ const SAME_WAY: f32 = 1.0;      // what moves so much like most of the picture o
                                 // too, rather than being hidden there
 
 const UNSEEN_PRICE: f32 = 0.06; // for leaving the picture on both sides as most of it does
+const MUCH_ALIKE: f32 = 4.0;    // motion off that of most by less than this [px] reaches at most 2 px to either side of
+                                // its pixel in a whole frame: no farther than the patch that was compared
+const AS_WELL: f32 = 0.01;      // matches that differ by less are equally good
 
 fn displaced(homography: mat4x4f, x: vec2f) -> vec2f {
     let at = homography * vec4f(x, 1.0, 0.0);
@@ -66,31 +69,54 @@ fn follow(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     }
 }
 
-/// Motion out of the picture, where there is nothing to match: on as most of the picture moves. A pixel that moves like it
-/// on the side where it is seen keeps that side.
+/// Displacements to the near and the far frame of a few pixels, as their states have them.
 @compute @workgroup_size(WG_X, WG_Y)
-fn extend(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+fn write_ways(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    let few = textureDimensions(output);
+    if any(id >= few) { return; }
+    let state = load_state(states, vec2i((2u * id + 1u) * frame.size / (2u * few)));
+    textureStore(output, id, 0, vec4f(state.flow, way_to_far(state).flow));
+}
+
+/// In the end, motion that the picture hardly tells becomes that of most of it: what leaves the picture, and what moves
+/// much like most where it matches as well, as large areas of one colour do.
+@compute @workgroup_size(WG_X, WG_Y)
+fn settle(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = banded_pixel(local, group);
     let px = vec2i(min(id, frame.size - 1u));
     load_patch(px);
-    var state = load_state(states, px);
-    let way = way_to_far(state);
     let most = dominant_state(px);
-    let most_way = way_to_far(most);
-    let near_leaves = leaves(state.flow);
-    let far_leaves = leaves(way.flow);
-    if leaves(most.flow) && leaves(most_way.flow) {
-        if match_cost(state, OUTSIDE) > UNSEEN_PRICE { state = most; }
-    } else if near_leaves && !far_leaves && length(way.flow - most_way.flow) < SAME_WAY {
-        state.flow = (way.flow - most.bend) / view.far_factor;
-        state.bend = most.bend;
-    } else if far_leaves && !near_leaves && length(state.flow - most.flow) < SAME_WAY {
-        state.bend = most.bend;
+    var state = extended(load_state(states, px), most);
+    let near_apart = length(state.flow - most.flow);
+    let far_apart = select(length(way_to_far(state).flow - way_to_far(most).flow), 0.0, VIEWS == ONE);
+    if max(near_apart, far_apart) < MUCH_ALIKE {
+        let least = match_cost(state, OUTSIDE) + AS_WELL;
+        if match_cost(most, least) < least { state = most; }
     }
     if all(id < frame.size) {
         textureStore(output, id, 0, vec4f(state.flow, state.bend));
         textureStore(output, id, 1, state.slope);
     }
+}
+
+/// A state, which goes on as most of the picture moves where there is nothing to match. One that moves like most on the
+/// side where it is seen keeps that side.
+fn extended(own: State, most: State) -> State {
+    var state = own;
+    let way = way_to_far(state);
+    let most_way = way_to_far(most);
+    let near_leaves = leaves(state.flow);
+    let far_leaves = leaves(way.flow);
+    if leaves(most.flow) && (VIEWS == ONE || leaves(most_way.flow)) {
+        if match_cost(state, OUTSIDE) > UNSEEN_PRICE { state = most; }
+    } else if VIEWS == AROUND && near_leaves && !far_leaves && length(way.flow - most_way.flow) < SAME_WAY {
+        state.flow = (way.flow - most.bend) / view.far_factor;
+        state.bend = most.bend;
+    } else if VIEWS == AROUND && far_leaves && !near_leaves && length(state.flow - most.flow) < SAME_WAY {
+        state.bend = most.bend;
+    }
+    return state;
 }
 
 fn leaves(flow: vec2f) -> bool {
