@@ -158,7 +158,7 @@ def test_the_motion_of_most_is_taken_where_it_matches_better():
     ways = np.tile(np.round(true), (len(x), 1))
     ways[::10] += 7
     bound, given = matched(kit(), MIDDLE, small(bend=bend)[0], 0), states_texture(states)
-    got = follow_most(kit(), (13, 9), bound, MIDDLE, given, np.stack([x, y], axis=1), ways)
+    got, _ = follow_most(kit(), (13, 9), bound, MIDDLE, given, np.stack([x, y], axis=1), ways)
     got = read(got).astype(float)
     is_kept = (got == states.astype("f4")).all(axis=2)
     assert 0 < is_kept.sum() < 100
@@ -177,7 +177,7 @@ def test_a_motion_of_most_that_does_not_bend_is_left_to_the_search():
     states, centres = states_texture(random_states()), np.array([[0, 0], [9, 0], [0, 9], [9, 9.0]])
     bound = matched(kit(), MIDDLE, small()[0], 0)
     for ways in (np.zeros((4, 4)), np.tile([1.3, -0.6, -1.3, 0.6], (4, 1))):
-        assert follow_most(kit(), (13, 9), bound, MIDDLE, states, centres, ways) is states
+        assert follow_most(kit(), (13, 9), bound, MIDDLE, states, centres, ways)[0] is states
 
 
 @pytest.mark.parametrize(
@@ -224,7 +224,8 @@ def test_half_a_sweep_takes_the_best_candidate(views, number):
     states, match = random_states(), matcher(views)
     bound = matched(kit(), views, small()[0], 0)
     output = kit().take((13, 9), STATES)
-    half_sweep(kit(), (13, 9), bound, states_texture(states), [], 0, number, output)
+    most = np.array([[1.01, 0.02, 3], [-0.01, 1.0, -5], [1e-3, 0, 1]])
+    half_sweep(kit(), (13, 9), bound, states_texture(states), [], 0, number, output, most)
     got = read(output).astype(float)
     improved = 0
     for y in range(9):
@@ -233,8 +234,8 @@ def test_half_a_sweep_takes_the_best_candidate(views, number):
                 assert (got[y, x] == states[y, x].astype("f4")).all()
                 continue
             tried = (twin.propagated, twin.refined)[number % 2](match, states, x, y)
-            energies = [match.energy(x, y, state, states, 2.0) for state in tried]
-            new = match.energy(x, y, got[y, x], states, 2.0)
+            energies = [match.energy(x, y, state, states, 2.0, most) for state in tried]
+            new = match.energy(x, y, got[y, x], states, 2.0, most)
             assert new < min(energies) + FILTER
             improved += new < energies[0] - FILTER
     assert improved > 10
@@ -273,7 +274,7 @@ def test_a_sweep_takes_a_state_that_is_right_and_carried():
     right = np.tile([1.3, -0.6, 0, 0, 0, 0, 0, 0], (9, 13, 1))
     bound = matched(kit(), MIDDLE, small()[0], 0)
     guesses = [states_texture(wrong), states_texture(right)]
-    got = read(sweep(kit(), (13, 9), bound, states_texture(wrong), guesses, 0, 1))
+    got = read(sweep(kit(), (13, 9), bound, states_texture(wrong), guesses, 0, 1, np.eye(3)))
     assert np.abs(got[2:-2, 3:-3, :2] - [1.3, -0.6]).max() < 0.3
 
 

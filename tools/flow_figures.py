@@ -60,6 +60,12 @@ def discs() -> np.ndarray:
     return np.clip(out, 0.01, 0.99)
 
 
+@cache
+def plain() -> np.ndarray:
+    """One colour, of which no patch tells how it moves."""
+    return np.full((TILE, TILE, 3), (0.7, 0.2, 0.2), np.float32)
+
+
 def moving(turn=0.0, zoom=1.0, shift=(0.0, 0.0), grows=(0.0, 0.0), shear=0.0) -> Place:
     """Matrix and shift that bring a point from time 0 to another; `turn` [degrees], `shift` [px]
     per frame, `grows` [px] per frame and frame."""
@@ -99,6 +105,8 @@ MOTIONS: dict[str, tuple] = {
         discs, moving(), (disc(24), (-20, 0), noise, moving(shift=(19, 5)))),
     "a disc that turns by 20 degrees before a pan": (
         noise, moving(shift=(6, 1)), (disc(30), (10, 5), discs, moving(20, 1, (3, -2)))),
+    "a plain disc at 20 px before a pan, discs": (
+        discs, moving(shift=(5, 0)), (disc(34), (0, 0), plain, moving(shift=(-20, 4)))),
     "bars 5 px wide at 14 px": (noise, moving(shift=(2, 0)), *BARS),
     "two fast things": (
         discs, moving(shift=(-4, 0)), (bar(20, 14), (50, -30), noise, moving(shift=(-24, 6))),

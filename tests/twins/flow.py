@@ -93,12 +93,19 @@ class Matcher:
         f = self.side(self.far, x, y, way, self.factor * state[4:])
         return min((n + f) / 2, min(n, f + self.far_price) + 0.03)
 
+    def weights(self, x, y):
+        """Offsets of the samples of a patch and their weights, which sum up to 1."""
+        places = [(i * self.stride, j * self.stride) for j, i in PATCH]
+        total = sum(_weight(self, x, y, i, j) for i, j in places)
+        found = [(i, j, _weight(self, x, y, i, j) / total) for i, j in places]
+        return [one for one in found if one[2] > 0]
+
     def price(self, state):
         bend_price = min(0.002 * np.abs(state[2:4]).sum(), 0.01)
         return 0.02 * np.abs(state[4:]).sum() + bend_price
 
-    def energy(self, x, y, state, states, most_apart):
-        """With what differs from the 8 neighbours."""
+    def energy(self, x, y, state, states, most_apart, most):
+        """With what differs from the 8 neighbours, and from where the homography `most` leads."""
         total = weights = 0.0
         for j in (-1, 0, 1):
             for i in (-1, 0, 1):
@@ -107,7 +114,13 @@ class Matcher:
                     d = np.abs(near[:4] - state[:4]) @ [1, 1, 0.5, 0.5]
                     weight = likeness(self.here[y + j, x + i], self.here[y, x])
                     total, weights = total + weight * min(d, most_apart), weights + weight
-        smooth = 0.08 * total / max(weights, 1e-6)
+        goal = most @ [x + 0.5, y + 0.5, 1]
+        aside = np.abs(goal[:2] / goal[2] - [x + 0.5, y + 0.5] - state[:2]).sum()
+        square = sum(
+            w * ((self.here[y + j, x + i][3:5] - 0.5) ** 2).sum() for i, j, w in self.weights(x, y)
+        )
+        aside *= 0.4 * square / (square + 0.0009) / max(self.width, self.height)
+        smooth = 0.08 * total / max(weights, 1e-6) + aside
         return smooth + self.price(state) + self.cost(x, y, state)
 
 
@@ -276,7 +289,10 @@ def settled(matcher, states, to_near, to_far):
                 out[y, x, 2:4] = bend
             near, far = out[y, x, :2], factor * out[y, x, :2] + out[y, x, 2:4]
             apart = max(np.linalg.norm(near - most_near), np.linalg.norm(far - most_far))
-            if apart < 4 and matcher.cost(x, y, np.array(most)) < matcher.cost(x, y, out[y, x]) + 0.01:
+            if (
+                apart < 4
+                and matcher.cost(x, y, np.array(most)) < matcher.cost(x, y, out[y, x]) + 0.01
+            ):
                 out[y, x] = most
     return out
 

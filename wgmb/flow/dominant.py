@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import wgpu
 
-from .homography import TOLERANCE, dominant_homography
+from .homography import TOLERANCE, columns, dominant_homography
 from .passes import STATES, Passes
 from .views import AROUND, Views
 
@@ -23,8 +23,10 @@ def follow_most(
     states: wgpu.GPUTexture,
     centres: np.ndarray,
     ways: np.ndarray,
-) -> wgpu.GPUTexture:
+) -> tuple[wgpu.GPUTexture, np.ndarray]:
     """States; where the motion of most bends and explains a pixel better, that.
+
+    Also its homography to the near frame.
 
     The given states are given back as they are, or taken back.
 
@@ -43,11 +45,11 @@ def follow_most(
             most = _matrices(size, centres, ways, PARTS, has_far)
         passes.give(thin)
     if not _bends(views, most, centres, ways):
-        return states
+        return states, most[0]
     output = passes.take(size, STATES)
     _run(passes, "follow", size, most, output=output, **bound)
     passes.give(states)
-    return output
+    return output, most[0]
 
 
 def spaced(few: tuple[int, int], many: tuple[int, int]) -> np.ndarray:
@@ -93,7 +95,9 @@ def settle(
     centres, thin = spaced(few, size) + 0.5, passes.take(few, STATES)
     bound = {"states": states} | matched
     _run(passes, "write_ways", size, (np.eye(3), np.eye(3)), grid=few, output=thin, **bound)
-    most = _matrices(size, centres, _read(passes, thin), TOLERANCE * max(size), views.far is not None)
+    most = _matrices(
+        size, centres, _read(passes, thin), TOLERANCE * max(size), views.far is not None
+    )
     for _ in range(CORRECTIONS):
         _run(passes, "correct", size, most, grid=few, output=thin, **bound)
         most = _matrices(size, centres, _read(passes, thin), PARTS, views.far is not None)
@@ -116,13 +120,6 @@ def settled(
     output = passes.take(size, STATES)
     _run(passes, "settle", size, most, states=states, output=output, **matched)
     return output
-
-
-def columns(homography: np.ndarray) -> np.ndarray:
-    """A (3, 3) homography as WGSL takes it: columns of a matrix of 4 x 4."""
-    whole = np.eye(4)
-    whole[:3, :3] = homography
-    return whole.T  # row i in numpy is column i in WGSL
 
 
 def _read(passes: Passes, thin: wgpu.GPUTexture) -> np.ndarray:

@@ -41,6 +41,19 @@ def dominant_homography(
     return np.linalg.inv(scale) @ best @ scale
 
 
+def columns(homography: np.ndarray) -> np.ndarray:
+    """A (3, 3) homography as WGSL takes it: columns of a matrix of 4 x 4."""
+    whole = np.eye(4)
+    whole[:3, :3] = homography
+    return whole.T  # row i in numpy is column i in WGSL
+
+
+def enlarged(homography: np.ndarray, factor: float) -> np.ndarray:
+    """A (3, 3) homography from pixels to pixels of a picture that is so many times as large."""
+    scale = np.diag([factor, factor, 1.0])
+    return scale @ homography @ np.linalg.inv(scale)
+
+
 def _equations(here: np.ndarray, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rows and right sides for the 8 unknowns of homographies whose last entry is 1."""
     x, y, u, v = here[..., 0], here[..., 1], there[..., 0], there[..., 1]

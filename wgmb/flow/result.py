@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import wgpu
 
-from .dominant import columns
-from .homography import dominant_homography
+from .homography import columns, dominant_homography
 from .passes import Passes
 from .views import AROUND, Views
 

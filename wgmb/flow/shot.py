@@ -22,6 +22,7 @@ import wgpu
 from ..errors import InputError
 from .carry import carry
 from .dominant import follow_most, settle
+from .homography import enlarged
 from .match import matched
 from .mend import mend
 from .passes import STATES, Passes
@@ -56,7 +57,13 @@ class Effort:
 
 
 EFFORTS = {"best": Effort(3, 2, 2, 2, block=2), "fast": Effort(3, 2, 0, 1, block=4)}
-KEPT = {"pictures": 4, "searched": 1, "mended": 0, "motion": 2}  # frames around the one asked for
+KEPT = {
+    "pictures": 4,
+    "most": 1,
+    "searched": 1,
+    "mended": 0,
+    "motion": 2,
+}  # frames around the one asked for
 
 
 def checked(picture: np.ndarray, number: int) -> np.ndarray:
@@ -152,12 +159,15 @@ class Shot:
         count = self._effort.sweeps(level, len(self._sizes))
         if level == len(self._sizes) - 1:
             states, *some = self._full_search(size, bound)
-            states = follow_most(passes, size, bound, views, states, *some)
-            states = sweep(passes, size, bound, states, [], level, count)
+            states, most = follow_most(passes, size, bound, views, states, *some)
+            self._made["most", number, level] = most
+            states = sweep(passes, size, bound, states, [], level, count, most)
             return self._polished(states, size, bound) if level else states
         states = self._grown(self._once("mended", number, level + 1, self._mended), level)
         guesses = [self._carried(other, views, level) for other in views.beside] if count else []
-        states = sweep(passes, size, bound, states, guesses, level, count)
+        coarsest = len(self._sizes) - 1
+        most = enlarged(self._made["most", number, coarsest], 2.0 ** (coarsest - level))
+        states = sweep(passes, size, bound, states, guesses, level, count, most)
         passes.give(*guesses)
         return self._polished(states, size, bound) if level else states
 
@@ -224,7 +234,7 @@ class Shot:
             stage, other, level = key
             if abs(other - number) > KEPT[stage] + level:
                 made = self._made.pop(key)
-                textures = made if isinstance(made, list) else [made] if made else []
+                textures = made if isinstance(made, list) else [made]
                 if isinstance(made, Motion):
                     textures = [made.motion, made.depth]
-                self._passes.give(*textures)
+                self._passes.give(*(t for t in textures if isinstance(t, wgpu.GPUTexture)))

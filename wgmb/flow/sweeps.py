@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import wgpu
 
 from ..gpu import wgsl
+from .homography import columns
 from .passes import STATES, Passes
 
 NEAR_BY = 0.05  # of the longer side: how far off random pixels are tried
@@ -24,15 +26,17 @@ def sweep(
     carried: list[wgpu.GPUTexture],
     level: int,
     count: int,
+    most: np.ndarray,
 ) -> wgpu.GPUTexture:
     """New states after `count` sweeps; the given ones are taken back.
 
-    `matched`: the bindings of match.wgsl; `carried`: the near frame's states, and the far one's.
+    `matched`: the bindings of match.wgsl; `carried`: the near frame's states, and the far one's;
+    `most`: the homography of most of the picture to the near frame, on this level.
     """
     after = passes.take(size, STATES)
     for number in range(PASSES * count):
         is_known = number not in (0, 2)  # the first of a colour finds out what its states cost
-        half_sweep(passes, size, matched, states, carried, level, number, after, is_known)
+        half_sweep(passes, size, matched, states, carried, level, number, after, most, is_known)
         states, after = after, states
     passes.give(after)
     return states
@@ -47,6 +51,7 @@ def half_sweep(
     level: int,
     number: int,
     output: wgpu.GPUTexture,
+    most: np.ndarray,
     is_known: bool = False,
 ) -> None:
     """Pass `number` of the sweeps: one colour of the chessboard, propagated or refined.
@@ -55,7 +60,8 @@ def half_sweep(
     """
     entry = "refine" if number % 2 else "propagate"
     half = -(-size[0] // 2), size[1]
-    _run(passes, entry, size, half, matched, states, carried, level, number, output, is_known)
+    args = level, number, output, most, is_known
+    _run(passes, entry, size, half, matched, states, carried, *args)
 
 
 def polish(
@@ -66,11 +72,11 @@ def polish(
     output: wgpu.GPUTexture,
 ) -> None:
     """Steps of every pixel on the finest level that improve its match."""
-    _run(passes, "polish", size, size, matched, states, [], 0, 0, output, False)
+    _run(passes, "polish", size, size, matched, states, [], 0, 0, output, np.eye(3), False)
 
 
 def _run(
-    passes, entry, size, grid, matched, states, carried, level, number, output, is_known
+    passes, entry, size, grid, matched, states, carried, level, number, output, most, is_known
 ) -> None:
     assert 2 * wgsl.load("flow/sweep.wgsl").constant("REFINED") <= SEEDS
     uniform = passes.uniform(
@@ -84,6 +90,7 @@ def _run(
         most_apart=MOST_APART if level else FINEST_APART,
         carried=len(carried),
         is_known=is_known,
+        most=columns(most),
     )
     passes.run(
         "sweep.wgsl",

@@ -14,6 +14,7 @@ struct Sweep {
     most_apart: f32,    // differences from neighbours beyond this [px] cost no more
     carried: u32,       // how many of the carried states there are
     is_known: u32,      // 1 if `costs` tells what the states of this colour cost
+    most: mat4x4f,      // homography of most of the picture to the near frame: columns of 3, from pixels to pixels
 }
 
 @group(1) @binding(5) var<uniform> sweep: Sweep;
@@ -38,12 +39,16 @@ const SLOPE_STEP: f32 = 0.05;       // greatest of the first of them
 const SLOPE_FALL: f32 = 0.4;        // each is so much of the one before
 const BEND_TRIES: u32 = 2u;         // random changes of the bend, with the flow or without
 const REFINED: u32 = 11u;           // two planes, the changes, no slope, no bend
+const ASIDE_PRICE: f32 = 0.4;       // of moving otherwise than most, per longer side of the picture, where a patch
+const PLAIN: f32 = 0.0009;          // has gradients: more than this, squared; its neighbours tell how a plain one moves
 const SAME: f32 = 0.001;            // states closer than this are not tried again [px]
 
 var<private> around: array<vec4f, NEIGHBOURS>;      // flow and bend of the neighbours, each moved here
 var<private> around_weight: array<f32, NEIGHBOURS>; // all of them sum up to SMOOTHNESS
+var<private> most: vec2f;           // the flow of most of the picture here [px],
+var<private> aside_price: f32;      // and the price of differing from it by 1 px
 
-/// Each neighbour's state along its own slope, and its weight by likeness.
+/// Each neighbour's state along its own slope, and its weight by likeness; and what most of the picture does.
 fn load_neighbours(px: vec2i) {
     let color = textureLoad(here, px, 0, 0).rgb;
     var total = 1e-6;
@@ -59,11 +64,22 @@ fn load_neighbours(px: vec2i) {
         total += weight;
     }
     for (var k = 0u; k < NEIGHBOURS; k++) { around_weight[k] *= SMOOTHNESS / total; }
+    let x = vec2f(px) + 0.5;
+    let at = sweep.most * vec4f(x, 1.0, 0.0);
+    most = at.xy / at.z - x;
+    var square = 0.0;
+    for (var k = 0u; k < SAMPLES; k++) {
+        let gradient = vec2f(patch0[k].w, patch1[k].x) - 0.5;
+        square += patch1[k].w * dot(gradient, gradient);
+    }
+    aside_price = ASIDE_PRICE * square / (square + PLAIN) / f32(max(frame.size.x, frame.size.y));
 }
 
-/// Cost of differing from the neighbours.
+/// Cost of differing from the neighbours, and from most of the picture: where a thing repeats, or has no end along its
+/// way, this decides.
 fn smoothness(state: State) -> f32 {
-    var sum = 0.0;
+    let aside = abs(state.flow - most);
+    var sum = aside_price * (aside.x + aside.y);
     for (var k = 0u; k < NEIGHBOURS; k++) {
         let d = abs(around[k] - vec4f(state.flow, state.bend));
         sum += around_weight[k] * min(d.x + d.y + BEND_SHARE * (d.z + d.w), sweep.most_apart);
