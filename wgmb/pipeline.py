@@ -44,10 +44,10 @@ class Blur:
 
     `method`: a name in METHODS; its own options follow as keywords.
     `shutter`: degrees (180 is open for half a frame interval), or a Shutter.
-    `samples`: taps per pixel, 1 to 4096 (gather without a GPU: 512); by default 16, or the
+    `samples`: samples per pixel, 1 to 4096 (gather without a GPU: 512); by default 16, or the
     method's own default; "auto" uses one per pixel of blur length, at most 64 (methods with one
     count for the whole image use 64).
-    `jitter`: 0 to 1, trades banding for noise: random shift of a tap within its share of time.
+    `jitter`: 0 to 1, trades banding for noise: random shift of a sample within its share of time.
     `max_blur`: maximum blur length [px]; None: unlimited.
     `device`: your own wgpu device, the name of an adapter, or None for the best one.
     `output`: texel format of the result, rgba32float or rgba16float.
@@ -348,7 +348,7 @@ class Blur:
         return picture.astype("f4", copy=False), dict(zip(names, planes, strict=True))
 
     def motion(self, frame: Frame) -> np.ndarray:
-        """The motion that methods follow: (height, width, 4) to_prev, to_next [px]."""
+        """The motion that the methods follow: (height, width, 4), to_prev and to_next [px]."""
         if "motion" not in frame.has:
             raise InputError("no motion: pass to_next, to_prev, or depth and a camera")
         with self._working(frame.size):

@@ -37,15 +37,15 @@ from .windows import Placement
 class Clip:
     """Reader of a frame sequence or a single image.
 
-    Iterating gives Frames. `numbers` are the requested frames, `on_disk` all existing ones.
-    `finding` describes the detected vector convention, `stray_cuts` has the cuts given that no
-    frame on disk has. Of the frames read so far, `cuts` has those after a camera cut, `unread` the
-    neighbours that could not be read, `sizes` the sizes, `notes` lines that a user should know,
-    each with its frames, and `absent` the masks by index or id (`IndexOB=4`,
-    `CryptoObject=0x...`) that none of them has.
+    Iteration gives Frames. `numbers` are the requested frames, `on_disk` all existing ones.
+    `finding` describes the detected vector convention; `stray_cuts` are the given cuts at frames
+    that do not exist. Of the frames read so far, `cuts` are those after a camera cut, `unread` the
+    neighbours that could not be read, `sizes` the sizes, `notes` messages for the user, each with
+    its frames, and `absent` the masks by index or id (`IndexOB=4`, `CryptoObject=0x...`) that none
+    of them has.
 
     Stereo frames have `views`. Each view has its own picture, vectors, depth and masks; cuts and
-    what the vectors mean are settled on the default view.
+    the vector convention are determined from the default view.
     """
 
     def __init__(
@@ -62,12 +62,13 @@ class Clip:
         settled: Settled | None = None,
     ):
         """`frames`: "1-100x2", "1,3,5-8"; by default all existing ones, without gaps unless
-        `skip_missing`. `cuts`: frames that begin a new shot, in the same form, or a file that has
-        them (see CutList), beside those that are detected. `view`: the only view to blur; by
-        default all. `space`: colour space of the pictures, instead of what their files say; what
-        is not linear is made so. `max_mb`: largest decoded size of a file in megabytes. In
-        `pattern`, %V stands for the view: one file a view. `settled`: what another Clip of the
-        same sequence has found out, `settle()`, instead of looking again.
+        `skip_missing`. `cuts`: frames that begin a new shot, in the same form, or a file with them
+        (see CutList), in addition to the detected ones. `view`: the only view to blur; by default
+        all. `space`: colour space of the pictures, instead of that in their files; pictures that
+        are not linear are converted. `max_mb`: largest decoded size of a file in megabytes. In
+        `pattern`, %V stands for the view, with one file for each. `settled`: the findings of
+        another Clip of the same sequence (`settle()`), which are then not determined again.
+        InputError for missing files, gaps and settings that do not fit.
         """
         self._space, self._settled, self._max_mb = space, settled, max_mb
         self._cut_list = CutList(cuts or "")
@@ -110,10 +111,10 @@ class Clip:
             self.notes |= {text: list(self.numbers) for text in settled.notes}
 
     def settle(self) -> Settled:
-        """Find out all that depends on the whole sequence; `Clip(settled=)` takes it.
+        """Determine all findings that depend on the whole sequence, for `Clip(settled=)`.
 
-        Parts of the sequence that are blurred by themselves then give the same pictures as the
-        whole, whatever lies on disk by then.
+        Parts of the sequence that are blurred separately then give the same pictures as the whole,
+        even if the files on disk have changed.
         """
         if self._settled is None:
             self.check_names()
@@ -149,16 +150,16 @@ class Clip:
         return f'Clip("{pattern}", {frames}{vectors})'
 
     def move_by(self, motion: MotionSource) -> None:
-        """Take motion from the pictures (see wgmb/flow) where the files hold none."""
+        """Find motion in the pictures (see wgmb/flow) if the files hold none."""
         self._maker.picture_motion = PictureMotion(self._stored, motion)
         self._stored.around = FAR
         self._around.forget_all()
 
     def expand_highlights(self, highlights: float) -> None:
-        """Let white be so many times white in frames, for blurs alone (see wgmb/highlights.py).
+        """Brighten white by this factor in frames, for the blur alone (see wgmb/highlights.py).
 
-        `blurred` and `blur_sequence` compress it again. InputError unless it is 1 (off) to 32. A
-        frame that holds light above white cannot be read then.
+        `blurred` and `blur_sequence` compress it again. InputError unless it is 1 (off) to 32.
+        Frames that hold light above white can then not be read.
         """
         check_highlights(highlights)
         self._maker.highlights = highlights
@@ -218,7 +219,7 @@ class Clip:
         """Return the inputs of frame `number` apart from the settings, as values for JSON.
 
         Name, size [bytes] and time of change [ns] of every file, those of up to `reach` frames
-        before and after too; and what the vectors were found to mean.
+        before and after too; and the detected vector convention.
         """
         meaning = self._meaning.found.vectors
         return {
@@ -227,18 +228,18 @@ class Clip:
         }
 
     def source(self, number: int, view: str | None = None) -> FrameFile:
-        """Frame `number` as stored: `view`, or by default the one chosen, or the default one."""
+        """Frame `number` as stored: `view`, by default the chosen view, or else the default one."""
         return self._stored.source(number, view)
 
     def sources(self, number: int) -> list[FrameFile]:
         """The views of frame `number` that are to be blurred, the default one first.
 
-        All that have a picture, or the one chosen.
+        These are all views with a picture, or the chosen one.
         """
         return self._stored.sources(number)
 
     def leader(self, number: int) -> FrameFile:
-        """The view on which is settled what all views of a frame share: the default one."""
+        """The default view, from which the findings for all views of a frame are determined."""
         return self._stored.leader(number)
 
     def forget(self, number: int) -> None:
@@ -253,7 +254,7 @@ class Clip:
 
     @property
     def is_finding_notable(self) -> bool:
-        """True if the vectors do not mean what their names say, or should be checked."""
+        """True if the vectors do not follow the convention of their names, or should be checked."""
         return self._meaning.found.notable
 
     def vector_mask(self, source: FrameFile) -> str | None:
@@ -263,7 +264,7 @@ class Clip:
     def neighbour(self, source: FrameFile, side: int) -> FrameFile | None:
         """The same view of the frame before (`side` -1) or after (1).
 
-        None beyond a known cut, where there is no such file, and where it cannot be read.
+        None beyond a known cut, and if the file does not exist or cannot be read.
         """
         return self._stored.neighbour(source, side)
 
@@ -278,10 +279,10 @@ class Clip:
         """`frame`, and the same view of `reach` frames before and after it, as its `prev` and
         `next`, and theirs, as far as they can be read; none beyond a camera cut.
 
-        Frames whose files hold parts of the picture (data windows) come on one canvas, in
-        Frame.window; `extent`, the Blur's, makes room there for streaks that lead out of them.
-        Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
-        Blur, once, though it is shown in three, or five.
+        Frames whose files hold parts of the picture (data windows) are placed on one canvas
+        (Frame.window); `extent`, that of the Blur, makes room for streaks that leave them. The
+        arrays are read-only (Frame.locked): a frame is made, and uploaded by a Blur, only once,
+        although three or five outputs use it.
         """
         return self._around.between(source, extras(normal, light), extent, reach)[0]
 
@@ -310,7 +311,7 @@ class Clip:
         """Return the Frame of `source`; without `picture`, its colour is 0; without `normal`, it
         has no normals; without `light`, no passes of light.
 
-        Motion that leads across a camera cut is left out (see cuts.jumps).
+        Motion across a camera cut is omitted (see cuts.jumps).
         """
         return self._around.frame(source, picture, extras(normal, light))
 
@@ -329,7 +330,7 @@ class Clip:
 
     @property
     def unseen(self) -> list[str]:
-        """Masks by name that manifests list, and no pixel of the frames read so far has."""
+        """Masks by name that are in manifests, but in no pixel of the frames read so far."""
         return self._masks.unseen
 
     @property
@@ -338,15 +339,15 @@ class Clip:
         return self._masks.absent
 
     def check_names(self) -> None:
-        """InputError where a mask names an object that no frame's Cryptomatte has.
+        """InputError if a mask names an object that no frame's Cryptomatte has.
 
-        The headers of the frames are searched once, up to the first that has the name.
+        The headers of the frames are searched once, up to the first with the name.
         """
         self._masks.check_names()
 
     def check_layers(self) -> None:
-        """InputError where a layer that is asked for by its name is in none of the frames.
+        """InputError if a layer that is given by its name is in none of the frames.
 
-        The first frame is looked at, and only if it lacks one the middle and the last one.
+        The first frame is examined, and the middle and the last one only if it lacks a layer.
         """
         self._maker.check_layers()
