@@ -206,6 +206,7 @@ def test_the_picture_at_a_time_is_found_exactly():
         (["SHOT", "--begin", "1"], "--begin is for videos"),
         (["CLIP", "--depth", "Z"], "--depth is for rendered frames, a video has no layers"),
         (["CLIP", "--scale", "a.png"], "--scale is for rendered frames"),
+        (["CLIP", "--from", "acescg"], "--from is for rendered frames, a video says"),
         (["CLIP", "--begin", "9"], "has no pictures in this range"),
         (["CLIP", "--highlights", "90"], "--highlights must be 1 to 32"),
         (["CLIP", "--workers", "3"], "--workers is for `wgmb blur`: the viewer writes no files"),

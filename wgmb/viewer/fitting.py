@@ -36,6 +36,8 @@ def check_said(state: State, said: Collection[str]) -> None:
         if state.is_scene and (name in INPUTS or name == "from_"):
             kinds = "frames and videos" if name in OF_VIDEOS else "frames"
             raise InputError(f"{option} is for {kinds}, {state.source} is a scene")
+        if state.is_video and name == "from_":
+            raise InputError(f"{option} is for rendered frames, a video says what its colours are")
         if state.is_video:
             _check_layers(name)
 
