@@ -143,13 +143,10 @@ HARD_NOTES = """
 
 ## Where gather loses
 
-* `grass`: every other method is nearer to the truth in dB, `reproject` by 2 to 4 dB and in FLIP
-  too. The blades are thinner than a pixel: nearly every pixel is a silhouette, and its one depth
-  and one vector stand for several blades.
-* `car`: `reproject` is 0.2 to 0.5 dB better, `gather` in FLIP. The error is in the wheels, which
-  turn by 86° per frame: positions in three frames do not tell a path that bends so far.
-* `swarm` at 180°: `reproject` is 0.1 dB better. Small balls that overtake one another hide each
-  other in all three frames.
+* `grass` at 180°: `gather` is no better than `reproject`. The blades are thinner than a pixel:
+  nearly every pixel is a silhouette, its one depth and one vector stand for several blades, and
+  `gather` separates none of them there.
+* `swarm`: small balls that overtake one another hide each other in all three frames.
 * `fireworks`: 16 samples leave a fast spark as a row of dots. Depth and vectors of transparent
   veils are those of the veil alone.
 * `glass`: what glass refracts and a mirror shows moves otherwise than its surface; only
