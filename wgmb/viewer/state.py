@@ -332,10 +332,8 @@ class State:
             raise InputError(f"settings: {source!r} is {'' if on_disk else 'not '}a built-in scene")
         given.pop("time", None)
         state = State(source, **saved.values(given, tables.get("view", {}), State, on_disk=on_disk))
-        if state.is_video and ("fps" not in given or state.own_times):
-            state = replace(state, fps=float(video_time.own_rate(state)))
-        if state.is_video and "frames" not in {*given, *tables.get("view", {})}:
-            state = replace(state, frames=frames_of(source, video_time.most_mb(state)))
+        if state.is_video:
+            state = video_time.completed(state, {*given, *tables.get("view", {})})
         Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
         video_time.check(state)
         saved.check_words(state, method=METHODS, compare=COMPARE, tone=TONES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -62,6 +63,15 @@ def rate(state: State) -> Fraction:
     if state.is_video and state.fps == float(own := own_rate(state)):
         return own
     return Fraction(state.fps).limit_denominator(1001)
+
+
+def completed(state: State, said: Collection[str]) -> State:
+    """The same with the video's own rate and all of its pictures, unless others were said."""
+    if "fps" not in said or state.own_times:
+        state = replace(state, fps=float(own_rate(state)))
+    if "frames" not in said:
+        state = replace(state, frames=frames_of(state.source, most_mb(state)))
+    return state
 
 
 def output(state: State) -> Output:
