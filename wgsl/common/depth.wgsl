@@ -1,4 +1,4 @@
-// What counts as "no depth": one value that every pass reads, writes and compares.
+// The value of "no depth": one value that every pass reads, writes and compares.
 //#include common/finite.wgsl
 
 // Depth of a pixel in which nothing was hit. A power of two: its last bits are 0, so that flags may be packed

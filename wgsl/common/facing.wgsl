@@ -1,4 +1,4 @@
-// Whether a surface faces the way it moves, as far as the image plane shows it.
+// Facing of surfaces: leading ones face the way they move, as far as the image plane shows it.
 //#include common/finite.wgsl
 
 struct Facing {
@@ -10,7 +10,7 @@ struct Facing {
 const MIN_SLOPE: f32 = 2e-5;    // share of depth per pixel under which a slope is taken for rounding
 const MIN_COSINE: f32 = 1e-3;   // under which a normal counts as being at a right angle to the motion
 
-/// Whether what moves by `motion` [px] moves the way its surface faces, by the normal in the world.
+/// True if a surface that moves by `motion` [px] faces that way, by its normal in the world.
 fn normal_faces_motion(facing: Facing, normal: vec3f, motion: vec2f) -> bool {
     let n = vec2f(dot(facing.right.xyz, normal), -dot(facing.up.xyz, normal));
     return dot(n, motion) > MIN_COSINE * length(normal) * length(motion);

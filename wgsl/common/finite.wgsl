@@ -1,4 +1,4 @@
-// Whether numbers are finite, by their bits: compilers fold `x != x` to false.
+// Tests of numbers for being finite, by their bits: compilers fold `x != x` to false.
 
 fn is_finite(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
@@ -7,7 +7,7 @@ fn is_finite(x: f32) -> bool {
 /// Colours beyond this count as infinite: sums of weighted ones shall not overflow [linear].
 const BRIGHTEST: f32 = 1e30;
 
-/// Whether a colour has a weight.
+/// True if a colour has a weight.
 fn is_color(v: vec4f) -> bool {
     return all((bitcast<vec4u>(v) & vec4u(0x7fffffffu)) <= vec4u(bitcast<u32>(BRIGHTEST)));
 }

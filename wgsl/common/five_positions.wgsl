@@ -51,9 +51,9 @@ fn continued(here: vec2f, there: vec2f) -> vec2f {
     return 2.0 * select(1.0, cosine, turns) * here - there;
 }
 
-/// What turns about a point or swings by an angle w per frame has accelerations around it whose mean is cos w times
-/// its own. Its third term is then larger than five positions alone tell, by a factor that makes the path exact in
-/// the middle between the frames. 1 for all else.
+/// Factor of the third term for bodies that turn about a point or swing by an angle w per frame: the mean of the
+/// neighbouring accelerations is cos w times their own. It makes the path exact in the middle between the frames.
+/// 1 for all other bodies.
 fn turn_factor(here: vec2f, mean: vec2f) -> f32 {
     let length2 = dot(here, here);
     let cosine = dot(mean, here) / max(length2, 1e-12);

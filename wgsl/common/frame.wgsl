@@ -1,4 +1,4 @@
-// What every pass knows of the frame it works on, and the order in which invocations take its pixels.
+// Facts about the frame that every pass reads, and the order in which invocations take its pixels.
 // Group 0 is bound for every pass; group 1 is a pass's own.
 
 struct Frame {

@@ -17,7 +17,7 @@ fn displacement(trajectory: Trajectory, t: f32) -> vec2f {
     return (trajectory.velocity + trajectory.half_acceleration * t) * t;
 }
 
-/// When between `opens` and `closes` it moves slowest: a trajectory that comes back turns there, so that its
+/// The time between `opens` and `closes` at which it moves slowest: a trajectory that comes back turns there, so that its
 /// farthest displacement is at one of these three times.
 fn slowest_time(trajectory: Trajectory, opens: f32, closes: f32) -> f32 {
     let v = trajectory.velocity;
@@ -34,7 +34,7 @@ struct Trajectory5 {
     has_kink: bool,             // two straight pieces: |t| instead of t^2
 }
 
-/// How far any trajectory may leave its parabola within a frame interval of its instant, as a share of its half
+/// Largest deviation of any trajectory from its parabola within a frame interval of its instant, as a share of its half
 /// acceleration: a kink by 1/4, a cubic by 0.064 of a change that MOST_CHANGE limits.
 const MOST_BEND: f32 = 0.4;
 

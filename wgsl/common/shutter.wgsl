@@ -1,4 +1,4 @@
-// When the shutter is open, and the sample times of a pixel. It reaches the GPU as numbers, so that any curve
+// The exposure, and the sample times of a pixel. It reaches the GPU as numbers, so that any curve
 // drawn in wgmb/shutter.py works here. Time is in frame intervals; 0 is the frame's own instant.
 //#include common/frame.wgsl
 
@@ -22,7 +22,7 @@ override ADAPTIVE: bool = false;    // one sample per pixel of blur length, up t
 
 const MIN_SAMPLES: u32 = 2u;        // of a pixel that moves, if ADAPTIVE
 
-/// When a frame `offset` intervals away is exposed anywhere in the image: first and last time after
+/// First and last time at which a frame `offset` intervals away is exposed anywhere in the image, after
 /// that frame's own instant [frame intervals].
 fn exposure_window(offset: f32) -> vec2f {
     let first = vec2f(frame.origin) / vec2f(frame.display) - 0.5;
@@ -62,7 +62,7 @@ fn shutter_time(times: SampleTimes, i: u32) -> f32 {
     return time_in_stratum(strata[i], times.shift) + times.delay;
 }
 
-/// When the share `u`, 0..1, of the exposure has passed [frame intervals].
+/// The time at which the share `u`, 0..1, of the exposure has passed [frame intervals].
 fn time_at_share(u: f32) -> f32 {
     let x = u * f32(arrayLength(&strata));
     let i = min(u32(x), arrayLength(&strata) - 1u);

@@ -1,11 +1,11 @@
-// What the features of pyramid.wgsl are worth when two pixels are compared.
+// Weights of the features of pyramid.wgsl in the comparison of two pixels.
 
 const LUMA: vec3f = vec3f(0.299, 0.587, 0.114);     // ITU-R BT.601
 const DIRECTION_SCALE: f32 = 0.25;      // directions are stored this many times too large, inverted
 const LIKENESS: f32 = 300.0;            // how fast the weight falls with the difference of display colours
 const LEAST_WEIGHT: f32 = 0.02;         // of a pixel unlike the centre
 
-/// How far apart two pixels are: the sum of absolute differences of their 7 features.
+/// Difference of two pixels: the sum of absolute differences of their 7 features.
 fn difference(a0: vec4f, a1: vec3f, b0: vec4f, b1: vec3f) -> f32 {
     return dot(abs(a0 - b0), vec4f(1.0)) + dot(abs(a1 - b1), vec3f(1.0, DIRECTION_SCALE, DIRECTION_SCALE));
 }

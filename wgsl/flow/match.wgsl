@@ -1,4 +1,4 @@
-// How badly a state explains a pixel: its patch against the two other frames, each of which may hide it.
+// Cost of a state for a pixel: its patch against the two other frames, each of which may hide it.
 //#include common/frame.wgsl
 //#include flow/features.wgsl
 //#include flow/state.wgsl
@@ -98,7 +98,7 @@ fn sample_place(to: Target, offset: vec2f) -> vec2f {
     return (to.at + offset + sloped(to.slope, offset) + 0.5 + BESIDE_CENTRE) / vec2f(frame.size);
 }
 
-/// What sample `k` adds to the cost if this is found in the other frame.
+/// Addition of sample `k` to the cost if this is found in the other frame.
 fn sample_cost(k: u32, found0: vec4f, found1: vec4f) -> f32 {
     let d = difference(patch0[k], patch1[k].xyz, found0, found1.xyz);
     return patch1[k].w * min(d, MOST_DIFFERENCE);
@@ -147,7 +147,7 @@ fn far_row(to: Target, row: u32, before: f32) -> f32 {
     return sum;
 }
 
-/// What a state costs in itself.
+/// Cost of a state in itself.
 fn price(state: State) -> f32 {
     let bend_price = min(BEND_PRICE * (abs(state.bend.x) + abs(state.bend.y)), MOST_BEND_PRICE);
     return SLOPE_PRICE * dot(abs(state.slope), vec4f(1.0)) + bend_price;

@@ -1,4 +1,4 @@
-// What flow believes of a pixel: one displacement with its slope, which holds for both other frames but for a bend.
+// State of a pixel in flow: one displacement with its slope, which holds for both other frames but for a bend.
 
 struct State {
     flow: vec2f,        // displacement to the near frame [px]

@@ -1,4 +1,4 @@
-// What the filter over tiles reads of every pixel, in one texture: direction and length of its blur, and its depth.
+// Inputs of the filter over tiles, in one texture: direction and length of its blur, and its depth.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include common/shutter.wgsl

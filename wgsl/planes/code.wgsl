@@ -1,4 +1,4 @@
-// What the stored samples of a picture mean.
+// Meaning of the stored samples of a picture.
 
 struct Code {
     x: vec4f,           // rows of a matrix and an offset: signals from samples to decode, samples from signals to encode

@@ -9,7 +9,7 @@ const BRICKS: u32 = 3u;
 const DOTS: u32 = 4u;
 const GROUND: u32 = 5u;         // of a backdrop
 
-// How a pattern lies on a body.
+// Mappings of a pattern onto a body.
 const FLAT: u32 = 0u;           // on its faces
 const BALL: u32 = 1u;           // round a sphere
 const TUBE: u32 = 2u;           // round a cylinder

@@ -1,4 +1,4 @@
-// What the frames before and after a frame tell of it: where a surface goes beyond them, and backgrounds that it hides.
+// Information from the frames before and after a frame: paths of surfaces beyond them, and backgrounds that it hides.
 // Where there is no such frame its textures are empty, and not read.
 //#include common/depth.wgsl
 //#include common/five_positions.wgsl

@@ -102,7 +102,7 @@ fn size_lists(@builtin(workgroup_id) group: vec3u) {
     atomicStore(&lists[section + 2u], (wanted + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW);
 }
 
-/// Whether one step from the displacement `start` leads to the `solution`, not by way of an edge; or leaves the image.
+/// True if one step from the displacement `start` leads to the `solution`, not by way of an edge; or leaves the image.
 fn converges_to(x: vec2f, start: vec2f, solution: vec2f, u: f32, layer: u32) -> bool {
     let state = warp_step(x, start, u, layer);
     return state.residual2 >= INFINITE || (depth_in(state.word) > 0.0 && same_solution(state.d, solution));

@@ -159,7 +159,7 @@ fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(work
     if is_edge(here) && !is_in_crowd(px) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
 }
 
-/// Whether an edge of the 3 x 3 is separated, where there are edges: all are, but in crowds.
+/// True if an edge of the 3 x 3 is separated, where there are edges: all are, but in crowds.
 fn is_near_separated(px: vec2i) -> bool {
     let low = clamped(px - 1);
     let high = clamped(px + 1);
@@ -252,7 +252,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     var seen_around = false;    // its colour is that of neighbouring frames
 
     let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= NO_DEPTH);    // depth of neither
-    // What is behind is as deep as the pixel itself, or as the nearest background beside it, above or below.
+    // The back is as deep as the pixel itself, or as the nearest background beside it, above or below.
     var behind_z = select(INFINITE, z, z >= between);
     for (var i = 1; i < select(0, 9, behind_z >= INFINITE); i += 2) {
         let z_there = flagged_depth(flags_at(px + vec2i(i % 3, i / 3) - 1));
@@ -350,7 +350,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
             }
         }
     }
-    // How the paths of the two go on is told by the nearest pure pixels: filtered vectors lead to mixtures.
+    // The bends of the two paths come from the nearest pure pixels: filtered vectors lead to mixtures.
     let front_path = with_bend_of(front_place.at, front_motion);
     let back_path = with_bend_of(back_place.at, back_motion);
     textureStore(colors, px, FRONT, front);
@@ -362,7 +362,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     textureStore(mattes, px, pack_matte(Matte(z, has_back, coverage, coverage * counts)));
 }
 
-/// Whether some vector of the 3 x 3 is between those of the two surfaces: the renderer has filtered them.
+/// True if some vector of the 3 x 3 is between those of the two surfaces: the renderer has filtered them.
 fn are_filtered(px: vec2i, back: vec4f, axis: vec4f) -> bool {
     var result = false;
     for (var i = 0; i < 9; i++) {

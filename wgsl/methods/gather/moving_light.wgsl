@@ -42,7 +42,7 @@ fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
     return vec4f(select(vec3f(0.0), there.a * change, same), 0.0);
 }
 
-/// How far the light of such a sample is not known, from 0 to 1.
+/// Uncertainty of the light of such a sample, from 0 to 1.
 fn light_unknown(at: vec2f, layer: u32, t: f32, duration: f32) -> f32 {
     var here = at;
     if layer > 0u {
@@ -52,7 +52,7 @@ fn light_unknown(at: vec2f, layer: u32, t: f32, duration: f32) -> f32 {
     return select(0.0, 1.0 - light_during(here, t, duration).a, is_inside(here));
 }
 
-/// What is added on a place of this frame [px]: the mean over a time. a: how sure it is.
+/// Addition at a place of this frame [px]: the mean over a time. a: its confidence.
 fn light_during(at: vec2f, t: f32, duration: f32) -> vec4f {
     let uv = at / vec2f(frame.size);
     let last = f32(light_nodes.count) - 1.0;

@@ -29,7 +29,7 @@ const SOLUTION_TOLERANCE: f32 = 0.75;   // displacements closer than this [px] i
 const NEIGHBOUR_DEPTH_BIAS: f32 = 1.1;  // factor of depths in neighbouring frames: the frame's own sample is preferred
 const TRUSTED_TIME: f32 = 0.25; // up to here from its instant the frame itself is enough, if it shows anything [frame intervals]
 
-// What the classification writes: a bit per time, in words, of every block of pixels.
+// Results of the classification: a bit per time, in words, of every block of pixels.
 const BLOCK: u32 = 4u;          // side [px]
 const BLOCKS_PER_GROUP: u32 = CELL_TILES * TILE * STRIP_HEIGHT / (BLOCK * BLOCK);   // of a workgroup of the resolve
 const TIMES_PER_WORD: u32 = 32u;
@@ -64,7 +64,7 @@ fn candidates_of(tile: vec2u, f: u32, a: Candidates, b: Candidates, c: Candidate
     return result;
 }
 
-/// Which candidates, a bit each, may be in the tile at the time `u` and nearer than `depth`.
+/// The candidates, a bit each, that may be in the tile at the time `u` and nearer than `depth`.
 fn may_be_visible(candidates: Candidates, u: f32, depth: f32) -> u32 {
     let a = unpack2x16float(candidates.times.x);
     let b = unpack2x16float(candidates.times.y);
@@ -116,7 +116,7 @@ fn offset_of(f: u32) -> f32 {
     return select(sources.far_offsets.x, sources.far_offsets.y, f > sources.count);
 }
 
-/// Whether a layer is of a frame beyond the neighbours.
+/// True if a layer is of a frame beyond the neighbours.
 fn is_far(layer: u32) -> bool {
     return FAR && layer >= 2u * sources.count;
 }
@@ -126,7 +126,7 @@ fn far_of(t: f32, second: bool) -> u32 {
     return sources.count + select(0u, 1u, sources.far_count == 2u && (t > 0.0) != second);
 }
 
-/// Whether nothing moves that may come into a tile.
+/// True if nothing moves that may come into a tile.
 fn is_static_tile(a: Candidates, b: Candidates, c: Candidates) -> bool {
     return max(a.header.z, max(b.header.z, c.header.z)) < STATIC_EPSILON;
 }
@@ -137,7 +137,7 @@ fn sample_times(x: vec2f, shift: f32, a: Candidates, b: Candidates, c: Candidate
     return with_adaptive_count(shutter_times(x, shift), blur_length);
 }
 
-/// How far the longest candidate motion of frame `f` gets while the shutter is open [px].
+/// Length of the longest candidate motion of frame `f` while the shutter is open [px].
 fn blur_length_of(candidates: Candidates, f: u32) -> f32 {
     let window = abs(exposure_window(sources.offsets[f]));
     return candidates.header.z * (shutter.span.y - shutter.span.x) / max(max(window.x, window.y), 1e-9);
@@ -151,7 +151,7 @@ fn same_solution(a: vec2f, b: vec2f) -> bool {
     return all(abs(a - b) < vec2f(SOLUTION_TOLERANCE));
 }
 
-/// Which of the seeds, a bit each, are the solution `d`.
+/// The seeds, a bit each, that are the solution `d`.
 fn are_solution(seeds: Seeds, d: vec2f) -> u32 {
     return bits_of((abs(seeds.x - d.x) < vec4f(SOLUTION_TOLERANCE)) & (abs(seeds.y - d.y) < vec4f(SOLUTION_TOLERANCE)));
 }
@@ -176,7 +176,7 @@ fn warp_step(x: vec2f, d: vec2f, u: f32, layer: u32) -> WarpState {
     return WarpState(surface.w, next, select(INFINITE, dot(step, step), is_inside(p)));
 }
 
-/// Whether the iteration has converged, or left the image.
+/// True if the iteration has converged, or left the image.
 fn has_ended(state: WarpState) -> bool {
     return state.residual2 < CONVERGED * CONVERGED || state.residual2 >= INFINITE;
 }

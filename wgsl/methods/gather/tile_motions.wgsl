@@ -49,7 +49,7 @@ fn distance2_to_clusters(trajectory: vec4f, clusters: array<vec4f, 4>, u: f32) -
                min(trajectory_distance2(trajectory, clusters[2], u), trajectory_distance2(trajectory, clusters[3], u)));
 }
 
-/// Which of the clusters is nearest; several if they are equally near.
+/// The nearest of the clusters; several if they are equally near.
 fn nearest_cluster(trajectory: vec4f, clusters: array<vec4f, 4>, u: f32) -> vec4<bool> {
     let d = vec4f(trajectory_distance2(trajectory, clusters[0], u), trajectory_distance2(trajectory, clusters[1], u),
                   trajectory_distance2(trajectory, clusters[2], u), trajectory_distance2(trajectory, clusters[3], u));
@@ -285,13 +285,13 @@ fn source_tile(at: vec2i, here: vec2i) -> SourceTile {
     return SourceTile(at, off, may_reach, select(0u, u32(textureLoad(tile_motions, at, HEADER, 0).x), may_reach));
 }
 
-/// Whether the sweep of a tile, by the box of its displacements, may overlap the tile that is `off` [px] away.
+/// True if the sweep of a tile, by the box of its displacements, may overlap the tile that is `off` [px] away.
 fn sweep_overlaps(box: vec4f, off: vec2f) -> bool {
     let margin = f32(TILE) + 2.0;
     return all(off + margin > box.xy) && all(off - margin < box.zw);
 }
 
-/// When a tile moving along `trajectory` overlaps the one that is `off` [px] away, in shares of the `window`: t_enter,
+/// Times at which a tile moving along `trajectory` overlaps the one that is `off` [px] away, in shares of the `window`: t_enter,
 /// t_exit; t_exit < t_enter if it never does. A slab test of the line from its first to its last position
 /// against a square, which is larger by the greatest distance of the trajectory from that line.
 fn sweep_interval(trajectory: vec4f, window: vec2f, off: vec2f) -> vec2f {
