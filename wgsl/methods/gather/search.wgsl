@@ -31,7 +31,7 @@ const TRUSTED_TIME: f32 = 0.25; // up to here from its instant the frame itself 
 
 // Results of the classification: a bit per time, in words, of every block of pixels.
 const BLOCK: u32 = 4u;          // side [px]
-const BLOCKS_PER_GROUP: u32 = CELL_TILES * TILE * STRIP_HEIGHT / (BLOCK * BLOCK);   // of a workgroup of the resolve
+const BLOCKS_PER_GROUP = CELL_TILES * TILE * STRIP_HEIGHT / (BLOCK * BLOCK);   // of a workgroup of the resolve
 const TIMES_PER_WORD: u32 = 32u;
 
 struct Candidates {     // motions that may bring something of one frame into a tile, the nearest first
