@@ -101,8 +101,7 @@ class Clip:
             passes.holdout, passes.scale, patterns, self.numbers, self._max_mb, files.of_views
         )
         self._meaning = Meaning(stored, settled.finding if settled else None)
-        others = passes.camera, self._cut_list.path
-        self._ingredients = Ingredients(files, self._masks, others)
+        self._ingredients = Ingredients(files, self._masks, (passes.camera, self._cut_list.path))
         self._maker = FrameMaker(stored, self._meaning, self._masks, self._cameras)
         self._around = Neighbours(stored, self._maker, self._cut_list.is_search)
         if settled is not None:
@@ -140,13 +139,11 @@ class Clip:
         return made
 
     def __repr__(self) -> str:
-        asked = self.passes.vectors.convention
-        known = self._meaning.known
-        name = known.vectors.convention if known and known.vectors else asked
+        known = self._meaning.known or self.passes
+        name = (known.vectors or self.passes.vectors).convention
         vectors = {"auto": "", "none": ", no vectors"}.get(name, f", {name} vectors")
         pattern = self.pattern if len(self.pattern) <= 200 else f"...{self.pattern[-200:]}"
-        numbers = self.numbers
-        frames = f"frame{'s' if len(numbers) > 1 else ''} {frame_list(numbers)}"
+        frames = f"frame{'s' if len(self.numbers) > 1 else ''} {frame_list(self.numbers)}"
         return f'Clip("{pattern}", {frames}{vectors})'
 
     def move_by(self, motion: MotionSource) -> None:
@@ -296,10 +293,9 @@ class Clip:
     ) -> tuple[Frame, Placement]:
         """Input of a Blur of this `extent`: with_neighbours, or `frame` for a `reach` of 0; and its
         placement."""
-        also = extras(normal, light)
         if not reach:
-            return self._around.alone(source, also, extent)
-        return self._around.between(source, also, extent, reach)
+            return self._around.alone(source, extras(normal, light), extent)
+        return self._around.between(source, extras(normal, light), extent, reach)
 
     def frame(
         self,
