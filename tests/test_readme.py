@@ -26,6 +26,25 @@ def test_python_blocks_run_in_their_order(tmp_path, monkeypatch):
     assert [image.shape for image in names["images"]] == [(240, 400, 4)] * 3
 
 
+SCORED = {
+    "a camera moving past thin objects": "a_parallax 180°",
+    "fast objects crossing": "c_crossing 180°",
+}
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/engineers/accuracy.md"])
+def test_the_scores_are_those_of_the_page_of_scores(page):
+    rows = re.findall(r"^\| (.*) \|$", (HERE / page).read_text(encoding="utf-8"), re.M)
+    told = {row.split(" | ")[0]: row.split(" | ")[1:] for row in rows}
+    scores = (HERE / "docs/laboratory/blender-scores.md").read_text(encoding="utf-8")
+    table = [line.strip("| ").split(" | ") for line in scores.splitlines() if line[:1] == "|"]
+    columns = [table[0].index(name) for name in ("sharp", "tap 16", "reproject 16", "gather 16")]
+    for name, scene in SCORED.items():
+        row = next(row for row in table if row[0] == scene)
+        pairs = [map(float, row[i].split(" / ")) for i in columns]
+        assert told[name] == [f"{psnr:.1f} / {flip:.3f}" for flip, psnr in pairs]
+
+
 def test_every_option_that_is_named_exists():
     known = {"--version", "--help"}
     program = app.make_app()
