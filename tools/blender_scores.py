@@ -131,15 +131,15 @@ def page(device, table: str, sections: list[str]) -> str:
 
 
 HARD_NOTES = """
-## What they show
+## Results
 
-* `shadows`, `shadows_pan`, `reflections`: with passes of light, `gather` follows what moves over
-  the ground. At 360° the error of `shadows` is halved, by 7 dB. The checkered box in the mirror
-  of `reflections` moves by more than its own pattern and stays too sharp.
-* `slant`: no shadow moves; looking for one costs nothing there. In `car` it costs 0.0002 to
+* `shadows`, `shadows_pan`, `reflections`: with passes of light, `gather` follows the light that
+  moves over the ground. At 360° it halves the FLIP of `shadows`, and gains 7 dB. The checkered box
+  in the mirror of `reflections` moves by more than its own pattern and stays too sharp.
+* `slant`: no shadow moves, and the search for one costs nothing. In `car` it costs 0.0002 to
   0.0003 FLIP, in `glass` at 180° 0.0003 (and gains 0.3 dB).
-* `--shading frames`, without the passes, wins most of `shadows`, and loses on `reflections` and
-  `slant`.
+* `--shading frames`, without the passes, gains most of this in `shadows`, and loses in
+  `reflections` and `slant`.
 
 ## Where gather loses
 
@@ -149,8 +149,8 @@ HARD_NOTES = """
 * `swarm`: small balls that overtake one another hide each other in all three frames.
 * `fireworks`: 16 samples leave a fast spark as a row of dots. Depth and vectors of transparent
   veils are those of the veil alone.
-* `glass`: what glass refracts and a mirror shows moves otherwise than its surface; only
-  reflections are followed.
+* `glass`: refractions and mirror images do not move like their surface; only reflections are
+  followed.
 """
 
 
