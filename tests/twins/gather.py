@@ -212,7 +212,9 @@ def separate_pixel(color, motion, z, edges, y, x, bends, around_it, far):
         candidates = [motion[p] for p in inner if z[p] < between]
         before = max(candidates, key=lambda m: np.sum((m - behind) ** 2), default=behind)
     way = before - behind
-    if way @ way < 0.25:
+    off = motion[y, x] - behind
+    off = off - np.clip(off @ way / max(way @ way, 1e-9), 0, 1) * way
+    if way @ way < 0.25 or off @ off > way @ way / 16 + 0.25:  # one surface, or a third
         return None
 
     def bend_of(pixels):

@@ -46,7 +46,7 @@ const LEAST_SHARE: f32 = 0.1;
 const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and below 1 less it for 0
 const BETWEEN: f32 = 0.4;       // a vector from 0.1 to 0.9 of the way between two is a mixture of them
 const LEAST_CONTRAST: f32 = 0.05;   // of two colours that tell coverage
-const OFF_AXIS: f32 = 0.25;     // distance of a mixed colour from the line between them, as a share of its length
+const OFF_AXIS: f32 = 0.25;     // distance of a mixed colour or vector from the line between two, as a share of its length
 const MOST_CONTRAST: f32 = 2.0; // of a front layer to the brightest pixel of it around, which may be half background
 const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
 
@@ -311,7 +311,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
 
     if front_side.total > 0.0 && back_side.total > 0.0 && back_side.weight > 0.0 {
         let axis = foreground_motion - background_motion;
-        if dot(axis, axis) >= EDGE_MOTION * EDGE_MOTION {
+        if dot(axis, axis) >= EDGE_MOTION * EDGE_MOTION && is_mixture(own_motion - background_motion, axis) {
             // Where alphas differ they tell coverage better than vectors, which some renderers do not filter.
             let front_alpha = select(front_side.color.a / max(front_side.weight, 1e-9), 1.0, thin);
             let back_alpha = back_side.color.a / back_side.weight;
@@ -360,6 +360,13 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     if has_back { textureStore(colors, px, BACK, back); }     // else nobody reads it
     textureStore(surfaces, px, BACK, pack_surface(back_path, max(back_depth, 0.0), select(SINGLE, told, has_back)));
     textureStore(mattes, px, pack_matte(Matte(z, has_back, coverage, coverage * counts)));
+}
+
+/// True if a vector, from that of the background on, lies near the way to that of the foreground: else it is of a third surface.
+fn is_mixture(own: vec4f, axis: vec4f) -> bool {
+    let length2 = dot(axis, axis);
+    let off = own - clamp(dot(own, axis) / length2, 0.0, 1.0) * axis;
+    return dot(off, off) <= OFF_AXIS * OFF_AXIS * length2 + EDGE_MOTION * EDGE_MOTION;
 }
 
 /// True if some vector of the 3 x 3 is between those of the two surfaces: the renderer has filtered them.
