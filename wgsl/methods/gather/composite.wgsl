@@ -1,0 +1,125 @@
+// Samples composited front to back, edges by the texels of their own surface.
+//#include common/depth.wgsl
+//#include common/frame.wgsl
+//#include methods/gather/moving_light.wgsl
+//#include methods/gather/search.wgsl
+//#include methods/gather/visibility.wgsl
+
+@group(1) @binding(4) var layer_colors: texture_2d_array<f32>;  // front, back per frame; premultiplied by alpha, coverage, weight
+@group(1) @binding(5) var mattes: texture_2d_array<u32>;    // stored as r32uint, rg32uint if WEIGHTED: per frame, see pack_matte()
+@group(1) @binding(6) var second_differences: texture_2d<u32>;  // stored as rgba32uint: of the frame's own front colours
+
+/// The matte of a pixel of frame `f`.
+fn matte_at(px: vec2u, f: u32) -> Matte {
+    return unpack_matte(textureLoad(mattes, px, f, 0), WEIGHTED);
+}
+
+struct Composite {
+    color: vec4f,       // premultiplied by coverage
+    weight: f32,
+    coverage: f32,
+    residual: f32,      // distance from the pixel of what is composited, times its coverage [px]
+    neighbours: f32,    // the part of the coverage that neighbouring frames gave
+    unlit: f32,         // the part whose light moves and is not known
+}
+
+fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
+    (*sum).color += share * one.color;
+    (*sum).weight += share * one.weight;
+    (*sum).coverage += share * one.coverage;
+    (*sum).residual += share * one.residual;
+    (*sum).neighbours += share * one.neighbours;
+    (*sum).unlit += share * one.unlit;
+}
+
+/// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then what is opaque.
+fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite {
+    let front_edge = is_before(visible.front_edge, visible.opaque);
+    let back_edge = front_edge && is_before(visible.back_edge, visible.opaque)
+        && is_behind(visible.back_edge, visible.front_edge);
+    let opaque = visible.opaque.depth < INFINITE;
+    let at = visible.opaque.at;
+    let layer = visible.opaque.layer;
+    var filtered = opaque && visible.opaque.layer % 2u == 0u;   // as a whole, not texel by texel
+    if WEIGHTED { filtered = filtered && is_smooth(surface_of(vec2i(nearest_pixel(at)), layer)); }
+    let parts = u32(front_edge) + u32(back_edge) + u32(opaque && !filtered);
+    var sum = Composite();
+    var n = 0u;
+    loop {
+        var part = visible.opaque;
+        if back_edge && n == 1u { part = visible.back_edge; }
+        if front_edge && n == 0u { part = visible.front_edge; }
+        var one = Composite();
+        var i = 0u;
+        loop {
+            if n < parts { add_texel(&one, part, i); }
+            i++;
+            if n >= parts || i >= 4u { break; }
+        }
+        if part.layer % 2u == 1u && one.coverage > 1e-4 {       // backgrounds are opaque
+            one.color /= one.coverage;
+            one.weight /= one.coverage;
+            one.coverage = 1.0;
+        }
+        if MOVING_LIGHT && n < parts { one.color += one.coverage * moving_light(part.at, part.layer, t, duration); }
+        one.residual = one.coverage * sqrt(part.residual2);
+        var from_around = part.layer > 1u;
+        if CONFIDENCE && part.layer == 1u {
+            from_around = (surface_of(vec2i(nearest_pixel(part.at)), 1u).w & AROUND) != 0u;
+        }
+        one.neighbours = select(0.0, one.coverage, from_around);
+        if CONFIDENCE && MOVING_LIGHT && n < parts {
+            one.unlit = one.coverage * light_unknown(part.at, part.layer, t, duration);
+        }
+        add(&sum, one, 1.0 - sum.coverage);
+        n++;
+        if n >= parts { break; }
+    }
+    if filtered {
+        var counts = 1.0;
+        if WEIGHTED { counts = matte_at(nearest_pixel(at), layer / 2u).weight; }
+        let neighbours = select(0.0, 1.0, visible.opaque.layer > 1u);
+        var color = resampled(at, layer, visible.opaque.layer == 0u);
+        if MOVING_LIGHT { color += moving_light(at, visible.opaque.layer, t, duration); }
+        var one = Composite(color, counts, 1.0, sqrt(visible.opaque.residual2), neighbours, 0.0);
+        if CONFIDENCE && MOVING_LIGHT { one.unlit = light_unknown(at, layer, t, duration); }
+        add(&sum, one, 1.0 - sum.coverage);
+    }
+    return sum;
+}
+
+/// Add texel `i` of the four around a sample, with its bilinear weight, if it is of the same surface.
+fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32) {
+    let front = sample.layer / 2u * 2u;
+    let is_back = sample.layer % 2u == 1u;
+    let corner = floor(sample.at - 0.5);
+    let share = sample.at - 0.5 - corner;
+    let step = vec2f(vec2u(i & 1u, i >> 1u));
+    let px = nearest_pixel(corner + step);
+    let shares = mix(1.0 - share, share, step);
+    let matte = matte_at(px, front / 2u);
+    let from_back = is_back && matte.has_back;
+    let z = matte.depth;
+    // Of a front layer: what is not behind it. Of a back layer: the other back layers, and what lies as deep.
+    let is_beyond = z > sample.true_depth * SURFACE_DEPTH_RATIO;
+    let is_before = is_back && z < sample.true_depth / SURFACE_DEPTH_RATIO;
+    let belongs = from_back || !(is_beyond || is_before);
+    let amount = select(0.0, shares.x * shares.y, belongs);
+    (*sum).color += amount * textureLoad(layer_colors, px, front + u32(from_back), 0);
+    (*sum).weight += amount * select(matte.weight, 1.0, from_back);
+    (*sum).coverage += amount * select(matte.coverage, 1.0, is_back);
+}
+
+/// Catmull-Rom interpolation where the frame's own texel is smooth, bilinear elsewhere. Between two texels the cubic
+/// differs from the line by their second differences; those of the nearest texel stand for both. It is never less than half
+/// of the line: beside a lamp it would swing far below 0.
+fn resampled(at: vec2f, layer: u32, is_own: bool) -> vec4f {
+    let f = fract(at - 0.5);
+    let px = nearest_pixel(at);
+    let differences = textureLoad(second_differences, px, 0);
+    let across = vec4f(unpack2x16float(differences.x), unpack2x16float(differences.y));
+    let down = vec4f(unpack2x16float(differences.z), unpack2x16float(differences.w));
+    let share = select(vec2f(0.0), 0.5 * f * (1.0 - f), is_own);
+    let line = textureSampleLevel(layer_colors, linear, at / vec2f(frame.size), layer, 0.0);
+    return line - share.x * across - share.y * down;
+}
