@@ -115,10 +115,10 @@ class Neighbours:
         frames = {0: (source, self._locked(source, also))}
         for side in (-1, 1):
             for offset in range(side, side * (reach + 1), side):
-                beside = self._beside(*frames[offset - side], side, also)
-                if beside is None:
+                found = self._beside(*frames[offset - side], side, also)
+                if found is None:
                     break
-                frames[offset] = beside
+                frames[offset] = found
         onto = self._canvas(frames, extent)
         made = {side: self._on(onto, *one) for side, one in frames.items()}
         beside: list[Frame | None] = []
