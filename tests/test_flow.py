@@ -102,6 +102,12 @@ def matcher(views, stride=1, bend=0.0):
     return twin.Matcher(here, near, far, views.factor, stride, far_price)
 
 
+def compared(views, level, bend=0.0):
+    """Bindings of match.wgsl that compare the small pictures as on a level."""
+    levels = {n: (level + 1) * found[:1] for n, found in small(bend=bend)[0].items()}
+    return matched(kit(), views, levels, level)
+
+
 def random_states(size=(9, 13), seed=0):
     rng = np.random.default_rng(seed)
     states = rng.normal(0, 0.05, (*size, 8))
@@ -133,13 +139,13 @@ def test_every_level_is_half_as_large(close):
     close(read(got[1])[..., :7] / 255.0, twin.features(twin.halved(picture)), 0.51 / 255)
 
 
-@pytest.mark.parametrize("bend", [0.0, 2.5])
-def test_the_full_search_finds_the_cheapest_displacements(bend):
+@pytest.mark.parametrize("bend, level", [(0.0, 0), (2.5, 0), (2.5, 1)])
+def test_the_full_search_finds_the_cheapest_displacements(bend, level):
     """One for both sides, or two where the motion changes so much that no single one fits."""
-    bound = matched(kit(), MIDDLE, small(bend=bend)[0], 0)
+    bound = compared(MIDDLE, level, bend)
     states, centres, ways = FullSearch(kit(), 2)((13, 9), bound)
     got = read(states)
-    want, sides = twin.full_search(matcher(MIDDLE, bend=bend), reach=3)  # a fifth of 13
+    want, sides = twin.full_search(matcher(MIDDLE, level + 1, bend), reach=3)  # a fifth of 13
     x, y = np.meshgrid(np.arange(0, 13, 2), np.arange(0, 9, 2))
     assert (centres.reshape(5, 7, 2) - 0.5 == np.stack([x, y], axis=2)).all()
     assert (ways.reshape(5, 7, 4) == sides).all()
@@ -218,11 +224,12 @@ def test_motion_much_like_that_of_most_becomes_it_where_it_matches_as_well():
 
 
 @pytest.mark.parametrize("views", [MIDDLE, FIRST])
-@pytest.mark.parametrize("number", [0, 1, 3])
-def test_half_a_sweep_takes_the_best_candidate(views, number):
+@pytest.mark.parametrize("number, aside, level", [(0, 0.4, 1), (1, 0.15, 1), (3, 0.4, 0)])
+def test_half_a_sweep_takes_the_best_candidate(views, number, aside, level):
     """Nothing that the twin tries is better; the pixels of the other colour stay."""
-    states, match = random_states(), matcher(views)
-    bound = matched(kit(), views, small()[0], 0)
+    states, match = random_states(), matcher(views, level + 1)
+    bound = compared(views, level)
+    bound["constants"]["ASIDE_PRICE"] = aside
     output = kit().take((13, 9), STATES)
     most = np.array([[1.01, 0.02, 3], [-0.01, 1.0, -5], [1e-3, 0, 1]])
     half_sweep(kit(), (13, 9), bound, states_texture(states), [], 0, number, output, most)
@@ -234,8 +241,8 @@ def test_half_a_sweep_takes_the_best_candidate(views, number):
                 assert (got[y, x] == states[y, x].astype("f4")).all()
                 continue
             tried = (twin.propagated, twin.refined)[number % 2](match, states, x, y)
-            energies = [match.energy(x, y, state, states, 2.0, most) for state in tried]
-            new = match.energy(x, y, got[y, x], states, 2.0, most)
+            energies = [match.energy(x, y, state, states, 2.0, most, aside) for state in tried]
+            new = match.energy(x, y, got[y, x], states, 2.0, most, aside)
             assert new < min(energies) + FILTER
             improved += new < energies[0] - FILTER
     assert improved > 10

@@ -71,6 +71,12 @@ class Matcher:
         self.factor, self.stride, self.far_price = factor, stride, far_price
         self.height, self.width = here.shape[:2]
 
+    def difference(self, own, found):
+        """Of features; on coarser levels, what all colours differ by alike counts less."""
+        most = 0.08 if self.stride > 1 else 0.0
+        grey = np.clip((own - found)[..., :3].mean(axis=-1, keepdims=True), -most, most)
+        return np.abs(own - found - 0.75 * grey * [1, 1, 1, 0, 0, 0, 0]) @ WEIGHTS
+
     def side(self, other, x, y, flow, slope):
         goal = np.array([x, y]) + flow
         if not (0 <= goal[0] <= self.width - 1 and 0 <= goal[1] <= self.height - 1):
@@ -82,7 +88,7 @@ class Matcher:
         weight = np.where(inside, likeness(own, self.here[y, x]), 0)
         sx = goal[0] + i + slope[0] * i + slope[1] * j
         sy = goal[1] + j + slope[2] * i + slope[3] * j
-        d = np.abs(own - bilinear(other, sx, sy)) @ WEIGHTS
+        d = self.difference(own, bilinear(other, sx, sy))
         return float((weight * np.minimum(d, 0.6)).sum() / weight.sum())
 
     def cost(self, x, y, state):
@@ -104,7 +110,7 @@ class Matcher:
         bend_price = min(0.002 * np.abs(state[2:4]).sum(), 0.01)
         return 0.02 * np.abs(state[4:]).sum() + bend_price
 
-    def energy(self, x, y, state, states, most_apart, most):
+    def energy(self, x, y, state, states, most_apart, most, aside_price):
         """With what differs from the 8 neighbours, and from where the homography `most` leads."""
         total = weights = 0.0
         for j in (-1, 0, 1):
@@ -119,7 +125,7 @@ class Matcher:
         square = sum(
             w * ((self.here[y + j, x + i][3:5] - 0.5) ** 2).sum() for i, j, w in self.weights(x, y)
         )
-        aside *= 0.4 * square / (square + 0.0009) / max(self.width, self.height)
+        aside *= aside_price * square / (square + 0.0009) / max(self.width, self.height)
         smooth = 0.08 * total / max(weights, 1e-6) + aside
         return smooth + self.price(state) + self.cost(x, y, state)
 
@@ -225,13 +231,13 @@ def full_search(matcher, reach):
             if 0 <= x + i < width and 0 <= y + j < height:
                 own = matcher.here[y + j, x + i]
                 weight = likeness(own, matcher.here[y, x])
-                d = np.abs(own - at(other, x + u + i, y + v + j)) @ WEIGHTS
+                d = matcher.difference(own, at(other, x + u + i, y + v + j))
                 total, weights = total + weight * min(d, 0.6), weights + weight
         return total / weights
 
     ways = [(u, v) for u in range(-reach, reach + 1) for v in range(-reach, reach + 1)]
     ways.sort(key=lambda way: np.abs(way).sum())
-    length = np.array([1e-4 * np.abs(way).sum() for way in ways])
+    length = np.array([2.5e-3 * np.abs(way).sum() for way in ways])
     out = np.zeros((-(-height // 2), -(-width // 2), 4))
     sides = np.zeros_like(out)
     for y in range(0, height, 2):

@@ -9,6 +9,7 @@ from .passes import Passes
 from .views import BESIDE, Views
 
 FINEST_STRIDE, STRIDE = 1.0, 2.0  # between the samples of a patch [px]: finest level, coarser
+MOST_SHADE = 0.08  # difference in grey that may be the light's, on coarser levels; 0 on the finest
 FAR_PRICE = 0.03  # for being hidden in the near frame, if the far one is two frames away
 
 
@@ -23,6 +24,7 @@ def matched(
         far_factor=views.factor,
         far_price=FAR_PRICE if views.factor == BESIDE else 0.0,
         stride=STRIDE if level else FINEST_STRIDE,
+        most_shade=MOST_SHADE if level else 0.0,
     )
     return {
         "constants": {"VIEWS": int(wgsl.load("flow/match.wgsl").constant(views.kind))},

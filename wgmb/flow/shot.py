@@ -40,7 +40,8 @@ class Effort:
     """Number of sweeps: on the coarsest level, on those between, and on the finest.
 
     `polish`: how often parts of a pixel are refined and noise is removed, on every level.
-    `block`: pixels along those that share a first state.
+    `block`: pixels along those that share a first state. `aside`: price of moving otherwise than
+    most, see sweep.wgsl.
     """
 
     coarsest: int
@@ -48,6 +49,7 @@ class Effort:
     finest: int
     polish: int
     block: int
+    aside: float
 
     def sweeps(self, level: int, levels: int) -> int:
         """Sweeps on a level; 0 is the finest."""
@@ -56,7 +58,10 @@ class Effort:
         return self.between if level else self.finest
 
 
-EFFORTS = {"best": Effort(3, 2, 2, 2, block=2), "fast": Effort(3, 2, 0, 1, block=4)}
+EFFORTS = {
+    "best": Effort(3, 2, 2, 2, block=2, aside=0.4),
+    "fast": Effort(3, 2, 0, 1, block=4, aside=0.15),
+}
 KEPT = {
     "pictures": 4,
     "most": 1,
@@ -156,18 +161,20 @@ class Shot:
         views, passes, size = self._views(number), self._passes, self._sizes[level]
         assert views is not None
         bound = self._matched(views, level)
+        price = {"ASIDE_PRICE": self._effort.aside}
+        swept = bound | {"constants": bound["constants"] | price}
         count = self._effort.sweeps(level, len(self._sizes))
         if level == len(self._sizes) - 1:
             states, *some = self._full_search(size, bound)
             states, most = follow_most(passes, size, bound, views, states, *some)
             self._made["most", number, level] = most
-            states = sweep(passes, size, bound, states, [], level, count, most)
+            states = sweep(passes, size, swept, states, [], level, count, most)
             return self._polished(states, size, bound) if level else states
         states = self._grown(self._once("mended", number, level + 1, self._mended), level)
         guesses = [self._carried(other, views, level) for other in views.beside] if count else []
         coarsest = len(self._sizes) - 1
         most = enlarged(self._made["most", number, coarsest], 2.0 ** (coarsest - level))
-        states = sweep(passes, size, bound, states, guesses, level, count, most)
+        states = sweep(passes, size, swept, states, guesses, level, count, most)
         passes.give(*guesses)
         return self._polished(states, size, bound) if level else states
 

@@ -27,7 +27,7 @@ override BLOCK: i32 = 2;            // pixels along a block
 const SEARCH_SIDE: i32 = 4;         // samples along a patch,
 const SEARCH_PATCH: i32 = 16;       // and in it
 const SEARCH_STRIDE: i32 = 2;       // from one to the next [px]
-const LENGTH_PRICE: f32 = 0.0001;   // per px of displacement: of equals, the shortest
+const LENGTH_PRICE: f32 = 0.0025;   // per px of displacement: of those that match much alike, the shortest
 const PAIR_PRICE: f32 = 0.015;      // for two displacements in place of one, besides what the bend costs
 
 var<private> own0: array<vec4f, SEARCH_PATCH>;
@@ -72,7 +72,8 @@ fn search_row(other: texture_2d_array<f32>, at: vec2i, row: i32, before: f32) ->
         let k = SEARCH_SIDE * row + column;
         let px = clamp(at + search_offset(k), vec2i(0), last);
         let found0 = textureLoad(other, px, 0, 0);
-        let d = difference(own0[k], own1[k].xyz, found0, textureLoad(other, px, 1, 0).xyz);
+        let found1 = textureLoad(other, px, 1, 0).xyz;
+        let d = shaded_difference(own0[k], own1[k].xyz, found0, found1, view.most_shade);
         sum += own1[k].w * min(d, MOST_DIFFERENCE);
     }
     return sum;

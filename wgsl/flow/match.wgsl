@@ -7,7 +7,7 @@ struct View {
     far_factor: f32,    // displacement to the far frame over that to the near one: -1 around a frame, 2 at an end
     far_price: f32,     // for being hidden in the near frame, where the far one is twice as far off
     stride: f32,        // of the patch [px]
-    unused: f32,
+    most_shade: f32,    // difference in grey up to which the light may have changed
 }
 
 @group(1) @binding(0) var<uniform> view: View;
@@ -100,7 +100,7 @@ fn sample_place(to: Target, offset: vec2f) -> vec2f {
 
 /// Addition of sample `k` to the cost if this is found in the other frame.
 fn sample_cost(k: u32, found0: vec4f, found1: vec4f) -> f32 {
-    let d = difference(patch0[k], patch1[k].xyz, found0, found1.xyz);
+    let d = shaded_difference(patch0[k], patch1[k].xyz, found0, found1.xyz, view.most_shade);
     return patch1[k].w * min(d, MOST_DIFFERENCE);
 }
 

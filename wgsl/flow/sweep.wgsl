@@ -39,7 +39,7 @@ const SLOPE_STEP: f32 = 0.05;       // greatest of the first of them
 const SLOPE_FALL: f32 = 0.4;        // each is so much of the one before
 const BEND_TRIES: u32 = 2u;         // random changes of the bend, with the flow or without
 const REFINED: u32 = 11u;           // two planes, the changes, no slope, no bend
-const ASIDE_PRICE: f32 = 0.4;       // of moving otherwise than most, per longer side of the picture, where a patch
+override ASIDE_PRICE: f32 = 0.4;    // of moving otherwise than most, per longer side of the picture, where a patch
 const PLAIN: f32 = 0.0009;          // has gradients: more than this, squared; its neighbours tell how a plain one moves
 const SAME: f32 = 0.001;            // states closer than this are not tried again [px]
 
