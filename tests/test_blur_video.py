@@ -188,7 +188,7 @@ def test_pictures_without_vectors_move_by_flow(tmp_path, capsys):
         )
     words = ["blur", tmp_path / "a.#.png", "-o", tmp_path / "b.#.png", "--frames", "2-4"]
     text = run(capsys, *words, "--flow", "dis", "-v")
-    assert "dense inverse search, as the frames hold none" in text
+    assert "the frames have no vectors; motion: dense inverse search" in text
     assert '"samples": "auto"' in text
     with Image.open(tmp_path / "a.3.png") as a, Image.open(tmp_path / "b.3.png") as b:
         off = np.abs(np.asarray(a).astype(int) - np.asarray(b))

@@ -278,7 +278,7 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
         settings["highlights"] = video.highlights
     if how:
         settings["flow"] = how
-        remarks.append(f"motion: {how}, as the frames hold none")
+        remarks.append(f"the frames have no vectors; motion: {how}")
     told = tuple(filter(None, remarks))
     return Job(asked, settings, clip.numbers, how, clip_opened=(clip, shown), remarks=told)
 

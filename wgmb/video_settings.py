@@ -54,7 +54,7 @@ class FlowSettings:
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         quality, why = self.flow_quality, ""
         if self.flow == "auto" and software:
-            quality, why = "fast", ", the fast one, as there is no GPU"
+            quality, why = "fast", " (fast, because there is no GPU)"
         if self.flow == "dis" or (self.flow == "auto" and software and is_installed("cv2")):
             return replace(self, flow="dis", flow_quality=quality), f"dense inverse search{why}"
         return replace(self, flow="search", flow_quality=quality), f"search{why}"
