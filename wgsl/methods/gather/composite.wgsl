@@ -9,6 +9,9 @@
 @group(1) @binding(5) var mattes: texture_2d_array<u32>;    // stored as r32uint, rg32uint if WEIGHTED: per frame, see pack_matte()
 @group(1) @binding(6) var second_differences: texture_2d<u32>;  // stored as rgba32uint: of the frame's own front colours
 
+override WEIGHTED: bool = false;    // pixels have weights
+override CONFIDENCE: bool = false;  // show how sure the result is instead of it
+
 /// The matte of a pixel of frame `f`.
 fn matte_at(px: vec2u, f: u32) -> Matte {
     return unpack_matte(textureLoad(mattes, px, f, 0), WEIGHTED);

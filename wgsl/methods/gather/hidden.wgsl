@@ -3,6 +3,9 @@
 //#include methods/gather/composite.wgsl
 //#include methods/gather/search.wgsl
 
+@group(1) @binding(7) var own_color: texture_2d<f32>;       // the frame as it came
+@group(1) @binding(8) var own_weight: texture_2d<f32>;
+
 const FILL_DIRECTIONS: u32 = 8u;        // see cosine_of()
 const SQRT_HALF: f32 = 0.70710678;
 const FILL_STEPS: u32 = 13u;            // to every side, each FILL_GROWTH times as far as the one before: 64 px

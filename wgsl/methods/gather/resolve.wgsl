@@ -14,13 +14,9 @@
 //#include methods/gather/visibility.wgsl
 
 @group(1) @binding(3) var single_layer_mask: texture_2d_array<u32>; // bits of times, see the classification
-@group(1) @binding(7) var own_color: texture_2d<f32>;       // the frame as it came
-@group(1) @binding(8) var own_weight: texture_2d<f32>;
 @group(1) @binding(10) var output: Output;
 @group(1) @binding(11) var<storage, read> worklist: WorkList;
 
-override WEIGHTED: bool = false;    // read `own_weight`
-override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 override PLAIN: bool = false;       // the blocks have one layer at all times, or nothing moves there: one search is enough
 
 const MAX_MISS: f32 = 8.0;              // if no search along the pixel's own path comes nearer than this [px], what is there is hidden
@@ -198,9 +194,4 @@ fn time_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
 fn duration_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
     if !MOVING_LIGHT { return 0.0; }
     return sample_duration(times, min(first + firstTrailingBit(bits), times.count - 1u));
-}
-
-/// The pixel of the image nearest to a position [px].
-fn nearest_pixel(p: vec2f) -> vec2u {
-    return vec2u(clamp(p, vec2f(0.0), vec2f(frame.size) - 1.0));
 }

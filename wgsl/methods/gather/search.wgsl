@@ -147,6 +147,11 @@ fn is_inside(p: vec2f) -> bool {
     return all(p >= vec2f(0.0)) && all(p < vec2f(frame.size));
 }
 
+/// The pixel of the image nearest to a position [px].
+fn nearest_pixel(p: vec2f) -> vec2u {
+    return vec2u(clamp(p, vec2f(0.0), vec2f(frame.size) - 1.0));
+}
+
 fn same_solution(a: vec2f, b: vec2f) -> bool {
     return all(abs(a - b) < vec2f(SOLUTION_TOLERANCE));
 }
