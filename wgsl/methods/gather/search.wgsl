@@ -191,7 +191,7 @@ const SLOW_STEP: f32 = 0.5;
 const MOST_GROWTH: f32 = 2.0;
 const LEAST_TURN: f32 = 0.25;   // difference of the two steps, as a share of the first, that tells where they lead
 
-/// What is added after a `step` of a slow iteration, and the step `before` it, to get where they lead: steps of what turns and zooms
+/// The way on after a `step` of a slow iteration, and the step `before` it, to get where they lead: steps of what turns and zooms
 /// are, as complex numbers, a geometric series (Aitken's delta-squared process). 0 where it is not slow.
 fn leap(step: vec2f, before: vec2f) -> vec2f {
     let change = before - step;

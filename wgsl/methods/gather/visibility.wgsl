@@ -186,7 +186,7 @@ fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
     }
 }
 
-/// Whether the frame itself hides a sample of a frame beyond its neighbours, or does not hold its place: else it would
+/// True if the frame itself hides a sample of a frame beyond its neighbours, or does not hold its place: else it would
 /// show it. What is far away is easily mistaken.
 fn is_hidden(found: Sample) -> bool {
     let surface = surface_of(vec2i(nearest_pixel(found.at)), found.layer);
@@ -199,12 +199,12 @@ fn nothing() -> Sample {
     return Sample(INFINITE, INFINITE, INFINITE, vec2f(-9.0), 99u);
 }
 
-/// Whether `b` is of another surface, behind that of `a`; neighbouring frames show the same one again.
+/// True if `b` is of another surface, behind that of `a`; neighbouring frames show the same one again.
 fn is_behind(b: Sample, a: Sample) -> bool {
     return b.depth >= a.depth * SURFACE_DEPTH_RATIO * select(NEIGHBOUR_DEPTH_BIAS, 1.0, a.layer == b.layer);
 }
 
-/// Whether the edge `a` is of another surface, before that of `b`: clearly nearer; or just nearer, if it is elsewhere in the
+/// True if the edge `a` is of another surface, before that of `b`: clearly nearer; or just nearer, if it is elsewhere in the
 /// same frame.
 fn is_before(a: Sample, b: Sample) -> bool {
     let is_elsewhere = a.layer / 2u == b.layer / 2u && distance(a.at, b.at) > ELSEWHERE;
