@@ -88,7 +88,7 @@ def go(said: str) -> dict:
 
 
 def check(file: Path, want: np.ndarray, strays: int = 0) -> None:
-    """Compare a picture of the page with Python's; `strays` pixels of it may differ by up to STRAY."""
+    """Compare a picture with Python's; `strays` pixels of it may differ by up to STRAY."""
     got, want = iio.imread(file)[..., :3].astype(float), to_display(want[..., :3], 8).astype(float)
     assert got.shape == want.shape
     apart = np.abs(got - want)
