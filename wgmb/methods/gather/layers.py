@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import wgpu
 
 from ... import gpu
 from ...gpu.textures import ScratchBuffer, TexturePool
-from .active_tiles import grid_of
+from .edges import Edges
 
 
 def layer_view(images: TexturePool, texture: wgpu.GPUTexture, index: int) -> wgpu.GPUTextureView:
@@ -25,7 +24,7 @@ class Layers:
 
     def __init__(self, device: wgpu.GPUDevice, images: TexturePool):
         self._device, self._images = device, images
-        self._edges, self._crowds = ScratchBuffer(device), ScratchBuffer(device)
+        self._edges, self._edge_pixels = Edges(device, images), ScratchBuffer(device)
         self._edge_groups, self._spare = ScratchBuffer(device), ScratchBuffer(device)
         self.textures: dict[str, wgpu.GPUTexture] = {}
 
@@ -88,18 +87,15 @@ class Layers:
         size, colors = inputs.bindings.size, self.textures["layer_colors"]
         if copied := _is_like(frame.color.texture, colors):
             _copy(encoder, (frame.color.texture, 0), (colors, 2 * slot))
+        found = self._edges.encode(encoder, inputs, frame, worklists["flagged"])
         groups = {"buffer": self._edge_groups.at_least(16), "offset": 0, "size": 16}
-        cells = {
-            "copy_motion_only": worklists["motion_only"],
-            "detect_edges": worklists["flagged"],
-            "find_crowds": worklists["flagged"],
-            "write_single_layer": worklists["separated"],
+        cells = worklists["separated"]
+        passes: dict[str, tuple[dict | None, dict]] = {
+            "copy_motion_only": (worklists["motion_only"],) * 2,
+            "write_single_layer": (cells, cells),
+            "size_dispatch": (None, cells),
+            "separate_layers": (groups, cells),
         }
-        passes: dict[str, tuple[dict | None, dict]] = {k: (c, c) for k, c in cells.items()}
-        passes["find_crowds"] = None, cells["find_crowds"]
-        edge_cells = cells["write_single_layer"]
-        passes |= {"size_dispatch": (None, edge_cells), "separate_layers": (groups, edge_cells)}
-        sizes = {"find_crowds": grid_of(size), "size_dispatch": (1, 1)}
         kernel = gpu.kernel(
             self._device,
             "methods/gather/layers.wgsl",
@@ -111,34 +107,28 @@ class Layers:
             HAS_FAR_PREV=not frame.offset and any(f.offset == -2 for f in inputs.frames),
             HAS_FAR_NEXT=not frame.offset and any(f.offset == 2 for f in inputs.frames),
         )
-        flags = self._images.view("edge flags", size, "r32uint")
-        unbound = self._images.view("no edge flags", size, "r32uint")
-        edges = self._edges.at_least(4 + 4 * size[0] * size[1])
-        encoder.clear_buffer(edges, 0, 4)
-        crowds = self._crowds.at_least(8 * math.prod(grid_of(size)))
-        encoder.clear_buffer(crowds)
+        pixels = self._edge_pixels.at_least(4 + 4 * size[0] * size[1])
+        encoder.clear_buffer(pixels, 0, 4)
         others = {
             f"{side}_{name}": getattr(other, name, None) or inputs.unbound
             for side, other in around.items()
             for name in ("color", "motion", "depth", "weight")
         }
         for entry, (indirect, worklist) in passes.items():
-            detecting = entry == "detect_edges"
+            sizing = entry == "size_dispatch"
             kernel.run(
                 encoder,
                 entry,
-                replace(inputs.bindings, size=sizes.get(entry, size)),
+                replace(inputs.bindings, size=(1, 1)) if sizing else inputs.bindings,
                 indirect,
                 worklist=worklist,
                 color=frame.color,
                 motion=frame.motion,
                 depth=frame.depth,
                 weight=frame.weight or inputs.unbound,
-                edge_flags=unbound if detecting else flags,
-                edge_flags_out=flags if detecting else unbound,
-                edges=edges,
-                crowds=crowds,
-                edge_groups=groups if entry == "size_dispatch" else self._spare.at_least(16),
+                edges=pixels,
+                edge_groups=groups if sizing else self._spare.at_least(16),
+                **found,
                 **self._views(slot),
                 **self._far(inputs, frame.offset),
                 **others,

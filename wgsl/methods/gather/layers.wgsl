@@ -1,19 +1,17 @@
 // Silhouettes as two layers. A renderer filters colours and vectors over the surfaces that a pixel shows; here these
 // are separated again, as in matting: a front layer with its coverage, and what is behind it.
-//#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include common/path.wgsl
 //#include methods/gather/worklist.wgsl
 //#include methods/gather/surface.wgsl
+//#include methods/gather/edge_flags.wgsl
+//#include methods/gather/coverage.wgsl
 //#include methods/gather/around.wgsl
 //#include methods/gather/crowd.wgsl
 
 @group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
-@group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
-@group(1) @binding(2) var depth: texture_2d<f32>;
 @group(1) @binding(3) var weight: texture_2d<f32>;
-@group(1) @binding(4) var edge_flags: texture_2d<u32>;  // what `detect_edges` wrote: depth and flags
-@group(1) @binding(5) var edge_flags_out: Flags;
+@group(1) @binding(4) var edge_flags: texture_2d<u32>;  // what edges.wgsl wrote: depth and flags
 @group(1) @binding(6) var colors: Color;                // FRONT, premultiplied by coverage too, and BACK
 @group(1) @binding(7) var surfaces: Packed;             // FRONT and BACK, see pack_surface()
 @group(1) @binding(8) var mattes: Mattes;               // see pack_matte()
@@ -26,7 +24,6 @@ struct EdgeList {       // the edge pixels, which may show two surfaces
     pixels: array<u32>, // packed as cells are
 }
 
-alias Flags = texture_storage_2d<r32uint, write>;
 alias Color = texture_storage_2d_array<rgba32float, write>;
 alias Packed = texture_storage_2d_array<rgba32uint, write>;
 alias Mattes = texture_storage_2d<r32uint, write>;  // rg32uint if WEIGHTED
@@ -36,32 +33,9 @@ override COPIED: bool = false;      // `colors` has the frame's pixels already
 const FRONT: u32 = 0u;          // layers of an array
 const BACK: u32 = 1u;
 
-const EDGE: u32 = 1u;           // flag in the last bit of a depth: the pixel may show two surfaces
-
-const EDGE_MOTION: f32 = 0.5;   // difference of the motions of different surfaces [px]
-// From this difference on [px], motions tell surfaces apart as well: the depth ratio that is asked for shrinks with it,
-// down to LEAST_SHARE of its difference from 1, which is above what half floats round.
-const APART_MOTION: f32 = 4.0;
-const LEAST_SHARE: f32 = 0.1;
 const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and below 1 less it for 0
-const BETWEEN: f32 = 0.4;       // a vector from 0.1 to 0.9 of the way between two is a mixture of them
-const LEAST_CONTRAST: f32 = 0.05;   // of two colours that tell coverage
-const OFF_AXIS: f32 = 0.25;     // distance of a mixed colour or vector from the line between two, as a share of its length
 const MOST_CONTRAST: f32 = 2.0; // of a front layer to the brightest pixel of it around, which may be half background
 const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
-
-fn clamped(px: vec2i) -> vec2i {
-    return clamp(px, vec2i(0), vec2i(frame.size) - 1);
-}
-
-fn depth_at(px: vec2i) -> f32 {
-    return valid_depth(textureLoad(depth, clamped(px), 0).x);
-}
-
-/// Of a pixel and the ones to its left and right. Written out, as is what works on 3 x 3 pixels: lavapipe unrolls no loop.
-fn three_depths(px: vec2i) -> vec3f {
-    return vec3f(depth_at(px - vec2i(1, 0)), depth_at(px), depth_at(px + vec2i(1, 0)));
-}
 
 fn color_at(px: vec2i) -> vec4f {
     return textureLoad(color, clamped(px), 0);
@@ -76,64 +50,12 @@ fn three_flags(px: vec2i) -> u32 {
     return flags_at(px - vec2i(1, 0)) | flags_at(px) | flags_at(px + vec2i(1, 0));
 }
 
-fn is_edge(flags: u32) -> bool {
-    return (flags & EDGE) != 0u;
-}
-
-/// The depth that is packed with flags.
-fn flagged_depth(flags: u32) -> f32 {
-    return bitcast<f32>(flags & ~EDGE);
-}
-
 fn weight_at(px: vec2i) -> f32 {
     if !WEIGHTED { return 1.0; }
     return textureLoad(weight, clamped(px), 0).x;
 }
 
-/// First pass: a pixel is at an edge if depths differ in its 3 x 3, and motions from its own too. The more motions differ,
-/// the less depths have to: what moves so differently is no smooth surface.
-@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
-fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
-    let k = worklist_index(group);
-    let px = vec2i(pixel_in_strip(worklist.cells[k], group, local));
-    if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
-    let above = three_depths(px - vec2i(0, 1));
-    let here = three_depths(px);
-    let below = three_depths(px + vec2i(0, 1));
-    let least = min(min(above, here), below);
-    let most = max(max(above, here), below);
-    let nearest = min(min(least.x, least.y), least.z);
-    let farthest = max(max(most.x, most.y), most.z);
-    let own = textureLoad(motion, px, 0);
-    var difference2 = 0.0;
-    let beyond = farthest - nearest;
-    let apart = nearest * (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO - 1.0);   // the 3 x 3 is two pixels from side to side
-    let count = select(0, 9, beyond > LEAST_SHARE * apart);
-    for (var i = 0; i < count; i++) {
-        let difference = textureLoad(motion, clamped(px + vec2i(i % 3, i / 3) - 1), 0) - own;
-        difference2 = max(difference2, dot(difference, difference));
-    }
-    let share = clamp(APART_MOTION * inverseSqrt(max(difference2, 1e-12)), LEAST_SHARE, 1.0);
-    let is_there = difference2 > EDGE_MOTION * EDGE_MOTION && beyond > share * apart;
-    if is_there {
-        let low = nearest + apart;
-        let high = farthest / (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO);
-        if any(are_between(above, low, high) | are_between(here, low, high) | are_between(below, low, high)) { count_in_crowd(px); }
-    }
-    textureStore(edge_flags_out, px, vec4u((bitcast<u32>(here.y) & ~EDGE) | select(0u, EDGE, is_there)));
-}
-
-fn are_between(z: vec3f, low: f32, high: f32) -> vec3<bool> {
-    return (z > vec3f(low)) & (z < vec3f(high));
-}
-
-/// Between the first and the second pass: which tiles are in a crowd. An invocation is a tile; beyond the last, that one.
-@compute @workgroup_size(WG_X, WG_Y)
-fn find_crowds(@builtin(global_invocation_id) id: vec3u) {
-    find_crowd(min(id.xy, tiles_of(frame.size) - 1u));
-}
-
-/// Second pass: every pixel as one layer, which is copied to BACK after it, and the list of edge pixels, which
+/// First pass: every pixel as one layer, which is copied to BACK after it, and the list of edge pixels, which
 /// `separate_layers` corrects. Stores are what costs in this pass.
 @compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
 fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
@@ -172,7 +94,7 @@ fn is_near_separated(px: vec2i) -> bool {
     return result;
 }
 
-/// Third pass: workgroups for the list of edge pixels.
+/// Second pass: workgroups for the list of edge pixels.
 @compute @workgroup_size(1)
 fn size_dispatch() {
     let wanted = (atomicLoad(&edges.count) + WG_X * WG_Y - 1u) / (WG_X * WG_Y);
@@ -223,7 +145,7 @@ fn neighbour(px: vec2i, i: i32, between: f32) -> Neighbour {
     return Neighbour(at, distance2, z, counts, z < between, !is_edge(flags));
 }
 
-/// Fourth pass: the two layers of edge pixels. The pure pixels around are front or back by their depth; the pixel's
+/// Third pass: the two layers of edge pixels. The pure pixels around are front or back by their depth; the pixel's
 /// coverage is where its own alpha, or its own filtered motion, is between theirs.
 @compute @workgroup_size(WG_X, WG_Y)
 fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
@@ -360,35 +282,6 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     if has_back { textureStore(colors, px, BACK, back); }     // else nobody reads it
     textureStore(surfaces, px, BACK, pack_surface(back_path, max(back_depth, 0.0), select(SINGLE, told, has_back)));
     textureStore(mattes, px, pack_matte(Matte(z, has_back, coverage, coverage * counts)));
-}
-
-/// True if a vector, from that of the background on, lies near the way to that of the foreground: else it is of a third surface.
-fn is_mixture(own: vec4f, axis: vec4f) -> bool {
-    let length2 = dot(axis, axis);
-    let off = own - clamp(dot(own, axis) / length2, 0.0, 1.0) * axis;
-    return dot(off, off) <= OFF_AXIS * OFF_AXIS * length2 + EDGE_MOTION * EDGE_MOTION;
-}
-
-/// True if some vector of the 3 x 3 is between those of the two surfaces: the renderer has filtered them.
-fn are_filtered(px: vec2i, back: vec4f, axis: vec4f) -> bool {
-    var result = false;
-    for (var i = 0; i < 9; i++) {
-        let share = dot(textureLoad(motion, clamped(px + vec2i(i % 3, i / 3) - 1), 0) - back, axis) / dot(axis, axis);
-        result = result || abs(share - 0.5) < BETWEEN;
-    }
-    return result;
-}
-
-/// Coverage where vectors are of the pixel's middle, by the colour's place between those of front and back, if it is between them.
-/// It is over or under one half, as that middle says.
-fn coverage_by_color(own: vec4f, front: vec4f, back: vec4f, at_middle: f32) -> f32 {
-    let axis = front.rgb - back.rgb;
-    let length2 = dot(axis, axis);
-    let share = dot(own.rgb - back.rgb, axis) / max(length2, 1e-12);
-    let off = own.rgb - back.rgb - share * axis;
-    let is_between = length2 > LEAST_CONTRAST * LEAST_CONTRAST && dot(off, off) < OFF_AXIS * OFF_AXIS * length2;
-    let least = select(0.0, 0.5, at_middle >= 0.5);
-    return select(at_middle, clamp(share, least, least + 0.5), is_between);
 }
 
 /// The trajectory of these vectors, bent as that of the surface at `px` is.

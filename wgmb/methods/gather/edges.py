@@ -1,0 +1,40 @@
+"""The pixels that may show two surfaces, and the tiles that show too many to separate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import wgpu
+
+from ... import gpu
+from ...gpu.textures import ScratchBuffer, TexturePool
+from .active_tiles import grid_of
+
+
+class Edges:
+    """The edges of one frame after the other: each overwrites those before it."""
+
+    def __init__(self, device: wgpu.GPUDevice, images: TexturePool):
+        self._device, self._images = device, images
+        self._crowds = ScratchBuffer(device)
+
+    def encode(self, encoder, inputs, frame, worklist: dict) -> dict:
+        """Record the search for a frame's edges, and return them by the names of their bindings:
+        "edge_flags" per pixel and "crowds" per tile."""
+        size = inputs.bindings.size
+        flags = self._images.view("edge flags", size, "r32uint")
+        crowds = self._crowds.at_least(8 * math.prod(grid_of(size)))
+        encoder.clear_buffer(crowds)
+        kernel = gpu.kernel(self._device, "methods/gather/edges.wgsl")
+        given = {
+            "worklist": worklist,
+            "motion": frame.motion,
+            "depth": frame.depth,
+            "edge_flags_out": flags,
+            "crowds": crowds,
+        }
+        kernel.run(encoder, "detect_edges", inputs.bindings, worklist, **given)
+        tiles = replace(inputs.bindings, size=grid_of(size))
+        kernel.run(encoder, "find_crowds", tiles, **given)
+        return {"edge_flags": flags, "crowds": crowds}

@@ -1,0 +1,31 @@
+// One word per pixel with its depth, flagged where it is at an edge: what edges.wgsl finds, for layers.wgsl.
+//#include common/depth.wgsl
+//#include common/frame.wgsl
+
+@group(1) @binding(1) var motion: texture_2d<f32>;      // of one frame: to_prev, to_next [px]
+@group(1) @binding(2) var depth: texture_2d<f32>;
+
+const EDGE: u32 = 1u;           // the last bit of a depth: the pixel may show two surfaces
+const EDGE_MOTION: f32 = 0.5;   // difference of the motions of different surfaces [px]
+
+fn clamped(px: vec2i) -> vec2i {
+    return clamp(px, vec2i(0), vec2i(frame.size) - 1);
+}
+
+fn depth_at(px: vec2i) -> f32 {
+    return valid_depth(textureLoad(depth, clamped(px), 0).x);
+}
+
+/// A depth packed with the flag of an edge.
+fn flag_depth(z: f32, is_at_edge: bool) -> u32 {
+    return (bitcast<u32>(z) & ~EDGE) | select(0u, EDGE, is_at_edge);
+}
+
+fn is_edge(flags: u32) -> bool {
+    return (flags & EDGE) != 0u;
+}
+
+/// The depth that is packed with flags.
+fn flagged_depth(flags: u32) -> f32 {
+    return bitcast<f32>(flags & ~EDGE);
+}

@@ -1,0 +1,65 @@
+// Edges: the pixels that may show two surfaces, which layers.wgsl separates, and the crowds of surfaces, where it does not.
+//#include common/depth.wgsl
+//#include common/frame.wgsl
+//#include methods/gather/surface.wgsl
+//#include methods/gather/worklist.wgsl
+//#include methods/gather/edge_flags.wgsl
+//#include methods/gather/crowd.wgsl
+
+@group(1) @binding(5) var edge_flags_out: Flags;        // see flag_depth()
+@group(1) @binding(9) var<storage, read> worklist: WorkList;
+
+alias Flags = texture_storage_2d<r32uint, write>;
+
+// From this difference on [px], motions tell surfaces apart as well: the depth ratio that is asked for shrinks with it,
+// down to LEAST_SHARE of its difference from 1, which is above what half floats round.
+const APART_MOTION: f32 = 4.0;
+const LEAST_SHARE: f32 = 0.1;
+
+/// First pass: a pixel is at an edge if depths differ in its 3 x 3, and motions from its own too. The more motions differ,
+/// the less depths have to: what moves so differently is no smooth surface.
+@compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
+fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = worklist_index(group);
+    let px = vec2i(pixel_in_strip(worklist.cells[k], group, local));
+    if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
+    let above = three_depths(px - vec2i(0, 1));
+    let here = three_depths(px);
+    let below = three_depths(px + vec2i(0, 1));
+    let least = min(min(above, here), below);
+    let most = max(max(above, here), below);
+    let nearest = min(min(least.x, least.y), least.z);
+    let farthest = max(max(most.x, most.y), most.z);
+    let own = textureLoad(motion, px, 0);
+    var difference2 = 0.0;
+    let beyond = farthest - nearest;
+    let apart = nearest * (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO - 1.0);   // the 3 x 3 is two pixels from side to side
+    let count = select(0, 9, beyond > LEAST_SHARE * apart);
+    for (var i = 0; i < count; i++) {
+        let difference = textureLoad(motion, clamped(px + vec2i(i % 3, i / 3) - 1), 0) - own;
+        difference2 = max(difference2, dot(difference, difference));
+    }
+    let share = clamp(APART_MOTION * inverseSqrt(max(difference2, 1e-12)), LEAST_SHARE, 1.0);
+    let is_there = difference2 > EDGE_MOTION * EDGE_MOTION && beyond > share * apart;
+    if is_there {
+        let low = nearest + apart;
+        let high = farthest / (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO);
+        if any(are_between(above, low, high) | are_between(here, low, high) | are_between(below, low, high)) { count_in_crowd(px); }
+    }
+    textureStore(edge_flags_out, px, vec4u(flag_depth(here.y, is_there)));
+}
+
+/// Of a pixel and the ones to its left and right. Written out, as is what works on 3 x 3 pixels: lavapipe unrolls no loop.
+fn three_depths(px: vec2i) -> vec3f {
+    return vec3f(depth_at(px - vec2i(1, 0)), depth_at(px), depth_at(px + vec2i(1, 0)));
+}
+
+fn are_between(z: vec3f, low: f32, high: f32) -> vec3<bool> {
+    return (z > vec3f(low)) & (z < vec3f(high));
+}
+
+/// Second pass: which tiles are in a crowd. An invocation is a tile; beyond the last, that one.
+@compute @workgroup_size(WG_X, WG_Y)
+fn find_crowds(@builtin(global_invocation_id) id: vec3u) {
+    find_crowd(min(id.xy, tiles_of(frame.size) - 1u));
+}
