@@ -74,12 +74,12 @@ def test_groups_go_with_what_they_bind(device):
     there = views(device)
     blurred(blur, *there)
     gone = weakref.ref(there[1].color)
-    assert len(blur._groups)
+    assert len(blur._constants.groups)
     del there
     gc.collect()
     assert gone() is None
-    assert len(blur._groups) <= 1  # that of the frame's own constants
-    assert len(blur._groups._keys) == len(blur._groups._watched) <= 3
+    assert len(blur._constants.groups) <= 1  # that of the frame's own constants
+    assert len(blur._constants.groups._keys) == len(blur._constants.groups._watched) <= 3
 
 
 def test_constants_are_shared_by_contents_and_use(device):

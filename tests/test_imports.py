@@ -25,9 +25,10 @@ LAYERS = [
     {"velocity", "holdout", "planes", "reel"},
     {"io", "scene", "observer", "flow"},
     {"methods"},
-    {"residency"},
+    {"residency", "arguments", "frame_constants", "preparation"},
     {"pipeline"},
     {
+        "one_frame",
         "render",
         "settings",
         "background",
@@ -55,6 +56,7 @@ LAYERS = [
 PLACE = {room: number for number, layer in enumerate(LAYERS) for room in layer}
 GPU = {
     "gpu", "scene", "methods", "velocity", "holdout", "observer", "residency", "pipeline",
+    "arguments", "frame_constants", "preparation",
     "render", "lab", "viewer", "frame_views", "flow", "planes", "exposer",
     "video_batch", "video_settings", "reel_views", "hosts", "video_pictures",
     "perceived_video",

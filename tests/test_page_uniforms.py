@@ -13,9 +13,9 @@ import page_export
 import standard
 from wgmb import gpu, scene
 from wgmb.cli import app
+from wgmb.frame_constants import FrameConstants
 from wgmb.gpu import wgsl
 from wgmb.methods import volume
-from wgmb.pipeline import Blur
 from wgmb.scene.gbuffer import SceneOnGpu
 from wgmb.settings import size_of
 from wgmb.shutter import CURVES, Shutter
@@ -71,11 +71,10 @@ class Recorder:
 
 def group_zero(state: dict) -> dict[str, bytes]:
     """The buffers that Blur binds for every pass."""
-    blur = object.__new__(Blur)
-    blur.device, blur.auto, blur._groups = Recorder(), False, None
-    blur.samples, blur.jitter, blur.max_blur = state["samples"], state["jitter"], state["maxBlur"]
-    blur.shutter = Shutter(**state["shutter"])
-    return blur.frame_bindings((state["width"], state["height"]), state["number"]).resources
+    samples, jitter, max_blur = state["samples"], state["jitter"], state["maxBlur"]
+    constants = FrameConstants(Recorder(), samples, samples, jitter, max_blur)
+    constants.expose(Shutter(**state["shutter"]))
+    return constants.bindings((state["width"], state["height"]), state["number"]).resources
 
 
 def kernel(shown: scene.Scene, shutter: Shutter, time: float, fps: float, size, monkeypatch):

@@ -175,7 +175,7 @@ def test_500_frames_leave_nothing_behind(small):
 
     def counts() -> tuple[int, ...]:
         gc.collect()
-        groups = blur.blur._groups
+        groups = blur.blur._constants.groups
         return len(groups), len(groups._keys), len(groups._watched), len(blur._images._textures)
 
     for n in range(80):

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from standard_words import groups_of
 
-from wgmb import pipeline, shutter
+from wgmb import arguments, shutter
 from wgmb.errors import ShaderError
 from wgmb.gpu import wgsl
 from wgmb.scene import density, torusphere
@@ -143,7 +143,7 @@ def constants() -> dict[str, Any]:
         "CLOSED_FROM": occupancy.constant("CLOSED_FROM"),
         "MOST_VOLUMES": volume.constant("MOST_VOLUMES"),
         "TILES_A_ROW": volume.constant("TILES_A_ROW"),
-        "SAMPLES": pipeline.SAMPLES,
+        "SAMPLES": arguments.SAMPLES,
     }
 
 

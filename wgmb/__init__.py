@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from .io.vectors import Vectors
     from .methods import METHODS
     from .observer import Observer
-    from .pipeline import Blur, blur
+    from .one_frame import blur
+    from .pipeline import Blur
     from .render import Render
     from .scene import Body, CameraPath, Scene
     from .shown import show
@@ -97,7 +98,8 @@ _PLACES = {
     "io.vectors": ("Vectors",),
     "methods": ("METHODS",),
     "observer": ("Observer",),
-    "pipeline": ("Blur", "blur"),
+    "one_frame": ("blur",),
+    "pipeline": ("Blur",),
     "render": ("Render",),
     "scene": ("Body", "Scene", "CameraPath"),
     "shown": ("show",),

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
@@ -15,28 +15,22 @@ import numpy as np
 import wgpu
 
 from . import gpu
+from .arguments import checked, most_samples, shutter_of
 from .camera import Window
-from .errors import InputError, check_choice, did_you_mean
+from .errors import InputError
 from .extent import Extent
-from .frame import PASSES, Frame
+from .frame import Frame
+from .frame_constants import AUTO_STRATA, FrameConstants
 from .frame_views import FrameViews, View, check_output, check_view
-from .gpu import wgsl
 from .gpu.textures import TexturePool
 from .gpu.timing import Clock
-from .holdout import HoldoutPass
-from .methods import METHODS, default_method
-from .methods.contract import Inputs, PreparedFrame, reach_of
-from .methods.options import options_of
+from .methods import METHODS
+from .methods.contract import Inputs, PreparedFrame, extent_of, frames_around, reach_of
+from .preparation import Preparation
 from .residency import Residency
 from .scene.gbuffer import SceneOnGpu
 from .shutter import Shutter
 from .velocity import VelocityPass
-
-MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
-SAMPLES = 16
-AUTO_SAMPLES = 64  # the most that "auto" takes a pixel
-AUTO_STRATA = 256  # equal shares of the exposure that times are interpolated in
-OUTPUTS = ("rgba32float", "rgba16float")
 
 
 class Blur:
@@ -78,7 +72,8 @@ class Blur:
         self.method = METHODS[method](self.device, self._options, output=output)
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._lock = threading.RLock()
-        self._groups = gpu.BindGroups()
+        strata = AUTO_STRATA if self.auto else samples
+        self._constants = FrameConstants(self.device, samples, strata, jitter, max_blur)
         self._images = TexturePool(self.device)
         wanted = self.method.needs | self.method.uses
         self._residency = Residency(self._images, wanted, 2 * reach_of(self.method) + 1)
@@ -86,7 +81,8 @@ class Blur:
         self._unbound = self._images.view("unbound", (1, 1), gpu.texel(self.device, 4))
         no_object = self._images.view("no object", (1, 1), "r32uint")
         self._velocity = VelocityPass(self.device, self._unbound, no_object)
-        self._holdout = HoldoutPass(self.device, self._images, self._unbound)
+        limited = max_blur is not None
+        self._prepared = Preparation(self._images, self._velocity, self._unbound, limited)
         self.shutter = shutter
 
     def __repr__(self) -> str:
@@ -115,17 +111,7 @@ class Blur:
     def extent(self) -> Extent:
         """Distance over which it moves colours, for frames that hold a part of their picture; see
         Clip.with_neighbours."""
-        opens, closes = self._shutter.span
-        late = sum(map(abs, self._shutter.delay))  # twice that of the display window's edges
-        method = type(self.method)
-        return Extent(
-            (opens - late, closes + late),
-            (opens, closes),
-            getattr(method, "spread", "along"),
-            self.max_blur,
-            getattr(method, "margin", lambda height: 0),
-            getattr(self.method, "bend", 0.0),
-        )
+        return extent_of(self.method, self._shutter, self.max_blur)
 
     @property
     def shutter(self) -> Shutter:
@@ -134,29 +120,8 @@ class Blur:
 
     @shutter.setter
     def shutter(self, shutter: Shutter | float) -> None:
-        if not isinstance(shutter, Shutter):
-            try:
-                degrees = float(shutter)
-            except (TypeError, ValueError):
-                wanted = "degrees or a Shutter"
-                raise InputError(f"shutter must be {wanted}, got {shutter!r}") from None
-            shutter = Shutter(degrees)
-        self._shutter = shutter
-        self._bound: tuple[tuple[Any, ...], gpu.FrameBindings] | None = None  # of the last frame
-        data = np.zeros((), wgsl.load("common/shutter.wgsl").dtype("Shutter"))
-        opens, closes = self._shutter.span
-        data["span"] = opens, closes
-        data["step"] = (closes - opens) / self.samples
-        data["rolling"] = self._shutter.delay
-        create = self.device.create_buffer_with_data
-        self._group0 = {
-            "shutter": create(label="shutter", data=data, usage=wgpu.BufferUsage.UNIFORM),
-            "strata": create(
-                label="strata",
-                data=self._shutter.strata(AUTO_STRATA if self.auto else self.samples),
-                usage=wgpu.BufferUsage.STORAGE,
-            ),
-        }
+        self._shutter = shutter_of(shutter)
+        self._constants.expose(self._shutter)
 
     def encode(
         self,
@@ -205,19 +170,14 @@ class Blur:
             self._require(one.has, whose)
         bindings = self.frame_bindings(size, number, frame.window)
         encoder = timing.watch(encoder) if timing else encoder
-        masked = any(one.holdout is not None or one.check for _, one in around.values())
-        frames = tuple(
-            self._prepare(encoder, bindings, one, offset, masked) for offset, one in around.values()
-        )
+        frames = self._prepared.frames(encoder, bindings, list(around.values()))
         inputs = self._inputs(bindings, number, frames=frames)
-        if not masked:
+        if inputs.frame.weight is None:
             self._record(encoder, inputs, output, confidence)
             return
         result = self._images.view("blurred", size, self.output)
         self._record(encoder, inputs, result, confidence)
-        self._holdout.after(
-            encoder, bindings, frame.color, frame.holdout, result, output, self.output
-        )
+        self._prepared.put_back(encoder, bindings, frame, result, output, self.output)
 
     def encode_scene(
         self,
@@ -243,28 +203,6 @@ class Blur:
         self._record(
             encoder, self._inputs(bindings, number, scene=scene, progress=progress), output
         )
-
-    def _prepare(
-        self,
-        encoder: wgpu.GPUCommandEncoder,
-        bindings: gpu.FrameBindings,
-        frame: FrameViews,
-        offset: int,
-        masked: bool,
-    ) -> PreparedFrame:
-        """Record what a frame, the one that is blurred or a neighbour, is to methods."""
-        motion = frame.motion
-        if not frame.has_plain_motion or self.max_blur is not None or frame.check:
-            motion = self._images.view(f"motion {offset}", bindings.size, "rgba32float")
-            self._velocity.encode(encoder, bindings, frame, self.max_blur is not None, motion)
-        color, weight = frame.color, None
-        if masked:
-            color, weight = self._holdout.before(
-                encoder, bindings, color, frame.holdout, f" {offset}"
-            )
-        by_camera = frame.camera is not None and not frame.has_vectors
-        changed = {"color": color, "motion": motion, "offset": offset, "weight": weight}
-        return PreparedFrame(**vars(frame) | changed, by_camera=by_camera)
 
     def _inputs(
         self,
@@ -366,7 +304,7 @@ class Blur:
         check_view("output", output, self.device, frame.size)
         check_output("output", output, "rgba32float")
         bindings = self.frame_bindings(frame.size, number, frame.window)
-        self._velocity.encode(encoder, bindings, frame, self.max_blur is not None, output)
+        self._prepared.encode_motion(encoder, bindings, frame, output)
 
     def upload(self, frame: Frame) -> dict[str, Any]:
         """Upload a frame and its neighbours; returns the keywords of `encode`.
@@ -395,16 +333,8 @@ class Blur:
 
     def _views(self, frame: Frame) -> dict[str, Any]:
         """The frame and the neighbours that the method takes, as keywords of `encode`."""
-        around: dict[int, Frame] = {0: frame}
-        for side in (-1, 1):
-            beside = frame
-            for offset in range(side, side * (reach_of(self.method) + 1), side):
-                beside = beside.prev if side < 0 else beside.next
-                if beside is None or not beside.has >= self.method.needs:
-                    break
-                around[offset] = beside
         names = {0: "frame", -1: "prev", 1: "next", -2: "prev_prev", 2: "next_next"}
-        views = self._residency.views_of(around)
+        views = self._residency.views_of(frames_around(frame, self.method))
         return {"number": frame.number} | {names[offset]: one for offset, one in views.items()}
 
     def _require(self, there: Collection[str], whose: str = "") -> None:
@@ -416,80 +346,4 @@ class Blur:
         self, size: tuple[int, int], number: int = 0, window: Window | None = None
     ) -> gpu.FrameBindings:
         """Return the bindings shared by all passes: frame, shutter, times of the samples."""
-        window = window or (0, 0, *size)
-        told = size, number, window, self.samples, self.jitter, self.max_blur
-        if self._bound is not None and self._bound[0] == told:
-            return self._bound[1]
-        data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
-        data["size"], data["samples"], data["jitter"] = size, self.samples, self.jitter
-        data["index"] = number % 2**32
-        data["origin"], data["display"] = window[:2], window[2:]
-        data["max_blur"] = np.inf if self.max_blur is None else self.max_blur
-        frame = gpu.constant(self.device, "frame", data)
-        bound = gpu.FrameBindings(size, {"frame": frame, **self._group0}, window, self._groups)
-        self._bound = told, bound
-        return bound
-
-
-def checked(
-    method: str,
-    samples: int | str | None = None,
-    jitter: float = 0.0,
-    max_blur: float | None = None,
-    output: str = OUTPUTS[0],
-    options: Mapping[str, Any] | None = None,
-) -> tuple[int, bool]:
-    """The samples that a Blur of these arguments takes, and whether they are "auto".
-
-    InputError where one of them makes no sense; no device is opened.
-    """
-    if method not in METHODS:
-        known = f"available: {', '.join(METHODS)}{did_you_mean(method, METHODS)}"
-        raise InputError(f"unknown method {method!r}; {known}")
-    auto = samples == "auto" and getattr(METHODS[method], "adaptive", False)
-    if samples is None:
-        samples = getattr(METHODS[method], "samples", SAMPLES)
-    samples = AUTO_SAMPLES if samples == "auto" else samples
-    if not isinstance(samples, (int, np.integer)) or not 1 <= samples <= MOST_SAMPLES:
-        raise InputError(f"samples must be 1 to {MOST_SAMPLES} or auto, got {samples!r}")
-    if not 0 <= jitter <= 1:
-        raise InputError(f"jitter must be 0 to 1, got {jitter}")
-    if max_blur is not None and not max_blur >= 0:
-        raise InputError(f"`max_blur` must be 0 or more pixels, got {max_blur}")
-    check_choice("output", output, OUTPUTS)
-    known = options_of(METHODS[method].Options)
-    if unknown := (options or {}).keys() - known.keys():
-        raise InputError(
-            f"method {method!r} has no option {', '.join(sorted(unknown))}; "
-            f"it has {', '.join(known) or 'none'}"
-        )
-    return int(samples), auto
-
-
-def most_samples(method: str, device: wgpu.GPUDevice) -> int:
-    """The most samples that a pixel may take on the device."""
-    if device.adapter_info["adapter_type"] != gpu.SOFTWARE:
-        return MOST_SAMPLES
-    return getattr(METHODS[method], "most_in_software", MOST_SAMPLES)
-
-
-def blur(
-    color: np.ndarray,
-    to_next: np.ndarray | None = None,
-    *,
-    method: str | None = None,
-    shutter: Shutter | float = 180,
-    samples: int | str | None = None,
-    **more: Any,
-) -> np.ndarray:
-    """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.
-
-    `method`: a name in METHODS; by default gather if depth is available, else tap. `more`: the
-    passes of Frame (to_prev, depth, camera, holdout, ...) and the options of Blur (jitter,
-    max_blur, device, and those of the method).
-    """
-    passes = {name: more.pop(name) for name in PASSES if name in more}
-    frame = Frame(color, to_next, **passes)
-    return Blur(method or default_method(frame.has), shutter=shutter, samples=samples, **more)(
-        frame
-    )
+        return self._constants.bindings(size, number, window)

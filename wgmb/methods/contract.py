@@ -10,6 +10,8 @@ from typing import Protocol
 import wgpu
 
 from .. import gpu
+from ..extent import Extent
+from ..frame import Frame
 from ..frame_views import FrameViews, View
 from ..scene.gbuffer import SceneOnGpu
 from ..shutter import Shutter
@@ -74,6 +76,33 @@ class Inputs:
 def reach_of(method: Method) -> int:
     """Frames to either side of the one that is blurred that a method takes."""
     return getattr(method, "reach", 1) if "neighbours" in method.uses else 0
+
+
+def frames_around(frame: Frame, method: Method) -> dict[int, Frame]:
+    """The frame and those neighbours that a method takes, by their offsets from it."""
+    around: dict[int, Frame] = {0: frame}
+    for side in (-1, 1):
+        beside = frame
+        for offset in range(side, side * (reach_of(method) + 1), side):
+            beside = beside.prev if side < 0 else beside.next
+            if beside is None or not beside.has >= method.needs:
+                break
+            around[offset] = beside
+    return around
+
+
+def extent_of(method: Method, shutter: Shutter, max_blur: float | None) -> Extent:
+    """Distance over which a method moves colours while the shutter is open."""
+    opens, closes = shutter.span
+    late = sum(map(abs, shutter.delay))  # twice that of the display window's edges
+    return Extent(
+        (opens - late, closes + late),
+        (opens, closes),
+        getattr(method, "spread", "along"),
+        max_blur,
+        getattr(method, "margin", lambda height: 0),
+        getattr(method, "bend", 0.0),
+    )
 
 
 class Method(Protocol):

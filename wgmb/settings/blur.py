@@ -3,10 +3,11 @@
 from dataclasses import dataclass, replace
 from typing import Literal, Self, TypeVar
 
+from ..arguments import checked
 from ..io.clip import Clip
 from ..methods import METHODS, default_method
 from ..methods.options import Option, options_of
-from ..pipeline import Blur, checked
+from ..pipeline import Blur
 from ..scene.scene import Scene
 from ..shutter import Shutter
 

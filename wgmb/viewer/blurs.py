@@ -6,9 +6,10 @@ from typing import Any
 
 import wgpu
 
+from ..arguments import SAMPLES
 from ..errors import InputError
 from ..methods import METHODS
-from ..pipeline import SAMPLES, Blur
+from ..pipeline import Blur
 from ..settings import ShutterSettings
 from ..shutter import Shutter
 from .adaptive import QUICK, Pace

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from ..arguments import SAMPLES
 from ..display import Display
 from ..methods import METHODS
 from ..ocio import installed
-from ..pipeline import SAMPLES
 from ..scene import builtin
 from ..shutter import CURVES, PHASES, ROLLING
 from .blurs import shutter_of
