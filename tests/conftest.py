@@ -17,10 +17,12 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # the workers have shared out the cores
     os.environ["LP_NUM_THREADS"] = "1"
 
 os.environ.pop("OCIO", None)  # a config of whoever runs the tests
+pytest.register_assert_rewrite("viewer_hand")
 standard.record()  # every kernel that a test makes; they are sent through Dawn in the end
 
 # Files that take longest are begun first, so that all workers end at about the same time.
-LONGEST = ("test_blender", "test_page", "test_window", "test_viewer", "test_moving_light",
+LONGEST = ("test_blender", "test_page", "test_window", "test_viewer_controls",
+           "test_viewer_perceived", "test_viewer_pictures", "test_moving_light",
            "test_pygfx", "test_farm", "test_twins", "test_faults", "test_volume", "test_flow",
            "test_experiments", "test_reference", "test_blur_video", "test_perceive")  # fmt: skip
 

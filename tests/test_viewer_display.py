@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_viewer import ALONE, BARE, PLAIN, SIZE, Hand
 
 import make_frames as make
 from make_config import film_config
+from viewer_hand import ALONE, BARE, PLAIN, SIZE, Hand
 from wgmb import DeviceError, InputError
 from wgmb.cli import app
 from wgmb.display import ColorConfig

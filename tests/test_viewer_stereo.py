@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_viewer import PLAIN, SAMPLE, Hand
 
 import make_frames as make
 from make_stereo import many_parts, one_view, single_part, with_stereo
+from viewer_hand import PLAIN, SAMPLE, Hand
 from wgmb import Blur, Clip
 from wgmb.viewer import State, controls
 
