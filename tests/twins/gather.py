@@ -447,7 +447,7 @@ def resolve_visibility(layers, tiles, x, y, t):
             found = Sample(z * weight, z, residual, centre - d, f, back, pixel)
             if f not in far or is_hidden(layers[0], frame, found):
                 record(seen, found, is_opaque=back or frame.edgeless[pixel])
-        return d, is_there
+        return d if is_there else np.full(2, np.inf), is_there
 
     def search_front(f):
         tile, u = tiles[f], t - layers[f].offset
@@ -491,7 +491,7 @@ def is_hidden(own, frame, found):
 def iterate_fixed_point(paths, centre, seed, u, first):
     """Fixed point of d = displacement(centre - d): d, the last step, pixel; None: from 0."""
     height, width = paths.shape[:2]
-    d, steps = (np.zeros(2), 9) if seed is None else (seed, 6)
+    d, steps = (np.zeros(2), 8) if seed is None else (seed, 4)
     residual, pixel, before = np.inf, None, 0j
     if first is not None and (np.abs(d - first[0]) < 0.75).all():
         return d, residual, pixel

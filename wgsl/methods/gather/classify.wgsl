@@ -50,7 +50,7 @@ fn main(@builtin(local_invocation_index) local: u32,
             let layer = 2u * f;
             let handicap = select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u);
             let candidates = candidates_of(tile, f, candidates0, candidates1, candidates2);
-            let starts = seeds_at(candidates, u, 0u);
+            let starts = seeds_at(candidates, u, may_be_there(candidates, u));
             let start = displacement5(unpack_trajectory(surface_of(vec2i(low), layer)), u);
             let visible_depth = deepest;
             var n = 0u;
@@ -59,10 +59,10 @@ fn main(@builtin(local_invocation_index) local: u32,
                 let found = iterate_fixed_point(x, start, u, layer);
                 let z = depth_in(found.word) * handicap;
                 deepest = max(deepest, z);
-                let wanted = may_be_visible(candidates, u, select(visible_depth, z, f == 0u) / handicap);
+                let nearer = may_be_nearer(candidates, select(visible_depth, z, f == 0u) / handicap);
                 let is_there = found.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
                 is_single = is_single && (found.word & SMOOTH) != 0u && is_there && z >= visible_depth;
-                var seeds = Seeds(wanted & ~are_solution(starts, found.d), starts.x, starts.y);
+                var seeds = Seeds(starts.pending & nearer & ~are_solution(starts, found.d), starts.x, starts.y);
                 loop {
                     let is_pending = seeds.pending != 0u;
                     let converges = converges_to(x, next_seed(&seeds), found.d, u, layer);

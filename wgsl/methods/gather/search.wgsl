@@ -22,7 +22,7 @@ struct SourceFrames {
 
 override FAR: bool = false;     // there are frames beyond the neighbours
 
-const MAX_ITERATIONS: u32 = 8u; // from the pixel's own trajectory
+const MAX_ITERATIONS: u32 = 7u; // from the pixel's own trajectory
 const CONVERGED: f32 = 0.5;     // a step shorter than this [px] ends the iteration
 const MAX_RESIDUAL: f32 = 1.0;  // a sample that is farther than this [px] from the pixel is not there
 const SOLUTION_TOLERANCE: f32 = 0.75;   // displacements closer than this [px] in x and y are the same solution
@@ -64,15 +64,20 @@ fn candidates_of(tile: vec2u, f: u32, a: Candidates, b: Candidates, c: Candidate
     return result;
 }
 
-/// The candidates, a bit each, that may be in the tile at the time `u` and nearer than `depth`.
-fn may_be_visible(candidates: Candidates, u: f32, depth: f32) -> u32 {
+/// The candidates, a bit each, that may be in the tile at the time `u`.
+fn may_be_there(candidates: Candidates, u: f32) -> u32 {
     let a = unpack2x16float(candidates.times.x);
     let b = unpack2x16float(candidates.times.y);
     let c = unpack2x16float(candidates.times.z);
     let d = unpack2x16float(candidates.times.w);
     let entered = vec4f(a.x, b.x, c.x, d.x) <= vec4f(u);
     let is_left = vec4f(a.y, b.y, c.y, d.y) < vec4f(u);
-    return bits_of((candidates.min_depth < vec4f(depth)) & entered & !is_left);
+    return bits_of(entered & !is_left);
+}
+
+/// Those that may be nearer than `depth`.
+fn may_be_nearer(candidates: Candidates, depth: f32) -> u32 {
+    return bits_of(candidates.min_depth < vec4f(depth));
 }
 
 fn bits_of(flags: vec4<bool>) -> u32 {
@@ -175,8 +180,8 @@ fn surface_of(px: vec2i, layer: u32) -> vec4u {
 /// One step d <- displacement at (x - d) in a layer, `u` after its frame's instant. INFINITE residual outside the image.
 fn warp_step(x: vec2f, d: vec2f, u: f32, layer: u32) -> WarpState {
     let p = x - d;
-    let surface = surface_of(vec2i(floor(p)), layer);
-    let next = displacement5(unpack_trajectory(surface), u);
+    let surface = surface_of(vec2i(p), layer);      // towards 0: what is outside does not matter
+    let next = displacement_of(surface, u);
     let step = next - d;
     return WarpState(surface.w, next, select(INFINITE, dot(step, step), is_inside(p)));
 }
@@ -191,17 +196,22 @@ const SLOW_STEP: f32 = 0.5;
 const MOST_GROWTH: f32 = 2.0;
 const LEAST_TURN: f32 = 0.25;   // difference of the two steps, as a share of the first, that tells where they lead
 
-/// The way on after a `step` of a slow iteration, and the step `before` it, to get where they lead: steps of what turns and zooms
-/// are, as complex numbers, a geometric series (Aitken's delta-squared process). 0 where it is not slow.
+/// True if the iteration converges slowly, or not at all, by a `step` and the one `before` it.
+fn is_slow(step: vec2f, before: vec2f) -> bool {
+    let change = before - step;
+    let step2 = dot(step, step);
+    let before2 = dot(before, before);
+    return step2 > SLOW_STEP * SLOW_STEP * before2 && step2 < MOST_GROWTH * MOST_GROWTH * before2
+        && dot(change, change) > LEAST_TURN * LEAST_TURN * before2;
+}
+
+/// The way on after a `step` and the one `before` it, to get where they lead: steps of what turns and zooms are, as complex
+/// numbers, a geometric series (Aitken's delta-squared process).
 fn leap(step: vec2f, before: vec2f) -> vec2f {
     let change = before - step;
-    let change2 = dot(change, change);
-    let ratio2 = dot(step, step) / max(dot(before, before), 1e-12);
-    let is_slow = ratio2 > SLOW_STEP * SLOW_STEP && ratio2 < MOST_GROWTH * MOST_GROWTH
-        && change2 > LEAST_TURN * LEAST_TURN * dot(before, before);
     let square = vec2f(step.x * step.x - step.y * step.y, 2.0 * step.x * step.y);
-    let rest = vec2f(dot(square, change), square.y * change.x - square.x * change.y) / max(change2, 1e-12);
-    return select(vec2f(0.0), rest, is_slow);
+    let rest = vec2f(dot(square, change), square.y * change.x - square.x * change.y);
+    return rest * (1.0 / max(dot(change, change), 1e-12));
 }
 
 /// The fixed point to which the iteration leads from the displacement `start`.

@@ -44,6 +44,7 @@ const SINGLE: u32 = 8u;         // nothing is behind: a back layer is empty here
 const FLAGS: u32 = 15u;
 const THIRD_BITS: u32 = 10u;
 const THIRD_STEP: f32 = 0.03125;        // [px]: up to 0.39 of it are seen within a frame interval
+const THIRD_UNIT: f32 = 7.450580596923828e-9;   // THIRD_STEP / 2^(32 - THIRD_BITS)
 const THIRD_MAX: f32 = 511.0;
 
 fn unpack_trajectory(surface: vec4u) -> Trajectory5 {
@@ -51,6 +52,15 @@ fn unpack_trajectory(surface: vec4u) -> Trajectory5 {
     let third = vec2f(bitcast<vec2i>(surface.xy << vec2u(unused)) >> vec2u(unused)) * THIRD_STEP;
     let velocity = bitcast<vec2f>(surface.xy & vec2u(~((1u << THIRD_BITS) - 1u)));
     return Trajectory5(velocity, unpack2x16float(surface.z), third, (surface.w & KINK) != 0u);
+}
+
+/// displacement5() of the trajectory of a surface, in fewer operations one after the other: the search waits for it.
+fn displacement_of(surface: vec4u, t: f32) -> vec2f {
+    let unused = 32u - THIRD_BITS;
+    let velocity = bitcast<vec2f>(surface.xy & vec2u(~((1u << THIRD_BITS) - 1u)));
+    let bend = select(t * t, abs(t), (surface.w & KINK) != 0u);
+    let third = vec2f(bitcast<vec2i>(surface.xy << vec2u(unused)));
+    return velocity * t + third * (THIRD_UNIT * (t * t - 1.0) * t) + unpack2x16float(surface.z) * bend;
 }
 
 fn unpack_depth(surface: vec4u) -> f32 {

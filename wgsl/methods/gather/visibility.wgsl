@@ -4,7 +4,7 @@
 //#include methods/gather/search.wgsl
 
 const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: what one showed is preferred
-const ITERATIONS_SAVED: u32 = 3u;       // from a tile's motion, compared with a start from nothing
+const ITERATIONS_SAVED: u32 = 4u;       // from a tile's motion, compared with a start from nothing
 const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
 const ELSEWHERE: f32 = 2.0;             // samples of one frame farther apart than this [px] are of different surfaces
 
@@ -105,26 +105,21 @@ fn start_of(starts: Starts, query: Query) -> vec2f {
     return select(there, displacement5(starts.own, query.u), query.layer < 2u);
 }
 
-struct First {          // where the first search of a layer led
-    d: vec2f,           // [px]
-    is_there: bool,     // a surface is at the pixel by the time
-}
-
 /// Search one layer from `own`, the displacement of the pixel's own trajectory [px]; then, in a front layer, from the
 /// tile's candidates that may be nearer than what is visible already.
 fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candidates: Candidates) {
     let is_front = query.layer % 2u == 0u;
-    var seeds = seeds_at(candidates, query.u, select(0u, ~0u, is_front));
-    var first = First(vec2f(INFINITE), false);
+    var seeds = seeds_at(candidates, query.u, select(0u, may_be_there(candidates, query.u), is_front));
+    var first = vec2f(INFINITE);    // where the first search led; if nowhere, the place where it stopped tells nothing
     var is_first = true;
     loop {
         let state = find_surface(&seeds, query, own, is_first, first, (*visible).opaque.depth);
         let is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
-        if is_first { first = First(state.d, is_there); }
+        if is_first && is_there { first = state.d; }
         if is_first && is_front && !is_far(query.layer) { (*visible).miss2 = min((*visible).miss2, state.residual2); }
         if is_there { record(visible, query, state); }
-        let wanted = may_be_visible(candidates, query.u, (*visible).opaque.depth / query.handicap);
-        seeds.pending &= wanted & ~are_solution(seeds, first.d);
+        let nearer = may_be_nearer(candidates, (*visible).opaque.depth / query.handicap);
+        seeds.pending &= nearer & ~are_solution(seeds, first);
         is_first = false;
         if seeds.pending == 0u { break; }
     }
@@ -133,7 +128,7 @@ fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candi
 /// Iterate from `own` at first; after that from pending seeds, one after the other until one leads to a surface. A seed
 /// is given up if it leads to the first solution, to something that is not nearer than `limit`, or astray: its
 /// residual is INFINITE then.
-fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first: bool, first: First, limit: f32) -> WarpState {
+fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first: bool, first: vec2f, limit: f32) -> WarpState {
     var state = WarpState(0u, own, INFINITE);
     var n = 1u;
     var before = vec2f(0.0);    // the last step, if no leap came after it
@@ -142,21 +137,21 @@ fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first:
         n = ITERATIONS_SAVED;
     }
     loop {              // a turn is a step
-        let back = state.d - first.d;
+        let back = state.d - first;
         let start = state.d;
         state = warp_step(query.x, state.d, query.u, query.layer);
         n++;
-        let again = same_solution(state.d, first.d);
+        let again = same_solution(state.d, first);
         let farther = !is_first && depth_in(state.word) * query.handicap >= limit;
         let astray = !is_first && state.residual2 > MAX_STEP_RATIO * MAX_STEP_RATIO * dot(back, back);
         let ended = has_ended(state) || n > MAX_ITERATIONS || again || farther || astray;
-        if (again && first.is_there) || farther { state.residual2 = INFINITE; }
+        if again || farther { state.residual2 = INFINITE; }
         let is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
         if ended && (is_first || is_there || (*seeds).pending == 0u) { break; }
         let step = state.d - start;
-        let further = leap(step, before);
-        state.d += further;
-        before = select(vec2f(0.0), step, all(further == vec2f(0.0)));
+        let leaps = is_slow(step, before);
+        state.d += select(vec2f(0.0), leap(step, before), leaps);
+        before = select(step, vec2f(0.0), leaps);
         if ended {
             state.d = next_seed(seeds);
             n = ITERATIONS_SAVED;
