@@ -20,13 +20,13 @@ KNEE = 0.92
 
 def slowly(rgb, times):
     """One pixel."""
-    most = max(rgb)
-    if most <= KNEE:
+    least = min(rgb)
+    if least <= KNEE:
         return list(rgb)
-    bent = most + (times - 1) * ((most - KNEE) / (1 - KNEE)) ** 2
-    if most > 1:
-        bent = times + (1 + 2 * (times - 1) / (1 - KNEE)) * (most - 1)
-    return [c * bent / most for c in rgb]
+    bent = least + (times - 1) * ((least - KNEE) / (1 - KNEE)) ** 2
+    if least > 1:
+        bent = times + (1 + 2 * (times - 1) / (1 - KNEE)) * (least - 1)
+    return [c * bent / least for c in rgb]
 
 
 def colors(count=400, channels=3, seed=3):
@@ -62,6 +62,13 @@ def test_the_curve_ascends_and_has_no_corner():
     slope = np.diff(light) / np.diff(grey)
     assert slope.min() > 0.99 and np.abs(np.diff(slope)).max() < 0.5  # up to 176; f32 rounds
     np.testing.assert_array_equal(light[grey <= KNEE], grey[grey <= KNEE].astype("f4"))
+
+
+def test_paint_is_no_light():
+    """A colour that is cut off in one or two of its channels only."""
+    paint = np.array([[[1, 0.9, 0.1], [1, 0.1, 0.1], [0.1, 1, 1]]], "f4")
+    np.testing.assert_array_equal(expanded(paint, 8.0), paint)
+    np.testing.assert_array_equal(compressed(paint, 8.0), paint)
 
 
 def picture(channels):

@@ -3,7 +3,8 @@
 8- and 10-bit pictures end at white, so that a lamp that moves is blurred as if it were no brighter
 than paper, and its streak fades. The curve is the identity up to a knee, adds a square from there
 to white, and goes on straight: smooth, ascending, with a closed inverse. It is taken of the
-brightest colour of a pixel, and the others keep their ratio to it, so that hues stay.
+darkest colour of a pixel, since white paper and lamps reach white in all three and yellow paint
+in two only; the others keep their ratio to it, so that hues stay.
 `wgsl/common/highlights.wgsl` is the same for videos.
 """
 
@@ -11,6 +12,7 @@ brightest colour of a pixel, and the others keep their ratio to it, so that hues
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -40,27 +42,27 @@ def expanded(rgba: np.ndarray, highlights: float) -> np.ndarray:
 
     InputError for pictures that hold light above white. Not finite values stay as they are.
     """
-    brightest = _brightest(rgba)
-    if np.any(brightest > _WHITE):
-        most = float(brightest.max())
+    most = float(_straight(rgba, np.max).max(initial=0))
+    if most > _WHITE:
         raise InputError(
             f"holds light up to {most:.3g} times white, so `highlights` does not apply"
         )
     knee, bend = _curve(highlights)
-    over = np.maximum(brightest - knee, 0)
+    darkest = _straight(rgba, np.min)
+    over = np.maximum(darkest - knee, 0)
     bent = np.minimum(over, 1 - knee)
-    return _scaled(rgba, 1 + bend * bent * (2 * over - bent) / np.maximum(brightest, knee))
+    return _scaled(rgba, 1 + bend * bent * (2 * over - bent) / np.maximum(darkest, knee))
 
 
 def compressed(rgba: np.ndarray, highlights: float) -> np.ndarray:
     """The inverse of `expanded`, for any light."""
     knee, bend = _curve(highlights)
-    brightest = _brightest(rgba)
-    over = np.maximum(brightest - knee, 0)
+    darkest = _straight(rgba, np.min)
+    over = np.maximum(darkest - knee, 0)
     bent = np.minimum(over, highlights - knee)
     root = 2 * bent / (1 + np.sqrt(1 + 4 * bend * bent))
     x = root + (over - bent) / (1 + 2 * bend * (1 - knee))
-    return _scaled(rgba, np.where(over > 0, (knee + x) / np.maximum(brightest, knee), 1))
+    return _scaled(rgba, np.where(over > 0, (knee + x) / np.maximum(darkest, knee), 1))
 
 
 def _curve(highlights: float) -> tuple[float, float]:
@@ -69,13 +71,13 @@ def _curve(highlights: float) -> tuple[float, float]:
     return knee, (highlights - 1) / (1 - knee) ** 2
 
 
-def _brightest(rgba: np.ndarray) -> np.ndarray:
-    """(height, width) the greatest of R, G, B, without alpha; 0 where nothing is finite."""
-    most = rgba[..., :3].max(axis=2).astype(np.float32)
+def _straight(rgba: np.ndarray, pick: Callable[..., np.ndarray]) -> np.ndarray:
+    """(height, width) the least or greatest of R, G, B, without alpha; 0 where it is not finite."""
+    picked = pick(rgba[..., :3], axis=2).astype(np.float32)
     if rgba.shape[2] == 4:
         alpha = rgba[..., 3].astype(np.float32)
-        most = np.divide(most, alpha, out=np.zeros_like(most), where=alpha > 0)
-    return np.where(np.isfinite(most), most, np.float32(0))
+        picked = np.divide(picked, alpha, out=np.zeros_like(picked), where=alpha > 0)
+    return np.where(np.isfinite(picked), picked, np.float32(0))
 
 
 def _scaled(rgba: np.ndarray, gain: np.ndarray) -> np.ndarray:
