@@ -23,7 +23,8 @@ standard.record()  # every kernel that a test makes; they are sent through Dawn 
 # Files that take longest are begun first, so that all workers end at about the same time.
 LONGEST = ("test_blender", "test_page", "test_window", "test_viewer_controls",
            "test_viewer_perceived", "test_viewer_pictures", "test_moving_light",
-           "test_pygfx", "test_farm", "test_twins", "test_faults", "test_volume", "test_flow",
+           "test_pygfx", "test_farm", "test_twins", "test_faults",
+           "test_interruptions", "test_volume", "test_flow",
            "test_experiments", "test_reference", "test_blur_video", "test_perceive")  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -208,3 +209,21 @@ def add_attributes(path: Path, raw: dict[str, tuple[str, bytes]]) -> Path:
 def attribute_bytes(name: str, kind: str, value: bytes) -> bytes:
     """An attribute as it stands in a file's header."""
     return f"{name}\0{kind}\0".encode() + len(value).to_bytes(4, "little") + value
+
+
+def error_lines(err: str) -> list[str]:
+    """What a command said of its failure, which is no traceback."""
+    assert "Traceback" not in err
+    return err.splitlines()
+
+
+def begun(line, has_begun, **options) -> subprocess.Popen:
+    """A run of which `has_begun()` is true, and which has more to do."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+    process = subprocess.Popen([*COMMAND, *map(str, line)], text=True, **pipes)
+    ends = time.monotonic() + 120
+    while not has_begun():
+        assert time.monotonic() < ends
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.002)
+    return process

@@ -409,18 +409,6 @@ def test_a_worker_that_is_named_is_so_in_the_words_of_the_command_line(
     assert "`device=" not in err
 
 
-def begun(line, has_begun) -> subprocess.Popen:
-    process = subprocess.Popen(
-        [*make.COMMAND, *line], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    ends = time.monotonic() + 120
-    while not has_begun():
-        assert time.monotonic() < ends
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.01)
-    return process
-
-
 @pytest.fixture(scope="module")
 def long_shot(tmp_path_factory):
     folder = tmp_path_factory.mktemp("long")
@@ -442,7 +430,7 @@ def made(out) -> int:
 def test_an_interrupted_farm_ends_its_frames_and_goes_on_later(long_shot, tmp_path, capsys):
     out = tmp_path / "out"
     line = long_words(long_shot, out, "--workers", 2)
-    process = begun(line, lambda: made(out) >= 8)
+    process = make.begun(line, lambda: made(out) >= 8)
     process.send_signal(signal.SIGINT)
     said, err = process.communicate(timeout=60)
     assert (process.returncode, said, err) == (130, "", "wgmb: interrupted\n")
@@ -484,7 +472,9 @@ def scheduler_and_worker(folder):
 def test_a_scheduler_that_is_lost_is_one_line_and_resume_goes_on(long_shot, tmp_path):
     out = tmp_path / "out"
     with scheduler_and_worker(tmp_path / "first") as (scheduler, address):
-        process = begun(long_words(long_shot, out, "--cluster", address), lambda: made(out) >= 8)
+        process = make.begun(
+            long_words(long_shot, out, "--cluster", address), lambda: made(out) >= 8
+        )
         scheduler.kill()
         said, err = process.communicate(timeout=60)
     assert (process.returncode, said) == (1, "")

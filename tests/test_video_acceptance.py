@@ -9,7 +9,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from test_faults import small_disk
+from test_disk_faults import small_disk
 from test_other_streams import FLASH, flash_and_click, flashing, packets
 
 import make_clips as clips

@@ -1,0 +1,108 @@
+"""Killed and interrupted runs leave whole files only, and go on later."""
+
+import contextlib
+import itertools
+import signal
+
+import pytest
+
+import make_frames as make
+from wgmb import Blur
+from wgmb.cli import app, terminal
+
+LONG = 96  # frames: many more than a run makes before it is interrupted
+
+
+@pytest.fixture(scope="module")
+def long_shot(tmp_path_factory):
+    """Frames (of three pictures) by the dozen, and what an unbroken run makes of them."""
+    folder = tmp_path_factory.mktemp("long")
+    for n in range(1, 4):
+        make.write_exr(folder / f"of.{n}.exr", make.frame(n))
+    for n in range(1, LONG + 1):
+        (folder / f"shot.{n:04d}.exr").hardlink_to(folder / f"of.{(n - 1) % 3 + 1}.exr")
+    pattern = str(folder / "shot.####.exr")
+    assert app.main(list(map(str, arguments(pattern, folder / "whole", "-q")))) == 0
+    whole = {p.name: p.read_bytes() for p in (folder / "whole").iterdir()}
+    assert len(whole) == LONG
+    return pattern, whole
+
+
+def arguments(pattern, out, *more):
+    # A constant convention: the frames do not follow each other.
+    return ("blur", pattern, "-o", out / "o.####.exr", "--vectors", "blender", *more)
+
+
+def made(out) -> int:
+    return len(list(out.glob("o.*.exr")))
+
+
+def test_killed_runs_leave_whole_files_only_and_resume_to_the_same_bytes(tmp_path, long_shot):
+    pattern, whole = long_shot
+    out = tmp_path / "out"
+    for frames in (1, 23, 48):
+        process = make.begun(arguments(pattern, out, "--resume"), lambda n=frames: made(out) >= n)
+        process.kill()
+        process.communicate()
+        for path in out.glob("o.*.exr"):
+            assert path.read_bytes() == whole[path.name]
+    assert app.main(list(map(str, arguments(pattern, out, "--resume", "-q")))) == 0
+    assert {p.name: p.read_bytes() for p in out.iterdir()} == whole
+
+
+def ignore_ctrl_c():
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # as a shell does for what runs in the background
+
+
+@pytest.mark.parametrize(
+    ("number", "prepare"),
+    [(signal.SIGINT, None), (signal.SIGTERM, None), (signal.SIGTERM, ignore_ctrl_c)],
+    ids=["Ctrl-C", "SIGTERM", "SIGTERM in the background"],
+)
+def test_an_interrupted_run_ends_with_130_one_line_and_whole_files(
+    tmp_path, long_shot, number, prepare
+):
+    pattern, whole = long_shot
+    out = tmp_path / "out"
+    line = arguments(pattern, out, "--resume")
+    process = make.begun(line, lambda: made(out) >= 5, preexec_fn=prepare)
+    process.send_signal(number)
+    said, err = process.communicate(timeout=20)
+    assert (process.returncode, said) == (130, "")
+    assert make.error_lines(err) == ["wgmb: interrupted"]
+    got = {p.name: p.read_bytes() for p in out.iterdir()}
+    assert 5 <= len(got) < LONG
+    assert got.items() <= whole.items()
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "gif"])
+def test_an_interrupted_video_leaves_nothing(tmp_path, long_shot, suffix):
+    pattern, _ = long_shot
+    out, said = tmp_path / "out", tmp_path / "said.txt"
+    line = ["blur", pattern, "-o", out / f"v.{suffix}", "--samples", "512", "--verbose"]
+    with said.open("w") as file:
+        process = make.begun(line, lambda: "settings: " in said.read_text(), stderr=file)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert said.read_text().endswith("\nwgmb: interrupted\n")
+    assert make.names_in(out) == []
+
+
+def test_an_interruption_that_python_lost_is_heard_at_the_next_frame(
+    tmp_path, long_shot, monkeypatch
+):
+    """Exceptions that a signal raises within a destructor are dropped."""
+    calls = itertools.count()
+    blur = Blur.__call__
+
+    def blurred(*given):
+        if next(calls) == 3:
+            with contextlib.suppress(KeyboardInterrupt):
+                terminal.interrupt()
+        return blur(*given)
+
+    monkeypatch.setattr(Blur, "__call__", blurred)
+    code = app.main(list(map(str, arguments(long_shot[0], tmp_path / "out", "-q"))))
+    assert code == 130
+    assert 0 < len(list((tmp_path / "out").glob("o.*.exr"))) < 10
