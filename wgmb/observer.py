@@ -14,7 +14,6 @@ import wgpu
 from . import gpu
 from .cone import Cone
 from .errors import InputError
-from .gpu import wgsl
 from .gpu.textures import ScratchBuffer, TexturePool
 
 EIGHT = 8  # pictures that one pass takes
@@ -40,11 +39,8 @@ class WeightedSum:
         `output`: rgba32float, of that size. `onto`: added to the sum of the call before.
         """
         width, height, _ = output.size
-        data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
-        data["size"] = width, height
-        uniform = wgpu.BufferUsage.UNIFORM
-        create = self._device.create_buffer_with_data
-        bindings = gpu.FrameBindings((width, height), {"frame": create(data=data, usage=uniform)})
+        bindings = gpu.FrameBindings.of_size(self._device, (width, height))
+        uniform, create = wgpu.BufferUsage.UNIFORM, self._device.create_buffer_with_data
         views = [picture.create_view() for picture in pictures]
         for first in range(0, len(views), EIGHT):
             begins = first == 0 and not onto

@@ -16,7 +16,6 @@ from .exposure import evened
 from .flow import Shot
 from .frame_views import TEXTURES, FrameViews, View
 from .glance import Glance
-from .gpu import wgsl
 from .gpu.textures import TexturePool
 from .motion_source import MotionSource
 from .pipeline import Blur
@@ -166,15 +165,14 @@ class ReelViews:
         size = motion.size[0], motion.size[1]
         output = self._images.texture(f"motion {index % _FRAMES}", size, "rgba32float")
         kernel = gpu.kernel(self._device, "reel_views.wgsl")
-        frame = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
         pace = np.zeros((), kernel.source.dtype("Pace"))
-        frame["size"], pace["factors"] = size, np.repeat(factors, 2)
+        pace["factors"] = np.repeat(factors, 2)
         uniform, create = wgpu.BufferUsage.UNIFORM, self._device.create_buffer_with_data
         encoder = self._device.create_command_encoder(label="pace")
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings(size, {"frame": create(data=frame, usage=uniform)}),
+            gpu.FrameBindings.of_size(self._device, size),
             pace=create(data=pace, usage=uniform),
             motion=motion.create_view(),
             output=output.create_view(),

@@ -100,12 +100,7 @@ class Passes:
 
     def _frame(self, size: tuple[int, int]) -> gpu.FrameBindings:
         if size not in self._frames:
-            data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
-            data["size"] = size
-            buffer = self.device.create_buffer_with_data(
-                label="frame", data=data, usage=wgpu.BufferUsage.UNIFORM
-            )
-            self._frames[size] = gpu.FrameBindings(size, {"frame": buffer})
+            self._frames[size] = gpu.FrameBindings.of_size(self.device, size)
         return self._frames[size]
 
     @staticmethod

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
 import wgpu
 
 from ..errors import ShaderError
@@ -21,6 +22,16 @@ class FrameBindings:
     resources: dict[str, wgpu.GPUBuffer]  # by binding name
     window: tuple[int, int, int, int] = (0, 0, 0, 0)  # x, y in the display window, its size [px]
     groups: BindGroups | None = None  # where bind groups are kept; None: each is made anew
+
+    @classmethod
+    def of_size(cls, device: wgpu.GPUDevice, size: tuple[int, int]) -> FrameBindings:
+        """For passes that need no more of a frame than its size [px]."""
+        data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
+        data["size"] = size
+        usage = wgpu.BufferUsage.UNIFORM
+        return cls(
+            size, {"frame": device.create_buffer_with_data(label="frame", data=data, usage=usage)}
+        )
 
 
 class Kernel:

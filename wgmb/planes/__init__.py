@@ -13,7 +13,7 @@ from ..gpu.textures import TexturePool
 from .average import Average, averages
 from .matrices import from_samples
 from .packed import Packed, Place, places_of
-from .uniforms import curve_of, frame_of, reading, writing
+from .uniforms import curve_of, reading, writing
 
 __all__ = ["Average", "Planes", "averages", "check"]
 
@@ -57,7 +57,7 @@ class Planes:
         kernel.run(
             encoder,
             "main",
-            frame_of(self._device, picture.size),
+            gpu.FrameBindings.of_size(self._device, picture.size),
             code=reading(self._device, coding),
             plane0=views[0],
             plane1=views[1 % len(views)],
@@ -84,7 +84,7 @@ class Planes:
         kernel.run(
             encoder,
             "main",
-            frame_of(self._device, size),
+            gpu.FrameBindings.of_size(self._device, size),
             code=writing(self._device, coding),
             light=light,
             output=samples.create_view(),
@@ -108,7 +108,7 @@ class Planes:
             {"Output": "rgba32float"},
             HIGHLIGHTS=self._highlights,
         )
-        frame = frame_of(self._device, size)
+        frame = gpu.FrameBindings.of_size(self._device, size)
         kernel.run(encoder, "main", frame, light=light, output=output)
 
     def _pack(
@@ -133,7 +133,7 @@ class Planes:
         kernel.run(
             encoder,
             "main",
-            frame_of(self._device, (place.words, place.size[1])),
+            gpu.FrameBindings.of_size(self._device, (place.words, place.size[1])),
             plane=self._device.create_buffer_with_data(data=data, usage=uniform),
             samples=samples.create_view(),
             packed=self._packed.buffer(places),

@@ -13,7 +13,7 @@ from .. import gpu
 from ..coding import CodedPicture, Coding
 from ..gpu.textures import ScratchBuffer, TexturePool
 from .packed import Packed, places_of
-from .uniforms import curve_of, frame_of, reading, writing
+from .uniforms import curve_of, reading, writing
 
 EIGHT = 8  # pictures that one pass takes, and that are kept on the GPU
 _BLOCK = 16, 2  # columns and rows of pixels that an invocation makes
@@ -90,7 +90,9 @@ class Average:
         kernel.run(
             encoder,
             "main",
-            frame_of(self._device, _invocations(grid[0] * grid[1], kernel.workgroup)),
+            gpu.FrameBindings.of_size(
+                self._device, _invocations(grid[0] * grid[1], kernel.workgroup)
+            ),
             stored=reading(self._device, stored),
             wanted=writing(self._device, wanted),
             average=self._device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM),

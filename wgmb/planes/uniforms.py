@@ -7,7 +7,6 @@ from __future__ import annotations
 import numpy as np
 import wgpu
 
-from .. import gpu
 from ..coding import Coding
 from ..errors import InputError
 from ..gpu import wgsl
@@ -23,14 +22,6 @@ def curve_of(coding: Coding) -> int:
         known = ", ".join(map(str, sorted(_CURVES)))
         raise InputError(f"transfer {coding.transfer} of H.273 is not known; these are: {known}")
     return _CURVES[coding.transfer]
-
-
-def frame_of(device: wgpu.GPUDevice, size: tuple[int, int]) -> gpu.FrameBindings:
-    """Group 0 of a pass that takes `size` invocations, across and down."""
-    data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
-    data["size"] = size
-    frame = device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM)
-    return gpu.FrameBindings(size, {"frame": frame})
 
 
 def reading(device: wgpu.GPUDevice, coding: Coding) -> wgpu.GPUBuffer:

@@ -81,15 +81,12 @@ class Screen:
         if (key := key_box(state, first.kind, place, area, ratio)) is not None:
             data["wheel" if first.kind == "MOTION" else "key"] = key
         buffer = self.device.create_buffer_with_data
-        given = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
-        given["size"] = size
         uniform = wgpu.BufferUsage.UNIFORM
-        frame = buffer(label="frame", data=given, usage=uniform)
         encoder = self.device.create_command_encoder(label="view")
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings(size, {"frame": frame}),
+            gpu.FrameBindings.of_size(self.device, size),
             view=buffer(label="view", data=data, usage=uniform),
             first=first.texture.create_view() if first.texture else self._none,
             second=second.texture.create_view() if second.texture else self._none,

@@ -7,7 +7,6 @@ import wgpu
 
 from .. import gpu
 from ..coding import HLG, Coding
-from ..gpu import wgsl
 from ..gpu.textures import TexturePool
 from ..primaries import H273, REC709, conversion, luminance
 from .screen import Image
@@ -55,14 +54,12 @@ class VideoLight:
         for name, row in zip(("red", "green", "blue"), rows, strict=True):
             onto[name][:3] = row
         onto["luminance"][:3] = luminance(primaries)
-        frame = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
-        frame["size"] = size
         uniform, create = wgpu.BufferUsage.UNIFORM, self._device.create_buffer_with_data
         encoder = self._device.create_command_encoder(label="video light")
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings(size, {"frame": create(data=frame, usage=uniform)}),
+            gpu.FrameBindings.of_size(self._device, size),
             onto=create(data=onto, usage=uniform),
             light=light.create_view(),
             output=output.create_view(),
