@@ -45,7 +45,7 @@ def view(
 
     Example: wgmb view clip.mp4 --flow dis --fps 60
 
-    Example: wgmb view game.mp4 --speed 0.5 --keep static
+    Example: wgmb view game.mp4 --speed 0.5 --holdout static
 
     Parameters
     ----------
