@@ -217,6 +217,30 @@ def test_what_all_frames_hide_is_like_what_is_around():
     assert np.abs(picture - truth)[14:50, 30:90][hidden].max() < 0.06
 
 
+def pan(t):
+    """A pattern that enters from the left and from above."""
+    y, x = np.mgrid[:64, :96] + 0.5
+    x, y = x - 24 * t, y - 9 * t
+    slow, quick = np.sin(0.11 * x + 0.05 * y), np.sin(0.31 * y - 0.09 * x + 2 * np.sin(0.07 * x))
+    color = np.stack([0.5 + 0.25 * slow + 0.2 * quick] * 3, axis=-1).astype("f4")
+    motion = np.broadcast_to(np.array([-24, -9, 24, 9], "f4"), (*y.shape, 4))
+    return color, motion, np.full(y.shape, 5, "f4")
+
+
+@pytest.mark.parametrize("sides, most", [("next", 0.6), ("", 0.85), ("prev next", 0.25)])
+def test_what_comes_over_the_border_is_like_the_border(sides, most):
+    """At the ends of a shot no frame shows it; the frame's own pixels are no substitute."""
+    frame = frame_of([pan(t) for t in (0, -1, 1)])
+    frame = frame.between(*(getattr(frame, s) if s in sides else None for s in ("prev", "next")))
+    got, told = wgmb.Blur("gather", samples=16).with_confidence(frame)
+    truth = np.mean([pan(t)[0] for t in SHUTTER.sample_times(64)], axis=0)
+    border = np.ones(truth.shape[:2], bool)
+    border[3:-3, 7:-7] = False
+    assert error(got[border], truth[border]) < most * error(frame.color[border], truth[border])
+    np.testing.assert_allclose(got[~border], truth[~border], atol=0.01)
+    assert told["left"][~border].max() == 0
+
+
 def test_colours_tell_coverage_if_neither_alpha_nor_vectors_do():
     picture, told, truth = blurred(lambda x, y: x**2 + y**2 < 26**2)
     assert error(picture, truth) < 0.003

@@ -52,7 +52,7 @@ def gather(frames, times):
         for x in range(width):
             here = [t[y // TILE][x // TILE] for t in tiles]
             if max(tile["longest"] for tile in here[: len(layers) - len(far)]) >= 0.01:
-                seen = [instant(layers, here, x, y, t, own) for t in times]
+                seen = [instant(layers, here, x, y, t, own, n) for n, t in enumerate(times)]
                 if any(one is None for one in seen):
                     filled = hidden(layers[0], x, y, own)
                     seen = [filled if one is None else one for one in seen]
@@ -376,8 +376,8 @@ def tile_candidates(frame, span):
 # ---- search ---------------------------------------------------------------------------------
 
 
-def instant(layers, tiles, x, y, t, color):
-    """The samples at the pixel at time `t`: edge, the edge behind it, the opaque one.
+def instant(layers, tiles, x, y, t, color, n):
+    """The samples at the pixel at time `t`, number `n`: edge, the edge behind it, the opaque one.
 
     None: something that all frames hide.
     """
@@ -396,10 +396,20 @@ def instant(layers, tiles, x, y, t, color):
         clear *= 1 - cover
     if clear < 0.5:
         return sum_ / (1 - clear)
-    if miss > 8:
+    at = np.array([x + 0.5, y + 0.5]) - moved(layers[0].trajectory[0][y, x], t)
+    size = np.array(color.shape[1::-1])
+    is_inside = (at >= 0).all() and (at < size).all()
+    if is_inside and miss > 8:
         return None
-    way = moved(layers[0].trajectory[0][y, x], t)
-    return bilinear(color, x + 0.5 - way[0], y + 0.5 - way[1])
+    return bilinear(color, *(at if is_inside else at_border(at, size, n)))
+
+
+def at_border(at, size, n):
+    """The place at the border that stands for one beyond it, for sample `n` of the exposure."""
+    nearest = np.clip(at, 0.5, size - 0.5)
+    beyond = np.abs(at - nearest)
+    along = np.array([0.0, 1.0] if beyond[0] > beyond[1] else [1.0, 0.0])
+    return nearest + max(beyond) / 2 * (2 * ((0.618034 * n + 0.5) % 1) - 1) * along
 
 
 def hidden(frame, x, y, color):

@@ -10,6 +10,8 @@ const FILL_DIRECTIONS: u32 = 8u;        // see cosine_of()
 const SQRT_HALF: f32 = 0.70710678;
 const FILL_STEPS: u32 = 13u;            // to every side, each FILL_GROWTH times as far as the one before: 64 px
 const FILL_GROWTH: f32 = 1.414213562;
+const BORDER_SPREAD: f32 = 0.5;         // half the length of the border that stands for a place beyond it, per distance
+const GOLDEN_RATIO: f32 = 0.618034;     // less 1
 const FILL_DEPTH_RATIO: f32 = 1.1;      // of what is behind a surface
 
 /// A tap of the frame itself.
@@ -17,6 +19,17 @@ fn tap(p: vec2f) -> Composite {
     var counts = 1.0;
     if WEIGHTED { counts = textureSampleLevel(own_weight, linear, p / vec2f(frame.size), 0.0).x; }
     return Composite(textureSampleLevel(own_color, linear, p / vec2f(frame.size), 0.0), counts, 1.0, 0.0, 0.0, 0.0);
+}
+
+/// The place [px] that stands for one of a path, for sample `n` of the exposure: itself, or beyond the border of the
+/// picture, a place along the border. The farther a path has left the picture, the less of the border tells what is there:
+/// the samples are spread over a longer part of it.
+fn at_border(p: vec2f, n: u32) -> vec2f {
+    let nearest = clamp(p, vec2f(0.5), vec2f(frame.size) - 0.5);
+    let beyond = abs(p - nearest);
+    let along = select(vec2f(1.0, 0.0), vec2f(0.0, 1.0), beyond.x > beyond.y);
+    let turn = 2.0 * fract(f32(n) * GOLDEN_RATIO + 0.5) - 1.0;      // even over any run of samples
+    return select(nearest + BORDER_SPREAD * max(beyond.x, beyond.y) * turn * along, p, is_inside(p));
 }
 
 /// Add what is hidden behind the pixel in all frames: the nearest surfaces behind its own, in FILL_DIRECTIONS

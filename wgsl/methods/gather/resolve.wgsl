@@ -113,11 +113,13 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
                 if unresolved != 0u {
                     let t = time_in(times, first, unresolved);
                     let p = x - displacement5(trajectory, t);
-                    if (far & unresolved & (~unresolved + 1u)) != 0u {
+                    let is_far = (far & unresolved & (~unresolved + 1u)) != 0u;
+                    if is_far && is_inside(p) {
                         hidden += 1.0;
                     } else {
-                        var one = tap(p);
-                        if MOVING_LIGHT { one.color += moving_light(p, 0u, t, duration_in(times, first, unresolved)); }
+                        let at = at_border(p, first + firstTrailingBit(unresolved));
+                        var one = tap(at);
+                        if MOVING_LIGHT { one.color += moving_light(at, 0u, t, duration_in(times, first, unresolved)); }
                         add(&sum, one, share);
                     }
                     if !is_inside(p) { left_image += 1.0; }
