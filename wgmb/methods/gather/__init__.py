@@ -30,7 +30,8 @@ class Gather:
     nearer; what all frames hide is filled from the surfaces around and behind.
     `show`: "confidence" gives, instead of colour, the share of times at which a sample was
     accepted and its light followed, the share that neighbouring frames gave (backgrounds included),
-    the mean residual [px] and the share of times whose path left the picture, as r, g, b, a.
+    the mean residual [px] and the share that came over the picture's border, in no frame, as r, g,
+    b, a.
 
     `shading`: light that moves over surfaces, as shadows and reflections do, is followed too, where
     the passes of light of the frame and of a neighbour tell it from what it falls on (see
