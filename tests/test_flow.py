@@ -7,6 +7,7 @@ import pytest
 
 from twins import flow as twin
 from wgmb import Blur, Flow, Frame, InputError
+from wgmb.flow import homography as flow_homography
 from wgmb.flow import passes as flow_passes
 from wgmb.flow.carry import carry
 from wgmb.flow.dominant import follow_most, settled
@@ -355,6 +356,18 @@ def test_the_homography_of_most_is_found_among_others():
     assert (few == np.eye(3)).all()
     line = np.repeat(np.arange(40.0)[:, None], 2, axis=1)
     assert np.allclose(dominant_homography(line, 0 * line, 40), np.eye(3))
+
+
+@pytest.mark.parametrize("astray", [0.0, 0.2, 0.6, 0.8])
+def test_homographies_are_left_out_only_where_they_cannot_be_the_best(monkeypatch, astray):
+    rng = np.random.default_rng(5)
+    points = rng.uniform(0, 160, (700, 2))
+    motion = points * (0.02, -0.05) + rng.normal(0, 0.3, (700, 2))
+    lost = rng.random(700) < astray
+    motion[lost] = rng.uniform(-30, 30, (lost.sum(), 2))
+    found = dominant_homography(points, motion, 160, 0.5 / 160)
+    monkeypatch.setattr(flow_homography, "PARTS", 1)
+    assert np.allclose(found, dominant_homography(points, motion, 160, 0.5 / 160), atol=1e-9)
 
 
 def test_a_frame_is_compared_with_those_around_it():

@@ -12,6 +12,10 @@ SAMPLES = 500  # of four points each
 POINTS = 4
 TOLERANCE = 3.0 / 640  # of the longer side, unless another one is asked for
 REFINEMENTS = 3
+PARTS = 8  # of the points
+AT_ONCE = 64  # homographies: what they are multiplied with stays in the cache, and in one thread
+ROUNDING = 1e-6  # sums of agreement that differ by less are equal
+IN_FRONT = 0.1  # depth from which a point is seen
 
 
 def dominant_homography(
@@ -28,14 +32,13 @@ def dominant_homography(
     there = here + 2 * motion.astype(float) / longest
     tolerance *= 2
     picks = np.random.default_rng(0).integers(0, len(here), (SAMPLES, POINTS))
-    candidates = np.concatenate([np.eye(3)[None], _fits(here[picks], there[picks])])
-    best = max(candidates, key=lambda h: _agreement(h, here, there, tolerance))
+    ends = _Ends(here, there, tolerance)
+    best = ends.best(np.concatenate([np.eye(3)[None], _fits(here[picks], there[picks])]))
     for _ in range(REFINEMENTS):
-        near = _apart(best, here, there) <= tolerance
+        near = ends.near(best)
         if near.sum() < POINTS:
             break
-        fitted = _least_squares(here[near], there[near])
-        best = max(best, fitted, key=lambda h: _agreement(h, here, there, tolerance))
+        best = ends.best(np.stack([best, _least_squares(here[near], there[near])]))
     scale = np.diag([2 / longest, 2 / longest, 1.0])
     scale[:2, 2] = -points.max(axis=0) / longest
     return np.linalg.inv(scale) @ best @ scale
@@ -74,18 +77,61 @@ def _fits(here: np.ndarray, there: np.ndarray) -> np.ndarray:
 
 def _least_squares(here: np.ndarray, there: np.ndarray) -> np.ndarray:
     rows, sides = _equations(here, there)
-    solved = np.linalg.lstsq(rows, sides, rcond=None)[0]
+    solved = np.linalg.lstsq(rows.T @ rows, rows.T @ sides, rcond=None)[0]
     return np.append(solved, 1.0).reshape(3, 3)
 
 
-def _agreement(homography, here, there, tolerance: float) -> float:
-    """Number of points that end where the homography moves them; near ends count less."""
-    return float(np.maximum(0, 1 - _apart(homography, here, there) / tolerance).sum())
+class _Ends:
+    """Points and where they end, as rows of numbers to be multiplied with those of homographies.
 
+    `tolerance`: how far from its end a homography may move a point.
+    """
 
-def _apart(homography, here, there) -> np.ndarray:
-    """Distance of every point's end from where the homography moves it."""
-    moved = here @ homography[:, :2].T + homography[:, 2]
-    in_front = moved[:, 2] > 0.1
-    apart = moved[:, :2] / np.where(in_front, moved[:, 2], 1.0)[:, None] - there
-    return np.where(in_front, np.hypot(apart[:, 0], apart[:, 1]), np.inf)
+    def __init__(self, here: np.ndarray, there: np.ndarray, tolerance: float):
+        place = np.concatenate([here, np.ones((len(here), 1))], axis=1).T
+        self._across = np.concatenate([place, -there[:, 0] * place])
+        self._down = np.concatenate([place, -there[:, 1] * place])
+        self._tolerance = tolerance
+
+    def best(self, homographies: np.ndarray) -> np.ndarray:
+        """The first of those (count, 3, 3) with which most points agree.
+
+        The points are looked at in parts, and in each part the homographies that may still turn out
+        better than the one that leads after the first.
+        """
+        agree, left = np.zeros(len(homographies)), np.arange(len(homographies))
+        count = self._across.shape[1]
+        leader, most, seen = 0, 0.0, 0
+        for part in range(PARTS):
+            some = slice(part, None, PARTS)
+            for few in np.array_split(left, len(left) // AT_ONCE + 1):
+                agree[few] += self._agreement(homographies[few], some)
+            if part == 0:
+                leader = int(np.argmax(agree))
+                most = self._agreement(homographies[[leader]], slice(None))[0]
+            seen += len(range(count)[some])
+            left = left[agree[left] + count - seen > most + ROUNDING]
+        return homographies[left[np.argmax(agree[left])] if len(left) else leader]
+
+    def near(self, homography: np.ndarray) -> np.ndarray:
+        """(points,) True where it moves a point to its end, within the tolerance."""
+        return self._apart(homography[None], slice(None))[0] <= 1
+
+    def _agreement(self, homographies: np.ndarray, some: slice) -> np.ndarray:
+        """(count,) how many of some points end where each moves them; near ends count less."""
+        return np.maximum(1 - self._apart(homographies, some), 0).sum(axis=1)
+
+    def _apart(self, homographies: np.ndarray, some: slice) -> np.ndarray:
+        """(count, points) distance of each end from where the point is moved, in tolerances."""
+        rows = homographies.reshape(-1, 9)
+        depth = rows[:, 6:] @ self._across[:3, some]
+        across = rows[:, [0, 1, 2, 6, 7, 8]] @ self._across[:, some]  # times the depth
+        down = rows[:, 3:] @ self._down[:, some]
+        across *= across
+        down *= down
+        across += down
+        np.sqrt(across, out=across)
+        is_seen = depth > IN_FRONT
+        across[~is_seen], depth[~is_seen] = np.inf, 1.0
+        across /= depth
+        return across / self._tolerance
