@@ -73,9 +73,9 @@ fn main(
     let turns = turns_of(average.count, id.x);
     // Below the last row stands the last row again.
     let rows = vec2u(2u * id.y, min(2u * id.y + 1u, average.luma.y - 1u));
-    red_row = stored.x;
-    green_row = stored.y;
-    blue_row = stored.z;
+    red_row = stored.x / signal_unit();
+    green_row = stored.y / signal_unit();
+    blue_row = stored.z / signal_unit();
     var upper = Row();
     var lower = Row();
     var n = 0u;
@@ -184,7 +184,7 @@ fn light(y: f32, cb: f32, cr: f32) -> vec3f {
     let tint = vec3f(
         fma(red_row.y, cb, fma(red_row.z, cr, red_row.w)), fma(green_row.y, cb, fma(green_row.z, cr, green_row.w)),
         fma(blue_row.y, cb, fma(blue_row.z, cr, blue_row.w)));
-    return light_of(fma(vec3f(red_row.x, green_row.x, blue_row.x), vec3f(y), tint));
+    return light_of(fma(vec3f(red_row.x), vec3f(y), tint));     // all have the same share of luma
 }
 
 /// A sum, and what was kept of the one before.
@@ -232,7 +232,8 @@ fn signals_of(light: mat4x3f) -> mat3x4f {
 
 /// One component of four pixels, not rounded yet.
 fn mixed(row: vec4f, signals: mat3x4f) -> vec4f {
-    return fma(vec4f(row.x), signals[0], fma(vec4f(row.y), signals[1], fma(vec4f(row.z), signals[2], vec4f(row.w))));
+    let by = signal_unit() * row.xyz;
+    return fma(vec4f(by.x), signals[0], fma(vec4f(by.y), signals[1], fma(vec4f(by.z), signals[2], vec4f(row.w))));
 }
 
 /// Write Cb and Cr of eight pixels, from sums of their signals over WRITE_Y rows.
