@@ -1,5 +1,6 @@
 // The states of one frame carried along their own flow into the frame beside it, where they are tried. Of those that
 // land on a pixel the cheapest wins, and of equals the first: the result does not depend on any order.
+//#include flow/band.wgsl
 //#include flow/match.wgsl
 
 struct Carry {
@@ -36,23 +37,25 @@ fn landing(px: vec2i, flow: vec2f, corner: u32) -> i32 {
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn clear(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
+fn clear(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    if any(id >= frame.size) { return; }
     let index = id.y * frame.size.x + id.x;
     atomicStore(&landings[index].cost, NONE);
     atomicStore(&landings[index].source, NONE);
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn claim(@builtin(global_invocation_id) id: vec3u) {
-    let px = vec2i(min(id.xy, frame.size - 1u));
+fn claim(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    let px = vec2i(min(id, frame.size - 1u));
     let way = way_of(load_state(states, px));
     load_patch(px);
     let is_near = carry.along > 0.0;
     let n = near_cost(target_of(way.flow, way.slope, select(-1.0, OUTSIDE, is_near)));
     let f = far_cost(target_of(way.flow, way.slope, select(OUTSIDE, -1.0, is_near)));
     let cost = bitcast<u32>(min(n, f) + 1.0);
-    if any(id.xy >= frame.size) { return; }
+    if any(id >= frame.size) { return; }
     landings[id.y * frame.size.x + id.x].own = cost;
     for (var corner = 0u; corner < CORNERS; corner++) {
         let at = landing(px, way.flow, corner);
@@ -61,12 +64,13 @@ fn claim(@builtin(global_invocation_id) id: vec3u) {
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn settle(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
+fn settle(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    if any(id >= frame.size) { return; }
     let index = id.y * frame.size.x + id.x;
-    let way = way_of(load_state(states, vec2i(id.xy)));
+    let way = way_of(load_state(states, vec2i(id)));
     for (var corner = 0u; corner < CORNERS; corner++) {
-        let at = landing(vec2i(id.xy), way.flow, corner);
+        let at = landing(vec2i(id), way.flow, corner);
         if at >= 0 && atomicLoad(&landings[max(at, 0)].cost) == landings[index].own {
             atomicMin(&landings[at].source, index);
         }
@@ -75,12 +79,13 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
 
 /// The state that came, from this frame's side: back along its way, or, by constant velocity, on along it.
 @compute @workgroup_size(WG_X, WG_Y)
-fn fetch(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
+fn fetch(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    if any(id >= frame.size) { return; }
     let source = atomicLoad(&landings[id.y * frame.size.x + id.x].source);
     let start = vec2u(source % frame.size.x, source / frame.size.x);
     var way = State();
     if source != NONE { way = way_of(load_state(states, vec2i(start))); }
-    textureStore(output, id.xy, 0, vec4f(carry.turn * way.flow, 0.0, 0.0));
-    textureStore(output, id.xy, 1, carry.turn * way.slope);
+    textureStore(output, id, 0, vec4f(carry.turn * way.flow, 0.0, 0.0));
+    textureStore(output, id, 1, carry.turn * way.slope);
 }

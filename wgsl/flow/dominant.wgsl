@@ -90,33 +90,37 @@ fn settle(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     var state = extended(load_state(states, px), most);
     let near_apart = length(state.flow - most.flow);
     let far_apart = select(length(way_to_far(state).flow - way_to_far(most).flow), 0.0, VIEWS == ONE);
-    if max(near_apart, far_apart) < MUCH_ALIKE {
-        let least = match_cost(state, OUTSIDE) + AS_WELL;
-        if match_cost(most, least) < least { state = most; }
-    }
+    let cost = match_cost(state, OUTSIDE);
+    let least = cost + AS_WELL;
+    let is_alike = max(near_apart, far_apart) < MUCH_ALIKE && match_cost(most, least) < least;
+    if is_alike || (cost > UNSEEN_PRICE && has_left(most)) { state = most; }
     if all(id < frame.size) {
         textureStore(output, id, 0, vec4f(state.flow, state.bend));
         textureStore(output, id, 1, state.slope);
     }
 }
 
-/// A state, which goes on as most of the picture moves where there is nothing to match. One that moves like most on the
-/// side where it is seen keeps that side.
+/// A state that leaves the picture on one side and on the other moves like most of it, which does not leave: it goes on
+/// like most, too.
 fn extended(own: State, most: State) -> State {
     var state = own;
     let way = way_to_far(state);
-    let most_way = way_to_far(most);
     let near_leaves = leaves(state.flow);
     let far_leaves = leaves(way.flow);
-    if leaves(most.flow) && (VIEWS == ONE || leaves(most_way.flow)) {
-        if match_cost(state, OUTSIDE) > UNSEEN_PRICE { state = most; }
-    } else if VIEWS == AROUND && near_leaves && !far_leaves && length(way.flow - most_way.flow) < SAME_WAY {
+    let may_go_on = VIEWS == AROUND && !has_left(most);
+    if may_go_on && near_leaves && !far_leaves && length(way.flow - way_to_far(most).flow) < SAME_WAY {
         state.flow = (way.flow - most.bend) / view.far_factor;
         state.bend = most.bend;
-    } else if VIEWS == AROUND && far_leaves && !near_leaves && length(state.flow - most.flow) < SAME_WAY {
+    }
+    if may_go_on && far_leaves && !near_leaves && length(own.flow - most.flow) < SAME_WAY {
         state.bend = most.bend;
     }
     return state;
+}
+
+/// True where most of the picture leaves it on all sides that there are.
+fn has_left(most: State) -> bool {
+    return leaves(most.flow) && (VIEWS == ONE || leaves(way_to_far(most).flow));
 }
 
 fn leaves(flow: vec2f) -> bool {

@@ -1,6 +1,6 @@
 // The result: motion of every pixel to the previous and the next frame, and depth by the distance from the motion of
 // most of the picture, which is taken for the background.
-//#include common/frame.wgsl
+//#include flow/band.wgsl
 //#include flow/state.wgsl
 
 struct Result {
@@ -27,31 +27,34 @@ const MEDIAN_COUNT: i32 = 25;
 const RANK: i32 = 12;           // of the median
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn write_motion(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let state = load_state(states, vec2i(id.xy));
+fn write_motion(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    if any(id >= frame.size) { return; }
+    let state = load_state(states, vec2i(id));
     let ahead = select(vec2f(0.0), state.flow, result.near != 0.0);
     let behind = select(vec2f(0.0), state.bend, result.around == 1u) - ahead;
-    textureStore(motion_out, id.xy, select(vec4f(ahead, behind), vec4f(behind, ahead), result.near >= 0.0));
+    textureStore(motion_out, id, select(vec4f(ahead, behind), vec4f(behind, ahead), result.near >= 0.0));
 }
 
 /// The motion of a few pixels, evenly spaced: one for each pixel of a small picture.
 @compute @workgroup_size(WG_X, WG_Y)
-fn thin(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = result.spacing * id.xy + result.spacing / 2u;
-    textureStore(apart_out, id.xy, textureLoad(motion, min(px, textureDimensions(motion) - 1u), 0));
+fn thin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    if any(id >= frame.size) { return; }
+    let px = result.spacing * id + result.spacing / 2u;
+    textureStore(apart_out, id, textureLoad(motion, min(px, textureDimensions(motion) - 1u), 0));
 }
 
 /// Distance of each pixel's motion from that of most of the picture.
 @compute @workgroup_size(WG_X, WG_Y)
-fn find_apart(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let own = textureLoad(motion, id.xy, 0);
-    let x = vec2f(id.xy) + 0.5;
+fn find_apart(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    if any(id >= frame.size) { return; }
+    let own = textureLoad(motion, id, 0);
+    let x = vec2f(id) + 0.5;
     let back = length(own.xy - displaced(result.to_prev, x));
     let ahead = length(own.zw - displaced(result.to_next, x));
-    textureStore(apart_out, id.xy, vec4f(back, ahead, 0.0, 0.0));
+    textureStore(apart_out, id, vec4f(back, ahead, 0.0, 0.0));
 }
 
 fn displaced(homography: mat4x4f, x: vec2f) -> vec2f {
@@ -61,29 +64,27 @@ fn displaced(homography: mat4x4f, x: vec2f) -> vec2f {
 
 /// Depth from the greater distance of both, each the median of the pixels around.
 @compute @workgroup_size(WG_X, WG_Y)
-fn write_depth(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let distance = max(median(vec2i(id.xy), 0u), median(vec2i(id.xy), 1u));
-    textureStore(depth_out, id.xy, vec4f(1.0 / (1.0 + NEARNESS * distance)));
+fn write_depth(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    let distances = medians(vec2i(min(id, frame.size - 1u)));
+    if any(id >= frame.size) { return; }
+    textureStore(depth_out, id, vec4f(1.0 / (1.0 + NEARNESS * max(distances.x, distances.y))));
 }
 
-/// The value that as many of 5 x 5 pixels are below as above.
-fn median(px: vec2i, channel: u32) -> f32 {
+/// The distances that as many of 5 x 5 pixels are below as above.
+fn medians(px: vec2i) -> vec2f {
     let last = vec2i(frame.size) - 1;
-    var values: array<f32, MEDIAN_COUNT>;
+    var values: array<vec2f, MEDIAN_COUNT>;
     for (var k = 0; k < MEDIAN_COUNT; k++) {
         let by = vec2i(k % MEDIAN_SIDE, k / MEDIAN_SIDE) - MEDIAN_RADIUS;
-        values[k] = textureLoad(apart, clamp(px + by, vec2i(0), last), 0)[channel];
+        values[k] = textureLoad(apart, clamp(px + by, vec2i(0), last), 0).xy;
     }
-    var found = 0.0;
+    // The greatest of those that no more than RANK values are below.
+    var found = vec2f(0.0);
     for (var k = 0; k < MEDIAN_COUNT; k++) {
-        var below = 0;
-        var equal = 0;
-        for (var i = 0; i < MEDIAN_COUNT; i++) {
-            below += i32(values[i] < values[k]);
-            equal += i32(values[i] == values[k]);
-        }
-        if below <= RANK && RANK < below + equal { found = values[k]; }
+        var below = vec2i(0);
+        for (var i = 0; i < MEDIAN_COUNT; i++) { below += vec2i(values[i] < values[k]); }
+        found = max(found, select(vec2f(0.0), values[k], below <= vec2i(RANK)));
     }
     return found;
 }

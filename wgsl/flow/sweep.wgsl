@@ -1,6 +1,7 @@
 // Half a sweep: every second pixel, as on a chessboard, tries other states and keeps the best. First those of other
 // pixels (Barnes et al., "PatchMatch", 2009; on planes: Bleyer et al. 2011), then variations of its own.
 //#include common/hash.wgsl
+//#include common/loops.wgsl
 //#include flow/band.wgsl
 //#include flow/plane.wgsl
 //#include flow/steps.wgsl
@@ -42,6 +43,7 @@ const REFINED: u32 = 11u;           // two planes, the changes, no slope, no ben
 override ASIDE_PRICE: f32 = 0.4;    // of moving otherwise than most, per longer side of the picture, where a patch
 const PLAIN: f32 = 0.0009;          // has gradients: more than this, squared; its neighbours tell how a plain one moves
 const SAME: f32 = 0.001;            // states closer than this are not tried again [px]
+const UNKNOWN: f32 = 1000.0;        // energy of a state that is to be tried first: more than any
 
 var<private> around: array<vec4f, NEIGHBOURS>;      // flow and bend of the neighbours, each moved here
 var<private> around_weight: array<f32, NEIGHBOURS>; // all of them sum up to SMOOTHNESS
@@ -97,9 +99,8 @@ fn begin(px: vec2i) -> Best {
     load_patch(px);
     load_neighbours(px);
     let state = load_state(states, px);
-    var cost = costs[px.y * i32(frame.size.x) + px.x];
-    if sweep.is_known == 0u { cost = match_cost(state, OUTSIDE); }
-    return Best(state, smoothness(state) + price(state) + cost, cost);
+    let cost = costs[px.y * i32(frame.size.x) + px.x];
+    return Best(state, select(UNKNOWN, smoothness(state) + price(state) + cost, sweep.is_known == 1u), cost);
 }
 
 /// The better one of two states.
@@ -108,7 +109,7 @@ fn attempt(best: Best, candidate: State) -> Best {
     state.slope = clamp(state.slope, vec4f(-STEEPEST), vec4f(STEEPEST));
     let least = smoothness(state) + price(state);
     let apart = abs(vec4f(state.flow - best.state.flow, state.bend - best.state.bend));
-    let is_same = max(max(apart.x, apart.y), max(apart.z, apart.w)) < SAME
+    let is_same = best.energy < UNKNOWN && max(max(apart.x, apart.y), max(apart.z, apart.w)) < SAME
         && all(abs(state.slope - best.state.slope) < vec4f(SAME));
     let most = select(best.energy - least, -1.0, is_same);
     let cost = match_cost(state, most);
@@ -157,13 +158,20 @@ fn source_of(px: vec2i, k: u32) -> vec2i {
     return px + select(fixed, random, k >= FIXED);
 }
 
+// Loops end at their end, for lavapipe. Where a pixel's own state has no known cost, it is the first candidate.
+
 @compute @workgroup_size(WG_X, WG_Y)
 fn propagate(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let px = own_pixel(banded_pixel(local, group));
     var best = begin(min(px, vec2i(frame.size) - 1));
-    for (var k = 0u; k < PROPAGATED; k++) {
+    let own = 1u - sweep.is_known;
+    let turns = turns_of(PROPAGATED + own, local);
+    var turn = 0u;
+    loop {
+        let k = turn - own;
         var source = source_of(px, k);
-        if any(source < vec2i(0)) || any(source >= vec2i(frame.size)) { source = px; }
+        let is_there = all(source >= vec2i(0)) && all(source < vec2i(frame.size));
+        if k >= PROPAGATED || !is_there { source = px; }
         var candidate = moved(load_state(states, source), vec2f(px - source));
         if k == FIXED + RANDOM { candidate = State(); }
         if k == FIXED + RANDOM + 1u && sweep.carried > 0u { candidate = load_state(carried_near, px); }
@@ -173,6 +181,8 @@ fn propagate(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id)
             candidate.bend = view.far_factor * (load_state(carried_far, px).flow - candidate.flow);
         }
         best = attempt(best, candidate);
+        turn++;
+        if turn >= turns { break; }
     }
     store_best(px, best);
 }
@@ -207,10 +217,22 @@ fn refine(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     let inside = min(px, vec2i(frame.size) - 1);
     var best = begin(inside);
     let plane = fitted_plane(here, states, inside, best.state);
-    for (var k = 0u; k < REFINED; k++) { best = attempt(best, varied(best.state, plane, px, k)); }
+    let own = 1u - sweep.is_known;
+    let turns = turns_of(REFINED + own, local);
+    var turn = 0u;
+    loop {
+        best = attempt(best, varied(best.state, plane, px, turn - own));
+        turn++;
+        if turn >= turns { break; }
+    }
     let steps = inverse_steps(best.state);
     let state = best.state;
-    for (var k = 0u; k < STEPS; k++) { best = attempt(best, stepped(state, steps, k)); }
+    var k = 0u;
+    loop {
+        best = attempt(best, stepped(state, steps, k));
+        k++;
+        if k >= STEPS { break; }
+    }
     store_best(px, best);
 }
 
@@ -225,7 +247,8 @@ fn polish(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     let steps = inverse_steps(own);
     var state = own;
     var energy = price(own) + steps.cost;
-    for (var k = 0u; k < STEPS; k++) {
+    var k = 0u;
+    loop {
         let candidate = stepped(own, steps, k);
         let least = price(candidate);
         let changed = least + match_cost(candidate, energy - least);
@@ -233,6 +256,8 @@ fn polish(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
             energy = changed;
             state = candidate;
         }
+        k++;
+        if k >= STEPS { break; }
     }
     store(px, state);
 }
