@@ -55,11 +55,14 @@ def smalls_differ(a: np.ndarray, b: np.ndarray) -> bool:
     contrast = np.abs(blocks - blocks.mean(axis=(1, 3), keepdims=True)).sum(axis=4).mean()
     most = _UNLIKE * max(float(contrast), _ALIKE)
     reach = round(_SEARCH * b.shape[1] / _STEP) * _STEP
-    b = np.pad(b, ((reach, reach), (reach, reach), (0, 0)), mode="edge")
-    left = np.full((height, width), np.inf)
+    a = np.ascontiguousarray(np.moveaxis(a, 2, 0))  # planes: sums along rows are quick
+    b = np.pad(np.moveaxis(b, 2, 0), ((0, 0), (reach, reach), (reach, reach)), mode="edge")
+    left, apart = np.full((height, width), np.inf), np.empty_like(a)
     for y, x in _ways(reach):
-        there = b[reach + y : reach + y + a.shape[0], reach + x : reach + x + a.shape[1]]
-        left = np.minimum(left, _blocks(np.abs(a - there).sum(axis=2)).mean(axis=(1, 3)))
+        there = b[:, reach + y : reach + y + a.shape[1], reach + x : reach + x + a.shape[2]]
+        np.abs(np.subtract(a, there, out=apart), out=apart)
+        rows = apart.sum(axis=0).reshape(height, _BLOCK, -1).sum(axis=1)
+        left = np.minimum(left, rows.reshape(height, width, _BLOCK).sum(axis=2) / _BLOCK**2)
         if left.mean() <= most:  # it can only become less
             return False
     return True
