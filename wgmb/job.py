@@ -167,9 +167,7 @@ class Job:
         if numbers is not None:
             clip = clip.part(self.chosen(numbers))
         if self.flow:
-            motion, _ = self.asked.video.source(blur.device)
-            if motion is not None:
-                clip.move_by(motion)
+            clip.move_by(self.asked.video.source(blur.device)[0])
         if self.asked.video.highlights != 1:
             clip.expand_highlights(self.asked.video.highlights)
         files = self.make_output(None if numbers is None else clip)
@@ -245,7 +243,7 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
     if conversion:
         remarks.append(_of_conversion(conversion, clip, asked.output))
         asked = replace(asked, output=replace(asked.output, layers="picture"))
-    video, how = _motion(clip, asked.video, adapter)
+    video, how = _motion(clip, asked, adapter)
     if how:
         look = replace(asked.look, method=asked.look.method or video.method).for_pictures()
     else:
@@ -316,13 +314,22 @@ def _check_space(clip: Clip, shown: Display | None) -> str:
     return f"{source.path}: {said} is not in {shown.config.name}, so it is taken as {found.text}"
 
 
-def _motion(clip: Clip, video: VideoSettings, adapter: str | None) -> tuple[VideoSettings, str]:
+def _motion(clip: Clip, asked: Asked, adapter: str | None) -> tuple[VideoSettings, str]:
     """Source of the motion for frames without vectors, decided, and in words."""
-    if video.flow == "none" or len(clip.on_disk) < 2:
+    video = asked.video
+    if len(clip.on_disk) < 2:
         return video, ""
     has = clip.has
     if "motion" in has or not has:  # nothing can be read: its turn to fail comes
         return video, ""
+    if video.flow == "none":
+        if asked.conversion is None:
+            raise InputError(
+                "the frames have no vectors, and `flow` none only averages frames of a higher "
+                "rate: name it by `fps_in`, and that of the output by `fps`"
+            )
+        if asked.look.holdout:
+            raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
     return video.settled(gpu.open_device(adapter))
 
 

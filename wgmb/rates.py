@@ -158,8 +158,14 @@ class ConversionStages(Stages):
                 of_view.add(result, cell.share, cell.index == nearest)
             for name, count in blurred.bad.items():
                 done.bad[name] = done.bad.get(name, 0) + count
-        done.views = [of_view.result(read.number) for of_view in sums.values()]
+        for of_view in sums.values():
+            made = of_view.result(read.number)
+            done.views.append(replace(made, picture=super()._finished(made.picture)))
         return done
+
+    def _finished(self, light: np.ndarray) -> np.ndarray:
+        """As it is: highlights are compressed in the sum."""
+        return light
 
 
 class _Sum:

@@ -134,9 +134,12 @@ class Stages:
             picture, confidence = self._blur.with_confidence(frame)
         else:
             picture = self._blur(frame)
-        if self.clip.highlights != 1:
-            picture = compressed(picture, self.clip.highlights)
-        return Result(source, picture, confidence, placement)
+        return Result(source, self._finished(picture), confidence, placement)
+
+    def _finished(self, light: np.ndarray) -> np.ndarray:
+        """The light of a frame as it is written: highlights that were expanded are compressed."""
+        highlights = self.clip.highlights
+        return light if highlights == 1 else compressed(light, highlights)
 
 
 class MotionStages(Stages):

@@ -90,7 +90,9 @@ def blur_video(
         for text in left_out:
             note(f"{plan.name}: {text}")
     if not quiet and (reel := run.reel) is not None:
-        took = f"{time.perf_counter() - started:.1f} s with {wish.blur.method.name}"
+        took = f"{time.perf_counter() - started:.1f} s"
+        if wish.motion is not None:
+            took += f" with {wish.blur.method.name}"
         if reel.cuts:
             note(f"camera cut before picture {', '.join(map(str, sorted(reel.cuts)))}")
         if reel.flashes:

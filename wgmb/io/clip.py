@@ -27,7 +27,7 @@ from .masks import Masks
 from .meaning import Meaning
 from .neighbours import Neighbours, extras
 from .passes import Passes
-from .picture_motion import FAR, PictureMotion
+from .picture_motion import FAR, PictureMotion, standing
 from .sequence_files import SequenceFiles
 from .settled import Settled
 from .stored_frames import StoredFrames
@@ -146,10 +146,10 @@ class Clip:
         frames = f"frame{'s' if len(self.numbers) > 1 else ''} {frame_list(self.numbers)}"
         return f'Clip("{pattern}", {frames}{vectors})'
 
-    def move_by(self, motion: MotionSource) -> None:
-        """Find motion in the pictures (see wgmb/flow) if the files hold none."""
-        self._maker.picture_motion = PictureMotion(self._stored, motion)
-        self._stored.around = FAR
+    def move_by(self, motion: MotionSource | None) -> None:
+        """Find motion in the pictures (see wgmb/flow) if the files hold none; None: all stand."""
+        self._maker.picture_motion = PictureMotion(self._stored, motion) if motion else standing
+        self._stored.around = FAR if motion else 0
         self._around.forget_all()
 
     def expand_highlights(self, highlights: float) -> None:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from .camera_file import CameraFile
 from .frame_file import FrameFile, about
 from .masks import Masks
 from .meaning import Meaning
-from .picture_motion import PictureMotion
+from .picture_motion import Found
 from .stored_frames import StoredFrames
 
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
@@ -40,7 +40,7 @@ class FrameMaker:
     ):
         self._stored, self._meaning, self._masks = stored, meaning, masks
         self._cameras = cameras
-        self.picture_motion: PictureMotion | None = None
+        self.picture_motion: Callable[[FrameFile], Found | None] | None = None
         self.highlights = 1.0
 
     def made(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:

@@ -18,6 +18,12 @@ Found = tuple[np.ndarray, np.ndarray]
 FAR = 5  # frames around one that its motion may depend on
 
 
+def standing(source: FrameFile) -> Found:
+    """No motion (height, width, 4) [px], and one depth: at another rate, pictures are averaged."""
+    shape = source.rgba.shape[:2]
+    return np.zeros((*shape, 4), np.float32), np.ones(shape, np.float32)
+
+
 class PictureMotion:
     """Motion (height, width, 4) [px] and depth order of frames by a source of motion.
 
