@@ -198,7 +198,7 @@ def test_pictures_without_vectors_move_by_flow(tmp_path, capsys):
     assert '"samples": 16' in run(
         capsys, *words, "--flow", "dis", "--samples", 16, "-v", "--overwrite"
     )
-    assert "needs motion" in run(capsys, *words, "--flow", "none", "--overwrite", code=1)
+    assert "have no vectors" in run(capsys, *words, "--flow", "none", "--overwrite", code=2)
 
 
 @pytest.mark.parametrize(

@@ -169,12 +169,13 @@ def _apart(one: Path, other: Path) -> str:
 
 
 def _flash_and_click(path: Path) -> tuple[float, float]:
-    """Times of the brightest picture and of the loudest sound [s]."""
-    with av.open(str(path)) as container:
-        shown = max(
-            (int(f.to_ndarray(format="gray").sum(dtype=np.int64)), -(f.time or 0.0))
-            for f in container.decode(video=0)
-        )
+    """Times of the middle of the bright pictures and of the loudest sound [s].
+
+    In slow motion a flash is several pictures long.
+    """
+    times, sums = _times_and_sums(path)
+    darkest, brightest = min(sums), max(sums)
+    shown = float(np.average(times, weights=[s > (darkest + brightest) / 2 for s in sums]))
     loud, heard = 0.0, 0.0
     with av.open(str(path)) as container:
         for frame in container.decode(audio=0):
@@ -182,7 +183,7 @@ def _flash_and_click(path: Path) -> tuple[float, float]:
             if wave.max() > loud:
                 loud = float(wave.max())
                 heard = (frame.time or 0.0) + int(wave.argmax()) / frame.sample_rate
-    return -shown[1], heard
+    return shown, heard
 
 
 @row(full=600)
