@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from dataclasses import fields, replace
 from pathlib import Path
@@ -119,7 +120,7 @@ def blur(
             if crew and not (confidence or fps_in):
                 option = "--workers" if workers else "--cluster"
             raise InputError(f"{option} is for rendered frames")
-        _tell_unused(color)
+        _tell_unused(color, quiet)
         settings = look, when, given, video, adapter, quiet, verbose
         if is_batch(patterns, output.output):
             return blur_videos(patterns, output, *settings)
@@ -143,11 +144,15 @@ def blur(
     return blur_frames(made, adapter, verbose, quiet)
 
 
-def _tell_unused(color: ColorSettings) -> None:
-    """Say which colour options have no part in the blur of videos."""
+def _tell_unused(color: ColorSettings, quiet: bool) -> None:
+    """Say which colour options have no part in the blur of videos; InputError for a time."""
     plain = ColorSettings()
+    if color.from_ and re.fullmatch(r"[\d:.]+", color.from_):
+        raise InputError(
+            f"--from is a colour space, got {color.from_}; a part of a video is --begin and --end"
+        )
     used = [f.name for f in fields(plain) if getattr(color, f.name) != getattr(plain, f.name)]
-    if used:
+    if used and not quiet:
         options = ", ".join(map(option_name, used))
         note(f"videos keep their own colours: {options} not used")
 

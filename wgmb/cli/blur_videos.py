@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -106,5 +107,5 @@ def _check_output(output: OutputSettings, video: VideoSettings) -> None:
     if suffix not in SUFFIXES:
         raise InputError(f"output {path}: must be a video {' '.join(SUFFIXES)}, or a frame pattern")
     chosen(path, video.codec, video.quality, video.encoder)
-    if path.exists() and not (output.overwrite or output.resume):
+    if os.path.exists(os.path.realpath(path)) and not (output.overwrite or output.resume):
         raise InputError(f"{path} exists; --overwrite replaces it, --resume keeps finished videos")

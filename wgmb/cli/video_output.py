@@ -84,7 +84,7 @@ def _write_video(
     found = os.stat(footage.path)
     made_of = settings | {"input": [footage.path.name, found.st_size, found.st_mtime_ns]}
     texts = _texts(footage, made_of)
-    there = [path] if path.exists() else []
+    there = [path] if os.path.exists(os.path.realpath(path)) else []
     refuse_inputs(path.parent, [path.name], there, [footage.path])
     if there and output.resume and texts.items() <= Footage(path).metadata.items():
         remove_left(path)

@@ -74,6 +74,7 @@ class Footage:
         self.path = Path(path)
         self.missing: set[int] = set()
         self.damaged: set[int] = set()
+        self._is_at_end = False
         self.notes: list[str] = []
         with opened(self.path) as container:
             stream = picture_stream(container, self.path)
@@ -239,6 +240,9 @@ class Footage:
         if self.damaged:
             at = float(self.times[min(self.damaged)])
             said.append(f"{len(self.damaged)} pictures are damaged, the first at {at:.2f} s")
+        if self._packets.lacks and self._is_at_end:
+            count, at = round(self._packets.lacks * self.rate), float(self._packets.end)
+            said.append(f"about {count} pictures after {at:.2f} s are lost, as it is cut off")
         return f"{self.path}: {'; '.join(said)}" if said else ""
 
     def __len__(self) -> int:
@@ -267,10 +271,12 @@ class Footage:
             if frame.is_corrupt:
                 self.damaged.add(number)
             expected = number + 1
+            self._is_at_end |= expected == len(self)
             yield number, CodedPicture(self._upright(frame, by), self.coding)
             if number == last:
                 break
         self.missing.update(range(expected, last + 1))
+        self._is_at_end |= last + 1 == len(self)
 
     def _upright(self, frame: av.VideoFrame, by: VideoReformatter) -> tuple[np.ndarray, ...]:
         if (frame.width, frame.height) != self._frame_size:

@@ -19,7 +19,8 @@ def refuse_inputs(
     By the folder itself, however it is reached; and, for `there`, the outputs that exist, by the
     file itself, whatever links lead to it.
     """
-    place, wanted, folders = _identity(folder), set(names), {}
+    real = Path(os.path.realpath(folder))  # also through folders that are to be made
+    place, wanted, folders = _identity(real), set(names), {}
     outputs = {_identity(path): path for path in there}
     for path in inputs:
         if path.parent not in folders:
@@ -42,7 +43,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
 def that_exist(folder: Path, names: Iterable[str]) -> list[Path]:
     """The files of these names that there are in `folder`."""
     try:
-        existing = set(os.listdir(folder))
+        existing = set(os.listdir(os.path.realpath(folder)))
     except OSError:  # not there yet, or said when it is prepared
         return []
     return [folder / name for name in names if name in existing]
