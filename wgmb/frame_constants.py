@@ -1,4 +1,4 @@
-"""What all passes over a frame bind: its constants, the shutter, and the times of the samples."""
+"""Bindings of all passes over a frame: its constants, the shutter, and the times of the samples."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 

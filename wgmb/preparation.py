@@ -1,4 +1,4 @@
-"""What is done around a method: motion is completed, and holdouts are taken out and put back."""
+"""Work around a method: motion is completed, and holdouts are taken out and put back."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
