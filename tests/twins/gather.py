@@ -501,7 +501,7 @@ def is_hidden(own, frame, found):
 def iterate_fixed_point(paths, centre, seed, u, first):
     """Fixed point of d = displacement(centre - d): d, the last step, pixel; None: from 0."""
     height, width = paths.shape[:2]
-    d, steps = (np.zeros(2), 8) if seed is None else (seed, 4)
+    d, steps = (np.zeros(2), 7) if seed is None else (seed, 4)
     residual, pixel, before = np.inf, None, 0j
     if first is not None and (np.abs(d - first[0]) < 0.75).all():
         return d, residual, pixel

@@ -22,7 +22,7 @@ struct SourceFrames {
 
 override FAR: bool = false;     // there are frames beyond the neighbours
 
-const MAX_ITERATIONS: u32 = 7u; // from the pixel's own trajectory
+const MAX_ITERATIONS: u32 = 6u; // from the pixel's own trajectory
 const CONVERGED: f32 = 0.5;     // a step shorter than this [px] ends the iteration
 const MAX_RESIDUAL: f32 = 1.0;  // a sample that is farther than this [px] from the pixel is not there
 const SOLUTION_TOLERANCE: f32 = 0.75;   // displacements closer than this [px] in x and y are the same solution

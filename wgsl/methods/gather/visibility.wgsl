@@ -4,7 +4,7 @@
 //#include methods/gather/search.wgsl
 
 const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: what one showed is preferred
-const ITERATIONS_SAVED: u32 = 4u;       // from a tile's motion, compared with a start from nothing
+const ITERATIONS_SAVED: u32 = 3u;       // from a tile's motion, compared with a start from nothing
 const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
 const ELSEWHERE: f32 = 2.0;             // samples of one frame farther apart than this [px] are of different surfaces
 
