@@ -106,10 +106,11 @@ fn begin(px: vec2i) -> Best {
 /// The better one of two states.
 fn attempt(best: Best, candidate: State) -> Best {
     var state = candidate;
-    state.slope = clamp(state.slope, vec4f(-STEEPEST), vec4f(STEEPEST));
+    let is_own = best.energy == UNKNOWN;
+    if !is_own { state.slope = clamp(state.slope, vec4f(-STEEPEST), vec4f(STEEPEST)); }
     let least = smoothness(state) + price(state);
     let apart = abs(vec4f(state.flow - best.state.flow, state.bend - best.state.bend));
-    let is_same = best.energy < UNKNOWN && max(max(apart.x, apart.y), max(apart.z, apart.w)) < SAME
+    let is_same = !is_own && max(max(apart.x, apart.y), max(apart.z, apart.w)) < SAME
         && all(abs(state.slope - best.state.slope) < vec4f(SAME));
     let most = select(best.energy - least, -1.0, is_same);
     let cost = match_cost(state, most);
