@@ -369,6 +369,25 @@ def mended(matcher, states, is_lost):
     return out
 
 
+def lit(matcher, states, lights):
+    """Pixels of lights that lead to nothing alike take their light's motion if it does."""
+    out = states.copy()
+    for y in range(matcher.height):
+        for x in range(matcher.width):
+            own, light = states[y, x], None
+            for one in lights:
+                if (np.abs(np.array([x, y]) - one[:2]) < one[2:4] + 1.5).all():
+                    light = np.concatenate([one[4:], np.zeros(4)])
+            if light is None:
+                continue
+            way = matcher.factor * own[:2] + own[2:4]
+            near = matcher.side(matcher.near, x, y, own[:2], own[4:])
+            far = matcher.side(matcher.far, x, y, way, matcher.factor * own[4:])
+            if matcher.cost(x, y, light) < min(near, far) - 0.1:
+                out[y, x] = light
+    return out
+
+
 def grown(states, size):
     """States on the next finer level, of `size` (height, width)."""
     out = np.zeros((*size, 8))

@@ -23,6 +23,7 @@ from ..errors import InputError
 from .carry import carry
 from .dominant import follow_most, settle
 from .homography import enlarged
+from .lights import find_lights, follow_lights, move_lights
 from .match import matched
 from .mend import mend
 from .passes import STATES, Passes
@@ -62,8 +63,10 @@ EFFORTS = {
     "best": Effort(3, 2, 2, 2, block=2, aside=0.4),
     "fast": Effort(3, 2, 0, 1, block=4, aside=0.15),
 }
+LARGEST = 4  # px across a light on the coarsest level: what is larger, the search finds
 KEPT = {
     "pictures": 4,
+    "lights": 2,
     "most": 1,
     "searched": 1,
     "mended": 0,
@@ -218,12 +221,30 @@ class Shot:
         is_swept = self._effort.sweeps(0, len(self._sizes)) > 0
         states = (self._mended if is_swept else self._searched)(number, 0)
         bound = self._matched(views, 0)
+        states = move_lights(self._passes, self._sizes[0], bound, states, self._followed(views))
         states = self._polished(states, self._sizes[0], bound)
         states = settle(self._passes, self._sizes[0], bound, views, states)
         made = result(self._passes, self._sizes[0], views, states)
         self._passes.give(states)
         self._forget(number)
         return made
+
+    def _followed(self, views: Views) -> np.ndarray:
+        """Small lights of a frame and their motion; none if no coarse level loses them."""
+        here, near = (self._once("lights", n, 0, self._lights) for n in (views.here, views.near))
+        far = np.zeros((0, 4))
+        if views.far is not None:
+            far = self._once("lights", views.far, 0, self._lights)
+        return follow_lights(here, near, far, views.factor, max(self._sizes[0]))
+
+    def _lights(self, number: int, _: int) -> np.ndarray:
+        coarsest = len(self._sizes) - 1
+        finest = (self._features(number) or [])[:1]
+        if not coarsest or not finest:
+            return np.zeros((0, 4))
+        encoder = self._passes.device.create_command_encoder()
+        shown = self._passes.images.download(encoder, finest[0])
+        return find_lights(shown, LARGEST * 2**coarsest)
 
     def _polished(self, states: wgpu.GPUTexture, size, bound: dict) -> wgpu.GPUTexture:
         """The states to parts of a pixel and without noise; the given ones are taken back."""

@@ -15,7 +15,8 @@ _BAND = 4 << 20  # bytes written at once: five times faster at 4K than all at on
 _READBACK = 256 << 20  # bytes read back at once: a buffer has a limit, and memory is not endless
 _HALF_MAX = 65504.0  # largest finite f16
 _USAGE = wgpu.TextureUsage
-_NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4", "16uint": "<u2", "8uint": "u1"}
+_NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4", "16uint": "<u2"}
+_NUMPY |= {"8uint": "u1", "8unorm": "u1"}
 _STORABLE = ("rgba16float", "rgba32float", "r32float", "r32uint", "rg32uint", "rgba32uint")
 _CHANNELS = {"r": 1, "rg": 2, "rgba": 4}
 
