@@ -447,14 +447,15 @@ def resolve_visibility(layers, tiles, x, y, t):
         d, residual, pixel = iterate_fixed_point(
             frame.trajectory[int(back)], centre, seed, u, first
         )
-        is_there = pixel is not None and residual <= 1.0
+        at, size = centre - d, np.array(frame.edgeless.shape[::-1])
+        is_there = pixel is not None and residual <= 1.0 and (at >= 0).all() and (at < size).all()
         if first is None and not back and f not in far:
             misses.append(residual)
         again = first is not None and first[1] and (np.abs(d - first[0]) < 0.75).all()
         if is_there and not again and frame.depth[int(back)][pixel] > 0:
             z = frame.depth[int(back)][pixel]
             weight = (1.1 if f else 1.0) * (1.2 if back and frame.inferred[pixel] else 1.0)
-            found = Sample(z * weight, z, residual, centre - d, f, back, pixel)
+            found = Sample(z * weight, z, residual, at, f, back, pixel)
             if f not in far or is_hidden(layers[0], frame, found):
                 record(seen, found, is_opaque=back or frame.edgeless[pixel])
         return d if is_there else np.full(2, np.inf), is_there
@@ -522,7 +523,7 @@ def iterate_fixed_point(paths, centre, seed, u, first):
             continue
         if (
             n < steps - 1
-            and 0.5 < abs(way) / max(abs(before), 1e-6) < 2
+            and 0.5 < abs(way) / max(abs(before), 1e-6) < 2.2
             and abs(before - way) > abs(before) / 4
         ):
             rest = way**2 / (before - way)  # of a geometric series

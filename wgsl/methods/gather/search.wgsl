@@ -192,8 +192,10 @@ fn has_ended(state: WarpState) -> bool {
 }
 
 // An iteration is slow if a step is longer than this share of the one before it, and leads nowhere from MOST_GROWTH times it on.
+// Between two surfaces that both move away from the pixel, a leap goes half of the way, and the step after the next is twice as
+// long: no rounding may decide whether it grows too much.
 const SLOW_STEP: f32 = 0.5;
-const MOST_GROWTH: f32 = 2.0;
+const MOST_GROWTH: f32 = 2.2;
 const LEAST_TURN: f32 = 0.25;   // difference of the two steps, as a share of the first, that tells where they lead
 
 /// True if the iteration converges slowly, or not at all, by a `step` and the one `before` it.

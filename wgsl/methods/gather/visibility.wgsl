@@ -114,7 +114,7 @@ fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candi
     var is_first = true;
     loop {
         let state = find_surface(&seeds, query, own, is_first, first, (*visible).opaque.depth);
-        let is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
+        let is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL && is_inside(query.x - state.d);
         if is_first && is_there { first = state.d; }
         if is_first && is_front && !is_far(query.layer) { (*visible).miss2 = min((*visible).miss2, state.residual2); }
         if is_there { record(visible, query, state); }
