@@ -1,0 +1,21 @@
+"""A job as the command line asks for it."""
+
+from wgmb.color_settings import ColorSettings
+from wgmb.job import Asked, settle
+from wgmb.settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings
+from wgmb.video_settings import VideoSettings
+
+
+def job_of(pattern, folder, **more):
+    """Frames blurred by four taps into `folder`; `more`: further settings of the output."""
+    return settle(
+        Asked(
+            pattern=str(pattern),
+            output=OutputSettings(output=str(folder / "o.####.exr"), **more),
+            look=BlurSettings(method="tap", samples=4),
+            when=ShutterSettings(),
+            given=InputSettings(),
+            color=ColorSettings(),
+            video=VideoSettings(),
+        )
+    )
