@@ -271,3 +271,26 @@ def test_no_dark_ring_is_beside_a_lamp():
     frame = wgmb.Frame(color, motion=motion, depth=np.full((40, 80), 5, "f4"))
     half_way = wgmb.Blur("gather", shutter=Shutter(360, "start"), samples=1)(frame)
     assert half_way.min() > 0.004
+
+
+def test_what_comes_nearer_keeps_its_edges():
+    """A neighbour shows a body nearer than the frame does, which is the same body still: 42 dB."""
+
+    def shot(t):
+        """A disk at the depth 4 - 0.8 t: colour, motion, depth."""
+        fine, (height, width) = 4, (90, 100)
+        y, x = (np.mgrid[: height * fine, : width * fine] + 0.5) / fine
+        u, v = x - width / 2, y - height / 2
+        disk = np.hypot(u, v) < 20 / (1 - 0.2 * t)
+        wall = 0.4 + 0.2 * np.sin(0.3 * x + 0.5 * y)
+        color = np.where(disk, 0.9, wall)[..., None] * [1.0, 0.8, 0.6]
+        color = color.reshape(height, fine, width, fine, 3).mean(axis=(1, 3)).astype("f4")
+        grow = [(1 - 0.2 * t) / (1 - 0.2 * (t + side)) - 1 for side in (-1, 1)]
+        vectors = np.stack([u * grow[0], v * grow[0], u * grow[1], v * grow[1]], axis=-1)
+        middle = np.s_[2::fine, 2::fine]
+        motion = np.where(disk[..., None], vectors, 0.0)[middle].astype("f4")
+        return color, motion, np.where(disk, 4 - 0.8 * t, 9.0)[middle].astype("f4")
+
+    truth = np.mean([shot(t)[0] for t in SHUTTER.sample_times(64).astype(float)], axis=0)
+    got = wgmb.Blur("gather", shutter=SHUTTER, samples=16)(frame_of([shot(t) for t in (0, -1, 1)]))
+    assert -20 * np.log10(error(got, truth)) > 48

@@ -10,19 +10,38 @@ def valid(depth):
     return np.where(np.isfinite(depth) & (depth > 0), np.minimum(depth, NO_DEPTH), NO_DEPTH)
 
 
+def found_again(frame, step, back, z, y, x):
+    """The vectors of a pixel's surface in another frame, and its depth there as a ratio; or None.
+
+    `step` leads there; `back`: which of the vectors there lead back.
+    """
+    place = np.array([x, y]) + 0.5 + step
+    if frame is None or (place < 0).any() or (place >= frame[3].shape[::-1]).any():
+        return None
+    j, i = int(place[1]), int(place[0])
+    vectors, given = frame[2][j, i].astype(float), frame[3][j, i]
+    ratio = valid(given) / z
+    leads_back = np.hypot(*(vectors[back] + step)) < 1.5
+    return (vectors, ratio) if given > 0 and 1 / 1.5 < ratio < 1.5 and leads_back else None
+
+
+def depth_ratio(offset, motion, z, y, x, prev, next):
+    """Depth of a neighbour's surface in the frame itself, as a ratio to that in the neighbour."""
+    if abs(offset) != 1:
+        return 1.0
+    frame, side = (prev, 0) if offset > 0 else (next, 1)
+    forth, back = (np.s_[:2], np.s_[2:])[:: 1 - 2 * side]
+    found = found_again(frame, motion[forth], back, z, y, x)
+    return found[1] if found else 1.0
+
+
 def bend(motion, z, y, x, prev, next):
     """Third term of the path of a pixel through five positions, 1 if it has a kink instead."""
     here, there = (motion[:2] + motion[2:]) / 2, []
     for frame, step, back in ((prev, motion[:2], np.s_[2:]), (next, motion[2:], np.s_[:2])):
-        there.append(None)
-        place = np.array([x, y]) + 0.5 + step
-        if frame is None or (place < 0).any() or (place >= frame[3].shape[::-1]).any():
-            continue
-        j, i = int(place[1]), int(place[0])
-        vectors, given = frame[2][j, i].astype(float), frame[3][j, i]
-        leads_back = np.hypot(*(vectors[back] + step)) < 1.5
-        if given > 0 and 1 / 1.15 < valid(given) / z < 1.15 and leads_back:
-            there[-1] = (vectors[:2] + vectors[2:]) / 2
+        found = found_again(frame, step, back, z, y, x)
+        is_same = found and 1 / 1.15 < found[1] < 1.15
+        there.append((found[0][:2] + found[0][2:]) / 2 if is_same else None)
     before, after = there
     if (before is None and after is None) or (np.abs(motion) < 0.01).all():
         return 0.0, 0.0, 0.0

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twins.five_positions import NO_DEPTH, bend, moved, valid
+from twins.five_positions import NO_DEPTH, bend, depth_ratio, moved, valid
 from twins.tap import bilinear
 
 TILE, MOTIONS = 16, 4
@@ -17,7 +17,7 @@ class Layers:
     offset: float
     color: list  # front, premultiplied by coverage, and back
     trajectory: list  # velocity, half acceleration, third term, 1 where it has a kink
-    depth: list  # back: 0 where there is none
+    depth: list  # of a neighbour, as it is in the frame itself; back: 0 where there is none
     coverage: np.ndarray
     inferred: np.ndarray  # the back layer was not seen
     edgeless: np.ndarray  # no edge that is separated in the 3 x 3
@@ -91,16 +91,17 @@ def separate(offset, color, motion, depth, prev=None, next=None, far=()):
                 min(depths) * k < d < max(depths) / k for d in depths
             )
     separated = edges & ~in_crowd(shows_third)
-    bends = np.zeros((height, width, 3))
+    bends, ratios = np.zeros((height, width, 3)), np.ones((height, width))
     for y in range(height):
         for x in range(width):
             bends[y, x] = bend(motion[y, x], z[y, x], y, x, prev, next)
+            ratios[y, x] = depth_ratio(offset, motion[y, x], z[y, x], y, x, prev, next)
     own = np.concatenate([motion, bends], axis=-1)
-    found = [color.copy(), own.copy(), z.copy(), np.ones((height, width))]
+    found = [color.copy(), own.copy(), z * ratios, np.ones((height, width))]
     back = [np.zeros_like(color), own.copy(), np.zeros((height, width))]
     inferred = np.zeros((height, width), bool)
     for y, x in np.argwhere(separated):
-        parts = separate_pixel(color, motion, z, edges, y, x, bends, (prev, next), far)
+        parts = separate_pixel(color, motion, z, edges, y, x, (bends, ratios), (prev, next), far)
         if parts:
             for array, value in zip([*found, *back, inferred], parts, strict=True):
                 array[y, x] = value
@@ -175,10 +176,11 @@ def far_background(far, motion, z, y, x):
     return np.mean(found, axis=0) if found else None
 
 
-def separate_pixel(color, motion, z, edges, y, x, bends, around_it, far):
+def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     """Front colour, path, depth, coverage; back colour, path, depth; whether it is inferred.
 
-    Paths are a motion and a bend, that of the nearest pixel that shows this surface alone.
+    Paths are a motion and a bend, that of the nearest pixel that shows this surface alone, as is
+    the ratio of depths to those in the frame itself. `told_around`: bends and ratios of all pixels.
     """
     height, width = z.shape
     inner = list(around(height, width, y, x, 1))
@@ -217,12 +219,15 @@ def separate_pixel(color, motion, z, edges, y, x, bends, around_it, far):
     if way @ way < 0.25 or off @ off > way @ way / 16 + 0.25:  # one surface, or a third
         return None
 
-    def bend_of(pixels):
+    def nearest_pure(pixels):
         pure = [(j, i) for j, i in pixels if not edges[j, i]] or [(y, x)]
-        return bends[min(pure, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)]
+        return min(pure, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)
+
+    bends, ratios = told_around
+    front_ratio, back_ratio = ratios[nearest_pure(nearer)], ratios[nearest_pure(farther)]
 
     def path(vectors, pixels):
-        return np.concatenate([vectors, bend_of(pixels)])
+        return np.concatenate([vectors, bends[nearest_pure(pixels)]])
 
     back_depth = mean(z, back)
     seen = seen_background(around_it, behind, back_depth, y, x)
@@ -242,7 +247,8 @@ def separate_pixel(color, motion, z, edges, y, x, bends, around_it, far):
     if coverage < 1 - 0.98:
         back_depth = z[y, x] if z[y, x] >= between else back_depth
         own = path(motion[y, x], farther)
-        return 0.0, path(before, nearer), mean(z, front), 0.0, color[y, x], own, back_depth, False
+        front_depth, back_depth = mean(z, front) * front_ratio, back_depth * back_ratio
+        return 0.0, path(before, nearer), front_depth, 0.0, color[y, x], own, back_depth, False
     whole = coverage > 0.98
     coverage = 1.0 if whole else coverage
     rest = color[y, x] - (1 - coverage) * back_color
@@ -254,7 +260,8 @@ def separate_pixel(color, motion, z, edges, y, x, bends, around_it, far):
         back_color = back_color + (rest - front_color) / (1 - coverage)
     front_path = path(motion[y, x] if whole else before, nearer)
     behind = path(behind, farther)
-    front_depth = z[y, x] if whole and z[y, x] < between else mean(z, front)
+    front_depth = (z[y, x] if whole and z[y, x] < between else mean(z, front)) * front_ratio
+    back_depth = back_depth * back_ratio
     return front_color, front_path, front_depth, coverage, back_color, behind, back_depth, True
 
 

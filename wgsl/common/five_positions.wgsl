@@ -6,6 +6,7 @@
 
 const RETURNS: f32 = 1.5;               // a surface is found again where its vector leads back within this [px]
 const SAME_DEPTH_RATIO: f32 = 1.15;     // and its depth has not changed by more: it may come nearer
+const MOST_DEPTH_CHANGE: f32 = 1.5;     // the same, for its depth there to be believed
 const MOST_CHANGE: f32 = 3.0;           // of a half acceleration from one frame to the next, as a ratio
 const SPARED_CHANGE: f32 = 2.0;         // and this much more [px]: what changes more is another surface, or noise
 const KINK_ACCELERATION: f32 = 1.0;     // from this half acceleration on [px] a path may have a kink,
@@ -18,6 +19,7 @@ const OFF_TURN: f32 = 0.2;              // share of the acceleration by which a 
 struct Acceleration {       // of a surface in a neighbouring frame
     half: vec2f,            // [px per squared frame interval]
     is_known: bool,
+    depth_ratio: f32,       // of the depth there to that here, 1 if it is not known
 }
 
 /// The trajectory with these vectors, through five positions as far as the frames before and after show the surface.
@@ -74,9 +76,10 @@ fn acceleration_in(motion_there: texture_2d<f32>, depth_there: texture_2d<f32>, 
     let given = textureLoad(depth_there, there, 0).x;
     let ratio = valid_depth(given) / z;
     let off = select(vectors.zw, vectors.xy, is_next) + step;
-    let is_same = given > 0.0 && ratio < SAME_DEPTH_RATIO && ratio > 1.0 / SAME_DEPTH_RATIO
-        && dot(off, off) < RETURNS * RETURNS;
-    return Acceleration(0.5 * (vectors.xy + vectors.zw), is_inside && is_same);
+    let returns = is_inside && given > 0.0 && dot(off, off) < RETURNS * RETURNS;
+    let change = max(ratio, 1.0 / ratio);
+    let depth_ratio = select(1.0, ratio, returns && change < MOST_DEPTH_CHANGE);
+    return Acceleration(0.5 * (vectors.xy + vectors.zw), returns && change < SAME_DEPTH_RATIO, depth_ratio);
 }
 
 /// The part of a trajectory that three positions do not tell, in a word: its third term, or KINKED.

@@ -104,6 +104,8 @@ class Layers:
             COPIED=copied,
             HAS_PREV=around["prev"] is not None,
             HAS_NEXT=around["next"] is not None,
+            OWN_IS_PREV=frame.offset == 1,
+            OWN_IS_NEXT=frame.offset == -1,
             HAS_FAR_PREV=not frame.offset and any(f.offset == -2 for f in inputs.frames),
             HAS_FAR_NEXT=not frame.offset and any(f.offset == 2 for f in inputs.frames),
         )

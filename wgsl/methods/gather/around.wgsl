@@ -22,16 +22,24 @@
 override WEIGHTED: bool = false;        // read weights
 override HAS_PREV: bool = true;         // there is a frame before, and one after
 override HAS_NEXT: bool = true;
+override OWN_IS_PREV: bool = false;     // the one before is the frame that is blurred, or the one after is
+override OWN_IS_NEXT: bool = false;
 override HAS_FAR_PREV: bool = false;    // there is a frame beyond the one before, and beyond the one after
 override HAS_FAR_NEXT: bool = false;
 
+struct SurfaceAround {
+    trajectory: Trajectory5,
+    depth_ratio: f32,       // of its depth in the frame that is blurred to that here, 1 if it is not known
+}
+
 /// The trajectory of the surface at the centre of `px` with these vectors, as far as the frames around tell.
-fn trajectory_around(px: vec2i, motion: vec4f, z: f32) -> Trajectory5 {
-    var before = Acceleration(vec2f(0.0), false);
+fn surface_around(px: vec2i, motion: vec4f, z: f32) -> SurfaceAround {
+    var before = Acceleration(vec2f(0.0), false, 1.0);
     var after = before;
     if HAS_PREV { before = acceleration_in(prev_motion, prev_depth, px, motion.xy, z, false); }
     if HAS_NEXT { after = acceleration_in(next_motion, next_depth, px, motion.zw, z, true); }
-    return trajectory_between(motion, before, after);
+    let depth_ratio = select(select(1.0, after.depth_ratio, OWN_IS_NEXT), before.depth_ratio, OWN_IS_PREV);
+    return SurfaceAround(trajectory_between(motion, before, after), depth_ratio);
 }
 
 struct Background {         // sums over the frames that show it

@@ -72,11 +72,11 @@ fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(work
         }
     }
     if near_edge { near_edge = is_near_separated(px); }
-    let z = flagged_depth(here);
-    let trajectory = trajectory_around(px, textureLoad(motion, px, 0), z);
+    let around = surface_around(px, textureLoad(motion, px, 0), flagged_depth(here));
+    let z = flagged_depth(here) * around.depth_ratio;
     if !COPIED { textureStore(colors, px, FRONT, textureLoad(color, px, 0)); }
     let flags = SINGLE | select(0u, SMOOTH, smooth_here);
-    textureStore(surfaces, px, FRONT, pack_surface(trajectory, select(z, -z, near_edge), flags));
+    textureStore(surfaces, px, FRONT, pack_surface(around.trajectory, select(z, -z, near_edge), flags));
     textureStore(mattes, px, pack_matte(Matte(z, false, 1.0, counts)));
     if is_edge(here) && !is_in_crowd(px) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
 }
@@ -276,19 +276,23 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     let front_path = with_bend_of(front_place.at, front_motion);
     let back_path = with_bend_of(back_place.at, back_motion);
     textureStore(colors, px, FRONT, front);
+    z *= front_path.depth_ratio;
+    back_depth *= back_path.depth_ratio;
     let has_back = back_depth > 0.0;
     let told = select(select(0u, AROUND, seen_around), SEEN, back_seen);
-    textureStore(surfaces, px, FRONT, pack_surface(front_path, -z, 0u));
+    textureStore(surfaces, px, FRONT, pack_surface(front_path.trajectory, -z, 0u));
     if has_back { textureStore(colors, px, BACK, back); }     // else nobody reads it
-    textureStore(surfaces, px, BACK, pack_surface(back_path, max(back_depth, 0.0), select(SINGLE, told, has_back)));
+    textureStore(surfaces, px, BACK, pack_surface(back_path.trajectory, max(back_depth, 0.0), select(SINGLE, told, has_back)));
     textureStore(mattes, px, pack_matte(Matte(z, has_back, coverage, coverage * counts)));
 }
 
 /// The trajectory of these vectors, bent as that of the surface at `px` is.
-fn with_bend_of(px: vec2i, vectors: vec4f) -> Trajectory5 {
+fn with_bend_of(px: vec2i, vectors: vec4f) -> SurfaceAround {
     let parabola = trajectory_from(vectors);
-    let there = trajectory_around(px, textureLoad(motion, px, 0), flagged_depth(flags_at(px)));
-    return Trajectory5(parabola.velocity, parabola.half_acceleration, there.third, there.has_kink);
+    let there = surface_around(px, textureLoad(motion, px, 0), flagged_depth(flags_at(px)));
+    let bend = there.trajectory;
+    let trajectory = Trajectory5(parabola.velocity, parabola.half_acceleration, bend.third, bend.has_kink);
+    return SurfaceAround(trajectory, there.depth_ratio);
 }
 
 /// For cells far from all that moves: searches may pass over them, but nobody reads their colours.
