@@ -36,8 +36,11 @@ def grey_frames(values, pixels="yuv420p"):
         yield clips.frame(planes, pixels)
 
 
-def moving(count, speed=2.0, hud=False):
-    """A textured square that passes over a textured background, and perhaps a fixed sign."""
+def moving(count, speed=2.0, hud=False, turned=False):
+    """A textured square that passes over a textured background, and perhaps a fixed sign.
+
+    `turned`: the picture is upside down.
+    """
     width, height = SIZE
     y, x = np.mgrid[:height, :width].astype(np.float32)
     for n in range(count):
@@ -47,6 +50,7 @@ def moving(count, speed=2.0, hud=False):
         if hud:
             tone = np.where((x > 40) & (x < 56) & (y < 10), (x + y) % 2, tone + 0.2 * np.sin(n))
         luma = np.clip(16 + 219 * tone, 16, 235).round().astype(np.uint8)
+        luma = luma[::-1] if turned else luma
         chroma = np.full((height // 2, width // 2), 128, np.uint8)
         yield clips.frame([luma, chroma, chroma], "yuv420p")
 
@@ -126,6 +130,32 @@ def test_variable_rates_keep_their_times_or_become_even(tmp_path, capsys):
         assert abs(len(got) - len(want)) <= 1
 
 
+def test_without_a_rate_pictures_of_a_variable_one_keep_their_times_and_a_line_says_so(
+    tmp_path, capsys
+):
+    times = [Fraction(n, 100) for n in (0, 1, 2, 7, 8, 12, 20, 21)]
+    source = write(tmp_path / "a.mp4", grey_frames(range(30, 110, 10)), times=times)
+    text = run(capsys, "blur", source, "-o", tmp_path / "b.mp4", "--flow", "none")
+    said = "variable rate (10.0 to 80.0 ms)"
+    assert f"a.mp4: {said}: each picture keeps its own time; --fps 60 sets a steady rate\n" in text
+    assert list(Footage(tmp_path / "b.mp4").times) == times
+    both = [source, source.rename(tmp_path / "c.mp4")][1:]
+    text = run(capsys, "blur", *both, "-o", f"{tmp_path}/{{name}}.out.mkv", "--flow", "none")
+    assert said in text
+    text = run(capsys, "blur", *both, "-o", tmp_path / "d.##.png", "--flow", "none")
+    assert f"{said}: {float(Footage(both[0]).rate):g} files a second; --fps sets another" in text
+    run(capsys, "blur", *both, "-o", tmp_path / "e.##.png", "--flow", "none", "--fps", "source")
+    assert len(list(tmp_path.glob("e.*.png"))) == 8
+
+
+def test_a_pause_of_a_steady_rate_is_filled(tmp_path, capsys):
+    times = [Fraction(n, 50) for n in (*range(40), *range(45, 85))]
+    source = write(tmp_path / "a.mp4", grey_frames([*range(30, 110)]), times=times)
+    text = run(capsys, "blur", source, "-o", tmp_path / "b.mp4", "--flow", "none")
+    assert "variable" not in text and "pause once" in text
+    assert list(Footage(tmp_path / "b.mp4").times) == [Fraction(n, 50) for n in range(85)]
+
+
 def test_motion_smears_what_moves_and_leaves_the_rest_to_the_sample(tmp_path, capsys):
     source = write(tmp_path / "a.mp4", moving(9), 24)
     out = tmp_path / "b.mkv"
@@ -176,8 +206,24 @@ def test_info_describes_a_video(tmp_path, capsys):
                  "BT.601, transfer BT.709; Y'CbCr 4:2:0, 8 bits, limited range",
                  "stream    audio: aac", "does not state its colours"):  # fmt: skip
         assert said in text, text
+    assert "cuts      not looked for; --scan decodes" in text and "mastered" not in text
     text = run(capsys, "info", source, "-o", tmp_path / "m.png", code=2)
     assert "rendered frames" in text
+
+
+def test_info_scans_a_video_for_cuts_flashes_and_repeated_pictures(tmp_path, capsys):
+    shot, other = list(moving(9, 4.0)), list(moving(8, -1.0, turned=True))
+    frames = [*shot[:4], *grey_frames([235]), *shot[4:], *other, other[-1]]
+    source = write(tmp_path / "a.mp4", frames, 96)
+    assert app.main(["info", str(source), "--scan"]) == 0
+    text = capsys.readouterr().out
+    assert text.endswith(
+        "cuts      before picture 10 (0.10 s)\nflashes   at picture 4\nrepeated  1: picture 18\n"
+    ), text
+    cut = clips.write(tmp_path / "b.mkv", moving(24), tone=1)
+    cut.write_bytes(cut.read_bytes()[: cut.stat().st_size * 2 // 3])
+    text = run(capsys, "info", cut, "--scan", code=1)
+    assert "as it is cut off" in text
 
 
 def test_pictures_without_vectors_move_by_flow(tmp_path, capsys):

@@ -11,6 +11,7 @@ from av.video.reformatter import VideoReformatter
 
 import make_clips as clips
 from wgmb import InputError
+from wgmb.cli.video_lines import describe_video
 from wgmb.coding import Coding
 from wgmb.io.decoding import decoded
 from wgmb.io.footage import Footage
@@ -193,6 +194,19 @@ def test_the_display_that_an_hdr10_video_was_graded_on_is_read(tmp_path):
     assert footage.mastering.for_x265() in options["x265-params"]
     assert str(footage.light_level) == "1000,400"
     assert footage.mastering.luminance == (0.0001, 1000.0)
+    said = dict(describe_video(footage))
+    assert said["mastered"] == (
+        "on a display of 0.0001 to 1000 cd/m2; "
+        "red 0.680 0.320, green 0.265 0.690, blue 0.150 0.060, white 0.313 0.329"
+    )
+    assert said["light"] == (
+        "brightest pixel 1000, brightest mean of a picture 400 cd/m2 (MaxCLL, MaxFALL)"
+    )
+
+
+def test_a_codec_has_its_own_name_not_that_of_a_decoder(tmp_path):
+    path = clips.write(tmp_path / "c.mp4", codec="libsvtav1", options={"svtav1-params": "lp=1"})
+    assert Footage(path).codec == "av1"
 
 
 # ---- times ----------------------------------------------------------------------------------

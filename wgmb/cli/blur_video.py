@@ -6,6 +6,7 @@ import json
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from ..errors import InputError
 from ..highlights import check as check_highlights
 from ..io.clock import Clock
 from ..io.cut_list import CutList
+from ..io.encoders import SUFFIXES
 from ..io.footage import Footage
 from ..io.video_masks import holdout_of
 from ..moments import Moment, clock_of, moments
@@ -58,6 +60,13 @@ class Plan:
     output: OutputSettings
     clock: Clock
     wanted: list[Moment]
+    rate: str
+    """A line about the output's rate where it was chosen for the user, or ''."""
+
+    @property
+    def notes(self) -> list[str]:
+        """Lines that a user should know."""
+        return [*self.footage.notes, self.rate] if self.rate else self.footage.notes
 
     @property
     def name(self) -> str:
@@ -81,7 +90,7 @@ def blur_video(
     plan = planned(path, output, wish)
     tell_how(wish, quiet, verbose)
     if not quiet:
-        for text in plan.footage.notes:
+        for text in plan.notes:
             note(f"{path}: {text}")
     started = time.perf_counter()
     with progress(len(plan.wanted), quiet) as tell:
@@ -137,8 +146,27 @@ def planned(path: str | Path, output: OutputSettings, wish: Wish) -> Plan:
     """Open a video; InputError if it cannot be read or has no pictures in the range."""
     footage = Footage(path, max_mb=wish.given.max_mb)
     clock = clock_of(footage, wish.given.frames, wish.video)
-    fps = None if output.fps == "source" else output.rate_or(footage.rate)
-    return Plan(footage, output, clock, moments(footage, clock, fps))
+    fps, said = _rate(footage, output)
+    return Plan(footage, output, clock, moments(footage, clock, fps), said)
+
+
+def _rate(footage: Footage, output: OutputSettings) -> tuple[Fraction | None, str]:
+    """Output frames per second, None for the times of the pictures; and a line if not wished for.
+
+    Image files have no times, so that they need a rate.
+    """
+    if output.fps == "source":
+        return None, ""
+    if output.fps is not None or footage.has_rate:
+        return output.rate_or(footage.rate), ""
+    steps = "{:.1f} to {:.1f} ms".format(*(1000 * step for step in footage.steps))
+    if Path(output.output).suffix.lower() in SUFFIXES:
+        return None, (
+            f"variable rate ({steps}): each picture keeps its own time; --fps 60 sets a steady rate"
+        )
+    return footage.rate, (
+        f"variable rate ({steps}): {float(footage.rate):g} files a second; --fps sets another rate"
+    )
 
 
 def blurred(plan: Plan, wish: Wish, tell: Tell) -> tuple[FootageBlur, list[str]]:

@@ -82,7 +82,7 @@ def _one_of_many(plan: Plan, wish: Wish, tell: Tell, quiet: bool) -> bool:
             tell_name(moment.number, "skipped")
     if not quiet:
         took = f"{len(plan.wanted)} frames in {time.perf_counter() - started:.1f} s"
-        words = [took if run.reel is not None else "", *left_out, *plan.footage.notes]
+        words = [took if run.reel is not None else "", *left_out, *plan.notes]
         if run.reel is not None and run.reel.doubles:
             words.append(f"{len(run.reel.doubles)} repeated pictures left out")
         note(f"{path}: {'; '.join(filter(None, words))} -> {plan.name}")

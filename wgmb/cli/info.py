@@ -36,12 +36,13 @@ def info(
     *,
     output: Annotated[Path | None, Parameter(alias="-o")] = None,
     overwrite: bool = False,
+    scan: bool = False,
 ) -> int:
     """Describe a frame or a video: layers, sizes, motion vector convention, speeds.
 
     Example: wgmb info 'shot.####.exr' --frames 10 -o motion.png
 
-    Example: wgmb info clip.mp4
+    Example: wgmb info clip.mp4 --scan
 
     Parameters
     ----------
@@ -52,17 +53,18 @@ def info(
         Draw the motion as an image: hue is direction, brightness is speed.
     overwrite
         Replace an existing image.
+    scan
+        Decode a video to its end, and list its cuts, flashes and repeated pictures.
     """
     shown = color.open()
     if is_video(pattern):
         with needed_by(pattern, "video"):
-            from ..io.footage import Footage
-            from .video_lines import describe_video
+            from .video_lines import tell_about
         if output is not None:
             raise InputError("`output` draws the motion of rendered frames, a video holds none")
-        for name, text in describe_video(Footage(pattern, max_mb=given.max_mb)):
-            out(f"{name:10}{text}")
-        return DONE
+        return tell_about(pattern, given.max_mb, scan)
+    if scan:
+        raise InputError("`scan` is for videos")
     clip = given.open(pattern, space=color.space(shown))
     if color.remark:
         note(color.remark)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from ..coding import Coding
 from ..io.footage import Footage
+from .exit_codes import DONE, SOME_FAILED
+from .terminal import note, out, progress
+from .video_scan import scan_video
 
 _KINDS = {"yuv": "Y'CbCr", "rgb": "RGB", "grey": "grey"}
 _STEPS = {(2, 2): " 4:2:0", (2, 1): " 4:2:2", (1, 1): " 4:4:4"}
@@ -29,6 +32,27 @@ def _colors(coding: Coding) -> str:
     return ", ".join(words)
 
 
+def tell_about(path: str, max_mb: float, scan: bool) -> int:
+    """Print the lines about a video; returns the exit code. `scan`: those of all its pictures."""
+    footage = Footage(path, max_mb=max_mb)
+    _print(describe_video(footage))
+    if not scan:
+        _print([("cuts", "not looked for; --scan decodes the video and lists them")])
+        return DONE
+    with progress(len(footage), quiet=False, doing="reading") as tell:
+        found = scan_video(footage, tell)
+    _print(found)
+    if loss := footage.loss():
+        note(f"wgmb: {loss}")
+        return SOME_FAILED
+    return DONE
+
+
+def _print(lines: list[tuple[str, str]]) -> None:
+    for name, text in lines:
+        out(f"{name:10}{text}")
+
+
 def describe_video(footage: Footage) -> list[tuple[str, str]]:
     """(name, text) lines about a video."""
     coding = footage.coding
@@ -42,6 +66,12 @@ def describe_video(footage: Footage) -> list[tuple[str, str]]:
         ("rate", _rate(footage)),
         ("colour", f"{_colors(coding)}; {kind}, {coding.bits} bits, {extent} range"),
     ]
+    if footage.mastering is not None and (display := str(footage.mastering)):
+        lines.append(("mastered", f"on a display of {display}"))
+    if footage.light_level is not None:
+        level = footage.light_level
+        text = f"brightest pixel {level.max_cll}, brightest mean of a picture {level.max_fall}"
+        lines.append(("light", f"{text} cd/m2 (MaxCLL, MaxFALL)"))
     if coding.alpha:
         lines.append(("alpha", "straight"))
     if footage.pixel_aspect != 1:

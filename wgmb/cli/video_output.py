@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -148,7 +149,7 @@ def _write_frames(
 ) -> list[str]:
     """Write image files."""
     numbers = [FIRST + moment.number for moment in wanted]
-    files = output.make(settings, numbers, [run.footage.path])
+    files = replace(output, fps=None).make(settings, numbers, [run.footage.path])
     channels = 4 if run.footage.coding.alpha else 3
     try:
         make_part(wanted, FramesSink(files, run.device, channels, FIRST))

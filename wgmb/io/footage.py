@@ -80,7 +80,8 @@ class Footage:
             stream = picture_stream(container, self.path)
             self.index = stream.index
             self._check_size(stream, max_mb)
-            self.container, self.codec = container.format.name, stream.codec_context.name
+            self.container = container.format.name
+            self.codec = stream.codec_context.codec.canonical_name  # not that of the decoder
             self.metadata = dict(container.metadata)
             self.chapters = len(container.chapters())
             self.streams = tuple(_described(s) for s in container.streams if s is not stream)
@@ -201,6 +202,11 @@ class Footage:
     def is_variable(self) -> bool:
         """Return True if the pictures keep no steady rate."""
         return self._timeline.is_variable
+
+    @property
+    def has_rate(self) -> bool:
+        """Return True if the pictures keep a steady rate, apart from pauses."""
+        return not self._timeline.is_variable or bool(self._timeline.gaps)
 
     @property
     def duration(self) -> Fraction:

@@ -182,7 +182,7 @@ class State:
                 return replace(state, frames=f"0-{last}", frame=0.0, speed=1.0)
             return replace(state, frames=plain.frames, frame=0.0, speed=plain.speed)
         if state.is_video:
-            state = replace(state, fps=float(video_time.own_rate(state)))
+            state = video_time.at_own_rate(state)
         frames = frames_of(source, max_mb)
         return replace(state, frames=frames, frame=math.nan, speed=1.0).settled()
 
@@ -276,7 +276,7 @@ class State:
         if self.is_video:
             look |= {"flow": self.flow, "flow_quality": self.flow_quality, "speed": self.pace}
             look |= dict(self.video)
-            if not self.own_times and video_time.rate(self) == video_time.own_rate(self):
+            if not self.own_times and video_time.is_own_rate(self):
                 del look["fps"]
         if not self.is_scene:
             return {"pattern": self.source, **dict(self.given), **look}

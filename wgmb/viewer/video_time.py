@@ -53,6 +53,18 @@ def own_rate(state: State) -> Fraction:
     return footage_of(state.source, most_mb(state)).rate
 
 
+def is_own_rate(state: State) -> bool:
+    """Return True if the video keeps a steady rate, and the output has it too."""
+    has_rate = footage_of(state.source, most_mb(state)).has_rate
+    return has_rate and rate(state) == own_rate(state)
+
+
+def at_own_rate(state: State) -> State:
+    """The same at the rate of the video, or at the times of its pictures if it keeps no rate."""
+    footage = footage_of(state.source, most_mb(state))
+    return replace(state, own_times=not footage.has_rate, fps=float(footage.rate))
+
+
 def is_hdr(state: State) -> bool:
     """Return True if the video holds light above white."""
     return footage_of(state.source, most_mb(state)).coding.transfer in (PQ, HLG)
@@ -67,7 +79,9 @@ def rate(state: State) -> Fraction:
 
 def completed(state: State, said: Collection[str]) -> State:
     """The same with the video's own rate and all of its pictures, unless others were said."""
-    if "fps" not in said or state.own_times:
+    if "fps" not in said:
+        state = at_own_rate(state)
+    elif state.own_times:
         state = replace(state, fps=float(own_rate(state)))
     if "frames" not in said:
         state = replace(state, frames=frames_of(state.source, most_mb(state)))
