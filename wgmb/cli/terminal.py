@@ -8,9 +8,6 @@ import sys
 import threading
 import time
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
 interrupted = threading.Event()
 """Set by Ctrl-C: Python drops an exception that a signal raises within a destructor."""
 
@@ -145,10 +142,14 @@ def progress(frames: int, quiet: bool, doing: str = "blurring"):
 
     It takes the frame's number, "done", "skipped" or "failed", and what stands before the number.
     """
-    say = Console(stderr=True, highlight=False, soft_wrap=True)
-    if quiet or not say.is_terminal:
+    number = _number(sys.stderr)
+    if quiet or number is None or not os.isatty(number):
         yield check
         return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    say = Console(stderr=True, highlight=False, soft_wrap=True)
     columns = (
         "{task.description}",
         BarColumn(),

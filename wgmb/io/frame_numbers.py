@@ -7,11 +7,12 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-
-from fileseq.exceptions import FileSeqException
-from fileseq.frameset import FrameSet
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from fileseq.frameset import FrameSet
 
 MOST_FRAMES = 1_000_000
 """Largest number of frames in one run."""
@@ -131,8 +132,8 @@ def frame_numbers(text: str, what: str = "frames") -> list[int]:
         ranges = [(int(a), int(b), int(step or 1)) for a, b, step in _RANGE.findall(text)]
         count = sum(abs(b - a) // max(step, 1) + 1 for a, b, step in ranges)
         sensible = count <= MOST_FRAMES and "." not in text
-        numbers = [int(n) for n in FrameSet(text)] if sensible else []
-    except (FileSeqException, ValueError):
+        numbers = [int(n) for n in _frame_set(text)] if sensible else []
+    except ValueError:  # such as those of fileseq
         count, numbers = 0, []
     if count > MOST_FRAMES:
         raise InputError(f"{asked}: {count} frames, but one run takes {MOST_FRAMES} at most")
@@ -143,7 +144,14 @@ def frame_numbers(text: str, what: str = "frames") -> list[int]:
 
 def frame_range(numbers: list[int]) -> str:
     """Numbers as `frame_numbers` takes them: `1-4,9`."""
-    return str(FrameSet(numbers))
+    return str(_frame_set(numbers))
+
+
+def _frame_set(of: str | list[int]) -> FrameSet:
+    """Numbers as fileseq reads and writes them; it is loaded where numbers are given."""
+    from fileseq.frameset import FrameSet
+
+    return FrameSet(of)
 
 
 def frame_list(numbers: list[int], longest: int = 120) -> str:
