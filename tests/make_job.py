@@ -1,7 +1,8 @@
 """A job as the command line asks for it."""
 
+from wgmb.asked import Asked
 from wgmb.color_settings import ColorSettings
-from wgmb.job import Asked, settle
+from wgmb.job import settle
 from wgmb.settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings
 from wgmb.video_settings import VideoSettings
 

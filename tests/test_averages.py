@@ -34,9 +34,44 @@ def test_frames_without_vectors_are_averaged_by_their_shares(tmp_path, capsys, h
 
 
 @pytest.mark.parametrize(
+    ("options", "weights"),
+    [
+        ("--shutter 720", {1: 1, 2: 2, 3: 1}),
+        ("--shutter 720 --fps-in 30 --fps 30", {1: 1, 2: 2, 3: 1}),
+        ("--shutter 360 --phase start", {2: 1, 3: 1}),
+    ],
+)
+def test_frames_of_the_same_rate_are_averaged_where_the_shutter_reaches_beyond_one(
+    tmp_path, capsys, options, weights
+):
+    shot, light = stills(tmp_path, 5)
+    words = "blur", shot, "-o", tmp_path / "b.#.png", "--flow", "none", "--cuts", "only:1"
+    code, _, err = make.inside(capsys, *words, *options.split())
+    assert code == 0 and "none: pictures are averaged" in err, err
+    assert [name for name in make.names_in(tmp_path) if name[0] == "b"] == [
+        f"b.{n}.png" for n in range(1, 6)
+    ]
+    want = to_display(np.average([light[n] for n in weights], 0, weights=[*weights.values()]), 8)
+    with Image.open(tmp_path / "b.3.png") as image:
+        assert np.abs(np.asarray(image).astype(int) - want).max() <= 1
+    code, _, err = make.inside(capsys, *words, *options.split(), "--resume")
+    assert code == 0 and "5 already done" in err, err
+
+
+def test_job_files_hold_no_averages(tmp_path, capsys):
+    shot, _ = stills(tmp_path, 3)
+    words = "job", shot, "-o", tmp_path / "b.#.png", "--flow", "none", "--shutter", 720
+    code, _, err = make.inside(capsys, *words, "--job", tmp_path / "j.json")
+    assert code == 2 and "job files do not support --flow none" in err, err
+
+
+@pytest.mark.parametrize(
     ("options", "why"),
     [
-        ("", "--flow none only averages frames of a higher rate: name it by --fps-in"),
+        ("", "--flow none would leave each as it is: it averages frames of a higher rate"),
+        ("--fps-in 24 --fps 24 --shutter 360", "such as --fps-in 240 and --fps 60, or over a"),
+        ("--shutter 720 --rolling down", "a rolling shutter needs frames of the output's own rate"),
+        ("--shutter 720 --workers 2", "--flow none cannot be combined with --workers"),
         ("--fps-in 240 --fps 60 --holdout a.1.png", "--holdout needs motion; --flow none averages"),
     ],
 )

@@ -41,7 +41,7 @@ LAYERS = [
     {"exposer"},
     {"stages", "settings_toml", "scene_batch"},
     {"rates"},
-    {"batch"},
+    {"batch", "asked"},
     {"outcome"},
     {"job"},
     {"job_file", "video_pictures", "moments"},

@@ -8,11 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import make_frames as make
+from wgmb.asked import Asked
 from wgmb.batch_report import BatchReport
 from wgmb.color_settings import ColorSettings
 from wgmb.farm_worker import Blurring
 from wgmb.io.settled import Settled
-from wgmb.job import Asked, Job, settle
+from wgmb.job import Job, settle
 from wgmb.outcome import Outcome
 from wgmb.settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings
 from wgmb.video_settings import VideoSettings

@@ -15,9 +15,9 @@ from typing import Any
 
 from . import gpu
 from ._version import __version__
+from .asked import Asked
 from .batch import blur_sequence, convert_sequence
 from .batch_report import Progress
-from .color_settings import ColorSettings, color_record
 from .display import ColorSpace, Display
 from .errors import InputError
 from .highlights import check as check_highlights
@@ -35,60 +35,13 @@ from .outcome import Outcome
 from .pipeline import Blur
 from .rates import Conversion
 from .settings import (
-    BlurSettings,
-    InputSettings,
     OutputSettings,
-    ShutterSettings,
     plain,
-    rate_of,
 )
 from .video_settings import VideoSettings
 
+_OWN = 0.5  # frame intervals around a frame that it stands for
 _NO_LOOK = "frames", "skip_missing", "max_mb"  # of InputSettings: they change no frame
-
-
-@dataclass(frozen=True, kw_only=True)
-class Asked:
-    """Request to blur rendered frames, as `wgmb blur` receives it."""
-
-    pattern: str
-    output: OutputSettings
-    look: BlurSettings
-    when: ShutterSettings
-    given: InputSettings
-    color: ColorSettings
-    video: VideoSettings
-    confidence: bool = False
-    fps_in: str | None = None
-
-    @property
-    def conversion(self) -> Conversion | None:
-        """To the output's rate, if the frames have another one; InputError where it cannot be."""
-        if self.fps_in is None:
-            return None
-        if self.output.fps is None:
-            raise InputError("`fps_in` needs `fps`, the rate of the output, such as 60")
-        made = Conversion(rate_of(self.fps_in, "`fps_in`"), self.output.rate)
-        if made.step == 1:
-            return None
-        if self.confidence:
-            raise InputError("`confidence` cannot be combined with `fps_in`")
-        if self.when.make().rolling is not None:
-            raise InputError("a rolling shutter needs frames of the output's own rate")
-        return made
-
-    def opened(self, settled: Settled | None = None) -> tuple[Clip, Display | None]:
-        """The Clip, and how it is shown."""
-        shown = self.color.open(needed=not self.output.is_exr)
-        given = replace(self.given, frames=None, skip_missing=True) if settled else self.given
-        space = self.color.space(shown)
-        masks = self.look.holdout, self.look.scale
-        return given.open(self.pattern, *masks, space, settled), shown
-
-    def color_record(self, shown: Display | None) -> dict[str, str | None]:
-        """Colour settings that change the contents of the files."""
-        space = self.color.space(shown)
-        return color_record(shown, self.output.output, space, self.pattern)
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,6 +192,7 @@ def settle(asked: Asked, adapter: str | None = None) -> Job:
     remarks = list(map(_of_scale, asked.look.scale))
     if asked.color.space(shown) is None:
         remarks.append(_check_space(clip, shown))
+    asked = replace(asked, averages=_averages(clip, asked))
     conversion = asked.conversion
     if conversion:
         remarks.append(_of_conversion(conversion, clip, asked.output))
@@ -288,14 +242,17 @@ def _of_scale(scale: str) -> str:
 
 
 def _of_conversion(conversion: Conversion, clip: Clip, output: OutputSettings) -> str:
-    made = frame_list(conversion.numbers(clip))
-    text = (
-        f"frames {frame_list(clip.numbers)} at {conversion.fps_in} frames per second become "
-        f"frames {made} at {conversion.fps}"
-    )
+    said = []
+    if conversion.step != 1:
+        said.append(
+            f"frames {frame_list(clip.numbers)} at {conversion.fps_in} frames per second become "
+            f"frames {frame_list(conversion.numbers(clip))} at {conversion.fps}"
+        )
     if output.is_exr and output.layers == "all":
-        text += "; only the picture is written, as the other layers belong to the input's rate"
-    return text
+        said.append(
+            "only the picture is written, as the other layers belong to single input frames"
+        )
+    return "; ".join(said)
 
 
 def _check_space(clip: Clip, shown: Display | None) -> str:
@@ -316,21 +273,31 @@ def _check_space(clip: Clip, shown: Display | None) -> str:
 
 def _motion(clip: Clip, asked: Asked, adapter: str | None) -> tuple[VideoSettings, str]:
     """Source of the motion for frames without vectors, decided, and in words."""
-    video = asked.video
-    if len(clip.on_disk) < 2:
-        return video, ""
-    has = clip.has
-    if "motion" in has or not has:  # nothing can be read: its turn to fail comes
-        return video, ""
-    if video.flow == "none":
-        if asked.conversion is None:
-            raise InputError(
-                "the frames have no vectors, and `flow` none only averages frames of a higher "
-                "rate: name it by `fps_in`, and that of the output by `fps`"
-            )
-        if asked.look.holdout:
-            raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
-    return video.settled(gpu.open_device(adapter))
+    if not _lacks_motion(clip):
+        return asked.video, ""
+    return asked.video.settled(gpu.open_device(adapter))
+
+
+def _lacks_motion(clip: Clip) -> bool:
+    """Return True if the frames can be read, and motion must come from their pictures."""
+    has = clip.has if len(clip.on_disk) > 1 else ()
+    return bool(has) and "motion" not in has
+
+
+def _averages(clip: Clip, asked: Asked) -> bool:
+    """Return True if frames without motion are averaged; InputError where that changes nothing."""
+    if asked.video.flow != "none" or not _lacks_motion(clip):
+        return False
+    if asked.look.holdout:
+        raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
+    opens, closes = asked.when.make().span
+    if asked.conversion is None and max(-opens, closes) <= _OWN:
+        raise InputError(
+            "the frames have no vectors, and `flow` none would leave each as it is: it averages "
+            "frames of a higher rate, such as `fps_in` 240 and `fps` 60, or over a `shutter` above "
+            "360"
+        )
+    return True
 
 
 def check_confidence(method: str, output: OutputSettings) -> None:

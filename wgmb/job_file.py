@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ._version import __version__
+from .asked import Asked
 from .color_settings import ColorSettings
 from .errors import InputError
 from .io import atomic
@@ -24,7 +25,7 @@ from .io.masks import is_file, with_amount
 from .io.picture_motion import FAR
 from .io.settled import Settled, numbers, ranges
 from .io.suffixes import VIDEOS
-from .job import Asked, Job
+from .job import Job
 from .settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings
 from .shutter import CURVES
 from .video_settings import VideoSettings

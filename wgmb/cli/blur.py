@@ -10,12 +10,13 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from ..asked import Asked
 from ..color_settings import ColorSettings, option_name
 from ..errors import InputError
 from ..extras import needed_by
 from ..io.frame_file import is_video
 from ..io.frame_numbers import frame_numbers
-from ..job import Asked, Job, settle
+from ..job import Job, settle
 from ..job_file import read_job
 from ..video_settings import VideoSettings
 from .conclusion import conclude
@@ -136,9 +137,10 @@ def blur(
         confidence=confidence,
         fps_in=fps_in,
     )
-    if crew and asked.conversion:
-        raise InputError("--fps-in cannot be combined with --workers or --cluster")
     made = settle(asked, adapter)
+    if crew and made.asked.conversion:
+        option = "--fps-in" if fps_in else "--flow none"
+        raise InputError(f"{option} cannot be combined with --workers or --cluster")
     if crew:
         return blur_on_farm(made, *crew, adapter, verbose, quiet)
     return blur_frames(made, adapter, verbose, quiet)

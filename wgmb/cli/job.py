@@ -9,12 +9,13 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..asked import Asked
 from ..color_settings import ColorSettings
 from ..errors import InputError
 from ..io.atomic import write_file
 from ..io.frame_file import is_video
 from ..io.frame_numbers import frame_list
-from ..job import Asked, settle
+from ..job import settle
 from ..job_file import is_job, stored, time_there
 from ..video_settings import VideoSettings
 from . import submit
@@ -105,6 +106,8 @@ def job(
         confidence=confidence,
     )
     made = settle(asked, adapter)
+    if made.asked.averages:
+        raise InputError("job files do not support `flow` none; use `wgmb blur` for averages")
     kept = stored(made, chunk)
     texts = {file: ""}
     if openjd is not None:
