@@ -143,7 +143,7 @@ def test_without_a_rate_pictures_of_a_variable_one_keep_their_times_and_a_line_s
     text = run(capsys, "blur", *both, "-o", f"{tmp_path}/{{name}}.out.mkv", "--flow", "none")
     assert said in text
     text = run(capsys, "blur", *both, "-o", tmp_path / "d.##.png", "--flow", "none")
-    assert f"{said}: {float(Footage(both[0]).rate):g} files a second; --fps sets another" in text
+    assert f"{said}: {float(Footage(both[0]).rate):g} frames a second, as on average" in text
     run(capsys, "blur", *both, "-o", tmp_path / "e.##.png", "--flow", "none", "--fps", "source")
     assert len(list(tmp_path.glob("e.*.png"))) == 8
 
@@ -154,6 +154,14 @@ def test_a_pause_of_a_steady_rate_is_filled(tmp_path, capsys):
     text = run(capsys, "blur", source, "-o", tmp_path / "b.mp4", "--flow", "none")
     assert "variable" not in text and "pause once" in text
     assert list(Footage(tmp_path / "b.mp4").times) == [Fraction(n, 50) for n in range(85)]
+
+
+def test_jitter_and_pulldown_are_made_even(tmp_path, capsys):
+    times = [Fraction(n, 240) for n in (0, 8, 20, 28, 40, 48, 60, 68, 80)]  # 24 a second for 60
+    source = write(tmp_path / "a.mp4", grey_frames(range(30, 120, 10)), times=times)
+    text = run(capsys, "blur", source, "-o", tmp_path / "b.mp4", "--flow", "none")
+    assert "variable rate (33.3 to 50.0 ms): 24 frames a second, as on average" in text
+    assert list(Footage(tmp_path / "b.mp4").times) == [Fraction(n, 24) for n in range(9)]
 
 
 def test_motion_smears_what_moves_and_leaves_the_rest_to_the_sample(tmp_path, capsys):

@@ -532,3 +532,26 @@ def test_a_playlist_leads_nowhere(tmp_path):
                                      "http://127.0.0.1:9/a.ts\n#EXT-X-ENDLIST\n")  # fmt: skip
     with pytest.raises(InputError, match=r"c\.m3u8: "):
         Footage(tmp_path / "c.m3u8")
+
+
+def test_pictures_of_another_size_are_scaled_to_that_of_the_first(tmp_path):
+    """Recordings of calls change their size; a raw stream is joined of two."""
+    parts = []
+    for size in ((64, 48), (128, 96)):
+        frames = [clips.frame(clips.planes(n, size), "yuv420p") for n in range(4)]
+        parts.append(clips.write(tmp_path / f"{size[0]}.h264", frames, kind="h264").read_bytes())
+    (tmp_path / "both.h264").write_bytes(b"".join(parts))
+    footage = Footage(tmp_path / "both.h264")
+    assert not footage.scaling()
+    pictures = dict(footage)
+    assert footage.scaled == {4, 5, 6, 7} and len(pictures) == 8 and not footage.loss()
+    assert "4 pictures of another size were scaled to 64 x 48, from 0." in footage.scaling()
+    for n, picture in pictures.items():
+        assert picture.size == (64, 48)
+        luma, want = picture.planes[0].astype(int), clips.planes(n % 4)[0]
+        assert np.abs(luma - want).max() <= 2
+
+
+def test_a_single_picture_has_the_rate_that_its_file_states(tmp_path):
+    one = [clips.frame(clips.planes(0), "yuv420p")]
+    assert Footage(clips.write(tmp_path / "a.mp4", one, rate=Fraction(50))).rate == 50

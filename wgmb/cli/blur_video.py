@@ -108,6 +108,8 @@ def blur_video(
             note(f"flash at picture {', '.join(map(str, reel.flashes))}")
         if reel.doubles:
             note(f"{len(reel.doubles)} repeated pictures left out")
+        if scaling := plan.footage.scaling():
+            note(scaling)
         note(f"{len(plan.wanted)} frames in {took} -> {plan.name}")
     if loss := plan.footage.loss():
         note(f"wgmb: {loss}")
@@ -157,15 +159,16 @@ def _rate(footage: Footage, output: OutputSettings) -> tuple[Fraction | None, st
     """
     if output.fps == "source":
         return None, ""
-    if output.fps is not None or footage.has_rate:
+    if output.fps is not None or not footage.is_variable or footage.gaps:
         return output.rate_or(footage.rate), ""
     steps = "{:.1f} to {:.1f} ms".format(*(1000 * step for step in footage.steps))
-    if Path(output.output).suffix.lower() in SUFFIXES:
+    if not footage.has_rate and Path(output.output).suffix.lower() in SUFFIXES:
         return None, (
             f"variable rate ({steps}): each picture keeps its own time; --fps 60 sets a steady rate"
         )
     return footage.rate, (
-        f"variable rate ({steps}): {float(footage.rate):g} files a second; --fps sets another rate"
+        f"variable rate ({steps}): {float(footage.rate):g} frames a second, as on average; "
+        "--fps sets another rate"
     )
 
 

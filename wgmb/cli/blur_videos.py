@@ -85,6 +85,7 @@ def _one_of_many(plan: Plan, wish: Wish, tell: Tell, quiet: bool) -> bool:
         words = [took if run.reel is not None else "", *left_out, *plan.notes]
         if run.reel is not None and run.reel.doubles:
             words.append(f"{len(run.reel.doubles)} repeated pictures left out")
+        words.append(plan.footage.scaling())
         note(f"{path}: {'; '.join(filter(None, words))} -> {plan.name}")
     if loss := plan.footage.loss():
         complain(loss)

@@ -42,6 +42,8 @@ def tell_about(path: str, max_mb: float, scan: bool) -> int:
     with progress(len(footage), quiet=False, doing="reading") as tell:
         found = scan_video(footage, tell)
     _print(found)
+    if scaling := footage.scaling():
+        _print([("scaled", scaling)])
     if loss := footage.loss():
         note(f"wgmb: {loss}")
         return SOME_FAILED

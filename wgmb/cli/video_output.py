@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..io import atomic
 from ..io.clock import Clock, tick
 from ..io.coded_video import CodedVideo
-from ..io.encoders import SUFFIXES, Facts, chosen
+from ..io.encoders import SUFFIXES, chosen
 from ..io.footage import Footage
 from ..io.other_streams import OtherStreams
 from ..io.output_names import refuse_inputs
@@ -77,11 +77,7 @@ def _write_video(
     path, footage = Path(output.output), run.footage
     encoding = chosen(path, video.codec, video.quality, video.encoder)
     coding, lost = encoding.coding(footage.coding)
-    facts = Facts(
-        pixel_aspect=footage.pixel_aspect,
-        mastering=footage.mastering,
-        light_level=footage.light_level,
-    )
+    facts = footage.facts
     found = os.stat(footage.path)
     made_of = settings | {"input": [footage.path.name, found.st_size, found.st_mtime_ns]}
     texts = _texts(footage, made_of)

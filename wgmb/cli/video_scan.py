@@ -16,8 +16,7 @@ _READ_AHEAD = 2  # coded pictures
 def scan_video(footage: Footage, tell: Callable[[int, str, str], None]) -> list[tuple[str, str]]:
     """(name, text) lines about all pictures of a video, which are decoded for them.
 
-    `tell`: called after every picture, see `terminal.progress`. InputError if its pictures change
-    their size.
+    `tell`: called after every picture, see `terminal.progress`.
     """
     times = footage.times
 

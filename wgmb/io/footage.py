@@ -34,7 +34,7 @@ from .decoding import Decoder, decoded
 from .deinterlace import Fields
 from .encoders import Facts
 from .hdr10 import LightLevel, Mastering, is_base_layer
-from .pixels import Layout, is_transparent, layout, planes_of
+from .pixels import THREADS, Layout, is_transparent, layout, planes_of
 from .timeline import Times, scanned
 from .turn import turn_of
 
@@ -62,9 +62,9 @@ class Footage:
     Pictures have numbers from 0 on and are at `times` [s], on the clock that the file's streams
     share. `rate`: pictures a second, usually; `is_variable` if the times keep no steady rate.
     `size` [px] is that of upright pictures. `assumed`: what the file does not say about its colours
-    and what is taken instead. `notes`: lines that a user should know. `missing`: numbers of the
-    pictures that could not be decoded, of those asked for so far; `damaged`: of those that were
-    mended by the decoder. `index`: of their stream in the file.
+    and what is taken instead. `notes`: lines that a user should know. Numbers of the pictures,
+    of those asked for so far, that could not be decoded are `missing`; that the decoder mended,
+    `damaged`; that had another size, `scaled`. `index`: of their stream in the file.
 
     InputError in one line for a file that cannot be read, that has no pictures, or whose pictures
     would take more than `max_mb` megabytes each (see limits.py).
@@ -74,6 +74,7 @@ class Footage:
         self.path = Path(path)
         self.missing: set[int] = set()
         self.damaged: set[int] = set()
+        self.scaled: set[int] = set()
         self._is_at_end = False
         self.notes: list[str] = []
         with opened(self.path) as container:
@@ -99,7 +100,7 @@ class Footage:
         width, height = stream.codec_context.width, stream.codec_context.height
         if not (width and height):
             raise InputError(f"{self.path}: its pictures have no size; it may be cut off")
-        if not (0 < width <= limits.MOST_PIXELS_A_SIDE and 0 < height <= limits.MOST_PIXELS_A_SIDE):
+        if not 0 < min(width, height) <= max(width, height) <= limits.MOST_PIXELS_A_SIDE:
             raise InputError(
                 f"{self.path}: pictures of {width} x {height}, expected 1 to "
                 f"{limits.MOST_PIXELS_A_SIDE} pixels a side"
@@ -204,9 +205,14 @@ class Footage:
         return self._timeline.is_variable
 
     @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """Begin and length of the pauses of a rate that is steady elsewhere [s]."""
+        return self._timeline.gaps
+
+    @property
     def has_rate(self) -> bool:
-        """Return True if the pictures keep a steady rate, apart from pauses."""
-        return not self._timeline.is_variable or bool(self._timeline.gaps)
+        """Return True if the steps are alike to a quarter, apart from a few pauses."""
+        return self._timeline.has_rate
 
     @property
     def duration(self) -> Fraction:
@@ -238,11 +244,9 @@ class Footage:
         """Requested pictures that could not be read, in one line; '' if there are none."""
         said = []
         if self.missing:
-            at = float(self.times[min(self.missing)])
-            said.append(
-                f"{len(self.missing)} of {len(self.times)} pictures could not be decoded, "
-                f"the first at {at:.2f} s"
-            )
+            at, all_ = float(self.times[min(self.missing)]), len(self.times)
+            text = f"{len(self.missing)} of {all_} pictures could not be decoded"
+            said.append(f"{text}, the first at {at:.2f} s")
         if self.damaged:
             at = float(self.times[min(self.damaged)])
             said.append(f"{len(self.damaged)} pictures are damaged, the first at {at:.2f} s")
@@ -250,6 +254,13 @@ class Footage:
             count, at = round(self._packets.lacks * self.rate), float(self._packets.end)
             said.append(f"about {count} pictures after {at:.2f} s are lost, as it is cut off")
         return f"{self.path}: {'; '.join(said)}" if said else ""
+
+    def scaling(self) -> str:
+        """Requested pictures that were scaled, in one line; '' if there are none."""
+        if not self.scaled:
+            return ""
+        at, size = float(self.times[min(self.scaled)]), "{} x {}".format(*self.size)
+        return f"{len(self.scaled)} pictures of another size were scaled to {size}, from {at:.2f} s"
 
     def __len__(self) -> int:
         return len(self.times)
@@ -278,19 +289,20 @@ class Footage:
                 self.damaged.add(number)
             expected = number + 1
             self._is_at_end |= expected == len(self)
-            yield number, CodedPicture(self._upright(frame, by), self.coding)
+            planes = planes_of(self._fitted(frame, number, by), self._layout, by)
+            yield number, CodedPicture(tuple(map(self._turn, planes)), self.coding)
             if number == last:
                 break
         self.missing.update(range(expected, last + 1))
         self._is_at_end |= last + 1 == len(self)
 
-    def _upright(self, frame: av.VideoFrame, by: VideoReformatter) -> tuple[np.ndarray, ...]:
-        if (frame.width, frame.height) != self._frame_size:
-            size = "{} x {}".format(*self._frame_size)
-            raise InputError(
-                f"{self.path}: its pictures change from {size} to {frame.width} x {frame.height}"
-            )
-        return tuple(self._turn(plane) for plane in planes_of(frame, self._layout, by))
+    def _fitted(self, frame: av.VideoFrame, number: int, by: VideoReformatter) -> av.VideoFrame:
+        """The frame in the size of the first one."""
+        if (frame.width, frame.height) == self._frame_size:
+            return frame
+        self.scaled.add(number)
+        pixels, size = frame.format.name, self._frame_size
+        return by.reformat(frame, *size, format=pixels, interpolation="BICUBIC", threads=THREADS)
 
     def _from(self, first: int) -> Iterator[tuple[int, av.VideoFrame]]:
         """Frames with their numbers, in order, beginning at or before `first`."""
@@ -299,9 +311,10 @@ class Footage:
             return
         before = max(first // 2 - 2, 0)  # what bwdif looks back on
         fields = Fields(self._frame_size, self.pixels, self._packets.times.base)
+        by = VideoReformatter()
         for number, frame in self._decoder.frames(before):
             if number >= before:
-                yield from fields.of(frame, number)
+                yield from fields.of(self._fitted(frame, 2 * number, by), number)
         yield from fields.of(None)
 
 

@@ -35,6 +35,7 @@ _NEAR = 1e-3  # of a rate: it is taken for the known one
 _ROUNDED = 1.001  # ticks by which times differ at most from those of a rate
 _STATED = 1e-4  # the same of a rate that the file states
 _UNEVEN = 0.02  # of a step: more is a variable rate
+_JITTER = 0.25  # of a step: less is a rate all the same
 _SELDOM = 0.05  # of the steps: if more are uneven, the rate varies
 _FINEST = 1_001_000  # denominator of a rate
 
@@ -95,14 +96,14 @@ class Timeline:
 
     @cached_property
     def rate(self) -> Fraction:
-        """Pictures a second, by the mean of the steps without gaps and hitches.
+        """Pictures a second, by the mean of the steps without gaps and hitches; 24 without steps.
 
         The rate that the file states if all times are those of it, rounded; else the nearest known
         rate if it is within 0.1 %, or within what the clock's rounding makes of a few steps.
         """
         steps = self.steps
         if not len(steps):
-            return Fraction(24)
+            return self.stated or Fraction(24)
         if self.stated is not None and self._keeps(self.stated):
             return self.stated
         middle = np.median(steps)
@@ -131,19 +132,33 @@ class Timeline:
         """Return True if steps differ by more than the clock's rounding."""
         return bool(self._uneven().any())
 
-    def _uneven(self) -> np.ndarray:
-        usual = float(1 / (self.rate * self.times.base))
-        return np.abs(self.steps - usual) > max(1.0, _UNEVEN * usual)
+    def _uneven(self, tolerance: float = _UNEVEN) -> np.ndarray:
+        return np.abs(self.steps - self._usual) > max(1.0, tolerance * self._usual)
+
+    @property
+    def _usual(self) -> float:
+        """A step at the rate [ticks]."""
+        return float(1 / (self.rate * self.times.base))
+
+    @property
+    def has_rate(self) -> bool:
+        """Return True if the steps are alike to a quarter, apart from a few pauses."""
+        uneven = self._uneven(_JITTER)
+        return not uneven.any() or self._are_pauses(uneven)
+
+    def _are_pauses(self, uneven: np.ndarray) -> bool:
+        is_seldom = np.count_nonzero(uneven) <= _SELDOM * len(uneven)
+        return bool(is_seldom and (self.steps[uneven] >= 1.5 * self._usual).all())
 
     @property
     def gaps(self) -> list[tuple[float, float]]:
         """Gaps of a steady rate: begin and length of each [s]; none if the rate varies."""
-        uneven = np.flatnonzero(self._uneven())
-        usual = float(1 / (self.rate * self.times.base))
-        if len(uneven) > _SELDOM * len(self.steps) or (self.steps[uneven] < 1.5 * usual).any():
+        uneven = self._uneven()
+        if not self._are_pauses(uneven):
             return []
         base = float(self.times.base)
-        return [(int(self.times.ticks[n]) * base, int(self.steps[n]) * base) for n in uneven]
+        places = np.flatnonzero(uneven)
+        return [(int(self.times.ticks[n]) * base, int(self.steps[n]) * base) for n in places]
 
     def from_picture(self, number: int) -> Timeline:
         """The same without the pictures before `number`."""
