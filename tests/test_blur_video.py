@@ -11,7 +11,7 @@ import make_clips as clips
 import make_frames as make
 from wgmb import gpu, video_batch
 from wgmb.cli import app
-from wgmb.cli.blur_video import make_wish
+from wgmb.cli.blur_video import make_wish, tell_how
 from wgmb.color import linear, srgb, to_display
 from wgmb.io.footage import Footage
 from wgmb.settings import BlurSettings, InputSettings, ShutterSettings
@@ -279,6 +279,19 @@ def test_the_method_suits_where_motion_comes_from(tmp_path, capsys, flow, asked,
     look, when = BlurSettings(method=asked), ShutterSettings().resolved()
     wish = make_wish(look, when, InputSettings(), VideoSettings(flow=flow), None)
     assert wish.blur.method.name == method
+
+
+def test_without_a_gpu_and_opencv_a_line_says_what_would_be_quicker(capsys, monkeypatch):
+    for module in ("wgmb.video_settings", "wgmb.cli.blur_video"):
+        monkeypatch.setattr(f"{module}.is_installed", lambda package: False)
+    for flow in ("auto", "search"):
+        video = VideoSettings(flow=flow)
+        look, when = BlurSettings(), ShutterSettings().resolved()
+        wish = make_wish(look, when, InputSettings(), video, None)
+        tell_how(wish, quiet=False, verbose=False)
+        slow = wish.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        said = "pip install 'wgmb[flow]'" in capsys.readouterr().err
+        assert said == (slow and flow == "auto")
 
 
 def test_a_cut_between_pictures_is_not_crossed(tmp_path, capsys):
