@@ -13,6 +13,7 @@ import make_clips as clips
 from wgmb import InputError
 from wgmb.cli.video_lines import describe_video
 from wgmb.coding import Coding
+from wgmb.io.container import picture_stream
 from wgmb.io.decoding import decoded
 from wgmb.io.footage import Footage
 from wgmb.io.pixels import frame_of, layout, pixel_format, planes_of
@@ -555,3 +556,35 @@ def test_pictures_of_another_size_are_scaled_to_that_of_the_first(tmp_path):
 def test_a_single_picture_has_the_rate_that_its_file_states(tmp_path):
     one = [clips.frame(clips.planes(0), "yuv420p")]
     assert Footage(clips.write(tmp_path / "a.mp4", one, rate=Fraction(50))).rate == 50
+
+
+def test_a_stream_of_alpha_is_not_taken_for_the_pictures(tmp_path):
+    """As in animated AVIF, where it may come with more bits than the pictures."""
+    path = tmp_path / "a.mkv"
+    with av.open(str(path), "w") as out:
+        kinds = ("yuv420p", "gray")
+        streams = [out.add_stream("ffv1", rate=24) for _ in kinds]
+        for stream, pixels in zip(streams, kinds, strict=True):
+            stream.width, stream.height, stream.pix_fmt = clips.WIDTH, clips.HEIGHT, pixels
+        for n in range(3):
+            planes = clips.planes(n)
+            for stream, pixels in zip(streams, kinds, strict=True):
+                one = clips.frame(planes if pixels == "yuv420p" else planes[:1], pixels)
+                one.pts, one.time_base = n, Fraction(1, 24)
+                out.mux(stream.encode(one))
+        for stream in streams:
+            out.mux(stream.encode(None))
+    with av.open(str(path)) as container:
+
+        class Streams:
+            """Those of the container; FFmpeg thinks the grey one best."""
+
+            video = container.streams.video
+
+            def best(self, kind):
+                return self.video[1]
+
+        class Container:
+            streams = Streams()
+
+        assert picture_stream(Container(), path).index == 0  # pyright: ignore

@@ -38,16 +38,27 @@ def opened(path: Path) -> InputContainer:
 
 
 def picture_stream(container: InputContainer, path: Path) -> VideoStream:
-    """The stream of moving pictures: the one FFmpeg thinks best, but never a cover."""
+    """The stream of moving pictures: the one FFmpeg thinks best, but never a cover, nor the alpha.
+
+    Animated AVIF holds alpha as grey pictures in a stream of its own, which may be thought best.
+    """
     streams = [s for s in container.streams.video if not s.disposition & Disposition.attached_pic]
     if not streams:
         there = ", ".join(dict.fromkeys(s.type for s in container.streams)) or "nothing"
         raise InputError(f"{path}: has no pictures that move; it holds {there}")
     best = container.streams.best("video")
     chosen = next((s for s in streams if best is not None and s.index == best.index), streams[0])
+    if _is_grey(chosen):
+        colored = (s for s in streams if s.frames == chosen.frames and not _is_grey(s))
+        chosen = next(colored, chosen)
     if chosen.codec_context is None:
         raise InputError(f"{path}: its pictures are of a codec that is not known here")
     return chosen
+
+
+def _is_grey(stream: VideoStream) -> bool:
+    context = stream.codec_context
+    return context is not None and (context.pix_fmt or "").startswith("gray")
 
 
 def _what_is_wrong(path: Path, error: Exception) -> str:
