@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from av.sidedata.sidedata import Type
 from av.video.reformatter import VideoReformatter
+from PIL import Image
 
 import make_clips as clips
 from wgmb import InputError
@@ -588,3 +589,11 @@ def test_a_stream_of_alpha_is_not_taken_for_the_pictures(tmp_path):
             streams = Streams()
 
         assert picture_stream(Container(), path).index == 0  # pyright: ignore
+
+
+def test_animated_webp_is_refused_by_its_name(tmp_path):
+    frames = [Image.new("RGB", (32, 20), (40 * n, 0, 0)) for n in range(4)]
+    path = tmp_path / "a.webp"
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=40)
+    with pytest.raises(InputError, match=r"a\.webp: animated WebP is not read; GIF, APNG and AVIF"):
+        Footage(path)

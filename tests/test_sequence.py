@@ -374,6 +374,14 @@ def test_what_exists_is_not_overwritten_unless_told(tmp_path, capsys, shot):
     assert kept.read_bytes() != b"precious"
 
 
+def test_several_that_exist_are_counted(tmp_path, capsys, shot):
+    for number in (2, 3):
+        (tmp_path / f"b.{number:04d}.exr").write_bytes(b"precious")
+    code, _, err = run(capsys, shot, tmp_path)
+    assert code == 2
+    assert "b.0002.exr and 1 more exist; --overwrite replaces them" in err
+
+
 def test_the_same_run_twice_gives_the_same_bytes(tmp_path, capsys, shot):
     for suffix in ("exr", "png", "jpg", "tif"):
         for folder in ("a", "b"):

@@ -98,6 +98,8 @@ class Footage:
 
     def _check_size(self, stream: VideoStream, max_mb: float) -> None:
         width, height = stream.codec_context.width, stream.codec_context.height
+        if not (width and height) and stream.codec_context.name == "webp":
+            raise InputError(f"{self.path}: animated WebP is not read; GIF, APNG and AVIF are")
         if not (width and height):
             raise InputError(f"{self.path}: its pictures have no size; it may be cut off")
         if not 0 < min(width, height) <= max(width, height) <= limits.MOST_PIXELS_A_SIDE:

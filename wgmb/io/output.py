@@ -129,9 +129,11 @@ class Output:
         if folders := [p for p in there if not p.is_file()]:
             raise InputError(f"output {folders[0]} exists and is not a file")
         if there and not (self._overwrite or self._resume):
-            more = f" and {len(there) - 1} more" if len(there) > 1 else ""
+            exists, it = "exists", "it"
+            if len(there) > 1:
+                exists, it = f"and {len(there) - 1} more exist", "them"
             raise InputError(
-                f"{there[0]}{more} exists; `overwrite=True` replaces it"
+                f"{there[0]} {exists}; `overwrite=True` replaces {it}"
                 + ("" if is_video else ", `resume=True` keeps finished frames")
             )
         return names
