@@ -60,7 +60,7 @@ def bend(motion, z, y, x, prev, next):
 def continued(here, there):
     """The acceleration on the side that is not seen: turned back, or changed the other way."""
     length2 = here @ here
-    turns = length2 > 1 and -0.2 * length2 < here @ there < length2
+    turns = length2 > 1 and -0.5 * length2 < here @ there < length2
     if turns and abs(there @ there / length2 - 1) < 0.2:
         return 2 * (here @ there) / length2 * here - there
     return 2 * here - there
@@ -72,7 +72,7 @@ def turn_factor(here, mean):
         return 1.0
     cosine = mean @ here / (here @ here)
     off = mean - cosine * here
-    if cosine <= -0.2 or off @ off >= 0.04 * (here @ here):
+    if cosine <= -0.5 or off @ off >= 0.04 * (here @ here):
         return 1.0
     angle = np.arccos(min(cosine, 1.0))
     # By which the cubic misses a circle in the middle between two frames.

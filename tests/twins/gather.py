@@ -211,8 +211,9 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
 
     behind, before = mean(motion, back), mean(motion, front)
     if thin:
-        candidates = [motion[p] for p in inner if z[p] < between]
-        before = max(candidates, key=lambda m: np.sum((m - behind) ** 2), default=behind)
+        shown = [p for p in inner if z[p] < between]
+        purest = max(shown, key=lambda p: np.sum((motion[p] - behind) ** 2))
+        before = motion[purest]
     way = before - behind
     off = motion[y, x] - behind
     off = off - np.clip(off @ way / max(way @ way, 1e-9), 0, 1) * way
@@ -222,12 +223,6 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     def nearest_pure(pixels):
         pure = [(j, i) for j, i in pixels if not edges[j, i]] or [(y, x)]
         return min(pure, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)
-
-    bends, ratios = told_around
-    front_ratio, back_ratio = ratios[nearest_pure(nearer)], ratios[nearest_pure(farther)]
-
-    def path(vectors, pixels):
-        return np.concatenate([vectors, bends[nearest_pure(pixels)]])
 
     back_depth = mean(z, back)
     seen = seen_background(around_it, behind, back_depth, y, x)
@@ -244,12 +239,16 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     elif not thin and not any(0.1 < share < 0.9 for share in shares):
         coverage = coverage_by_color(color[y, x], mean(color, front), back_color, coverage)
     coverage = np.round(511 * coverage) / 511
-    if coverage < 1 - 0.98:
-        back_depth = z[y, x] if z[y, x] >= between else back_depth
-        own = path(motion[y, x], farther)
-        front_depth, back_depth = mean(z, front) * front_ratio, back_depth * back_ratio
-        return 0.0, path(before, nearer), front_depth, 0.0, color[y, x], own, back_depth, False
     whole = coverage > 0.98
+    front_place = purest if thin and not whole else nearest_pure(nearer)
+    back_place = nearest_pure(farther)
+    bends, ratios = told_around
+    if coverage < 1 - 0.98:
+        back_depth = (z[y, x] if z[y, x] >= between else back_depth) * ratios[back_place]
+        own = np.concatenate([motion[y, x], bends[back_place]])
+        front_depth = mean(z, front) * ratios[front_place]
+        before = np.concatenate([before, bends[front_place]])
+        return 0.0, before, front_depth, 0.0, color[y, x], own, back_depth, False
     coverage = 1.0 if whole else coverage
     rest = color[y, x] - (1 - coverage) * back_color
     brightest = np.max([color[p] for p in [*front, (y, x)]], axis=0)
@@ -258,10 +257,10 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     )
     if not whole:
         back_color = back_color + (rest - front_color) / (1 - coverage)
-    front_path = path(motion[y, x] if whole else before, nearer)
-    behind = path(behind, farther)
-    front_depth = (z[y, x] if whole and z[y, x] < between else mean(z, front)) * front_ratio
-    back_depth = back_depth * back_ratio
+    front_path = np.concatenate([motion[y, x] if whole else before, bends[front_place]])
+    behind = np.concatenate([behind, bends[back_place]])
+    front_depth = z[y, x] if whole and z[y, x] < between else mean(z, front)
+    front_depth, back_depth = front_depth * ratios[front_place], back_depth * ratios[back_place]
     return front_color, front_path, front_depth, coverage, back_color, behind, back_depth, True
 
 

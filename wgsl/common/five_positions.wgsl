@@ -12,7 +12,7 @@ const SPARED_CHANGE: f32 = 2.0;         // and this much more [px]: what changes
 const KINK_ACCELERATION: f32 = 1.0;     // from this half acceleration on [px] a path may have a kink,
 const KINK_RATIO: f32 = 0.15;           // if those before and after it are smaller by this
 const LEAST_TURNED: f32 = 1.0;          // half acceleration [px] from which on turns are told
-const LEAST_COSINE: f32 = -0.2;         // of the angle per frame: beyond 100 degrees it may be another one
+const LEAST_COSINE: f32 = -0.5;         // of the angle per frame: beyond 120 degrees it may be another one
 const SAME_LENGTH: f32 = 0.2;           // of accelerations on a circle: relative difference of their squares
 const OFF_TURN: f32 = 0.2;              // share of the acceleration by which a turn may miss
 

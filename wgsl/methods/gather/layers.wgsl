@@ -220,6 +220,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     }
     let background_motion = back_side.motion / back_side.total;
     var foreground_motion = select(front_side.motion / front_side.total, background_motion, thin);
+    var purest = px;
     var most = 0.0;
     for (var i = 0; i < select(0, 9, thin); i++) {      // of a wire, the motion that differs most from the background's
         let there = neighbour(px, i % 3 + i / 3 * 5 + 6, between);
@@ -227,6 +228,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
         let difference2 = dot(motion_there - background_motion, motion_there - background_motion);
         if there.counts && there.is_front && difference2 > most {
             most = difference2;
+            purest = there.at;
             foreground_motion = motion_there;
         }
     }
@@ -256,6 +258,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
                 back = select(background, own_color / counts, counts > 0.0);
                 front = vec4f(0.0);
                 front_motion = foreground_motion;
+                if thin { front_place.at = purest; }
                 if z >= between { back_depth = z; }
                 z = front_side.depth / front_side.total;
             } else {
@@ -268,6 +271,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
                 back = background + select(vec4f(0.0), (rest - front) / max(behind, 1e-6), behind > 0.0);
                 back_motion = background_motion;
                 if measured <= FULL { front_motion = foreground_motion; }
+                if measured <= FULL && thin { front_place.at = purest; }
                 if measured <= FULL || z >= between { z = front_side.depth / front_side.total; }
             }
         }
