@@ -7,7 +7,8 @@ import numpy as np
 from twins.five_positions import NO_DEPTH, bend, depth_ratio, moved, valid
 from twins.tap import bilinear
 
-TILE, MOTIONS = 16, 4
+TILE, MOTIONS, BLOCK, SLICES = 16, 4, 4, 16
+CROWDED, CROWDED_SHARE = 3.1, 0.34
 
 
 @dataclass
@@ -45,6 +46,7 @@ def gather(frames, times):
     layers.insert(0, separate(*frames[0], prev=at.get(-1), next=at.get(1), far=far))
     span = times[0] - (times[1] - times[0]) / 2, times[-1] + (times[1] - times[0]) / 2
     tiles = [tile_candidates(f, span) for f in layers]
+    scatter(layers[0], tiles[0], span, min(SLICES, len(times)))
     height, width = frames[0][1].shape[:2]
     own = frames[0][1].astype(float)
     out = own.copy()
@@ -52,7 +54,9 @@ def gather(frames, times):
         for x in range(width):
             here = [t[y // TILE][x // TILE] for t in tiles]
             if max(tile["longest"] for tile in here[: len(layers) - len(far)]) >= 0.01:
-                seen = [instant(layers, here, x, y, t, own, n) for n, t in enumerate(times)]
+                seen = [
+                    instant(layers, here, x, y, t, own, n, len(times)) for n, t in enumerate(times)
+                ]
                 if any(one is None for one in seen):
                     filled = hidden(layers[0], x, y, own)
                     seen = [filled if one is None else one for one in seen]
@@ -355,15 +359,18 @@ def tile_candidates(frame, span):
             offs = {k: np.array([i - k[1], j - k[0]]) * TILE for k in own}
             met = [k for k in own if sweep_overlaps(own[k], offs[k])]
             candidates = [
-                (path, z, sweep_interval(path, offs[k]))
+                (path, z, sweep_interval(path, offs[k]), k)
                 for k in met
                 for path, z in zip(own[k]["paths"], own[k]["depths"], strict=True)
             ]
             candidates = [entry for entry in candidates if entry[2] is not None]
-            chosen, _ = cluster([path for path, _, _ in candidates], u)
+            chosen, _ = cluster([path for path, *_ in candidates], u)
+            listed = np.array([np.zeros(7), *chosen])
+            missed = [min(trajectory_distance(listed, path, u)) for path, *_ in candidates]
+            reach = trajectory_distance(chosen[0], np.zeros(7), u) if chosen else 0.0
             depths = [np.inf] * len(chosen)
             times = [[np.inf, -np.inf] for _ in chosen]
-            for path, z, (t_enter, t_exit) in candidates:
+            for path, z, (t_enter, t_exit), _ in candidates:
                 k = nearest_cluster(path, chosen, u)
                 if k is not None:
                     depths[k] = min(depths[k], z)
@@ -375,19 +382,55 @@ def tile_candidates(frame, span):
                 "times": [times[k] for k in order],
                 "edges": any(own[k]["edges"] for k in met),
                 "longest": max((own[k]["longest"] for k in met), default=0.0),
+                "crowded": max(missed, default=0.0) > max(CROWDED, CROWDED_SHARE * reach),
+                "missed": {key for (*_, key), far in zip(candidates, missed, strict=True)
+                           if far > CROWDED},
+                "scattered": {},
             })  # fmt: skip
     return out
+
+
+def scatter(frame, tiles, span, slices):
+    """Put the nearest pixel that is in a block at a slice of the exposure into its crowded tile.
+
+    `tiles` get "scattered": by slice and block, the depth, rounded down to 1/64, and the pixel.
+    Of 2 x 2 pixels the nearest stands for all.
+    """
+    height, width = frame.edgeless.shape
+    paths = frame.trajectory[0]
+    moves = (np.abs(paths[..., :2]) + np.abs(paths[..., 2:4]) > 1).any(axis=-1)
+    crowded = [tile["missed"] for row in tiles for tile in row if tile["crowded"]]
+    sources = set().union(*crowded)
+    exact = frame.depth[0].astype("f4")
+    depths = (exact.view("u4") >> 17 << 17).view("f4")
+    quads = [
+        min(((y, x) for y in (j, min(j + 1, height - 1)) for x in (i, min(i + 1, width - 1))),
+            key=lambda at: exact[at])
+        for j in range(0, height, 2) for i in range(0, width, 2)
+    ]  # fmt: skip
+    for k in range(slices):
+        u = span[0] + (span[1] - span[0]) * (k + 0.5) / slices - frame.offset
+        for y, x in (at for at in quads if moves[at] and (at[0] // TILE, at[1] // TILE) in sources):
+            to = np.array([x, y]) + 0.5 + moved(paths[y, x], u)
+            if (to < 0).any() or (to >= (width, height)).any():
+                continue
+            i, j = to.astype(int)
+            tile, block = tiles[j // TILE][i // TILE], (k, j // BLOCK, i // BLOCK)
+            new = depths[y, x], y, x
+            if tile["crowded"] and new < tile["scattered"].get(block, (np.inf,)):
+                tile["scattered"][block] = new
 
 
 # ---- search ---------------------------------------------------------------------------------
 
 
-def instant(layers, tiles, x, y, t, color, n):
+def instant(layers, tiles, x, y, t, color, n, samples):
     """The samples at the pixel at time `t`, number `n`: edge, the edge behind it, the opaque one.
 
     None: something that all frames hide.
     """
-    (opaque, front_edge, back_edge), miss = resolve_visibility(layers, tiles, x, y, t)
+    slice_ = (2 * n + 1) * min(SLICES, samples) // (2 * samples)
+    (opaque, front_edge, back_edge), miss = resolve_visibility(layers, tiles, x, y, t, slice_)
     shown = []
     if is_before(front_edge, opaque):
         shown.append(front_edge)
@@ -435,7 +478,7 @@ def hidden(frame, x, y, color):
     return sum_ / total if total else color[y, x]
 
 
-def resolve_visibility(layers, tiles, x, y, t):
+def resolve_visibility(layers, tiles, x, y, t, slice_):
     """The nearest opaque sample at the pixel at time `t`, the nearest two at silhouettes.
 
     And how far from the pixel the nearest of the searches along its own path ended [px].
@@ -469,6 +512,9 @@ def resolve_visibility(layers, tiles, x, y, t):
     def search_front(f):
         tile, u = tiles[f], t - layers[f].offset
         own = search_layer(f, False, None, None)
+        z, *pixel = tile["scattered"].get((slice_, y // BLOCK, x // BLOCK), (np.inf,))
+        if z < seen[0].depth:
+            search_layer(f, False, moved(layers[f].trajectory[0][tuple(pixel)], u), own)
         for path, z, when in zip(tile["paths"], tile["depths"], tile["times"], strict=True):
             if z * (1.1 if f else 1.0) < seen[0].depth and when[0] <= u <= when[1]:
                 search_layer(f, False, moved(path, u), own)

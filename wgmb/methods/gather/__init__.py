@@ -11,6 +11,7 @@ from ..options import MethodOptions, Range
 from .active_tiles import ActiveTiles
 from .kinds import PASSES, Shading, kinds_of
 from .layers import Layers
+from .scatter import Scatter
 from .search import Search
 from .shading import MovingLight, Times
 from .tile_motions import TileMotions
@@ -83,7 +84,7 @@ class Gather:
         self._light = MovingLight(device)
         self._tiles = ActiveTiles(device)
         self._layers = Layers(device, images)
-        self._motions = TileMotions(device, images)
+        self._motions, self._scatter = TileMotions(device, images), Scatter(device)
         self._search = Search(device, images, confidence=confidence, output=output)
 
     def encode(self, encoder, inputs, output):
@@ -91,14 +92,19 @@ class Gather:
         size, frames = inputs.bindings.size, inputs.frames
         worklists = self._tiles.encode(encoder, inputs)
         self._layers.encode(encoder, inputs, worklists)
+        candidates = self._motions.candidates(size, len(frames))
+        tiles = self._scatter.tiles(encoder, size)
         for i in range(len(frames)):
             surface = self._layers.front_surface(i)
-            self._motions.encode(encoder, inputs, i, surface, worklists)
-        candidates = self._motions.candidates(size, len(frames))
+            self._motions.encode(encoder, inputs, i, surface, worklists, tiles)
+        scattered = self._scatter.encode(
+            encoder, inputs, self._layers.front_surface(0), candidates, tiles
+        )
         textures = self._layers.textures
         added = None
         if kinds := kinds_of(inputs, self._shading):
             opens, closes = inputs.exposed
             times = Times.within(opens, closes, inputs.samples)
             added = self._light.encode(encoder, inputs.bindings, kinds, times, inputs.frame.weight)
-        self._search.encode(encoder, inputs, textures, candidates, worklists, output, added)
+        starts = candidates, scattered
+        self._search.encode(encoder, inputs, textures, starts, worklists, output, added)

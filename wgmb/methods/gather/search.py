@@ -26,8 +26,11 @@ class Search:
         self._confidence, self._output = confidence, output
         self._blocks = ScratchBuffer(device)
 
-    def encode(self, encoder, inputs, layers, candidates, worklists, output, added: Added | None):
-        """Record the classification of blocks, then all pixels. `added`: moving light."""
+    def encode(self, encoder, inputs, layers, starts, worklists, output, added: Added | None):
+        """Record the classification of blocks, then all pixels.
+
+        `starts`: of searches, the tiles' candidates and what is scattered. `added`: moving light.
+        """
         timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
         timed["FAR"] = any(abs(frame.offset) > 1 for frame in inputs.frames)
         timed["WEIGHTED"] = inputs.frame.weight is not None
@@ -37,12 +40,14 @@ class Search:
         far = [frame.offset for frame in inputs.frames[len(near) :]]
         data["offsets"][: len(near)], data["far_offsets"][: len(far)] = near, far
         data["count"], data["far_count"] = len(near), len(far)
+        candidates, scattered = starts
         array = partial(self._images.view_of, dimension="2d-array")
         arrays = {name: array(texture) for name, texture in layers.items()}
         searched = {
             "sources": uniform(self._device, "sources", data),
             "surfaces": arrays.pop("surfaces"),
             "tile_candidates": candidates,
+            "scattered": scattered,
         }
         wide, side, block, times = (
             int(classify.source.constant(n))
@@ -54,13 +59,13 @@ class Search:
             "single-layer mask", blocks, "r32uint", -(-inputs.samples // times) + 1
         )
         mask = array(words)
-        # Two lists: of plain blocks, and of all others.
+        # Three lists: of plain blocks, of others, and of others in crowded tiles.
         size = (
             4 * -(-(blocks[0] * blocks[1] + int(classify.source.constant("CELLS_WORD"))) // 64) * 64
         )
-        lists = {"buffer": self._blocks.at_least(2 * size), "offset": 0, "size": 2 * size}
-        encoder.clear_buffer(lists["buffer"], 0, 2 * size)
-        for entry, over in (("main", blocks), ("size_lists", (2 * classify.workgroup[0], 1))):
+        lists = {"buffer": self._blocks.at_least(3 * size), "offset": 0, "size": 3 * size}
+        encoder.clear_buffer(lists["buffer"], 0, 3 * size)
+        for entry, over in (("main", blocks), ("size_lists", (3 * classify.workgroup[0], 1))):
             classify.run(
                 encoder,
                 entry,
@@ -70,13 +75,14 @@ class Search:
                 lists=lists,
                 **searched,
             )
-        plain, others = (lists | {"offset": offset, "size": size} for offset in (0, size))
+        plain, others, crowded = (lists | {"offset": k * size, "size": size} for k in range(3))
         separated = worklists["separated"]
         differences = self._differences(encoder, inputs, layers["surfaces"], separated)
-        for entry, cells, is_plain in (
-            ("main", others, False),
-            ("main", plain, True),
-            ("copy_static", worklists["static"], True),
+        for entry, cells, kind in (
+            ("main", others, {}),
+            ("main", crowded, {"CROWDED": True}),
+            ("main", plain, {"PLAIN": True}),
+            ("copy_static", worklists["static"], {"PLAIN": True}),
         ):
             for lit, groups in self._groups(encoder, inputs, cells, added):
                 kernel = gpu.kernel(
@@ -84,7 +90,7 @@ class Search:
                     "methods/gather/resolve.wgsl",
                     {"Output": self._output, "mattes": layers["mattes"].format},
                     CONFIDENCE=self._confidence,
-                    PLAIN=is_plain,
+                    **kind,
                     MOVING_LIGHT=lit is not None,
                     **timed,
                 )

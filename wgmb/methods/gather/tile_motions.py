@@ -27,8 +27,11 @@ class TileMotions:
         texture = self._images.texture("tile candidates", grid, "rgba32uint", layers * count)
         return self._images.view_of(texture, dimension="2d-array")
 
-    def encode(self, encoder, inputs, index: int, front_surface, worklists):
-        """Record the candidate motions of every tile in frame `index` of the inputs."""
+    def encode(self, encoder, inputs, index: int, front_surface, worklists, scattering):
+        """Record the candidate motions of every tile in frame `index` of the inputs.
+
+        `scattering`: gets the tiles of the scatter, if it is the frame itself and any is crowded.
+        """
         kernel = gpu.kernel(self._device, "methods/gather/tile_motions.wgsl")
         data = np.zeros((), kernel.source.dtype("SourceFrame"))
         data["offset"] = inputs.frames[index].offset
@@ -56,6 +59,7 @@ class TileMotions:
                 tile_motions=motions if reads else no_motions,
                 tile_motions_out=no_motions if reads else motions,
                 tile_candidates=candidates,
+                scattering=scattering,
                 max_displacement=self._max_displacement.at_least(4),
                 coarse_boxes=boxes if last else inputs.unbound,
                 coarse_boxes_out=no_boxes if last else boxes,

@@ -1,5 +1,6 @@
 // Classification of blocks of pixels, an early out: at which times is one smooth surface all that can be visible?
 // Such a time needs one search, in the front layer of the frame itself; most times of most pixels are such.
+//#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include common/loops.wgsl
 //#include common/shutter.wgsl
@@ -8,7 +9,7 @@
 
 @group(1) @binding(3) var single_layer_mask: Mask;  // by block: words of bits, TIMES_PER_WORD a layer; last, 1 if all are set
 @group(1) @binding(4) var<storage, read> active_cells: WorkList;
-@group(1) @binding(5) var<storage, read_write> lists: array<atomic<u32>>;   // two WorkLists of blocks, see PLAIN; all 0 at first
+@group(1) @binding(5) var<storage, read_write> lists: array<atomic<u32>>;   // three WorkLists of blocks: PLAIN, others, CROWDED; all 0 at first
 
 override WEIGHTED: bool = false;    // pixels have weights, and may show more than one in a block
 
@@ -32,6 +33,7 @@ fn main(@builtin(local_invocation_index) local: u32,
     let candidates0 = load_candidates(tile, 0u);
     let candidates1 = load_candidates(tile, 1u);
     let candidates2 = load_candidates(tile, 2u);
+    let is_crowded = candidates0.header.w > 0.0;
     let times = sample_times(0.5 * vec2f(low + high) + 0.5, 0.0, candidates0, candidates1, candidates2);
     // Jittered pixels have times of their own.
     let is_static = is_static_tile(candidates0, candidates1, candidates2);
@@ -72,6 +74,8 @@ fn main(@builtin(local_invocation_index) local: u32,
                 n++;
                 if !is_single || n >= 4u { break; }
             }
+            let word = scattered_at(low, t, is_single && is_crowded && f == 0u);
+            is_single = is_single && (word == 0u || scattered_depth(word) * SURFACE_DEPTH_RATIO >= deepest);
             let again = is_single && f == 0u && sources.count > 1u && abs(t) > TRUSTED_TIME;
             f = neighbour_of(t, false);
             if !again { break; }
@@ -87,15 +91,15 @@ fn main(@builtin(local_invocation_index) local: u32,
     }
     textureStore(single_layer_mask, id, (frame.samples - 1u) / TIMES_PER_WORD + 1u, vec4u(u32(all_single)));
     let is_plain = is_static || (all_single && !WEIGHTED);
-    let section = select(arrayLength(&lists) / 2u, 0u, is_plain);
+    let section = select(select(1u, 2u, is_crowded), 0u, is_plain) * (arrayLength(&lists) / 3u);
     let place = atomicAdd(&lists[section + COUNT_WORD], 1u);
     atomicStore(&lists[section + CELLS_WORD + place], pack_cell(id));
 }
 
-/// After all blocks: workgroups for both lists.
+/// After all blocks: workgroups for all lists.
 @compute @workgroup_size(1)
 fn size_lists(@builtin(workgroup_id) group: vec3u) {
-    let section = group.x * (arrayLength(&lists) / 2u);
+    let section = group.x * (arrayLength(&lists) / 3u);
     let wanted = (atomicLoad(&lists[section + COUNT_WORD]) + BLOCKS_PER_GROUP - 1u) / BLOCKS_PER_GROUP;
     atomicStore(&lists[section], min(wanted, GROUPS_PER_ROW));
     atomicStore(&lists[section + 1u], 1u);

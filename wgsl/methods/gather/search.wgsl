@@ -6,6 +6,7 @@
 //#include common/frame.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
+//#include methods/gather/scattered.wgsl
 //#include methods/gather/surface.wgsl
 //#include methods/gather/worklist.wgsl
 
@@ -19,6 +20,7 @@ struct SourceFrames {
 @group(1) @binding(0) var<uniform> sources: SourceFrames;
 @group(1) @binding(1) var surfaces: texture_2d_array<u32>;          // stored as rgba32uint: see pack_surface(); front, back of the frame itself, front, back of the next one, ...
 @group(1) @binding(2) var tile_candidates: texture_2d_array<u32>;   // CANDIDATE_LAYERS per frame
+@group(1) @binding(20) var<storage, read> scattered: array<u32>;    // see scattered.wgsl
 
 override FAR: bool = false;     // there are frames beyond the neighbours
 
@@ -30,7 +32,6 @@ const NEIGHBOUR_DEPTH_BIAS: f32 = 1.1;  // factor of depths in neighbouring fram
 const TRUSTED_TIME: f32 = 0.25; // up to here from its instant the frame itself is enough, if it shows anything [frame intervals]
 
 // Results of the classification: a bit per time, in words, of every block of pixels.
-const BLOCK: u32 = 4u;          // side [px]
 const BLOCKS_PER_GROUP = CELL_TILES * TILE * STRIP_HEIGHT / (BLOCK * BLOCK);   // of a workgroup of the resolve
 const TIMES_PER_WORD: u32 = 32u;
 
@@ -108,6 +109,16 @@ fn next_seed(seeds: ptr<function, Seeds>) -> vec2f {
     (*seeds).pending = s.pending & (s.pending - 1u);
     let later = select(vec2f(s.x.w, s.y.w), vec2f(s.x.z, s.y.z), (s.pending & 4u) != 0u);
     return select(select(later, vec2f(s.x.y, s.y.y), (s.pending & 2u) != 0u), vec2f(s.x.x, s.y.x), (s.pending & 1u) != 0u);
+}
+
+/// The word of what of the frame itself is scattered into the block of the pixel `px` by the time `t`, if `wanted`; else 0.
+fn scattered_at(px: vec2u, t: f32, wanted: bool) -> u32 {
+    var word = 0u;
+    for (var i = 0u; i < u32(wanted); i++) {
+        let slices = slice_count(arrayLength(&scattered));
+        word = scattered[scattered_index(slice_at(t, slices), px / BLOCK)];
+    }
+    return word;
 }
 
 /// The neighbouring frame on the side of `t`, or the only one; the `second`: the other one.

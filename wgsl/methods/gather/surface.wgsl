@@ -9,7 +9,8 @@ const HALF_MAX: f32 = 65504.0;  // largest finite f16
 // The candidate motions of a tile: those which may bring something into it while the shutter is open. Per frame they
 // are layers of one texture of bits: header, min_depth; in half floats, as searches only start from them, the times at
 // which they enter and leave the tile, velocities, half accelerations. The header is their number, which is smaller where
-// further ones would resemble these or standing still; 1 if an edge may come; the greatest displacement [px]; 0.
+// further ones would resemble these or standing still; 1 if an edge may come; the greatest displacement [px]; in the
+// frame itself, 1 if the tile is crowded, as motions come that are unlike all of these (see scatter.wgsl).
 const CANDIDATE_LAYERS: u32 = 5u;
 const TIME_SLACK: f32 = 0.002;  // for rounding: they enter so much earlier and leave so much later [frame intervals]
 

@@ -23,6 +23,7 @@ struct SourceFrame {
 @group(1) @binding(7) var<storage, read> static_cells: WorkList;
 @group(1) @binding(8) var coarse_boxes: texture_2d<f32>;    // what `coarsen` wrote
 @group(1) @binding(9) var coarse_boxes_out: Boxes;      // around the boxes of COARSE x COARSE tiles
+@group(1) @binding(10) var<storage, read_write> scattering: array<atomic<u32>>; // a WorkList of the tiles to scatter; then a flag for each; all 0 at first
 
 alias Layers = texture_storage_2d_array<rgba32float, write>;
 alias Packed = texture_storage_2d_array<rgba32uint, write>;
@@ -36,6 +37,10 @@ const MOTION_LAYERS: u32 = 7u;
 
 const COARSE: i32 = 4;          // tiles per side of a coarse box
 const MERGE_DISTANCE: f32 = 0.5;    // motions closer than this [px] are one
+// A tile is crowded if a motion is farther than this [px] from all candidates, and than this share of the longest one. Motions
+// along one line are never farther than 1/4. Neither is a simple number, so that rounding rarely decides.
+const CROWDED_DISTANCE: f32 = 3.1;
+const CROWDED_SHARE: f32 = 0.34;
 
 /// The foreground's surface of a pixel.
 fn front_at(px: vec2u) -> vec4u {
@@ -55,6 +60,11 @@ fn nearest_cluster(trajectory: vec4f, clusters: array<vec4f, 4>, u: f32) -> vec4
                   trajectory_distance2(trajectory, clusters[2], u), trajectory_distance2(trajectory, clusters[3], u));
     let least = min(min(d.x, d.y), min(d.z, d.w));
     return d == vec4f(least);
+}
+
+/// Squared distance [px^2] to the nearest of the clusters' motions, all found, and of standing still.
+fn missed_distance2(trajectory: vec4f, clusters: array<vec4f, 4>, u: f32) -> f32 {
+    return min(distance2_to_clusters(trajectory, clusters, u), trajectory_distance2(trajectory, vec4f(0.0), u));
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -216,6 +226,7 @@ fn gather_candidates(@builtin(local_invocation_index) local: u32,
     var min_depth = vec4f(INFINITE);
     var t_enter = vec4f(1.0);
     var t_exit = vec4f(0.0);
+    var missed = 0.0;           // greatest squared distance of a motion from all candidates [px^2]
     for (var tile = first; tile.y <= last.y; tile = after(tile, first, last)) {
         let other = source_tile(tile, here);
         for (var n = 0u; n < other.count; n++) {
@@ -227,9 +238,11 @@ fn gather_candidates(@builtin(local_invocation_index) local: u32,
                 min_depth = min(min_depth, select(vec4f(INFINITE), vec4f(z), nearest));
                 t_enter = min(t_enter, select(vec4f(1.0), vec4f(interval.x), nearest));
                 t_exit = max(t_exit, select(vec4f(0.0), vec4f(interval.y), nearest));
+                missed = max(missed, missed_distance2(trajectory, motions, u));
             }
         }
     }
+    let reach2 = CROWDED_SHARE * CROWDED_SHARE * trajectory_distance2(motions[0], vec4f(0.0), u);
 
     // Sorted by depth, the nearest first.
     for (var i = 0u; i < MOTIONS; i++) {
@@ -260,11 +273,36 @@ fn gather_candidates(@builtin(local_invocation_index) local: u32,
         velocities[k] = pack_halves(motions[k].xy);
         half_accelerations[k] = pack_halves(motions[k].zw);
     }
-    textureStore(tile_candidates, id, source.first, bitcast<vec4u>(vec4f(f32(count), has_edge, longest, 0.0)));
+    let is_crowded = source.first == 0u && missed > max(CROWDED_DISTANCE * CROWDED_DISTANCE, reach2);
+    let sources_end = select(first.y - 1, last.y, is_crowded);
+    for (var tile = first; tile.y <= sources_end; tile = after(tile, first, last)) {
+        let other = source_tile(tile, here);
+        var is_source = false;
+        for (var n = 0u; n < other.count; n++) {
+            let trajectory = textureLoad(tile_motions, other.at, n, 0);
+            let interval = sweep_interval(trajectory, window, other.off);
+            let is_missed = missed_distance2(trajectory, motions, u) > CROWDED_DISTANCE * CROWDED_DISTANCE;
+            is_source = is_source || (is_missed && interval.x <= interval.y);
+        }
+        if is_source { scatter_from(vec2u(tile)); }
+    }
+    textureStore(tile_candidates, id, source.first, bitcast<vec4u>(vec4f(f32(count), has_edge, longest, f32(is_crowded))));
     textureStore(tile_candidates, id, source.first + 1u, bitcast<vec4u>(min_depth));
     textureStore(tile_candidates, id, source.first + 2u, times);
     textureStore(tile_candidates, id, source.first + 3u, velocities);
     textureStore(tile_candidates, id, source.first + 4u, half_accelerations);
+}
+
+/// Add a tile to the list of those to scatter, if it is not in it.
+fn scatter_from(tile: vec2u) {
+    let flag = arrayLength(&scattering) / 2u + tile.y * tiles_of(frame.size).x + tile.x;
+    if atomicExchange(&scattering[flag], 1u) == 0u {
+        let place = atomicAdd(&scattering[COUNT_WORD], 1u);
+        atomicStore(&scattering[CELLS_WORD + place], pack_cell(tile));
+        atomicMax(&scattering[0], min(place + 1u, GROUPS_PER_ROW));
+        atomicMax(&scattering[1], 1u);
+        atomicMax(&scattering[2], place / GROUPS_PER_ROW + 1u);
+    }
 }
 
 /// The tile that follows another one, row by row of those from `first` to `last`.

@@ -3,8 +3,11 @@
 //#include methods/gather/motion.wgsl
 //#include methods/gather/search.wgsl
 
+override CROWDED: bool = false;     // tiles are crowded: searches of the frame itself start from what is scattered too
+
 const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: what one showed is preferred
 const ITERATIONS_SAVED: u32 = 3u;       // from a tile's motion, compared with a start from nothing
+const SCATTERED: u32 = 16u;             // bit of what is scattered among the pending starts
 const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
 const ELSEWHERE: f32 = 2.0;             // samples of one frame farther apart than this [px] are of different surfaces
 
@@ -105,35 +108,59 @@ fn start_of(starts: Starts, query: Query) -> vec2f {
     return select(there, displacement5(starts.own, query.u), query.layer < 2u);
 }
 
-/// Search one layer from `own`, the displacement of the pixel's own trajectory [px]; then, in a front layer, from the
-/// tile's candidates that may be nearer than what is visible already.
+/// Search one layer from `own`, the displacement of the pixel's own trajectory [px]; then, in a front layer, from what is
+/// scattered and from the tile's candidates, if they may be nearer than what is visible already.
 fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candidates: Candidates) {
     let is_front = query.layer % 2u == 0u;
     var seeds = seeds_at(candidates, query.u, select(0u, may_be_there(candidates, query.u), is_front));
+    let word = scattered_at(vec2u(query.x), query.u, CROWDED && query.layer == 0u);
+    let there = displacement_in(word, query);
     var first = vec2f(INFINITE);    // where the first search led; if nowhere, the place where it stopped tells nothing
     var is_first = true;
     loop {
-        let state = find_surface(&seeds, query, own, is_first, first, (*visible).opaque.depth);
+        let state = find_surface(&seeds, query, own, there, is_first, first, (*visible).opaque.depth);
         let is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL && is_inside(query.x - state.d);
         if is_first && is_there { first = state.d; }
         if is_first && is_front && !is_far(query.layer) { (*visible).miss2 = min((*visible).miss2, state.residual2); }
         if is_there { record(visible, query, state); }
         let nearer = may_be_nearer(candidates, (*visible).opaque.depth / query.handicap);
         seeds.pending &= nearer & ~are_solution(seeds, first);
+        let is_nearer = is_first && word != 0u && scattered_depth(word) < (*visible).opaque.depth;
+        if CROWDED && is_nearer && !same_solution(there, first) { seeds.pending |= SCATTERED; }
         is_first = false;
         if seeds.pending == 0u { break; }
     }
 }
 
-/// Iterate from `own` at first; after that from pending seeds, one after the other until one leads to a surface. A seed
+/// The displacement of the pixel in a word of what is scattered [px].
+fn displacement_in(word: u32, query: Query) -> vec2f {
+    var d = vec2f(0.0);
+    for (var i = 0u; i < select(0u, 1u, CROWDED && word != 0u); i++) {
+        let there = surface_of(scattered_pixel(word, vec2u(query.x) / BLOCK), query.layer);
+        d = displacement5(unpack_trajectory(there), query.u);
+    }
+    return d;
+}
+
+/// The first pending start, which is pending no more: what is scattered, `there`, before the seeds, as it is the nearest.
+fn next_start(seeds: ptr<function, Seeds>, there: vec2f) -> vec2f {
+    if CROWDED && (*seeds).pending >= SCATTERED {
+        (*seeds).pending -= SCATTERED;
+        return there;
+    }
+    return next_seed(seeds);
+}
+
+/// Iterate from `own` at first; after that from pending starts, `there` and seeds, one after the other until one leads to a surface. A seed
 /// is given up if it leads to the first solution, to something that is not nearer than `limit`, or astray: its
 /// residual is INFINITE then.
-fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first: bool, first: vec2f, limit: f32) -> WarpState {
+fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, there: vec2f,
+                is_first: bool, first: vec2f, limit: f32) -> WarpState {
     var state = WarpState(0u, own, INFINITE);
     var n = 1u;
     var before = vec2f(0.0);    // the last step, if no leap came after it
     if !is_first {
-        state.d = next_seed(seeds);
+        state.d = next_start(seeds, there);
         n = ITERATIONS_SAVED;
     }
     loop {              // a turn is a step
@@ -153,7 +180,7 @@ fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, is_first:
         state.d += select(vec2f(0.0), leap(step, before), leaps);
         before = select(step, vec2f(0.0), leaps);
         if ended {
-            state.d = next_seed(seeds);
+            state.d = next_start(seeds, there);
             n = ITERATIONS_SAVED;
             before = vec2f(0.0);
         }

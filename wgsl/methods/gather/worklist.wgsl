@@ -11,6 +11,7 @@ struct WorkList {
 }
 
 const CELL_TILES: u32 = 2u;
+const BLOCK: u32 = 4u;                  // side of a block of pixels, which some passes take in place of cells [px]
 const STRIP_HEIGHT: u32 = 2u;           // [px]
 const GROUPS_PER_ROW: u32 = 32768u;     // of a dispatch; devices take 65,535
 // Offsets within a WorkList [words].
