@@ -267,7 +267,7 @@ def test_runs_are_resumed_and_files_replaced_only_when_asked(shot, tmp_path, cap
     line = ("vectors", shot, "-o", tmp_path / "o.####.exr", "--as", "nuke")
     assert make.inside(capsys, *line)[0] == 0
     code, _, err = make.inside(capsys, *line)
-    assert (code, "exists" in err) == (2, True)
+    assert (code, "and 2 more exist;" in err) == (2, True)
     before = (tmp_path / "o.0001.exr").read_bytes()
     (tmp_path / "o.0002.exr").unlink()
     _, _, err = make.inside(capsys, *line, "--resume")
