@@ -93,7 +93,7 @@ def test_circles_swings_and_kinks_are_nearly_exact():
         assert decibel(frame_of([shot(path, t) for t in (0, -1, 1)]), path) > least
 
 
-@pytest.mark.parametrize("method, least", [("gather", 36.5), ("reproject", 36)])
+@pytest.mark.parametrize("method, least", [("gather", 42), ("reproject", 36)])
 def test_turns_are_told_up_to_120_degrees(method, least):
     """As changes that go on evenly, such accelerations give 33.6 and 33.8 dB."""
 
@@ -101,6 +101,35 @@ def test_turns_are_told_up_to_120_degrees(method, least):
         return 24 * np.cos(np.radians(105) * t + 0.4), 24 * np.sin(np.radians(105) * t + 0.4)
 
     assert decibel(frame_of([shot(turns, t) for t in (0, -1, 1)]), turns, method) > least
+
+
+def lamp(degrees, t):
+    """A light 2.6 px wide, on a circle by so many degrees a frame: colour, motion, depth."""
+    fine, (height, width) = 4, SIZE
+    y, x = (np.mgrid[: height * fine, : width * fine] + 0.5) / fine
+
+    def place(t):
+        angle = np.radians(degrees) * t + 0.4
+        return np.array([width / 2 + 20 * np.cos(angle), height / 2 + 20 * np.sin(angle)])
+
+    at = place(t)
+    disk = np.hypot(x - at[0], y - at[1]) < 1.3
+    color = np.where(disk, 4.0, 0.1)[..., None] * [1.0, 0.8, 0.6]
+    color = color.reshape(height, fine, width, fine, 3).mean(axis=(1, 3)).astype("f4")
+    vectors = np.concatenate([place(t + side) - at for side in (-1, 1)])
+    motion = np.where(disk[..., None], vectors, 0.0).astype("f4")
+    middle = np.s_[2::fine, 2::fine]
+    return color, motion[middle], np.where(disk, 4.0, 9.0).astype("f4")[middle]
+
+
+@pytest.mark.parametrize("degrees", [80, 95, 110])
+@pytest.mark.parametrize("shutter", [180, 360])
+def test_a_small_light_on_a_circle_is_found_at_all_times(degrees, shutter):
+    """Where searches start beside it, off the circle, 51 to 78 % of the light is left."""
+    frame = frame_of([lamp(degrees, t) for t in (0, -1, 1)])
+    got = wgmb.Blur("gather", shutter=shutter, samples=16)(frame)
+    wall = np.array([0.1, 0.08, 0.06])
+    assert abs((got - wall).sum() / (frame.color - wall).sum() - 1) < 0.05
 
 
 @pytest.mark.parametrize("method, least", [("gather", 50), ("reproject", 48)])

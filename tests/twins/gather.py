@@ -283,10 +283,11 @@ def coverage_by_color(own, front, back, at_middle):
 
 
 def parabola(paths, longest):
-    """The paths without what leaves the parabola; of a kink, a parabola of alike lengths."""
+    """Parabolas near the paths until the time `longest`; of a kink, one of alike lengths."""
     closer = np.where(paths[..., 6:] > 0, 1.25 / max(longest, 0.01), 1.0) * paths[..., 2:4]
+    straighter = paths[..., :2] + (min(0.75 * longest**2, 1) - 1) * paths[..., 4:6]
     rest = np.zeros((*paths.shape[:-1], 3))
-    return np.concatenate([paths[..., :2], closer, rest], axis=-1)
+    return np.concatenate([straighter, closer, rest], axis=-1)
 
 
 def trajectory_distance(a, b, u):

@@ -8,10 +8,13 @@ const MAX_TILE_RADIUS: i32 = 16;    // tiles over which a motion is followed, to
 const KINK_AS_PARABOLA: f32 = 1.25; // t^2 times this misses |t| by a quarter at most, for |t| up to 1
 const LEAST_TIME: f32 = 0.01;       // [frame intervals]
 
-/// Of a kink, which the frame itself alone may have, the parabola that is near it while the frame is exposed.
-fn as_vec4(trajectory: Trajectory5) -> vec4f {
+/// The parabola that is near a trajectory until the time `u`, before and after; of a kink, which the frame itself alone may
+/// have, while that is exposed. In place of t^3, the line that misses it least (Chebyshev) stands in a frame exposed about
+/// its instant, and t elsewhere, which is right at the instants of the frames before and after.
+fn as_vec4(trajectory: Trajectory5, u: f32) -> vec4f {
+    let as_line = min(0.75 * u * u, 1.0);
     let closer = select(1.0, KINK_AS_PARABOLA / max(max_abs_time(0.0), LEAST_TIME), trajectory.has_kink);
-    return vec4f(trajectory.velocity, closer * trajectory.half_acceleration);
+    return vec4f(trajectory.velocity + (as_line - 1.0) * trajectory.third, closer * trajectory.half_acceleration);
 }
 
 /// Displacement by the time `u` [px].

@@ -99,7 +99,7 @@ fn cluster_motions(@builtin(local_invocation_index) local: u32,
         var found = vec4f(0.0);
         for (var i = 0u; i < pixels; i++) {
             let px = min(corner + vec2u(i % TILE, i / TILE), end);
-            let trajectory = as_vec4(unpack_trajectory(front_at(px)));
+            let trajectory = as_vec4(unpack_trajectory(front_at(px)), u);
             let distance2 = distance2_to_clusters(trajectory, clusters, u);
             if distance2 > farthest && distance2 < MAX_MOTION * MAX_MOTION {
                 farthest = distance2;
@@ -122,7 +122,7 @@ fn cluster_motions(@builtin(local_invocation_index) local: u32,
         let surface = front_at(min(corner + vec2u(i % TILE, i / TILE), end));
         let z = abs(unpack_depth(surface));
         if unpack_depth(surface) < 0.0 { has_edge = 1.0; }
-        let is_nearest = nearest_cluster(as_vec4(unpack_trajectory(surface)), motions, u);
+        let is_nearest = nearest_cluster(as_vec4(unpack_trajectory(surface), u), motions, u);
         min_depth = min(min_depth, select(vec4f(INFINITE), vec4f(z), is_nearest));
     }
     for (var k = 0u; k < MOTIONS; k++) { textureStore(tile_motions_out, id, k, motions[k]); }
