@@ -6,6 +6,7 @@ import pytest
 import make_frames as make
 from wgmb import Blur, Frame, Shutter
 from wgmb.coding import CodedPicture, Coding
+from wgmb.color import linear
 from wgmb.exposer import Exposer
 from wgmb.flow import Flow
 from wgmb.glance import Glance, is_double
@@ -255,6 +256,19 @@ def test_unrelated_pictures_differ_and_moving_ones_do_not():
     moved = make.texture((x - 60) / 20, (y + 20) / 20, 0.0) ** 2
     assert pictures_differ(a, b) and not pictures_differ(a, moved) and not pictures_differ(a, a)
     assert pictures_differ(a, np.zeros_like(a)) and pictures_differ(a, a[:100])
+
+
+def test_a_fade_is_no_cut_and_a_flash_is_one():
+    """Display values of the second picture, which has moved on, fade to black and to white."""
+    a, other = np.random.default_rng(0).uniform(0.2, 0.7, (2, 9, 16, 3)).repeat(30, 1).repeat(30, 2)
+    moved = np.roll(a, (10, 15), (0, 1))
+    for share in (0.8, 0.9, 0.95):
+        for light in (0, 1):
+            faded = share * moved + (1 - share) * light
+            assert not pictures_differ(linear(a), linear(faded))
+            assert not pictures_differ(linear(faded), linear(a))
+        assert pictures_differ(linear(a), linear(share * other))
+    assert pictures_differ(linear(a), linear(0.6 * moved + 0.4))
 
 
 def test_a_copy_differs_by_the_noise_of_a_codec_and_not_by_motion():
