@@ -17,6 +17,7 @@ from .io.frame_numbers import frame_numbers
 from .video_settings import VideoSettings
 
 _SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
+_HELD = Fraction(1, 2)  # of a picture's interval beyond it: less is rounding
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,9 @@ class Moment:
 class Moments(Sequence[Moment]):
     """The output frames of a video: at `fps`, or at the times of its own pictures where it is None.
 
-    From the first picture that `clock` lets through to the end of the last one. InputError if it
-    lets none through.
+    From the first picture that `clock` lets through to the end of the last one. A last picture that
+    is held is shown once more where its own interval ends, so that no time is lost. InputError if
+    `clock` lets none through.
     """
 
     def __init__(self, footage: Footage, clock: Clock, fps: Fraction | None):
@@ -41,14 +43,19 @@ class Moments(Sequence[Moment]):
         last = len(times) if clock.end is None else _count_before(times, clock.end)
         if first >= last:
             raise InputError(f"{footage.path}: has no pictures in this range")
-        self._clock, self._own = clock, None if fps is not None else times[first:last]
+        self._clock = clock
+        self._own: list[Fraction] | None = None
         self._begin = clock.out(times[first])
         self._step = 1 / (fps or footage.rate * clock.speed)
-        self._count = last - first
+        end = footage.until if clock.end is None else min(footage.until, clock.end)
         if fps is not None:
-            end = times[-1] + 1 / footage.rate
-            end = clock.out(min(end, clock.end) if clock.end is not None else end)
-            self._count = max(1, math.ceil((end - self._begin) * fps - _SPARE))
+            self._count = max(1, math.ceil((clock.out(end) - self._begin) * fps - _SPARE))
+            return
+        self._own, self._count = list(times[first:last]), last - first
+        again = footage.until - 1 / footage.rate
+        if times[-1] + _HELD / footage.rate < again < end:
+            self._own.append(again)
+            self._count += 1
 
     def __len__(self) -> int:
         return self._count

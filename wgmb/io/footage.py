@@ -219,7 +219,12 @@ class Footage:
     @property
     def duration(self) -> Fraction:
         """From the first picture to the end of the last one [s]."""
-        return self.times[-1] - self.times[0] + 1 / self.rate
+        return self.until - self.times[0]
+
+    @property
+    def until(self) -> Fraction:
+        """The end of the last picture [s]."""
+        return self._timeline.until
 
     @property
     def size(self) -> tuple[int, int]:

@@ -37,6 +37,7 @@ _STATED = 1e-4  # the same of a rate that the file states
 _UNEVEN = 0.02  # of a step: more is a variable rate
 _JITTER = 0.25  # of a step: less is a rate all the same
 _SELDOM = 0.05  # of the steps: if more are uneven, the rate varies
+_HOLDS = ("gif", "apng")  # elsewhere the last packet's duration is often that of any other rate
 _FINEST = 1_001_000  # denominator of a rate
 
 
@@ -85,6 +86,8 @@ class Timeline:
     """Its packets cannot be decoded without a key."""
     stated: Fraction | None = None
     """The known rate that the file states."""
+    lasts: Fraction = Fraction(0)
+    """Duration of the last picture [s] in formats that state it for each; else 0."""
     counted: Timeline | None = None
     """The timeline for decoded pictures that do not come in the order of their times; the times are
     then those of decoding, and pictures are counted. None if that is impossible."""
@@ -131,6 +134,11 @@ class Timeline:
     def is_variable(self) -> bool:
         """Return True if steps differ by more than the clock's rounding."""
         return bool(self._uneven().any())
+
+    @property
+    def until(self) -> Fraction:
+        """The end of the last picture [s]."""
+        return self.times[-1] + max(self.lasts, 1 / self.rate)
 
     def _uneven(self, tolerance: float = _UNEVEN) -> np.ndarray:
         return np.abs(self.steps - self._usual) > max(1.0, tolerance * self._usual)
@@ -209,6 +217,7 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
         lacks=_lacking(container, stream, timeline, found.read),
         is_encrypted=found.is_encrypted,
         stated=_known(stream.average_rate),
+        lasts=found.lasts * base if container.format.name in _HOLDS else Fraction(0),
     )
     if in_order:
         return timeline
@@ -241,6 +250,7 @@ class _Packets:
 
     def __init__(self, codec: str):
         self.shown, self.decoded, self.keys = array("q"), array("q"), array("q")
+        self.lasts = 0  # ticks for which the last one is shown
         self.count = self.read = 0  # of pictures that are shown, of packets
         self.ascends = True  # the time at which each is shown
         self.is_encrypted = False
@@ -257,6 +267,7 @@ class _Packets:
         if packet.pts is not None:
             self.ascends = self.ascends and (not self.shown or packet.pts >= self.shown[-1])
             self.shown.append(packet.pts)
+            self.lasts = packet.duration or 0
             if packet.is_keyframe:
                 self.keys.append(packet.pts)
         if packet.dts is not None:
