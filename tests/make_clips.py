@@ -42,6 +42,14 @@ def frame(data: Sequence[np.ndarray], pixels: str) -> av.VideoFrame:
     return made
 
 
+def grey(size: tuple[int, int], pixels: str = "yuv420p") -> av.VideoFrame:
+    """One frame of mid grey."""
+    made = av.VideoFrame(*size, pixels)
+    for plane in made.planes:
+        np.frombuffer(plane, np.uint8)[:] = 128
+    return made
+
+
 def write(
     path: Path,
     frames: Iterable[av.VideoFrame] | None = None,

@@ -1,36 +1,19 @@
-"""Videos are read as they are: every sample, every time, what colours mean, which way is up."""
+"""Videos are read as they are: every sample, what colours mean, which way is up."""
 
-import struct
 from fractions import Fraction
 
 import av
 import numpy as np
 import pytest
-from av.sidedata.sidedata import Type
 from av.video.reformatter import VideoReformatter
-from PIL import Image
 
 import make_clips as clips
-from wgmb import InputError
 from wgmb.cli.video_lines import describe_video
 from wgmb.coding import Coding
-from wgmb.io.container import picture_stream
-from wgmb.io.decoding import decoded
 from wgmb.io.footage import Footage
 from wgmb.io.pixels import frame_of, layout, pixel_format, planes_of
-from wgmb.io.timeline import Timeline, Times
 
 pytestmark = pytest.mark.fast
-
-
-def shown(footage: Footage, *which) -> list[int]:
-    """The numbers of the pictures, told by their levels, which repeat after 6."""
-    found = []
-    for number, picture in footage.pictures(*which):
-        level = float(np.median(picture.planes[0])) - 5  # in the middle of the ramp
-        assert abs(level - clips.level(number)) < 12
-        found.append(number)
-    return found
 
 
 # ---- samples --------------------------------------------------------------------------------
@@ -152,21 +135,13 @@ def test_planes_become_a_frame_and_come_back(coding):
 # ---- what colours mean ----------------------------------------------------------------------
 
 
-def plain(size, pixels="yuv420p"):
-    """One frame of mid grey."""
-    made = av.VideoFrame(*size, pixels)
-    for plane in made.planes:
-        np.frombuffer(plane, np.uint8)[:] = 128
-    return made
-
-
 @pytest.mark.parametrize(
     ("size", "want"),
     [((1280, 32), (1, 1, 1)), ((64, 720), (1, 1, 1)), ((720, 480), (6, 1, 6)),
      ((720, 576), (6, 1, 5))],
 )  # fmt: skip
 def test_untagged_colours_go_by_the_size(tmp_path, size, want):
-    footage = Footage(clips.write(tmp_path / "c.mp4", [plain(size)]))
+    footage = Footage(clips.write(tmp_path / "c.mp4", [clips.grey(size)]))
     coding = footage.coding
     assert (coding.matrix, coding.transfer, coding.primaries) == want
     name = "BT.709" if want[0] == 1 else "BT.601"
@@ -209,178 +184,6 @@ def test_the_display_that_an_hdr10_video_was_graded_on_is_read(tmp_path):
 def test_a_codec_has_its_own_name_not_that_of_a_decoder(tmp_path):
     path = clips.write(tmp_path / "c.mp4", codec="libsvtav1", options={"svtav1-params": "lp=1"})
     assert Footage(path).codec == "av1"
-
-
-# ---- times ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", ["mp4", "mkv", "mov", "avi", "ts"])
-@pytest.mark.parametrize("late", [0, 0.523])
-def test_times_are_those_in_the_file(tmp_path, kind, late):
-    late = 0 if kind == "avi" else late  # which has no times
-    tick = Fraction(1, clips.RATE) if kind == "avi" else clips.TICK
-    path = clips.write(tmp_path / f"c.{kind}", tone=0.5, late=late, tick=tick)
-    footage = Footage(path)
-    with av.open(str(path)) as container:
-        first = next(container.decode(audio=0))
-        sound = first.pts * first.time_base
-    assert len(footage) == 12
-    assert footage.rate == 24
-    assert not footage.is_variable
-    steady = [float(t - footage.times[0]) for t in footage.times]
-    assert steady == pytest.approx([n / 24 for n in range(12)], abs=0.0011)
-    if kind != "avi":
-        assert float(footage.times[0] - sound) == pytest.approx(
-            late + (1024 / 48000 if kind == "ts" else 0), abs=0.0015
-        )
-    assert shown(footage) == list(range(12))
-
-
-@pytest.mark.parametrize("kind", ["mp4", "mkv"])
-def test_a_variable_rate_is_seen_in_the_times_alone(tmp_path, kind):
-    times = [Fraction(n, 60) for n in (0, 1, 3, 4, 7, 8, 9, 10, 13, 14, 15, 16)]
-    footage = Footage(clips.write(tmp_path / f"c.{kind}", times=times))
-    assert footage.is_variable
-    assert footage.rate == 60
-    assert [float(t) for t in footage.times] == pytest.approx([float(t) for t in times], abs=6e-4)
-    assert footage.steps == pytest.approx((1 / 60, 3 / 60), abs=0.001)
-    assert shown(footage) == list(range(12))
-
-
-@pytest.mark.parametrize(
-    ("rate", "want"),
-    [("24000/1001", "24000/1001"), ("29.97", "30000/1001"), ("144", "144"), ("240", "240"),
-     ("37", "37")],
-)  # fmt: skip
-def test_a_rate_that_is_rounded_to_milliseconds_is_known_again(tmp_path, rate, want):
-    times = [n / Fraction(rate) for n in range(40)]
-    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(40)]
-    footage = Footage(clips.write(tmp_path / "c.mkv", frames, times))
-    assert float(footage.rate) == pytest.approx(float(Fraction(want)), rel=2e-4)
-    assert want == "37" or footage.rate == Fraction(want)
-    assert not footage.is_variable
-
-
-@pytest.mark.parametrize("rate", ["30", "30000/1001", "60000/1001", "120000/1001"])
-@pytest.mark.parametrize("count", [3, 8, 44])
-def test_a_few_times_of_milliseconds_have_the_rate_that_the_file_states(tmp_path, rate, count):
-    """Rounded, those of 29.97 and 30 are the same for long."""
-    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(count)]
-    path = clips.write(tmp_path / "c.mkv", frames, rate=Fraction(rate))
-    with av.open(str(path)) as container:
-        assert container.streams.video[0].time_base == Fraction(1, 1000)
-    footage = Footage(path)
-    assert footage.rate == Fraction(rate) and not footage.is_variable
-
-
-def test_a_rate_that_the_times_do_not_keep_is_not_believed(tmp_path):
-    """Matroska states one whatever the times are."""
-    times = [Fraction(n, 24) for n in range(20)]
-    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(20)]
-    path = clips.write(tmp_path / "c.mkv", frames, times, rate=Fraction(60))
-    with av.open(str(path)) as container:
-        assert container.streams.video[0].average_rate == 60
-    assert Footage(path).rate == 24
-
-
-def test_steps_of_two_lengths_alone_have_a_rate():
-    """RealVideo 2: the middle of the lengths is near to neither."""
-    ticks = np.array([1, 82, 83, 164, 165], np.int64)
-    timeline = Timeline(
-        Times(ticks, Fraction(1, 1000)), ticks[:1], False, False, Fraction(1), ""
-    )  # fmt: skip
-    assert timeline.rate == pytest.approx(4 / 0.164, rel=0.001)
-    assert timeline.is_variable
-
-
-@pytest.mark.parametrize(
-    ("suffix", "keys"), [(".mkv", 0), (".mp4", 1)], ids=["VC-1 and RealVideo", "CAVS"]
-)
-def test_pictures_whose_times_are_those_of_decoding_are_counted(tmp_path, suffix, keys):
-    """B-frames come before, with later times. `keys`: by how much those of key frames are later."""
-    options = {"bf": "2", "b_strategy": "0", "qp": "8", "g": "12"}
-    plain = clips.write(tmp_path / "in.mp4", options=options)
-    path = tmp_path / f"c{suffix}"
-    with av.open(str(plain)) as source, av.open(str(path), "w") as target:
-        stream = target.add_stream_from_template(source.streams.video[0], opaque=True)
-        for n, packet in enumerate(p for p in source.demux() if p.size):
-            packet.stream, packet.time_base = stream, Fraction(1, 24)
-            packet.pts = packet.dts = n
-            packet.pts += keys if packet.is_keyframe else 0
-            target.mux_one(packet)
-    with av.open(str(path)) as container:
-        raw = [frame.pts for frame in container.decode(video=0)]
-    assert raw != sorted(raw)
-    footage, wanted = Footage(path), Footage(plain)
-    assert shown(footage) == shown(wanted)
-    assert footage.loss() == ""
-    assert footage.rate == 24
-
-
-@pytest.mark.parametrize(
-    ("profile", "full_range", "want"),
-    [(0, 1, "its colours come out wrong"), (1, 0, "those of its base layer"),
-     (0, 0, "those of its base layer")],
-)  # fmt: skip
-def test_dolby_vision_without_a_base_layer_is_said(
-    tmp_path, monkeypatch, profile, full_range, want
-):
-    """The header as FFmpeg has it: of three offsets first, then two kinds, the profile, ..."""
-    header = struct.pack("=BxHBBBBBBB", 2, 18, profile, 0, 0, 0, 23, 1, full_range)
-    data = struct.pack("=3Q", 48, 0, 0).ljust(48, b"\0") + header
-    monkeypatch.setattr("wgmb.io.footage._side_data", lambda frame: {Type.DOVI_METADATA: data})
-    assert any(want in note for note in Footage(clips.write(tmp_path / "c.mp4")).notes)
-
-
-def test_packets_without_data_do_not_end_a_stream():
-    """PMP has them for pictures that repeat the one before."""
-
-    class Packet:
-        def __init__(self, size):
-            self.size = size
-
-    class Stream:
-        def decode(self, packet):
-            return [packet.size] if packet is not None else ["the end"]
-
-    class Container:
-        def demux(self, stream):
-            return iter([Packet(3), Packet(0), Packet(5), Packet(0)])
-
-    assert list(decoded(Container(), Stream())) == [3, 5, "the end"]
-
-
-def test_what_an_edit_list_leaves_out_is_left_out(tmp_path):
-    """Three frames lie before the beginning that the file states."""
-    times = [Fraction(n - 3, 24) for n in range(12)]
-    path = clips.write(tmp_path / "c.mp4", times=times, options={"bf": "0", "qp": "0", "g": "30"},
-                       muxing={"use_editlist": "1", "avoid_negative_ts": "disabled"})  # fmt: skip
-    with av.open(str(path)) as container:
-        assert container.streams.video[0].frames == 12
-    footage = Footage(path)
-    assert len(footage) == 9
-    assert footage.times[0] == 0
-    levels = [float(np.median(p.planes[0])) for _, p in footage.pictures()]
-    assert [round(level - 5) for level in levels] == pytest.approx(
-        [clips.level(n) for n in range(3, 12)], abs=8
-    )
-
-
-@pytest.mark.parametrize("kind", ["mp4", "mkv", "ts"])
-@pytest.mark.parametrize("g", ["4", "250"])
-def test_pictures_from_the_middle_are_those_of_a_whole_pass(tmp_path, kind, g):
-    """With B-frames and open groups, whose first pictures build on the group before."""
-    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(30)]
-    options = {"g": g, "bf": "3", "x264-params": "open-gop=1:keyint-min=1:scenecut=0", "qp": "8"}
-    footage = Footage(clips.write(tmp_path / f"c.{kind}", frames, options=options))
-    whole = dict(footage)
-    for first in (0, 3, 4, 11, 17, 29):
-        part = dict(footage.pictures(first, first + 2))
-        assert list(part) == [n for n in range(first, first + 3) if n < 30]
-        for number, picture in part.items():
-            for a, b in zip(picture.planes, whole[number].planes, strict=True):
-                assert np.array_equal(a, b), number
-    assert footage.loss() == ""
 
 
 # ---- which way is up, fields ----------------------------------------------------------------
@@ -435,165 +238,3 @@ def test_an_interlaced_frame_is_two_pictures(tmp_path):
     for number, picture in later.items():
         row = picture.planes[0][10:38].astype(float).mean(0) - 50
         assert (row * np.arange(64)).sum() / row.sum() == pytest.approx(places[number], abs=0.01)
-
-
-# ---- files that are not whole ---------------------------------------------------------------
-
-
-def long(tmp_path, kind, count=48, **more):
-    """A clip that nothing can be left out of unseen: pictures of noise."""
-    rng = np.random.default_rng(3)
-    frames = []
-    for n in range(count):
-        luma, *chroma = clips.planes(n)
-        noise = rng.integers(0, 30, luma.shape, np.uint8)
-        frames.append(clips.frame([luma + noise, *chroma], "yuv420p"))
-    options = {"crf": "20", "g": "12"}
-    return clips.write(tmp_path / f"c.{kind}", frames, options=options, tone=2, **more)
-
-
-def test_an_mp4_without_its_end_says_what_is_missing(tmp_path):
-    path = long(tmp_path, "mp4")
-    path.write_bytes(path.read_bytes()[:-3000])
-    with pytest.raises(InputError, match=r"c\.mp4: is cut off: its index \(moov\)") as error:
-        Footage(path)
-    assert str(error.value).count("\n") == 0
-
-
-@pytest.mark.parametrize(
-    ("kind", "muxing"), [("mkv", {}), ("mp4", {"movflags": "faststart"}), ("avi", {})]
-)
-def test_a_file_that_was_cut_off_says_where(tmp_path, kind, muxing):
-    tick = Fraction(1, 24)
-    path = long(tmp_path, kind, muxing=muxing, tick=tick)
-    whole = path.read_bytes()
-    assert not any("cut off" in note for note in Footage(path).notes)
-    path.write_bytes(whole[: len(whole) // 2])
-    footage = Footage(path)
-    got = [n for n, _ in footage]
-    assert 10 < len(got) < 40
-    (note,) = [note for note in footage.notes if "is cut off: it ends at" in note]
-    assert note.endswith(("of 2.00 s", "of 2.02 s", "of 2.05 s"))
-
-
-@pytest.mark.parametrize("kind", ["mp4", "mkv"])
-def test_damaged_bytes_are_counted_in_pictures(tmp_path, kind):
-    path = long(tmp_path, kind)
-    data = bytearray(path.read_bytes())
-    at = len(data) // 3
-    data[at : at + 400] = np.random.default_rng(4).bytes(400)
-    path.write_bytes(data)
-    footage = Footage(path)
-    got = [n for n, _ in footage]
-    assert len(got) + len(footage.missing) == len(footage)
-    said = " ".join((footage.loss(), *footage.notes))
-    assert any(word in said for word in ("could not be decoded", "are damaged", "pause once"))
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [(b"", "is empty"), (b"hello " * 100, "is not a video"), (None, "no such file")],
-)
-def test_what_is_no_video_is_one_line(tmp_path, content, said):
-    path = tmp_path / "c.mp4"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(InputError, match=rf"c\.mp4: {said}") as error:
-        Footage(path)
-    assert "\n" not in str(error.value)
-
-
-def test_sound_alone_has_no_pictures(tmp_path):
-    path = tmp_path / "c.m4a"
-    with av.open(str(path), "w", format="mp4") as out:
-        sound = out.add_stream("aac", rate=48000)
-        sound.layout = "mono"
-        for block in clips.samples(0.2):
-            out.mux(sound.encode(block))
-        out.mux(sound.encode(None))
-    with pytest.raises(InputError, match="no pictures that move; it holds audio"):
-        Footage(path)
-
-
-def test_absurd_sizes_are_refused(tmp_path):
-    path = clips.write(tmp_path / "c.mp4", [plain((1280, 720))])
-    with pytest.raises(InputError, match="max_mb"):
-        Footage(path, max_mb=2)
-
-
-def test_names_that_look_like_addresses_are_files(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "http:").mkdir()
-    path = clips.write(tmp_path / "x.mp4")
-    path.rename(tmp_path / "http:" / "a%02d.mp4")
-    assert len(Footage("http:/a%02d.mp4")) == 12
-
-
-def test_a_playlist_leads_nowhere(tmp_path):
-    (tmp_path / "c.m3u8").write_text("#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n"
-                                     "http://127.0.0.1:9/a.ts\n#EXT-X-ENDLIST\n")  # fmt: skip
-    with pytest.raises(InputError, match=r"c\.m3u8: "):
-        Footage(tmp_path / "c.m3u8")
-
-
-def test_pictures_of_another_size_are_scaled_to_that_of_the_first(tmp_path):
-    """Recordings of calls change their size; a raw stream is joined of two."""
-    parts = []
-    for size in ((64, 48), (128, 96)):
-        frames = [clips.frame(clips.planes(n, size), "yuv420p") for n in range(4)]
-        parts.append(clips.write(tmp_path / f"{size[0]}.h264", frames, kind="h264").read_bytes())
-    (tmp_path / "both.h264").write_bytes(b"".join(parts))
-    footage = Footage(tmp_path / "both.h264")
-    assert not footage.scaling()
-    pictures = dict(footage)
-    assert footage.scaled == {4, 5, 6, 7} and len(pictures) == 8 and not footage.loss()
-    assert "4 pictures of another size were scaled to 64 x 48, from 0." in footage.scaling()
-    for n, picture in pictures.items():
-        assert picture.size == (64, 48)
-        luma, want = picture.planes[0].astype(int), clips.planes(n % 4)[0]
-        assert np.abs(luma - want).max() <= 2
-
-
-def test_a_single_picture_has_the_rate_that_its_file_states(tmp_path):
-    one = [clips.frame(clips.planes(0), "yuv420p")]
-    assert Footage(clips.write(tmp_path / "a.mp4", one, rate=Fraction(50))).rate == 50
-
-
-def test_a_stream_of_alpha_is_not_taken_for_the_pictures(tmp_path):
-    """As in animated AVIF, where it may come with more bits than the pictures."""
-    path = tmp_path / "a.mkv"
-    with av.open(str(path), "w") as out:
-        kinds = ("yuv420p", "gray")
-        streams = [out.add_stream("ffv1", rate=24) for _ in kinds]
-        for stream, pixels in zip(streams, kinds, strict=True):
-            stream.width, stream.height, stream.pix_fmt = clips.WIDTH, clips.HEIGHT, pixels
-        for n in range(3):
-            planes = clips.planes(n)
-            for stream, pixels in zip(streams, kinds, strict=True):
-                one = clips.frame(planes if pixels == "yuv420p" else planes[:1], pixels)
-                one.pts, one.time_base = n, Fraction(1, 24)
-                out.mux(stream.encode(one))
-        for stream in streams:
-            out.mux(stream.encode(None))
-    with av.open(str(path)) as container:
-
-        class Streams:
-            """Those of the container; FFmpeg thinks the grey one best."""
-
-            video = container.streams.video
-
-            def best(self, kind):
-                return self.video[1]
-
-        class Container:
-            streams = Streams()
-
-        assert picture_stream(Container(), path).index == 0  # pyright: ignore
-
-
-def test_animated_webp_is_refused_by_its_name(tmp_path):
-    frames = [Image.new("RGB", (32, 20), (40 * n, 0, 0)) for n in range(4)]
-    path = tmp_path / "a.webp"
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=40)
-    with pytest.raises(InputError, match=r"a\.webp: animated WebP is not read; GIF, APNG and AVIF"):
-        Footage(path)
