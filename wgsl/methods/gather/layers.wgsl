@@ -11,7 +11,7 @@
 
 @group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
 @group(1) @binding(3) var weight: texture_2d<f32>;
-@group(1) @binding(4) var edge_flags: texture_2d<u32>;  // what edges.wgsl wrote: depth and flags
+@group(1) @binding(4) var edge_flags: texture_2d<u32>;  // stored as r32uint, by edges.wgsl: depth and flags
 @group(1) @binding(6) var colors: Color;                // FRONT, premultiplied by coverage too, and BACK
 @group(1) @binding(7) var surfaces: Packed;             // FRONT and BACK, see pack_surface()
 @group(1) @binding(8) var mattes: Mattes;               // see pack_matte()
@@ -42,7 +42,8 @@ fn color_at(px: vec2i) -> vec4f {
 }
 
 fn flags_at(px: vec2i) -> u32 {
-    return textureLoad(edge_flags, clamped(px), 0).x;
+    let at = clamped(px);
+    return textureLoad(edge_flags, at, 0).x;
 }
 
 /// Those of a pixel and of the ones to its left and right together.
