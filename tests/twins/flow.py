@@ -216,25 +216,27 @@ def polished(matcher, states, x, y):
     return [own, own + np.concatenate([near, far - matcher.factor * near, np.zeros(4)])]
 
 
-def full_search(matcher, reach):
-    """Flow and bend of every second pixel each way, the cheapest whole displacements, and (..., 4)
-    those to the near frame and to the far one, each by itself.
-    """
-    offsets = np.array([(i, j) for j in (-3, -1, 1, 3) for i in (-3, -1, 1, 3)])
+def whole_cost(matcher, other, x, y, u, v):
+    """Mean difference of the full search's patch from another frame at a whole displacement."""
     height, width = matcher.height, matcher.width
-
-    def side(other, x, y, u, v):
-        if not (0 <= x + u < width and 0 <= y + v < height):
-            return 2.0
-        total = weights = 0.0
-        for i, j in offsets:
+    if not (0 <= x + u < width and 0 <= y + v < height):
+        return 2.0
+    total = weights = 0.0
+    for j in (-3, -1, 1, 3):
+        for i in (-3, -1, 1, 3):
             if 0 <= x + i < width and 0 <= y + j < height:
                 own = matcher.here[y + j, x + i]
                 weight = likeness(own, matcher.here[y, x])
                 d = matcher.difference(own, at(other, x + u + i, y + v + j))
                 total, weights = total + weight * min(d, 0.6), weights + weight
-        return total / weights
+    return total / weights
 
+
+def full_search(matcher, reach):
+    """Flow and bend of every second pixel each way, the cheapest whole displacements, and (..., 4)
+    those to the near frame and to the far one, each by itself.
+    """
+    height, width = matcher.height, matcher.width
     ways = [(u, v) for u in range(-reach, reach + 1) for v in range(-reach, reach + 1)]
     ways.sort(key=lambda way: np.abs(way).sum())
     length = np.array([2.5e-3 * np.abs(way).sum() for way in ways])
@@ -242,8 +244,8 @@ def full_search(matcher, reach):
     sides = np.zeros_like(out)
     for y in range(0, height, 2):
         for x in range(0, width, 2):
-            n = np.array([side(matcher.near, x, y, u, v) for u, v in ways])
-            f = np.array([side(matcher.far, x, y, -u, -v) for u, v in ways])
+            n = np.array([whole_cost(matcher, matcher.near, x, y, u, v) for u, v in ways])
+            f = np.array([whole_cost(matcher, matcher.far, x, y, -u, -v) for u, v in ways])
             both = np.minimum((n + f) / 2, np.minimum(n, f) + 0.03) + length
             best = [
                 np.array(ways[np.argmin(cost.round(7))]) for cost in (both, n + length, f + length)

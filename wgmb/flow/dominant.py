@@ -23,10 +23,10 @@ def follow_most(
     states: wgpu.GPUTexture,
     centres: np.ndarray,
     ways: np.ndarray,
-) -> tuple[wgpu.GPUTexture, np.ndarray]:
+) -> tuple[wgpu.GPUTexture, tuple[np.ndarray, np.ndarray]]:
     """States; where the motion of most bends and explains a pixel better, that.
 
-    Also its homography to the near frame.
+    Also its homographies to the near frame and to the far one.
 
     The given states are given back as they are, or taken back.
 
@@ -45,11 +45,11 @@ def follow_most(
             most = _matrices(size, centres, ways, PARTS, has_far)
         passes.give(thin)
     if not _bends(views, most, centres, ways):
-        return states, most[0]
+        return states, most
     output = passes.take(size, STATES)
     _run(passes, "follow", size, most, output=output, **bound)
     passes.give(states)
-    return output, most[0]
+    return output, most
 
 
 def spaced(few: tuple[int, int], many: tuple[int, int]) -> np.ndarray:

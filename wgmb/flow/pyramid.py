@@ -9,7 +9,8 @@ import wgpu
 
 from .passes import FEATURES, Passes
 
-COARSEST = 160  # px along the longer side of the coarsest level, about
+COARSEST = 160  # px along the longer side of the coarsest level that is swept, about
+COARSER = 2  # levels beyond it
 
 
 def level_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
@@ -17,6 +18,14 @@ def level_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
     halvings = max(0, round(np.log2(max(size) / COARSEST)))
     sizes = [size]
     for _ in range(halvings):
+        sizes.append((-(-sizes[-1][0] // 2), -(-sizes[-1][1] // 2)))
+    return sizes
+
+
+def all_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
+    """The same with the coarser levels that guide the search."""
+    sizes = level_sizes(size)
+    for _ in range(COARSER):
         sizes.append((-(-sizes[-1][0] // 2), -(-sizes[-1][1] // 2)))
     return sizes
 
@@ -43,7 +52,7 @@ def _levels(passes: Passes, picture, size) -> Iterator[wgpu.GPUTexture]:
         )
 
     coarser = picture
-    for level, here in enumerate(level_sizes(size)):
+    for level, here in enumerate(all_sizes(size)):
         texture = [
             passes.scratch(here, "rgba32float", f"{name} {level}")
             for name in ("linear", "display", "gradient", "spread")

@@ -22,12 +22,14 @@ import wgpu
 from ..errors import InputError
 from .carry import carry
 from .dominant import follow_most, settle
+from .guide import guide
 from .homography import enlarged
 from .lights import find_lights, follow_lights, move_lights
 from .match import matched
 from .mend import mend
 from .passes import STATES, Passes
-from .pyramid import features, level_sizes
+from .pyramid import all_sizes, features, level_sizes
+from .repeats import follow_guide
 from .result import Motion, result
 from .search import FullSearch
 from .sweeps import polish, sweep
@@ -67,7 +69,7 @@ LARGEST = 4  # px across a light on the coarsest level: what is larger, the sear
 KEPT = {
     "pictures": 4,
     "lights": 2,
-    "most": 1,
+    "led": 1,
     "searched": 1,
     "mended": 0,
     "motion": 2,
@@ -169,17 +171,42 @@ class Shot:
         count = self._effort.sweeps(level, len(self._sizes))
         if level == len(self._sizes) - 1:
             states, *some = self._full_search(size, bound)
-            states, most = follow_most(passes, size, bound, views, states, *some)
-            self._made["most", number, level] = most
-            states = sweep(passes, size, swept, states, [], level, count, most)
+            states, both = follow_most(passes, size, bound, views, states, *some)
+            states = sweep(passes, size, swept, states, [], level, count, both[0])
+            states, lead = self._led(views, level, states, both)
+            self._made["led", number, level] = both[0], lead
             return self._polished(states, size, bound) if level else states
         states = self._grown(self._once("mended", number, level + 1, self._mended), level)
         guesses = [self._carried(other, views, level) for other in views.beside] if count else []
         coarsest = len(self._sizes) - 1
-        most = enlarged(self._made["most", number, coarsest], 2.0 ** (coarsest - level))
-        states = sweep(passes, size, swept, states, guesses, level, count, most)
+        most, lead = self._made["led", number, coarsest]
+        most = enlarged(most, 2.0 ** (coarsest - level))
+        states = sweep(passes, size, swept, states, guesses, level, count, most, lead)
         passes.give(*guesses)
         return self._polished(states, size, bound) if level else states
+
+    def _led(
+        self,
+        views: Views,
+        level: int,
+        states: wgpu.GPUTexture,
+        most: tuple[np.ndarray, np.ndarray],
+    ) -> tuple[wgpu.GPUTexture, wgpu.GPUTexture]:
+        """States of the coarsest level, those of the guide where it leads; and the lead."""
+        sizes = all_sizes(self._sizes[0])[level:]
+
+        def guided(views: Views, most: tuple[np.ndarray, np.ndarray]) -> wgpu.GPUTexture:
+            return guide(self._passes, sizes, lambda k: self._matched(views, level + k), most)
+
+        ways = [guided(views, most)]
+        if len(views.beside) == 2:
+            for other, matrix in zip(views.beside, most, strict=True):
+                back = np.linalg.pinv(matrix)
+                ways.append(guided(Views(other, views.here, None, BESIDE), (back, back)))
+        bound = self._matched(views, level)
+        led = follow_guide(self._passes, sizes[0], bound, states, ways[0], ways[1:])
+        self._passes.give(*ways)
+        return led
 
     def _grown(self, states: wgpu.GPUTexture, level: int) -> wgpu.GPUTexture:
         output = self._passes.take(self._sizes[level], STATES)
@@ -262,7 +289,7 @@ class Shot:
             stage, other, level = key
             if abs(other - number) > KEPT[stage] + level:
                 made = self._made.pop(key)
-                textures = made if isinstance(made, list) else [made]
+                textures = made if isinstance(made, list | tuple) else [made]
                 if isinstance(made, Motion):
                     textures = [made.motion, made.depth]
                 self._passes.give(*(t for t in textures if isinstance(t, wgpu.GPUTexture)))

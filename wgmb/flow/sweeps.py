@@ -27,16 +27,19 @@ def sweep(
     level: int,
     count: int,
     most: np.ndarray,
+    lead: wgpu.GPUTexture | None = None,
 ) -> wgpu.GPUTexture:
     """New states after `count` sweeps; the given ones are taken back.
 
     `matched`: the bindings of match.wgsl; `carried`: the near frame's states, and the far one's;
-    `most`: the homography of most of the picture to the near frame, on this level.
+    `most`: the homography of most of the picture to the near frame, on this level; `lead`: what
+    repeats.py made.
     """
     after = passes.take(size, STATES)
     for number in range(PASSES * count):
         is_known = number not in (0, 2)  # the first of a colour finds out what its states cost
-        half_sweep(passes, size, matched, states, carried, level, number, after, most, is_known)
+        args = level, number, after, most, is_known, lead
+        half_sweep(passes, size, matched, states, carried, *args)
         states, after = after, states
     passes.give(after)
     return states
@@ -53,6 +56,7 @@ def half_sweep(
     output: wgpu.GPUTexture,
     most: np.ndarray,
     is_known: bool = False,
+    lead: wgpu.GPUTexture | None = None,
 ) -> None:
     """Pass `number` of the sweeps: one colour of the chessboard, propagated or refined.
 
@@ -60,7 +64,7 @@ def half_sweep(
     """
     entry = "refine" if number % 2 else "propagate"
     half = -(-size[0] // 2), size[1]
-    args = level, number, output, most, is_known
+    args = level, number, output, most, is_known, lead
     _run(passes, entry, size, half, matched, states, carried, *args)
 
 
@@ -72,11 +76,11 @@ def polish(
     output: wgpu.GPUTexture,
 ) -> None:
     """Steps of every pixel on the finest level that improve its match."""
-    _run(passes, "polish", size, size, matched, states, [], 0, 0, output, np.eye(3), False)
+    _run(passes, "polish", size, size, matched, states, [], 0, 0, output, np.eye(3), False, None)
 
 
 def _run(
-    passes, entry, size, grid, matched, states, carried, level, number, output, most, is_known
+    passes, entry, size, grid, matched, states, carried, level, number, output, most, is_known, lead
 ) -> None:
     assert 2 * wgsl.load("flow/sweep.wgsl").constant("REFINED") <= SEEDS
     uniform = passes.uniform(
@@ -91,6 +95,7 @@ def _run(
         carried=len(carried),
         is_known=is_known,
         most=columns(most),
+        lead_factor=0 if lead is None else round(max(size) / max(lead.size[:2])),
     )
     passes.run(
         "sweep.wgsl",
@@ -103,5 +108,6 @@ def _run(
         carried_far=carried[-1] if carried else states,
         costs=passes.costs.at_least(4 * size[0] * size[1]),
         output=output,
+        lead=states if lead is None else lead,
         **matched,
     )

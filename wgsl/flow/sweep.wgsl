@@ -16,6 +16,9 @@ struct Sweep {
     carried: u32,       // how many of the carried states there are
     is_known: u32,      // 1 if `costs` tells what the states of this colour cost
     most: mat4x4f,      // homography of most of the picture to the near frame: columns of 3, from pixels to pixels
+    lead_factor: f32,   // pixels of this level along one of `lead`; 0 if there is none
+    unused: u32,
+    unused_too: vec2u,
 }
 
 @group(1) @binding(5) var<uniform> sweep: Sweep;
@@ -24,6 +27,7 @@ struct Sweep {
 @group(1) @binding(8) var carried_far: texture_2d_array<f32>;   // the same of the far frame
 @group(1) @binding(9) var<storage, read_write> costs: array<f32>;   // of every pixel's state: its match
 @group(1) @binding(10) var output: StatesOut;
+@group(1) @binding(11) var lead: texture_2d_array<f32>;         // the guide, and where it leads: see repeats.wgsl
 
 const SMOOTHNESS: f32 = 0.08;       // cost of 1 px of difference from the neighbours
 const BEND_SHARE: f32 = 0.5;        // of a difference of bends, against one of flows
@@ -42,6 +46,9 @@ const BEND_TRIES: u32 = 2u;         // random changes of the bend, with the flow
 const REFINED: u32 = 11u;           // two planes, the changes, no slope, no bend
 override ASIDE_PRICE: f32 = 0.4;    // of moving otherwise than most, per longer side of the picture, where a patch
 const PLAIN: f32 = 0.0009;          // has gradients: more than this, squared; its neighbours tell how a plain one moves
+const ASTRAY_PRICE: f32 = 0.2;      // of differing from the guide where it leads, per px of its level,
+const LEEWAY: f32 = 1.0;            // beyond this [px of its level],
+const MOST_ASTRAY: f32 = 2.0;       // for so much more at most [px of its level]
 const SAME: f32 = 0.001;            // states closer than this are not tried again [px]
 const UNKNOWN: f32 = 1000.0;        // energy of a state that is to be tried first: more than any
 
@@ -49,6 +56,8 @@ var<private> around: array<vec4f, NEIGHBOURS>;      // flow and bend of the neig
 var<private> around_weight: array<f32, NEIGHBOURS>; // all of them sum up to SMOOTHNESS
 var<private> most: vec2f;           // the flow of most of the picture here [px],
 var<private> aside_price: f32;      // and the price of differing from it by 1 px
+var<private> led: vec4f;            // what the guide says here [px]: to the near frame and the far one,
+var<private> astray_price: f32;     // and the price of differing from it by 1 px
 
 /// Each neighbour's state along its own slope, and its weight by likeness; and what most of the picture does.
 fn load_neighbours(px: vec2i) {
@@ -75,6 +84,20 @@ fn load_neighbours(px: vec2i) {
         square += patch1[k].w * dot(gradient, gradient);
     }
     aside_price = ASIDE_PRICE * square / (square + PLAIN) / f32(max(frame.size.x, frame.size.y));
+    astray_price = 0.0;
+    if sweep.lead_factor > 0.0 {
+        let source = px / i32(sweep.lead_factor);
+        led = sweep.lead_factor * textureLoad(lead, source, 0, 0);
+        astray_price = ASTRAY_PRICE * textureLoad(lead, source, 1, 0).x / sweep.lead_factor;
+    }
+}
+
+/// By how much a state differs from the guide [px]: the mean of both sides, of each what is beyond LEEWAY.
+fn astray(state: State) -> f32 {
+    let by = abs(led - vec4f(state.flow, way_to_far(state).flow));
+    let away = max(by.xz, by.yw) - sweep.lead_factor * LEEWAY;
+    let counted = clamp(away, vec2f(0.0), vec2f(sweep.lead_factor * MOST_ASTRAY));
+    return select(counted.x, 0.5 * (counted.x + counted.y), VIEWS == AROUND);
 }
 
 /// Cost of differing from the neighbours, and from most of the picture: where a thing repeats, or has no end along its
@@ -82,6 +105,7 @@ fn load_neighbours(px: vec2i) {
 fn smoothness(state: State) -> f32 {
     let aside = abs(state.flow - most);
     var sum = aside_price * (aside.x + aside.y);
+    if astray_price > 0.0 { sum += astray_price * astray(state); }
     for (var k = 0u; k < NEIGHBOURS; k++) {
         let d = abs(around[k] - vec4f(state.flow, state.bend));
         sum += around_weight[k] * min(d.x + d.y + BEND_SHARE * (d.z + d.w), sweep.most_apart);

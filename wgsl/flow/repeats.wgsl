@@ -1,0 +1,133 @@
+// Where the picture repeats, a wrong repeat may match better than the right one, because the light changes; and what
+// turns back is taken for hidden on one side, because the slope differs there. In both, the smooth motion of guide.wgsl
+// leads.
+//#include flow/search_patch.wgsl
+
+@group(1) @binding(5) var states: texture_2d_array<f32>;
+@group(1) @binding(6) var guide: texture_2d_array<f32>;         // states of this frame,
+@group(1) @binding(7) var near_back: texture_2d_array<f32>;     // of the near frame, whose flow leads to this one,
+@group(1) @binding(8) var far_back: texture_2d_array<f32>;      // and of the far one
+@group(1) @binding(9) var found: texture_2d<u32>;               // what `find` wrote
+@group(1) @binding(10) var found_out: texture_storage_2d<r32uint, write>;
+@group(1) @binding(11) var output: StatesOut;
+@group(1) @binding(12) var lead: StatesOut;     // where the guide leads to: near frame, far one; x of layer 1: 1 if it leads
+
+const APART: f32 = 2.0;         // along either axis [px]: a state that differs more from the guide is another motion
+const TURNS: f32 = 1.5;         // the same of one side, where the other agrees
+const ALIKE: f32 = 0.4;         // share of the difference half way up to which a patch is found again
+const MOST_TURN: f32 = 0.05;    // of the longer side: how far from constant velocity a side is led
+const MOST_MISSED: f32 = 3.0;   // along either axis: way there and back [px]
+const HIDDEN: f32 = 0.3;        // cost of a side above which a pixel seems hidden there,
+const LESS: f32 = 0.1;          // if the guide costs at least so much less
+const AROUND_SIDE: i32 = 17;    // every third pixel along a side is counted,
+const STRIDE: i32 = 3;
+const ENOUGH: f32 = 0.08;       // share of them that must be found for the guide to lead
+const IS_REPEAT: u32 = 1u;      // bits of what is found: leads to a repeat,
+const IS_HIDDEN: u32 = 0x1000u;     // seems hidden where the guide matches better,
+const MAY_TURN: u32 = 0x1000000u;   // is led by the guide if enough around are so
+
+/// Least difference of the patch from the own picture around a displacement.
+fn own_cost(px: vec2i, by: vec2f) -> f32 {
+    var least = OUTSIDE;
+    for (var k = 0; k < 9; k++) {
+        least = min(least, whole_cost(here, px + vec2i(round(by)) + vec2i(k % 3, k / 3) - 1, least));
+    }
+    return least;
+}
+
+/// True if a pixel's displacement differs from the guide's by a repeat of the picture, and matches better: its patch is
+/// found again after the difference, but not half way.
+fn is_repeat(px: vec2i, other: texture_2d_array<f32>, own: vec2f, guided: vec2f) -> bool {
+    let by = own - guided;
+    if own_cost(px, by) >= ALIKE * own_cost(px, 0.5 * by) { return false; }
+    let guided_cost = whole_cost(other, px + vec2i(round(guided)), OUTSIDE);
+    return whole_cost(other, px + vec2i(round(own)), guided_cost) < guided_cost;
+}
+
+/// Where a state leads: displacements to the near frame and the far one.
+fn ways_of(state: State) -> vec4f {
+    return vec4f(state.flow, way_to_far(state).flow);
+}
+
+/// Greatest difference of two states along either axis: to the near frame and to the far one [px].
+fn apart(own: vec4f, guided: vec4f) -> vec2f {
+    let by = abs(own - guided);
+    return vec2f(max(by.x, by.y), select(0.0, max(by.z, by.w), VIEWS == AROUND));
+}
+
+/// True if the guide's way to another frame is also that of the guide from there.
+fn comes_back(px: vec2i, way: vec2f, back: texture_2d_array<f32>) -> bool {
+    let at = px + vec2i(round(way));
+    if any(at < vec2i(0)) || any(at >= vec2i(frame.size)) { return false; }
+    let missed = abs(way + textureLoad(back, at, 0, 0).xy);
+    return max(missed.x, missed.y) <= MOST_MISSED;
+}
+
+/// True if a side seems hidden where the guide matches.
+fn is_hidden(px: vec2i, other: texture_2d_array<f32>, own: vec2f, guided: vec2f) -> bool {
+    let cost = whole_cost(other, px + vec2i(round(own)), OUTSIDE);
+    return cost > HIDDEN && cost < OUTSIDE && whole_cost(other, px + vec2i(round(guided)), cost) < cost - LESS;
+}
+
+@compute @workgroup_size(WG_X, WG_Y)
+fn find(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let px = vec2i(id.xy);
+    let own = ways_of(load_state(states, px));
+    let guided = ways_of(load_state(guide, px));
+    let by = apart(own, guided);
+    var result = 0u;
+    if max(by.x, by.y) > TURNS {
+        load_search_patch(px);
+        var has_repeat = false;
+        if max(by.x, by.y) > APART {
+            has_repeat = is_repeat(px, near, own.xy, guided.xy);
+            if VIEWS == AROUND { has_repeat = has_repeat || is_repeat(px, far, own.zw, guided.zw); }
+        }
+        if VIEWS == AROUND {
+            let is_one_sided = min(by.x, by.y) <= APART
+                && max(by.x, by.y) <= MOST_TURN * f32(max(frame.size.x, frame.size.y));
+            if is_one_sided && comes_back(px, guided.xy, near_back)
+                && comes_back(px, guided.zw, far_back) {
+                var seems_hidden = false;
+                if by.x > TURNS { seems_hidden = is_hidden(px, near, own.xy, guided.xy); }
+                if by.y > TURNS { seems_hidden = is_hidden(px, far, own.zw, guided.zw); }
+                result = MAY_TURN + select(0u, IS_HIDDEN, seems_hidden);
+            }
+        }
+        result += select(0u, IS_REPEAT, has_repeat);
+    }
+    textureStore(found_out, id.xy, vec4u(result));
+}
+
+/// True where the guide leads, because enough pixels around are found.
+fn is_led(px: vec2i) -> vec2<bool> {
+    var sum = 0u;
+    var all_around = 0u;
+    for (var k = 0; k < AROUND_SIDE * AROUND_SIDE; k++) {
+        let at = px + STRIDE * (vec2i(k % AROUND_SIDE, k / AROUND_SIDE) - AROUND_SIDE / 2);
+        if all(at >= vec2i(0)) && all(at < vec2i(frame.size)) {
+            sum += textureLoad(found, at, 0).r % MAY_TURN;
+            all_around++;
+        }
+    }
+    let enough = ENOUGH * f32(all_around);
+    let may_turn = textureLoad(found, px, 0).r >= MAY_TURN;
+    return vec2<bool>(f32(sum % IS_HIDDEN) > enough, may_turn && f32(sum / IS_HIDDEN) > enough);
+}
+
+/// Where the guide leads, it takes the place of states that differ from it.
+@compute @workgroup_size(WG_X, WG_Y)
+fn follow(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    let px = vec2i(id.xy);
+    var state = load_state(states, px);
+    let guided = load_state(guide, px);
+    let by = apart(ways_of(state), ways_of(guided));
+    let leads = is_led(px);
+    if (leads.x && max(by.x, by.y) > APART) || leads.y { state = guided; }
+    textureStore(output, id.xy, 0, vec4f(state.flow, state.bend));
+    textureStore(output, id.xy, 1, state.slope);
+    textureStore(lead, id.xy, 0, ways_of(guided));
+    textureStore(lead, id.xy, 1, vec4f(f32(any(leads)), 0.0, 0.0, 0.0));
+}
