@@ -19,7 +19,7 @@ from test_flow import (
 from twins import flow as twin_flow
 from twins import guide as twin
 from wgmb import Flow
-from wgmb.flow.guide import descended, median
+from wgmb.flow.guide import begun, descended, median
 from wgmb.flow.match import matched
 from wgmb.flow.passes import STATES
 from wgmb.flow.pyramid import features
@@ -38,7 +38,7 @@ def random_ways(size=(9, 13), seed=3):
 
 def test_the_guide_descends_from_the_motion_of_most():
     most = np.array([[1, 0, 3.3], [0, 1, -1.7], [0, 0, 1]]), np.diag([1.3, 1, 1])
-    got = read(descended(kit(), [SIZE], 0, compared(MIDDLE, 1), None, most))[..., :4]
+    got = read(begun(kit(), SIZE, compared(MIDDLE, 1), most))[..., :4]
 
     def starts(x, y):
         place = np.array([x + 0.5, y + 0.5, 1])
@@ -48,12 +48,11 @@ def test_the_guide_descends_from_the_motion_of_most():
     assert (got == want).all(axis=2).mean() > 0.97
 
 
-@pytest.mark.parametrize(("level", "reach"), [(0, 1), (1, 2)])
-def test_the_guide_descends_from_the_coarser_level(level, reach):
+@pytest.mark.parametrize("reach", [1, 2])
+def test_the_guide_descends_from_the_coarser_level(reach):
     coarser = random_ways((5, 7))
     bound, given = compared(MIDDLE, 1), states_texture(coarser)
-    most = np.eye(3), np.eye(3)
-    got = read(descended(kit(), [SIZE, SIZE], level, bound, given, most))[..., :4]
+    got = read(descended(kit(), SIZE, bound, given, reach))[..., :4]
     want = twin.descended(matcher(MIDDLE, 2), twin.from_coarser(coarser[..., :4]), reach)
     assert (got == want).all(axis=2).mean() > 0.97
 
@@ -83,35 +82,40 @@ def striped(views):
     return match, matched(kit(), views, on_gpu, 1)
 
 
-@pytest.mark.parametrize("views", [MIDDLE, FIRST])
+@pytest.mark.parametrize(("views", "is_finer"), [(MIDDLE, False), (MIDDLE, True), (FIRST, False)])
 @pytest.mark.parametrize("places", [slice(0, 20), slice(20, 64)])
-def test_the_guide_leads_where_states_lead_to_repeats_or_turn_back(views, places):
+def test_the_guide_leads_where_states_lead_to_repeats_or_turn_back(views, is_finer, places):
     """It does so in a part of the picture, of whose pixels a few are enough."""
     match, bound = striped(views)
     rng = np.random.default_rng(5)
     shape = WIDE[::-1]
     states, guide, near, far = np.zeros((4, *shape, 8))
-    guide[..., 0] = states[..., 0] = 1
-    guide[..., 1] = rng.choice([0, 1], shape)
+    states[..., 0] = 1
     states[:, places, 0] = rng.choice([1, 1, 1, 7, -5], shape)[:, places]
     states[:, places, 2] = rng.choice([0, 0, 2, 3], shape)[:, places]
+    guide[..., 0], guide[..., 1] = 1, rng.choice([0, 1], shape)
+    if views is MIDDLE:
+        guide[..., 2:4] = -guide[..., :2]
     near[..., 0] = rng.choice([-1, 1, 3], shape)
     far[..., 0] = rng.choice([1, -1], shape)
     backs = [near, far] if views is MIDDLE else []
-    marks = twin.found(match, states, guide, backs)
-    want, leads = twin.followed(match, states, guide, marks)
+    coarser = random_ways((4, 32)) if is_finer else None
+    if is_finer:
+        coarser[..., 4] = rng.choice([0, 1], (4, 32))
+    marks = twin.found(match, states, guide[..., :4], backs, seeks_repeats=not is_finer)
+    known = coarser[..., :5] if is_finer else None
+    want, leads = twin.followed(match, states, guide[..., :4], marks, known)
     textures = states_texture(states), states_texture(guide)
     back = [states_texture(way) for way in backs]
-    output, lead = follow_guide(kit(), WIDE, bound, *textures, back)
+    before = states_texture(coarser) if is_finer else None
+    output, lead = follow_guide(kit(), WIDE, bound, *textures, back, before)
     assert (np.abs(read(output) - want).max(axis=2) < 1e-4).mean() > 0.97
-    assert (read(lead)[..., 4] == leads).mean() > 0.97
-    ways = [[twin.ways_of(match, state) for state in row] for row in guide]
-    columns = slice(0, 4 if views is MIDDLE else 2)
-    assert np.abs(read(lead)[..., columns] - np.array(ways)[..., columns]).max() < 1e-5
-    assert 0.01 < marks[..., 0].mean() < 0.2
+    assert (np.abs(read(lead)[..., :5] - leads).max(axis=2) < 1e-5).mean() > 0.97
+    assert (0.01 < marks[..., 0].mean() < 0.2) != is_finer
     assert (0.01 < marks[..., 1].mean() < 0.2) == (views is MIDDLE)
-    assert 0.1 < leads.mean() < 0.9
-    assert 0.05 < (np.abs(want - states) > 1e-4).any(axis=2).mean() < 0.5
+    assert 0.1 < leads[..., 4].mean() < 0.9
+    least = 0.03 if is_finer else 0.05
+    assert least < (np.abs(want - states) > 1e-4).any(axis=2).mean() < 0.5
 
 
 @pytest.mark.parametrize("views", [MIDDLE, FIRST])
@@ -157,3 +161,23 @@ def test_checks_that_change_their_shade_are_not_confused(quality):
     motion, _ = Flow(quality=quality)(seen(-1), seen(0), seen(1))
     error = np.abs(motion - [*-way, *way]).max(axis=2)[20:-20, 50:-50]
     assert (error < 4).mean() > 0.95
+
+
+def test_cloth_that_turns_back_is_found_on_both_sides():
+    """Waves run through it: slopes and speeds differ so much that one side seems hidden."""
+    highest, length, turn = 8, 90, 1.0  # px, px, radians per frame
+    x, y = grid((180, 320))
+    wave = 2 * np.pi / length
+
+    def cloth(n):
+        at = x
+        for _ in range(60):
+            at = x - highest * np.sin(wave * at + turn * n)
+        return at
+
+    place = [highest * np.sin(wave * cloth(0) + turn * n) for n in (-1, 0, 1)]
+    true = np.stack([place[0] - place[1], 0 * x, place[2] - place[1], 0 * x], axis=2)
+    pictures = (texture(cloth(n), y).astype("f4") for n in (-1, 0, 1))
+    motion, _ = Flow()(*pictures)
+    error = np.abs(motion - true).max(axis=2)[20:-20, 30:-30]
+    assert (error < 1).mean() > 0.8

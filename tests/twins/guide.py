@@ -83,21 +83,21 @@ def is_hidden(matcher, x, y, other, own, guided):
     cost, guided_cost = (
         whole_cost(matcher, other, x, y, *np.round(way).astype(int)) for way in (own, guided)
     )
-    return 0.3 < cost < 2 and guided_cost < cost - 0.1
+    return 0.3 < cost < 2 and guided_cost < cost - 0.15
 
 
-def found(matcher, states, guide, backs):
+def found(matcher, states, guide, backs, seeks_repeats=True):
     """(height, width, 3): differs by a repeat, seems hidden on one side, may turn back there.
 
-    `backs`: the guides of the near frame and of the far one, to this one.
+    `guide`: displacements; `backs`: those of the near frame and of the far one, to this one.
     """
     out = np.zeros((*states.shape[:2], 3), bool)
     frames = (matcher.near, matcher.far)[: 2 if matcher.factor < 0 else 1]
     for y, x in np.ndindex(states.shape[:2]):
-        own, guided = (ways_of(matcher, given[y, x]).reshape(2, 2) for given in (states, guide))
+        own, guided = ways_of(matcher, states[y, x]).reshape(2, 2), guide[y, x].reshape(2, 2)
         by = np.abs(own - guided).max(axis=1)
         for k, other in enumerate(frames):
-            if by.max() > 2:
+            if seeks_repeats and by.max() > 2:
                 out[y, x, 0] |= is_repeat(matcher, x, y, other, own[k], guided[k])
         if len(frames) == 2 and by.min() <= 2 and 1.5 < by.max() <= 0.05 * max(states.shape[:2]):
             ways = zip(guided, backs, strict=True)
@@ -108,21 +108,27 @@ def found(matcher, states, guide, backs):
     return out
 
 
-def followed(matcher, states, guide, marks):
-    """States, those of the guide where it leads, and where that is, from what is found."""
+def followed(matcher, states, guide, marks, coarser=None):
+    """States, those of the guide where it leads, and (height, width, 5) the lead.
+
+    `coarser`: the lead of the coarser level.
+    """
     height, width = states.shape[:2]
-    out, leads = states.copy(), np.zeros((height, width), bool)
+    out, lead = states.copy(), np.zeros((height, width, 5))
+    lead[..., :4] = guide
     for y, x in np.ndindex(height, width):
         rows = [j for j in range(y - 24, y + 25, 3) if 0 <= j < height]
         columns = [i for i in range(x - 24, x + 25, 3) if 0 <= i < width]
         shares = marks[rows][:, columns].mean(axis=(0, 1))
         repeats = shares[0] > 0.08
-        apart = np.abs(ways_of(matcher, states[y, x]) - ways_of(matcher, guide[y, x])).max()
-        turns = shares[1] > 0.08 and marks[y, x, 2]
-        leads[y, x] = repeats or turns
+        apart = np.abs(ways_of(matcher, states[y, x]) - guide[y, x]).max()
+        turns = shares[1] > 0.1 and marks[y, x, 2]
+        lead[y, x, 4] = repeats or turns
         if turns or (repeats and apart > 2):
-            out[y, x] = guide[y, x]
-    return out, leads
+            out[y, x] = state_of(matcher, guide[y, x])
+        if coarser is not None and not lead[y, x, 4]:
+            lead[y, x] = [2, 2, 2, 2, 1] * coarser[y // 2, x // 2]
+    return out, lead
 
 
 def astray(matcher, state, lead, factor):

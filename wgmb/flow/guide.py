@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 import numpy as np
 import wgpu
@@ -11,59 +11,80 @@ from .homography import columns, enlarged
 from .passes import STATES, Passes
 
 REACH = 0.2  # of the longer side: how far around the motion of most the coarsest level is searched
-FINEST_AROUND, AROUND = 1, 2  # px around what the coarser level has: the last level, those before
-MEDIANS = 2  # on every level but the last
+AROUND, FINER_AROUND = 2, 1  # px around what the coarser level has: up to the search's, beyond
 
 
 def guide(
     passes: Passes,
     sizes: list[tuple[int, int]],
-    matched: Callable[[int], dict],
+    matched: Sequence[dict],
     most: tuple[np.ndarray, np.ndarray],
 ) -> wgpu.GPUTexture:
-    """States that lead where the picture seems to move from afar, on the first of some levels.
+    """Where the picture seems to move from afar: displacements on the first of some levels.
 
-    `sizes`: of the levels; `matched`: the bindings of match.wgsl on one of these; `most`: the
+    `sizes`: of the levels; `matched`: the bindings of match.wgsl on each; `most`: the
     homographies of most of the picture to the near frame and the far one on the first level.
     """
-    ways = None
-    for level in reversed(range(len(sizes))):
-        ways = descended(passes, sizes, level, matched(level), ways, most)
-        for _ in range(MEDIANS if level else 0):
-            ways = median(passes, sizes[level], matched(level), ways)
-    assert ways is not None
-    return _taken(passes, "write_states", sizes[0], matched(0), ways)
+    coarsest = len(sizes) - 1
+    near, far = (enlarged(matrix, 0.5**coarsest) for matrix in most)
+    ways = begun(passes, sizes[-1], matched[-1], (near, far))
+    for level in reversed(range(coarsest)):
+        coarser = ways
+        ways = finer(passes, sizes[level:], matched[level:], coarser, AROUND)
+        passes.give(coarser)
+    return ways
+
+
+def finer(
+    passes: Passes,
+    sizes: list[tuple[int, int]],
+    matched: Sequence[dict],
+    coarser: wgpu.GPUTexture,
+    reach: int = FINER_AROUND,
+) -> wgpu.GPUTexture:
+    """Displacements of the first level from medians of those of the second one."""
+    once = median(passes, sizes[1], matched[1], coarser)
+    twice = median(passes, sizes[1], matched[1], once)
+    ways = descended(passes, sizes[0], matched[0], twice, reach)
+    passes.give(once, twice)
+    return ways
+
+
+def begun(
+    passes: Passes,
+    size: tuple[int, int],
+    matched: dict,
+    most: tuple[np.ndarray, np.ndarray],
+) -> wgpu.GPUTexture:
+    """Displacements of the coarsest level: the best around those of most of the picture."""
+    near, far = (columns(matrix) for matrix in most)
+    own = {"to_near": near, "to_far": far, "reach": max(1, round(REACH * max(size)))}
+    none = passes.take((1, 1), STATES)
+    ways = _run(passes, "descend", size, matched, none, begins=True, **own)
+    passes.give(none)
+    return ways
 
 
 def descended(
     passes: Passes,
-    sizes: list[tuple[int, int]],
-    level: int,
+    size: tuple[int, int],
     matched: dict,
-    coarser: wgpu.GPUTexture | None,
-    most: tuple[np.ndarray, np.ndarray],
+    coarser: wgpu.GPUTexture,
+    reach: int,
 ) -> wgpu.GPUTexture:
-    """Displacements of a level from those of the coarser one, which are taken back, if any."""
-    size = sizes[level]
-    reach = AROUND if level else FINEST_AROUND
-    if coarser is None:
-        reach = max(1, round(REACH * max(size)))
-    near, far = (columns(enlarged(matrix, 0.5**level)) for matrix in most)
-    own = {"to_near": near, "to_far": far, "reach": reach, "begins": coarser is None}
-    if coarser is None:
-        coarser = passes.take((1, 1), STATES)
-    return _taken(passes, "descend", size, matched, coarser, **own)
+    """Displacements of a level: the best within `reach` px of those of the coarser one."""
+    return _run(passes, "descend", size, matched, coarser, reach=reach)
 
 
-def median(passes: Passes, size, matched: dict, ways: wgpu.GPUTexture) -> wgpu.GPUTexture:
-    """Of the displacements of 3 x 3 pixels, the one nearest to all; the given are taken back."""
-    return _taken(passes, "median", size, matched, ways)
+def median(
+    passes: Passes, size: tuple[int, int], matched: dict, ways: wgpu.GPUTexture
+) -> wgpu.GPUTexture:
+    """Of the displacements of 3 x 3 pixels, the one nearest to all."""
+    return _run(passes, "median", size, matched, ways)
 
 
-def _taken(passes, entry, size, matched, ways, **own) -> wgpu.GPUTexture:
-    """The output of a pass; the given displacements are taken back."""
+def _run(passes, entry, size, matched, ways, **own) -> wgpu.GPUTexture:
     output = passes.take(size, STATES)
     uniform = passes.uniform("guide.wgsl", "Guide", **own)
     passes.run("guide.wgsl", entry, size, guide=uniform, ways=ways, output=output, **matched)
-    passes.give(ways)
     return output

@@ -14,12 +14,15 @@ def follow_guide(
     states: wgpu.GPUTexture,
     guide: wgpu.GPUTexture,
     back: list[wgpu.GPUTexture],
+    coarser: wgpu.GPUTexture | None = None,
 ) -> tuple[wgpu.GPUTexture, wgpu.GPUTexture]:
     """States, those of the guide where it leads; and the lead, for the sweeps on finer levels.
 
-    `guide`: states that guide.py made; `back`: the same of the near frame and of the far one, to
-    this frame, if they are on different sides. The given states are taken back.
+    `guide`: displacements that guide.py found; `back`: the same of the near frame and of the far
+    one, to this frame, if they are on different sides. `coarser`: the lead of the coarser level,
+    if there is one, which holds where no other is found. The given states are taken back.
     """
+    constants = matched["constants"] | {"IS_COARSEST": coarser is None}
     found = passes.scratch(size, "r32uint", "found")
     none = passes.scratch((1, 1), "r32uint", "none found")
     output, lead = passes.take(size, STATES), passes.take(size, STATES)
@@ -34,9 +37,10 @@ def follow_guide(
             found_out=written,
             output=output,
             lead=lead,
+            coarser_lead=guide if coarser is None else coarser,
             near_back=back[0] if back else guide,
             far_back=back[-1] if back else guide,
-            **matched,
+            **matched | {"constants": constants},
         )
     passes.give(states)
     return output, lead

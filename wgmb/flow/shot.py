@@ -22,7 +22,7 @@ import wgpu
 from ..errors import InputError
 from .carry import carry
 from .dominant import follow_most, settle
-from .guide import guide
+from .guide import finer, guide
 from .homography import enlarged
 from .lights import find_lights, follow_lights, move_lights
 from .match import matched
@@ -44,7 +44,7 @@ class Effort:
 
     `polish`: how often parts of a pixel are refined and noise is removed, on every level.
     `block`: pixels along those that share a first state. `aside`: price of moving otherwise than
-    most, see sweep.wgsl.
+    most, see sweep.wgsl. `led`: on how many levels the guide may lead, from the coarsest on.
     """
 
     coarsest: int
@@ -53,6 +53,7 @@ class Effort:
     polish: int
     block: int
     aside: float
+    led: int
 
     def sweeps(self, level: int, levels: int) -> int:
         """Sweeps on a level; 0 is the finest."""
@@ -62,14 +63,16 @@ class Effort:
 
 
 EFFORTS = {
-    "best": Effort(3, 2, 2, 2, block=2, aside=0.4),
-    "fast": Effort(3, 2, 0, 1, block=4, aside=0.15),
+    "best": Effort(3, 2, 2, 2, block=2, aside=0.4, led=2),
+    "fast": Effort(3, 2, 0, 1, block=4, aside=0.15, led=1),
 }
 LARGEST = 4  # px across a light on the coarsest level: what is larger, the search finds
 KEPT = {
     "pictures": 4,
     "lights": 2,
-    "led": 1,
+    "most": 1,
+    "guides": 1,
+    "lead": 1,
     "searched": 1,
     "mended": 0,
     "motion": 2,
@@ -168,45 +171,57 @@ class Shot:
         bound = self._matched(views, level)
         price = {"ASIDE_PRICE": self._effort.aside}
         swept = bound | {"constants": bound["constants"] | price}
-        count = self._effort.sweeps(level, len(self._sizes))
-        if level == len(self._sizes) - 1:
+        coarsest = len(self._sizes) - 1
+        count = self._effort.sweeps(level, coarsest + 1)
+        if level == coarsest:
             states, *some = self._full_search(size, bound)
             states, both = follow_most(passes, size, bound, views, states, *some)
             states = sweep(passes, size, swept, states, [], level, count, both[0])
-            states, lead = self._led(views, level, states, both)
-            self._made["led", number, level] = both[0], lead
+            self._made["most", number, level] = both
+            states = self._led(views, level, states)
             return self._polished(states, size, bound) if level else states
         states = self._grown(self._once("mended", number, level + 1, self._mended), level)
+        if level > coarsest - self._effort.led and len(views.beside) == 2:
+            states = self._led(views, level, states)
         guesses = [self._carried(other, views, level) for other in views.beside] if count else []
-        coarsest = len(self._sizes) - 1
-        most, lead = self._made["led", number, coarsest]
-        most = enlarged(most, 2.0 ** (coarsest - level))
+        most = enlarged(self._made["most", number, coarsest][0], 2.0 ** (coarsest - level))
+        leads = (self._made.get(("lead", number, k)) for k in range(level, coarsest + 1))
+        lead = next(one for one in leads if one is not None)
         states = sweep(passes, size, swept, states, guesses, level, count, most, lead)
         passes.give(*guesses)
         return self._polished(states, size, bound) if level else states
 
-    def _led(
-        self,
-        views: Views,
-        level: int,
-        states: wgpu.GPUTexture,
-        most: tuple[np.ndarray, np.ndarray],
-    ) -> tuple[wgpu.GPUTexture, wgpu.GPUTexture]:
-        """States of the coarsest level, those of the guide where it leads; and the lead."""
+    def _led(self, views: Views, level: int, states: wgpu.GPUTexture) -> wgpu.GPUTexture:
+        """The states, those of the guide where it leads."""
+        number, size, bound = views.here, self._sizes[level], self._matched(views, level)
+        guides = self._guides(number, level)
+        coarser = self._made.get(("lead", number, level + 1))
+        led = follow_guide(self._passes, size, bound, states, guides[0], guides[1:], coarser)
+        states, self._made["lead", number, level] = led
+        if level > len(self._sizes) - self._effort.led:
+            self._made["guides", number, level] = guides
+        else:
+            self._passes.give(*guides)
+        return states
+
+    def _guides(self, number: int, level: int) -> list[wgpu.GPUTexture]:
+        """The guide of a frame, and if it has two neighbours, theirs back to it."""
+        own, most = self._views(number), self._made["most", number, len(self._sizes) - 1]
+        assert own is not None
+        views, mosts = [own], [most]
+        if len(own.beside) == 2:
+            views += [Views(other, number, None, BESIDE) for other in own.beside]
+            mosts += [2 * (np.linalg.pinv(matrix),) for matrix in most]
+        coarser = self._made.get(("guides", number, level + 1))
         sizes = all_sizes(self._sizes[0])[level:]
-
-        def guided(views: Views, most: tuple[np.ndarray, np.ndarray]) -> wgpu.GPUTexture:
-            return guide(self._passes, sizes, lambda k: self._matched(views, level + k), most)
-
-        ways = [guided(views, most)]
-        if len(views.beside) == 2:
-            for other, matrix in zip(views.beside, most, strict=True):
-                back = np.linalg.pinv(matrix)
-                ways.append(guided(Views(other, views.here, None, BESIDE), (back, back)))
-        bound = self._matched(views, level)
-        led = follow_guide(self._passes, sizes[0], bound, states, ways[0], ways[1:])
-        self._passes.give(*ways)
-        return led
+        guides = []
+        for k, (view, matrices) in enumerate(zip(views, mosts, strict=True)):
+            bound = [self._matched(view, level + further) for further in range(len(sizes))]
+            if coarser:
+                guides.append(finer(self._passes, sizes, bound, coarser[k]))
+            else:
+                guides.append(guide(self._passes, sizes, bound, matrices))
+        return guides
 
     def _grown(self, states: wgpu.GPUTexture, level: int) -> wgpu.GPUTexture:
         output = self._passes.take(self._sizes[level], STATES)

@@ -1,6 +1,7 @@
 // From coarse to fine: the smooth motion that a picture seems to have from afar, where what repeats on it is too small
 // to be seen. A displacement to the near frame and one to the far frame for each pixel.
 //#include common/loops.wgsl
+//#include flow/band.wgsl
 //#include flow/search_patch.wgsl
 
 struct Guide {
@@ -20,6 +21,8 @@ const AWAY_PRICE: f32 = 0.02;       // per px from a given displacement
 const GIVEN: u32 = 5u;              // the pixel's own on the coarser level, and those beside it
 const COUNT: i32 = 9;               // pixels of a median
 
+var<private> starts: array<vec2i, GIVEN>;   // displacements to one frame around which is searched
+
 fn displaced(homography: mat4x4f, x: vec2f) -> vec2f {
     let at = homography * vec4f(x, 1.0, 0.0);
     return at.xy / at.z - x;
@@ -37,33 +40,62 @@ fn given(px: vec2i, k: u32) -> vec4i {
     return 2 * vec4i(round(textureLoad(ways, at, 0, 0)));
 }
 
-fn better(found: vec3f, by: vec2i, cost: f32) -> vec3f {
-    return select(found, vec3f(vec2f(by), cost), cost < found.z);
+/// True if displacement `k` is not beside one of the starts before its own.
+fn is_new(k: u32, area: u32) -> bool {
+    let by = displacement(k, area);
+    var is_first = true;
+    for (var j = 0u; j < k / area; j++) {
+        let away = abs(by - starts[j]);
+        is_first = is_first && max(away.x, away.y) > guide.reach;
+    }
+    return is_first;
+}
+
+/// Displacement `k` of those around the starts.
+fn displacement(k: u32, area: u32) -> vec2i {
+    let side = 2 * guide.reach + 1;
+    let place = i32(k % area);
+    return starts[k / area] + vec2i(place % side, place / side) - guide.reach;
+}
+
+/// The best displacement to another frame of those around the starts: each is tried once.
+fn descended(px: vec2i, other: texture_2d_array<f32>, count: u32) -> vec2f {
+    let side = u32(2 * guide.reach + 1);
+    let turns = turns_of(count * side * side, u32(px.x));
+    var found = vec3f(0.0, 0.0, 2.0 * OUTSIDE);
+    var k = 0u;
+    loop {
+        let by = displacement(k, side * side);
+        var away = 1 << 20;
+        for (var j = 0u; j < count; j++) {
+            let d = abs(by - starts[j]);
+            away = min(away, d.x + d.y);
+        }
+        let price = AWAY_PRICE * f32(away);
+        let cost = price + whole_cost(other, px + by, found.z - price);
+        found = select(found, vec3f(vec2f(by), cost), cost < found.z);
+        loop {
+            k++;
+            if k >= turns || is_new(k, side * side) { break; }
+        }
+        if k >= turns { break; }
+    }
+    return found.xy;
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn descend(@builtin(global_invocation_id) id: vec3u) {
-    let px = vec2i(min(id.xy, frame.size - 1u));
+fn descend(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    let px = vec2i(min(id, frame.size - 1u));
     load_search_patch(px);
-    var to_near = vec3f(0.0, 0.0, 2.0 * OUTSIDE);
-    var to_far = to_near;
-    let side = 2 * guide.reach + 1;
-    let turns = turns_of(u32(side * side), id.x);
-    let starts = select(GIVEN, 1u, guide.begins == 1u);
-    for (var k = 0u; k < starts; k++) {
-        let start = given(px, k);
-        for (var turn = 0u; turn < turns; turn++) {
-            let by = vec2i(i32(turn) % side, i32(turn) / side) - guide.reach;
-            let away = AWAY_PRICE * f32(abs(by.x) + abs(by.y));
-            let n = whole_cost(near, px + start.xy + by, to_near.z - away);
-            to_near = better(to_near, start.xy + by, n + away);
-            if VIEWS == AROUND {
-                let f = whole_cost(far, px + start.zw + by, to_far.z - away);
-                to_far = better(to_far, start.zw + by, f + away);
-            }
-        }
+    let count = select(GIVEN, 1u, guide.begins == 1u);
+    for (var k = 0u; k < count; k++) { starts[k] = given(px, k).xy; }
+    var ways_here = vec4f(descended(px, near, count), 0.0, 0.0);
+    if VIEWS == AROUND {
+        for (var k = 0u; k < count; k++) { starts[k] = given(px, k).zw; }
+        ways_here = vec4f(ways_here.xy, descended(px, far, count));
     }
-    if all(id.xy < frame.size) { textureStore(output, id.xy, 0, vec4f(to_near.xy, to_far.xy)); }
+    if all(id < frame.size) { textureStore(output, id, 0, ways_here); }
 }
 
 /// The displacement, of those of 3 x 3 pixels, that is nearest to all of them.
@@ -88,14 +120,4 @@ fn median(@builtin(global_invocation_id) id: vec3u) {
 fn neighbour(px: vec2i, k: i32) -> vec4f {
     let by = vec2i(k % 3, k / 3) - 1;
     return textureLoad(ways, clamp(px + by, vec2i(0), vec2i(frame.size) - 1), 0, 0);
-}
-
-/// States that lead where the guide does.
-@compute @workgroup_size(WG_X, WG_Y)
-fn write_states(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let own = textureLoad(ways, id.xy, 0, 0);
-    let bend = select(vec2f(0.0), own.zw - view.far_factor * own.xy, VIEWS == AROUND);
-    textureStore(output, id.xy, 0, vec4f(own.xy, bend));
-    textureStore(output, id.xy, 1, vec4f(0.0));
 }

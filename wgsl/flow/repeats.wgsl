@@ -1,16 +1,20 @@
 // Where the picture repeats, a wrong repeat may match better than the right one, because the light changes; and what
 // turns back is taken for hidden on one side, because the slope differs there. In both, the smooth motion of guide.wgsl
 // leads.
+//#include flow/band.wgsl
 //#include flow/search_patch.wgsl
 
 @group(1) @binding(5) var states: texture_2d_array<f32>;
-@group(1) @binding(6) var guide: texture_2d_array<f32>;         // states of this frame,
-@group(1) @binding(7) var near_back: texture_2d_array<f32>;     // of the near frame, whose flow leads to this one,
+@group(1) @binding(6) var guide: texture_2d_array<f32>;         // displacements of this frame,
+@group(1) @binding(7) var near_back: texture_2d_array<f32>;     // of the near frame to this one,
 @group(1) @binding(8) var far_back: texture_2d_array<f32>;      // and of the far one
 @group(1) @binding(9) var found: texture_2d<u32>;               // what `find` wrote
 @group(1) @binding(10) var found_out: texture_storage_2d<r32uint, write>;
 @group(1) @binding(11) var output: StatesOut;
 @group(1) @binding(12) var lead: StatesOut;     // where the guide leads to: near frame, far one; x of layer 1: 1 if it leads
+@group(1) @binding(13) var coarser_lead: texture_2d_array<f32>;     // the same of the coarser level
+
+override IS_COARSEST: bool = true;      // repeats are sought, and there is no coarser lead
 
 const APART: f32 = 2.0;         // along either axis [px]: a state that differs more from the guide is another motion
 const TURNS: f32 = 1.5;         // the same of one side, where the other agrees
@@ -18,10 +22,11 @@ const ALIKE: f32 = 0.4;         // share of the difference half way up to which 
 const MOST_TURN: f32 = 0.05;    // of the longer side: how far from constant velocity a side is led
 const MOST_MISSED: f32 = 3.0;   // along either axis: way there and back [px]
 const HIDDEN: f32 = 0.3;        // cost of a side above which a pixel seems hidden there,
-const LESS: f32 = 0.1;          // if the guide costs at least so much less
+const LESS: f32 = 0.15;          // if the guide costs at least so much less
 const AROUND_SIDE: i32 = 17;    // every third pixel along a side is counted,
 const STRIDE: i32 = 3;
-const ENOUGH: f32 = 0.08;       // share of them that must be found for the guide to lead
+const ENOUGH_REPEATS: f32 = 0.08;   // share of them that must lead to repeats for the guide to lead,
+const ENOUGH_HIDDEN: f32 = 0.1;     // or seem hidden
 const IS_REPEAT: u32 = 1u;      // bits of what is found: leads to a repeat,
 const IS_HIDDEN: u32 = 0x1000u;     // seems hidden where the guide matches better,
 const MAY_TURN: u32 = 0x1000000u;   // is led by the guide if enough around are so
@@ -49,6 +54,12 @@ fn ways_of(state: State) -> vec4f {
     return vec4f(state.flow, way_to_far(state).flow);
 }
 
+/// The state that leads so.
+fn state_of(ways: vec4f) -> State {
+    let bend = select(vec2f(0.0), ways.zw - view.far_factor * ways.xy, VIEWS == AROUND);
+    return State(ways.xy, bend, vec4f(0.0));
+}
+
 /// Greatest difference of two states along either axis: to the near frame and to the far one [px].
 fn apart(own: vec4f, guided: vec4f) -> vec2f {
     let by = abs(own - guided);
@@ -70,17 +81,18 @@ fn is_hidden(px: vec2i, other: texture_2d_array<f32>, own: vec2f, guided: vec2f)
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn find(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
+fn find(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     let own = ways_of(load_state(states, px));
-    let guided = ways_of(load_state(guide, px));
+    let guided = textureLoad(guide, px, 0, 0);
     let by = apart(own, guided);
     var result = 0u;
     if max(by.x, by.y) > TURNS {
         load_search_patch(px);
         var has_repeat = false;
-        if max(by.x, by.y) > APART {
+        if IS_COARSEST && max(by.x, by.y) > APART {
             has_repeat = is_repeat(px, near, own.xy, guided.xy);
             if VIEWS == AROUND { has_repeat = has_repeat || is_repeat(px, far, own.zw, guided.zw); }
         }
@@ -97,7 +109,7 @@ fn find(@builtin(global_invocation_id) id: vec3u) {
         }
         result += select(0u, IS_REPEAT, has_repeat);
     }
-    textureStore(found_out, id.xy, vec4u(result));
+    textureStore(found_out, id, vec4u(result));
 }
 
 /// True where the guide leads, because enough pixels around are found.
@@ -111,23 +123,30 @@ fn is_led(px: vec2i) -> vec2<bool> {
             all_around++;
         }
     }
-    let enough = ENOUGH * f32(all_around);
+    let most = f32(all_around);
     let may_turn = textureLoad(found, px, 0).r >= MAY_TURN;
-    return vec2<bool>(f32(sum % IS_HIDDEN) > enough, may_turn && f32(sum / IS_HIDDEN) > enough);
+    let is_turning = may_turn && f32(sum / IS_HIDDEN) > ENOUGH_HIDDEN * most;
+    return vec2<bool>(f32(sum % IS_HIDDEN) > ENOUGH_REPEATS * most, is_turning);
 }
 
 /// Where the guide leads, it takes the place of states that differ from it.
 @compute @workgroup_size(WG_X, WG_Y)
-fn follow(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
+fn follow(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = banded_pixel(local, group);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     var state = load_state(states, px);
-    let guided = load_state(guide, px);
-    let by = apart(ways_of(state), ways_of(guided));
-    let leads = is_led(px);
-    if (leads.x && max(by.x, by.y) > APART) || leads.y { state = guided; }
-    textureStore(output, id.xy, 0, vec4f(state.flow, state.bend));
-    textureStore(output, id.xy, 1, state.slope);
-    textureStore(lead, id.xy, 0, ways_of(guided));
-    textureStore(lead, id.xy, 1, vec4f(f32(any(leads)), 0.0, 0.0, 0.0));
+    var leads_to = textureLoad(guide, px, 0, 0);
+    let by = apart(ways_of(state), leads_to);
+    let is_led_here = is_led(px);
+    if (is_led_here.x && max(by.x, by.y) > APART) || is_led_here.y { state = state_of(leads_to); }
+    textureStore(output, id, 0, vec4f(state.flow, state.bend));
+    textureStore(output, id, 1, state.slope);
+    var leads = f32(any(is_led_here));
+    if !IS_COARSEST && leads == 0.0 {
+        leads_to = 2.0 * textureLoad(coarser_lead, px / 2, 0, 0);
+        leads = textureLoad(coarser_lead, px / 2, 1, 0).x;
+    }
+    textureStore(lead, id, 0, leads_to);
+    textureStore(lead, id, 1, vec4f(leads, 0.0, 0.0, 0.0));
 }
