@@ -15,6 +15,13 @@ def threads():
     return {t for t in threading.enumerate() if t.name in ("ahead", "behind")}
 
 
+@pytest.fixture
+def left():
+    """The threads that a test leaves, beside those that others left before it."""
+    before = threads()
+    return lambda: threads() - before
+
+
 def test_items_come_in_order_and_few_are_made_beforehand():
     made = []
 
@@ -41,24 +48,24 @@ def test_an_error_comes_after_the_items_before_it():
         next(got)
 
 
-def test_nobody_reads_on_and_the_thread_ends():
+def test_nobody_reads_on_and_the_thread_ends(left):
     got = ahead(itertools.count(), 2)
     assert [next(got), next(got)] == [0, 1]
     got.close()
     time.sleep(0.2)
-    assert not threads()
+    assert not left()
 
 
-def test_work_is_done_in_order_and_all_of_it():
+def test_work_is_done_in_order_and_all_of_it(left):
     done = []
     with Behind(done.append) as put:
         for n in range(50):
             put(n)
-    assert done == list(range(50)) and not threads()
+    assert done == list(range(50)) and not left()
 
 
 @pytest.mark.parametrize("when", [0, 30])
-def test_an_error_of_the_work_is_raised_where_it_is_given(when):
+def test_an_error_of_the_work_is_raised_where_it_is_given(when, left):
     def work(n):
         if n == when:
             raise OSError("full")
@@ -66,10 +73,10 @@ def test_an_error_of_the_work_is_raised_where_it_is_given(when):
     with pytest.raises(OSError, match="full"), Behind(work) as put:
         for n in range(31):
             put(n)
-    assert not threads()
+    assert not left()
 
 
-def test_an_error_of_the_caller_leaves_the_rest_undone():
+def test_an_error_of_the_caller_leaves_the_rest_undone(left):
     done = []
 
     def slowly(n):
@@ -79,4 +86,4 @@ def test_an_error_of_the_caller_leaves_the_rest_undone():
     with pytest.raises(KeyboardInterrupt), Behind(slowly) as put:
         put(1)
         raise KeyboardInterrupt
-    assert len(done) <= 1 and not threads()
+    assert len(done) <= 1 and not left()

@@ -53,7 +53,8 @@ def display():
             pytest.fail(missing)
         pytest.skip(missing)
     ours, theirs = os.pipe()
-    screen = ["-screen", "0", "1200x900x24", "-nolisten", "tcp"]
+    # A server that resets when its last client goes refuses a client that comes meanwhile.
+    screen = ["-screen", "0", "1200x900x24", "-nolisten", "tcp", "-noreset"]
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", str(theirs), *screen],
         pass_fds=[theirs],
