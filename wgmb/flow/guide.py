@@ -11,7 +11,8 @@ from .homography import columns, enlarged
 from .passes import STATES, Passes
 
 REACH = 0.2  # of the longer side: how far around the motion of most the coarsest level is searched
-AROUND, FINER_AROUND = 2, 1  # px around what the coarser level has: up to the search's, beyond
+AROUND = 2  # px around the displacements of the coarser level
+FINER_AROUND = 1  # the same on a level finer than the coarsest that is swept
 
 
 def guide(
@@ -20,7 +21,7 @@ def guide(
     matched: Sequence[dict],
     most: tuple[np.ndarray, np.ndarray],
 ) -> wgpu.GPUTexture:
-    """Where the picture seems to move from afar: displacements on the first of some levels.
+    """Displacements as the picture seems to move from afar, on the first of some levels.
 
     `sizes`: of the levels; `matched`: the bindings of match.wgsl on each; `most`: the
     homographies of most of the picture to the near frame and the far one on the first level.

@@ -1,4 +1,4 @@
-"""Where the picture repeats, or turns back, the smooth motion of the guide leads."""
+"""The lead of the guide where the picture repeats or turns back."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ const ALIKE: f32 = 0.4;         // share of the difference half way up to which 
 const MOST_TURN: f32 = 0.05;    // of the longer side: how far from constant velocity a side is led
 const MOST_MISSED: f32 = 3.0;   // along either axis: way there and back [px]
 const HIDDEN: f32 = 0.3;        // cost of a side above which a pixel seems hidden there,
-const LESS: f32 = 0.15;          // if the guide costs at least so much less
+const LESS: f32 = 0.15;         // if the guide costs at least so much less
 const AROUND_SIDE: i32 = 17;    // every third pixel along a side is counted,
 const STRIDE: i32 = 3;
 const ENOUGH_REPEATS: f32 = 0.08;   // share of them that must lead to repeats for the guide to lead,
@@ -60,7 +60,7 @@ fn state_of(ways: vec4f) -> State {
     return State(ways.xy, bend, vec4f(0.0));
 }
 
-/// Greatest difference of two states along either axis: to the near frame and to the far one [px].
+/// Greatest difference of two ways along either axis: to the near frame and to the far one [px].
 fn apart(own: vec4f, guided: vec4f) -> vec2f {
     let by = abs(own - guided);
     return vec2f(max(by.x, by.y), select(0.0, max(by.z, by.w), VIEWS == AROUND));
