@@ -31,7 +31,10 @@ def test_contract(name):
     if "confidence" in public:  # a name for each channel of what it shows then
         red, green, blue, alpha = method.confidence
         assert len({red, green, blue, alpha}) == 4
-    optional = {"samples", "adaptive", "confidence", "most_in_software", "spread", "margin", "bend"}
+    optional = {
+        "samples", "adaptive", "quick", "confidence", "most_in_software", "spread", "margin",
+        "bend",
+    }  # fmt: skip
     assert public - optional == {
         "name",
         "needs",

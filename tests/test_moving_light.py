@@ -389,6 +389,38 @@ def test_sizes_that_fit_no_patch():
         assert np.isfinite(wgmb.Blur("gather")(frame)).all()
 
 
+@pytest.mark.parametrize("shading", ["auto", "passes"])
+def test_scenes_are_drawn_with_their_light_and_nearer_the_truth(shading):
+    scene = scenes.make("crossing", speed=3)
+
+    def drawn(method, **options):
+        blur = Blur(method, shutter=360, **options)
+        return Render(scene, blur, size=(240, 136))(0.5)[..., :3].astype(float)
+
+    truth = drawn("distributed", samples=64)
+    off, followed = (
+        np.square(drawn("gather", shading=how) - truth).mean() for how in ("off", shading)
+    )
+    assert followed < 0.85 * off
+
+
+def test_light_is_that_of_the_moment_and_of_its_frames():
+    """A Render that is used for another time does not keep the light of the last one."""
+    scene, blur = scenes.make("crossing", speed=3), Blur("gather", shading="passes")
+    one = Render(scene, blur, size=(64, 36))
+    one(0.2)
+    fresh = Render(scene, blur, size=(64, 36))
+    np.testing.assert_array_equal(one(0.7), fresh(0.7))
+    frame = one.frame(0.7, light=True)
+    np.testing.assert_array_equal(frame.diffuse_light, fresh.frame(0.7, light=True).diffuse_light)
+
+
+def test_a_scene_with_a_backdrop_has_no_light():
+    flat = Render(scenes.make("torusphere"), Blur("gather", shading="passes"), size=(64, 36))
+    with pytest.raises(InputError, match="needs passes of light"):
+        flat(0.0)
+
+
 def test_own_scenes_know_their_light():
     render = Render(scenes.make("crossing"), Blur("tap", samples=2), size=(48, 27), fps=24)
     frame = render.frame(0.5, light=True)

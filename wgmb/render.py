@@ -26,6 +26,8 @@ from .scene.gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
 from .scene.scene import Scene
 
 _BUSY = 0.1  # seconds of GPU work handed over at once, so that Ctrl-C is heard
+# Passes of light of a scene, by the names of the textures, as inputs of a Blur.
+_LIGHT = {"light": "diffuse_light", "albedo": "diffuse_color"}
 Progress = Callable[[int, int], None]
 """Called with the samples done and their total."""
 
@@ -65,6 +67,7 @@ class Render:
         self._moment: tuple[Any, ...] = ()
         self._spans: dict[tuple[float, float], SceneOnGpu] = {}
         self._pictures: dict[int, dict[str, Any]] = {}
+        self._lights: dict[int, dict[str, wgpu.GPUTexture]] = {}
 
     def __call__(
         self, time: float, number: int = 0, progress: Progress | None = None
@@ -196,7 +199,7 @@ class Render:
             self.blur.encode_motion(encoder, here, motion.create_view(), number)
             gpu.submit(self.blur.device, encoder)
             textures["motion"] = motion
-        return {name: texture for name, texture in textures.items() if name != "camera"}
+        return {name: textures[name] for name in ("color", "depth", "normal", "object", "motion")}
 
     def frame(self, time: float, number: int = 0, *, light: bool = False) -> Frame:
         """The sharp picture at `time` [s] with its depth, normals, object indices and motion.
@@ -211,7 +214,9 @@ class Render:
                 encoder = self.blur.device.create_command_encoder(label="download")
                 arrays[name] = self._images.download(encoder, self._pictures[0][name])
             if light:
-                passes = self._light(time, number)
+                for name, texture in self._light(time, number, 0, self.blur).items():
+                    encoder = self.blur.device.create_command_encoder(label="download")
+                    passes[_LIGHT[name]] = self._images.download(encoder, texture)[..., :3].copy()
         return Frame(
             arrays["color"],
             depth=arrays["depth"][..., 0],
@@ -221,19 +226,6 @@ class Render:
             number=number,
             **passes,
         )
-
-    def _light(self, time: float, number: int) -> dict[str, Any]:
-        """Passes of light, as fields of Frame."""
-        bindings = self.blur.frame_bindings(self.size, number)
-        encoder = self.blur.device.create_command_encoder(label="light")
-        lit = self.on_gpu(time).encode_light(encoder, bindings, self._images, 0.0)
-        gpu.submit(self.blur.device, encoder)
-        found = {}
-        for name, field in (("light", "diffuse_light"), ("albedo", "diffuse_color")):
-            if name in lit:
-                encoder = self.blur.device.create_command_encoder(label="download")
-                found[field] = self._images.download(encoder, lit[name])[..., :3].copy()
-        return found
 
     def sharp(self, time: float) -> np.ndarray:
         """The sharp picture at `time` [s]: (height, width, 4) float32, linear."""
@@ -255,13 +247,33 @@ class Render:
             gpu.submit(blur.device, encoder)
             self._pictures[offset] = {**drawn, "camera": on_gpu.reprojections(offset)}
         seen = self._pictures[offset]
+        lit = {}
+        if abs(offset) <= 1 and blur.method.uses >= {*_LIGHT.values()}:
+            lit = self._light(time, number, offset, blur, timing)
         return FrameViews(
             color=seen["color"].create_view(),
             depth=seen["depth"].create_view(),
             normal=seen["normal"].create_view(),
             object_id=seen["object"].create_view(),
             camera=seen["camera"],
+            diffuse_light=lit["light"].create_view() if lit else None,
+            diffuse_color=lit["albedo"].create_view() if lit else None,
         )
+
+    def _light(
+        self, time: float, number: int, offset: int, blur: Blur, timing: Clock | None = None
+    ) -> dict[str, wgpu.GPUTexture]:
+        """The passes of light `offset` frames from the moment, by the names of _LIGHT."""
+        on_gpu = self.on_gpu(time, blur)
+        if offset not in self._lights:
+            encoder = blur.device.create_command_encoder(label="light")
+            bindings, name = blur.frame_bindings(self.size, number), f"frame {offset}"
+            watched = timing.watch(encoder) if timing else encoder
+            self._lights[offset] = on_gpu.encode_light(
+                watched, bindings, self._images, name, float(offset)
+            )
+            gpu.submit(blur.device, encoder)
+        return self._lights[offset]
 
     def on_gpu(self, time: float, blur: Blur | None = None) -> SceneOnGpu:
         """Return the scene on the GPU for the time span that the blur reads around `time` [s]."""
@@ -270,7 +282,7 @@ class Render:
             raise InputError(f"time must be finite, got {time}")
         moment = (time, id(self.scene), self.size, self.fps, self.antialias)
         if moment != self._moment:
-            self._moment, self._spans, self._pictures = moment, {}, {}
+            self._moment, self._spans, self._pictures, self._lights = moment, {}, {}, {}
         opens, closes = blur.shutter.span
         delay = max(map(abs, blur.shutter.delay)) / 2
         most = max(_offsets(blur))

@@ -116,7 +116,7 @@ class SceneFrame:
     def frame(self, device) -> Frame:
         """The sharp frame between two on either side, as image methods are given it from files."""
         render = self.render(Blur("tap", device=device))
-        made = {k: render.frame(self.time + k / self.fps, k + 1) for k in range(-2, 3)}
+        made = {k: render.frame(self.time + k / self.fps, k + 1, light=True) for k in range(-2, 3)}
         before, after = made[-1].between(made[-2], None), made[1].between(None, made[2])
         return made[0].between(before, after)
 

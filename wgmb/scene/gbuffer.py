@@ -130,6 +130,7 @@ class SceneOnGpu:
         encoder: wgpu.GPUCommandEncoder,
         bindings: gpu.FrameBindings,
         images: TexturePool,
+        name: str,
         time: float,
     ) -> dict[str, wgpu.GPUTexture]:
         """Record the passes of light at `time` [frame intervals from this frame]; their textures.
@@ -144,7 +145,9 @@ class SceneOnGpu:
         buffer = self.device.create_buffer_with_data(
             label="view", data=view, usage=wgpu.BufferUsage.UNIFORM
         )
-        textures = {k: images.texture(k, self.size, "rgba32float") for k in ("light", "albedo")}
+        textures = {
+            k: images.texture(f"{name} {k}", self.size, "rgba32float") for k in ("light", "albedo")
+        }
         views = {k: t.create_view() for k, t in textures.items()}
         kernel.run(encoder, "main", bindings, view=buffer, **self.resources, **views)
         return textures

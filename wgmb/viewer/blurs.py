@@ -30,7 +30,7 @@ class Blurs:
     def __call__(self, slot: str, name: str, state: State, quick: int | None) -> Blur:
         """The Blur for `name` (a look, a method or the reference) in a slot.
 
-        `quick`: the level of detail while something moves; None: in full.
+        `quick`: the level of detail while something moves, 0 the finest; None: in full.
         """
         options: dict[str, Any] = dict(state.options)
         method, samples, shutter = state.method, state.sampling, shutter_of(state)
@@ -51,6 +51,8 @@ class Blurs:
             traced = "progress" in METHODS[method].uses
             fewer = min(count, QUICK) if traced else self._pace.samples(quick, count)
             samples = fewer if fewer < count else samples
+        if quick:
+            options |= getattr(METHODS[method], "quick", {})
         kept = slot, name == "perceived"  # each has the sums of a picture of its own
         key = (kept, method, samples, state.jitter, state.max_blur, *options.items())
         if key not in self._made:

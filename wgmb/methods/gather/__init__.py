@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from ...gpu import wgsl
 from ...gpu.textures import TexturePool
@@ -53,6 +53,7 @@ class Gather:
     needs = frozenset({"color", "motion", "depth"})
     uses = frozenset({"neighbours", *PASSES})
     adaptive = True
+    quick: ClassVar = {"shading": "off"}
     most_in_software = 512  # loops end there after 65,535 turns, all of a pixel together
     bend = float(wgsl.load("common/path.wgsl").constant("MOST_BEND"))
     confidence = ("accepted", "disocclusion", "residual", "left")
