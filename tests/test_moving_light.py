@@ -69,7 +69,8 @@ def device():
 class Stages:
     """All that the passes of one kind of light wrote."""
 
-    def __init__(self, device, pulled, whole=None):
+    def __init__(self, device, pulled, whole=None, fold=0.0):
+        """`fold`: from the middle of the shadow on, depth grows by this share per pixel."""
         pool, light = TexturePool(device), MovingLight(device)
         whole = whole or around(glossy=pulled)
         self.pulled = pulled
@@ -79,7 +80,9 @@ class Stages:
             given = frame.glossy_light if pulled else frame.diffuse_light
             assert given is not None and frame.depth is not None and frame.motion is not None
             rng = np.random.default_rng(offset + 5)
-            depth = np.where(rng.random(SIZE) < 0.002, 14, frame.depth).astype("f4")  # edges
+            edges = rng.random(SIZE) < 0.002
+            folded = frame.depth * (1 + fold * np.maximum(np.arange(SIZE[1]) - 36, 0))
+            depth = np.where(edges, 14, folded).astype("f4")
             light_there = np.dstack([given, np.ones(SIZE, "f4")])
             seen[offset] = Seen(
                 pool.upload(f"light {offset}", light_there, "rgba32float"),
@@ -120,7 +123,7 @@ class Stages:
 
 @pytest.fixture(scope="module", params=[False, True], ids=["shadows", "reflections"])
 def stages(request, device):
-    return Stages(device, request.param)
+    return Stages(device, request.param, fold=0.05)
 
 
 def test_what_changes_is_its_twin(stages, close):
@@ -145,6 +148,17 @@ def test_values_are_their_twin(stages, close):
     for offset, change in ((0, 0 * before), (-1, before), (1, after)):
         want = twin.values(here["light"], before, after, bright, change, stages.pulled)
         close(stages[f"values {offset}"], want, 4e-3)
+
+
+def test_a_fold_parts_light_and_flow(stages):
+    """Else the twins of both would be those of a plane."""
+    depth = stages.frames[0]["depth"]
+    assert 0 < twin.creases(depth)[:, 36].mean() <= 1
+    assert twin.creases(depth).mean() < 0.1
+    flow = np.broadcast_to((5.0, 0.0), (*SIZE, 2))
+    stays = twin.on_one_surface(flow, depth)
+    assert stays[:, :28].mean() > 0.9
+    assert not stays[:, 33:36].any()
 
 
 def test_levels_are_their_twin(stages, close):
@@ -186,14 +200,15 @@ def test_flow_is_that_of_the_shadow(device):
 def test_trust_is_its_twin(stages, close):
     for side in (-1, 1):
         own, other = stages["values 0"][..., 3], stages[f"values {side}"][..., 3]
+        depth = stages.frames[0]["depth"]
         ahead, back = (stages[f"flow {name} {side}"] for name in ("ahead", "back"))
-        want = twin.trust(ahead[..., :2], back[..., :2], own, other)
+        want = twin.trust(ahead[..., :2], back[..., :2], own, other, depth)
         # What is trusted again is the filled flow, of half floats as it is.
         close(ahead[..., 2], want, 2e-2)
         raw = stages["level flow 0 ahead"][..., :2] if side == 1 else None
         if raw is not None:
             raw_back = stages["level flow 0 back"][..., :2]
-            sure = twin.trust(raw, raw_back, own, other)
+            sure = twin.trust(raw, raw_back, own, other, depth)
             close(ahead[..., :2], twin.filled(raw, sure, own), 0.05)
         if not stages.pulled:
             want = twin.explained(ahead[..., :2], back[..., :2], own, other)

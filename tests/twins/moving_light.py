@@ -118,8 +118,20 @@ def limited(change, seen, light, albedo, pulled=False):
     return np.clip(change * gain[..., None], -4, 4)
 
 
+def creases(depth):
+    """True where a surface turns."""
+    found = np.zeros(depth.shape, bool)
+    for by in ((1, 0), (0, 1)):
+        around = np.array([shifted(depth, -by[0], -by[1]), depth, shifted(depth, *by)])
+        same = around.max(0) < 1.06**2 * around.min(0)
+        turn = np.abs(depth / around[0] + depth / around[2] - 2)
+        found |= same & (turn > max(2 / depth.shape[1], 0.004))
+    return found
+
+
 def closed(light, depth, before, after, steps):
     """The brightest light around on the same surface, as a logarithm."""
+    sends = ~creases(depth)
     state = np.log(light + 0.02) + np.maximum(0, np.maximum(before, after))
     for sign in (1, -1):
         for _ in range(steps):
@@ -127,6 +139,7 @@ def closed(light, depth, before, after, steps):
             for by in ((-1, 0), (1, 0), (0, -1), (0, 1)):
                 z = shifted(depth, *by)
                 same = np.maximum(z, depth) < 1.06 * np.minimum(z, depth)
+                same &= shifted(sends, *by)
                 near = sign * shifted(state, *by)
                 most = np.where(same[..., None], np.maximum(most, near), most)
             state = sign * most
@@ -221,15 +234,44 @@ def blurred(a, sigma):
     return a
 
 
-def trust(flow, back, own, other):
+def slopes(inverse):
+    """Changes per pixel in x and y, to the sides where they are less."""
+    found = []
+    for by in ((2, 0), (0, 2)):
+        ahead = shifted(inverse, *by) - inverse
+        behind = inverse - shifted(inverse, -by[0], -by[1])
+        found.append(np.where(np.abs(ahead) < np.abs(behind), ahead, behind) / 2)
+    return found
+
+
+def on_one_surface(flow, depth):
+    """True where the flow leads to a pixel near the tangent plane, and the way back too."""
+    height, width = depth.shape
+    inverse = 1 / depth
+    across, down = slopes(inverse)
+    y, x = np.mgrid[:height, :width]
+    i, j = (np.floor(n + 0.5 + flow[..., k]).astype(int) for k, n in enumerate((x, y)))
+    there = np.clip(j, 0, height - 1), np.clip(i, 0, width - 1)
+    most = 1.02 + 0.5 * np.hypot(i - x, j - y) / width
+    expected = (
+        (inverse + (i - x) * across + (j - y) * down, inverse[there]),
+        (inverse[there] - (i - x) * across[there] - (j - y) * down[there], inverse),
+    )
+    return np.all([np.maximum(a, b) < most * np.minimum(a, b) for a, b in expected], axis=0)
+
+
+def trust(flow, back, own, other, depth):
     """Trust in the flow; own, other: the amount of what moves in either frame."""
+    stays = on_one_surface(flow, depth)
     x, y = centres(own.shape)
     x, y = x + flow[..., 0], y + flow[..., 1]
     astray = np.hypot(*np.moveaxis(flow + sampled(back, x, y), 2, 0))
     unlike = np.abs(sampled(other, x, y) - own)
     length = np.hypot(flow[..., 0], flow[..., 1])
-    return np.clip(2 - astray / (12 + 0.1 * length), 0, 1) * np.clip(
-        2 - unlike / (0.2 + 0.5 * own), 0, 1
+    return (
+        stays
+        * np.clip(2 - astray / (12 + 0.1 * length), 0, 1)
+        * np.clip(2 - unlike / (0.2 + 0.5 * own), 0, 1)
     )
 
 

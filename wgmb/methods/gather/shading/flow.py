@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import wgpu
 
@@ -58,27 +59,32 @@ def pyramid(stage: Stage, name: str, source: View) -> list[View]:
 
 def flow(
     stage: Stage, side: int, here: tuple[View, list[View]], there: tuple[View, list[View]],
-    linear: wgpu.GPUSampler,
+    depth: View, linear: wgpu.GPUSampler,
 ) -> Flow:  # fmt: skip
-    """Flow to the neighbour at the offset `side`; `here`, `there`: values and their pyramid."""
+    """Flow to the neighbour at the offset `side`; `here`, `there`: values and their pyramid.
+
+    `depth`: of the frame itself, over whose surfaces both move.
+    """
     raw = {
         True: _search(stage, "ahead", here[1], there[1], linear),
         False: _search(stage, "back", there[1], here[1], linear),
     }
-    filled = {}
-    for ahead in (True, False):
-        own, other = (here, there) if ahead else (there, here)
-        name = f"{'ahead' if ahead else 'back'} {side}"
-        filled[ahead] = _filled(stage, name, raw[ahead], raw[not ahead], own[0], other[0], linear)
+    given = {
+        ahead: {"values": own[0], "values_there": other[0], "depth": depth, "linear": linear}
+        for ahead, own, other in ((True, here, there), (False, there, here))
+    }
+    names = {True: f"ahead {side}", False: f"back {side}"}
+    filled = {
+        ahead: _filled(stage, names[ahead], raw[ahead], raw[not ahead], given[ahead])
+        for ahead in (True, False)
+    }
     trusted = {}
     for ahead in (True, False):
-        own, other = (here, there) if ahead else (there, here)
-        name = f"{'ahead' if ahead else 'back'} {side}"
-        trusted[ahead] = stage.texture(f"flow {name}", "rgba16float")
+        trusted[ahead] = stage.texture(f"flow {names[ahead]}", "rgba16float")
         stage.run(
-            "accept", "trust", flow=filled[ahead], flow_back=filled[not ahead], values=own[0],
-            values_there=other[0], around=stage.none("rgba32float"), linear=linear,
-            flow_out=trusted[ahead], weighted=stage.texture("weighted", "rgba32float"),
+            "accept", "trust", flow=filled[ahead], flow_back=filled[not ahead],
+            around=stage.none("rgba32float"), flow_out=trusted[ahead],
+            weighted=stage.texture("weighted", "rgba32float"), **given[ahead],
         )  # fmt: skip
     explained = stage.texture(f"explained {side}", "rgba32float")
     if not stage.pulled:
@@ -98,13 +104,11 @@ def blurred(stage: Stage, source: View, sigma: float, output: View) -> None:
     stage.run("blur", "down", constants={"SIGMA": sigma}, source=half, output=output)
 
 
-def _filled(
-    stage: Stage, name: str, flow: View, back: View, values: View, values_there: View, linear
-) -> View:
-    """Flow in which that around it stands for what is not trusted."""
+def _filled(stage: Stage, name: str, flow: View, back: View, given: dict[str, Any]) -> View:
+    """Flow in which that around it stands for what is not trusted; `given`: what else is bound."""
     known, result = (stage.texture(n, "rgba16float") for n in ("known", f"filled {name}"))
     weighted, around = (stage.texture(n, "rgba32float") for n in ("weighted", "around"))
-    given = {"flow_back": back, "values": values, "values_there": values_there, "linear": linear}
+    given = given | {"flow_back": back}
     stage.run("accept", "trust", flow=flow, around=stage.none("rgba32float"), flow_out=known,
               weighted=weighted, **given)  # fmt: skip
     blurred(stage, weighted, SPREAD, around)

@@ -116,7 +116,10 @@ class MovingLight:
         present = values(stage, kind.frames[0], changed, kind.by_color)
         seen = {offset: (view, pyramid(stage, str(offset), view))
                 for offset, view in present.items()}  # fmt: skip
-        flows = {side: flow(stage, side, seen[0], seen[side], self._linear) for side in changed}
+        depth = kind.frames[0].depth
+        flows = {
+            side: flow(stage, side, seen[0], seen[side], depth, self._linear) for side in changed
+        }
         result = self._images.texture(
             f"light {stage.name}", stage.size, "rgba16float", times.count + 2
         )

@@ -1,5 +1,6 @@
 // The brightest light around on the same surface, which stands for the light without its shadows: greatest values are
-// spread, then smallest ones (a closing). So shadows are found that lie on a place in all three frames.
+// spread, then smallest ones (a closing). So shadows are found that lie on a place in all three frames. Nothing spreads
+// from creases, since the sides of a box have a light of their own.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
@@ -8,12 +9,14 @@
 @group(1) @binding(1) var depth_here: texture_2d<f32>;
 @group(1) @binding(2) var before: texture_2d<f32>;      // changes to the previous frame, to the next one
 @group(1) @binding(3) var after: texture_2d<f32>;
-@group(1) @binding(4) var state: texture_2d<f32>;       // what the pass before wrote
+@group(1) @binding(4) var state: texture_2d<f32>;       // what the pass before wrote: light, depth, negative at a crease
 @group(1) @binding(5) var output: State;
 
 alias State = texture_storage_2d<rgba32float, write>;
 
 const AS_DEEP: f32 = 1.06;      // ratio of the depths of pixels side by side on one surface
+const CREASE: f32 = 2.0;        // change of the slope at a crease [share of the depth, over the picture's width],
+const LEAST_CREASE: f32 = 0.004;    // and at least this much [share of the depth per pixel]: depths may be half floats
 
 fn own_light(px: vec2i) -> vec3f {
     return log(valid_light(textureLoad(light_here, px, 0)) + dark());
@@ -25,7 +28,26 @@ fn begin(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let px = vec2i(id.xy);
     let most = max(vec3f(0.0), max(textureLoad(before, px, 0).rgb, textureLoad(after, px, 0).rgb));
-    textureStore(output, px, vec4f(own_light(px) + most, valid_depth(textureLoad(depth_here, px, 0).x)));
+    textureStore(output, px, vec4f(own_light(px) + most, select(1.0, -1.0, is_crease(px)) * depth_at(px)));
+}
+
+fn depth_at(px: vec2i) -> f32 {
+    return valid_depth(textureLoad(depth_here, inside(px), 0).x);
+}
+
+/// True if the surface turns at the pixel. Along a plane the inverse of depth is linear.
+fn is_crease(px: vec2i) -> bool {
+    let z = depth_at(px);
+    let most = max(CREASE / f32(frame.size.x), LEAST_CREASE);
+    var turns = false;
+    for (var k = 0; k < 2; k++) {
+        let by = vec2i(1 - k, k);
+        let a = depth_at(px - by);
+        let b = depth_at(px + by);
+        let same = max(max(a, b), z) < AS_DEEP * AS_DEEP * min(min(a, b), z);
+        turns = turns || (same && abs(z / a + z / b - 2.0) > most);
+    }
+    return turns;
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -47,7 +69,7 @@ fn spread(px: vec2i, sign: f32) {
     for (var k = 0; k < 4; k++) {
         let by = select(vec2i(0, k * 2 - 5), vec2i(k * 2 - 1, 0), k < 2);
         let there = textureLoad(state, inside(px + by), 0);
-        let same = max(there.a, own.a) < AS_DEEP * min(there.a, own.a);
+        let same = max(there.a, abs(own.a)) < AS_DEEP * min(there.a, abs(own.a));
         most = max(most, select(most, sign * there.rgb, same));
     }
     textureStore(output, px, vec4f(sign * most, own.a));
