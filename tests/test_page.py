@@ -137,7 +137,8 @@ def test_the_sample_frame_is_that_of_python(visit, tmp_path):
     visit({"hash": state(method="tap"), "steps": steps})
     recording = make_page.page_recording
     for file, (method, degrees, curve, samples) in zip(files, SAMPLE, strict=True):
-        blur = Blur(method, shutter=Shutter(degrees, curve=curve), samples=samples)
+        options = recording.OPTIONS.get(method, {})
+        blur = Blur(method, shutter=Shutter(degrees, curve=curve), samples=samples, **options)
         scene = make(recording.SCENE)
         want = Render(scene, blur, size=SIZE, antialias=recording.RAYS)(recording.TIME)
         check(file, want)

@@ -28,6 +28,8 @@ from wgmb.scene import make
 
 SCENE, TIME, SIZE, RAYS = "crossing", 0.25, (640, 360), 2
 METHODS = ("tap", "tiles", "gather")
+OPTIONS = {"gather": {"shading": "off"}}
+"""Moving light has times of its own in many buffers, which the page does not write."""
 SAMPLES = (4, 8, 16, 32)
 CURVES = ("box", "cosine")
 """The box has kernels of its own; all other curves share those of the cosine."""
@@ -182,7 +184,7 @@ class Session:
     def __init__(self, device: wgpu.GPUDevice):
         self.device, self.once = device, Recorder()
         with self.once.listening(device):
-            blur = Blur("gather", device=device, output=OUTPUT)
+            blur = Blur("gather", device=device, output=OUTPUT, **OPTIONS["gather"])
             self.render = Render(make(SCENE), blur, size=SIZE, antialias=RAYS)
             for offset in (0, -1, 1):
                 self.render._see(TIME, 0, offset, blur)
@@ -195,7 +197,8 @@ class Session:
         recorder, shutter = Recorder(self.once), Shutter(degrees, curve=curve)
         images = self.render._images
         with recorder.listening(self.device):
-            blur = Blur(method, shutter=shutter, samples=samples, device=self.device, output=OUTPUT)
+            given = {"samples": samples, "device": self.device, "output": OUTPUT}
+            blur = Blur(method, shutter=shutter, **given, **OPTIONS.get(method, {}))
             output = images.texture("page", SIZE, OUTPUT)
             self.render.draw(output.create_view(), TIME, blur=blur)
         picture = images.download(self.device.create_command_encoder(), output)
