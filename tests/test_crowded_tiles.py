@@ -6,15 +6,17 @@ import pytest
 import wgmb
 from images import frame_of
 from twins import gather as gather_twin
+from twins.gather import TILE
 from wgmb import Shutter
 
 TURN = np.radians(50)  # per frame
 
 
-def wheel(t, size=(90, 100), spokes=5, turn=TURN):
+def wheel(t, size=(90, 100), spokes=5, turn=TURN, post=0):
     """A wheel of thin spokes that turns before a textured wall: colour, motion, depth.
 
-    Its middle is beside that of the picture, so that no two motions are equally long.
+    Its middle is beside that of the picture, so that no two motions are equally long. `post`: the
+    width of a post before it [px].
     """
     fine, (height, width) = 4, size
     y, x = (np.mgrid[: height * fine, : width * fine] + 0.5) / fine
@@ -24,6 +26,8 @@ def wheel(t, size=(90, 100), spokes=5, turn=TURN):
     spoke = (beside < 1.6) & (radius < 0.45 * height)
     wall = 0.4 + 0.2 * np.sin(0.3 * x + 0.5 * y)
     color = np.where(spoke, 0.9, wall)[..., None] * [1.0, 0.8, 0.6]
+    before = np.abs(x - 0.63 * width) < post / 2
+    color[before], spoke = 0.2, spoke & ~before
 
     def mean(a):
         return a.reshape(height, fine, width, fine, -1).mean(axis=(1, 3)).astype("f4")
@@ -34,7 +38,7 @@ def wheel(t, size=(90, 100), spokes=5, turn=TURN):
 
     middle = np.s_[2::fine, 2::fine]
     motion = np.where(spoke[..., None], np.dstack([turned(-turn), turned(turn)]), 0.0)[middle]
-    depth = np.where(spoke, 4.0, 9.0)[middle]
+    depth = np.where(before, 2.0, np.where(spoke, 4.0, 9.0))[middle]
     return mean(color), motion.astype("f4"), depth.astype("f4")
 
 
@@ -56,3 +60,50 @@ def test_crowded_tiles_are_their_twin():
     times = Shutter(360).sample_times(4).astype(float)
     want = gather_twin.gather([(0, color, motion, depth)], times)
     assert (np.abs(got - want) > 1e-3).any(axis=2).mean() < 0.01
+
+
+def words_of(blur, frames, slices):
+    """What a Blur scattered last: by frame, the depth and pixel of slices and blocks."""
+    scatter = blur.method._scatter
+    size = blur.method._search._images._textures["second differences"].size[:2]
+    across, down = (TILE // 4 * -(-n // TILE) for n in size)
+    words = np.frombuffer(blur.device.queue.read_buffer(scatter._scattered._buffer), np.uint32)
+    words = words[: frames * slices * down * across].reshape(frames, slices, down, across)
+    found = [{} for _ in range(frames)]
+    for f, k, j, i in np.argwhere(words):
+        word = int(words[f, k, j, i]) ^ 0xFFFFFFFF
+        depth = np.array(word >> 18 << 17, np.uint32).view("f4")
+        x, y = ((word >> n & 511) - 256 + 4 * at for n, at in ((0, i), (9, j)))
+        found[f][k, j, i] = float(depth), y, x
+    return found
+
+
+def test_what_is_scattered_is_its_twin():
+    frames = [wheel(t, (48, 52), spokes=4, turn=np.radians(80), post=14) for t in (0, -1, 1)]
+    blur = wgmb.Blur("gather", samples=4, shutter=360)
+    blur(frame_of(frames))
+    given = [(offset, *frame) for offset, frame in zip((0, -1, 1), frames, strict=True)]
+    layers = [
+        gather_twin.separate(*given[0], prev=given[1], next=given[2]),
+        gather_twin.separate(*given[1], next=given[0]),
+        gather_twin.separate(*given[2], prev=given[0]),
+    ]
+    for frame, got in zip(layers, words_of(blur, 3, 4), strict=True):
+        tiles = gather_twin.tile_candidates(frame, (-0.5, 0.5))
+        gather_twin.scatter(frame, tiles, (-0.5, 0.5), 4, own=layers[0])
+        want = {}
+        for row in tiles:
+            for tile in row:
+                want |= tile["scattered"]
+        assert len(want) > 10
+        assert got == want
+
+
+def test_spokes_behind_a_post_are_those_of_the_neighbours():
+    """From what the frame itself scatters: 26.3 dB."""
+    look = {"spokes": 7, "post": 14}
+    frame, off = frame_of([wheel(t, **look) for t in (0, -1, 1)]), []
+    for t in (-0.4, -0.3, 0.3, 0.4):
+        got = wgmb.Blur("gather", shutter=Shutter(1, phase=t), samples=1)(frame)
+        off.append(np.square(got - wheel(t, **look)[0]).mean())
+    assert -10 * np.log10(np.mean(off)) > 26.5

@@ -46,7 +46,8 @@ def gather(frames, times):
     layers.insert(0, separate(*frames[0], prev=at.get(-1), next=at.get(1), far=far))
     span = times[0] - (times[1] - times[0]) / 2, times[-1] + (times[1] - times[0]) / 2
     tiles = [tile_candidates(f, span) for f in layers]
-    scatter(layers[0], tiles[0], span, min(SLICES, len(times)))
+    for frame, its_tiles in zip(layers[: len(layers) - len(far)], tiles, strict=False):
+        scatter(frame, its_tiles, span, min(SLICES, len(times)), own=layers[0])
     height, width = frames[0][1].shape[:2]
     own = frames[0][1].astype(float)
     out = own.copy()
@@ -383,7 +384,8 @@ def tile_candidates(frame, span):
                 "times": [times[k] for k in order],
                 "edges": any(own[k]["edges"] for k in met),
                 "longest": max((own[k]["longest"] for k in met), default=0.0),
-                "crowded": max(missed, default=0.0) > max(CROWDED, CROWDED_SHARE * reach),
+                "crowded": abs(frame.offset) <= 1
+                and max(missed, default=0.0) > max(CROWDED, CROWDED_SHARE * reach),
                 "missed": {key for (*_, key), far in zip(candidates, missed, strict=True)
                            if far > CROWDED},
                 "scattered": {},
@@ -391,11 +393,12 @@ def tile_candidates(frame, span):
     return out
 
 
-def scatter(frame, tiles, span, slices):
+def scatter(frame, tiles, span, slices, own):
     """Put the nearest pixel that is in a block at a slice of the exposure into its crowded tile.
 
     `tiles` get "scattered": by slice and block, the depth, rounded down to 1/64, and the pixel.
-    Of 2 x 2 pixels the nearest stands for all.
+    Of 2 x 2 pixels the nearest stands for all. Of a neighbour, only what `own`, the frame itself,
+    hides.
     """
     height, width = frame.edgeless.shape
     paths = frame.trajectory[0]
@@ -413,7 +416,10 @@ def scatter(frame, tiles, span, slices):
         u = span[0] + (span[1] - span[0]) * (k + 0.5) / slices - frame.offset
         for y, x in (at for at in quads if moves[at] and (at[0] // TILE, at[1] // TILE) in sources):
             to = np.array([x, y]) + 0.5 + moved(paths[y, x], u)
-            if (to < 0).any() or (to >= (width, height)).any():
+            here = np.array([x, y]) + 0.5 + moved(paths[y, x], -frame.offset)
+            shown = (here >= 0).all() and (here < (width, height)).all()
+            nearer = shown and own.depth[0][int(here[1]), int(here[0])] * 1.05 < exact[y, x]
+            if (to < 0).any() or (to >= (width, height)).any() or (frame.offset and not nearer):
                 continue
             i, j = to.astype(int)
             tile, block = tiles[j // TILE][i // TILE], (k, j // BLOCK, i // BLOCK)
@@ -514,7 +520,7 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
         tile, u = tiles[f], t - layers[f].offset
         own = search_layer(f, False, None, None)
         z, *pixel = tile["scattered"].get((slice_, y // BLOCK, x // BLOCK), (np.inf,))
-        if z < seen[0].depth:
+        if z * (1.1 if f else 1.0) < seen[0].depth:
             search_layer(f, False, moved(layers[f].trajectory[0][tuple(pixel)], u), own)
         for path, z, when in zip(tile["paths"], tile["depths"], tile["times"], strict=True):
             if z * (1.1 if f else 1.0) < seen[0].depth and when[0] <= u <= when[1]:

@@ -94,13 +94,12 @@ class Gather:
         worklists = self._tiles.encode(encoder, inputs)
         self._layers.encode(encoder, inputs, worklists)
         candidates = self._motions.candidates(size, len(frames))
-        tiles = self._scatter.tiles(encoder, size)
+        scattered = self._scatter.scattered(encoder, inputs)
         for i in range(len(frames)):
-            surface = self._layers.front_surface(i)
+            own, surface = (self._layers.front_surface(k) for k in (0, i))
+            tiles = self._scatter.tiles(encoder, size)
             self._motions.encode(encoder, inputs, i, surface, worklists, tiles)
-        scattered = self._scatter.encode(
-            encoder, inputs, self._layers.front_surface(0), candidates, tiles
-        )
+            self._scatter.encode(encoder, inputs, i, (own, surface), candidates, tiles, scattered)
         textures = self._layers.textures
         added = None
         if kinds := kinds_of(inputs, self._shading):

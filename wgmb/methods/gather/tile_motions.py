@@ -30,7 +30,7 @@ class TileMotions:
     def encode(self, encoder, inputs, index: int, front_surface, worklists, scattering):
         """Record the candidate motions of every tile in frame `index` of the inputs.
 
-        `scattering`: gets the tiles of the scatter, if it is the frame itself and any is crowded.
+        `scattering`: gets its tiles to scatter, if any tile is crowded.
         """
         kernel = gpu.kernel(self._device, "methods/gather/tile_motions.wgsl")
         data = np.zeros((), kernel.source.dtype("SourceFrame"))

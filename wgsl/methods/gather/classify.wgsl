@@ -33,7 +33,7 @@ fn main(@builtin(local_invocation_index) local: u32,
     let candidates0 = load_candidates(tile, 0u);
     let candidates1 = load_candidates(tile, 1u);
     let candidates2 = load_candidates(tile, 2u);
-    let is_crowded = candidates0.header.w > 0.0;
+    let is_crowded = max(candidates0.header.w, max(candidates1.header.w, candidates2.header.w)) > 0.0;
     let times = sample_times(0.5 * vec2f(low + high) + 0.5, 0.0, candidates0, candidates1, candidates2);
     // Jittered pixels have times of their own.
     let is_static = is_static_tile(candidates0, candidates1, candidates2);
@@ -74,8 +74,8 @@ fn main(@builtin(local_invocation_index) local: u32,
                 n++;
                 if !is_single || n >= 4u { break; }
             }
-            let word = scattered_at(low, t, is_single && is_crowded && f == 0u);
-            is_single = is_single && (word == 0u || scattered_depth(word) * SURFACE_DEPTH_RATIO >= deepest);
+            let word = scattered_at(low, t, f, is_single && is_crowded);
+            is_single = is_single && (word == 0u || scattered_depth(word) * handicap * SURFACE_DEPTH_RATIO >= deepest);
             let again = is_single && f == 0u && sources.count > 1u && abs(t) > TRUSTED_TIME;
             f = neighbour_of(t, false);
             if !again { break; }

@@ -1,5 +1,5 @@
-// What is scattered: for every slice of the exposure and every block of pixels a word that tells the nearest pixel of the frame
-// that is in the block by then: its depth, and its place counted from the block's first pixel. 0: none; greater: nearer.
+// What is scattered: for the frame and its neighbours, every slice of the exposure and every block of pixels a word that tells the
+// nearest pixel that is in the block by then: its depth, and its place counted from the block's first pixel. 0: none; greater: nearer.
 //#include common/frame.wgsl
 //#include common/shutter.wgsl
 //#include methods/gather/worklist.wgsl
@@ -10,10 +10,10 @@ const PLACE_BITS: u32 = 9u;         // of x and y each, as far as motions are fo
 const HALF_PLACE: i32 = 256;        // [px]
 const LOST_BITS: u32 = 17u;         // of a depth, which is known to 1/64 of itself
 
-/// The slices in a buffer of so many words.
-fn slice_count(words: u32) -> u32 {
+/// The slices in a buffer of so many words, for so many frames.
+fn slice_count(words: u32, frames: u32) -> u32 {
     let blocks = tiles_of(frame.size) * (TILE / BLOCK);
-    return words / (blocks.x * blocks.y);
+    return words / (blocks.x * blocks.y * frames);
 }
 
 /// The middle of a slice [frame intervals].
@@ -29,10 +29,10 @@ fn slice_at(t: f32, slices: u32) -> u32 {
     return min(u32(max(share, 0.0) * f32(slices) + 0.001), slices - 1u);
 }
 
-/// The place of a block's word in the buffer.
-fn scattered_index(slice: u32, block: vec2u) -> u32 {
+/// The place of a block's word in the buffer: of frame `f`, in a slice of so many.
+fn scattered_index(f: u32, slice: u32, slices: u32, block: vec2u) -> u32 {
     let blocks = tiles_of(frame.size) * (TILE / BLOCK);
-    return (slice * blocks.y + block.y) * blocks.x + block.x;
+    return ((f * slices + slice) * blocks.y + block.y) * blocks.x + block.x;
 }
 
 /// The word of a pixel of that depth; 0 if it is too far from the block.

@@ -111,12 +111,12 @@ fn next_seed(seeds: ptr<function, Seeds>) -> vec2f {
     return select(select(later, vec2f(s.x.y, s.y.y), (s.pending & 2u) != 0u), vec2f(s.x.x, s.y.x), (s.pending & 1u) != 0u);
 }
 
-/// The word of what of the frame itself is scattered into the block of the pixel `px` by the time `t`, if `wanted`; else 0.
-fn scattered_at(px: vec2u, t: f32, wanted: bool) -> u32 {
+/// The word of what of frame `f` is scattered into the block of the pixel `px` by the time `t`, if `wanted`; else 0.
+fn scattered_at(px: vec2u, t: f32, f: u32, wanted: bool) -> u32 {
     var word = 0u;
     for (var i = 0u; i < u32(wanted); i++) {
-        let slices = slice_count(arrayLength(&scattered));
-        word = scattered[scattered_index(slice_at(t, slices), px / BLOCK)];
+        let slices = slice_count(arrayLength(&scattered), sources.count);
+        word = scattered[scattered_index(f, slice_at(t, slices), slices, px / BLOCK)];
     }
     return word;
 }

@@ -23,7 +23,7 @@ struct SourceFrame {
 @group(1) @binding(7) var<storage, read> static_cells: WorkList;
 @group(1) @binding(8) var coarse_boxes: texture_2d<f32>;    // what `coarsen` wrote
 @group(1) @binding(9) var coarse_boxes_out: Boxes;      // around the boxes of COARSE x COARSE tiles
-@group(1) @binding(10) var<storage, read_write> scattering: array<atomic<u32>>; // a WorkList of the tiles to scatter; then a flag for each; all 0 at first
+@group(1) @binding(10) var<storage, read_write> scattering: array<atomic<u32>>; // a WorkList of the tiles of this frame to scatter; then a flag for each; all 0 at first
 
 alias Layers = texture_storage_2d_array<rgba32float, write>;
 alias Packed = texture_storage_2d_array<rgba32uint, write>;
@@ -273,7 +273,7 @@ fn gather_candidates(@builtin(local_invocation_index) local: u32,
         velocities[k] = pack_halves(motions[k].xy);
         half_accelerations[k] = pack_halves(motions[k].zw);
     }
-    let is_crowded = source.first == 0u && missed > max(CROWDED_DISTANCE * CROWDED_DISTANCE, reach2);
+    let is_crowded = abs(source.offset) <= 1.0 && missed > max(CROWDED_DISTANCE * CROWDED_DISTANCE, reach2);
     let sources_end = select(first.y - 1, last.y, is_crowded);
     for (var tile = first; tile.y <= sources_end; tile = after(tile, first, last)) {
         let other = source_tile(tile, here);

@@ -3,7 +3,7 @@
 //#include methods/gather/motion.wgsl
 //#include methods/gather/search.wgsl
 
-override CROWDED: bool = false;     // tiles are crowded: searches of the frame itself start from what is scattered too
+override CROWDED: bool = false;     // tiles are crowded: searches of front layers start from what is scattered too
 
 const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: what one showed is preferred
 const ITERATIONS_SAVED: u32 = 3u;       // from a tile's motion, compared with a start from nothing
@@ -113,7 +113,8 @@ fn start_of(starts: Starts, query: Query) -> vec2f {
 fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candidates: Candidates) {
     let is_front = query.layer % 2u == 0u;
     var seeds = seeds_at(candidates, query.u, select(0u, may_be_there(candidates, query.u), is_front));
-    let word = scattered_at(vec2u(query.x), query.u, CROWDED && query.layer == 0u);
+    let f = query.layer / 2u;
+    let word = scattered_at(vec2u(query.x), query.u + offset_of(f), f, CROWDED && is_front && !is_far(query.layer));
     let there = displacement_in(word, query);
     var first = vec2f(INFINITE);    // where the first search led; if nowhere, the place where it stopped tells nothing
     var is_first = true;
@@ -125,7 +126,7 @@ fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candi
         if is_there { record(visible, query, state); }
         let nearer = may_be_nearer(candidates, (*visible).opaque.depth / query.handicap);
         seeds.pending &= nearer & ~are_solution(seeds, first);
-        let is_nearer = is_first && word != 0u && scattered_depth(word) < (*visible).opaque.depth;
+        let is_nearer = is_first && word != 0u && scattered_depth(word) * query.handicap < (*visible).opaque.depth;
         if CROWDED && is_nearer && !same_solution(there, first) { seeds.pending |= SCATTERED; }
         is_first = false;
         if seeds.pending == 0u { break; }
