@@ -333,7 +333,7 @@ def from_pushed(a, b, own, other, trusts, guard, time):
         for share, one in ((1 - late, a), (late, b))
     )
     there = np.minimum(np.maximum(a[..., 3], b[..., 3]), 1)
-    moved = mean * (there / np.maximum(n, 1e-3))[..., None]
+    moved = mean * (there / np.maximum(n, 0.05))[..., None]
     late = smooth(time, 0.2)
     rests = (1 - late) * (1 - trusts[0])[..., None] * own + late * (1 - trusts[1])[
         ..., None

@@ -32,6 +32,7 @@ override HAS_ALBEDO: bool = true;   // else it is 1
 override WEIGHTED: bool = false;    // multiply by `weight`
 override ONTO: bool = false;        // add to `earlier`
 
+const LEAST_COVERED: f32 = 0.05;    // what comes from one frame alone counts less than this close to the instant of the other
 const LEAST_LIGHT: f32 = 0.005;     // share of the light that the darkest shadow leaves
 const MOST_ADDED: f32 = 60000.0;    // [linear]
 const COUNTS: f32 = 0.1;            // change of the logarithm of light from which on it has to be followed
@@ -150,7 +151,7 @@ fn pushed(px: vec2i) -> vec4f {
     let shares = vec2f(1.0 - step_around(node.time, 0.3), step_around(node.time, 0.3));
     let covered = shares * min(vec2f(a.w, b.w), vec2f(1.0));
     let mixed = (shares.x * a.rgb / max(a.w, 1.0) + shares.y * b.rgb / max(b.w, 1.0))
-        / max(covered.x + covered.y, 1e-3) * min(max(a.w, b.w), 1.0);
+        / max(covered.x + covered.y, LEAST_COVERED) * min(max(a.w, b.w), 1.0);
     let late = step_around(node.time, 0.2);
     let rests = (1.0 - late) * (1.0 - trusts.x) * own + late * (1.0 - trusts.y) * other;
     let differs = textureLoad(explained, px, 0);
