@@ -171,6 +171,7 @@ def picture_of(whole):
 
 def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     words = [ROOT / "app.py", "--window", "{}x{}".format(*SIZE), "--samples", "4"]
+    words += ["--shading", "off"]  # without a GPU, light takes longer than a picture has to settle
     it = desk(*map(str, words))
     it.wait_for_window()
     it.plays()

@@ -1,5 +1,6 @@
 // Light that moves: what is added to the colour of a surface because it is seen at another time than that of its frame.
 // It is known on this frame's surfaces at a few times, the nodes (see shading/compose.wgsl).
+//#include common/loops.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
 //#include methods/gather/search.wgsl
@@ -60,10 +61,10 @@ fn light_during(at: vec2f, t: f32, duration: f32) -> vec4f {
     let u = clamp((t - light_nodes.first) / light_nodes.step, half - 0.5, max(last - half + 0.5, half - 0.5));
     // A node stands for half a step to either side.
     let first = clamp(ceil(u - half - 0.5), 0.0, last);
-    let count = i32(clamp(ceil(2.0 * half), 1.0, last + 1.0)) + 1;
+    let count = turns_of(u32(clamp(ceil(2.0 * half), 1.0, last + 1.0)) + 1u, u32(max(at.x, 0.0)));
     var sum = vec4f(0.0);
     var total = 0.0;
-    for (var k = 0; k < count; k++) {
+    for (var k = 0u; k < count; k++) {
         let node = first + f32(k);
         let share = max(min(node + 0.5, u + half) - max(node - 0.5, u - half), 0.0);
         sum += share * textureSampleLevel(added_light, linear, uv, u32(min(node, last)), 0.0);

@@ -2,6 +2,7 @@
 // are searched, the nearest ones composited front to back, and the results averaged.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
+//#include common/loops.wgsl
 //#include common/noise.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
@@ -169,7 +170,8 @@ fn lit_color(px: vec2u) -> vec4f {
     let times = shutter_times(x, 0.0);
     let share = 1.0 / f32(times.count);
     var sum = vec4f(0.0);
-    for (var i = 0u; i < times.count; i++) {
+    let count = turns_of(times.count, px.x);
+    for (var i = 0u; i < count; i++) {
         sum += share * moving_light(x, 0u, shutter_time(times, i), sample_duration(times, i));
     }
     return max(color + sum, vec4f(0.0));
@@ -181,7 +183,8 @@ fn static_unlit(px: vec2u) -> f32 {
     let x = vec2f(px) + 0.5;
     let times = shutter_times(x, 0.0);
     var sum = 0.0;
-    for (var i = 0u; i < times.count; i++) {
+    let count = turns_of(times.count, px.x);
+    for (var i = 0u; i < count; i++) {
         sum += light_unknown(x, 0u, shutter_time(times, i), sample_duration(times, i)) / f32(times.count);
     }
     return sum;
