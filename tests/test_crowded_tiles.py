@@ -6,7 +6,7 @@ import pytest
 import wgmb
 from images import frame_of
 from twins import gather as gather_twin
-from twins.gather import TILE
+from twins.gather import BLOCK, TILE
 from wgmb import Shutter
 
 TURN = np.radians(50)  # per frame
@@ -63,17 +63,17 @@ def test_crowded_tiles_are_their_twin():
 
 
 def words_of(blur, frames, slices):
-    """What a Blur scattered last: by frame, the depth and pixel of slices and blocks."""
+    """The depth and pixel that a Blur scattered last, by frame, then by slice and block."""
     scatter = blur.method._scatter
     size = blur.method._search._images._textures["second differences"].size[:2]
-    across, down = (TILE // 4 * -(-n // TILE) for n in size)
+    across, down = (TILE // BLOCK * -(-n // TILE) for n in size)
     words = np.frombuffer(blur.device.queue.read_buffer(scatter._scattered._buffer), np.uint32)
     words = words[: frames * slices * down * across].reshape(frames, slices, down, across)
     found = [{} for _ in range(frames)]
     for f, k, j, i in np.argwhere(words):
         word = int(words[f, k, j, i]) ^ 0xFFFFFFFF
         depth = np.array(word >> 18 << 17, np.uint32).view("f4")
-        x, y = ((word >> n & 511) - 256 + 4 * at for n, at in ((0, i), (9, j)))
+        x, y = ((word >> n & 511) - 256 + BLOCK * at for n, at in ((0, i), (9, j)))
         found[f][k, j, i] = float(depth), y, x
     return found
 

@@ -26,8 +26,6 @@ from .scene.gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
 from .scene.scene import Scene
 
 _BUSY = 0.1  # seconds of GPU work handed over at once, so that Ctrl-C is heard
-# Passes of light of a scene, by the names of the textures, as inputs of a Blur.
-_LIGHT = {"light": "diffuse_light", "albedo": "diffuse_color"}
 Progress = Callable[[int, int], None]
 """Called with the samples done and their total."""
 
@@ -216,7 +214,7 @@ class Render:
             if light:
                 for name, texture in self._light(time, number, 0, self.blur).items():
                     encoder = self.blur.device.create_command_encoder(label="download")
-                    passes[_LIGHT[name]] = self._images.download(encoder, texture)[..., :3].copy()
+                    passes[name] = self._images.download(encoder, texture)[..., :3].copy()
         return Frame(
             arrays["color"],
             depth=arrays["depth"][..., 0],
@@ -248,7 +246,7 @@ class Render:
             self._pictures[offset] = {**drawn, "camera": on_gpu.reprojections(offset)}
         seen = self._pictures[offset]
         lit = {}
-        if abs(offset) <= 1 and blur.method.uses >= {*_LIGHT.values()}:
+        if abs(offset) <= 1 and "diffuse_light" in blur.method.uses:
             lit = self._light(time, number, offset, blur, timing)
         return FrameViews(
             color=seen["color"].create_view(),
@@ -256,14 +254,14 @@ class Render:
             normal=seen["normal"].create_view(),
             object_id=seen["object"].create_view(),
             camera=seen["camera"],
-            diffuse_light=lit["light"].create_view() if lit else None,
-            diffuse_color=lit["albedo"].create_view() if lit else None,
+            diffuse_light=lit["diffuse_light"].create_view() if lit else None,
+            diffuse_color=lit["diffuse_color"].create_view() if lit else None,
         )
 
     def _light(
         self, time: float, number: int, offset: int, blur: Blur, timing: Clock | None = None
     ) -> dict[str, wgpu.GPUTexture]:
-        """The passes of light `offset` frames from the moment, by the names of _LIGHT."""
+        """The passes of light `offset` frames from the moment, by their names in Frame."""
         on_gpu = self.on_gpu(time, blur)
         if offset not in self._lights:
             encoder = blur.device.create_command_encoder(label="light")

@@ -133,7 +133,9 @@ class SceneOnGpu:
         name: str,
         time: float,
     ) -> dict[str, wgpu.GPUTexture]:
-        """Record the passes of light at `time` [frame intervals from this frame]; their textures.
+        """Record the passes of light at `time` [frame intervals from this frame].
+
+        Returns their textures by their names in Frame.
 
         None of scenes with a backdrop, whose solids are shaded otherwise.
         """
@@ -150,7 +152,7 @@ class SceneOnGpu:
         }
         views = {k: t.create_view() for k, t in textures.items()}
         kernel.run(encoder, "main", bindings, view=buffer, **self.resources, **views)
-        return textures
+        return {"diffuse_light": textures["light"], "diffuse_color": textures["albedo"]}
 
     def reprojections(self, time: float = 0.0) -> Reprojections:
         """Camera and body motion around `time` [frame intervals from this frame]."""
