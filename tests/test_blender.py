@@ -1,7 +1,7 @@
 """The Blender add-on: what can be told without Blender, and tests/blender in Blender's module.
 
-`./run test` installs the module into build/blender where it can; WGMB_BLENDER=required fails where
-it cannot, WGMB_BLENDER=skip does without.
+`./run test all` installs the module into build/blender where it can; WGMB_BLENDER=required fails
+where it cannot, WGMB_WITHOUT=blender does without.
 """
 
 import ast
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+import parts
 from wgmb import __version__
 
 ROOT = Path(__file__).parents[1]
@@ -74,20 +75,10 @@ def test_the_add_on_can_be_loaded_without_what_it_brings(file):
     assert not {n for n in names if n.partition(".")[0] in ("wgmb", "wgpu", "OpenEXR")}
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("file", FILES)
 def test_in_blenders_module(file):
-    asked = os.environ.get("WGMB_BLENDER")
-    if asked == "skip":
-        pytest.skip("WGMB_BLENDER=skip")
-    if not (HOME / "ready").exists():
-        why = HOME / "why"
-        reason = (
-            why.read_text("utf-8").strip() if why.exists() else "WGMB_BLENDER=required makes it"
-        )
-        if asked == "required":
-            pytest.fail(f"no Blender module in {HOME}: {reason}")
-        pytest.skip(f"no Blender module in {HOME}: {reason}")
+    parts.need("blender")
     words = [PYTHON, "-m", "pytest", "-c", TESTS / "pytest.ini", f"--confcutdir={TESTS}"]
     words += [f"--rootdir={TESTS}", "-q", TESTS / file]
     keep = {name: v for name, v in os.environ.items() if not name.startswith("PYTEST")}

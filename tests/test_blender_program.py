@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 PROGRAM = shlex.split(os.environ.get("WGMB_BLENDER_PROGRAM", ""))
 WHEELS = ROOT / "build/blender/wheels"
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.full,
     pytest.mark.skipif(not PROGRAM, reason="WGMB_BLENDER_PROGRAM names no Blender"),
 ]
 INSTALL = """

@@ -1,7 +1,6 @@
 """The core without extras, in an environment that `./run test` makes: nothing else is installed."""
 
 import json
-import os
 import re
 import subprocess
 from pathlib import Path
@@ -10,21 +9,16 @@ import numpy as np
 import pytest
 
 import core_alone
+import parts
 from wgmb.extras import EXTRAS
 
-pytestmark = pytest.mark.slow
-
-ROOT = Path(__file__).parents[1]
-PYTHON = ROOT / "build/core/bin/python"
+PYTHON = Path(__file__).parents[1] / "build/core/bin/python"
 
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory):
     """Messages and results of the core alone: said.json and results.npz."""
-    if not PYTHON.exists():
-        if os.environ.get("WGMB_CORE") == "required":
-            pytest.fail(f"{PYTHON} is missing")
-        pytest.skip(f"no {PYTHON}; `./run test` makes it")
+    parts.need("core")
     folder = tmp_path_factory.mktemp("alone")
     line = [PYTHON, "-W", "error", core_alone.__file__, folder]
     done = subprocess.run(line, capture_output=True, text=True, timeout=300)

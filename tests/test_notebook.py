@@ -14,7 +14,7 @@ import wgmb
 from wgmb.hosts import explorer
 
 # Jupyter's own remarks, in this process.
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
+pytestmark = pytest.mark.filterwarnings("ignore")
 
 
 @pytest.fixture(scope="module")

@@ -1,13 +1,11 @@
 """docs/page.html in Chromium: pictures against Python's, controls, and life without WebGPU.
 
-Skipped with a reason where node, playwright-core or Chromium is missing; WGMB_CHROMIUM=required,
-which `./run test` sets where CI is set, makes that a failure.
+Skipped where there is no Chromium, except in CI, which installs it.
 """
 
 import base64
 import gzip
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -18,6 +16,7 @@ import numpy as np
 import pytest
 
 import make_page
+import parts
 import standard
 from wgmb import Blur, Render, Shutter
 from wgmb.color import to_display
@@ -26,16 +25,6 @@ from wgmb.scene import make
 HERE = Path(__file__).parent
 SIZE = 640, 360
 LEAST, MOST = 55, 2  # dB, and 255ths
-
-
-def why_not() -> str:
-    if standard.node_path() is None:
-        return "node is missing"
-    if not (standard.HERE / "node_modules" / "playwright-core").is_dir():
-        return "npm ci has not been run in tests/dawn (./run test does it)"
-    if shutil.which("chromium") is None:
-        return "chromium is missing"
-    return ""
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +38,7 @@ def page(tmp_path_factory):
 @pytest.fixture(scope="module")
 def visit(page):
     """visit(*visits): what page.mjs saw of each; none may have an error or ask a network."""
-    if reason := why_not():
-        if os.environ.get("WGMB_CHROMIUM") == "required":
-            pytest.fail(reason)
-        pytest.skip(reason)
+    parts.need("chromium", "dawn")
 
     def visited(*visits: dict) -> list[dict]:
         given = {"page": page.as_uri(), "chromium": shutil.which("chromium"), "visits": visits}

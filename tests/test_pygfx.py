@@ -15,7 +15,7 @@ from wgmb.gpu import bind_groups
 from wgmb.hosts.pygfx import Bodies, MotionBlurPass
 from wgmb.methods import METHODS
 
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]  # pygfx's own
+pytestmark = pytest.mark.filterwarnings("ignore")  # pygfx's own
 
 ROOT = Path(__file__).parents[1]
 INSTANT, TIMES = 5.0, 64  # of the truth: pictures over half a frame

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import parts
 import standard
 import wgmb
 from images import crossing, frame_of
@@ -16,10 +17,7 @@ FILES = sorted(str(p.relative_to(wgsl.ROOT)) for p in wgsl.ROOT.rglob("*.wgsl"))
 
 @pytest.fixture
 def dawn():
-    if reason := standard.why_not():
-        if standard.is_required():
-            pytest.fail(reason)
-        pytest.skip(reason)
+    parts.need("dawn")
     return standard.compiled
 
 

@@ -14,7 +14,6 @@ import make_frames as make
 from wgmb.cli import app
 
 ROOT = Path(__file__).parent.parent
-pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
