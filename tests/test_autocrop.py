@@ -102,6 +102,7 @@ def autocropped(tmp_path_factory):
     return sequence(tmp_path_factory.mktemp("crop") / "in", slack)
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("shutter", SHUTTERS, ids=str)
 @pytest.mark.parametrize("method", IMAGE_METHODS)
 def test_cropped_frames_give_the_same_picture(whole, autocropped, tmp_path, method, shutter):

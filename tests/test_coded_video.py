@@ -1,5 +1,6 @@
 """Pictures go into a video as they are coded, at the times they are given, or not at all."""
 
+import os
 import sys
 from dataclasses import replace
 from fractions import Fraction
@@ -17,6 +18,7 @@ from wgmb.io.coded_video import CodedVideo
 from wgmb.io.encoders import CODECS, Facts, chosen
 from wgmb.io.footage import Footage
 from wgmb.io.hdr10 import LightLevel, Mastering
+from wgmb.io.video_file import VideoFile
 
 pytestmark = pytest.mark.fast
 
@@ -324,3 +326,21 @@ def test_a_clock_goes_there_and_back():
     assert clock.out(Fraction(1, 3)) == Fraction(1, 7)
     assert clock.out(Fraction(1, 3) + 2) == Fraction(1, 7) + 5
     assert clock.back(clock.out(Fraction(9, 11))) == Fraction(9, 11)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getscheduler"), reason="this system has no policies")
+@pytest.mark.parametrize(("name", "codec"), [("v.mp4", "av1"), ("v.mp4", "h265"), ("v.mp4", None)])
+def test_no_thread_is_made_real_time(tmp_path, monkeypatch, name, codec):
+    """SVT-AV1 would where it may, as root: new threads would inherit it and hold others up."""
+    begin, during = VideoFile._begin, []
+
+    def observed(*given):
+        stream = begin(*given)
+        during.extend(os.sched_getscheduler(int(n)) for n in os.listdir("/proc/self/task"))
+        return stream
+
+    monkeypatch.setattr(VideoFile, "_begin", observed)
+    write(tmp_path / name, Coding(bits=8), codec)
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER
+    assert during
+    assert not {os.SCHED_FIFO, os.SCHED_RR} & set(during)

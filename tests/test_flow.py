@@ -224,6 +224,7 @@ def test_motion_much_like_that_of_most_becomes_it_where_it_matches_as_well():
     assert 0.5 < is_taken.mean() < 0.9
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("views", [MIDDLE, FIRST])
 @pytest.mark.parametrize("number, aside, level", [(0, 0.4, 1), (1, 0.15, 1), (3, 0.4, 0)])
 def test_half_a_sweep_takes_the_best_candidate(views, number, aside, level):
@@ -456,7 +457,13 @@ def test_what_is_hidden_on_one_side_follows_the_other():
     assert depth[26, 40] < 0.97 < 0.999 < depth[5, 5]
 
 
-@pytest.mark.parametrize("size", [(37, 53), (2, 3), (1, 1), (20, 230)])
+LARGE = pytest.mark.full
+
+
+@pytest.mark.parametrize(
+    "size",
+    [pytest.param((37, 53), marks=LARGE), (2, 3), (1, 1), pytest.param((20, 230), marks=LARGE)],
+)
 def test_a_still_picture_is_left_alone(size):
     rng = np.random.default_rng(size[1])
     picture = rng.random((*size, 3)).astype("f4")

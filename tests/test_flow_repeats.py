@@ -144,7 +144,7 @@ def test_half_a_sweep_keeps_near_the_lead(views):
     assert (new < before - FILTER).sum() > 10
 
 
-@pytest.mark.parametrize("quality", ["best", "fast"])
+@pytest.mark.parametrize("quality", [pytest.param("best", marks=pytest.mark.full), "fast"])
 def test_checks_that_change_their_shade_are_not_confused(quality):
     """A shadow moves over a checkered cloth by half of its period more than the cloth does."""
     way, period, centre = np.array([3.0, 1.0]), 40, (128, 72)
@@ -163,6 +163,7 @@ def test_checks_that_change_their_shade_are_not_confused(quality):
     assert (error < 4).mean() > 0.95
 
 
+@pytest.mark.full
 def test_cloth_that_turns_back_is_found_on_both_sides():
     """Waves run through it: slopes and speeds differ so much that one side seems hidden."""
     highest, length, turn = 8, 90, 1.0  # px, px, radians per frame

@@ -72,11 +72,11 @@ def check(capsys, pattern, parts, *options, suffix="exr", name="o.####"):
     [
         ("tap", 1),
         ("gather", 3),
-        ("gather", COUNT),
-        ("gather --reach 2", 3),
+        pytest.param("gather", COUNT, marks=pytest.mark.full),
+        pytest.param("gather --reach 2", 3, marks=pytest.mark.full),
         ("reproject", 4),
-        ("tiles", 7),
-        ("fusion", 4),
+        pytest.param("tiles", 7, marks=pytest.mark.full),
+        pytest.param("fusion", 4, marks=pytest.mark.full),
     ],
 )
 def test_parts_of_any_size_are_the_whole_with_every_method(desk, capsys, shot, method, chunk):
@@ -97,6 +97,7 @@ def test_parts_of_a_shot_that_moves_only_at_times_read_its_vectors_alike(desk, c
     assert told.count("flip y") == 3
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("reach", [1, 2])
 @pytest.mark.parametrize("cut", [5, 6, 7])
 @pytest.mark.parametrize("known", [True, False], ids=["named", "found"])
@@ -179,7 +180,7 @@ def test_windows_that_cut_through_the_picture_are_the_same(desk, capsys):
     check(capsys, "in/s.####.exr", ["1-3", "4", "5"], "--method", "gather")
 
 
-@pytest.mark.parametrize("flow", ["dis", "search"])
+@pytest.mark.parametrize("flow", ["dis", pytest.param("search", marks=pytest.mark.full)])
 def test_motion_that_comes_from_the_pictures_is_the_same(desk, capsys, flow):
     for n in range(1, 9):
         make.write_exr(desk / "in" / f"s.{n:04d}.exr", make.colors(make.picture(n)))

@@ -187,6 +187,7 @@ def test_every_colour_of_8_bits_averaged_with_itself_is_itself(device, matrix, f
         np.testing.assert_array_equal(plane, want)
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("count", [3, 19])
 @pytest.mark.parametrize("name", YUV)
 def test_an_average_of_planes_is_that_of_their_light(device, name, count):
@@ -239,6 +240,7 @@ def mild(picture, seed):
     return CodedPicture((luma, *chroma), picture.coding)
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("size", [(13, 7), (8, 2), (1, 1)])
 @pytest.mark.parametrize(
     ("stored_as", "wanted"),

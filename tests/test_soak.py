@@ -55,14 +55,17 @@ def test_what_once_did_what_no_file_may_is_read_or_refused_by_name(name, outcome
     assert outcomes[name]["why"] == ""
 
 
+@pytest.mark.full
 def test_killed_runs_leave_whole_files_and_are_resumed_to_the_same_bytes(tmp_path):
     check(stopping.kills, 4, tmp_path)
 
 
+@pytest.mark.full
 def test_interrupted_runs_end_with_one_line_at_any_time_also_while_they_start(tmp_path):
     check(stopping.stops, 4, tmp_path)
 
 
+@pytest.mark.full
 def test_several_processes_may_blur_into_one_folder(tmp_path):
     check(resuming.processes, 1, tmp_path)
 
@@ -115,6 +118,7 @@ def eating(mib: int) -> int:
     return len(b"x" * (mib << 20)) >> 20
 
 
+@pytest.mark.full
 def test_limits_hold_and_the_peak_is_told():
     # A forked process begins with the peak of this one, so it has to eat more than that.
     own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024

@@ -36,6 +36,7 @@ def pictures(size, speed=9.0, seed=0):
     return color, motion
 
 
+@pytest.mark.covers(2)
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("shutter", SHUTTERS)
 def test_tap_is_its_twin(close, size, shutter):
@@ -108,6 +109,7 @@ def depths(size, seed=0):
     return depth
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("shutter", SHUTTERS)
 def test_fusion_is_its_twin(close, size, shutter):
@@ -202,6 +204,7 @@ def test_reproject_is_its_twin(size, neighbours):
     assert wrong.mean() < 0.01
 
 
+@pytest.mark.covers(2)
 @pytest.mark.parametrize("frames", [1, 2, 3, 5])
 @pytest.mark.parametrize("size", [(36, 52), (1, 1)])
 @pytest.mark.parametrize("degrees", [180, 400])
@@ -295,6 +298,7 @@ def agree(got, want, few=0.01):
     assert (np.abs(got - want) > TOLERANCE).any(axis=2).mean() <= few
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("options", [{}, {"depth_test": True}, {"splat": "line"}])
 @pytest.mark.parametrize("size", [(24, 32), (17, 23), (1, 1), (3, 130)])
 def test_published_reprojection_along_vectors_is_its_twin(size, options):
@@ -313,6 +317,7 @@ def test_published_reprojection_along_vectors_is_its_twin(size, options):
     agree(blur[1](frame)[..., :1], count[..., None])
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("options", [{}, {"depth_test": True}, {"splat": "line"}, {"facing": True},
                                      {"facing": True, "splat": "line"}])  # fmt: skip
 @pytest.mark.parametrize("normals", [True, False])
@@ -368,6 +373,7 @@ def seen_from_three_cameras(size, kind, orthographic):
     return depth, ids, around, want
 
 
+@pytest.mark.covers(2)
 @pytest.mark.parametrize("orthographic", [False, True])
 @pytest.mark.parametrize("kind", ["planar", "clip"])
 @pytest.mark.parametrize("size", [(37, 53), (1, 1), (3, 130)])

@@ -141,6 +141,9 @@ def command_line(
     raise AssertionError(f"{len(wanted)} frames")
 
 
+FULL = pytest.mark.full
+
+
 @pytest.mark.parametrize(
     ("changes", "made"),
     [
@@ -148,19 +151,23 @@ def command_line(
         ({"shutter": 360.0, "phase": "start"}, {"degrees": 360, "phase": "start"}),
         ({"fps": 12.0, "frame": 1.0}, {"fps": 12}),
         ({"method": "gather"}, {"method": "gather"}),
-        ({"fps": 12.0, "shutter": 360.0, "frame": 2.0}, {"fps": 12, "degrees": 360}),
+        pytest.param({"fps": 12.0, "shutter": 360.0, "frame": 2.0},
+                     {"fps": 12, "degrees": 360}, marks=FULL),
         ({"fps": 12.0, "flow": "none", "frame": 1.0}, {"fps": 12}),
-        ({"pace": "0.5", "frame": 8.0}, {}),
+        pytest.param({"pace": "0.5", "frame": 8.0},
+                     {}, marks=FULL),
         ({"pace": "0.5", "frame": 9.0}, {}),
         ({"pace": "0.4", "fps": 60.0, "frame": 13.0, "method": "gather"},
          {"fps": 60, "method": "gather"}),
         ({"pace": "0.4", "fps": 60.0, "frame": 34.0, "shutter": 360.0},
          {"fps": 60, "degrees": 360}),
-        ({"pace": "0.5", "frame": 11.0, "flow": "search", "flow_quality": "fast"}, {}),
+        pytest.param({"pace": "0.5", "frame": 11.0, "flow": "search", "flow_quality": "fast"},
+                     {}, marks=FULL),
         ({"pace": "4", "frame": 1.0}, {}),
         ({"video": (("begin", "0.05"), ("end", "0.2")), "frame": 3.0}, {}),
         ({"frames": "3-9", "pace": "0.3", "frame": 0.0}, {"frames": "3-9"}),
-        ({"frames": "3-9", "pace": "0.3", "frame": 22.0}, {"frames": "3-9"}),
+        pytest.param({"frames": "3-9", "pace": "0.3", "frame": 22.0},
+                     {"frames": "3-9"}, marks=FULL),
         ({"video": (("highlights", 8.0),), "frame": 4.0}, {}),
         ({"given": (("cuts", "3,5"),), "shutter": 720.0}, {"cuts": "3,5", "degrees": 720}),
         ({"given": (("cuts", "only:5"),), "frame": 9.0}, {"cuts": "only:5"}),
@@ -197,6 +204,7 @@ def test_it_shows_what_the_command_line_makes(clip, changes, made):
 TIMES = [Fraction(n, 48) for n in (0, 1, 2, 4, 5, 7, 8, 9, 12, 13, 14, 16, 17, 18)]
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("speed", ["1", "0.4"])
 @pytest.mark.parametrize("own_times", [False, True])
 @pytest.mark.parametrize("fill", ["keep", "fill"])

@@ -127,6 +127,7 @@ def densities(device):
     return found
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("speed", SPEEDS)
 @pytest.mark.parametrize("curve", CURVES)
 def test_density_is_the_share_of_the_exposure_in_which_the_body_is_there(densities, curve, speed):
@@ -200,6 +201,7 @@ def test_the_published_form_counts_each_crossing_once(densities):
             assert exact < 1e-4 if speed < 100 else exact > 0.03
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("density", ["exact", "published"])
 @pytest.mark.parametrize("time, cam_y", [(4, 0.0), (13, 0.75), (17, -1.0), (19.5, 0.3), (23, 0.0),
                                          (27, -0.6), (40, 0.0), (48, 0.0)])  # fmt: skip

@@ -30,7 +30,8 @@ def pytest_collection_modifyitems(items):
             products[item.nodeid.partition("[")[0]].append(item)
     for cases in products.values():
         (n,) = cases[0].get_closest_marker("covers").args
-        chosen = covering([case.callspec.indices for case in cases], n)
+        values = [{name: id(value) for name, value in c.callspec.params.items()} for c in cases]
+        chosen = covering(values, n)
         for i, case in enumerate(cases):
             if i not in chosen:
                 case.add_marker("full")
@@ -39,8 +40,8 @@ def pytest_collection_modifyitems(items):
 def covering(cases: list[dict[str, int]], n: int) -> set[int]:
     """Indices of a few of the cases that meet every combination of n values of all cases.
 
-    A case is the index of each parameter's value. Greedy: the next one is that which meets most
-    combinations not met yet.
+    A case is the value of each parameter, as a number. Greedy: the next one is that which meets
+    most combinations not met yet.
     """
     met = [set(combinations(sorted(case.items()), min(n, len(case)))) for case in cases]
     open_ = set().union(*met)

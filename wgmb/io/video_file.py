@@ -22,6 +22,7 @@ from ..coding import Coding
 from ..errors import InputError
 from . import atomic
 from .encoders import CONTAINERS, HARDWARE, NO_FACTS, Encoding, Facts
+from .scheduling import kept_scheduling
 
 _RANGES = {False: 1, True: 2}  # limited, full, as FFmpeg counts them
 _FEW = 2  # frames: x265 states no decoding times for so few
@@ -139,7 +140,8 @@ class VideoFile(NewFile):
         if encoding.codec != "gif":
             tag(context, coding)
         name_codec(stream, encoding)
-        context.open()
+        with kept_scheduling():
+            context.open()
         return stream
 
     def encode(self, frame: av.VideoFrame | None, tick: int = 0) -> None:
