@@ -23,6 +23,7 @@ from wgmb.flow.sweeps import half_sweep, polish, sweep
 from wgmb.flow.views import AROUND, BESIDE, Views, views_of
 
 MIDDLE, FIRST = Views(1, 2, 0, AROUND), Views(0, 1, 2, BESIDE)
+LARGE = pytest.mark.full
 FILTER = 0.02  # a sampler may filter in 8 bits: cost of a patch
 
 
@@ -393,7 +394,9 @@ def test_a_shift_is_found():
     assert np.percentile(np.abs(inside - [*-way, *way]), 95) < 0.3
 
 
-@pytest.mark.parametrize(("before", "after", "width"), [(-5, 10, 112), (3, 6, 232)])
+@pytest.mark.parametrize(
+    ("before", "after", "width"), [(-5, 10, 112), pytest.param(3, 6, 232, marks=LARGE)]
+)
 def test_a_shift_that_grows_is_found(before, after, width):
     """5 px before, 10 px after, or a turning back: no constant velocity fits both sides."""
     ways = np.array([[before, 1], [0, 0], [after, 2]])
@@ -409,13 +412,15 @@ def test_bands_give_the_same_bits(monkeypatch):
     for most in (1, 200, 1 << 30):
         monkeypatch.setattr(flow_passes, "AT_ONCE", most)
         monkeypatch.setattr(flow_passes.gpu, "SOFTWARE", kit().device.adapter_info["adapter_type"])
-        found.append(Flow()(*pictures))
+        found.append(Flow(quality="fast")(*pictures))
     for motion, depth in found[1:]:
         assert (motion == found[0][0]).all()
         assert (depth == found[0][1]).all()
 
 
-@pytest.mark.parametrize(("turn", "zoom"), [(0.06, 1.03), (np.radians(12), 1.0)])
+@pytest.mark.parametrize(
+    ("turn", "zoom"), [(0.06, 1.03), pytest.param(np.radians(12), 1.0, marks=LARGE)]
+)
 def test_a_turning_and_zooming_texture_is_followed(turn, zoom):
     size = (48, 120)
     x, y = grid(size)
@@ -457,9 +462,6 @@ def test_what_is_hidden_on_one_side_follows_the_other():
     assert depth[26, 40] < 0.97 < 0.999 < depth[5, 5]
 
 
-LARGE = pytest.mark.full
-
-
 @pytest.mark.parametrize(
     "size",
     [pytest.param((37, 53), marks=LARGE), (2, 3), (1, 1), pytest.param((20, 230), marks=LARGE)],
@@ -492,7 +494,7 @@ def test_a_frame_of_a_shot_does_not_depend_on_what_was_asked_before():
     def load(n):
         return pictures[n] if 0 <= n < 7 else None
 
-    whole, alone = Flow().shot(load), Flow().shot(load)
+    whole, alone = (Flow(quality="fast").shot(load) for _ in range(2))
     motions = [whole(n) for n in range(7)]
     for n in (5, 0, 3):
         got, want = alone(n), motions[n]

@@ -12,6 +12,7 @@ from wgmb.cli.video_lines import describe_video
 from wgmb.coding import Coding
 from wgmb.io.footage import Footage
 from wgmb.io.pixels import frame_of, layout, pixel_format, planes_of
+from wgmb.io.scheduling import kept_scheduling
 
 pytestmark = pytest.mark.fast
 
@@ -182,7 +183,8 @@ def test_the_display_that_an_hdr10_video_was_graded_on_is_read(tmp_path):
 
 
 def test_a_codec_has_its_own_name_not_that_of_a_decoder(tmp_path):
-    path = clips.write(tmp_path / "c.mp4", codec="libsvtav1", options={"svtav1-params": "lp=1"})
+    with kept_scheduling():
+        path = clips.write(tmp_path / "c.mp4", codec="libsvtav1", options={"svtav1-params": "lp=1"})
     assert Footage(path).codec == "av1"
 
 

@@ -181,7 +181,13 @@ PARTS |= {
 }
 
 
-@pytest.mark.parametrize("name", PARTS)
+USUAL = {"gather", "tap", "reproject", "render accumulate", "render gather", "perceive", "viewer"}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[] if name in USUAL else pytest.mark.full) for name in PARTS],
+)
 def test_memory_does_not_grow_with_frames(fresh, name):
     assert growth(PARTS[name](fresh)) <= MOST
 

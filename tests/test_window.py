@@ -23,7 +23,7 @@ from wgmb.viewer import State, view
 from wgmb.viewer.screen import Screen
 def compose(*_): raise ZeroDivisionError("broken")
 Screen.compose = compose
-view(State())
+view(State(method="tap"))
 """
 CLOSE = """
 import ctypes, sys
@@ -54,7 +54,7 @@ def display():
         pytest.skip(missing)
     ours, theirs = os.pipe()
     # A server that resets when its last client goes refuses a client that comes meanwhile.
-    screen = ["-screen", "0", "1200x900x24", "-nolisten", "tcp", "-noreset"]
+    screen = ["-screen", "0", "960x760x24", "-nolisten", "tcp", "-noreset"]
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", str(theirs), *screen],
         pass_fds=[theirs],
@@ -103,7 +103,7 @@ class Desk:
         while time.monotonic() < until:
             assert self.program.poll() is None, self.program.communicate()[1]
             yield self.grab(size)
-            time.sleep(0.2)
+            time.sleep(0.4)
 
     def settled(self, size=SIZE):
         """The window's content once its picture does not change for two seconds."""
@@ -171,7 +171,7 @@ def picture_of(whole):
 
 def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     words = [ROOT / "app.py", "--window", "{}x{}".format(*SIZE), "--samples", "4"]
-    words += ["--shading", "off"]  # without a GPU, light takes longer than a picture has to settle
+    words += ["--method", "tap"]  # without a GPU, others take longer than a picture has to settle
     it = desk(*map(str, words))
     it.wait_for_window()
     it.plays()
@@ -188,7 +188,7 @@ def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     it.do("key", "r")
     assert it.shows_again(first)
 
-    twin = offscreen(State(samples=4), SIZE)
+    twin = offscreen(State(samples=4, method="tap"), SIZE)
     frame(twin)
     x, y, width, height = twin.panel.places["shutter"]
     it.drag((x + width * 0.25, y + height / 2), (x + width * 0.8, y + height / 2 + 100))
@@ -222,19 +222,19 @@ def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
         time.sleep(0.1)
     assert (tmp_path / "wgmb-001.png").exists()
 
-    it.do("windowsize", it.window, 1000, 600)
+    it.do("windowsize", it.window, 900, 600)
     time.sleep(1)
-    assert it.settled((1000, 600))[:, -20:].max() < 120  # the panel has moved to the edge
+    assert it.settled((900, 600))[:, -20:].max() < 120  # the panel has moved to the edge
     it.do("windowunmap", it.window)
     time.sleep(0.5)
     it.do("windowmap", it.window)
-    it.settled((1000, 600))
+    it.settled((900, 600))
     it.do("key", "f")
     time.sleep(1)
-    assert it.settled((1200, 900)).std() > 5
+    assert it.settled((960, 760)).std() > 5
     it.do("key", "f")
     time.sleep(1)
-    it.settled((1000, 600))
+    it.settled((900, 600))
     it.do("key", "Escape")
     code, said = it.end()
     assert (code, said) == (0, "")
