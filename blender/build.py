@@ -6,7 +6,7 @@ python blender/build.py lock      wheels.txt anew, from constraints.txt
 
 A bundle holds the add-on, its licence, wgmb and what wgmb needs but for numpy, which Blender has.
 Of wgpu's own requirements, rendercanvas is left out: only windows need it. The same sources and
-wheels give the same bytes. `bundle` needs hatchling, which `pip install -e .[dev]` brings.
+wheels give the same bytes. `./run add-on` does the first two; without it, `bundle` needs hatchling.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import tempfile
 import tomllib
 import zipfile
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -53,7 +54,10 @@ def download(requirements: list[str], folder: Path) -> None:
             words += ["--disable-pip-version-check", "--only-binary=:all:", "--dest", str(folder)]
             words += ["--python-version", python]
             words += [word for tag in tags for word in ("--platform", tag)]
-            subprocess.run([*words, *requirements], check=True)
+            done = subprocess.run([*words, *requirements], stderr=subprocess.PIPE, text=True)
+            if done.returncode:
+                last = done.stderr.strip().rpartition("\n")[2]
+                sys.exit(f"pip could not download the wheels for Python {python}: {last}")
 
 
 def fetch() -> None:
@@ -103,6 +107,8 @@ def wheels_of(platform: str, folder: Path) -> list[Path]:
 
 def own_wheel(folder: Path) -> Path:
     """The wheel of wgmb as it is here."""
+    if find_spec("hatchling") is None:
+        sys.exit("this Python has no hatchling, which builds wgmb's wheel; ./run add-on brings it")
     words = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
     if done.returncode:

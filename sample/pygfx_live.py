@@ -1,6 +1,6 @@
 """Boxes that turn and fly, with motion blur, live in a window: `python sample/pygfx_live.py`.
 
-Needs the extra pygfx and a window library: `pip install '.[pygfx,view]'`. Space switches the blur.
+Needs the extra pygfx and a window library: `./run setup pygfx view`. Space switches the blur.
 """
 
 import sys

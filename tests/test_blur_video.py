@@ -13,6 +13,7 @@ from wgmb import gpu, video_batch
 from wgmb.cli import app
 from wgmb.cli.blur_video import make_wish, tell_how
 from wgmb.color import linear, srgb, to_display
+from wgmb.extras import install_command
 from wgmb.io.footage import Footage
 from wgmb.settings import BlurSettings, InputSettings, ShutterSettings
 from wgmb.video_settings import FlowSettings, VideoSettings
@@ -290,7 +291,7 @@ def test_without_a_gpu_and_opencv_a_line_says_what_would_be_quicker(capsys, monk
         wish = make_wish(look, when, InputSettings(), video, None)
         tell_how(wish, quiet=False, verbose=False)
         slow = wish.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        said = "pip install 'wgmb[flow]'" in capsys.readouterr().err
+        said = install_command("flow") in capsys.readouterr().err
         assert said == (slow and flow == "auto")
 
 

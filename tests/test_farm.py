@@ -15,6 +15,7 @@ from make_job import job_of
 import make_frames as make
 from wgmb import DeviceError
 from wgmb import farm as farming
+from wgmb.extras import install_command
 from wgmb.farm import Farm, as_farm_job
 
 COUNT = 12
@@ -221,5 +222,5 @@ def test_without_distributed_one_line_says_what_to_install(shot, tmp_path, capsy
     assert code == 2
     assert err == (
         "wgmb: --workers and --cluster: dask.distributed is not installed: "
-        "pip install 'wgmb[cluster]'\n"
+        f"{install_command('cluster')}\n"
     )

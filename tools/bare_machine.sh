@@ -97,10 +97,10 @@ try() {  # try SYSTEM ROOT COMMAND [--offline]: run it and add a row to the tabl
     TIMEFORMAT='%U %S'
     took=$({ time inside "$2" $4 "$3" >"$log" 2>&1; } 2>&1) && code=0 || code=$?
     [ $code = 0 ] || { failed=1; tail -15 "$log" >&2; }
-    table+=("$(awk -v system="$1" -v command="$3 $4" -v code=$code -v begun="$begun" \
+    table+=("$(awk -v name="$1" -v what="$3 $4" -v code=$code -v begun="$begun" \
         -v now="$(date +%s.%N)" -v size="$(du -sm "$2" | cut -f1)" -v installed="$(
             sed -n 's/^run: installing \(.*\)/\1/p' "$log" | grep -v / | paste -sd ' ')" \
-        '{ printf "| %s | `%s` | %d | %.0f | %.0f | %d | %s |", system, command, code,
+        '{ printf "| %s | `%s` | %d | %.0f | %.0f | %d | %s |", name, what, code,
            now - begun, $1 + $2, size, installed }' <<<"$took")")
 }
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from .display import ColorConfig, ColorSpace, Display
 from .errors import InputError
+from .extras import install_command
 from .ocio import installed
 
 
@@ -50,7 +51,7 @@ class DisplaySettings:
         """A remark for users whose $OCIO cannot be used; None otherwise."""
         if self.ocio is not None or not os.environ.get("OCIO") or installed():
             return None
-        return "$OCIO is ignored, as OpenColorIO is not installed: pip install 'wgmb[ocio]'"
+        return f"$OCIO is ignored, as OpenColorIO is not installed: {install_command('ocio')}"
 
 
 @dataclass(frozen=True, kw_only=True)

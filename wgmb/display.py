@@ -1,6 +1,6 @@
 """OpenColorIO: colour spaces of pictures, and their conversion for a display.
 
-The package is optional (`pip install wgmb[ocio]`) and loaded when a ColorConfig is made.
+The package is optional (the extra `ocio`) and loaded when a ColorConfig is made.
 """
 
 from __future__ import annotations

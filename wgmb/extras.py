@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import re
+import shlex
+import shutil
 import sys
 from collections.abc import Iterator
+from importlib import metadata
 from importlib.util import find_spec
+from pathlib import Path
 
 from .errors import InputError
 
@@ -58,9 +64,47 @@ def reason(error: ImportError, extra: str = "") -> str:
     if package not in EXTRAS:
         return ""
     of, name = EXTRAS[package]
-    install = f"pip install 'wgmb[{extra or of}]'"
+    install = install_command(extra or of)
     if isinstance(error, ModuleNotFoundError):
         return f"{name} is not installed: {install}"
     if error.msg.startswith("cannot import name"):
         return f"{name} is too old for this: {install}"
     return ""  # a library of the system
+
+
+def install_command(extra: str) -> str:
+    """The command that installs an extra into the environment that runs, published or not.
+
+    In the environment of a clone's `./run`, that is `./run setup EXTRA`; elsewhere pip with the
+    packages of the extra.
+    """
+    clone = Path(__file__).parents[1]
+    if Path(sys.prefix) == clone / ".venv" and (clone / "run").is_file():
+        return f"{_nearest(clone / 'run')} setup {extra}"
+    packages = " ".join(shlex.quote(text) for text in requirements(extra)) or f"wgmb[{extra}]"
+    found = shutil.which("python")
+    is_same = found is not None and os.path.samefile(found, sys.executable)
+    return f"{'python' if is_same else shlex.quote(sys.executable)} -m pip install {packages}"
+
+
+def requirements(extra: str) -> list[str]:
+    """The packages of an extra, such as "glfw>=2.10"; none where wgmb has no metadata."""
+    found: list[str] = []
+    with contextlib.suppress(metadata.PackageNotFoundError):
+        for line in metadata.requires("wgmb") or []:
+            package, _, condition = (part.strip() for part in line.partition(";"))
+            if not re.search(rf"""extra == ['"]{extra}['"]""", condition):
+                continue
+            nested = re.fullmatch(r"wgmb\[(.*)\]", package)
+            if nested:
+                found += [text for name in nested[1].split(",") for text in requirements(name)]
+            else:
+                found.append(package)
+    return list(dict.fromkeys(found))
+
+
+def _nearest(path: Path) -> str:
+    """A path as it is shorter to type: from the current folder, if it lies below, or whole."""
+    with contextlib.suppress(ValueError, OSError):
+        return f"./{path.relative_to(Path.cwd())}"
+    return shlex.quote(str(path))

@@ -168,6 +168,12 @@ def _window(planes: np.ndarray) -> np.ndarray:
     return planes
 
 
+def check_flip() -> None:
+    """InputError with the command that installs FLIP's package, if it is missing."""
+    with needed_by("FLIP"):
+        import flip_evaluator  # noqa: F401  # pyright: ignore[reportMissingImports]
+
+
 def _flip(picture, truth) -> tuple[np.ndarray, float]:
     with needed_by("FLIP"):
         from flip_evaluator import evaluate  # pyright: ignore[reportMissingImports]

@@ -31,6 +31,7 @@ COMMANDS = {
     "view": "View a scene, frames or a video interactively.",
     "info": "Describe a frame or a video: layers, sizes, motion vector convention, speeds.",
     "vectors": "Write the motion of frames in the form of another program.",
+    "doctor": "Describe this installation and test one blur, as text to paste into a report.",
     "devices": "List the GPUs for --adapter (or WGMB_ADAPTER); * is the default.",
     "compare": "Score and time methods against a ground truth; write an HTML, JSON and CSV report.",
     "bench": "Time methods on this machine: median milliseconds per frame, transfers apart.",
@@ -54,6 +55,9 @@ def make_app(*whole: str) -> cyclopts.App:
         result_action="return_value",
         suppress_keyboard_interrupt=False,
         default_parameter=Parameter(negative=(), show_default=_default),
+    )
+    app.register_install_completion_command(
+        help="Let the shell (bash, zsh or fish) complete commands and options."
     )
     for name, line in COMMANDS.items():
         app.command(f"wgmb.cli.{name}:{name}", name=name, help=None if name in whole else line)

@@ -13,7 +13,7 @@ from typing import Any
 from .. import gpu
 from .._version import __version__
 from ..errors import InputError
-from ..extras import is_installed
+from ..extras import install_command, is_installed
 from ..highlights import check as check_highlights
 from ..io.clock import Clock
 from ..io.cut_list import CutList
@@ -145,7 +145,7 @@ def tell_how(wish: Wish, quiet: bool, verbose: bool) -> None:
         note(f"motion: {wish.how}")
         is_slow = wish.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
         if wish.video.flow == "auto" and is_slow and not is_installed("cv2"):
-            note("without a GPU, OpenCV finds motion much sooner: pip install 'wgmb[flow]'")
+            note(f"without a GPU, OpenCV finds motion much sooner: {install_command('flow')}")
 
 
 def planned(path: str | Path, output: OutputSettings, wish: Wish) -> Plan:

@@ -18,6 +18,7 @@ from ..lab.experiments import EXPERIMENTS
 from ..lab.report import write
 from ..lab.results import Report, machine
 from ..methods import METHODS
+from ..metrics import check_flip
 from ..scene.scene import Scene
 from ..settings import ShutterSettings, size_of
 from ..shutter import Shutter
@@ -134,6 +135,7 @@ def compare(
             raise InputError(f"{file} exists; --overwrite replaces it")
     if (truth is None) != (not inputs) or bool(scene) + bool(inputs) + bool(experiment) != 1:
         raise InputError("pass either scenes, --truth with --inputs, or --experiment")
+    check_flip()  # before a reference is rendered for minutes
     device = gpu.open_device(adapter)
     tell = teller(quiet)
     lab = Laboratory(device, rounds=who.rounds, tell=tell)

@@ -1,6 +1,6 @@
 """Cuts that are known beforehand: frame numbers, an edit decision list, or an OpenTimelineIO file.
 
-OpenTimelineIO is optional (`pip install wgmb[edit]`) and loaded when a file of it is read.
+OpenTimelineIO is optional (the extra `edit`) and loaded when a file of it is read.
 """
 
 from __future__ import annotations
