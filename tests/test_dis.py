@@ -1,5 +1,6 @@
 """Dense inverse search: shifts, ends of a shot, and the order in depth."""
 
+import re
 import sys
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 import make_frames as make
 from wgmb import InputError
+from wgmb.extras import install_command
 from wgmb.flow.dis import Dis
 
 SHIFT = 3.0, -2.0
@@ -57,7 +59,7 @@ def test_what_moves_otherwise_than_most_is_nearer():
 def test_without_opencv_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "cv2", None)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"wgmb\[flow\]"):
+    with pytest.raises(InputError, match=re.escape(install_command("flow"))):
         Dis()
     with pytest.raises(InputError, match="fast, best"):
         Dis("good")

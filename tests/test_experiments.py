@@ -45,6 +45,7 @@ def chen(lab):
     return made(lab, "chen", moments=2)
 
 
+@pytest.mark.full
 def test_taylor_has_two_budgets_and_his_findings(taylor):
     found = taylor
     (case,) = found.cases
@@ -94,6 +95,7 @@ def test_taylors_reprojection_gains_little_by_more_samples_and_distributed_gains
     assert rays[-1] < 0.4 * flip(published, 40)
 
 
+@pytest.mark.full
 def test_chen_compares_rates_faces_and_alphas(chen):
     found = chen
     titles = [t.title for t in found.tables]
@@ -176,6 +178,7 @@ def test_chen_without_fusion_says_so(lab, monkeypatch):
         made(lab, "chen")
 
 
+@pytest.mark.full
 def test_rosado_finds_that_the_mask_or_the_velocity_buffer_helps(lab):
     found = made(lab, "rosado", (160, 90))
     error = {row[0]: row[3] for row in found.tables[0].rows}

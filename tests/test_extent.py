@@ -40,6 +40,7 @@ def reached(blur, around):
     return min(left), min(top), max(right), max(bottom)
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("shutter", SHUTTERS, ids=str)
 @pytest.mark.parametrize("method", IMAGE_METHODS)
 def test_every_pixel_of_a_result_is_within_reach(method, shutter):

@@ -26,6 +26,7 @@ SHUTTERS = [Shutter(360), Shutter(720, curve="cosine"), Shutter(540, "start", "t
             Shutter(720, curve=lambda x: x)]  # fmt: skip
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("speed", [0.0, 20.0, 500.0])
 @pytest.mark.parametrize("shutter", SHUTTERS)
 def test_disk_is_the_mean_over_the_exposure(shutter, speed):
@@ -46,6 +47,7 @@ def test_a_closed_shutter_shows_the_disk_antialiased():
     assert 4 < edge.sum() < 60
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("slice_", [0.0, 0.08, 0.2])
 @pytest.mark.parametrize("shutter", SHUTTERS)
 def test_spiric_is_the_mean_over_the_exposure(shutter, slice_):

@@ -67,6 +67,7 @@ def decibel(frame, way, method="gather", **options):
     ("gather", bounces, 18), ("reproject", swings, 3), ("reproject", circles, 5),
     ("reproject", starts, 7), ("reproject", bounces, 6),
 ])  # fmt: skip
+@pytest.mark.covers(1)
 def test_a_path_bends_as_five_positions_say(method, path, gain):
     sources = [shot(path, t) for t in (0, -1, 1)]
     known = decibel(frame_of(sources), path, method)

@@ -52,7 +52,7 @@ def test_lights_take_their_motion_where_the_own_one_matches_nothing():
     assert (np.abs(want - states).max(axis=2) > 1e-5).sum() > 3
 
 
-@pytest.mark.parametrize("quality", ["fast", "best"])
+@pytest.mark.parametrize("quality", ["fast", pytest.param("best", marks=pytest.mark.full)])
 def test_small_fast_lights_are_followed(quality):
     """White dots 3 to 5 px across move 20 to 40 px over texture, one of them hidden at last."""
     x, y = grid((120, 320))

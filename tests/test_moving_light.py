@@ -250,6 +250,7 @@ def test_what_is_added_is_its_twin(stages, close):
         close(stages.layer(stages.times.count + i)[..., :3], want, 4e-3)
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("glossy", [False, True], ids=["shadow", "reflection"])
 @pytest.mark.parametrize("pan", [(0.0, 0.0), PAN], ids=["still", "pan"])
 def test_light_that_moves_is_nearer_the_truth(pan, glossy):
@@ -404,7 +405,7 @@ def test_sizes_that_fit_no_patch():
         assert np.isfinite(wgmb.Blur("gather")(frame)).all()
 
 
-@pytest.mark.parametrize("shading", ["auto", "passes"])
+@pytest.mark.parametrize("shading", ["auto", pytest.param("passes", marks=pytest.mark.full)])
 def test_scenes_are_drawn_with_their_light_and_nearer_the_truth(shading):
     scene = scenes.make("crossing", speed=3)
 

@@ -11,6 +11,7 @@ import pytest
 
 import make_notebook
 import wgmb
+from wgmb import extras
 from wgmb.hosts import explorer
 
 # Jupyter's own remarks, in this process.
@@ -114,6 +115,7 @@ def test_a_frame_without_motion_is_refused():
 def test_without_ipywidgets_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "ipywidgets", None)
     monkeypatch.delitem(sys.modules, "wgmb.hosts.explorer")
-    told = r"^wgmb\.explore: ipywidgets is not installed: .*'wgmb\[notebook\]'$"
+    why = f"wgmb.explore: ipywidgets is not installed: {extras.install_command('notebook')}"
+    told = f"^{re.escape(why)}$"
     with pytest.raises(wgmb.InputError, match=told):
         wgmb.explore(wgmb.Frame(np.zeros((4, 4, 3), np.float32)))

@@ -36,9 +36,10 @@ def page(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def visit(page):
+def visit(request):
     """visit(*visits): what page.mjs saw of each; none may have an error or ask a network."""
     parts.need("chromium", "dawn")
+    page = request.getfixturevalue("page")
 
     def visited(*visits: dict) -> list[dict]:
         given = {"page": page.as_uri(), "chromium": shutil.which("chromium"), "visits": visits}
@@ -232,6 +233,7 @@ def test_phones_and_desks(visit):
     assert phone["results"][1] == pytest.approx(0.25, abs=0.02)
 
 
+@pytest.mark.full
 def test_the_page_is_made_the_same_every_time(page):
     text = page.read_text("utf-8")
     assert make_page.page() == text

@@ -85,7 +85,14 @@ CAMERA_ALONE = {"tap": 30.3, "tiles": 30.6, "reproject": 30.8, "gather": 30.1}
     ("boxes", "moving", "sharp", "tables"),
     [
         pytest.param(60, False, 32.4, {False: CAMERA}, id="camera"),
-        pytest.param(40, True, 29.2, {False: CAMERA_ALONE, True: OBJECTS}, id="objects"),
+        pytest.param(
+            40,
+            True,
+            29.2,
+            {False: CAMERA_ALONE, True: OBJECTS},
+            id="objects",
+            marks=pytest.mark.full,
+        ),
     ],
 )
 def test_it_comes_as_near_to_the_truth_as_was_measured(boxes, moving, sharp, tables):
@@ -169,6 +176,7 @@ def test_more_objects_than_bodies_move_with_the_camera(device, monkeypatch):
     assert sorted(bodies._index.values()) == [0, 0, 0, 1, 2]
 
 
+@pytest.mark.full
 def test_500_frames_leave_nothing_behind(small):
     blur = MotionBlurPass(small.camera, jitter=1, **small.objects())
     small.use(blur)

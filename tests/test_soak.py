@@ -36,6 +36,7 @@ def check(rows, count: int, folder: Path) -> None:
 # ---- what CI has time for -------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_damaged_files_are_read_or_refused_by_name_and_nothing_else(tmp_path):
     check(damage.mutations, 40, tmp_path)
 

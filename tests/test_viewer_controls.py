@@ -206,7 +206,13 @@ def test_a_parameter_of_the_scene(hand):
     assert np.abs(hand.picture() - before).mean() > 1e-3
 
 
-@pytest.mark.parametrize("name", list(builtin.SCENES))
+USUAL = {"crossing", "torusphere", "disk"}  # scenes of every kind: bodies, volumes, a figure
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[] if n in USUAL else pytest.mark.full) for n in builtin.SCENES],
+)
 def test_the_panel_changes_nothing_by_itself(hand, name):
     opened = PLAIN.opened(name)
     for method in hand.viewer.stage.choices.methods(opened):

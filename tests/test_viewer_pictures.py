@@ -96,7 +96,17 @@ def test_what_a_method_shows_of_itself_can_be_looked_at(hand):
     assert np.abs(hand.picture() - result).max() > 0.1
 
 
-@pytest.mark.parametrize("method", [name for name in METHODS if name != "volume"])
+USUAL = {"tap", "gather", "accumulate"}
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        pytest.param(name, marks=[] if name in USUAL else pytest.mark.full)
+        for name in METHODS
+        if name != "volume"
+    ],
+)
 def test_all_that_a_method_draws_is_what_render_draws(small, method):
     """Depth, velocity and error are those of all methods, and have tests of their own."""
     found = small.viewer.stage.choices.looks(replace(ALONE, method=method))
