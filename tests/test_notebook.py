@@ -2,6 +2,7 @@
 
 import base64
 import io
+import re
 import sys
 
 import imageio.v3 as iio
