@@ -2,7 +2,7 @@
 
 PYTHONPATH=.:blender:tests/blender python tools/blender_worth.py FOLDER [--shaded]
 
-Runs in the environment of tests/blender (`WGMB_BLENDER=required ./run test` makes it). The scene is
+Runs in the environment of tests/blender (`./run test all` makes it). The scene is
 the tests' crossing, 480 x 270, with a centred shutter of 180 degrees: emission only, or `--shaded`:
 rough surfaces, a lamp of some size, soft shadows that move, two bounces. Truth is Cycles' blur with
 512 samples a pixel.
