@@ -56,6 +56,25 @@ def test_wheels_are_locked_for_all_that_wgmb_needs():
     assert counts["wgpu"] == len(build.PLATFORMS)
 
 
+@pytest.mark.fast
+def test_without_hatchling_a_line_says_what_brings_it(monkeypatch, tmp_path):
+    import build
+
+    monkeypatch.setattr(build, "find_spec", lambda name: None)
+    with pytest.raises(SystemExit, match=r"^this Python has no hatchling, .*; \./run add-on"):
+        build.bundle(tmp_path / "dist")
+
+
+@pytest.mark.fast
+def test_without_a_network_a_line_says_so(monkeypatch, tmp_path):
+    import build
+
+    answer = subprocess.CompletedProcess([], 1, "", "WARNING: Retrying\nERROR: No matching a\n")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: answer)
+    with pytest.raises(SystemExit, match=r"could not download .* 3\.11: ERROR: No matching a$"):
+        build.download(["wgpu"], tmp_path / "wheels")
+
+
 def ends(lock: str) -> list[tuple[str, int]]:
     """Each package of the lock, and where the next one begins."""
     found = [(m[1], m.start()) for m in re.finditer(r"^([a-z-]+)==", lock, re.M)]

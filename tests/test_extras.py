@@ -61,7 +61,9 @@ DECLARED = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["opti
 
 def normal(requirement: str) -> tuple[str, set[str]]:
     """The name and the limits of a requirement, however it is spaced."""
-    name, limits = re.fullmatch(r"([\w.\[\]-]+)(.*)", requirement.replace(" ", "")).groups()
+    name, limits = re.fullmatch(
+        r"([\w.\[\]-]+)(.*)", requirement.partition(";")[0].replace(" ", "")
+    ).groups()
     return name.lower(), {limit for limit in limits.split(",") if limit}
 
 

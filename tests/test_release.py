@@ -49,7 +49,7 @@ def test_the_address_is_set_in_one_place():
 
 
 def test_the_notes_of_a_version_are_its_section_of_the_changelog():
-    text = "# C\n\n## Unreleased\n\n- c\n\n## 0.2.0 (2026-02-01)\n\n### Added\n\n- b\n\n## 0.1.0\n\n- a\n"
+    text = "## Unreleased\n\n- c\n\n## 0.2.0 (2026-02-01)\n\n### Added\n\n- b\n\n## 0.1.0\n\n- a\n"
     assert release.notes(text, "0.2.0") == "### Added\n\n- b\n"
     assert release.notes(text, "0.1.0") == "- a\n"
     with pytest.raises(SystemExit, match=r"CHANGELOG\.md has no section for 0\.3\.0"):

@@ -19,7 +19,7 @@ apt_install() {
 
 # Sets $python to one that is new enough.
 find_python() {
-    for python in python3.14 python3.13 python3.12 python3.11 python3; do
+    for python in python3.13 python3.12 python3.11 python3; do
         "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && return
     done
     return 1
