@@ -1,8 +1,9 @@
 """Three tiers of tests, and the processor time of each file.
 
 `./run test fast` runs the cases marked fast, `./run test` all but those marked full, and `./run
-test all` every case. A run ends with its dearest files; CI fails where the cases of the default
-tier in one file take more than MOST seconds, so that the default tier stays short.
+test all` every case. A run ends with its dearest files. With WGMB_BUDGET, it fails where the cases
+of the default tier in one file take more than MOST seconds, so that this tier stays short; the
+workflow sets it for a second run, as the first one compiles every kernel.
 """
 
 import json
@@ -85,10 +86,10 @@ def _told(node) -> list[dict]:
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session):
-    """Hand the times to the first process, which fails in CI if a file takes too long."""
+    """Hand the times to the first process, which fails with WGMB_BUDGET if a file takes too long."""
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["spent"] = json.dumps([spent, default_spent])
-    elif os.environ.get("CI") and too_long():
+    elif os.environ.get("WGMB_BUDGET") and too_long():
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
