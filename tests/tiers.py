@@ -86,7 +86,7 @@ def _told(node) -> list[dict]:
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session):
-    """Hand the times to the first process, which fails with WGMB_BUDGET if a file takes too long."""
+    """Hand the times to the first process, which judges them if WGMB_BUDGET asks it to."""
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["spent"] = json.dumps([spent, default_spent])
     elif os.environ.get("WGMB_BUDGET") and too_long():
