@@ -104,10 +104,12 @@ def test_elsewhere_it_is_pip_of_the_python_that_runs(monkeypatch):
     assert re.fullmatch(r"python -m pip install 'opencolorio\S+'", install_command("ocio"))
     monkeypatch.setattr(extras.shutil, "which", lambda name: None)
     assert install_command("ocio").startswith(f"{sys.executable} -m pip install ")
+    assert install_command("nothing") == "the extra nothing of wgmb has it"
 
 
 def test_no_message_or_page_names_a_package_that_nobody_published():
     places = [*ROOT.glob("wgmb/**/*.py"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("docs/*.ipynb")]
     places += [ROOT / "README.md", *ROOT.glob("tools/*.py"), *ROOT.glob("sample/*.py")]
-    found = [p.name for p in places if re.search(r"pip install '?wgmb", p.read_text("utf-8"))]
+    wrong = re.compile(r"install `?'?wgmb\b|\bwgmb\[[a-z]")
+    found = [p.name for p in places if wrong.search(p.read_text("utf-8"))]
     assert found == []

@@ -76,12 +76,14 @@ def install_command(extra: str) -> str:
     """The command that installs an extra into the environment that runs, published or not.
 
     In the environment of a clone's `./run`, that is `./run setup EXTRA`; elsewhere pip with the
-    packages of the extra.
+    packages of the extra, as far as wgmb's metadata tell them.
     """
     clone = Path(__file__).parents[1]
     if Path(sys.prefix) == clone / ".venv" and (clone / "run").is_file():
         return f"{_nearest(clone / 'run')} setup {extra}"
-    packages = " ".join(shlex.quote(text) for text in requirements(extra)) or f"wgmb[{extra}]"
+    packages = " ".join(map(shlex.quote, requirements(extra)))
+    if not packages:  # wgmb was copied, not installed, as into a bundle for Blender
+        return f"the extra {extra} of wgmb has it"
     found = shutil.which("python")
     is_same = found is not None and os.path.samefile(found, sys.executable)
     return f"{'python' if is_same else shlex.quote(sys.executable)} -m pip install {packages}"
