@@ -106,3 +106,19 @@ def test_an_interruption_that_python_lost_is_heard_at_the_next_frame(
     code = app.main(list(map(str, arguments(long_shot[0], tmp_path / "out", "-q"))))
     assert code == 130
     assert 0 < len(list((tmp_path / "out").glob("o.*.exr"))) < 10
+
+
+def test_a_library_that_breaks_when_it_is_interrupted_is_an_interruption(capsys, monkeypatch):
+    def broken(*_):
+        terminal.interrupted.set()
+        raise AssertionError("half done")
+
+    monkeypatch.setattr(app, "make_app", broken)
+    assert app.main(["devices"]) == 130
+    assert capsys.readouterr().err == "wgmb: interrupted\n"
+
+
+def test_a_library_that_breaks_by_itself_is_not(monkeypatch):
+    monkeypatch.setattr(app, "make_app", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        app.main(["devices"])

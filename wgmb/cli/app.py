@@ -111,6 +111,10 @@ def main(arguments: list[str] | None = None) -> int:
         return _say_why("not enough memory", SOME_FAILED)
     except KeyboardInterrupt:
         return _say_why("interrupted", INTERRUPTED)
+    except Exception:  # of a library that an interruption left half done
+        if not terminal.interrupted.is_set():
+            raise
+        return _say_why("interrupted", INTERRUPTED)
 
 
 def _check_text(words: list[str]) -> None:
