@@ -17,7 +17,8 @@ PACKAGE, SHADERS = ROOT / "wgmb", ROOT / "wgsl"
 # A room imports only from lines above its own, and from itself.
 LAYERS = [
     {"_version", "errors", "color", "coding", "charts"},
-    {"primaries", "extras", "shown"},
+    {"primaries", "requirements", "shown"},
+    {"extras"},
     {"ocio"},
     {"gpu", "shutter", "camera", "metrics", "display"},
     {"frame", "cone", "highlights"},
@@ -119,8 +120,6 @@ def test_imports_point_upwards_in_the_table_and_third_parties_stay_at_home(file)
 
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-OTHER_NAMES = {"av": "av", "cv2": "opencv-python-headless", "PIL": "pillow"}
-OTHER_NAMES |= {"PyOpenColorIO": "opencolorio"}
 
 
 def listed(requirements) -> set[str]:
@@ -138,7 +137,7 @@ def listed(requirements) -> set[str]:
 
 def name_of(package: str) -> str:
     """The package index's name of an imported module."""
-    return OTHER_NAMES.get(package, package).lower().replace("_", "-")
+    return EXTRAS[package].index_name if package in EXTRAS else package.lower()
 
 
 def test_every_third_party_has_a_home():
@@ -148,8 +147,7 @@ def test_every_third_party_has_a_home():
 
 @pytest.mark.parametrize("package", EXTRAS)
 def test_the_extra_that_a_message_names_installs_the_package(package):
-    extra, _ = EXTRAS[package]
-    assert name_of(package) in listed([f"wgmb[{extra}]"])
+    assert name_of(package) in listed([f"wgmb[{EXTRAS[package].extra}]"])
 
 
 def test_what_is_not_of_the_core_has_an_extra():

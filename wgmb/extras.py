@@ -4,37 +4,49 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import shlex
 import shutil
 import sys
-from collections.abc import Iterator
-from importlib import metadata
+from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
 from .errors import InputError
 
+
+class Package(NamedTuple):
+    """A package of an extra."""
+
+    extra: str
+    "The extra that installs it."
+    name: str
+    "Its usual name, for messages."
+    index_name: str
+    "Its name in the package index."
+
+
 EXTRAS = {
-    "av": ("video", "PyAV"),
-    "cv2": ("flow", "OpenCV"),
-    "cyclopts": ("cli", "cyclopts"),
-    "dask": ("cluster", "dask"),
-    "distributed": ("cluster", "dask.distributed"),
-    "flip_evaluator": ("compare", "flip-evaluator"),
-    "glfw": ("view", "glfw"),
-    "imageio": ("images", "imageio"),
-    "ipywidgets": ("notebook", "ipywidgets"),
-    "imgui_bundle": ("view", "imgui-bundle"),
-    "opentimelineio": ("edit", "OpenTimelineIO"),
-    "PIL": ("images", "Pillow"),
-    "PyOpenColorIO": ("ocio", "OpenColorIO"),
-    "pygfx": ("pygfx", "pygfx"),
-    "rendercanvas": ("view", "rendercanvas"),
-    "rich": ("cli", "rich"),
-    "tifffile": ("images", "tifffile"),
+    "av": Package("video", "PyAV", "av"),
+    "cv2": Package("flow", "OpenCV", "opencv-python-headless"),
+    "cyclopts": Package("cli", "cyclopts", "cyclopts"),
+    "dask": Package("cluster", "dask", "dask"),
+    "distributed": Package("cluster", "dask.distributed", "distributed"),
+    "flip_evaluator": Package("compare", "flip-evaluator", "flip-evaluator"),
+    "glfw": Package("view", "glfw", "glfw"),
+    "imageio": Package("images", "imageio", "imageio"),
+    "ipywidgets": Package("notebook", "ipywidgets", "ipywidgets"),
+    "imgui_bundle": Package("view", "imgui-bundle", "imgui-bundle"),
+    "numba": Package("bench", "numba", "numba"),
+    "opentimelineio": Package("edit", "OpenTimelineIO", "opentimelineio"),
+    "PIL": Package("images", "Pillow", "pillow"),
+    "PyOpenColorIO": Package("ocio", "OpenColorIO", "opencolorio"),
+    "pygfx": Package("pygfx", "pygfx", "pygfx"),
+    "rendercanvas": Package("view", "rendercanvas", "rendercanvas"),
+    "rich": Package("cli", "rich", "rich"),
+    "tifffile": Package("images", "tifffile", "tifffile"),
 }
-"""The extra and the usual name of each package, by the name that Python imports."""
+"""Every package of an extra, by the name that Python imports."""
 
 
 def is_installed(package: str) -> bool:
@@ -44,9 +56,17 @@ def is_installed(package: str) -> bool:
     return find_spec(package) is not None
 
 
+def is_available(package: str) -> bool:
+    """Return False if wgmb does without a package of EXTRAS on the Python that runs."""
+    from .requirements import of_extra
+
+    extra, _, name = EXTRAS[package]
+    return all(one.is_for_this_python for one in of_extra(extra) if one.name.lower() == name)
+
+
 @contextlib.contextmanager
 def needed_by(what: str, extra: str = "") -> Iterator[None]:
-    """Import packages of extras within it; InputError names the extra where one is missing.
+    """Import packages of extras within it; InputError names the command that installs one.
 
     `what`: who needs them, which begins the message. `extra`: if not the one in EXTRAS.
     """
@@ -59,54 +79,81 @@ def needed_by(what: str, extra: str = "") -> Iterator[None]:
 
 
 def reason(error: ImportError, extra: str = "") -> str:
-    """The package and extra to install, if an extra's package is missing or too old; else ""."""
+    """The package that is missing or too old and the command that installs it, or "".
+
+    "" is for errors that are not about a package of an extra.
+    """
     package = (error.name or "").partition(".")[0]
     if package not in EXTRAS:
         return ""
-    of, name = EXTRAS[package]
-    install = install_command(extra or of)
+    of, name, _ = EXTRAS[package]
     if isinstance(error, ModuleNotFoundError):
-        return f"{name} is not installed: {install}"
+        if not is_available(package):
+            return f"{name} is not available for Python {sys.version_info[0]}.{sys.version_info[1]}"
+        return f"{name} is not installed: {install_command(extra or of)}"
     if error.msg.startswith("cannot import name"):
-        return f"{name} is too old for this: {install}"
+        return f"{name} is too old for this: {install_command(extra or of)}"
     return ""  # a library of the system
 
 
 def install_command(extra: str) -> str:
-    """The command that installs an extra into the environment that runs, published or not.
+    """The command line that installs an extra into the environment that runs.
 
-    In the environment of a clone's `./run`, that is `./run setup EXTRA`; elsewhere pip with the
-    packages of the extra, as far as wgmb's metadata tell them.
+    In the `.venv` of a clone it is `./run setup EXTRA`; elsewhere pip's with the requirements that
+    are not met, so that wgmb need not be in an index. Quoted for the shell of the system.
     """
-    clone = Path(__file__).parents[1]
-    if Path(sys.prefix) == clone / ".venv" and (clone / "run").is_file():
-        return f"{_nearest(clone / 'run')} setup {extra}"
-    packages = " ".join(map(shlex.quote, requirements(extra)))
-    if not packages:  # wgmb was copied, not installed, as into a bundle for Blender
-        return f"the extra {extra} of wgmb has it"
-    found = shutil.which("python")
-    is_same = found is not None and os.path.samefile(found, sys.executable)
-    return f"{'python' if is_same else shlex.quote(sys.executable)} -m pip install {packages}"
+    if run := _run_of_the_clone():
+        return f"{run} setup {extra}"
+    from .requirements import of_extra
+
+    needed = [one for one in of_extra(extra) if one.is_for_this_python]
+    named = [package.index_name for package in EXTRAS.values() if package.extra == extra]
+    if lacking := [str(one) for one in needed if not one.is_met]:
+        return _pip(lacking)
+    own = [str(one) for one in needed if one.name.lower() in named]
+    return _pip(["--force-reinstall", "--no-deps", *own] if own else named)  # files are damaged
 
 
-def requirements(extra: str) -> list[str]:
-    """The packages of an extra, such as "glfw>=2.10"; none where wgmb has no metadata."""
-    found: list[str] = []
-    with contextlib.suppress(metadata.PackageNotFoundError):
-        for line in metadata.requires("wgmb") or []:
-            package, _, condition = (part.strip() for part in line.partition(";"))
-            if not re.search(rf"""extra == ['"]{extra}['"]""", condition):
-                continue
-            nested = re.fullmatch(r"wgmb\[(.*)\]", package)
-            if nested:
-                found += [text for name in nested[1].split(",") for text in requirements(name)]
-            else:
-                found.append(package)
-    return list(dict.fromkeys(found))
+def _run_of_the_clone() -> str:
+    """The script `run` of the clone whose `.venv` runs, as it is called from here; else ""."""
+    root = Path(__file__).parents[1]
+    run, project = root / "run", root / "pyproject.toml"
+    try:
+        if os.name == "nt" or not os.path.samefile(sys.prefix, root / ".venv"):
+            return ""
+        if not run.is_file() or 'name = "wgmb"' not in project.read_text("utf-8"):
+            return ""
+        path = os.path.relpath(run)
+    except OSError:
+        return ""
+    if path == "run":
+        return "./run"
+    return shlex.quote(str(run) if path.startswith(os.path.join("..", "..")) else path)
 
 
-def _nearest(path: Path) -> str:
-    """A path as it is shorter to type: from the current folder, if it lies below, or whole."""
-    with contextlib.suppress(ValueError, OSError):
-        return f"./{path.relative_to(Path.cwd())}"
-    return shlex.quote(str(path))
+def _pip(requirements: Iterable[str]) -> str:
+    """pip's line for the Python that runs, which need not have pip itself."""
+    python = _quoted([_python()])
+    words = _quoted(requirements)
+    if is_installed("pip"):
+        return f"{python} -m pip install {words}"
+    if shutil.which("uv"):
+        return f"uv pip install --python {python} {words}"
+    return f"{python} -m ensurepip && {python} -m pip install {words}"
+
+
+def _python() -> str:
+    """The name of the Python that runs where a shell finds it by that name, else its path."""
+    own = Path(sys.executable or "python")
+    for name in ("python", "python3"):
+        found = shutil.which(name)
+        if found and Path(found).parent.resolve() == own.parent.resolve():
+            return name
+    return str(own)
+
+
+def _quoted(words: Iterable[str]) -> str:
+    if os.name == "nt":
+        plain = [word.replace('"', "'") for word in words]
+        return " ".join(f'"{word}"' if set(word) & set(" <>;&|^") else word for word in plain)
+    return " ".join(map(shlex.quote, words))

@@ -20,7 +20,7 @@ from cyclopts.config import Dict
 
 from .._version import __version__
 from ..errors import DeviceError, Error, InputError, did_you_mean
-from ..extras import reason
+from ..extras import EXTRAS, reason
 from . import terminal
 from .exit_codes import DONE, INTERRUPTED, NO_DEVICE, SOME_FAILED, USAGE
 
@@ -99,7 +99,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _say_why(str(error), USAGE)
     except ImportError as error:
         cause = error.__cause__  # of a command's module that cannot be loaded
-        if not (why := reason(cause if isinstance(cause, ImportError) else error)):
+        own = words[0] if words[0] in {package.extra for package in EXTRAS.values()} else ""
+        if not (why := reason(cause if isinstance(cause, ImportError) else error, own)):
             raise
         return _say_why(f"{words[0]}: {why}", USAGE)
     except OSError as error:

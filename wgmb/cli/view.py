@@ -62,7 +62,7 @@ def view(
         GPU to use: a number or part of a name from `wgmb devices`.
     """
     try:
-        with needed_by("view"):
+        with needed_by("view", "view"):
             from .. import viewer
     except ImportError as error:  # of a system library
         raise DeviceError(
