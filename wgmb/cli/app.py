@@ -56,8 +56,10 @@ def make_app(*whole: str) -> cyclopts.App:
         suppress_keyboard_interrupt=False,
         default_parameter=Parameter(negative=(), show_default=_default),
     )
-    app.register_install_completion_command(
-        help="Let the shell (bash, zsh or fish) complete commands and options."
+    app.command(
+        "wgmb.cli.completion:install_completion",
+        name="--install-completion",
+        help="Let the shell (bash, zsh or fish) complete commands and options.",
     )
     for name, line in COMMANDS.items():
         app.command(f"wgmb.cli.{name}:{name}", name=name, help=None if name in whole else line)
