@@ -57,7 +57,9 @@ def download(requirements: list[str], folder: Path) -> None:
             done = subprocess.run([*words, *requirements], stderr=subprocess.PIPE, text=True)
             if done.returncode:
                 last = done.stderr.strip().rpartition("\n")[2]
-                sys.exit(f"pip could not download the wheels for Python {python}: {last}")
+                why = f"pip could not download the wheels for Python {python}: {last}"
+                is_alone = "Retrying" in done.stderr or "from versions: none" in done.stderr
+                sys.exit(f"{why}; is the package index within reach?" if is_alone else why)
 
 
 def fetch() -> None:
@@ -107,8 +109,6 @@ def wheels_of(platform: str, folder: Path) -> list[Path]:
 
 def own_wheel(folder: Path) -> Path:
     """The wheel of wgmb as it is here."""
-    if find_spec("hatchling") is None:
-        sys.exit("this Python has no hatchling, which builds wgmb's wheel; ./run add-on brings it")
     words = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
@@ -137,14 +137,17 @@ def files_of(platform: str, wheels: list[Path]) -> Iterator[tuple[str, bytes]]:
 def bundle(folder: Path, wheels: Path = WHEELS, platforms: tuple[str, ...] = ()) -> list[Path]:
     """Write the bundles of the platforms, by default all, into a folder."""
     version = tomllib.loads((ADD_ON / "blender_manifest.toml").read_text("utf-8"))["version"]
+    if find_spec("hatchling") is None:
+        sys.exit("this Python has no hatchling, which builds wgmb's wheel; ./run add-on brings it")
+    brought = {platform: wheels_of(platform, wheels) for platform in platforms or PLATFORMS}
     folder.mkdir(parents=True, exist_ok=True)
     made = []
     with tempfile.TemporaryDirectory() as place:
         own = own_wheel(Path(place))
-        for platform in platforms or tuple(PLATFORMS):
+        for platform, others in brought.items():
             path = folder / f"wgmb-{version}-{platform.replace('-', '_')}.zip"
             with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
-                for name, content in files_of(platform, [own, *wheels_of(platform, wheels)]):
+                for name, content in files_of(platform, [own, *others]):
                     file.writestr(zipfile.ZipInfo(name, _EPOCH), content, zipfile.ZIP_DEFLATED)
             if path.stat().st_size > MOST_BYTES:
                 sys.exit(f"{path}: {path.stat().st_size} bytes, {MOST_BYTES} are allowed")

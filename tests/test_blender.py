@@ -62,17 +62,31 @@ def test_without_hatchling_a_line_says_what_brings_it(monkeypatch, tmp_path):
 
     monkeypatch.setattr(build, "find_spec", lambda name: None)
     with pytest.raises(SystemExit, match=r"^this Python has no hatchling, .*; \./run add-on"):
-        build.bundle(tmp_path / "dist")
+        build.bundle(tmp_path / "dist", tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.fast
+def test_without_the_wheels_no_bundle_is_begun(monkeypatch, tmp_path):
+    import build
+
+    monkeypatch.setattr(build, "find_spec", lambda name: name)
+    monkeypatch.setattr(build, "own_wheel", lambda folder: pytest.fail("a wheel is built"))
+    with pytest.raises(SystemExit, match=r" has no cffi, .* for linux-x64: fetch them first$"):
+        build.bundle(tmp_path / "dist", tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.fast
 def test_without_a_network_a_line_says_so(monkeypatch, tmp_path):
     import build
 
-    answer = subprocess.CompletedProcess([], 1, "", "WARNING: Retrying\nERROR: No matching a\n")
-    monkeypatch.setattr(subprocess, "run", lambda *_, **__: answer)
-    with pytest.raises(SystemExit, match=r"could not download .* 3\.11: ERROR: No matching a$"):
-        build.download(["wgpu"], tmp_path / "wheels")
+    for first, end in (("WARNING: Retrying\n", "; is the package index within reach?"), ("", "")):
+        answer = subprocess.CompletedProcess([], 1, "", f"{first}ERROR: No matching a\n")
+        monkeypatch.setattr(subprocess, "run", lambda *_, answer=answer, **__: answer)
+        told = re.escape(f" for Python 3.11: ERROR: No matching a{end}")
+        with pytest.raises(SystemExit, match=rf"^pip could not download the wheels{told}$"):
+            build.download(["wgpu"], tmp_path / "wheels")
 
 
 def ends(lock: str) -> list[tuple[str, int]]:
