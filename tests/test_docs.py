@@ -34,7 +34,8 @@ def blocks(text: str, language: str) -> list[str]:
 @cache
 def options() -> set[str]:
     """Every name of every option of every command."""
-    found = [command.assemble_argument_collection() for command in COMMANDS.values()]
+    commands = [*COMMANDS.values(), app["--install-completion"]]
+    found = [command.assemble_argument_collection() for command in commands]
     names = {name for arguments in found for argument in arguments for name in argument.names}
     return names | {"--help", "--version"}
 

@@ -20,7 +20,7 @@ LINES = [
     "numpy>=1.24",
     "wgmb[b]; extra == 'a'",
     "One.Pkg >=2,<3 ; extra == 'a'",
-    "two (>=1.5); (python_version < '3.99') and extra == \"b\"",
+    "two (>=1.5); (sys_platform != 'none') and extra == \"b\"",
     "wgmb[a]; extra == 'b'",
     "one.pkg>=2.1; extra == 'c'",
     "wgmb[a,c]; extra == 'both'",
@@ -119,6 +119,13 @@ def test_a_marker_may_exclude_the_python_that_runs(marker, is_for_it):
     assert Requirement("some", "", marker).is_for_this_python == is_for_it
 
 
+def test_a_marker_that_holds_is_not_written():
+    held = '(python_version >= "3.11" and python_version < "3.99")'
+    assert str(Requirement("some", ">=1", held)) == "some>=1"
+    for marker in ('python_version < "3.11"', f'{held} and sys_platform == "win32"'):
+        assert str(Requirement("some", ">=1", marker)) == f"some>=1; {marker}"
+
+
 # ---- the command in a clone -----------------------------------------------------------------
 
 
@@ -173,13 +180,13 @@ def test_requirements_of_an_extra_are_those_of_the_extras_within(installed):
     installed(LINES)
     one, two = (
         Requirement("One.Pkg", ">=2,<3"),
-        Requirement("two", ">=1.5", '(python_version < "3.99")'),
+        Requirement("two", ">=1.5", '(sys_platform != "none")'),
     )
     assert requirements.of_extra("a") == [two, one]
     assert sorted(requirements.of_extra("b")) == sorted([one, two])
     assert requirements.of_extra("nothing") == []
     assert [str(line) for line in requirements.of_extra("both")] == [
-        'two>=1.5; (python_version < "3.99")',
+        'two>=1.5; (sys_platform != "none")',
         "One.Pkg>=2,<3,>=2.1",
     ]
 
@@ -210,7 +217,7 @@ def test_pip_is_told_what_is_not_met(installed, elsewhere, monkeypatch):
     assert install_command("a") == "python -m pip install 'One.Pkg>=2,<3'"
     installed(LINES, **{"One.Pkg": "3.1"})
     words = shlex.split(install_command("a"))
-    assert words[4:] == ['two>=1.5; (python_version < "3.99")', "One.Pkg>=2,<3"]
+    assert words[4:] == ['two>=1.5; (sys_platform != "none")', "One.Pkg>=2,<3"]
 
 
 def test_packages_that_are_listed_and_cannot_be_found_are_installed_again(

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 _LINE = re.compile(r"([\w.-]+)\s*(?:\[([^]]*)\])?\s*\(?([^;()]*)\)?\s*(?:;\s*(.*))?")
 _OF_EXTRA = re.compile(r"""\s*(?:\band\s+)?\bextra\s*==\s*['"]([\w.-]+)['"]""")
+_PYTHON = re.compile(r'\bpython_version\s*([<>=!]=|[<>])\s*"([\d.]+)"')
 _OPERATORS = {
     ">=": operator.ge, "<=": operator.le, "==": operator.eq, "!=": operator.ne,
     ">": operator.gt, "<": operator.lt,
@@ -34,12 +35,15 @@ class Requirement(NamedTuple):
     @property
     def is_for_this_python(self) -> bool:
         """False if the marker excludes the Python that runs; other conditions are pip's."""
-        limits = re.findall(r'\bpython_version\s*([<>=!]=|[<>])\s*"([\d.]+)"', self.marker)
+        limits = _PYTHON.findall(self.marker)
         here = ".".join(map(str, sys.version_info[:2]))
         return " or " in self.marker or all(_holds(here, sign + limit) for sign, limit in limits)
 
     def __str__(self) -> str:
-        return f"{self.name}{self.versions}" + (f"; {self.marker}" if self.marker else "")
+        """As pip reads it, without a marker that is known to hold."""
+        rest = _PYTHON.sub("", self.marker).replace(" and ", " ").strip(" ()")
+        marker = self.marker if rest or not self.is_for_this_python else ""
+        return f"{self.name}{self.versions}" + (f"; {marker}" if marker else "")
 
     @property
     def is_met(self) -> bool:
@@ -59,7 +63,7 @@ def version_of(name: str) -> str | None:
 
 
 def of_extra(extra: str) -> list[Requirement]:
-    """What an extra of wgmb needs, with the extras that it contains, a line for each package.
+    """Requirements of an extra of wgmb and of the extras within it, one for each package.
 
     Empty where the metadata of wgmb is missing, as in a frozen program, or knows no such extra.
     """

@@ -77,7 +77,7 @@ def _place(shell: Shell) -> Path:
 
 
 def _loading(shell: Shell, path: Path) -> list[str]:
-    """What the user does so that new shells load the file."""
+    """Lines that tell how new shells load the file."""
     if shell == "fish":
         return ["New shells load it by themselves (config.fish is for lines of your own)."]
     if shell == "zsh":
