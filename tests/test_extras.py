@@ -234,6 +234,7 @@ def test_packages_that_are_listed_and_cannot_be_found_are_installed_again(
 def test_without_metadata_the_packages_are_named(installed, elsewhere, lines):
     installed(lines)
     assert install_command("images").endswith(" -m pip install imageio pillow tifffile")
+    assert install_command("nothing") == "the extra nothing of wgmb has it"
 
 
 def test_every_extra_of_a_package_is_in_the_metadata():

@@ -111,6 +111,8 @@ def install_command(extra: str) -> str:
     if lacking := [str(one) for one in needed if not one.is_met]:
         return _pip(lacking)
     own = [str(one) for one in needed if one.name.lower() in named]
+    if not own and not named:
+        return f"the extra {extra} of wgmb has it"
     return _pip(["--force-reinstall", "--no-deps", *own] if own else named)  # files are damaged
 
 
