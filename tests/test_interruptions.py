@@ -122,3 +122,16 @@ def test_a_library_that_breaks_by_itself_is_not(monkeypatch):
     monkeypatch.setattr(app, "make_app", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         app.main(["devices"])
+
+
+def test_what_a_half_made_object_raises_after_an_interruption_is_not_printed(capsys, monkeypatch):
+    class HalfMade:
+        def __del__(self):
+            raise AttributeError("no attribute")
+
+    monkeypatch.setattr("sys.unraisablehook", terminal.hush)
+    HalfMade()
+    assert "AttributeError: no attribute" in capsys.readouterr().err
+    monkeypatch.setattr(terminal.interrupted, "is_set", lambda: True)
+    HalfMade()
+    assert capsys.readouterr().err == ""

@@ -19,8 +19,11 @@ def interrupt(*_) -> None:
 
 
 def hush(unraisable) -> None:
-    """Replace sys.unraisablehook: keep dropped interruptions instead of printing them."""
-    if not (interrupted.is_set() and issubclass(unraisable.exc_type, KeyboardInterrupt)):
+    """Replace sys.unraisablehook: after an interruption, what a destructor raises is not printed.
+
+    It is the interruption itself, or comes from an object that it left half made.
+    """
+    if not interrupted.is_set():
         sys.__unraisablehook__(unraisable)
 
 
