@@ -16,6 +16,8 @@ np.seterr(all="raise", under="ignore")
 collect_ignore = ["blender"]  # test_blender.py runs them in Blender's own Python
 if "PYTEST_XDIST_WORKER" in os.environ:  # the workers have shared out the cores already
     os.environ["LP_NUM_THREADS"] = "1"
+# Lavapipe compiles kernels of narrow vectors in two thirds of the time; the pictures are small.
+os.environ.setdefault("LP_NATIVE_VECTOR_WIDTH", "128")
 
 os.environ.pop("OCIO", None)  # a config of whoever runs the tests
 pytest.register_assert_rewrite("viewer_hand")
