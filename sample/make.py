@@ -7,8 +7,8 @@ import imageio.v3 as iio
 import numpy as np
 
 from wgmb.cli import app
-from wgmb.color import to_display
-from wgmb.io import clip
+from wgmb.color.srgb import to_display
+from wgmb.sequence import clip
 
 HERE = Path(__file__).parent
 OUT = HERE.parent / "out"

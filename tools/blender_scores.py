@@ -13,7 +13,13 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from wgmb import Blur, Clip, Frame, gpu, metrics
+from wgmb import (
+    Blur,
+    Clip,
+    Frame,
+    gpu,
+    metrics,
+)
 from wgmb.io import exr
 from wgmb.lab.results import machine
 

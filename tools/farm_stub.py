@@ -8,15 +8,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import make_frames as make
-from wgmb.asked import Asked
-from wgmb.batch_report import BatchReport
-from wgmb.color_settings import ColorSettings
-from wgmb.farm_worker import Blurring
-from wgmb.io.settled import Settled
-from wgmb.job import Job, settle
-from wgmb.outcome import Outcome
-from wgmb.settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings
-from wgmb.video_settings import VideoSettings
+from wgmb.run.batch_report import BatchReport
+from wgmb.run.farm.plugin import Blurring
+from wgmb.run.job import Job, settle
+from wgmb.run.report import Outcome
+from wgmb.run.request import Asked
+from wgmb.sequence.findings import Settled
+from wgmb.settings import (
+    BlurSettings,
+    InputSettings,
+    OutputSettings,
+    ShutterSettings,
+)
+from wgmb.settings.color import ColorSettings
+from wgmb.settings.video import VideoSettings
 
 
 def job_of(pattern: str, out: Path, method: str = "tap") -> Job:

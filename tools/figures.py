@@ -11,7 +11,14 @@ import numpy as np
 from PIL import Image
 
 from pictures import IMAGES, enlarged, grid, levels, save
-from wgmb import Blur, Clip, Passes, Render, Shutter, Vectors
+from wgmb import (
+    Blur,
+    Clip,
+    Passes,
+    Render,
+    Shutter,
+    Vectors,
+)
 from wgmb.cli import app
 from wgmb.lab.cases import SceneFrame
 from wgmb.metrics import display

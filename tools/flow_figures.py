@@ -15,8 +15,13 @@ from typing import Any
 import cv2
 import numpy as np
 
-from wgmb import Blur, Flow, Frame, metrics
-from wgmb.color import linear, to_display
+from wgmb import (
+    Blur,
+    Flow,
+    Frame,
+    metrics,
+)
+from wgmb.color.srgb import linear, to_display
 from wgmb.flow.dis import Dis
 
 SIZE = WIDTH, HEIGHT = 256, 144

@@ -17,10 +17,20 @@ import numpy as np
 from PIL import Image
 
 from wgmb import METHODS, gpu
-from wgmb.lab.cases import Candidate, SceneFrame, make_scene, scene_case
+from wgmb.lab.cases import (
+    Candidate,
+    SceneFrame,
+    make_scene,
+    scene_case,
+)
 from wgmb.lab.compare import Laboratory
 from wgmb.lab.results import Entry, Report, machine
-from wgmb.metrics import FLIP_GAIN, METRICS, display, flip_colors
+from wgmb.metrics import (
+    FLIP_GAIN,
+    METRICS,
+    display,
+    flip_colors,
+)
 from wgmb.settings import ShutterSettings
 
 DOCS = Path(__file__).parent.parent / "docs"

@@ -13,9 +13,15 @@ import wgpu
 from PIL import Image, ImageDraw
 
 from pictures import IMAGES, enlarged, grid, levels, save
-from wgmb import Blur, Clip, Frame, Render, Shutter
+from wgmb import (
+    Blur,
+    Clip,
+    Frame,
+    Render,
+    Shutter,
+)
 from wgmb.charts import Chart, svg
-from wgmb.color import motion_picture
+from wgmb.color.srgb import motion_picture
 from wgmb.gpu import wgsl
 from wgmb.gpu.textures import numpy_of
 from wgmb.metrics import display
@@ -267,7 +273,7 @@ def neighbours() -> None:
 
 
 def five_frames() -> None:
-    """Three bars that stand as far apart as they move in a frame; see tests/test_reach.py."""
+    """Three bars that stand as far apart as they move in a frame; see test_reach.py."""
     height, width, step, color = 40, 112, 12, (0.9, 0.8, 0.1)
     y, x = np.mgrid[:height, :width].astype(np.float32)
     tones = (

@@ -138,7 +138,7 @@ def make_media() -> None:
     import numpy as np
 
     from wgmb import Blur, Render, Shutter
-    from wgmb.color import to_display
+    from wgmb.color.srgb import to_display
     from wgmb.scene import make
 
     MEDIA.mkdir(exist_ok=True)

@@ -16,17 +16,18 @@ from typing import Any
 import numpy as np
 from standard_words import groups_of
 
-from wgmb import arguments, shutter
+from wgmb import shutter
 from wgmb.errors import ShaderError
 from wgmb.gpu import wgsl
+from wgmb.pipeline import arguments
 from wgmb.scene import density, torusphere
 from wgmb.scene.volumes import Backdrop, Torus
 
 FRAGMENT = 2  # GPUShaderStage
 PATTERNS = (
     "methods/volume.wgsl", "methods/tap.wgsl", "methods/tiles*.wgsl", "methods/gather/*.wgsl",
-    "velocity.wgsl", "holdout.wgsl", "scene/gbuffer.wgsl",
-    "viewer/compose.wgsl", "viewer/blit.wgsl",
+    "gpu_frame/velocity.wgsl", "gpu_frame/holdout.wgsl", "scene/gbuffer.wgsl",
+    "viewer/draw/compose.wgsl", "viewer/draw/blit.wgsl",
 )  # fmt: skip
 """The shaders of the page; of these, files without an entry point come with those that have one."""
 

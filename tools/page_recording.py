@@ -21,7 +21,12 @@ from typing import Any
 import numpy as np
 import wgpu
 
-from wgmb import Blur, Render, Shutter, gpu
+from wgmb import (
+    Blur,
+    Render,
+    Shutter,
+    gpu,
+)
 from wgmb.gpu import kernels, wgsl
 from wgmb.gpu.bind_groups import forget_constants
 from wgmb.scene import make

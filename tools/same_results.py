@@ -62,7 +62,8 @@ SCENES = [
     "render torusphere -o r.png --size 96x54 --method volume", "render wheel -o r.mp4 --frames 0-3 "
     "--size 96x54 --method reproject", "render fence -o r.exr --size 96x54 --method gather -v",
     "render crossing -o r.png --sharp --size 96x54 --set speed=3", "render nothing -o r.png",
-    "render crossing -o r.#.exr --frames 0-2 --size 64x36 --resume", "shutter --curve cosine -o s.png",
+    "render crossing -o r.#.exr --frames 0-2 --size 64x36 --resume",
+    "shutter --curve cosine -o s.svg",
     "job sample -o j.#.exr --job j.json --shutter 270", "blur --job j.json --frames 9",
     "blur --job j.json --frames 10", "blur --job j.json --frames 11", "--help",
     "job clip8.mp4 -o k.mp4 --job k.json", "job plain/p.####.png -o l.#.exr --job l.json",
@@ -86,12 +87,13 @@ def commands() -> list[str]:
 
 def make_inputs(folder: Path) -> None:
     """Stereo, cropped and plain frames, and two videos with sound."""
-    sys.path[:0] = [str(path) for path in (ROOT / "tests", ROOT / "tests" / "made")]
+    sys.path.insert(0, str(ROOT / "tests" / "made"))
     import imageio.v3 as iio
+    import numpy as np
+
     import make_clips
     import make_frames as make
     import make_stereo
-    import numpy as np
 
     for name in ("stereo", "cropped", "plain"):
         (folder / name).mkdir(parents=True)

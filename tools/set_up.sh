@@ -98,7 +98,7 @@ set_up_venv() {
     echo "$state" >"$ready"
 }
 
-# wgmb without extras, in build/core, for tests/test_core_alone.py.
+# wgmb without extras, in build/core, for tests/project/test_core_alone.py.
 set_up_core() {
     core=build/core
     state=$(echo "$here" | cat - pyproject.toml constraints.txt | cksum)

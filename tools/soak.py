@@ -7,7 +7,7 @@
     python tools/soak.py -o table.md         and into a file, whole or not there
 
 The exit code is 1 if something is not right. Linux only: it reads /proc and limits processes.
-Inputs that did what none may do are kept in tests/crashers, for tests/test_soak.py.
+Inputs that did what none may do are kept in tests/crashers, for tests/run/test_soak.py.
 """
 
 from __future__ import annotations

@@ -110,9 +110,9 @@ def length(clip: Path) -> Fraction:
 
 def codecs_alone(clip: Path, exact: Path, scratch: Path) -> None:
     """Decode the clip, and encode the pictures of `exact`, which were decoded before."""
-    from wgmb.io.coded_video import CodedVideo
-    from wgmb.io.encoders import chosen
-    from wgmb.io.footage import Footage
+    from wgmb.video.read.reader import Footage
+    from wgmb.video.write.encoders import chosen
+    from wgmb.video.write.pictures import CodedVideo
 
     footage = Footage(exact)
     pictures = [picture for _, picture in footage]
@@ -143,8 +143,8 @@ def kernel_alone(clip: Path, fps: int) -> None:
     An exposure begins and ends in the middle of a picture where a frame has an even number.
     """
     from wgmb import gpu
-    from wgmb.io.footage import Footage
-    from wgmb.planes import Average
+    from wgmb.video.planes import Average
+    from wgmb.video.read.reader import Footage
 
     footage = Footage(clip)
     count = max(1, round(float(footage.rate) / fps))

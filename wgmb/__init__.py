@@ -13,31 +13,37 @@ from ._version import __version__ as __version__
 
 TYPE_CHECKING = False  # typing's own, without the time that loading it takes
 if TYPE_CHECKING:
-    from .batch import blur_sequence, vectors_sequence
-    from .batch_report import BatchReport
     from .camera import Camera, Reprojections
+    from .color.spaces import ColorConfig, ColorSpace, Display
     from .cone import Cone
-    from .display import ColorConfig, ColorSpace, Display
-    from .errors import DeviceError, Error, GpuMemoryError, InputError, ShaderError
+    from .errors import (
+        DeviceError,
+        Error,
+        GpuMemoryError,
+        InputError,
+        ShaderError,
+    )
     from .flow import Flow
     from .frame import Frame
-    from .frame_views import FrameViews
+    from .gpu_frame.views import FrameViews
     from .hosts.notebook import explore
-    from .io.camera_file import CameraFile
-    from .io.clip import Clip, Passes
-    from .io.output import Output
-    from .io.result import Result
-    from .io.vector_output import VectorOutput
-    from .io.vectors import Vectors
     from .methods import METHODS
     from .observer import Observer
-    from .one_frame import blur
-    from .pipeline import Blur
+    from .output.output import Output
+    from .output.result import Result
+    from .output.vectors import VectorOutput
+    from .pipeline.blur import Blur
+    from .pipeline.one_frame import blur
+    from .png import show
     from .render import Render
+    from .run.batch_report import BatchReport
+    from .run.sequence import blur_sequence, vectors_sequence
+    from .run.stages import BlurredFrame, blurred
     from .scene import Body, CameraPath, Scene
-    from .shown import show
+    from .sequence.clip import Clip, Passes
+    from .sequence.layers.camera_file import CameraFile
+    from .sequence.layers.vectors import Vectors
     from .shutter import Shutter
-    from .stages import BlurredFrame, blurred
 
 __all__ = [
     "METHODS",
@@ -80,31 +86,31 @@ __all__ = [
 ]
 
 _PLACES = {
-    "batch": ("blur_sequence", "vectors_sequence"),
-    "batch_report": ("BatchReport",),
     "camera": ("Camera", "Reprojections"),
     "cone": ("Cone",),
-    "display": ("ColorConfig", "ColorSpace", "Display"),
+    "color.spaces": ("ColorConfig", "ColorSpace", "Display"),
     "errors": ("DeviceError", "Error", "GpuMemoryError", "InputError", "ShaderError"),
     "flow": ("Flow",),
     "frame": ("Frame",),
-    "frame_views": ("FrameViews",),
+    "gpu_frame.views": ("FrameViews",),
     "hosts.notebook": ("explore",),
-    "io.camera_file": ("CameraFile",),
-    "io.clip": ("Clip", "Passes"),
-    "io.output": ("Output",),
-    "io.result": ("Result",),
-    "io.vector_output": ("VectorOutput",),
-    "io.vectors": ("Vectors",),
     "methods": ("METHODS",),
     "observer": ("Observer",),
-    "one_frame": ("blur",),
-    "pipeline": ("Blur",),
+    "output.output": ("Output",),
+    "output.result": ("Result",),
+    "output.vectors": ("VectorOutput",),
+    "pipeline.blur": ("Blur",),
+    "pipeline.one_frame": ("blur",),
+    "png": ("show",),
     "render": ("Render",),
+    "run.batch_report": ("BatchReport",),
+    "run.sequence": ("blur_sequence", "vectors_sequence"),
+    "run.stages": ("BlurredFrame", "blurred"),
     "scene": ("Body", "Scene", "CameraPath"),
-    "shown": ("show",),
+    "sequence.clip": ("Clip", "Passes"),
+    "sequence.layers.camera_file": ("CameraFile",),
+    "sequence.layers.vectors": ("Vectors",),
     "shutter": ("Shutter",),
-    "stages": ("BlurredFrame", "blurred"),
 }
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}
 

@@ -14,6 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+TYPE_CHECKING = False  # typing's own, without the time that loading it takes
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 
 class Error(Exception):
     """Base class of wgmb's errors; the message states what was expected and what was given."""
@@ -52,3 +56,9 @@ def did_you_mean(word: object, known: Iterable[str]) -> str:
 
     close = get_close_matches(str(word), [str(k) for k in known], n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def size_text(of: NDArray | tuple[int, int]) -> str:
+    """Width x height of a plane, or of a pair, for messages."""
+    width, height = of if isinstance(of, tuple) else of.shape[::-1]
+    return f"{width} x {height}"

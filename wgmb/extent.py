@@ -71,7 +71,7 @@ class Extent:
         return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
     def _paths(self, frame: Frame, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 2) velocity and half acceleration at pixels x, y, as wgsl/velocity.wgsl has them."""
+        """(n, 2) velocity and half acceleration at pixels x, y, as in gpu_frame/velocity.wgsl."""
         back, ahead = (displacement(frame, side, x, y) for side in (-1, 1))
         back = np.where(np.isfinite(back), back, -ahead)
         ahead = np.where(np.isfinite(ahead), ahead, -back)

@@ -7,7 +7,7 @@ time     frame intervals, 0 = the frame's instant; a 180 degree shutter is open 
 depth    distance along the view axis [scene units], larger is farther, inf = nothing there
 matrix   `clip_from_world`: destination first, so that products read as chains
 
-Foreign conventions are translated in io/vectors.py and io/camera_file.py, nowhere else.
+Foreign conventions are translated in sequence/layers/ (vectors.py, camera_file.py), nowhere else.
 """
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from .camera import Reprojections, Window, window_of
 from .errors import InputError
 from .gpu import wgsl
-from .shown import show
+from .png import show
 
 _F32_MAX = float(np.finfo(np.float32).max)
 _CHANNELS = {

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .color import srgb
+from .color.srgb import srgb
 from .errors import InputError
 from .extras import needed_by
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Sequence
 
 import numpy as np
 import wgpu
@@ -14,48 +13,8 @@ import wgpu
 from . import gpu
 from .cone import Cone
 from .errors import InputError
-from .gpu.textures import ScratchBuffer, TexturePool
-
-EIGHT = 8  # pictures that one pass takes
-
-
-class WeightedSum:
-    """Weighted sum of images on the GPU; pixels that are not finite count as 0."""
-
-    def __init__(self, device: wgpu.GPUDevice):
-        self._device, self._sums = device, ScratchBuffer(device)
-
-    def encode(
-        self,
-        encoder: wgpu.GPUCommandEncoder,
-        pictures: Sequence[wgpu.GPUTexture],
-        weights: np.ndarray,
-        output: wgpu.GPUTexture,
-        *,
-        onto: bool = False,
-    ) -> None:
-        """Record it into `encoder`: float textures of one size, one weight each.
-
-        `output`: rgba32float, of that size. `onto`: added to the sum of the call before.
-        """
-        width, height, _ = output.size
-        bindings = gpu.FrameBindings.of_size(self._device, (width, height))
-        uniform, create = wgpu.BufferUsage.UNIFORM, self._device.create_buffer_with_data
-        views = [picture.create_view() for picture in pictures]
-        for first in range(0, len(views), EIGHT):
-            begins = first == 0 and not onto
-            kernel = gpu.kernel(self._device, "observer.wgsl", FIRST=begins)
-            share = np.zeros((), kernel.source.dtype("Share"))
-            share["weights"].flat[: len(views) - first] = weights[first : first + EIGHT]
-            kernel.run(
-                encoder,
-                "main",
-                bindings,
-                share=create(data=share, usage=uniform),
-                sums=self._sums.at_least(16 * width * height),
-                output=output.create_view(),
-                **{f"picture{i}": views[min(first + i, len(views) - 1)] for i in range(EIGHT)},
-            )
+from .gpu.textures import TexturePool
+from .gpu_frame.weighted_sum import WeightedSum
 
 
 class Observer:

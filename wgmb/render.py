@@ -17,11 +17,11 @@ import wgpu
 from . import gpu
 from .errors import InputError
 from .frame import Frame
-from .frame_views import FrameViews
 from .gpu.textures import TexturePool
 from .gpu.timing import Clock
+from .gpu_frame.views import FrameViews
 from .methods.contract import reach_of
-from .pipeline import Blur
+from .pipeline.blur import Blur
 from .scene.gbuffer import MOST_LOOPS, MOST_RAYS, SceneOnGpu
 from .scene.scene import Scene
 

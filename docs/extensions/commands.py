@@ -12,8 +12,8 @@ from cyclopts import App
 from sphinx.application import Sphinx
 
 from wgmb.cli.app import COMMANDS, make_app
-from wgmb.io.vectors import CONVENTIONS
 from wgmb.scene import builtin
+from wgmb.sequence.layers.vectors import CONVENTIONS
 
 _KINDS = {bool: "", int: "N", float: "X", str: "TEXT", Path: "PATH"}
 _TITLES = {"Parameters": "General"}

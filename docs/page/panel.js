@@ -19,8 +19,8 @@ export class Gpu {
     Object.assign(this, { device, shaders: exported.shaders });
     this.kernels = new Kernels(device, exported.shaders);
     this.format = navigator.gpu.getPreferredCanvasFormat();
-    const blit = exported.shaders['viewer/blit.wgsl'];
-    const module = device.createShaderModule({ code: blit.text, label: 'viewer/blit.wgsl' });
+    const blit = exported.shaders['viewer/draw/blit.wgsl'];
+    const module = device.createShaderModule({ code: blit.text, label: 'viewer/draw/blit.wgsl' });
     this.blit = device.createRenderPipelineAsync({
       layout: 'auto',
       vertex: { module, entryPoint: 'corner' },
@@ -85,13 +85,13 @@ export class Panel {
     const same = first.width === width && first.height === height;
     const taps = same ? 0 : Math.ceil(first.width / width);
     const kernel = await this.gpu.kernels.get({
-      file: 'viewer/compose.wgsl', texels: {}, constants: { COMPARE: second ? 1 : 0, TAPS: taps },
+      file: 'viewer/draw/compose.wgsl', texels: {}, constants: { COMPARE: second ? 1 : 0, TAPS: taps },
     });
     const blit = await this.gpu.blit;
     return (encoder) => {
       const nowhere = [-9, -9, 0, 0];
       this.buffers.write('frame', frame, GPUBufferUsage.UNIFORM);
-      this.buffers.write('view', packed('viewer/compose.wgsl', 'View', {
+      this.buffers.write('view', packed('viewer/draw/compose.wgsl', 'View', {
         area: [0, 0, width, height], place: [0, 0, width, height], key: nowhere, wheel: [-9, -9, 1, 1],
         line: line * width, thick: 0, exposure: 1, gain: 1, middle: 1, fastest: 1,
       }), GPUBufferUsage.UNIFORM);
@@ -106,7 +106,7 @@ export class Panel {
           layout: blit.getBindGroupLayout(0), entries: [{ binding: 0, resource: this.shown.createView() }],
         });
       }
-      const [x, y] = this.gpu.shaders['viewer/compose.wgsl'].workgroup;
+      const [x, y] = this.gpu.shaders['viewer/draw/compose.wgsl'].workgroup;
       const compose = encoder.beginComputePass();
       compose.setPipeline(kernel.pipelines.main);
       this.groups.forEach((group, i) => compose.setBindGroup(i, group));

@@ -125,7 +125,7 @@ export function shutterOf({ curve = 'box', degrees = 180, phase = 'centre' }) {
   return { curve, degrees, phase, span, weight, integral, time, strata };
 }
 
-// ---- wgmb/frame_constants.py --------------------------------------------------------------
+// ---- wgmb/gpu_frame/bindings.py --------------------------------------------------------------
 
 /// The buffers of bind group 0, by their names in the shaders. `maxBlur` [px], null: unlimited.
 export function groupZero({ width, height, samples = K.SAMPLES, shutter, number = 0, jitter = 0, maxBlur = null }) {

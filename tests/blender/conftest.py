@@ -1,6 +1,6 @@
 """Blender's module, the add-on, and what a bundle brings along: nothing else is installed here.
 
-`./run test` runs these files where it can install bpy; see tests/test_blender.py.
+`./run test` runs these files where it can install bpy; see tests/hosts/test_blender.py.
 """
 
 import os

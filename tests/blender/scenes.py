@@ -129,7 +129,8 @@ def truth(scene, number: int, path: Path, samples=TRUTH) -> np.ndarray:
 
 def pixels(path: Path, layer: str | None = None) -> np.ndarray:
     """The picture in an EXR file: (height, width, 3 or 4) linear light."""
-    from wgmb.io import exr, layers
+    from wgmb.io import exr
+    from wgmb.sequence.layers import names as layers
 
     channels = exr.read(path).channels()
     names = layers.find_color(list(channels), layer)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from wgmb.color import srgb
+from wgmb.color.srgb import srgb
 
 LUMA = np.array([0.299, 0.587, 0.114])
 PATCH = [(j, i) for j in range(-2, 3) for i in range(-2, 3) if (i + j) % 2 == 0]

@@ -16,9 +16,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 CRASHERS = ROOT / "tests" / "crashers"
-"""Inputs that once did what none may do; tests/test_soak.py reads them all."""
+"""Inputs that once did what none may do; tests/run/test_soak.py reads them all."""
 
-PATHS = [str(ROOT), str(ROOT / "tools"), str(ROOT / "tests")]
+PATHS = [str(ROOT), str(ROOT / "tools"), str(ROOT / "tests" / "made")]
 """Paths of wgmb, which lies beside this harness, of these modules, and of make_frames.py."""
 
 sys.path[:0] = [path for path in PATHS if path not in sys.path]

@@ -13,7 +13,12 @@ from pathlib import Path
 import numpy as np
 
 import make_frames as make
-from wgmb import Blur, DeviceError, Error, Frame
+from wgmb import (
+    Blur,
+    DeviceError,
+    Error,
+    Frame,
+)
 from wgmb.cli import app
 
 from . import ROOT, parts

@@ -21,11 +21,17 @@ import tifffile
 from PIL import Image
 
 import make_frames as make
-from wgmb import CameraFile, Clip, InputError, Passes, viewer
+from wgmb import (
+    CameraFile,
+    Clip,
+    InputError,
+    Passes,
+    viewer,
+)
 from wgmb.cli import app
-from wgmb.color import to_display
+from wgmb.color.srgb import to_display
 from wgmb.io import exr, stills
-from wgmb.io.cut_list import CutList
+from wgmb.shots.cut_list import CutList
 from wgmb.viewer import State
 
 

@@ -11,7 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from wgmb import Blur, Frame, Observer, Render, viewer
+from wgmb import (
+    Blur,
+    Frame,
+    Observer,
+    Render,
+    viewer,
+)
 from wgmb.scene import builtin
 from wgmb.viewer.window import frame as viewed
 

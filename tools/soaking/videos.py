@@ -12,7 +12,7 @@ import av
 import numpy as np
 
 from wgmb import Output
-from wgmb.io.frame_file import FrameFile
+from wgmb.sequence.frame_file import FrameFile
 
 from .processes import apart, use
 from .shots import contents, shot

@@ -19,10 +19,21 @@ from cyclopts import Parameter
 from cyclopts.config import Dict
 
 from .._version import __version__
-from ..errors import DeviceError, Error, InputError, did_you_mean
+from ..errors import (
+    DeviceError,
+    Error,
+    InputError,
+    did_you_mean,
+)
 from ..extras import EXTRAS, reason
 from . import terminal
-from .exit_codes import DONE, INTERRUPTED, NO_DEVICE, SOME_FAILED, USAGE
+from .exit_codes import (
+    DONE,
+    INTERRUPTED,
+    NO_DEVICE,
+    SOME_FAILED,
+    USAGE,
+)
 
 COMMANDS = {
     "blur": "Blur rendered frames or videos.",
@@ -38,7 +49,7 @@ COMMANDS = {
     "perceive": "Simulate a viewer's perception: each frame is held, and earlier ones fade.",
     "shutter": "Draw a shutter: its curve, its integral, and the sum of neighbouring windows.",
 }
-"""Every command, wgmb/cli/NAME.py, and the first line of its help."""
+"""Every command, wgmb/cli/commands/NAME.py, and the first line of its help."""
 
 
 def make_app(*whole: str) -> cyclopts.App:
@@ -57,12 +68,14 @@ def make_app(*whole: str) -> cyclopts.App:
         default_parameter=Parameter(negative=(), show_default=_default),
     )
     app.command(
-        "wgmb.cli.completion:install_completion",
+        "wgmb.cli.commands.completion:install_completion",
         name="--install-completion",
         help="Let the shell (bash, zsh or fish) complete commands and options.",
     )
     for name, line in COMMANDS.items():
-        app.command(f"wgmb.cli.{name}:{name}", name=name, help=None if name in whole else line)
+        app.command(
+            f"wgmb.cli.commands.{name}:{name}", name=name, help=None if name in whole else line
+        )
     return app
 
 
@@ -177,8 +190,8 @@ def _config(words: list[str]) -> tuple[Dict, ...]:
     for i, word in enumerate(words if words[:1] != ["view"] else []):
         name, _, given = word.partition("=")
         if name == "--config" and (given or words[i + 1 :]):
-            from ..io.frame_file import about
-            from ..settings_toml import parse, text_of
+            from ..sequence.frame_file import about
+            from ..settings.toml import parse, text_of
 
             path = Path(given or "".join(words[i + 1 : i + 2]))
             with about(path):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..io.frame_file import odd_sizes
 from ..io.frame_numbers import frame_list
-from ..outcome import Outcome
+from ..run.report import Outcome
+from ..sequence.frame_file import odd_sizes
 from .exit_codes import DONE, SOME_FAILED
 from .spelling import as_options
 from .terminal import complain, note

@@ -7,12 +7,11 @@ from typing import Annotated, TypeVar
 
 from cyclopts import Group, Parameter
 
-from ..color_settings import ColorSettings, DisplaySettings
 from ..io import exr
 from ..io.suffixes import STILLS, VIDEOS
-from ..io.vectors import CONVENTIONS
 from ..methods import METHODS
 from ..scene import builtin
+from ..sequence.layers.vectors import CONVENTIONS
 from ..settings import (
     METHOD_OPTIONS,
     BlurSettings,
@@ -21,8 +20,9 @@ from ..settings import (
     SceneSettings,
     ShutterSettings,
 )
+from ..settings.color import ColorSettings, DisplaySettings
+from ..settings.video import VideoSettings
 from ..shutter import CURVES, PHASES
-from ..video_settings import VideoSettings
 
 _Settings = TypeVar("_Settings", bound=type)
 

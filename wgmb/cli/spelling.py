@@ -28,8 +28,8 @@ _OTHERWISE = {
 def options() -> dict[str, str]:
     """The option that each argument is set by; the settings' fields have both names."""
     from .. import settings
-    from ..color_settings import ColorSettings, option_name
-    from ..video_settings import VideoSettings
+    from ..settings.color import ColorSettings, option_name
+    from ..settings.video import VideoSettings
 
     groups = (
         settings.InputSettings,

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import InputError
-from ..io.settled import Range, ranges
+from ..sequence.findings import Range, ranges
 
 MARK = "# Written by wgmb job"
 _MOST_IN_PARAMETER = 1024  # characters of an OpenJD parameter's value

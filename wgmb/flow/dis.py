@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import extras
-from ..color import to_display
+from ..color.srgb import to_display
 from ..errors import InputError
 
 QUALITIES = ("fast", "best")

@@ -13,8 +13,8 @@ import wgpu
 from ..errors import Error, InputError
 from ..frame import Frame
 from ..methods import METHODS, default_method
-from ..pipeline import Blur
-from ..shown import show
+from ..pipeline.blur import Blur
+from ..png import show
 
 MOST_DEGREES = 720
 MOST_SAMPLES = 64

@@ -8,14 +8,19 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..camera import MAX_INDEX, MOST_BODIES, Camera, Reprojections
+from ..camera import (
+    MAX_INDEX,
+    MOST_BODIES,
+    Camera,
+    Reprojections,
+)
 from ..errors import InputError
 from ..extras import needed_by
-from ..frame_views import FrameViews
 from ..gpu import wgsl
 from ..gpu.textures import TexturePool
+from ..gpu_frame.views import FrameViews
 from ..methods import METHODS
-from ..pipeline import Blur
+from ..pipeline.blur import Blur
 from ..shutter import Shutter
 
 with needed_by("wgmb.hosts.pygfx"):

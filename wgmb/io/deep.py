@@ -8,20 +8,16 @@ a point at its front. OpenEXR, "Interpreting OpenEXR Deep Pixels".
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
 from ..errors import InputError
-from .layers import stem
-from .vectors import CONVENTIONS
 
 _COLORS = ("r", "g", "b", "a", "y", "red", "green", "blue", "alpha")
-_NOT_COLORS = {"n", "normal", "normals", "p", "position", "id"} | {
-    stem for convention in CONVENTIONS.values() for stem in convention.stems
-}
+_NOT_COLORS = {"n", "normal", "normals", "p", "position", "id"}
 _MOST_HALF = float(np.finfo(np.float16).max)
 _OBJECT = 256  # bytes that the library takes for a pixel's samples of a channel, beside them
 _MANY_PARTS = 0x1000
@@ -29,11 +25,14 @@ _MOST = 1 << 40  # bytes of a chunk: more is damage
 
 
 @np.errstate(all="ignore")  # samples may be anything
-def flatten(channels: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def flatten(
+    channels: Mapping[str, np.ndarray], data_layers: Collection[str] = ()
+) -> dict[str, np.ndarray]:
     """(height, width) planes from (height, width) arrays of samples, None where there are none.
 
     Where a pixel is empty its depth is infinite, and all else 0. InputError where the channels
-    of a pixel have different numbers of samples.
+    of a pixel have different numbers of samples. `data_layers`: names of layers, their last parts
+    in lower case, that hold no colours either, such as vectors.
     """
     first, shape = next(iter(channels)), next(iter(channels.values())).shape
     filled = [
@@ -58,7 +57,7 @@ def flatten(channels: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         if depth not in orders:
             orders[depth] = _order(values[depth] if depth else None, counts)
         ordered = samples[orders[depth]]
-        if _is_color(name):
+        if _is_color(name, data_layers):
             key = depth, alpha
             if key not in seen:
                 clear = values[alpha][orders[depth]] if alpha else np.ones(len(ordered))
@@ -74,11 +73,16 @@ def flatten(channels: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return planes
 
 
-def _is_color(name: str) -> bool:
+def _is_color(name: str, data_layers: Collection[str]) -> bool:
     """Return True for a channel that is laid over, not one of vectors, normals or ids."""
     layer, _, component = name.rpartition(".")
-    own = stem(layer)
-    if component.lower() not in _COLORS or own in _NOT_COLORS or own[-2:].isdigit():
+    own = layer.rpartition(".")[2].lower()
+    if (
+        component.lower() not in _COLORS
+        or own in _NOT_COLORS
+        or own in data_layers
+        or own[-2:].isdigit()
+    ):
         return False
     return component != "y" and (component != "Y" or not layer)
 

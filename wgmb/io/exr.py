@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,8 +17,8 @@ import OpenEXR
 
 from ..errors import InputError, check_choice
 from . import chroma, deep, limits
+from .exr_library import hushed, inside
 from .limits import MOST_PIXELS_A_SIDE
-from .native import hushed, inside
 
 COMPRESSIONS = {
     "none": OpenEXR.NO_COMPRESSION,
@@ -90,11 +91,18 @@ class Exr:
         return found
 
 
-def read(path: str | Path, *, header_only: bool = False, max_mb: float = limits.MAX_MB) -> Exr:
+def read(
+    path: str | Path,
+    *,
+    header_only: bool = False,
+    max_mb: float = limits.MAX_MB,
+    data_layers: Collection[str] = (),
+) -> Exr:
     """Read `path`; `header_only` leaves every channel an empty array.
 
     Deep pixels are flattened, luminance and chroma become R, G and B, and of tiles' levels the
     largest is read; the part's `notes` say so. `max_mb`: megabytes that its pixels may take.
+    `data_layers`: layers of deep pixels that hold no colours (see `deep.flatten`).
     `InputError` names the file where it is missing, damaged, cut off, absurdly large or beyond
     that limit, and where memory is short.
     """
@@ -129,13 +137,13 @@ def read(path: str | Path, *, header_only: bool = False, max_mb: float = limits.
         )
     try:
         for want, stored in zip(promised, content.parts, strict=True):
-            _fill(path, want, stored)
+            _fill(path, want, stored, data_layers)
     except MemoryError:
         raise InputError(f"{path}: not enough memory for {needed >> 20} MB of pixels") from None
     return Exr(path, promised)
 
 
-def _fill(path: Path, part: Part, stored) -> None:
+def _fill(path: Path, part: Part, stored, data_layers: Collection[str]) -> None:
     """Give a part, promised by its header, the planes of what is stored."""
     sampling: dict[str, tuple[int, int]] = {}
     for name in part.channels:
@@ -154,7 +162,7 @@ def _fill(path: Path, part: Part, stored) -> None:
     try:
         if stored.header.get("type") in _DEEP:
             volumes = deep.has_volumes(part.channels)
-            part.channels = deep.flatten(part.channels)
+            part.channels = deep.flatten(part.channels, data_layers)
             part.notes += (_FLATTENED + (_VOLUMES if volumes else ""),)
         _fill_gaps(part, sampling)
     except InputError as error:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..color import ToDisplay, linear, to_display
-from ..display import ColorSpace
+from ..color.spaces import ColorSpace
+from ..color.srgb import ToDisplay, linear, to_display
 from ..errors import InputError
 from ..extras import needed_by
 from . import limits

@@ -14,7 +14,7 @@ from .. import gpu
 from ..frame import Frame
 from ..gpu.textures import TexturePool
 from ..gpu.timing import alternate
-from ..pipeline import Blur
+from ..pipeline.blur import Blur
 from ..render import Render
 from ..scene import builtin
 

@@ -14,16 +14,16 @@ import numpy as np
 from ..errors import InputError, did_you_mean
 from ..extent import EVERYWHERE
 from ..frame import Frame
-from ..io.clip import Clip
 from ..io.frame_numbers import frame_list
-from ..io.windows import laid, union
 from ..methods import METHODS
 from ..methods.options import options_of
 from ..metrics import measure
-from ..pipeline import Blur
+from ..pipeline.blur import Blur
 from ..render import Render
 from ..scene import builtin
 from ..scene.scene import Scene
+from ..sequence.clip import Clip
+from ..sequence.data_windows import laid, union
 from ..shutter import Shutter
 
 Tell = Callable[[str], None]

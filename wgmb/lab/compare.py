@@ -15,12 +15,12 @@ from functools import partial
 import numpy as np
 import wgpu
 
-from ..arguments import MOST_SAMPLES, most_samples
 from ..errors import InputError
 from ..gpu import timing
 from ..gpu.textures import TexturePool
 from ..metrics import METRICS, measure
-from ..pipeline import Blur
+from ..pipeline.arguments import MOST_SAMPLES, most_samples
+from ..pipeline.blur import Blur
 from ..shutter import Shutter
 from .cases import Candidate, Case, Tell
 from .results import Entry, Report, Table

@@ -15,10 +15,20 @@ import numpy as np
 from PIL import Image
 
 from ..io.atomic import write_file
-from ..metrics import FLIP_GAIN, METRICS, display, flip_colors
+from ..metrics import (
+    FLIP_GAIN,
+    METRICS,
+    display,
+    flip_colors,
+)
 from .cases import Case
 from .charts import plot_svg
-from .results import Entry, Plot, Report, Table
+from .results import (
+    Entry,
+    Plot,
+    Report,
+    Table,
+)
 
 _COLORS = 10  # in report.html
 _TEMPLATE = Path(__file__).with_name("report.html")

@@ -9,10 +9,10 @@ import wgpu
 
 from ..errors import InputError
 from ..frame import Frame
-from ..frame_views import FrameViews
 from ..gpu import timing
 from ..gpu.textures import TexturePool, numpy_of
-from ..pipeline import Blur
+from ..gpu_frame.views import FrameViews
+from ..pipeline.blur import Blur
 from ..scene import builtin
 from .cases import SceneFrame
 

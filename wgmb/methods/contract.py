@@ -12,22 +12,11 @@ import wgpu
 from .. import gpu
 from ..extent import Extent
 from ..frame import Frame
-from ..frame_views import FrameViews, View
+from ..gpu_frame.preparation import PreparedFrame
+from ..gpu_frame.views import View
 from ..scene.gbuffer import SceneOnGpu
 from ..shutter import Shutter
 from .options import MethodOptions
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PreparedFrame(FrameViews):
-    """A frame as methods read it: `motion` is complete, `color` is multiplied by `weight`."""
-
-    offset: int
-    """-1, 0, 1: how far it is from the frame that is blurred [frame intervals]."""
-    weight: View | None
-    """Weight per pixel, 0..1; None: equal weights. Either all frames have one, or none."""
-    by_camera: bool
-    """The motion is the camera's alone: there are no vectors."""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from ..camera import Camera, Reprojections
 from ..errors import InputError
 from ..gpu import wgsl
 from ..gpu.textures import ScratchBuffer
-from ..velocity import viewport_of
-from .bends import Bends
+from ..gpu_frame.velocity import viewport_of
+from .five_positions import Bends
 from .options import MethodOptions
 
 GOLDEN = (5**0.5 - 1) / 2

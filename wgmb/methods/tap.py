@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from .. import gpu
 from ..extent import Spread
 from ..gpu import wgsl
-from .bends import Bends
+from .five_positions import Bends
 from .options import MethodOptions
 
 

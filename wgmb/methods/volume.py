@@ -11,7 +11,12 @@ import wgpu
 from .. import gpu
 from ..errors import InputError
 from ..gpu import wgsl
-from ..scene.density import TURN, Rotation, overrides, tables
+from ..scene.density import (
+    TURN,
+    Rotation,
+    overrides,
+    tables,
+)
 from ..scene.figure import RATE
 from ..scene.volumes import Backdrop, OrbitingSphere, Torus
 from ..shutter import Shutter

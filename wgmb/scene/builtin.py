@@ -12,7 +12,13 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from .bodies import Body, at, moving, rotation, translation
+from .bodies import (
+    Body,
+    at,
+    moving,
+    rotation,
+    translation,
+)
 from .figure_scenes import cone, disk, spiric
 from .scene import CameraPath, Scene
 from .torusphere import torusphere

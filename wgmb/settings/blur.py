@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 from typing import Literal, Self, TypeVar
 
-from ..arguments import checked
-from ..io.clip import Clip
 from ..methods import METHODS, default_method
 from ..methods.options import Option, options_of
-from ..pipeline import Blur
+from ..pipeline.arguments import checked
+from ..pipeline.blur import Blur
 from ..scene.scene import Scene
+from ..sequence.clip import Clip
 from ..shutter import Shutter
 
 

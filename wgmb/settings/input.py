@@ -4,12 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from ..display import ColorSpace
-from ..io import limits, vectors
-from ..io.clip import Clip, Passes
+from ..color.spaces import ColorSpace
+from ..io import limits
 from ..io.frame_numbers import is_pattern, readable
-from ..io.masks import is_file, with_amount
-from ..io.settled import Settled
+from ..sequence.clip import Clip, Passes
+from ..sequence.findings import Settled
+from ..sequence.layers import vectors
+from ..sequence.layers.masks import is_file, with_amount
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,9 +7,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Literal
 
-from ..display import Display
+from ..color.spaces import Display
 from ..errors import InputError
-from ..io.output import Output
+from ..output.output import Output
 
 
 @dataclass(frozen=True, kw_only=True)

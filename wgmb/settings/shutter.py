@@ -8,7 +8,12 @@ from typing import Literal, Self
 from ..errors import check_choice
 from ..io.frame_numbers import readable
 from ..scene.scene import Scene
-from ..shutter import CURVES, PHASES, Shutter, read_curve
+from ..shutter import (
+    CURVES,
+    PHASES,
+    Shutter,
+    read_curve,
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,8 +15,8 @@ panel      the sliders: sections of widgets, video_section; overlay: text on the
 window     events in, images out, on a desktop or offscreen; actions: files, videos, exports
 """
 
-from .state import State
-from .video_time import at_rate
+from .state.state import State
+from .state.video_time import at_rate
 from .window import Viewer, offscreen, view
 
 __all__ = ["State", "Viewer", "at_rate", "offscreen", "view"]

@@ -11,16 +11,16 @@ import glfw
 import numpy as np
 from imgui_bundle import imgui
 
-from ..color import linear
+from ..color.srgb import linear
 from ..errors import Error, InputError
 from ..io import exr, stills
 from ..io.atomic import temporary_name, write_file
 from ..io.record import KEY
-from ..io.video import Video
-from .renderer import Renderer
-from .screen import Screen
-from .state import State
-from .video_time import rate
+from ..video.write.frames import Video
+from .draw.renderer import Renderer
+from .draw.screen import Screen
+from .state.state import State
+from .state.video_time import rate
 
 
 class Actions:

@@ -8,12 +8,17 @@ import wgpu
 
 from ..methods import METHODS
 from ..methods.options import Option, options_of
-from .displayed import Displayed
-from .footage_subject import FootageSubject
-from .on_disk import footage_of
-from .source import ClipSubject, SceneSubject, Subject
-from .state import BOTH_EYES, LOOKS, REFERENCE, State
-from .video_time import most_mb, settings_of
+from .draw.display import Displayed
+from .state.files import footage_of
+from .state.state import (
+    BOTH_EYES,
+    LOOKS,
+    REFERENCE,
+    State,
+)
+from .state.video_time import most_mb, settings_of
+from .subjects.subject import ClipSubject, SceneSubject, Subject
+from .subjects.video import FootageSubject
 
 
 class Choices:

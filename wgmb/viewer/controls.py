@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass, replace
 
 from ..scene import builtin
-from .state import State
-from .video_time import passed
+from .state.state import State
+from .state.video_time import passed
 
 Box = tuple[float, float, float, float]  # x, y, width, height [logical px]
 

@@ -19,11 +19,11 @@ from .. import gpu
 from ..errors import DeviceError, InputError
 from . import controls
 from .actions import Actions
-from .panel import Info, Panel
-from .renderer import Renderer
-from .screen import Screen, key_box
-from .state import COMPARE, State
-from .theme import style
+from .draw.renderer import Renderer
+from .draw.screen import Screen, key_box
+from .panel.panel import Info, Panel
+from .panel.theme import style
+from .state.state import COMPARE, State
 
 TITLE = "wgmb"
 _AFTER_WHEEL = 0.3  # seconds for which turning the wheel counts as moving

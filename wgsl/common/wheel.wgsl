@@ -1,4 +1,4 @@
-// Motion as a colour, as wgmb/color.py has it: hue is the direction, brightness the speed.
+// Motion as a colour, as wgmb/color/srgb.py has it: hue is the direction, brightness the speed.
 //#include common/finite.wgsl
 
 /// Linear light, 0 to 1; full brightness at the speed `fastest` and above; grey where motion is not finite.

@@ -1,7 +1,7 @@
 // Sample reprojection in depth-tested time slices: every sample is splatted to its position at every time, the
 // nearest one is visible (Taylor, extended by the depth test and the object motion that he left to others).
 //#include common/depth.wgsl
-//#include common/five_positions.wgsl
+//#include common/trajectory5.wgsl
 //#include common/frame.wgsl
 //#include common/loops.wgsl
 //#include common/shutter.wgsl

@@ -1,5 +1,5 @@
 // The mean colour along each pixel's own trajectory (Rosado 2007, GPU Gems 3, chapter 27).
-//#include common/five_positions.wgsl
+//#include common/trajectory5.wgsl
 //#include common/frame.wgsl
 //#include common/noise.wgsl
 //#include common/shutter.wgsl

@@ -1,7 +1,7 @@
 // Information from the frames before and after a frame: paths of surfaces beyond them, and backgrounds that it hides.
 // Where there is no such frame its textures are empty, and not read.
 //#include common/depth.wgsl
-//#include common/five_positions.wgsl
+//#include common/trajectory5.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/surface.wgsl
 

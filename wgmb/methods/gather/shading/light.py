@@ -12,7 +12,12 @@ import wgpu
 from ....gpu import wgsl
 from ....gpu.textures import ScratchBuffer, TexturePool
 from .changes import Seen, View, changes
-from .flow import Flow, flow, grids, pyramid
+from .flow import (
+    Flow,
+    flow,
+    grids,
+    pyramid,
+)
 from .stage import FOLDER, Stage
 from .values import values
 

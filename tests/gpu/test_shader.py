@@ -1,0 +1,176 @@
+"""WGSL is the one place of truth: Python reads it as the GPU does."""
+
+import itertools
+import random
+import re
+
+import numpy as np
+import pytest
+import wgpu
+
+import parts
+from wgmb import ShaderError, gpu
+from wgmb.gpu import wgsl
+
+LEAVES = ["f32", "u32", "i32", "vec2f", "vec2u", "vec3f", "vec3u", "vec4f", "vec4<i32>", "mat4x4f",
+          "array<vec4f, 3>"]  # fmt: skip
+FILES = sorted(p.relative_to(wgsl.ROOT).as_posix() for p in wgsl.ROOT.rglob("*.wgsl"))
+ENTERED = [f for f in FILES if wgsl.load(f).entry_points()]
+ONE = "const WG_X: u32 = 1u;\nconst WG_Y: u32 = 1u;\n"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(wgsl, "ROOT", tmp_path)
+    wgsl.load.cache_clear()
+    yield tmp_path
+    wgsl.load.cache_clear()
+
+
+INNER = "struct Inner {\n    a: vec3f,\n    b: u32,\n    c: array<vec4f, 2>,\n}\n"
+LEAVES += ["Inner", "array<Inner, 2>"]
+
+
+def words(kind):
+    """WGSL suffixes that read every 32-bit word of a field."""
+    if kind == "Inner":
+        return [".a.x", ".a.y", ".a.z", ".b"] + [f".c[{i}].{c}" for i in (0, 1) for c in "xyzw"]
+    if kind == "array<Inner, 2>":
+        return [f"[{i}]{w}" for i in (0, 1) for w in words("Inner")]
+    if kind in ("f32", "u32", "i32"):
+        return [""]
+    if kind.startswith("vec"):
+        return [f".{c}" for c in "xyzw"[: int(kind[3])]]
+    rows = 4 if kind == "mat4x4f" else 3
+    return [f"[{i}].{c}" for i in range(rows) for c in "xyzw"]
+
+
+def places(kind: np.dtype) -> list[int]:
+    """Offsets of every 32-bit word that holds a value [bytes]."""
+    if kind.subdtype:
+        item, shape = kind.subdtype
+        return [i * item.itemsize + at for i in range(np.prod(shape)) for at in places(item)]
+    if kind.fields:
+        return [offset + at for item, offset in kind.fields.values() for at in places(item)]
+    return [0]
+
+
+def run(device, source, size=(1, 1), **own):
+    kernel = gpu.Kernel(device, source)
+    encoder = device.create_command_encoder()
+    kernel.run(encoder, "main", gpu.FrameBindings(size, {}), **own)
+    gpu.submit(device, encoder)
+
+
+@pytest.mark.parametrize("seed", range(300))
+def test_python_and_gpu_agree_on_struct_layout(device, seed, folder):
+    rng = random.Random(seed)
+    fields = [(f"m{i}", rng.choice(LEAVES)) for i in range(rng.randint(1, 9))]
+    body = "".join(f"    {n}: {k},\n" for n, k in fields)
+    reads = [f"p.{name}{w}" for name, kind in fields for w in words(kind)]
+    code = "".join(f"    out[{i}] = bitcast<u32>({r});\n" for i, r in enumerate(reads))
+    (folder / "probe.wgsl").write_text(
+        f"{ONE}{INNER}struct Probe {{\n{body}}}\n@group(1) @binding(0) var<uniform> p: Probe;\n"
+        "@group(1) @binding(1) var<storage, read_write> out: array<u32>;\n"
+        f"@compute @workgroup_size(1)\nfn main() {{\n{code}}}\n"
+    )
+    source = wgsl.load("probe.wgsl")
+    kind = source.dtype("Probe")
+    data, want = np.zeros(kind.itemsize // 4, "<u4"), np.arange(1, len(reads) + 1, dtype="<u4")
+    data[[at // 4 for at in places(kind)]] = want
+    usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
+    out = device.create_buffer(size=4 * len(reads), usage=usage)
+    uniform = device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM)
+    run(device, source, p=uniform, out=out)
+    assert np.array_equal(np.frombuffer(device.queue.read_buffer(out), "<u4"), want)
+
+
+@pytest.mark.parametrize("file", ENTERED)
+def test_every_shader_compiles_with_every_override(device, file):
+    names = re.findall(r"^override (\w+): bool", wgsl.load(file).text, re.M)
+    many = list(itertools.product((0, 1), repeat=len(names)))
+    most = 8 if parts.TIER == "default" else 64
+    for values in random.Random(7).sample(many, min(len(many), most)):
+        gpu.Kernel(device, wgsl.load(file), dict(zip(names, values, strict=True)))
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_every_shader_begins_with_what_it_does(file):
+    lines = itertools.takewhile(
+        lambda line: line.startswith("// "), (wgsl.ROOT / file).read_text().splitlines()
+    )
+    text = " ".join(line[3:] for line in lines)
+    assert re.match(r"[A-Z][^.]{10,}\.", text), text
+
+
+def test_an_error_names_the_included_file(device, folder):
+    (folder / "inc.wgsl").write_text("const A: f32 = 1.0;\nfn broken() -> f32 { return A + 1u; }\n")
+    (folder / "main.wgsl").write_text(
+        f"//#include inc.wgsl\n{ONE}"
+        "@compute @workgroup_size(1)\nfn main() { let x = broken(); }\n"
+    )
+    with pytest.raises(ShaderError, match=r"inc\.wgsl:2"):
+        gpu.Kernel(device, wgsl.load("main.wgsl"))
+
+
+def test_an_error_in_the_file_itself_keeps_its_line(device, folder):
+    (folder / "inc.wgsl").write_text("const A: f32 = 1.0;\n")
+    (folder / "main.wgsl").write_text(
+        f"//#include inc.wgsl\n{ONE}@compute @workgroup_size(1)\nfn main() {{ let x = A +; }}\n"
+    )
+    with pytest.raises(ShaderError, match=r"main\.wgsl:5"):
+        gpu.Kernel(device, wgsl.load("main.wgsl"))
+
+
+def test_a_missing_include_names_both_files(folder):
+    (folder / "main.wgsl").write_text("//#include nope.wgsl\n")
+    with pytest.raises(ShaderError, match=r"main\.wgsl: no such file wgsl/nope\.wgsl"):
+        wgsl.load("main.wgsl")
+
+
+def test_a_file_included_twice_is_there_once(folder):
+    (folder / "c.wgsl").write_text("const C: u32 = 7u;\n")
+    (folder / "b.wgsl").write_text("//#include c.wgsl\n")
+    (folder / "a.wgsl").write_text("//#include b.wgsl\n//#include c.wgsl\n")
+    assert wgsl.load("a.wgsl").text.count("const C") == 1
+    assert wgsl.load("a.wgsl").constant("C") == 7
+
+
+@pytest.mark.parametrize(
+    "kind, text",
+    [
+        ("array<vec3f, 2>", ""),
+        ("S", "struct S {\n @size(32) a: f32,\n}"),
+        ("f16", ""),
+        ("mat3x3f", ""),
+        ("vec2<f16>", ""),
+        ("vec3<bool>", ""),
+    ],
+)
+def test_what_is_not_supported_is_refused(kind, text):
+    with pytest.raises(ShaderError):
+        wgsl.layout(kind, text)
+
+
+def test_a_missing_constant_is_named():
+    with pytest.raises(ShaderError, match="no constant NOPE in holdout"):
+        wgsl.load("gpu_frame/holdout.wgsl").constant("NOPE")
+
+
+@pytest.mark.parametrize("given", [{}, {"p": None, "q": None}])
+def test_too_few_or_too_many_names_are_listed(device, folder, given):
+    (folder / "m.wgsl").write_text(
+        f"{ONE}@group(1) @binding(0) var<uniform> p: vec4f;\n"
+        "@compute @workgroup_size(1)\nfn main() { let x = p; }\n"
+    )
+    with pytest.raises(ShaderError, match=r"binds \['p'\], got"):
+        run(device, wgsl.load("m.wgsl"), **given)
+
+
+@pytest.mark.parametrize(
+    "file", sorted(p.relative_to(wgsl.ROOT).as_posix() for p in wgsl.ROOT.rglob("*.wgsl"))
+)
+def test_every_scalar_constant_can_be_read(file):
+    source = wgsl.load(file)
+    for name in re.findall(r"^const (\w+)\s*:\s*[fiu]32", source.text, re.M):
+        assert np.isfinite(source.constant(name))

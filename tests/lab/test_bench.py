@@ -1,0 +1,269 @@
+"""The stopwatch: what is timed and written down; how fast is nobody's business here."""
+
+import json
+import signal
+from dataclasses import replace
+
+import pytest
+
+import make_frames as make
+from wgmb.cli import app
+from wgmb.errors import InputError
+from wgmb.gpu import timing
+from wgmb.lab import (
+    bench,
+    bench_figures,
+    bench_report,
+    report,
+)
+from wgmb.lab.cases import Candidate
+from wgmb.methods import METHODS
+
+SIZES = ((64, 36), (96, 54))
+
+
+@pytest.fixture(scope="module")
+def run(device):
+    return bench.bench(device, [Candidate(m) for m in METHODS], SIZES, (2, 4), rounds=1)
+
+
+def test_every_method_has_a_figure_for_every_size_and_number(run):
+    keys = {f.key for f in run.figures}
+    assert keys == {(m, *size, n) for m in METHODS for size in SIZES for n in (2, 4)}
+    assert all(f.gpu > 0 for f in run.figures)
+
+
+def test_methods_of_pictures_have_transfers_and_bytes(run):
+    for f in run.figures:
+        if "scene" in METHODS[f.method].needs:
+            assert (f.call, f.upload, f.readback, f.bytes) == (None, None, None, 0)
+        else:
+            assert f.call > 0 and f.upload > 0 and f.readback > 0
+            # Colour, motion and the output are there at least, 16 bytes a pixel each.
+            assert f.bytes >= 48 * f.width * f.height
+            assert f.bandwidth == pytest.approx(f.bytes / (f.gpu / 1e3) / 1e9)
+    tap, reproject = (next(f for f in run.figures if f.method == m) for m in ("tap", "reproject"))
+    assert tap.bytes == 48 * tap.width * tap.height
+    assert reproject.bytes == (16 + 3 * 36) * tap.width * tap.height  # three frames with depth
+
+
+def test_a_copy_has_a_bandwidth(run):
+    assert 0.1 < run.copy < 1e5
+
+
+def test_figures_are_kept_and_compared(run, tmp_path):
+    run.save(tmp_path / "kept.json")
+    kept = bench_figures.Bench.load(tmp_path / "kept.json")
+    assert kept == run
+    table = bench_report.against(run, kept)
+    assert len(table.rows) == len(run.figures)
+    assert all(row[-2] == 1.0 for row in table.rows)
+
+
+def test_what_was_not_kept_is_refused(run, tmp_path):
+    (tmp_path / "x.json").write_text('{"figures": 3}')
+    with pytest.raises(InputError, match=r"x\.json"):
+        bench_figures.Bench.load(tmp_path / "x.json")
+
+
+def test_another_run_with_nothing_in_common_says_so(run):
+    table = bench_report.against(run, bench_figures.Bench({}, 1.0, []))
+    assert not table.rows and "in common" in table.note
+
+
+@pytest.mark.parametrize("arguments, named", [
+    (["--methods", "tap:32"], "tap:32"),
+    (["--methods", "tap,tap"], "twice"),
+    (["-o", "x.txt"], "x.txt"),
+    (["-o", "missing/x.html"], "missing"),
+    (["--save", "missing/x.json"], "missing"),
+    (["-o", "x.html", "--save", "x.json"], "x.json"),
+])  # fmt: skip
+def test_wrong_usage_is_said_before_the_work(tmp_path, monkeypatch, capsys, arguments, named):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(bench, "bench", lambda *a: pytest.fail("measured"))
+    assert app.main(["bench", "--size", "64x36", *arguments]) == 2
+    assert named in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_slower_is_over_one(run):
+    slow = [replace(f, gpu=2 * f.gpu) for f in run.figures]
+    table = bench_report.against(bench_figures.Bench(run.machine, run.copy, slow), run)
+    assert all(row[-2] == 2.0 for row in table.rows)
+
+
+def test_text_and_page_tell_every_method(run):
+    said = bench_report.text(run)
+    page = report.page(bench_report.report(run, "wgmb bench", run))
+    for method in METHODS:
+        assert f", {method}, 4 samples" in said
+        assert page.count(f"{method}</td>") >= 4
+    several = {f.method for f in run.figures if len(f.passes) > 1}
+    assert {"tiles", "gather", "reproject", "accumulate"} <= several
+    assert page.count("<svg") == 2 + len(several)
+    assert "methods/accumulate.wgsl:main x 4" in said
+
+
+def test_without_entries_the_tables_are_the_csv(run):
+    every, passes = report.as_csv(bench_report.report(run, "")).split("\n\n")
+    assert len(every.splitlines()) == 1 + len(run.figures)
+    assert len(passes.splitlines()) == 1 + sum(len(f.passes) for f in run.figures)
+    assert passes.startswith("method,size,samples,pass,times")
+
+
+def test_all_jobs_take_turns():
+    order = []
+    jobs = {name: lambda n=name: order.append(n) for name in "ab"}
+    seconds = timing.alternate(jobs, 3)
+    assert order == list("ab" * 4)  # one round for warmth
+    assert {k: len(v) for k, v in seconds.items()} == {"a": 3, "b": 3}
+
+
+def test_a_job_that_has_used_up_its_limit_is_not_repeated(monkeypatch):
+    monkeypatch.setattr(timing, "_seconds", lambda job: job())
+    jobs = {"quick": lambda: 1, "slow": lambda: 5, "slowest": lambda: 20}
+    seconds = timing.alternate(jobs, 3, limit=12)  # the round for warmth is spent too
+    assert seconds == {"quick": [1, 1, 1], "slow": [5, 5], "slowest": [20]}
+
+
+def test_the_command_prints_saves_and_compares(tmp_path, capsys):
+    command = ["bench", "--methods", "tap", "--size", "64x36", "--samples", "2", "--rounds", 1]
+    code, out, _ = make.inside(capsys, *command, "--save", tmp_path / "a.json")
+    assert code == 0
+    assert "64 x 36, tap, 2 samples" in out
+    code, out, _ = make.inside(capsys, *command, "--against", tmp_path / "a.json",
+                               "-o", tmp_path / "b.html")  # fmt: skip
+    assert code == 0
+    assert "now / before" in out
+    titles = [t["title"] for t in json.loads((tmp_path / "b.json").read_text())["tables"]]
+    assert titles == ["Every method", "Every pass", "Against an earlier run"]
+
+
+@pytest.mark.parametrize("options", ["--rounds 0", "--samples x", "--methods smear",
+                                     "--against no.json", "--size big", "--seconds 0"])  # fmt: skip
+def test_wrong_usage_is_one_line_and_2(capsys, options):
+    code, out, err = make.inside(capsys, "bench", *options.split())
+    assert (code, out) == (2, "")
+    assert err.startswith("wgmb: ") and err.count("\n") == 1
+
+
+def test_every_method_has_its_passes(run):
+    for figure in run.figures:
+        assert figure.passes.keys() == figure.counts.keys()
+        assert any(label.startswith(f"methods/{figure.method}") for label in figure.passes)
+    every = bench_report.report(run, "").tables[1]
+    assert len(every.rows) == sum(len(f.passes) for f in run.figures)
+    for f in run.figures:
+        shares = [row[-1] for row in every.rows if row[:3] == bench_report._first(f)]
+        if any(f.passes.values()):  # too short for a wall clock, all may be 0
+            assert sum(shares) == pytest.approx(1, abs=0.01)
+
+
+@pytest.mark.parametrize("usable", [True, False])
+def test_both_clocks_tell_the_same_passes(device, monkeypatch, usable):
+    monkeypatch.setattr(timing.TimestampClock, "usable", staticmethod(lambda device: usable))
+    several = [Candidate(m) for m in ("tap", "tiles", "gather", "accumulate")]
+    run = bench.bench(device, several, SIZES[:1], (3,), 1)
+    assert run.clock == ("timestamps" if usable else "wall clock")
+    assert run.clock.split()[-1] in bench_report.report(run, "").tables[1].note
+    assert (run.empty > 0) != usable
+    counts = {f.method: f.counts for f in run.figures}
+    assert counts["tap"] == {"methods/tap.wgsl:main": 1}
+    assert counts["tiles"]["methods/tiles_velocity.wgsl:main"] == 1
+    assert counts["gather"]["methods/gather/edges.wgsl:detect_edges"] == 3  # of three frames
+    assert counts["accumulate"] == {"scene/gbuffer.wgsl:main": 3, "methods/accumulate.wgsl:main": 3}
+    if not usable:
+        assert all(v >= 0 for f in run.figures for v in f.passes.values())
+
+
+def test_a_method_holds_its_pictures_and_what_it_needs_besides(run):
+    for f in run.figures:
+        pixels = f.width * f.height
+        assert f.memory >= 0.95 * max(f.bytes, 16 * pixels)
+        assert f.memory < 1000 * pixels + 8_000_000
+    tap = [f for f in run.figures if f.method == "tap" and f.size == SIZES[0]]
+    for f in tap:
+        assert f.memory == pytest.approx(f.bytes, rel=0.05)
+
+
+def test_what_takes_too_long_is_left_out_and_said(device):
+    said = []
+    run = bench.bench(device, [Candidate("tap"), Candidate("gather")], SIZES[::-1], (2,),
+                      rounds=1, limit=1e-6, tell=said.append)  # fmt: skip
+    assert [(f.method, f.size) for f in run.figures] == [("tap", SIZES[0]), ("gather", SIZES[0])]
+    assert [n.partition(" skipped")[0] for n in run.notes] == [
+        "96 x 54, 2 samples: tap", "96 x 54, 2 samples: gather"
+    ]  # fmt: skip
+    assert set(run.notes) <= set(said)
+    assert all(note in bench_report.text(run) and note in bench_report.report(run, "").notes
+               for note in run.notes)  # fmt: skip
+
+
+def test_what_does_not_fit_into_memory_is_left_out(device, monkeypatch):
+    tap = bench.bench(device, [Candidate("tap")], SIZES[:1], (2,), 1).figures[0]
+    monkeypatch.setattr(bench, "_memory", lambda: 2 * tap.memory)
+    run = bench.bench(device, [Candidate("tap")], SIZES, (2,), 1)
+    assert [f.size for f in run.figures] == [SIZES[0]]
+    assert "skipped: it would hold" in run.notes[0]
+
+
+def test_a_size_that_no_texture_has_is_left_out(device):
+    huge = 1 << 20, 4
+    run = bench.bench(device, [Candidate("tap")], [huge, SIZES[0]], (2,), 1)
+    assert [f.size for f in run.figures] == [SIZES[0]]
+    assert "skipped: image is 1048576 x 4" in run.notes[0]
+    with pytest.raises(InputError, match="1048576 x 4"):
+        bench.bench(device, [Candidate("tap")], [huge], (2,), 1)
+
+
+def test_the_time_to_come_is_told(device):
+    said = []
+    bench.bench(device, [Candidate("tap")], SIZES, (2, 4), 1, tell=said.append)
+    assert [text.partition(":")[0] for text in said] == [
+        "64 x 36, 2 samples (1 of 4)", "64 x 36, 4 samples (2 of 4)",
+        "96 x 54, 2 samples (3 of 4)", "96 x 54, 4 samples (4 of 4)",
+    ]  # fmt: skip
+    assert all("to the end" in text for text in said[1:])
+
+
+def test_what_is_interrupted_has_what_was_measured(device, monkeypatch):
+    measure = bench._Matrix.measure
+
+    def interrupt(matrix, size, samples):
+        if samples == 4:
+            raise KeyboardInterrupt
+        measure(matrix, size, samples)
+
+    monkeypatch.setattr(bench._Matrix, "measure", interrupt)
+    run = bench.bench(device, [Candidate("tap")], SIZES[:1], (2, 4, 8), 1)
+    assert [f.samples for f in run.figures] == [2]
+    assert run.notes == ["interrupted: the rest is skipped"]
+    with pytest.raises(KeyboardInterrupt):
+        bench.bench(device, [Candidate("tap")], SIZES[:1], (4,), 1)
+
+
+def test_ctrl_c_writes_what_there_is_and_ends_with_130(tmp_path, capsys, monkeypatch):
+    measure = bench._Matrix.measure
+
+    def interrupt(matrix, size, samples):
+        measure(matrix, size, samples)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(bench._Matrix, "measure", interrupt)
+    code, out, err = make.inside(capsys, "bench", "--methods", "tap", "--size", "64x36", "--rounds",
+                                 1, "--samples", "2,4", "--save", tmp_path / "a.json")  # fmt: skip
+    assert code == 130
+    assert "64 x 36, tap, 2 samples" in out and "tap, 4 samples" not in out
+    assert err.splitlines()[-1] == "wgmb: interrupted"
+    assert len(bench_figures.Bench.load(tmp_path / "a.json").figures) == 1
+
+
+def test_all_methods_are_timed_when_all_are_asked_for(tmp_path, capsys):
+    code, _, err = make.inside(
+        capsys, "bench", "--methods", "all", "--size", "32x18", "--samples", 1, "--rounds", 1,
+        "--quiet", "--save", tmp_path / "a.json",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    run = bench_figures.Bench.load(tmp_path / "a.json")
+    assert [f.method for f in run.figures] == list(METHODS)

@@ -1,0 +1,39 @@
+"""Workers of a farm that misbehave on purpose; workers import this module."""
+
+import os
+import signal
+from pathlib import Path
+
+from wgmb import DeviceError
+from wgmb.io import atomic
+from wgmb.run.farm.plugin import Blurring
+
+
+class WithoutGpu(Blurring):
+    """Worker 1 has no GPU."""
+
+    def prepare(self, adapter):
+        if str(self._worker.name) == "1":
+            raise DeviceError("no GPU adapter; found none at all")
+        super().prepare(adapter)
+
+
+class Killing(Blurring):
+    """Frame 5 kills its worker, always; frame 9 does so once. Both leave an unfinished file."""
+
+    def blur(self, chosen, tell, stop):
+        folder = Path(self._job.asked.output.output).parent
+        sources = self._job.clip.__class__.sources
+
+        def deadly(clip, number):
+            again = folder.parent / "again"
+            if number == 5 or (number == 9 and not again.exists()):
+                if number == 9:
+                    again.write_bytes(b"")
+                left = atomic.temporary_name(folder / f"o.{number:04d}.exr")
+                os.close(atomic.create(left))
+                os.kill(os.getpid(), signal.SIGKILL)
+            return sources(clip, number)
+
+        self._job.clip.__class__.sources = deadly
+        return super().blur(chosen, tell, stop)

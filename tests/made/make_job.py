@@ -1,0 +1,27 @@
+"""A job as the command line asks for it."""
+
+from wgmb.run.job import settle
+from wgmb.run.request import Asked
+from wgmb.settings import (
+    BlurSettings,
+    InputSettings,
+    OutputSettings,
+    ShutterSettings,
+)
+from wgmb.settings.color import ColorSettings
+from wgmb.settings.video import VideoSettings
+
+
+def job_of(pattern, folder, **more):
+    """Frames blurred by four taps into `folder`; `more`: further settings of the output."""
+    return settle(
+        Asked(
+            pattern=str(pattern),
+            output=OutputSettings(output=str(folder / "o.####.exr"), **more),
+            look=BlurSettings(method="tap", samples=4),
+            when=ShutterSettings(),
+            given=InputSettings(),
+            color=ColorSettings(),
+            video=VideoSettings(),
+        )
+    )

@@ -1,0 +1,460 @@
+"""Shadows and reflections that move: every stage is its twin, and the blur is nearer the truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import wgmb
+from twins import moving_light as twin
+from wgmb import (
+    Blur,
+    Frame,
+    InputError,
+    Shutter,
+    gpu,
+)
+from wgmb import scene as scenes
+from wgmb.gpu.textures import TexturePool
+from wgmb.methods.gather.shading import (
+    Kind,
+    MovingLight,
+    Seen,
+    Times,
+)
+from wgmb.methods.gather.shading.flow import level_sizes, patch_grid
+from wgmb.render import Render
+
+SIZE = (45, 70)  # height, width
+SPEED = (4.0, -1.5)  # of the shadow [px per frame]
+PAN = (1.25, 0.5)  # of everything [px per frame]
+
+
+def ground(x, y):
+    """A textured surface."""
+    wave = np.sin(0.7 * x) * np.cos(0.55 * y + 0.2 * x)
+    return 0.5 + 0.25 * wave[..., None] * np.array([1, 0.8, 0.5])
+
+
+def shadow(x, y, t, radius):
+    """A soft disc that moves over the surface, and a bar that rests."""
+    far = np.hypot(x - 34 - SPEED[0] * t, y - 25 - SPEED[1] * t)
+    disc = 1 / (1 + np.exp(1.5 * (far - radius)))
+    bar = 1 / (1 + np.exp(2.0 * (np.abs(y - 10) - 3)))
+    return (1 - 0.85 * disc)[..., None] * (1 - 0.5 * bar)[..., None] * np.array([1.1, 1, 0.9])
+
+
+def scene(t, pan=PAN, glossy=False, size=SIZE, still=False, radius=8):
+    """The frame at the time t, without neighbours, with passes of light."""
+    x, y = twin.centres(size)
+    x, y = x - pan[0] * t, y - pan[1] * t
+    albedo, light = ground(x, y), shadow(x, y, 0 if still else t, radius)
+    motion = np.broadcast_to(np.array([-pan[0], -pan[1], *pan]), (*size, 4))
+    passes = ("glossy_light", "glossy_color") if glossy else ("diffuse_light", "diffuse_color")
+    given = dict(zip(passes, (light, albedo), strict=True))
+    given |= {"color": albedo * light, "motion": motion, "depth": np.full(size, 7.0)}
+    return Frame(**{name: np.asarray(array, "f4") for name, array in given.items()})
+
+
+def around(**how):
+    """The frame between its neighbours."""
+    return scene(0, **how).between(scene(-1, **how), scene(1, **how))
+
+
+def truth(shutter, **how):
+    """The mean over the shutter's time."""
+    times = shutter.sample_times(64).astype(float)
+    return np.mean([scene(t, **how).color for t in times], 0)
+
+
+def error(got, want, border=8):
+    inner = slice(border, -border)
+    return np.sqrt(np.mean((got[inner, inner, :3] - want[inner, inner, :3]) ** 2))
+
+
+@pytest.fixture(scope="module")
+def device():
+    return gpu.open_device()
+
+
+class Stages:
+    """All that the passes of one kind of light wrote."""
+
+    def __init__(self, device, pulled, whole=None, fold=0.0):
+        """`fold`: from the middle of the shadow on, depth grows by this share per pixel."""
+        pool, light = TexturePool(device), MovingLight(device)
+        whole = whole or around(glossy=pulled)
+        self.pulled = pulled
+        assert whole.prev is not None and whole.next is not None
+        self.frames, seen = {}, {}
+        for offset, frame in ((0, whole), (-1, whole.prev), (1, whole.next)):
+            given = frame.glossy_light if pulled else frame.diffuse_light
+            assert given is not None and frame.depth is not None and frame.motion is not None
+            rng = np.random.default_rng(offset + 5)
+            edges = rng.random(SIZE) < 0.002
+            folded = frame.depth * (1 + fold * np.maximum(np.arange(SIZE[1]) - 36, 0))
+            depth = np.where(edges, 14, folded).astype("f4")
+            light_there = np.dstack([given, np.ones(SIZE, "f4")])
+            seen[offset] = Seen(
+                pool.upload(f"light {offset}", light_there, "rgba32float"),
+                pool.upload(f"depth {offset}", depth, "r32float"),
+                pool.upload(f"motion {offset}", frame.motion, "rgba32float"),
+            )
+            self.frames[offset] = {"light": given, "depth": depth, "motion": frame.motion}
+        color = whole.glossy_color if pulled else whole.diffuse_color
+        assert color is not None
+        self.albedo = color
+        albedo = pool.upload("albedo", np.dstack([color, color[..., :1]]), "rgba32float")
+        bindings = Blur("gather", device=device).frame_bindings(SIZE[::-1])
+        self.times = Times.within(-0.5, 0.5, 4)
+        encoder = device.create_command_encoder()
+        kinds = [Kind(pulled, seen, albedo)]
+        done = light.encode(encoder, bindings, kinds, self.times, None)
+        gpu.submit(device, encoder)
+        self.found = np.frombuffer(device.queue.read_buffer(done.found), np.uint32)
+        self._device, self._pool, self._light, self._layers = device, pool, light, done.layers
+        self._kind = "glossy" if pulled else "diffuse"
+
+    def __getitem__(self, name):
+        name = f"{self._kind} {name}" if name.startswith("changes") else name
+        texture = self._light._images._textures[f"shading {name}"]
+        return self._pool.download(self._device.create_command_encoder(), texture).astype(float)
+
+    def layer(self, index):
+        width, height = SIZE[::-1]
+        one = self._pool.texture("layer", (width, height), "rgba16float")
+        encoder = self._device.create_command_encoder()
+        encoder.copy_texture_to_texture(
+            {"texture": self._layers, "origin": (0, 0, index)},
+            {"texture": one},
+            (width, height, 1),
+        )
+        return self._pool.download(encoder, one).astype(float)
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["shadows", "reflections"])
+def stages(request, device):
+    return Stages(device, request.param, fold=0.05)
+
+
+def test_what_changes_is_its_twin(stages, close):
+    here = stages.frames[0]
+    assert stages.found[0] == 1
+    for side in (-1, 1):
+        change, seen = twin.measure(here, stages.frames[side], side, stages.pulled)
+        assert 0.5 < seen.mean() < 0.99
+        want = twin.limited(change, seen, here["light"], stages.albedo, stages.pulled)
+        got = stages[f"changes {side}"]
+        close(got[..., 3], seen, 0)
+        close(got[..., :3], want, 4e-3)
+        assert np.abs(want).max() > 0.5
+
+
+def test_values_are_their_twin(stages, close):
+    before, after = (stages[f"changes {side}"][..., :3] for side in (-1, 1))
+    here = stages.frames[0]
+    bright = 0.0
+    if not stages.pulled:
+        bright = twin.closed(here["light"], here["depth"], before, after, 12)
+    for offset, change in ((0, 0 * before), (-1, before), (1, after)):
+        want = twin.values(here["light"], before, after, bright, change, stages.pulled)
+        close(stages[f"values {offset}"], want, 4e-3)
+
+
+def test_a_fold_parts_light_and_flow(stages):
+    """Else the twins of both would be those of a plane."""
+    depth = stages.frames[0]["depth"]
+    assert 0 < twin.creases(depth)[:, 36].mean() <= 1
+    assert twin.creases(depth).mean() < 0.1
+    flow = np.broadcast_to((5.0, 0.0), (*SIZE, 2))
+    stays = twin.on_one_surface(flow, depth)
+    assert stays[:, :28].mean() > 0.9
+    assert not stays[:, 33:36].any()
+
+
+def test_levels_are_their_twin(stages, close):
+    want = twin.first_level(stages["values 1"], stages.pulled)
+    close(stages["level 0 1"][..., :3], want, 1e-3)
+    for i in range(1, len(level_sizes(SIZE[::-1]))):
+        want = twin.next_level(stages[f"level {i - 1} 1"])
+        close(stages[f"level {i} 1"][..., :3], want, 1e-3)
+
+
+def test_patches_are_found_as_by_their_twin(stages):
+    here, there = stages["level 1 1"], stages["level 1 0"]  # the last search: from the next frame
+    across, down = patch_grid(here.shape[1::-1])
+    first, again = stages["patches 1 b"], stages["patches 1 a"]  # the second is propagated twice
+    searched = 0
+    for j in range(down):
+        for i in range(across):
+            patch = twin.Patch(here, there, (i, j))
+            if again[j, i, 3] == 0:
+                continue
+            searched += 1
+            near = [(j + 2 * b, i + 2 * a) for b in (-1, 0, 1) for a in (-1, 0, 1)]
+            starts = [first[min(max(b, 0), down - 1), min(max(a, 0), across - 1), :2]
+                      for b, a in near]  # fmt: skip
+            _, cost = patch.best([first[j, i, :2], *starts])
+            found, _ = patch.compare(again[j, i, :2])
+            np.testing.assert_allclose(again[j, i, 2], found, atol=2e-3)
+            assert found <= 1.1 * cost + 2e-3
+    assert searched > 10
+
+
+def test_flow_is_that_of_the_shadow(device):
+    flow = Stages(device, False)["flow ahead 1"]
+    found = flow[22:30, 30:40]
+    np.testing.assert_allclose(found[..., :2].mean((0, 1)), SPEED, atol=0.6)
+    assert found[..., 2].min() > 0.9
+
+
+def test_trust_is_its_twin(stages, close):
+    for side in (-1, 1):
+        own, other = stages["values 0"][..., 3], stages[f"values {side}"][..., 3]
+        depth = stages.frames[0]["depth"]
+        ahead, back = (stages[f"flow {name} {side}"] for name in ("ahead", "back"))
+        want = twin.trust(ahead[..., :2], back[..., :2], own, other, depth)
+        # What is trusted again is the filled flow, of half floats as it is.
+        close(ahead[..., 2], want, 2e-2)
+        raw = stages["level flow 0 ahead"][..., :2] if side == 1 else None
+        if raw is not None:
+            raw_back = stages["level flow 0 back"][..., :2]
+            sure = twin.trust(raw, raw_back, own, other, depth)
+            close(ahead[..., :2], twin.filled(raw, sure, own), 0.05)
+        if not stages.pulled:
+            want = twin.explained(ahead[..., :2], back[..., :2], own, other)
+            close(stages[f"explained {side}"][..., :2], want, 2e-3)
+
+
+def change_by_twin(stages, time):
+    """The change of light at a node, and how sure it is."""
+    own, side, share = stages["values 0"], -1 if time < 0 else 1, abs(time)
+    before, after = (stages[f"changes {i}"][..., :3] for i in (-1, 1))
+    other = stages[f"values {side}"]
+    flows = [stages[f"flow {name} {side}"] for name in ("ahead", "back")]
+    trusts = [flow[..., 2] for flow in flows]
+    if stages.pulled:
+        change, trusted = twin.pulled(
+            own[..., :3], other[..., :3], [f[..., :2] for f in flows], trusts, share
+        )
+    else:
+        a = twin.pushed(own, flows[0][..., :2], trusts[0], share)
+        b = twin.pushed(other, flows[1][..., :2], trusts[1], 1 - share)
+        guard = stages[f"explained {side}"]
+        change, trusted = twin.from_pushed(a, b, own, other, trusts, guard, share)
+    sure = twin.sure(own, other, flows, trusted, stages.pulled)
+    return twin.clamped(change, before, after), sure
+
+
+def test_what_is_added_is_its_twin(stages, close):
+    before, after = (stages[f"changes {side}"][..., :3] for side in (-1, 1))
+    here = stages.frames[0]
+    moved = 0.0
+    for i, time in enumerate(stages.times):
+        change, sure = change_by_twin(stages, time)
+        want = twin.added(change, here["light"], stages.albedo, stages.pulled)
+        close(stages.layer(i), np.dstack([want, sure]), 2e-2)
+        moved = max(moved, np.abs(want).max())
+    assert moved > 0.1
+    for i, change in enumerate((before, after)):
+        want = twin.added(change, here["light"], stages.albedo, stages.pulled)
+        close(stages.layer(stages.times.count + i)[..., :3], want, 4e-3)
+
+
+@pytest.mark.covers(1)
+@pytest.mark.parametrize("glossy", [False, True], ids=["shadow", "reflection"])
+@pytest.mark.parametrize("pan", [(0.0, 0.0), PAN], ids=["still", "pan"])
+def test_light_that_moves_is_nearer_the_truth(pan, glossy):
+    shutter, how = Shutter(360), {"pan": pan, "glossy": glossy}
+    want = truth(shutter, **how)
+    plain, followed = (
+        error(Blur("gather", shutter=shutter, shading=s)(around(**how)), want)
+        for s in ("off", "auto")
+    )
+    assert followed < (0.55 if glossy else 0.3) * plain
+
+
+@pytest.mark.parametrize("shutter", [Shutter(270, curve="triangle"), Shutter(200, "start"),
+                                     Shutter(250, rolling="down", rolling_duration=0.3)],
+                         ids=["curve", "after", "rolling"])  # fmt: skip
+def test_every_shutter_sees_the_light_move(shutter):
+    times = shutter.sample_times(32).astype(float)
+    delays = [0.0]
+    if shutter.rolling:
+        delays = (np.arange(SIZE[0]) + 0.5) / SIZE[0] * 0.3 - 0.15
+    want = np.zeros((*SIZE, 3))
+    for row, delay in enumerate(delays):
+        rows = slice(row, row + 1) if shutter.rolling else slice(None)
+        want[rows] = np.mean([scene(t + delay, pan=(0, 0)).color[rows] for t in times], 0)
+    plain, followed = (
+        error(Blur("gather", shutter=shutter, shading=s)(around(pan=(0, 0))), want)
+        for s in ("off", "passes")
+    )
+    assert followed < (0.4 if shutter.curve == "box" else 0.7) * plain
+
+
+@pytest.mark.parametrize("samples", [3, 40, "auto"])
+def test_every_number_of_samples_sees_it_move(samples):
+    shutter = Shutter(360)
+    want = truth(shutter, pan=(0, 0))
+    off, on = (Blur("gather", shutter=shutter, samples=samples, shading=s) for s in ("off", "auto"))
+    frame = around(pan=(0, 0))
+    assert error(on(frame), want) < 0.4 * error(off(frame), want)
+
+
+def test_one_neighbour_is_followed_on_its_side():
+    shutter, frame = Shutter(180, "start"), around(pan=(0, 0))
+    alone = frame.between(None, frame.next)
+    want = truth(shutter, pan=(0, 0))
+    off, on = (Blur("gather", shutter=shutter, shading=s) for s in ("off", "auto"))
+    assert error(on(alone), want) < 0.5 * error(off(alone), want)
+    before = Blur("gather", shutter=Shutter(180, "end"), shading="auto")(alone)
+    np.testing.assert_allclose(before, frame.color, atol=1e-3)
+
+
+def test_light_that_rests_changes_no_bit():
+    frame = around(still=True)
+    off, on = (Blur("gather", shading=s)(frame) for s in ("off", "passes"))
+    np.testing.assert_array_equal(on, off)
+
+
+def test_frames_without_passes_change_no_bit():
+    whole = around()
+    bare = [replace(f, diffuse_light=None) for f in (whole, whole.prev, whole.next)]
+    frame = bare[0].between(bare[1], bare[2])
+    off, auto = (Blur("gather", shading=s)(frame) for s in ("off", "auto"))
+    np.testing.assert_array_equal(auto, off)
+    with pytest.raises(InputError, match="needs passes of light"):
+        Blur("gather", shading="passes")(frame)
+
+
+def test_colours_alone_tell_of_shadows():
+    shutter, frame = Shutter(360), around(radius=3)  # a shadow that leaves no place in the dark
+    want = truth(shutter, radius=3)
+    off, on = (Blur("gather", shutter=shutter, shading=s) for s in ("off", "frames"))
+    assert error(on(frame), want) < 0.5 * error(off(frame), want)
+
+
+def test_what_is_held_out_stays_out():
+    holdout = np.zeros(SIZE, "f4")
+    holdout[:, 44:] = 1
+    frames = [replace(f, holdout=holdout) for f in (scene(0), scene(-1), scene(1))]
+    frame = frames[0].between(frames[1], frames[2])
+    got = Blur("gather", shutter=360)(frame)
+    np.testing.assert_allclose(got[:, 45:], frame.color[:, 45:], atol=2e-3)
+    want = truth(Shutter(360))
+    off = Blur("gather", shutter=360, shading="off")(frame)
+    assert error(got[:, :50], want[:, :50], 8) < 0.7 * error(off[:, :50], want[:, :50], 8)
+
+
+def test_wrong_light_is_no_light():
+    frame = around(pan=(0, 0))
+    light = np.array(frame.diffuse_light)
+    light[5:9, 5:9], light[30, 40], light[31, 41] = np.nan, np.inf, -4
+    broken = replace(frame, diffuse_light=light).between(frame.prev, frame.next)
+    got = Blur("gather", shutter=360)(broken)
+    assert np.isfinite(got).all() and got.min() >= 0 and got.max() < 3
+
+
+def accepted(frame, shading="auto", **how):
+    return Blur("gather", shading=shading, **how).with_confidence(frame)[1]["accepted"]
+
+
+def flash(pan=(0.0, 0.0), glossy=False):
+    """A spot of shadow in the middle one of three frames alone, where light rests otherwise."""
+    lit = around(pan=pan, glossy=glossy, still=True)
+    x, y = twin.centres(SIZE)
+    spot = 1 - 0.8 / (1 + np.exp(2 * (np.hypot(x - 52, y - 30) - 5)))[..., None]
+    name = "glossy_light" if glossy else "diffuse_light"
+    light = (getattr(lit, name) * spot).astype("f4")
+    dark = replace(lit, color=(lit.color * spot).astype("f4"), **{name: light})
+    return dark.between(lit.prev, lit.next), spot[..., 0] < 0.6
+
+
+@pytest.mark.parametrize("pulled", [False, True], ids=["shadows", "reflections"])
+def test_what_is_not_followed_is_as_sure_as_its_twin(device, close, pulled):
+    stages = Stages(device, pulled, flash(glossy=pulled)[0])
+    for i, time in enumerate(stages.times):
+        _, sure = change_by_twin(stages, time)
+        close(stages.layer(i)[..., 3], sure, 2e-2)
+        assert sure.min() < 0.1 < 0.8 < np.mean(sure > 0.95)
+
+
+@pytest.mark.parametrize("glossy", [False, True], ids=["shadow", "reflection"])
+@pytest.mark.parametrize("pan", [(0.0, 0.0), PAN], ids=["still", "pan"])
+def test_confidence_tells_where_light_could_not_be_followed(pan, glossy):
+    moving = around(pan=pan, glossy=glossy)
+    lost, changes = flash(pan, glossy)
+    for frame in (moving, lost):
+        assert accepted(frame, "off")[8:-8, 8:-8].min() > 0.999
+    sure = accepted(lost)
+    assert sure[changes].mean() < 0.3
+    assert sure[8:-8, 8:35].min() > 0.99  # nothing changes there
+    assert accepted(moving)[17:33, 26:42].mean() > (0.5 if glossy else 0.8)  # followed
+
+
+def test_confidence_tells_of_a_side_without_a_neighbour():
+    frame = around(pan=(0, 0))
+    alone = frame.between(None, frame.next)
+    after, before = (accepted(alone, shutter=Shutter(180, at)) for at in ("start", "end"))
+    changes = np.abs(scene(1, (0, 0)).diffuse_light - frame.diffuse_light).max(2)
+    assert after[changes > 0.3].mean() > 0.8
+    assert before[changes > 0.3].max() < 0.2
+    assert before[changes == 0].min() > 0.99
+
+
+def test_confidence_of_light_that_rests_changes_no_bit():
+    frame = around(still=True)
+    with_, without = (Blur("gather", shading=s).with_confidence(frame)[1] for s in ("auto", "off"))
+    for name in with_:
+        np.testing.assert_array_equal(with_[name], without[name])
+
+
+def test_sizes_that_fit_no_patch():
+    for size in ((1, 1), (3, 40), (13, 9)):
+        frame = around(size=size)
+        assert np.isfinite(wgmb.Blur("gather")(frame)).all()
+
+
+@pytest.mark.parametrize("shading", ["auto", pytest.param("passes", marks=pytest.mark.full)])
+def test_scenes_are_drawn_with_their_light_and_nearer_the_truth(shading):
+    scene = scenes.make("crossing", speed=3)
+
+    def drawn(method, **options):
+        blur = Blur(method, shutter=360, **options)
+        return Render(scene, blur, size=(240, 136))(0.5)[..., :3].astype(float)
+
+    truth = drawn("distributed", samples=64)
+    off, followed = (
+        np.square(drawn("gather", shading=how) - truth).mean() for how in ("off", shading)
+    )
+    assert followed < 0.85 * off
+
+
+def test_light_is_that_of_the_moment_and_of_its_frames():
+    """A Render that is used for another time does not keep the light of the last one."""
+    scene, blur = scenes.make("crossing", speed=3), Blur("gather", shading="passes")
+    one = Render(scene, blur, size=(64, 36))
+    one(0.2)
+    fresh = Render(scene, blur, size=(64, 36))
+    np.testing.assert_array_equal(one(0.7), fresh(0.7))
+    frame = one.frame(0.7, light=True)
+    np.testing.assert_array_equal(frame.diffuse_light, fresh.frame(0.7, light=True).diffuse_light)
+
+
+def test_a_scene_with_a_backdrop_has_no_light():
+    flat = Render(scenes.make("torusphere"), Blur("gather", shading="passes"), size=(64, 36))
+    with pytest.raises(InputError, match="needs passes of light"):
+        flat(0.0)
+
+
+def test_own_scenes_know_their_light():
+    render = Render(scenes.make("crossing"), Blur("tap", samples=2), size=(48, 27), fps=24)
+    frame = render.frame(0.5, light=True)
+    assert frame.diffuse_light is not None and frame.diffuse_color is not None
+    plain = render.frame(0.5)
+    assert plain.diffuse_light is None
+    np.testing.assert_array_equal(frame.color, plain.color)
+    seen = np.abs(frame.color[..., :3] - frame.diffuse_light * frame.diffuse_color).max(axis=2)
+    assert np.median(seen) < 0.02  # the rest is sky, gloss and edges
+    assert np.ptp(frame.diffuse_light) > 0.5

@@ -1,0 +1,153 @@
+"""The examples of the documentation work: Python, command lines, options, links."""
+
+import re
+import shlex
+import tomllib
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from urllib.parse import unquote
+
+import cyclopts
+import pytest
+
+from wgmb import METHODS
+from wgmb.cli import app as cli
+from wgmb.scene import builtin
+
+HERE = Path(__file__).parents[2]
+PAGES = {
+    str(path.relative_to(HERE)): path.read_text(encoding="utf-8")
+    for path in (HERE / "README.md", HERE / "CONTRIBUTING.md", *sorted(HERE.glob("docs/**/*.md")))
+}
+app = cli.make_app(*cli.COMMANDS)
+COMMANDS = {name: app[name] for name in cli.COMMANDS}
+ADD_ON = HERE / "blender/wgmb_blender/command.py"
+MOST_LINES = 125  # of the README
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """The fenced blocks of a page in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.M | re.S)
+
+
+@cache
+def options() -> set[str]:
+    """Every name of every option of every command."""
+    commands = [*COMMANDS.values(), app["--install-completion"]]
+    found = [command.assemble_argument_collection() for command in commands]
+    names = {name for arguments in found for argument in arguments for name in argument.names}
+    return names | {"--help", "--version"}
+
+
+WITH_PYTHON = [name for name, text in PAGES.items() if blocks(text, "python")]
+LINES = [
+    pytest.param(line, id=f"{name}: {line}")
+    for name, text in PAGES.items()
+    for block in blocks(text, "sh")
+    for line in block.splitlines()
+    if line.startswith("wgmb ")
+]
+
+
+@pytest.mark.parametrize("page", WITH_PYTHON)
+def test_python_blocks_run_in_their_order(page, tmp_path, monkeypatch):
+    (tmp_path / "sample").symlink_to(HERE / "sample")
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    for i, block in enumerate(blocks(PAGES[page], "python"), 1):
+        exec(compile(block, f"{page}, block {i}", "exec"), names)
+
+
+def test_the_pages_that_teach_python_have_blocks():
+    taught = {name for name in PAGES if re.fullmatch(r"docs/python/[a-z-]+\.md", name)}
+    others = {
+        "README.md",
+        "docs/engineers/pygfx.md",
+        "docs/engineers/embedding.md",
+        "docs/engineers/flow.md",
+    }
+    assert taught | others == set(WITH_PYTHON)
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_command_lines_are_understood(line, monkeypatch):
+    monkeypatch.setattr(app, "config", ())
+    command, *words = shlex.split(line)[1:]
+    assert command in COMMANDS
+    try:
+        app.parse_args([command, *words], exit_on_error=False, print_error=False)
+    except cyclopts.MissingArgumentError:
+        assert "--config" in words  # the file has it
+    for option, word in pairwise(words):
+        assert option != "--method" or word in METHODS
+    if command == "render" and not words[0].startswith("-"):
+        assert words[0] in builtin.SCENES
+
+
+def test_a_wrong_option_is_not_understood():
+    with pytest.raises(cyclopts.UnknownOptionError):
+        app.parse_args(
+            ["blur", "a.exr", "-o", "b.exr", "--no-such"], exit_on_error=False, print_error=False
+        )
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_option_that_is_named_exists(page):
+    named = set(re.findall(r"`(--[a-z][a-z-]+)", PAGES[page]))
+    known = options()
+    if page.endswith("blender-add-on.md"):  # of `blender -c wgmb`
+        known = set(re.findall(r'"(--[a-z-]+)"', ADD_ON.read_text("utf-8")))
+    assert named - known == set()
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_link_to_a_file_leads_to_one(page):
+    text = re.sub(r"^```.*?^```", "", PAGES[page], flags=re.M | re.S)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        path, _, _ = unquote(target).partition("#")
+        if path and not re.match(r"[a-z]+:", path):
+            assert ((HERE / page).parent / path).is_file(), target
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_has_a_page_that_says_where_it_fails(method):
+    text = PAGES[f"docs/engineers/methods/{method}.md"]
+    for heading in ("Idea", "Equation", "Artefacts", "Cost"):
+        assert f"\n## {heading}\n" in text
+    assert f"[`{method}`]({method}.md)" in PAGES["docs/engineers/methods/index.md"]
+
+
+def test_the_readme_is_short():
+    assert len(PAGES["README.md"].splitlines()) <= MOST_LINES
+
+
+@pytest.mark.parametrize(
+    ("html", "fault"),
+    [
+        ('<a href="b.html#there">', None),
+        ('<a href="https://example.org/">', None),
+        ('<img src="data:image/png;base64,AAAA">', None),
+        ('<a href="c.html">', "a.html links to c.html, which is not there"),
+        ('<a href="b.html#gone">', "a.html links to b.html#gone, where there is no such place"),
+        ('<a href="#gone">', "a.html links to #gone, where there is no such place"),
+        ('<img src="c.png">', "a.html links to c.png, which is not there"),
+        ('<script src="//example.org/x.js">', "a.html loads //example.org/x.js"),
+        ('<link href="http://example.org/x.css">', "a.html loads http://example.org/x.css"),
+    ],
+)
+def test_a_site_that_does_not_hold_together_is_told(html, fault, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(HERE / "docs" / "extensions")
+    from self_contained import faults
+
+    (tmp_path / "a.html").write_text(html)
+    (tmp_path / "b.html").write_text('<p id="there">')
+    assert faults(tmp_path) == ([fault] if fault else [])
+    (tmp_path / "x.css").write_text("@font-face { src: url('https://example.org/x.woff2') }")
+    assert "x.css loads https://example.org/x.woff2" in faults(tmp_path)
+
+
+def test_the_table_of_extras_has_them_all():
+    text = PAGES["docs/reference/extras.md"]
+    project = tomllib.loads((HERE / "pyproject.toml").read_text())["project"]
+    assert re.findall(r"^\| `(\w+)` \|", text, re.M) == [*project["optional-dependencies"]]

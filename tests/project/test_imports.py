@@ -1,0 +1,168 @@
+"""Imports point one way, third parties stay at home, Python and WGSL have the same stems."""
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from wgmb.extras import EXTRAS
+
+pytestmark = pytest.mark.fast
+
+ROOT = Path(__file__).parents[2]
+PACKAGE, SHADERS = ROOT / "wgmb", ROOT / "wgsl"
+
+# A room imports only from the rooms of lines above its own, and from itself.
+LAYERS = [
+    {"_version", "errors", "threads", "requirements"},
+    {"extras", "charts", "gpu"},
+    {"color", "shutter", "camera"},
+    {"png", "exposure", "cone", "metrics"},
+    {"frame"},
+    {"extent"},
+    {"gpu_frame", "scene", "flow", "io"},
+    {"methods", "shots", "observer"},
+    {"pipeline"},
+    {"render", "sequence", "video"},
+    {"output"},
+    {"settings"},
+    {"run"},
+    {"hosts", "lab", "viewer"},  # never each other
+    {"cli"},  # may start the viewer
+    {"__init__", "__main__"},
+]
+PLACE = {room: number for number, layer in enumerate(LAYERS) for room in layer}
+MOST_FILES = 20  # of a folder
+HOMES = {
+    "wgpu": set(PLACE) - {"io", "color", "sequence", "shots", "output", "cli"},
+    "OpenEXR": {"io"},
+    "av": {"io", "video"},
+    "tifffile": {"io"},
+    "imageio": {"io"},
+    "PIL": {"io", "lab"},
+    "fileseq": {"io"},
+    "cv2": {"flow"},
+    "PyOpenColorIO": {"color"},
+    "opentimelineio": {"shots"},
+    "distributed": {"run"},
+    "dask": {"run"},
+    "cyclopts": {"cli"},
+    "rich": {"cli"},
+    "imgui_bundle": {"viewer"},
+    "glfw": {"viewer"},
+    "rendercanvas": {"viewer"},
+    "ipywidgets": {"hosts"},
+    "pygfx": {"hosts"},
+}
+FILES = sorted(PACKAGE.rglob("*.py"))
+KERNELS = sorted(SHADERS.rglob("*.wgsl"))
+
+
+def room_of(file: Path) -> str:
+    first = file.relative_to(PACKAGE).parts[0]
+    return first.removesuffix(".py")
+
+
+def imported(file: Path):
+    """Every imported module, as its parts: those of wgmb from its name on."""
+    here = ("wgmb", *file.relative_to(PACKAGE).with_suffix("").parts)
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name.split(".")
+        elif isinstance(node, ast.ImportFrom):
+            start = list(here[: len(here) - node.level]) if node.level else []
+            module = start + (node.module.split(".") if node.module else [])
+            for alias in node.names:
+                yield [*module, alias.name]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(PACKAGE)))
+def test_imports_point_upwards_in_the_table_and_third_parties_stay_at_home(file):
+    room = room_of(file)
+    assert room in PLACE, f"{room} is in no layer: say where it belongs"
+    for module in imported(file):
+        if module[0] == "wgmb":
+            other = module[1] if module[1] in PLACE else "__init__"
+            ok = room == other or PLACE[other] < PLACE[room] or room == "__main__"
+            assert ok, f"{room} imports {'.'.join(module)}"
+        elif module[0] in HOMES:
+            assert room in HOMES[module[0]], f"{room} imports {module[0]}"
+
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def listed(requirements) -> set[str]:
+    """Names of the packages that are listed, and of those in extras that are listed."""
+    names = set()
+    for line in requirements:
+        name = re.match(r"[\w-]+", line)[0].lower().replace("_", "-")
+        if name != "wgmb":
+            names.add(name)
+            continue
+        for extra in re.search(r"\[(.*)\]", line)[1].split(","):
+            names |= listed(PROJECT["optional-dependencies"][extra])
+    return names
+
+
+def name_of(package: str) -> str:
+    """The package index's name of an imported module."""
+    return EXTRAS[package].index_name if package in EXTRAS else package.lower()
+
+
+def test_every_third_party_has_a_home():
+    known = {name_of(package) for package in HOMES} | {"numpy"}
+    assert listed(PROJECT["dependencies"]) | listed(["wgmb[all]"]) <= known
+
+
+@pytest.mark.parametrize("package", EXTRAS)
+def test_the_extra_that_a_message_names_installs_the_package(package):
+    assert name_of(package) in listed([f"wgmb[{EXTRAS[package].extra}]"])
+
+
+def test_what_is_not_of_the_core_has_an_extra():
+    core = listed(PROJECT["dependencies"]) | {"numpy"}
+    assert {package for package in HOMES if name_of(package) not in core} <= EXTRAS.keys()
+
+
+@pytest.mark.parametrize(
+    "folder",
+    sorted({file.parent for file in FILES}),
+    ids=lambda folder: str(folder.relative_to(ROOT)),
+)
+def test_a_folder_can_be_looked_over(folder):
+    assert len(list(folder.glob("*.py"))) <= MOST_FILES
+
+
+def test_no_room_stands_empty():
+    assert {room_of(file) for file in FILES} == set(PLACE)
+
+
+@pytest.mark.parametrize("file", KERNELS, ids=lambda f: str(f.relative_to(SHADERS)))
+def test_shaders_include_what_is_common_and_their_own(file):
+    own = file.relative_to(SHADERS).parts
+    for name in re.findall(r"^//#include (\S+)", file.read_text(), re.M):
+        parts = Path(name).parts
+        assert (SHADERS / name).is_file()
+        if own[0] == "common":
+            assert parts[0] == "common", f"{file.name} includes {name}"
+        elif own[0] == "methods":
+            stem = own[1].removesuffix(".wgsl").split("_")[0]
+            mine = parts[0] == "methods" and parts[1].removesuffix(".wgsl").split("_")[0] == stem
+            assert mine or parts[0] in ("common", "scene"), f"{file.name} includes {name}"
+        else:
+            assert parts[0] in ("common", own[0]), f"{file.name} includes {name}"
+
+
+@pytest.mark.parametrize("file", KERNELS, ids=lambda f: str(f.relative_to(SHADERS)))
+def test_shaders_lie_where_their_python_does(file):
+    """`wgsl/X/y.wgsl` belongs to `wgmb/X/y.py`, or to `wgmb/X/` as one of its stages."""
+    own = file.relative_to(SHADERS)
+    if own.parts[0] != "common":
+        stem = PACKAGE / own.parent / own.stem
+        begun = PACKAGE / own.parent / own.stem.split("_")[0]
+        places = stem.with_suffix(".py"), begun.with_suffix(".py"), PACKAGE / own.parent
+        assert any(p.exists() and p != PACKAGE for p in places)

@@ -1,0 +1,410 @@
+"""`wgmb blur` of videos, and of pictures without vectors: times, shares, motion, files."""
+
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+import make_clips as clips
+import make_frames as make
+from wgmb import gpu
+from wgmb.cli import app
+from wgmb.cli.commands.blur_video import make_wish, tell_how
+from wgmb.color.srgb import linear, srgb, to_display
+from wgmb.extras import install_command
+from wgmb.run import video as video_batch
+from wgmb.settings import BlurSettings, InputSettings, ShutterSettings
+from wgmb.settings.video import FlowSettings, VideoSettings
+from wgmb.video.read.reader import Footage
+
+SIZE = 96, 64  # width, height
+
+
+def run(capsys, *words, code=0):
+    got = app.main([str(w) for w in words])
+    text = capsys.readouterr().err
+    assert got == code, text
+    return text
+
+
+def grey_frames(values, pixels="yuv420p"):
+    """Frames of one grey each."""
+    width, height = SIZE
+    for value in values:
+        planes = [np.full((height, width), value, np.uint8)]
+        planes += [np.full((height // 2, width // 2), 128, np.uint8)] * 2
+        yield clips.frame(planes, pixels)
+
+
+def moving(count, speed=2.0, hud=False, turned=False):
+    """A textured square that passes over a textured background, and perhaps a fixed sign.
+
+    `turned`: the picture is upside down.
+    """
+    width, height = SIZE
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    for n in range(count):
+        at = 12 + speed * n
+        inside = (abs(x - at) < 12) & (abs(y - 32) < 14)
+        tone = np.where(inside, make.texture(x - at, y, 5.0)[..., 1], make.texture(x, y)[..., 0])
+        if hud:
+            tone = np.where((x > 40) & (x < 56) & (y < 10), (x + y) % 2, tone + 0.2 * np.sin(n))
+        luma = np.clip(16 + 219 * tone, 16, 235).round().astype(np.uint8)
+        luma = luma[::-1] if turned else luma
+        chroma = np.full((height // 2, width // 2), 128, np.uint8)
+        yield clips.frame([luma, chroma, chroma], "yuv420p")
+
+
+def write(path, frames, fps=240, **more):
+    frames = list(frames)
+    times = [Fraction(n, fps) for n in range(len(frames))]
+    return clips.write(path, frames, more.pop("times", times), **more)
+
+
+def lumas(path):
+    return [picture.planes[0] for _, picture in Footage(path)]
+
+
+@pytest.mark.parametrize(("pixels", "bits"), [("yuv420p", 8), ("yuv422p10le", 10)])
+def test_a_still_video_comes_back_to_the_sample(tmp_path, capsys, pixels, bits):
+    steps = (2, 2) if bits == 8 else (2, 1)
+    planes = clips.planes(1, SIZE, steps, bits)
+    source = write(tmp_path / "a.mkv", [clips.frame(planes, pixels)] * 8, 48, codec="ffv1",
+                   pixels=pixels)  # fmt: skip
+    for flow in ("none", "dis"):
+        out = tmp_path / f"{flow}.mkv"
+        run(capsys, "blur", source, "-o", out, "--codec", "ffv1", "--fps", 24, "--flow", flow, "-q")
+        got = Footage(out)
+        assert len(got) == 4 and got.coding.bits == bits
+        for _, picture in got:
+            for want, plane in zip(planes, picture.planes, strict=True):
+                assert np.abs(plane.astype(int) - want).max() <= (0 if bits == 8 else 1)
+
+
+@pytest.mark.parametrize("degrees", [180, 360])
+def test_averages_are_of_light_by_exact_shares(tmp_path, capsys, degrees):
+    values = [20, 200, 90, 235, 16, 120, 60, 180, 40, 220, 100, 30]
+    source = write(tmp_path / "a.mp4", grey_frames(values))
+    out = tmp_path / "b.mkv"
+    run(capsys, "blur", source, "-o", out, "--fps", 60, "--shutter", degrees, "--flow", "none",
+        "--cuts", "only:0", "--codec", "ffv1", "-q")  # fmt: skip
+    light = linear((np.array(values) - 16) / np.float32(219))
+    for k, got in enumerate(lumas(out)):
+        middle, half = 4 * k, degrees / 180  # in input frames
+        begins, ends = np.arange(12) - 0.5, np.arange(12) + 0.5
+        share = np.clip(
+            np.minimum(ends, middle + half) - np.maximum(begins, middle - half), 0, None
+        )
+        want = 16 + 219 * srgb((share * light).sum() / share.sum())
+        assert abs(got.astype(float) - want).max() <= 0.51
+
+
+@pytest.mark.parametrize(
+    ("words", "times"),
+    [
+        (["--fps", "60"], [Fraction(k, 60) for k in range(6)]),
+        (["--fps", "144"], [Fraction(k, 144) for k in range(15)]),
+        ([], [Fraction(k, 240) for k in range(24)]),
+        (["--fps", "60", "--speed", "0.5"], [Fraction(k, 60) for k in range(12)]),
+        (["--fps", "60", "--begin", "0.05"], [Fraction(k, 60) for k in range(3)]),
+        (["--fps", "60", "--frames", "4-11"], [Fraction(k, 60) for k in range(2)]),
+        (["--fps", "60", "--end", "0:0:0.05"], [Fraction(k, 60) for k in range(3)]),
+    ],
+)
+def test_output_frames_are_at_their_times(tmp_path, capsys, words, times):
+    source = write(tmp_path / "a.mp4", grey_frames(range(20, 44)))
+    out = tmp_path / "b.mp4"
+    run(capsys, "blur", source, "-o", out, "--flow", "none", "-q", *words)
+    got = Footage(out).times
+    assert [t - got[0] for t in got] == times
+
+
+def test_variable_rates_keep_their_times_or_become_even(tmp_path, capsys):
+    times = [Fraction(n, 100) for n in (0, 1, 2, 7, 8, 12, 20, 21)]
+    source = write(tmp_path / "a.mp4", grey_frames(range(30, 110, 10)), times=times)
+    for fps, want in (("source", times), ("50", [Fraction(k, 50) for k in range(11)])):
+        out = tmp_path / f"{fps}.mkv"
+        run(capsys, "blur", source, "-o", out, "--fps", fps, "--flow", "none", "-q")
+        got = [round(float(t) * 1000) for t in Footage(out).times]
+        assert got == [round(float(t) * 1000) for t in want][: len(got)]
+        assert abs(len(got) - len(want)) <= 1
+
+
+def test_without_a_rate_pictures_of_a_variable_one_keep_their_times_and_a_line_says_so(
+    tmp_path, capsys
+):
+    times = [Fraction(n, 100) for n in (0, 1, 2, 7, 8, 12, 20, 21)]
+    source = write(tmp_path / "a.mp4", grey_frames(range(30, 110, 10)), times=times)
+    text = run(capsys, "blur", source, "-o", tmp_path / "b.mp4", "--flow", "none")
+    said = "variable rate (10.0 to 80.0 ms)"
+    assert f"a.mp4: {said}: each picture keeps its own time; --fps 60 sets a steady rate\n" in text
+    assert list(Footage(tmp_path / "b.mp4").times) == times
+    both = [source, source.rename(tmp_path / "c.mp4")][1:]
+    text = run(capsys, "blur", *both, "-o", f"{tmp_path}/{{name}}.out.mkv", "--flow", "none")
+    assert said in text
+    text = run(capsys, "blur", *both, "-o", tmp_path / "d.##.png", "--flow", "none")
+    assert f"{said}: {float(Footage(both[0]).rate):g} frames a second, as on average" in text
+    run(capsys, "blur", *both, "-o", tmp_path / "e.##.png", "--flow", "none", "--fps", "source")
+    assert len(list(tmp_path.glob("e.*.png"))) == 8
+
+
+def test_a_pause_of_a_steady_rate_is_filled(tmp_path, capsys):
+    times = [Fraction(n, 50) for n in (*range(40), *range(45, 85))]
+    source = write(tmp_path / "a.mp4", grey_frames([*range(30, 110)]), times=times)
+    text = run(capsys, "blur", source, "-o", tmp_path / "b.mp4", "--flow", "none")
+    assert "variable" not in text and "pause once" in text
+    assert list(Footage(tmp_path / "b.mp4").times) == [Fraction(n, 50) for n in range(85)]
+
+
+def test_jitter_and_pulldown_are_made_even(tmp_path, capsys):
+    times = [Fraction(n, 240) for n in (0, 8, 20, 28, 40, 48, 60, 68, 80)]  # 24 a second for 60
+    source = write(tmp_path / "a.mp4", grey_frames(range(30, 120, 10)), times=times)
+    text = run(capsys, "blur", source, "-o", tmp_path / "b.mp4", "--flow", "none")
+    assert "variable rate (33.3 to 50.0 ms): 24 frames a second, as on average" in text
+    assert list(Footage(tmp_path / "b.mp4").times) == [Fraction(n, 24) for n in range(9)]
+
+
+def test_motion_smears_what_moves_and_leaves_the_rest_to_the_sample(tmp_path, capsys):
+    source = write(tmp_path / "a.mp4", moving(9), 24)
+    out = tmp_path / "b.mkv"
+    text = run(capsys, "blur", source, "-o", out, "--flow", "dis", "--codec", "ffv1")
+    assert "motion: dense inverse search" in text and "9 frames" in text
+    sharp, soft = lumas(source), lumas(out)
+    for n in range(2, 7):
+        at = int(12 + 2 * n)
+        assert np.abs(soft[n].astype(int) - sharp[n])[20:44, at - 8 : at + 8].mean() > 2
+        assert np.abs(soft[n].astype(int) - sharp[n])[:, 64:].max() <= 1
+
+
+def test_what_never_changes_while_all_around_does_stays_sharp(tmp_path, capsys):
+    source = write(tmp_path / "a.mp4", moving(24, hud=True), 96)
+    out = tmp_path / "b.mkv"
+    run(capsys, "blur", source, "-o", out, "--flow", "dis", "--fps", 24, "--holdout", "static",
+        "--shutter", 360, "--codec", "ffv1", "-q")  # fmt: skip
+    sign = np.s_[1:9, 42:55]
+    for got in lumas(out):
+        assert np.abs(got.astype(int) - lumas(source)[0])[sign].max() <= 1
+
+
+def test_repeated_pictures_may_be_filled(tmp_path, capsys):
+    doubled = [f for f in moving(8, 4.0) for _ in (0, 1)]
+    source = write(tmp_path / "a.mp4", doubled, 48)
+    texts = {}
+    for way in ("keep", "fill"):
+        words = ["-o", tmp_path / f"{way}.mkv", "--flow", "dis", "--duplicates", way]
+        texts[way] = run(capsys, "blur", source, *words)
+    assert "repeated pictures left out" in texts["fill"] and "left out" not in texts["keep"]
+    assert "8 repeated" in texts["fill"] or "7 repeated" in texts["fill"]
+
+
+def test_a_video_becomes_pictures(tmp_path, capsys):
+    source = write(tmp_path / "a.mp4", grey_frames(range(40, 52)))
+    run(capsys, "blur", source, "-o", tmp_path / "b.####.png", "--fps", 60, "--flow", "none", "-q")
+    assert make.names_in(tmp_path) == ["a.mp4", *(f"b.{k:04d}.png" for k in range(1, 4))]
+    with Image.open(tmp_path / "b.0002.png") as image:
+        assert image.size == SIZE
+
+
+def test_info_describes_a_video(tmp_path, capsys):
+    times = [Fraction(n, 100) for n in (0, 1, 2, 7, 8, 12, 20, 21)]
+    source = write(tmp_path / "a.mp4", grey_frames(range(30, 110, 10)), times=times, tone=0.2)
+    assert app.main(["info", str(source)]) == 0
+    text = capsys.readouterr().out
+    for said in ("h264 in mov", "96 x 64", "8 in 0.", "variable: 10.0 to 80.0 ms",
+                 "BT.601, transfer BT.709; Y'CbCr 4:2:0, 8 bits, limited range",
+                 "stream    audio: aac", "does not state its colours"):  # fmt: skip
+        assert said in text, text
+    assert "cuts      not looked for; --scan decodes" in text and "mastered" not in text
+    text = run(capsys, "info", source, "-o", tmp_path / "m.png", code=2)
+    assert "rendered frames" in text
+
+
+def test_info_scans_a_video_for_cuts_flashes_and_repeated_pictures(tmp_path, capsys):
+    shot, other = list(moving(9, 4.0)), list(moving(8, -1.0, turned=True))
+    frames = [*shot[:4], *grey_frames([235]), *shot[4:], *other, other[-1]]
+    source = write(tmp_path / "a.mp4", frames, 96)
+    assert app.main(["info", str(source), "--scan"]) == 0
+    text = capsys.readouterr().out
+    assert text.endswith(
+        "cuts      before picture 10 (0.10 s)\nflashes   at picture 4\nrepeated  1: picture 18\n"
+    ), text
+    cut = clips.write(tmp_path / "b.mkv", moving(24), tone=1)
+    cut.write_bytes(cut.read_bytes()[: cut.stat().st_size * 2 // 3])
+    text = run(capsys, "info", cut, "--scan", code=1)
+    assert "as it is cut off" in text
+
+
+def test_pictures_without_vectors_move_by_flow(tmp_path, capsys):
+    for n in range(1, 6):
+        picture = to_display(make.picture(n)[..., :3], 8)
+        Image.fromarray(np.kron(picture, np.ones((2, 2, 1), np.uint8))).save(
+            tmp_path / f"a.{n}.png"
+        )
+    words = ["blur", tmp_path / "a.#.png", "-o", tmp_path / "b.#.png", "--frames", "2-4"]
+    text = run(capsys, *words, "--flow", "dis", "-v")
+    assert "the frames have no vectors; motion: dense inverse search" in text
+    assert '"samples": "auto"' in text
+    with Image.open(tmp_path / "a.3.png") as a, Image.open(tmp_path / "b.3.png") as b:
+        off = np.abs(np.asarray(a).astype(int) - np.asarray(b))
+    assert off[30:50, 40:70].mean() > 1.5 and off[:, :16].mean() < 0.5
+    again = run(capsys, *words, "--flow", "dis", "--resume")
+    assert "3 already done" in again
+    assert '"samples": 16' in run(
+        capsys, *words, "--flow", "dis", "--samples", 16, "-v", "--overwrite"
+    )
+    assert "have no vectors" in run(capsys, *words, "--flow", "none", "--overwrite", code=2)
+
+
+@pytest.mark.parametrize(
+    ("flow", "asked", "method"),
+    [
+        ("search", None, "gather"),
+        ("auto", None, None),
+        ("dis", None, "tap"),
+        ("dis", "gather", "gather"),
+        ("search", "tap", "tap"),
+    ],
+)
+def test_the_method_suits_where_motion_comes_from(tmp_path, capsys, flow, asked, method):
+    """Pictures without vectors and a video take the same one; auto that of what it becomes."""
+    if flow == "auto":
+        method = FlowSettings().settled(gpu.open_device())[0].method
+    for n in (1, 2):
+        picture = to_display(make.picture(n)[..., :3], 8)
+        Image.fromarray(picture).save(tmp_path / f"a.{n}.png")
+    words = ["--flow", flow, *(["--method", asked] if asked else [])]
+    job = tmp_path / "a.json"
+    run(capsys, "job", tmp_path / "a.#.png", "-o", tmp_path / "b.#.png", "-j", job, *words)
+    assert f'"method": "{method}"' in job.read_text()
+    look, when = BlurSettings(method=asked), ShutterSettings().resolved()
+    wish = make_wish(look, when, InputSettings(), VideoSettings(flow=flow), None)
+    assert wish.blur.method.name == method
+
+
+def test_without_a_gpu_and_opencv_a_line_says_what_would_be_quicker(capsys, monkeypatch):
+    for module in ("wgmb.settings.video", "wgmb.cli.commands.blur_video"):
+        monkeypatch.setattr(f"{module}.is_installed", lambda package: False)
+    for flow in ("auto", "search"):
+        video = VideoSettings(flow=flow)
+        look, when = BlurSettings(), ShutterSettings().resolved()
+        wish = make_wish(look, when, InputSettings(), video, None)
+        tell_how(wish, quiet=False, verbose=False)
+        slow = wish.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        said = install_command("flow") in capsys.readouterr().err
+        assert said == (slow and flow == "auto")
+
+
+def test_a_cut_between_pictures_is_not_crossed(tmp_path, capsys):
+    y, x = np.mgrid[:64, :96].astype(np.float32)
+    for n in range(1, 7):
+        seed, way = (0.0, 2.0) if n < 4 else (9.0, -2.0)
+        shot = make.texture((x - way * n) / 6, y / 6, seed) ** (1 if n < 4 else 3)
+        Image.fromarray(to_display(shot[:: 1 if n < 4 else -1], 8)).save(tmp_path / f"a.{n}.png")
+    text = run(capsys, "blur", tmp_path / "a.#.png", "-o", tmp_path / "b.#.png", "--flow", "dis")
+    assert "frames in" in text
+    with Image.open(tmp_path / "a.3.png") as a, Image.open(tmp_path / "b.3.png") as b:
+        assert np.abs(np.asarray(a).astype(int) - np.asarray(b)).mean() < 12
+
+
+def packets(path, kind):
+    with av.open(str(path)) as container:
+        stream = next(s for s in container.streams if s.type == kind)
+        return [bytes(p) for p in container.demux(stream) if p.size]
+
+
+def test_sound_is_copied_byte_for_byte_and_may_be_left_out(tmp_path, capsys):
+    source = write(tmp_path / "a.mp4", moving(24), 24, tone=1.0)
+    out, alone = tmp_path / "b.mp4", tmp_path / "c.mp4"
+    run(capsys, "blur", source, "-o", out, "--flow", "none", "-q")
+    assert packets(out, "audio") == packets(source, "audio")
+    run(capsys, "blur", source, "-o", alone, "--flow", "none", "--streams", "video", "-q")
+    with av.open(str(alone)) as container:
+        assert [s.type for s in container.streams] == ["video"]
+
+
+def test_a_run_that_was_killed_goes_on_and_gives_the_same_video(tmp_path, capsys, monkeypatch):
+    source = write(tmp_path / "a.mp4", grey_frames([20 + n % 180 for n in range(50)]), 2, tone=20)
+    whole, out = tmp_path / "whole.mp4", tmp_path / "out.mp4"
+    words = ["--flow", "none", "-q"]
+    run(capsys, "blur", source, "-o", whole, *words)
+    add, count = video_batch.VideoSink.put, [0]
+
+    def killed(self, taken):
+        count[0] += 1
+        if count[0] == 33:
+            raise KeyboardInterrupt
+        add(self, taken)
+
+    monkeypatch.setattr(video_batch.VideoSink, "put", killed)
+    run(capsys, "blur", source, "-o", out, *words, "--resume", code=130)
+    assert make.names_in(tmp_path) == ["a.mp4", "out.mp4.segments", "whole.mp4"]
+    run(capsys, "blur", source, "-o", out, *words, "--resume")
+    assert 60 <= count[0] <= 64  # 33, of which 20 were kept, and the 30 others
+    assert make.names_in(tmp_path) == ["a.mp4", "out.mp4", "whole.mp4"]
+    one, other = Footage(whole), Footage(out)
+    assert list(one.times) == list(other.times)
+    assert packets(whole, "audio") == packets(out, "audio")
+    for (_, a), (_, b) in zip(one, other, strict=True):
+        assert np.abs(a.planes[0].astype(int) - b.planes[0]).max() <= 2
+    before = out.stat().st_mtime_ns
+    assert "already done" in run(capsys, "blur", source, "-o", out, "--flow", "none", "--resume")
+    assert out.stat().st_mtime_ns == before
+    text = run(capsys, "blur", source, "-o", out, *words, "--resume", "--shutter", 90, code=2)
+    assert "made otherwise" in text
+
+
+@pytest.mark.parametrize("words", [["--overwrite"], []])
+def test_segments_of_a_killed_run_go_when_the_video_is_made_again(tmp_path, capsys, words):
+    source = write(tmp_path / "a.mp4", grey_frames(range(40, 46)))
+    out, other = tmp_path / "b.mp4", tmp_path / "c.mp4.segments"
+    for folder in (tmp_path / "b.mp4.segments", other):
+        folder.mkdir()
+        (folder / "00000.mp4").write_bytes(b"half")
+    if words:
+        out.write_bytes(b"older")
+    run(capsys, "blur", source, "-o", out, "--flow", "none", "-q", *words)
+    assert make.names_in(tmp_path) == ["a.mp4", "b.mp4", "c.mp4.segments"]
+    assert (other / "00000.mp4").is_file() and len(Footage(out)) == 6
+
+
+def test_slow_motion_has_slow_sound(tmp_path, capsys):
+    source = write(tmp_path / "a.mp4", moving(24), 24, tone=1.0)
+    for pitch in ("keep", "follow"):
+        out = tmp_path / f"{pitch}.mp4"
+        words = ["--flow", "none", "--speed", "0.5", "--pitch", pitch, "-q"]
+        run(capsys, "blur", source, "-o", out, *words)
+        with av.open(str(out)) as container:
+            sound = sum(f.samples for f in container.decode(audio=0)) / 48000
+        assert abs(sound - 2) < 0.1 and abs(float(Footage(out).duration) - 2) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-o", "a.mp4"], "is the input"),
+        (["-o", "there.mp4"], "exists; --overwrite"),
+        (["-o", "b.mp4", "--codec", "prorez"], "did you mean 'prores'"),
+        (["-o", "b.mp4", "--layer", "beauty"], "--layer is for rendered frames"),
+        (["-o", "b.mp4", "--speed", "0"], "--speed must be 0.01 to 100"),
+        (["-o", "b.mp4", "--begin", "1:xx"], "--begin must be seconds"),
+        (["-o", "b.mp4", "--begin", "9"], "no pictures in this range"),
+        (["-o", "b.mp4", "--frames", "2-99"], "pictures 0 to 5"),
+        (["-o", "b.mp4", "--rolling", "down"], "rolling"),
+        (["-o", "b.mp4", "--holdout", "Layer", "--flow", "dis"], "static"),
+        (["-o", "b.mp4", "--holdout", "static"], "--holdout needs motion"),
+        (["-o", "b.mp4", "--confidence"], "--confidence is for rendered frames"),
+    ],
+)
+def test_what_does_not_fit_is_one_line_and_leaves_nothing(
+    tmp_path, capsys, monkeypatch, words, said
+):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "a.mp4", grey_frames(range(40, 46)))
+    (tmp_path / "there.mp4").write_bytes(b"mine")
+    words += [] if "--flow" in words else ["--flow", "none"]
+    text = run(capsys, "blur", "a.mp4", *words, "-q", code=2)
+    assert said in text and text.count("\n") == 1
+    assert make.names_in(tmp_path) == ["a.mp4", "there.mp4"]
+    assert (tmp_path / "there.mp4").read_bytes() == b"mine"

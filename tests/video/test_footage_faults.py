@@ -1,0 +1,174 @@
+"""Videos that are damaged, cut off or none, and streams that are not the pictures."""
+
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+import make_clips as clips
+from wgmb import InputError
+from wgmb.video.read.container import picture_stream
+from wgmb.video.read.reader import Footage
+
+pytestmark = pytest.mark.fast
+
+
+def long(tmp_path, kind, count=48, **more):
+    """A clip that nothing can be left out of unseen: pictures of noise."""
+    rng = np.random.default_rng(3)
+    frames = []
+    for n in range(count):
+        luma, *chroma = clips.planes(n)
+        noise = rng.integers(0, 30, luma.shape, np.uint8)
+        frames.append(clips.frame([luma + noise, *chroma], "yuv420p"))
+    options = {"crf": "20", "g": "12"}
+    return clips.write(tmp_path / f"c.{kind}", frames, options=options, tone=2, **more)
+
+
+def test_an_mp4_without_its_end_says_what_is_missing(tmp_path):
+    path = long(tmp_path, "mp4")
+    path.write_bytes(path.read_bytes()[:-3000])
+    with pytest.raises(InputError, match=r"c\.mp4: is cut off: its index \(moov\)") as error:
+        Footage(path)
+    assert str(error.value).count("\n") == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "muxing"), [("mkv", {}), ("mp4", {"movflags": "faststart"}), ("avi", {})]
+)
+def test_a_file_that_was_cut_off_says_where(tmp_path, kind, muxing):
+    tick = Fraction(1, 24)
+    path = long(tmp_path, kind, muxing=muxing, tick=tick)
+    whole = path.read_bytes()
+    assert not any("cut off" in note for note in Footage(path).notes)
+    path.write_bytes(whole[: len(whole) // 2])
+    footage = Footage(path)
+    got = [n for n, _ in footage]
+    assert 10 < len(got) < 40
+    (note,) = [note for note in footage.notes if "is cut off: it ends at" in note]
+    assert note.endswith(("of 2.00 s", "of 2.02 s", "of 2.05 s"))
+
+
+@pytest.mark.parametrize("kind", ["mp4", "mkv"])
+def test_damaged_bytes_are_counted_in_pictures(tmp_path, kind):
+    path = long(tmp_path, kind)
+    data = bytearray(path.read_bytes())
+    at = len(data) // 3
+    data[at : at + 400] = np.random.default_rng(4).bytes(400)
+    path.write_bytes(data)
+    footage = Footage(path)
+    got = [n for n, _ in footage]
+    assert len(got) + len(footage.missing) == len(footage)
+    said = " ".join((footage.loss(), *footage.notes))
+    assert any(word in said for word in ("could not be decoded", "are damaged", "pause once"))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [(b"", "is empty"), (b"hello " * 100, "is not a video"), (None, "no such file")],
+)
+def test_what_is_no_video_is_one_line(tmp_path, content, said):
+    path = tmp_path / "c.mp4"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=rf"c\.mp4: {said}") as error:
+        Footage(path)
+    assert "\n" not in str(error.value)
+
+
+def test_sound_alone_has_no_pictures(tmp_path):
+    path = tmp_path / "c.m4a"
+    with av.open(str(path), "w", format="mp4") as out:
+        sound = out.add_stream("aac", rate=48000)
+        sound.layout = "mono"
+        for block in clips.samples(0.2):
+            out.mux(sound.encode(block))
+        out.mux(sound.encode(None))
+    with pytest.raises(InputError, match="no pictures that move; it holds audio"):
+        Footage(path)
+
+
+def test_absurd_sizes_are_refused(tmp_path):
+    path = clips.write(tmp_path / "c.mp4", [clips.grey((1280, 720))])
+    with pytest.raises(InputError, match="max_mb"):
+        Footage(path, max_mb=2)
+
+
+def test_names_that_look_like_addresses_are_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "http:").mkdir()
+    path = clips.write(tmp_path / "x.mp4")
+    path.rename(tmp_path / "http:" / "a%02d.mp4")
+    assert len(Footage("http:/a%02d.mp4")) == 12
+
+
+def test_a_playlist_leads_nowhere(tmp_path):
+    (tmp_path / "c.m3u8").write_text("#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n"
+                                     "http://127.0.0.1:9/a.ts\n#EXT-X-ENDLIST\n")  # fmt: skip
+    with pytest.raises(InputError, match=r"c\.m3u8: "):
+        Footage(tmp_path / "c.m3u8")
+
+
+def test_pictures_of_another_size_are_scaled_to_that_of_the_first(tmp_path):
+    """Recordings of calls change their size; a raw stream is joined of two."""
+    parts = []
+    for size in ((64, 48), (128, 96)):
+        frames = [clips.frame(clips.planes(n, size), "yuv420p") for n in range(4)]
+        parts.append(clips.write(tmp_path / f"{size[0]}.h264", frames, kind="h264").read_bytes())
+    (tmp_path / "both.h264").write_bytes(b"".join(parts))
+    footage = Footage(tmp_path / "both.h264")
+    assert not footage.scaling()
+    pictures = dict(footage)
+    assert footage.scaled == {4, 5, 6, 7} and len(pictures) == 8 and not footage.loss()
+    assert "4 pictures of another size were scaled to 64 x 48, from 0." in footage.scaling()
+    for n, picture in pictures.items():
+        assert picture.size == (64, 48)
+        luma, want = picture.planes[0].astype(int), clips.planes(n % 4)[0]
+        assert np.abs(luma - want).max() <= 2
+
+
+def test_a_single_picture_has_the_rate_that_its_file_states(tmp_path):
+    one = [clips.frame(clips.planes(0), "yuv420p")]
+    assert Footage(clips.write(tmp_path / "a.mp4", one, rate=Fraction(50))).rate == 50
+
+
+def test_a_stream_of_alpha_is_not_taken_for_the_pictures(tmp_path):
+    """As in animated AVIF, where it may come with more bits than the pictures."""
+    path = tmp_path / "a.mkv"
+    with av.open(str(path), "w") as out:
+        kinds = ("yuv420p", "gray")
+        streams = [out.add_stream("ffv1", rate=24) for _ in kinds]
+        for stream, pixels in zip(streams, kinds, strict=True):
+            stream.width, stream.height, stream.pix_fmt = clips.WIDTH, clips.HEIGHT, pixels
+        for n in range(3):
+            planes = clips.planes(n)
+            for stream, pixels in zip(streams, kinds, strict=True):
+                one = clips.frame(planes if pixels == "yuv420p" else planes[:1], pixels)
+                one.pts, one.time_base = n, Fraction(1, 24)
+                out.mux(stream.encode(one))
+        for stream in streams:
+            out.mux(stream.encode(None))
+    with av.open(str(path)) as container:
+
+        class Streams:
+            """Those of the container; FFmpeg thinks the grey one best."""
+
+            video = container.streams.video
+
+            def best(self, kind):
+                return self.video[1]
+
+        class Container:
+            streams = Streams()
+
+        assert picture_stream(Container(), path).index == 0  # pyright: ignore
+
+
+def test_animated_webp_is_refused_by_its_name(tmp_path):
+    frames = [Image.new("RGB", (32, 20), (40 * n, 0, 0)) for n in range(4)]
+    path = tmp_path / "a.webp"
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=40)
+    with pytest.raises(InputError, match=r"a\.webp: animated WebP is not read; GIF, APNG and AVIF"):
+        Footage(path)

@@ -1,0 +1,42 @@
+"""Animations whose last picture is held for longer than the others."""
+
+from fractions import Fraction
+
+import pytest
+from PIL import Image
+
+from wgmb.settings.video import VideoSettings
+from wgmb.video.output_times import moments
+from wgmb.video.read.reader import Footage
+
+
+def animation(path, delays):
+    """A file of one colour a picture, shown for so many milliseconds each."""
+    pictures = [Image.new("RGB", (16, 16), (40 * n, 90, 200 - 30 * n)) for n in range(len(delays))]
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=list(delays))
+    return Footage(path)
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".apng"])
+def test_a_last_picture_that_is_held_lasts_as_long(tmp_path, suffix):
+    footage = animation(tmp_path / f"a{suffix}", (100, 100, 100, 900))
+    assert footage.duration == Fraction(12, 10)
+    clock = VideoSettings().clock(footage, None)
+    assert len(moments(footage, clock, Fraction(10))) == 12
+    part = VideoSettings(end="0.5").clock(footage, None)
+    assert len(moments(footage, part, Fraction(10))) == 5
+
+
+def test_at_its_own_times_it_is_shown_again_where_its_interval_ends(tmp_path):
+    footage = animation(tmp_path / "a.gif", (100, 300, 100, 900))
+    clock = VideoSettings().clock(footage, None)
+    times = [moment.time for moment in moments(footage, clock, None)]
+    assert times[:4] == [0, Fraction(1, 10), Fraction(4, 10), Fraction(5, 10)]
+    assert len(times) == 5 and times[4] + 1 / footage.rate == Fraction(14, 10)
+
+
+def test_delays_that_are_rounded_are_no_hold(tmp_path):
+    """GIF has hundredths of a second."""
+    footage = animation(tmp_path / "a.gif", (30, 40, 30, 40))
+    clock = VideoSettings().clock(footage, None)
+    assert len(moments(footage, clock, None)) == 4

@@ -1,0 +1,62 @@
+"""Videos that lose something say so, and an input is never written over."""
+
+import pytest
+
+import make_clips as clips
+import make_frames as make
+from wgmb.cli import app
+from wgmb.video.read.reader import Footage
+
+PLAIN = "--flow", "none", "-q"
+
+
+def run(capsys, *words, code=0):
+    got = app.main([str(w) for w in ("blur", *words, *PLAIN)])
+    text = capsys.readouterr().err
+    assert got == code, text
+    return text
+
+
+@pytest.fixture
+def cut(tmp_path):
+    """Two seconds of video, 24 pictures a second, of which the file ends early."""
+    pictures = [clips.frame(clips.planes(n), "yuv420p") for n in range(48)]
+    path = clips.write(tmp_path / "a.mkv", pictures, rate=clips.Fraction(24))
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    return path
+
+
+def test_a_cut_off_video_says_how_many_pictures_are_lost(tmp_path, capsys, cut):
+    text = run(capsys, cut, "-o", tmp_path / "b.mkv", code=1)
+    made = len(Footage(tmp_path / "b.mkv"))
+    (count,) = [int(w) for w in text.split() if w.isdigit()]
+    assert 10 < made < 40 and abs(made + count - 48) <= 2, text
+    assert "pictures after" in text and text.count("\n") == 1
+
+
+def test_a_part_before_the_cut_off_end_has_lost_nothing(tmp_path, capsys, cut):
+    assert run(capsys, cut, "-o", tmp_path / "b.mkv", "--frames", "0-4") == ""
+
+
+@pytest.mark.parametrize("more", [(), ("--overwrite",), ("--resume",)])
+def test_the_input_through_a_folder_that_is_not_there_stays(tmp_path, capsys, more):
+    source = clips.write(tmp_path / "a.mkv")
+    before = source.read_bytes()
+    text = run(capsys, source, "-o", tmp_path / "new" / ".." / "a.mkv", *more, code=2)
+    assert "is the input" in text and text.count("\n") == 1
+    assert source.read_bytes() == before and make.names_in(tmp_path) == ["a.mkv"]
+
+
+def test_another_file_through_a_folder_that_is_not_there_stays(tmp_path, capsys):
+    source = clips.write(tmp_path / "a.mkv")
+    (tmp_path / "b.mkv").write_bytes(b"mine")
+    text = run(capsys, source, "-o", tmp_path / "new" / ".." / "b.mkv", code=2)
+    assert "exists" in text and text.count("\n") == 1
+    assert (tmp_path / "b.mkv").read_bytes() == b"mine"
+
+
+def test_a_time_as_colour_space_names_the_option_that_is_meant(tmp_path, capsys):
+    source = clips.write(tmp_path / "a.mkv")
+    text = run(capsys, source, "-o", tmp_path / "b.mkv", "--from", "0:05", code=2)
+    assert "--begin" in text and text.count("\n") == 1
+    assert make.names_in(tmp_path) == ["a.mkv"]

@@ -1,0 +1,505 @@
+"""The viewer shows videos: pictures at once, their blur as soon as their motion is known."""
+
+import os
+import time
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import make_clips as clips
+import make_frames as make
+from wgmb import (
+    Blur,
+    InputError,
+    Shutter,
+    gpu,
+)
+from wgmb.cli.app import main
+from wgmb.color.coding import BT2020, HLG, PQ
+from wgmb.color.primaries import REC709, REC2020, conversion
+from wgmb.color.srgb import srgb
+from wgmb.flow import Flow
+from wgmb.flow.dis import Dis
+from wgmb.gpu.textures import TexturePool
+from wgmb.io import stills
+from wgmb.observer import Observer
+from wgmb.run.video import FootageBlur
+from wgmb.settings.video import FlowSettings, VideoSettings
+from wgmb.shots.cut_list import CutList
+from wgmb.video.holdouts import holdout_of
+from wgmb.video.linear_frames import VideoPictures
+from wgmb.video.output_times import moments
+from wgmb.video.read.reader import Footage
+from wgmb.viewer import State, controls, offscreen
+from wgmb.viewer.state.state import video_time
+from wgmb.viewer.subjects.video import FootageSubject
+from wgmb.viewer.subjects.video_motion import Finder, Known, Wish
+from wgmb.viewer.window import frame
+
+SIZE = 96, 64
+WINDOW = 96, 64  # of the picture alone
+BY_DIS = VideoSettings(flow="dis")
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    """A square that passes over a background, 48 a second, and a cut before picture 10."""
+    return passing(tmp_path_factory.mktemp("clip") / "a.mp4")
+
+
+@pytest.fixture(scope="module")
+def flash(tmp_path_factory):
+    """The same with a white picture 5."""
+    return passing(tmp_path_factory.mktemp("flash") / "a.mp4", white=5)
+
+
+def passing(path, white=None, repeats=(), times=None):
+    width, height = SIZE
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    frames, last = [], np.zeros((height, width), np.uint8)
+    for n in range(14):
+        at = 12 + 3.0 * n
+        inside = (abs(x - at) < 12) & (abs(y - 32) < 14)
+        behind = make.texture(x, y, 0.0 if n < 10 else 9.0)[..., 0]
+        tone = np.where(inside, make.texture(x - at, y, 5.0)[..., 1], behind)
+        tone = tone if n < 10 else 1 - tone[::-1] ** 3
+        tone = np.ones_like(tone) if n == white else tone
+        luma = np.clip(16 + 219 * tone, 16, 235).round().astype(np.uint8)
+        luma = last if n in repeats else luma
+        last = luma
+        chroma = np.full((height // 2, width // 2), 128, np.uint8)
+        frames.append(clips.frame([luma, chroma, chroma], "yuv420p"))
+    return clips.write(path, frames, times or [Fraction(n, 48) for n in range(14)])
+
+
+class Held:
+    """A source of motion that waits until it may go on, and counts."""
+
+    def __init__(self):
+        self.made, self.free = [], True
+        self.dis = Dis("best")
+
+    def shot(self, load):
+        found = self.dis.shot(load)
+
+        def motion(number):
+            while not self.free:
+                time.sleep(0.01)
+            self.made.append(number)
+            return found(number)
+
+        return motion
+
+
+@pytest.fixture
+def held(monkeypatch):
+    source = Held()
+    monkeypatch.setattr(FlowSettings, "source", lambda self, device: (source, "held"))
+    return source
+
+
+def opened(clip, **changes):
+    state = replace(State().opened(str(clip)), panel=False, method="tap", samples=8)
+    return offscreen(replace(state, **changes).settled(), WINDOW)
+
+
+def settled(viewer):
+    """The result when nothing lacks any more (height, width, 3)."""
+    for _ in range(600):
+        frame(viewer)
+        if not viewer.stage.report.busy:
+            return viewer.stage.download()[..., :3]
+    raise AssertionError(viewer.stage.report)
+
+
+def motion_of(video, device):
+    """A source of motion that shares nothing with that of the viewer."""
+    if video.flow == "search":
+        return Flow(quality=video.flow_quality, device=device)
+    return Dis(video.flow_quality) if video.flow == "dis" else None
+
+
+def command_line(
+    clip, number, fps=48, method="tap", masks=(), frames=None, cuts="", video=BY_DIS, **shutter
+):
+    """The output frame of that number that `wgmb blur` makes; `fps` None: at the video's times."""
+    footage, blur = Footage(clip), Blur(method, samples=8)
+    clock = video.clock(footage, frames)
+    cut_list = CutList(cuts)
+    run = FootageBlur(
+        footage,
+        blur,
+        motion_of(video, blur.device),
+        clock=clock,
+        holdout=holdout_of(masks, footage),
+        fill=video.duplicates == "fill",
+        cuts=cut_list.is_search,
+        known_cuts=cut_list.frames(0),
+        highlights=video.highlights,
+    )
+    wanted = moments(footage, clock, None if fps is None else Fraction(fps))
+    for moment, exposure in run.exposures(Shutter(**shutter), wanted):
+        if moment.number == number:
+            encoder = blur.device.create_command_encoder()
+            return TexturePool(blur.device).download(encoder, exposure.light())[..., :3]
+    raise AssertionError(f"{len(wanted)} frames")
+
+
+FULL = pytest.mark.full
+
+
+@pytest.mark.parametrize(
+    ("changes", "made"),
+    [
+        ({}, {}),
+        ({"shutter": 360.0, "phase": "start"}, {"degrees": 360, "phase": "start"}),
+        ({"fps": 12.0, "frame": 1.0}, {"fps": 12}),
+        ({"method": "gather"}, {"method": "gather"}),
+        pytest.param({"fps": 12.0, "shutter": 360.0, "frame": 2.0},
+                     {"fps": 12, "degrees": 360}, marks=FULL),
+        ({"fps": 12.0, "flow": "none", "frame": 1.0}, {"fps": 12}),
+        pytest.param({"pace": "0.5", "frame": 8.0},
+                     {}, marks=FULL),
+        ({"pace": "0.5", "frame": 9.0}, {}),
+        ({"pace": "0.4", "fps": 60.0, "frame": 13.0, "method": "gather"},
+         {"fps": 60, "method": "gather"}),
+        ({"pace": "0.4", "fps": 60.0, "frame": 34.0, "shutter": 360.0},
+         {"fps": 60, "degrees": 360}),
+        pytest.param({"pace": "0.5", "frame": 11.0, "flow": "search", "flow_quality": "fast"},
+                     {}, marks=FULL),
+        ({"pace": "4", "frame": 1.0}, {}),
+        ({"video": (("begin", "0.05"), ("end", "0.2")), "frame": 3.0}, {}),
+        ({"frames": "3-9", "pace": "0.3", "frame": 0.0}, {"frames": "3-9"}),
+        pytest.param({"frames": "3-9", "pace": "0.3", "frame": 22.0},
+                     {"frames": "3-9"}, marks=FULL),
+        ({"video": (("highlights", 8.0),), "frame": 4.0}, {}),
+        ({"given": (("cuts", "3,5"),), "shutter": 720.0}, {"cuts": "3,5", "degrees": 720}),
+        ({"given": (("cuts", "only:5"),), "frame": 9.0}, {"cuts": "only:5"}),
+    ],
+    ids=[
+        "own rate",
+        "into the next",
+        "four in one",
+        "neighbours",
+        "up to the cut",
+        "averaged",
+        "slow, at a picture",
+        "slow, in between",
+        "slow at another rate",
+        "slow, across the cut",
+        "slow, searched",
+        "quick",
+        "a part by times",
+        "the beginning of a part",
+        "the end of a part",
+        "highlights",
+        "cuts by hand",
+        "no cuts",
+    ],
+)  # fmt: skip
+def test_it_shows_what_the_command_line_makes(clip, changes, made):
+    viewer = opened(clip, **{"flow": "dis", "frame": 4.0} | changes)
+    state = viewer.state
+    want = command_line(clip, int(state.frame), video=video_time.settings_of(state), **made)
+    np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
+    viewer.stage.choices.close()
+
+
+TIMES = [Fraction(n, 48) for n in (0, 1, 2, 4, 5, 7, 8, 9, 12, 13, 14, 16, 17, 18)]
+
+
+@pytest.mark.covers(1)
+@pytest.mark.parametrize("speed", ["1", "0.4"])
+@pytest.mark.parametrize("own_times", [False, True])
+@pytest.mark.parametrize("fill", ["keep", "fill"])
+def test_variable_rates_and_repeats_are_as_by_the_command_line(tmp_path, speed, own_times, fill):
+    clip = passing(tmp_path / "a.mp4", repeats=(4, 5, 8), times=TIMES)
+    viewer = opened(
+        clip, flow="dis", pace=speed, own_times=own_times, video=(("duplicates", fill),),
+        method="gather", shutter=300.0,
+    )  # fmt: skip
+    fps = None if own_times else video_time.rate(viewer.state)
+    settings = video_time.settings_of(viewer.state)
+    assert settings.duplicates == fill
+    count = len(video_time.output(viewer.state).moments)
+    assert own_times == (count == 14)
+    for number in (count - 1, 5, 4, 8, 0):
+        made = {"fps": fps, "method": "gather", "degrees": 300}
+        want = command_line(clip, number, video=settings, **made)
+        viewer.state = replace(viewer.state, frame=float(number))
+        np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
+    viewer.stage.choices.close()
+
+
+def test_what_is_held_out_stays_sharp_as_by_the_command_line(clip, tmp_path):
+    matte = tmp_path / "matte.png"
+    mask = np.zeros((SIZE[1], SIZE[0], 3), np.float32)
+    mask[:, : SIZE[0] // 4] = 1
+    matte.write_bytes(stills.encode(mask, ".png", 8, ""))
+    given = (("holdout", (str(matte), "static")),)
+    viewer = opened(clip, flow="dis", frame=4.0, given=given)
+    got = settled(viewer)
+    want = command_line(clip, 4, masks=(str(matte), "static"))
+    np.testing.assert_allclose(got, want, atol=2e-5)
+    sharp = VideoPictures(Footage(clip), gpu.open_device()).at(4)
+    kept = np.abs(got - sharp)[:, : SIZE[0] // 4 - 2]
+    assert kept.max() < 1e-3 < 0.02 < np.abs(got - command_line(clip, 4)).max()
+    viewer.stage.choices.close()
+
+
+@pytest.mark.parametrize(
+    ("mask", "said"), [("Layer", "must be static, or an image file"), ("small.png", "96 x 64")]
+)
+def test_a_holdout_that_cannot_be_is_refused(clip, tmp_path, monkeypatch, mask, said):
+    monkeypatch.chdir(tmp_path)
+    small = stills.encode(np.ones((8, 8, 3), np.float32), ".png", 8, "")
+    (tmp_path / "small.png").write_bytes(small)
+    with pytest.raises(InputError, match=said):
+        frame(opened(clip, given=(("holdout", (mask,)),)))
+
+
+def test_the_speed_of_the_output_is_saved_and_played(clip):
+    state = replace(State().opened(str(clip)), pace="0.5", speed=2.0)
+    words = state.command("b.mp4")
+    assert words[words.index("--speed") + 1] == "0.5"
+    assert State.of_toml(state.toml()) == state
+    assert controls.played(replace(state, speed=1.0), 0.125).frame == pytest.approx(6)
+    assert "--speed" not in replace(state, pace="1").command("b.mp4")
+    with pytest.raises(InputError, match=r"`speed` must be 0\.01 to 100"):
+        State.of_toml(state.toml().replace('speed = "0.5"', 'speed = "0"'))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (["wheel", "--speed", "0.5"], "--speed is for videos"),
+        (["wheel", "--keep", "static"], "--holdout is for frames and videos"),
+        (["CLIP", "--speed", "0"], "--speed must be 0.01 to 100"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused_before_a_window_opens(clip, capsys, changes, said):
+    words = [str(clip) if word == "CLIP" else word for word in changes]
+    assert main(["view", *words]) == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("changes", [{"frame": 1.0}, {"frame": 1.0, "method": "gather"}])
+def test_it_shows_a_flash_as_the_command_line_does(clip, flash, changes):
+    made = {"fps": 12, "degrees": 360, "method": changes.get("method", "tap")}
+    viewer = opened(flash, flow="dis", fps=12.0, shutter=360.0, **changes)
+    want = command_line(flash, 1, **made)
+    np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
+    assert want.mean() > command_line(clip, 1, **made).mean() + 0.1
+    viewer.stage.choices.close()
+
+
+def test_the_sharp_picture_comes_first_and_says_so(clip, held):
+    held.free = False
+    viewer = opened(clip, frame=5.0)
+    for _ in range(3):
+        frame(viewer)
+    report = viewer.stage.report
+    assert report.waiting.startswith("sharp: finding the motion of picture 5")
+    sharp = VideoPictures(Footage(clip), gpu.open_device()).at(5)
+    np.testing.assert_allclose(viewer.stage.download()[..., :3], sharp, atol=1e-6)
+    held.free = True
+    assert np.abs(settled(viewer) - sharp).max() > 0.05
+    assert not viewer.stage.report.waiting
+    viewer.stage.choices.close()
+
+
+def test_motion_is_made_once_whatever_changes(clip, held):
+    viewer = opened(clip, frame=5.0)
+    first = settled(viewer)
+    assert held.made == [5]  # tap takes no neighbours
+    for change in (
+        {"shutter": 90.0},
+        {"samples": 4},
+        {"method": "reproject"},
+        {"look": "velocity"},
+    ):
+        viewer.state = replace(viewer.state, **change)
+        settled(viewer)
+    viewer.state = replace(viewer.state, frame=2.0)
+    settled(viewer)
+    assert sorted(held.made) == sorted(set(held.made)) and {2, 5} <= set(held.made)
+    before = len(held.made)
+    viewer.state = replace(viewer.state, frame=5.0, shutter=180.0, samples=8, method="tap",
+                           look="result")  # fmt: skip
+    np.testing.assert_array_equal(settled(viewer), first)
+    assert len(held.made) == before
+    viewer.stage.choices.close()
+
+
+def test_it_plays_at_its_own_rate_and_steps_from_picture_to_picture(clip):
+    state = State().opened(str(clip))
+    assert (state.frames, state.frame, state.fps) == ("0-13", 0.0, 48.0)
+    assert controls.stepped(state, 1).frame == 1
+    assert controls.played(state, 0.125).frame == pytest.approx(6)
+    assert controls.played(replace(state, fps=12.0), 0.125).frame == pytest.approx(1.5)
+
+
+def test_what_it_is_set_to_is_what_the_command_line_is_told(clip):
+    state = replace(State().opened(str(clip)), flow="dis", frames="2-5").settled()
+    words = state.command("b.mp4")
+    assert words[:4] == ["blur", str(clip), "-o", "b.mp4"] and "--fps" not in words
+    assert words[words.index("--flow") + 1] == "dis" and words[words.index("--frames") + 1] == "2-5"
+    assert "--fps" in replace(state, fps=24.0).command("b.mp4")
+    assert State.of_toml(state.toml()) == state
+    with pytest.raises(InputError, match="flow cannot be 'dise'"):
+        State.of_toml(state.toml().replace('"dis"', '"dise"'))
+
+
+def test_options_of_rendered_frames_are_refused(clip):
+    with pytest.raises(InputError, match="--layer is for rendered frames"):
+        frame(opened(clip, given=(("layer", "beauty"),)))
+
+
+def test_pictures_are_found_in_any_order(clip):
+    pictures, want = VideoPictures(Footage(clip), gpu.open_device()), {}
+    for number, light in VideoPictures(Footage(clip), gpu.open_device()).read():
+        want[number] = light
+    for number in (3, 4, 5, 9, 2, 2, 13, 0, 12):
+        np.testing.assert_array_equal(pictures.at(number), want[number])
+    assert pictures.at(14) is None
+
+
+def wide(path, transfer):
+    """A 10-bit video of one colour a quarter, in BT.2020 primaries; grey is white of paper."""
+    width, height = SIZE
+    rgb = np.full((height, width, 3), 0.58 if transfer == PQ else 0.75)
+    for i, color in enumerate([(0.55, 0.4, 0.4), (0.4, 0.5, 0.42), (0.35, 0.4, 0.5)]):
+        rgb[:, i * width // 4 : (i + 1) * width // 4] = color
+    luma = rgb @ [0.2627, 0.678, 0.0593]  # BT.2020, non-constant luminance
+    blue, red = (rgb[..., 2] - luma) / 1.8814, (rgb[..., 0] - luma) / 1.4746
+    found = [4 * (16 + 219 * luma)] + [4 * (128 + 224 * c[::2, ::2]) for c in (blue, red)]
+    planes = [plane.round().astype(np.uint16) for plane in found]
+    made = [clips.frame(planes, "yuv420p10le") for _ in range(2)]
+    tags = (1, BT2020, transfer, BT2020)
+    return clips.write(path, made, codec="ffv1", pixels="yuv420p10le", tags=tags)
+
+
+@pytest.mark.parametrize("transfer", [PQ, HLG], ids=["PQ", "HLG"])
+def test_hdr_is_shown_in_the_colours_of_the_display(tmp_path, transfer):
+    path = wide(tmp_path / "a.mkv", transfer)
+    assert Footage(path).coding.transfer == transfer
+    assert State().opened(str(path)).tone == "soft"  # the sky of a phone's video is not all white
+    viewer = opened(path, look="sharp", flow="none", tone="clip")
+    for _ in range(3):
+        frame(viewer)
+    light = VideoPictures(Footage(path), gpu.open_device()).at(0).astype(np.float64)
+    if transfer == HLG:
+        light *= (light @ [0.2627, 0.678, 0.0593])[..., None] ** 0.2  # BT.2100, table 5
+    want = srgb(light @ conversion(REC2020, REC709).T)
+    got = viewer.screen.picture()
+    np.testing.assert_allclose(got, want, atol=2e-3)
+    assert got[32, -8].min() > 0.97  # white of paper is white
+    assert np.abs(srgb(light) - want).max() > 0.03  # the primaries count
+    assert np.allclose(viewer.stage.chromaticities["chromaticities"], REC2020)
+    viewer.stage.choices.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "frame_shown"),
+    [
+        ({"shutter": 0.0, "flow": "none", "own_times": True}, 13.0),
+        ({"shutter": 0.0, "flow": "none", "own_times": True}, 6.0),
+        ({"flow": "dis", "pace": "0.5", "fps": 24.0}, 11.0),
+    ],
+    ids=["as wgmb perceive", "near the beginning", "of slow motion"],
+)
+def test_a_video_is_perceived_by_output_frames_held_until_the_next(tmp_path, changes, frame_shown):
+    clip = passing(tmp_path / "a.mp4", times=TIMES)
+    viewer = opened(clip, look="perceived", frame=frame_shown, **changes)
+    state = viewer.state
+    moments, fps = video_time.output(state).moments, None
+    if not state.own_times:
+        fps = video_time.rate(state)
+    observer = Observer(100, state.eye, device=viewer.stage.device)
+    for number in range(int(frame_shown) + 1):
+        settings = video_time.settings_of(state)
+        made = {"fps": fps, "video": settings, "degrees": state.shutter}
+        observer.present(command_line(clip, number, **made), video_time.held_for(state, number))
+    assert len(moments) > frame_shown
+    got = settled(viewer)
+    np.testing.assert_allclose(got, observer.perceived()[..., :3], atol=1e-3)  # it holds halves
+    assert np.abs(got - command_line(clip, int(frame_shown), **made)).max() > 0.05
+    assert viewer.stage.report.labels[0].endswith("perceived")
+    viewer.stage.choices.close()
+
+
+def test_what_is_perceived_waits_for_the_motion_of_all_its_frames(clip, held):
+    held.free = False
+    viewer = opened(clip, look="perceived", frame=7.0)
+    for _ in range(3):
+        frame(viewer)
+    assert viewer.stage.report.busy and "finding the motion" in viewer.stage.report.waiting
+    blurry = viewer.stage.download()
+    held.free = True
+    assert np.abs(settled(viewer) - blurry[..., :3]).max() > 1e-3
+    assert set(held.made) == set(range(8)) and not viewer.stage.report.waiting
+    viewer.stage.choices.close()
+
+
+def test_a_file_that_vanishes_while_it_plays_is_said_and_the_picture_stays(tmp_path):
+    clip = passing(tmp_path / "a.mp4")
+    viewer = opened(clip, flow="none", shutter=0.0, frame=3.0)
+    shown = settled(viewer)
+    clip.unlink()
+    subject = viewer.stage.choices.subject(viewer.state)
+    assert isinstance(subject, FootageSubject)
+    subject._frames._colors.clear()  # as if there had been many more
+    for frame_wanted in (12.0, 0.0, 13.0):
+        viewer.state = replace(viewer.state, frame=frame_wanted, playing=True)
+        for _ in range(3):
+            frame(viewer)
+    assert str(clip) in viewer.message[0] or "sharp: " in viewer.stage.report.waiting
+    assert shown.shape == viewer.stage.download()[..., :3].shape
+    viewer.stage.choices.close()
+
+
+def test_a_file_that_changes_is_read_anew(tmp_path):
+    clip = passing(tmp_path / "a.mp4")
+    viewer = opened(clip, flow="none", shutter=0.0, frame=3.0)
+    before = settled(viewer)
+    passing(tmp_path / "a.mp4", white=3)
+    os.utime(clip, (1, 1))
+    assert np.abs(settled(viewer) - before).max() > 0.2
+    viewer.stage.choices.close()
+
+
+def test_pixels_that_are_not_square_are_shown_in_their_shape(tmp_path):
+    def wide(stream):
+        stream.codec_context.sample_aspect_ratio = Fraction(2)
+
+    frames = [clips.frame(clips.planes(n, SIZE), "yuv420p") for n in range(3)]
+    clip = clips.write(tmp_path / "a.mp4", frames, setup=wide)
+    viewer = opened(clip, look="sharp")
+    frame(viewer)
+    assert viewer.stage.report.place == (0, 16, 96, 32)
+    assert viewer.stage.download().shape[:2] == (64, 96)
+    viewer.stage.choices.close()
+
+
+def test_where_nothing_can_be_decoded_a_picture_is_left_out_or_the_run_says_so(
+    tmp_path, monkeypatch
+):
+    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(24)]
+    clip = clips.write(tmp_path / "a.mp4", frames)
+    decoded = Footage.pictures
+
+    def begin_only(self, first=0, last=None):
+        return ((n, picture) for n, picture in decoded(self, first, last) if n < 4)
+
+    monkeypatch.setattr(Footage, "pictures", begin_only)
+    device, footage = gpu.open_device(), Footage(clip)
+    find = Finder(footage, device, None, Wish())
+    assert find(23) == Known(None, None, None, None, is_left_out=True)
+    assert find(10).is_left_out and find(10).before == 3
+    assert not find(2).is_left_out and find(2).after == 3
+    clock = VideoSettings(begin="0.9").clock(footage, None)
+    run = FootageBlur(footage, Blur("tap", device=device), None, clock=clock)
+    with pytest.raises(InputError, match=r"from 0\.[0-9]* s on can be decoded"):
+        next(run.exposures(Shutter(180), moments(footage, clock, Fraction(24))))

@@ -1,0 +1,236 @@
+"""`wgmb blur`: rendered frames and videos."""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from ...errors import InputError
+from ...extras import needed_by
+from ...io.frame_numbers import frame_numbers
+from ...run.job import Job, settle
+from ...run.job_file import read_job
+from ...run.request import Asked
+from ...sequence.frame_file import is_video
+from ...settings.color import ColorSettings, option_name
+from ...settings.video import VideoSettings
+from ..conclusion import conclude
+from ..names import is_batch
+from ..options import (
+    BlurOptions,
+    Colors,
+    Given,
+    InputOptions,
+    Look,
+    ShutterOptions,
+    Target,
+    Videos,
+    When,
+)
+from ..spelling import as_options
+from ..terminal import muted, note, progress
+
+
+def blur(
+    patterns: Annotated[tuple[str, ...], Parameter(name="pattern")] = (),
+    output: Target | None = None,
+    look: Look = BlurOptions(),
+    when: When = ShutterOptions(),
+    given: Given = InputOptions(),
+    color: Colors = ColorSettings(),
+    video: Videos = VideoSettings(),
+    *,
+    job: Path | None = None,
+    workers: int | Literal["auto"] | None = None,
+    cluster: str | None = None,
+    fps_in: str | None = None,
+    confidence: bool = False,
+    config: Path | None = None,
+    adapter: str | None = None,
+    verbose: Annotated[bool, Parameter(alias="-v")] = False,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+) -> int:
+    """Blur rendered frames or videos.
+
+    Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --shutter 180 --frames 1-100
+
+    Example: wgmb blur in.mp4 -o out.mp4 --shutter 180 --fps 60
+
+    Example: wgmb blur a.mp4 b.mkv -o out/ --fps 60
+
+    Example: wgmb blur night.mp4 -o out.mp4 --highlights 8
+
+    Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --fps-in 240 --fps 60
+
+    Example: wgmb blur --job shot.json --frames 17-32
+
+    Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --cluster tcp://farm:8786
+
+    Parameters
+    ----------
+    patterns
+        Frames: shot.####.exr, shot.%04d.exr, or one file. Or videos: files, folders, or patterns
+        such as 'clips/*.mp4'; for several, the output is a folder, or a name with {name}.
+    job
+        Job file of `wgmb job`, which holds all settings; --frames selects a part of the frames.
+    workers
+        Number of processes on this machine that share the frames; auto: one for each GPU.
+    cluster
+        Scheduler of dask.distributed whose workers share the frames, such as tcp://farm:8786.
+    fps_in
+        Frames per second of the rendered frames, if --fps is another rate: each is blurred by its
+        own vectors over its share of an exposure. Output numbers begin with the first input number.
+    confidence
+        Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
+    config
+        TOML file with options in its table [blur], as saved by `wgmb view`.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    verbose
+        Print the GPU, layers and settings in use.
+    quiet
+        Print errors only.
+    """
+    crew = _crew(workers, cluster)
+    if job is not None:
+        rest = replace(given, frames=None), look, when, color, video, output
+        plain = InputOptions(), BlurOptions(), ShutterOptions(), ColorSettings(), VideoSettings()
+        if patterns or confidence or fps_in or config or rest != (*plain, None):
+            raise InputError(
+                "--job holds all settings; only --frames, --workers, --cluster, --adapter, "
+                "--verbose and --quiet can be combined with it"
+            )
+        return blur_job(job, given.frames, crew, adapter, verbose, quiet)
+    if not patterns:
+        raise InputError("no input: name frames such as 'shot.####.exr', or a video")
+    if output is None:
+        such = "out.mp4" if is_video(patterns[0]) else "'blurred.####.exr'"
+        raise InputError(f"--output is missing, such as -o {such}")
+    when, pattern = when.resolved(), patterns[0]
+    if is_batch(patterns, output.output) or is_video(pattern):
+        with needed_by(pattern, "video"):
+            from .blur_video import blur_video
+            from .blur_videos import blur_videos
+        if confidence or fps_in or crew:
+            option = "--fps-in" if fps_in else "--confidence"
+            if crew and not (confidence or fps_in):
+                option = "--workers" if workers else "--cluster"
+            raise InputError(f"{option} is for rendered frames")
+        _tell_unused(color, quiet)
+        settings = look, when, given, video, adapter, quiet, verbose
+        if is_batch(patterns, output.output):
+            return blur_videos(patterns, output, *settings)
+        return blur_video(pattern, output, *settings)
+    asked = Asked(
+        pattern=pattern,
+        output=output,
+        look=look,
+        when=when,
+        given=given,
+        color=color,
+        video=video,
+        confidence=confidence,
+        fps_in=fps_in,
+    )
+    made = settle(asked, adapter)
+    if crew and made.asked.conversion:
+        option = "--fps-in" if fps_in else "--flow none"
+        raise InputError(f"{option} cannot be combined with --workers or --cluster")
+    if crew:
+        return blur_on_farm(made, *crew, adapter, verbose, quiet)
+    return blur_frames(made, adapter, verbose, quiet)
+
+
+def _tell_unused(color: ColorSettings, quiet: bool) -> None:
+    """Say which colour options have no part in the blur of videos; InputError for a time."""
+    plain = ColorSettings()
+    if color.from_ and re.fullmatch(r"[\d:.]+", color.from_):
+        raise InputError(
+            f"--from is a colour space, got {color.from_}; a part of a video is --begin and --end"
+        )
+    used = [f.name for f in fields(plain) if getattr(color, f.name) != getattr(plain, f.name)]
+    if used and not quiet:
+        options = ", ".join(map(option_name, used))
+        note(f"videos keep their own colours: {options} not used")
+
+
+Crew = tuple[int | None, str | None]
+"""Number of workers to start here, None for a suitable one; or the scheduler of other workers."""
+
+
+def _crew(workers: int | Literal["auto"] | None, cluster: str | None) -> Crew | None:
+    if workers is None and cluster is None:
+        return None
+    if workers is not None and cluster is not None:
+        raise InputError("choose either --workers, on this machine, or --cluster")
+    count = None if workers == "auto" else workers
+    if count is not None and not 1 <= count <= 256:
+        raise InputError(f"--workers must be 1 to 256 or auto, got {count}")
+    return count, cluster
+
+
+def blur_job(
+    path: Path,
+    frames: str | None,
+    crew: Crew | None,
+    adapter: str | None,
+    verbose: bool,
+    quiet: bool,
+) -> int:
+    """Blur some frames of a job file, or all; returns the exit code."""
+    kept = read_job(path)
+    numbers = kept.job.chosen(frame_numbers(frames) if frames else kept.job.numbers)
+    kept.check(numbers, str(path))
+    if crew:
+        return blur_on_farm(replace(kept.job, numbers=numbers), *crew, adapter, verbose, quiet)
+    return blur_frames(kept.job, adapter, verbose, quiet, numbers)
+
+
+def blur_on_farm(
+    job: Job,
+    workers: int | None,
+    cluster: str | None,
+    adapter: str | None,
+    verbose: bool,
+    quiet: bool,
+) -> int:
+    """Blur frames of a job in several processes; returns the exit code."""
+    from ...run.farm.farm import Farm, as_farm_job
+
+    for text in () if quiet else job.remarks:
+        note(as_options(text))
+    job = as_farm_job(job)
+
+    def say(text: str) -> None:
+        note(as_options(text))
+
+    farm = Farm(cluster, workers, adapter, say, say if verbose else lambda text: None)
+    started = time.perf_counter()
+    with progress(len(job.numbers), quiet) as tick, muted():
+        outcome = farm.blur(job, tick)
+    took = f"{time.perf_counter() - started:.1f} s with {job.asked.look.method}"
+    return conclude(outcome, Path(job.asked.output.output), took, quiet, verbose)
+
+
+def blur_frames(
+    job: Job, adapter: str | None, verbose: bool, quiet: bool, numbers: list[int] | None = None
+) -> int:
+    """Blur frames of a job in this process, by default all; returns the exit code."""
+    for text in () if quiet else job.remarks:
+        note(as_options(text))
+    run = job.run(adapter, numbers)
+    if verbose:
+        note(f"adapter: {run.blur.device.adapter.summary}")
+        note(f"settings: {run.output.settings}")
+    started = time.perf_counter()
+    with progress(len(run.numbers), quiet) as tick:
+        outcome = run(tick)
+    if len(run.clip.numbers) < len(job.numbers):
+        outcome.be_a_part()
+    took = f"{time.perf_counter() - started:.1f} s with {run.blur.method.name}"
+    return conclude(outcome, run.output.pattern, took, quiet, verbose)

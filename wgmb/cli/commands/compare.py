@@ -1,0 +1,191 @@
+"""`wgmb compare`: score methods against a ground truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Group, Parameter
+
+from ... import gpu
+from ...errors import InputError, check_choice
+from ...lab.cases import (
+    Candidate,
+    Case,
+    SceneFrame,
+    clip_case,
+    make_scene,
+    scene_case,
+)
+from ...lab.compare import Laboratory, crossings
+from ...lab.papers.experiments import EXPERIMENTS
+from ...lab.report import write
+from ...lab.results import Report, machine
+from ...methods import METHODS
+from ...metrics import check_flip
+from ...scene.scene import Scene
+from ...settings import ShutterSettings, size_of
+from ...shutter import Shutter
+from ..options import (
+    Given,
+    InputOptions,
+    ShutterOptions,
+    When,
+)
+from ..pages import (
+    command_line,
+    pages_of,
+    teller,
+    whole_numbers,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareSettings:
+    """Candidates and timing."""
+
+    methods: str | None = None
+    "NAME[:SAMPLES][:OPTION=VALUE]..., separated by commas; all by default."
+    reference: str = "distributed:1024"
+    "Method and samples that render the ground truth of scenes."
+    samples: int = 16
+    "Samples per pixel of every method in the comparison at equal samples."
+    ladder: str = "4,8,16,32,64"
+    "Sample counts for the error curves, separated by commas."
+    budget: float | None = None
+    "Milliseconds per frame in the comparison at equal time; default: the slowest image method's."
+    shutters: str | None = None
+    "Several shutter angles in degrees, such as 90,180,360, instead of --shutter."
+    rounds: int = 3
+    "Number of timing rounds; the fastest counts."
+
+    def candidates(self) -> list[Candidate]:
+        """Return the candidates."""
+        return [Candidate.parse(text) for text in (self.methods or ",".join(METHODS)).split(",")]
+
+    def steps(self) -> list[int]:
+        """Numbers of samples."""
+        return whole_numbers("ladder", self.ladder)
+
+    def budgets(self) -> Callable[[Report, Case], list[float]] | None:
+        """Return a function that gives the time budgets [s], or None without --budget."""
+        if self.budget is None:
+            return None
+        if not self.budget > 0:
+            raise InputError(f"budget must be over 0 ms, got {self.budget}")
+        seconds = self.budget / 1e3
+        return lambda report, case: [seconds]
+
+    def exposures(self, when: ShutterSettings, scene: Scene | None = None) -> dict[str, Shutter]:
+        """Return the shutters by label; unset fields are taken from the scene."""
+        settled = when.resolved(scene)
+        try:
+            degrees = [float(d) for d in (self.shutters or str(settled.shutter)).split(",")]
+        except ValueError:
+            raise InputError(f"shutters must be like 90,180, got {self.shutters!r}") from None
+        return {f"{d:g}°": replace(settled, shutter=d).make() for d in degrees}
+
+
+Who = Annotated[CompareSettings, Parameter(name="*", group=Group("Compare", sort_key=2))]
+
+
+def compare(
+    *scene: str,
+    output: Annotated[Path, Parameter(alias="-o")],
+    who: Who = CompareSettings(),
+    when: When = ShutterOptions(),
+    given: Given = InputOptions(),
+    size: str = "480x270",
+    time: float = 0.0,
+    antialias: int = 3,
+    truth: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
+    inputs: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    frame: int | None = None,
+    peer: tuple[str, ...] = (),
+    experiment: str | None = None,
+    adapter: str | None = None,
+    overwrite: bool = False,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+) -> int:
+    """Score and time methods against a ground truth; write an HTML, JSON and CSV report.
+
+    Example: wgmb compare crossing fence:speed=5 --methods tap,reproject -o report.html
+
+    Example: wgmb compare --truth t.exr --inputs 'shot.####.exr' --frame 2 -o report.html
+
+    Parameters
+    ----------
+    scene
+        Built-in scenes, NAME[:PARAMETER=VALUE]...
+    output
+        Report file, .html; JSON and CSV files are written next to it.
+    size
+        Image size for scenes.
+    time
+        Time of the scenes in seconds.
+    antialias
+        Antialiasing of the scenes' sharp frames: rays per pixel side.
+    truth
+        Ground truth of the blurred frame: one file, or two rendered with half the samples and
+        different seeds, whose mean is the truth and whose difference gives the noise floor.
+    inputs
+        Rendered frames: a pattern, or the files of the frame before, this one and the next.
+    frame
+        Frame number of the truth.
+    peer
+        NAME=FILE: the frame as blurred by another program; may be repeated.
+    experiment
+        Repeat a paper's experiment instead: taylor, chen or rosado.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    overwrite
+        Replace existing files.
+    quiet
+        Print errors only.
+    """
+    pages = pages_of(output)
+    for file in pages:
+        if file.exists() and not overwrite:
+            raise InputError(f"{file} exists; --overwrite replaces it")
+    if (truth is None) != (not inputs) or bool(scene) + bool(inputs) + bool(experiment) != 1:
+        raise InputError("pass either scenes, --truth with --inputs, or --experiment")
+    check_flip()  # before a reference is rendered for minutes
+    device = gpu.open_device(adapter)
+    tell = teller(quiet)
+    lab = Laboratory(device, rounds=who.rounds, tell=tell)
+    report = Report("", command_line(), machine(device), who.samples)
+    wanted, candidates = size_of(size), who.candidates()
+    steps, budgets = who.steps(), who.budgets()
+    if experiment:
+        check_choice("--experiment", experiment, EXPERIMENTS)
+        report.title = f"{experiment.capitalize()}'s experiment"
+        EXPERIMENTS[experiment](lab, report, wanted)
+        write(report, output)
+        tell(f"-> {output}")
+        return 0
+    reference = Candidate.parse(who.reference)
+    baselines = {name: Path(file) for name, _, file in (p.partition("=") for p in peer)}
+    cases: list[Callable[[], Case]] = []
+    for name, made in map(make_scene, scene):
+        scene_frame = SceneFrame(made, time, wanted, antialias=antialias)
+        for degrees, shutter in who.exposures(when, made).items():
+            cases.append(partial(scene_case, f"{name}, {degrees}", shutter, reference,
+                                 scene_frame, device, tell))  # fmt: skip
+    if truth is not None and inputs:
+        name = truth[0].parent.name or truth[0].stem
+        for degrees, shutter in who.exposures(when).items():
+            cases.append(partial(clip_case, f"{name}, {degrees}", shutter, inputs, frame,
+                                 truth, baselines, given.open))  # fmt: skip
+    able = candidates if who.methods or scene else [c for c in candidates if not c.needs_scene]
+    for make in cases:
+        case = make()
+        lab.compare(report, case, able, steps, budgets)
+        if found := crossings(report, case):
+            report.tables.append(found)
+    report.title = "Motion blur compared: " + ", ".join(c.name for c in report.cases)
+    write(report, output)
+    tell(f"-> {output}")
+    return 0

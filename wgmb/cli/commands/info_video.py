@@ -1,0 +1,100 @@
+"""Lines of `wgmb info` about a video."""
+
+from __future__ import annotations
+
+from ...color.coding import Coding
+from ...video.read.reader import Footage
+from ...video.scan import scan_video
+from ..exit_codes import DONE, SOME_FAILED
+from ..terminal import note, out, progress
+
+_KINDS = {"yuv": "Y'CbCr", "rgb": "RGB", "grey": "grey"}
+_STEPS = {(2, 2): " 4:2:0", (2, 1): " 4:2:2", (1, 1): " 4:4:4"}
+
+
+_MATRICES = {0: "RGB", 1: "BT.709", 5: "BT.601", 6: "BT.601", 9: "BT.2020"}
+_PRIMARIES = {1: "BT.709", 5: "BT.601 (625 lines)", 6: "BT.601", 9: "BT.2020", 11: "DCI-P3"}
+_PRIMARIES |= {12: "Display P3"}
+_TRANSFERS = {1: "BT.709", 4: "gamma 2.2", 5: "gamma 2.8", 6: "BT.601", 8: "linear", 13: "sRGB"}
+_TRANSFERS |= {14: "BT.2020", 15: "BT.2020", 16: "HDR (PQ)", 18: "HDR (HLG)"}
+
+
+def _colors(coding: Coding) -> str:
+    """Primaries, and where their names differ transfer and matrix, of a video (ITU-T H.273)."""
+    primaries = _PRIMARIES.get(coding.primaries, f"primaries {coding.primaries} of H.273")
+    transfer = _TRANSFERS.get(coding.transfer, f"{coding.transfer} of H.273")
+    matrix = _MATRICES.get(coding.matrix, f"{coding.matrix} of H.273")
+    words = [primaries]
+    if transfer != primaries:
+        words.append(transfer if transfer.startswith("HDR") else f"transfer {transfer}")
+    if not primaries.startswith(matrix) and coding.model == "yuv":
+        words.append(f"matrix {matrix}")
+    return ", ".join(words)
+
+
+def tell_about(path: str, max_mb: float, scan: bool) -> int:
+    """Print the lines about a video; returns the exit code. `scan`: those of all its pictures."""
+    footage = Footage(path, max_mb=max_mb)
+    _print(describe_video(footage))
+    if not scan:
+        _print([("cuts", "not looked for; --scan decodes the video and lists them")])
+        return DONE
+    with progress(len(footage), quiet=False, doing="reading") as tell:
+        found = scan_video(footage, tell)
+    _print(found)
+    if scaling := footage.scaling():
+        _print([("scaled", scaling)])
+    if loss := footage.loss():
+        note(f"wgmb: {loss}")
+        return SOME_FAILED
+    return DONE
+
+
+def _print(lines: list[tuple[str, str]]) -> None:
+    for name, text in lines:
+        out(f"{name:10}{text}")
+
+
+def describe_video(footage: Footage) -> list[tuple[str, str]]:
+    """(name, text) lines about a video."""
+    coding = footage.coding
+    kind = _KINDS[coding.model] + (_STEPS.get(coding.steps, "") if coding.model == "yuv" else "")
+    extent = "full" if coding.full_range else "limited"
+    lines = [
+        ("file", str(footage.path)),
+        ("video", f"{footage.codec} in {footage.container}"),
+        ("size", "{} x {}".format(*footage.size)),
+        ("pictures", f"{len(footage)} in {float(footage.duration):.2f} s"),
+        ("rate", _rate(footage)),
+        ("colour", f"{_colors(coding)}; {kind}, {coding.bits} bits, {extent} range"),
+    ]
+    if footage.mastering is not None and (display := str(footage.mastering)):
+        lines.append(("mastered", f"on a display of {display}"))
+    if footage.light_level is not None:
+        level = footage.light_level
+        text = f"brightest pixel {level.max_cll}, brightest mean of a picture {level.max_fall}"
+        lines.append(("light", f"{text} cd/m2 (MaxCLL, MaxFALL)"))
+    if coding.alpha:
+        lines.append(("alpha", "straight"))
+    if footage.pixel_aspect != 1:
+        lines.append(("pixels", f"{footage.pixel_aspect} times as wide as high"))
+    if footage.rotation:
+        lines.append(("rotation", f"turned by {footage.rotation} degrees to be upright"))
+    if footage.times[0]:
+        lines.append(("begins", f"at {float(footage.times[0]):.3f} s"))
+    for stream in footage.streams:
+        language = stream.language if stream.language != "und" else ""  # undetermined
+        words = [stream.text, language, stream.title]
+        lines.append(("stream", f"{stream.kind}: {', '.join(filter(None, words))}"))
+    if footage.chapters:
+        lines.append(("chapters", str(footage.chapters)))
+    return lines + [("note", note) for note in footage.notes]
+
+
+def _rate(footage: Footage) -> str:
+    """The rate, and how steady it is."""
+    text = f"{float(footage.rate):g} pictures a second"
+    if not footage.is_variable:
+        return text
+    least, most = footage.steps
+    return f"{text}, variable: {1000 * least:.1f} to {1000 * most:.1f} ms apart"

@@ -1,0 +1,143 @@
+"""`wgmb job`: a run that other processes, on other machines, do in parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ...errors import InputError
+from ...io.atomic import write_file
+from ...io.frame_numbers import frame_list
+from ...run.job import settle
+from ...run.job_file import is_job, stored, time_there
+from ...run.request import Asked
+from ...sequence.frame_file import is_video
+from ...settings.color import ColorSettings
+from ...settings.video import VideoSettings
+from .. import submit
+from ..exit_codes import DONE
+from ..options import (
+    BlurOptions,
+    Colors,
+    Given,
+    InputOptions,
+    Look,
+    ShutterOptions,
+    Target,
+    Videos,
+    When,
+)
+from ..spelling import as_options
+from ..submit import is_ours
+from ..terminal import note
+
+
+def job(
+    pattern: str,
+    output: Target,
+    look: Look = BlurOptions(),
+    when: When = ShutterOptions(),
+    given: Given = InputOptions(),
+    color: Colors = ColorSettings(),
+    video: Videos = VideoSettings(),
+    *,
+    file: Annotated[Path, Parameter(name="--job", alias="-j")],
+    chunk: int = 16,
+    openjd: Path | None = None,
+    slurm: Path | None = None,
+    fps_in: Annotated[str | None, Parameter(show=False)] = None,
+    confidence: bool = False,
+    config: Path | None = None,
+    adapter: str | None = None,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+) -> int:
+    """Write a job file, from which any machine can blur any part of a sequence.
+
+    Example: wgmb job 'shot.####.exr' -o 'blurred.####.exr' --method gather -j shot.json
+
+    Example: wgmb job 'shot.####.exr' -o 'blurred.####.exr' -j shot.json --openjd shot.yaml
+
+    The machines then run: wgmb blur --job shot.json --frames 17-32
+
+    Parameters
+    ----------
+    pattern
+        Frames to blur, as for `wgmb blur`.
+    file
+        The job file to write, .json; an older job file is replaced.
+    chunk
+        Number of frames in a part.
+    openjd
+        Also write an OpenJD template, .yaml, into the folder of the job file or one above it.
+    slurm
+        Also write a script for sbatch, .sh.
+    confidence
+        Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
+    config
+        TOML file with options in its table [blur], as saved by `wgmb view`.
+    adapter
+        GPU for the choice of --flow auto, if the frames hold no motion.
+    quiet
+        Print errors only.
+    """
+    if is_video(pattern):
+        raise InputError(f"{pattern}: a video is read by one process; `wgmb blur` blurs it")
+    if fps_in is not None:
+        raise InputError(
+            "job files do not support `fps_in`; use `wgmb blur` for frames of another rate"
+        )
+    if chunk < 1:
+        raise InputError(f"--chunk must be 1 frame or more, got {chunk}")
+    _check_target("--job", file, (".json",), is_job)
+    _check_target("--openjd", openjd, (".yaml", ".yml"), is_ours)
+    _check_target("--slurm", slurm, (".sh",), is_ours)
+    asked = Asked(
+        pattern=pattern,
+        output=output,
+        look=look,
+        when=when,
+        given=given,
+        color=color,
+        video=video,
+        confidence=confidence,
+    )
+    made = settle(asked, adapter)
+    if made.asked.averages:
+        raise InputError("job files do not support `flow` none; use `wgmb blur` for averages")
+    kept = stored(made, chunk)
+    texts = {file: ""}
+    if openjd is not None:
+        texts[openjd] = submit.openjd(openjd, file, made.numbers, chunk)
+    if slurm is not None:
+        texts[slurm] = submit.slurm(slurm, file, made.numbers, chunk)
+    made.make_output()
+    if output.overwrite and not output.resume:
+        since = time_there(Path(output.output).parent)
+        kept = replace(kept, job=replace(kept.job, since=since))
+    texts[file] = kept.text()
+    for path, text in texts.items():
+        write_file(path, text.encode())
+    for text in () if quiet else made.remarks:
+        note(as_options(text))
+    if not quiet:
+        if made.clip.is_finding_notable:
+            note(f"vectors: {made.clip.finding}")
+        frames = f"{len(made.numbers)} frames {frame_list(made.numbers)}"
+        note(f"{file}: {frames} with {made.asked.look.method}, not blurred yet")
+    return DONE
+
+
+def _check_target(
+    option: str, path: Path | None, suffixes: tuple[str, ...], is_own: Callable[[Path], bool]
+) -> None:
+    """InputError unless a file that is written beside the frames may be written here."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{option} {path}: the name must end in {suffixes[0]}")
+    if path.exists() and not (path.is_file() and is_own(path)):
+        raise InputError(f"{path} exists and was not written by wgmb job; choose another name")

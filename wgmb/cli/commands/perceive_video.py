@@ -1,0 +1,72 @@
+"""`wgmb perceive` of a video: its pictures are held for their own times."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from ... import gpu
+from ..._version import __version__
+from ...cone import Cone
+from ...errors import InputError
+from ...observer import Observer
+from ...run.perceive import Watched, densest_rate
+from ...run.video import Sink
+from ...run.video_output import write
+from ...settings import BlurSettings, InputSettings, OutputSettings
+from ...settings.video import VideoSettings
+from ...threads import Behind
+from ...video.linear_frames import VideoPictures
+from ...video.output_times import Moment, moments
+from ...video.read.reader import Footage
+from ..exit_codes import DONE, SOME_FAILED
+from ..terminal import note, progress
+from .blur_video import check_fits
+
+
+def perceive_video(
+    path: str,
+    output: OutputSettings,
+    given: InputSettings,
+    cone: Cone,
+    settings: dict[str, Any],
+    adapter: str | None,
+    quiet: bool,
+) -> int:
+    """Write what is seen of each picture, at its time; returns the exit code."""
+    check_fits(given, BlurSettings())
+    if output.fps is not None:
+        raise InputError("`fps` is for frames, the pictures of a video have their own times")
+    footage = Footage(path, max_mb=given.max_mb)
+    clock = VideoSettings().clock(footage, given.frames)
+    wanted = moments(footage, clock, None)
+    device = gpu.open_device(adapter)
+    observer = Observer(densest_rate(footage, cone), cone, device=device)
+    seen = Watched(footage, clock, VideoPictures(footage, device), observer)
+    first = next(n for n, t in enumerate(footage.times) if clock.out(t) == wanted[0].time)
+    if not quiet:
+        for text in footage.notes:
+            note(f"{path}: {text}")
+    started = time.perf_counter()
+    with progress(len(wanted), quiet, "perceiving") as tell:
+
+        def make_part(moments: Sequence[Moment], sink: Sink) -> None:
+            shown = seen.shown(first, first + len(moments) - 1)
+            with Behind(sink.put) as put:
+                for number, color, held in shown:
+                    observer.present(color, held)
+                    put(sink.take(moments[number - first], seen))
+                    tell(number, "done")
+
+        made_of = {"wgmb": __version__} | settings
+        left_out = write(seen, output, VideoSettings(), wanted, made_of, make_part)
+    if not quiet:
+        for text in left_out:
+            note(f"{output.output}: {text}")
+        seconds = time.perf_counter() - started
+        note(f"{len(wanted)} frames in {seconds:.1f} s -> {output.output}")
+    if loss := footage.loss():
+        note(f"wgmb: {loss}")
+        return SOME_FAILED
+    return DONE

@@ -1,0 +1,110 @@
+"""`wgmb render`: built-in scenes."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..._version import __version__
+from ...errors import InputError
+from ...render import Render
+from ...run.job import check_confidence
+from ...run.scene import render_frames
+from ...settings import SceneSettings, plain, size_of
+from ...settings.color import DisplaySettings, color_record
+from ..exit_codes import DONE
+from ..options import (
+    BlurOptions,
+    Look,
+    Moments,
+    SceneName,
+    Shown,
+    ShutterOptions,
+    Target,
+    When,
+)
+from ..terminal import note, progress
+
+
+def render(
+    scene: SceneName,
+    output: Target,
+    what: Moments = SceneSettings(),
+    look: Look = BlurOptions(),
+    when: When = ShutterOptions(),
+    color: Shown = DisplaySettings(),
+    *,
+    sharp: bool = False,
+    passes: bool = False,
+    confidence: bool = False,
+    config: Path | None = None,
+    adapter: str | None = None,
+    verbose: Annotated[bool, Parameter(alias="-v")] = False,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+) -> int:
+    """Render a built-in scene with motion blur.
+
+    Example: wgmb render crossing -o crossing.png --method distributed --samples 256
+
+    Parameters
+    ----------
+    sharp
+        Render without blur.
+    passes
+        EXR: add layers for depth, motion, normal, object index and light, as input for `wgmb blur`.
+    confidence
+        Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
+    config
+        TOML file with options in its table [render], as saved by `wgmb view`.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    verbose
+        Print the GPU and settings in use.
+    quiet
+        Print errors only.
+    """
+    fps = float(output.rate)
+    picture = what.make(scene)
+    look, when = look.resolved(picture), when.resolved(picture, fps)
+    if look.holdout or look.scale:
+        raise InputError("--holdout and --scale need input files; use them with wgmb blur")
+    if passes and not output.is_exr:
+        raise InputError(f"--passes needs an .exr output, got {output.output}")
+    if passes and output.layers == "picture":
+        raise InputError("--passes cannot be combined with --layers picture")
+    moments = what.moments(fps)
+    if confidence and sharp:
+        raise InputError("--confidence cannot be combined with --sharp")
+    made = look.make(when.make(), adapter)
+    renderer = Render(picture, made, size=size_of(what.size), fps=fps, antialias=what.antialias)
+    settings = {"scene": scene, "sharp": sharp, "passes": passes} | output.looks
+    settings |= plain(look) | plain(when) | plain(what) | {"wgmb": __version__, "fps": fps}
+    settings["samples"], settings["curve"] = look.settled_samples(), when.curve_read()
+    if confidence:
+        check_confidence(made.method.name, output)
+        settings["confidence"] = True
+    shown = color.open(needed=not output.is_exr)
+    settings |= color_record(shown, output.output)
+    files = output.make(settings, list(moments), display=shown)
+    if color.remark and not (quiet or output.is_exr):
+        note(color.remark)
+    if verbose:
+        note(f"adapter: {renderer.blur.device.adapter.summary}")
+        note(f"settings: {files.settings}")
+    started = time.perf_counter()
+    with progress(len(moments), quiet, "rendering") as tick:
+        try:
+            skipped = render_frames(
+                renderer, moments, files, sharp, passes, confidence, output.resume, tick
+            )
+        except BaseException:
+            files.abandon()
+            raise
+    if not quiet:
+        seconds, made = time.perf_counter() - started, len(moments) - skipped
+        done = f"{made} frames in {seconds:.1f} s -> {files.pattern}"
+        note(done + (f", {skipped} already done" if skipped else ""))
+    return DONE

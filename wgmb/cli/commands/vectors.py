@@ -1,0 +1,92 @@
+"""`wgmb vectors`: the motion of rendered frames in the form of another program."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..._version import __version__
+from ...errors import InputError
+from ...output.vectors import PROGRAMS, VectorOutput
+from ...pipeline.blur import Blur
+from ...run.report import Outcome
+from ...run.sequence import vectors_sequence
+from ...settings import plain
+from ..conclusion import conclude
+from ..options import Given, InputOptions
+from ..terminal import note, progress
+
+
+def vectors(
+    pattern: str,
+    /,
+    given: Given = InputOptions(),
+    *,
+    output: Annotated[str, Parameter(alias="-o")],
+    program: Annotated[
+        str, Parameter(name="--as", help=f"Form of the vectors: {', '.join(PROGRAMS)}.")
+    ],
+    max_displace: float | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    adapter: str | None = None,
+    verbose: Annotated[bool, Parameter(alias="-v")] = False,
+    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+) -> int:
+    """Write the motion of frames in the form of another program.
+
+    Example: wgmb vectors 'shot.####.exr' -o 'mv.####.exr' --as rsmb
+
+    Parameters
+    ----------
+    pattern
+        Frames with vectors in any convention, or with depth and a --camera.
+    output
+        Pattern or file: .exr (32-bit floats); rsmb also .png or .tif of 16 bits.
+    max_displace
+        rsmb: motion in pixels that 0 and 1 encode; default: 2048.
+    overwrite
+        Replace existing files.
+    resume
+        Keep finished frames; write frames with changed settings or inputs again.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    verbose
+        Print the vectors' convention and the settings in use.
+    quiet
+        Print errors only.
+    """
+    clip = given.open(pattern)
+    settings = {"wgmb": __version__, "as": program, "max_displace": max_displace} | plain(given)
+    for not_a_look in ("frames", "skip_missing", "max_mb"):
+        del settings[not_a_look]
+    has = clip.has
+    if has and "motion" not in has:
+        raise InputError(f"{pattern}: no motion to write (neither vectors nor a camera)")
+    blur = Blur("tap", device=adapter)
+    files = VectorOutput(
+        output,
+        program,
+        numbers=clip.numbers,
+        max_displace=max_displace,
+        mask_of=clip.vector_mask,
+        settings=settings,
+        inputs=clip.inputs,
+        overwrite=overwrite,
+        resume=resume,
+        views=clip.chosen,
+    )
+    if verbose:
+        note(f"settings: {files.settings}")
+    started = time.perf_counter()
+    with progress(len(clip.numbers), quiet, "writing vectors") as tick:
+        report = vectors_sequence(clip, files, blur=blur, resume=resume, progress=tick)
+    if not quiet:
+        for number, count in sorted(files.clipped.items()):
+            note(f"frame {number}: clipped {count} pixels that move over --max-displace")
+        if len(clip.chosen) > 1 and not files.takes_views:
+            note(f"wrote only view {clip.chosen[0]}; %V in the output's name makes a file for each")
+    took = f"{time.perf_counter() - started:.1f} s"
+    return conclude(Outcome.of(clip, report), files.pattern, took, quiet, verbose)

@@ -1,0 +1,86 @@
+"""`wgmb view`: the interactive viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ... import gpu
+from ...errors import DeviceError
+from ...extras import needed_by
+from ...settings import size_of
+from ...settings.color import ColorSettings
+from ...settings.video import VideoSettings
+from ..exit_codes import DONE
+from ..options import (
+    BlurOptions,
+    Colors,
+    Given,
+    InputOptions,
+    Look,
+    ShutterOptions,
+    Videos,
+    When,
+)
+from ..terminal import note
+
+
+def view(
+    what: str | None = None,
+    given: Given = InputOptions(),
+    look: Look = BlurOptions(),
+    when: When = ShutterOptions(),
+    color: Colors = ColorSettings(),
+    video: Videos = VideoSettings(),
+    *,
+    config: Path | None = None,
+    fps: str | None = None,
+    window: str = "1280x720",
+    adapter: str | None = None,
+) -> int:
+    """View a scene, frames or a video interactively.
+
+    Example: wgmb view wheel
+
+    Example: wgmb view 'shot.####.exr' --method reproject
+
+    Example: wgmb view clip.mp4 --flow dis --fps 60
+
+    Example: wgmb view game.mp4 --speed 0.5 --holdout static
+
+    Parameters
+    ----------
+    what
+        Scene, file, pattern or video; by default the one in --config, else the scene crossing.
+    config
+        TOML file saved by the viewer: start with its settings.
+    fps
+        Frames per second; of videos those of the output, whose interval the shutter is in, or
+        source: a frame for each picture of the video, at its time.
+    window
+        Window size, WIDTHxHEIGHT.
+    adapter
+        GPU to use: a number or part of a name from `wgmb devices`.
+    """
+    try:
+        with needed_by("view", "view"):
+            from ... import viewer
+    except ImportError as error:  # of a system library
+        raise DeviceError(
+            f"the viewer cannot be loaded: {error}; on Debian, Ubuntu: "
+            "apt-get install libx11-6 libxext6"
+        ) from None
+    state = viewer.State(playing=True)  # what moves is the point
+    if config is not None:
+        state = viewer.State.read(config)
+    if what is not None:
+        state = state.opened(what, given.max_mb)
+    state = state.told(vars(given) | vars(look) | vars(when) | vars(color) | vars(video))
+    if state.is_video and config is None and look.method is None:
+        settled, _ = video.settled(gpu.open_device(adapter))
+        state = state.with_method(settled.method)
+    if fps is not None:
+        state = viewer.at_rate(state, fps)
+    if color.remark:
+        note(color.remark)
+    viewer.view(state, adapter=adapter, size=size_of(window))
+    return DONE

@@ -1,0 +1,1 @@
+"""Colours: spaces, transfer, primaries, and what a display shows."""

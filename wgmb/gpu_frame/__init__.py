@@ -1,0 +1,1 @@
+"""A frame on the GPU: its textures, constants and motion, and what surrounds a method."""

@@ -1,0 +1,95 @@
+"""Work around a method: motion is completed, and holdouts are taken out and put back."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import wgpu
+
+from .. import gpu
+from ..gpu.textures import TexturePool
+from .holdout import HoldoutPass
+from .velocity import VelocityPass
+from .views import FrameViews, View
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PreparedFrame(FrameViews):
+    """A frame as methods read it: `motion` is complete, `color` is multiplied by `weight`."""
+
+    offset: int
+    """-1, 0, 1: how far it is from the frame that is blurred [frame intervals]."""
+    weight: View | None
+    """Weight per pixel, 0..1; None: equal weights. Either all frames have one, or none."""
+    by_camera: bool
+    """The motion is the camera's alone: there are no vectors."""
+
+
+class Preparation:
+    """Records the passes before and after a method.
+
+    `none`: bound where there is no texture; `limited`: motion is clamped to the longest blur.
+    """
+
+    def __init__(self, images: TexturePool, velocity: VelocityPass, none: View, limited: bool):
+        self._images, self._velocity, self._limited = images, velocity, limited
+        self._holdout = HoldoutPass(images.device, images, none)
+
+    def encode_motion(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        bindings: gpu.FrameBindings,
+        frame: FrameViews,
+        output: View,
+    ) -> None:
+        """Record to_prev and to_next [px] into `output`."""
+        self._velocity.encode(encoder, bindings, frame, self._limited, output)
+
+    def frames(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        bindings: gpu.FrameBindings,
+        around: Sequence[tuple[int, FrameViews]],
+    ) -> tuple[PreparedFrame, ...]:
+        """Record what frames are to methods: `around` are the frame that is blurred and its
+        neighbours, each after its offset. If one of them is masked, all have weights."""
+        masked = any(frame.holdout is not None or frame.check for _, frame in around)
+        return tuple(
+            self._frame(encoder, bindings, frame, offset, masked) for offset, frame in around
+        )
+
+    def _frame(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        bindings: gpu.FrameBindings,
+        frame: FrameViews,
+        offset: int,
+        masked: bool,
+    ) -> PreparedFrame:
+        motion = frame.motion
+        if not frame.has_plain_motion or self._limited or frame.check:
+            motion = self._images.view(f"motion {offset}", bindings.size, "rgba32float")
+            self.encode_motion(encoder, bindings, frame, motion)
+        color, weight = frame.color, None
+        if masked:
+            color, weight = self._holdout.before(
+                encoder, bindings, color, frame.holdout, f" {offset}"
+            )
+        by_camera = frame.camera is not None and not frame.has_vectors
+        changed = {"color": color, "motion": motion, "offset": offset, "weight": weight}
+        return PreparedFrame(**vars(frame) | changed, by_camera=by_camera)
+
+    def put_back(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        bindings: gpu.FrameBindings,
+        frame: FrameViews,
+        blurred: View,
+        output: View,
+        texel: str,
+    ) -> None:
+        """Record `output`, of format `texel`: the blurred frame with what was held out."""
+        self._holdout.after(encoder, bindings, frame.color, frame.holdout, blurred, output, texel)

@@ -1,0 +1,293 @@
+"""Output files: images or a video, each complete under its name or absent."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..color.spaces import Display
+from ..color.srgb import ToDisplay, to_display
+from ..errors import InputError, check_choice
+from ..extras import needed_by
+from ..io import (
+    atomic,
+    exr,
+    record,
+    stills,
+)
+from ..io.frame_numbers import (
+    frame_path,
+    has_view,
+    in_view,
+    is_pattern,
+)
+from ..io.suffixes import STILLS, VIDEOS
+from ..sequence.frame_file import FrameFile, about
+from ..sequence.input_color import space_of
+from .exr_layers import with_results
+from .names import prepare, refuse_inputs, that_exist
+from .result import Result
+
+if TYPE_CHECKING:
+    from ..video.write.frames import Video
+
+
+WINDOWS = ("grow", "keep")
+
+
+class Output:
+    """Output files: an image sequence, a single image, or a video.
+
+    `pattern`: a name, with `####` for several frames. `numbers`: of the frames. `bits`: 8 or 16 per
+    sample of PNG and TIFF. `fps`: rate of a video. `settings`: written into the record of every
+    file (see record.py), and compared when a run is resumed. `inputs`: the files that are read; an
+    output that is one of them is always refused. `overwrite` replaces any file, `resume` only
+    unfinished ones of wgmb. `layers`: "all" layers of an EXR input are copied to the EXR output, or
+    only those of the "picture". `compression` of EXR: a name in exr.COMPRESSIONS, or "same" as the
+    input's. `views`: names of the views for which %V in the pattern stands; each has its own file
+    or video. `display`: the display for PNG, JPEG, TIFF and videos; sRGB by default. `window`: the
+    data window of an EXR may "grow" with the streaks, or "keep" its size; stills and videos hold
+    the display window. `since`: older files [ns since 1970] count as unfinished. InputError for a
+    name or a setting that does not fit, and for existing files.
+    """
+
+    def __init__(
+        self,
+        pattern: str | Path,
+        *,
+        settings: dict[str, Any] | None = None,
+        numbers: list[int],
+        bits: int = 8,
+        fps: Fraction = Fraction(24),
+        inputs: Iterable[Path] = (),
+        overwrite: bool = False,
+        resume: bool = False,
+        layers: str = "all",
+        compression: str = "zip",
+        views: Sequence[str] = (),
+        display: Display | None = None,
+        window: str = "grow",
+        since: int | None = None,
+    ):
+        _check_exr_options(pattern, layers, compression)
+        if has_view(pattern) and not views:
+            raise InputError(f"output {pattern}: %V stands for a view, but the frames have none")
+        check_choice("window", window, WINDOWS)
+        self._layers, self._compression, self._display = layers, compression, display
+        self._grows = window == "grow"
+        self.pattern, self.bits, self.numbers = Path(pattern), bits, numbers
+        self.settings = json.dumps(settings or {}, sort_keys=True)
+        suffix = self.pattern.suffix.lower()
+        self._views = tuple(views) if has_view(pattern) else (None,)
+        self._videos: dict[str | None, Video] = {}
+        self._overwrite, self._resume, self._since = overwrite, resume, since
+        self._abandoned = False
+        self._under_way: Path | None = None
+        if suffix not in (".exr", *STILLS, *VIDEOS):
+            known = ", ".join((".exr", *STILLS, *VIDEOS))
+            raise InputError(f"output {pattern}: the name must end in one of {known}")
+        if bits not in (8, 16) or (bits == 16 and suffix in (".jpg", ".jpeg")):
+            raise InputError(f"bits must be 8 or 16 (JPEG: 8), got {bits}")
+        is_video = suffix in VIDEOS
+        if is_video:
+            with needed_by(f"output {pattern}", "video"):
+                from ..video.write import frames
+        elif suffix in STILLS:
+            stills.require(suffix)
+        if is_video and resume:
+            raise InputError(
+                "`resume` is not available for videos of rendered frames, only for frame files"
+            )
+        if not is_video and len(numbers) > 1 and not is_pattern(pattern):
+            raise InputError(
+                f"output {pattern}: {len(numbers)} frames need a pattern such as out.####.exr"
+            )
+        is_output = self._check_names(list(inputs), is_video)
+        for path in is_output:
+            atomic.sweep(path, is_output[path])
+        if is_video:
+            for view in self._views:
+                path = in_view(self.pattern, view)
+                temporary = atomic.temporary_name(path)
+                names = display.names if display else frames.SRGB_DISPLAY
+                self._videos[view] = frames.Video(path, temporary, fps, self.settings, names)
+
+    def _check_names(self, inputs: list[Path], is_video: bool) -> dict[Path, list[str]]:
+        """Make the folders; return the names of the outputs in each.
+
+        InputError where an output is an input, or exists and is not to be replaced.
+        """
+        names: dict[Path, list[str]] = {}
+        for pattern in (in_view(self.pattern, view) for view in self._views):
+            paths = [pattern] if is_video else [frame_path(pattern, n) for n in self.numbers]
+            names.setdefault(pattern.parent, []).extend(path.name for path in paths)
+        there: list[Path] = []
+        for folder in names:
+            existing = that_exist(folder, names[folder])
+            refuse_inputs(folder, names[folder], existing, inputs)
+            there += existing
+        for folder in names:
+            prepare(folder)
+        if folders := [p for p in there if not p.is_file()]:
+            raise InputError(f"output {folders[0]} exists and is not a file")
+        if there and not (self._overwrite or self._resume):
+            exists, it = "exists", "it"
+            if len(there) > 1:
+                exists, it = f"and {len(there) - 1} more exist", "them"
+            raise InputError(
+                f"{there[0]} {exists}; `overwrite=True` replaces {it}"
+                + ("" if is_video else ", `resume=True` keeps finished frames")
+            )
+        return names
+
+    @property
+    def is_video(self) -> bool:
+        """True if all frames go into one file."""
+        return bool(self._videos)
+
+    @property
+    def takes_views(self) -> bool:
+        """True if the output holds more than one view of a frame."""
+        return self.pattern.suffix.lower() == ".exr" or has_view(self.pattern)
+
+    def why_hopeless(self, error: BaseException) -> str:
+        """The reason, if an error in writing one frame will also affect the next ones; else ""."""
+        if not isinstance(error, OSError):
+            return ""
+        if self._videos:
+            return str(error)
+        what = os.strerror(error.errno) if error.errno else type(error).__name__
+        return f"{self.pattern.parent}: {what}"
+
+    def path(self, number: int, view: str | None = None) -> Path:
+        """The file of frame `number`, and of its `view` if %V is in the pattern."""
+        pattern = in_view(self.pattern, view)
+        return pattern if self._videos else frame_path(pattern, number)
+
+    def done(self, number: int, made_of: dict[str, Any] | None = None) -> bool:
+        """Return True if frame `number` exists and is complete, with the same settings and inputs.
+
+        `made_of`: the frame's inputs (see Clip.made_of). The whole file is read and its checksum
+        compared. Raises InputError if another program wrote it.
+        """
+        return all(self._is_done(self.path(number, view), made_of) for view in self._views)
+
+    def _is_done(self, path: Path, made_of: dict[str, Any] | None) -> bool:
+        try:
+            if self._since is not None and path.stat().st_mtime_ns < self._since:
+                return False
+            data = path.read_bytes()
+        except FileNotFoundError:
+            return False
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror}") from None
+        content = record.read(data)
+        if content is None and not (record.is_ours(data) or self._overwrite):
+            raise InputError(
+                f"{path} exists and was not written by wgmb; `overwrite=True` replaces it"
+            )
+        return content is not None and content == self._expected(made_of)
+
+    def _expected(self, made_of: dict[str, Any] | None) -> dict[str, Any]:
+        return json.loads(self.settings) | json.loads(json.dumps(made_of or {}))
+
+    def write(
+        self,
+        result: np.ndarray,
+        source: FrameFile,
+        confidence: Mapping[str, np.ndarray] | None = None,
+        made_of: dict[str, Any] | None = None,
+    ) -> None:
+        """Write one frame, or one view of it; see `write_views`."""
+        self.write_views([Result(source, result, confidence or {})], made_of)
+
+    def write_views(self, results: Sequence[Result], made_of: dict[str, Any] | None = None) -> None:
+        """Write the views of one frame.
+
+        An EXR also gets all other layers and views of the input file. Other files hold the first
+        view; with %V in the name, each view gets a file. Confidence, from Blur.with_confidence,
+        becomes channels `confidence.NAME` of an EXR. `made_of`: the frame's inputs (see
+        Clip.made_of), for its record. In a resumed run, a frame that another process has finished
+        meanwhile is not replaced.
+        """
+        if self._abandoned:
+            return
+        told = {f"confidence.{name}": None for result in results for name in result.confidence}
+        if told and self.pattern.suffix.lower() != ".exr":
+            raise InputError(f"{self.pattern}: only an .exr can store {', '.join(told)}")
+        if self._views == (None,):
+            self._write(None, results, made_of)
+            return
+        by_name = {result.source.view: result for result in results}
+        if lacking := [view for view in self._views if view not in by_name]:
+            raise InputError(f"{results[0].source.path}: no picture of view {lacking[0]}")
+        for view in self._views:
+            self._write(view, [by_name[view]], made_of)
+
+    def _write(
+        self, view: str | None, results: Sequence[Result], made_of: dict[str, Any] | None
+    ) -> None:
+        """Write the file of `view`, or of all."""
+        first = results[0]
+        if self._videos:
+            self._videos[view].add(first.displayed, self._shown(first))
+            return
+        path = self.path(first.source.number, view)
+        text = record.blank(self._expected(made_of))
+        data = self._encoded(path, view, results, text)
+        if self._resume and self._is_done(path, made_of):
+            return
+        if not (self._resume or self._overwrite) and path.exists():
+            raise InputError(f"{path} was written by another process during this run")
+        self._under_way = atomic.temporary_name(path)
+        atomic.write_file(path, *record.seal(data, text), temporary=self._under_way)
+
+    def _encoded(self, path: Path, view: str | None, results: Sequence[Result], text: str) -> bytes:
+        """The file at `path`, with the record's text."""
+        if path.suffix.lower() == ".exr":
+            only_picture = self._layers == "picture"
+            content = with_results(results, view, text, only_picture, self._grows)
+            return exr.encode(content, self._compression)
+        shown = self._shown(results[0])
+        return stills.encode(results[0].displayed, path.suffix, self.bits, text, shown)
+
+    def _shown(self, result: Result) -> ToDisplay:
+        """Conversion of the picture to display values."""
+        if self._display is None:
+            return to_display
+        with about(result.source.name):
+            return self._display.of(space_of(result.source, self._display.config))
+
+    def close(self) -> None:
+        """Finish a video; OSError if that fails. Files of single frames are finished already."""
+        for one in self._videos.values():
+            try:
+                if not self._overwrite and one.path.exists():
+                    raise OSError("was written by another process during this run")
+                one.close()
+            except OSError as error:
+                self.abandon()
+                raise atomic.about(one.path, error) from None
+
+    def abandon(self) -> None:
+        """Remove unfinished files, after an interruption or an error."""
+        self._abandoned = True
+        for one in self._videos.values():
+            one.abandon()
+        if self._under_way is not None:
+            self._under_way.unlink(missing_ok=True)
+
+
+def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> None:
+    check_choice("layers", layers, ("all", "picture"))
+    exr.check_compression(compression)
+    if compression != "zip" and Path(pattern).suffix.lower() != ".exr":
+        raise InputError(f"compression {compression} needs an .exr output, got {pattern}")

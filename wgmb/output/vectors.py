@@ -1,0 +1,152 @@
+"""Motion vectors as other programs read them: the inverse of vectors.py."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, check_choice
+from ..io import exr, record, stills
+from ..io.frame_numbers import has_view
+from ..sequence.data_windows import laid
+from ..sequence.frame_file import FrameFile
+from .output import Output
+from .result import Result
+
+PROGRAMS = ("nuke", "rsmb", "blender", "plain")
+"""Whose vectors can be written; CONVENTIONS in vectors.py has what the numbers mean."""
+MAX_DISPLACE = 2048.0
+"""The motion [px] that rsmb's 0 and 1 stand for, unless another is given."""
+_DEEP = (".png", ".tif", ".tiff")  # hold 16 bits
+_OF_THE_PICTURE = ("multiView", "view", "chromaticities", record.KEY)
+
+
+def written(
+    motion: np.ndarray, program: str, max_displace: float = MAX_DISPLACE
+) -> dict[str, np.ndarray]:
+    """The channels in which a program stores `motion`, (height, width, 4) to_prev, to_next [px].
+
+    Float32. Motion longer than `max_displace` on an axis is clipped in rsmb's.
+    """
+    px, py, nx, ny = np.moveaxis(motion.astype(np.float32, copy=False), 2, 0)
+    if program == "nuke":
+        return {"forward.u": nx, "forward.v": -ny, "backward.u": px, "backward.v": -py}
+    if program == "blender":
+        lead = "ViewLayer.Vector."
+        return {f"{lead}X": px, f"{lead}Y": -py, f"{lead}Z": -nx, f"{lead}W": ny}
+    if program == "rsmb":
+        half = np.float32(0.5 / max_displace)
+        red, green = (np.clip(0.5 + v * half, 0, 1) for v in (nx, -ny))
+        return {"R": red, "G": green, "B": np.zeros_like(red)}
+    return {"to_prev.x": px, "to_prev.y": py, "to_next.x": nx, "to_next.y": ny}
+
+
+class VectorOutput(Output):
+    """Files of motion vectors in a program's form; `written` makes the numbers.
+
+    `program`: one of PROGRAMS. EXR files are 32-bit floats and have the windows of the input;
+    rsmb's may be PNG or TIFF of 16 bits too, which cover the display window. Alpha of rsmb's is 1
+    where the vectors are valid. `max_displace`: of rsmb's [px]. `mask_of`: the channel of a frame
+    that is 1 where its vectors are valid (Clip.vector_mask). `clipped` has the number of pixels
+    that rsmb's form clipped, by frame. The others are as for Output.
+    """
+
+    def __init__(
+        self,
+        pattern: str | Path,
+        program: str,
+        *,
+        numbers: list[int],
+        max_displace: float | None = None,
+        mask_of: Callable[[FrameFile], str | None] = lambda source: None,
+        settings: dict[str, Any] | None = None,
+        inputs: Iterable[Path] = (),
+        overwrite: bool = False,
+        resume: bool = False,
+        views: Sequence[str] = (),
+    ):
+        _check(str(pattern), program, max_displace)
+        super().__init__(
+            pattern,
+            settings=settings,
+            numbers=numbers,
+            bits=16 if str(pattern).lower().endswith(_DEEP) else 8,
+            inputs=inputs,
+            overwrite=overwrite,
+            resume=resume,
+            views=views,
+        )
+        self._program, self._mask_of = program, mask_of
+        self._max_displace = MAX_DISPLACE if max_displace is None else max_displace
+        self.clipped: dict[int, int] = {}
+
+    @property
+    def takes_views(self) -> bool:
+        """True if there is a file for each view."""
+        return has_view(self.pattern)
+
+    def _encoded(self, path: Path, view: str | None, results: Sequence[Result], text: str) -> bytes:
+        (result,) = results
+        source, motion = result.source, result.picture
+        channels = written(motion, self._program, self._max_displace)
+        if self._program == "rsmb":
+            channels["A"] = self._valid(source, motion)
+            over = np.abs(motion[..., 2:]).max(axis=2) > self._max_displace
+            if count := int(over.sum()):
+                self.clipped[source.number] = self.clipped.get(source.number, 0) + count
+        if path.suffix.lower() == ".exr":
+            return exr.encode(_file(source, channels, {record.KEY: text}, view))
+        return stills.encode(_in_display(source, channels), path.suffix, 16, text, _as_data)
+
+    def _valid(self, source: FrameFile, motion: np.ndarray) -> np.ndarray:
+        """Float32, 1 where the vectors are valid, else 0."""
+        valid = np.ones(motion.shape[:2], np.float32)
+        if mask := self._mask_of(source):
+            valid[(source.channels[mask] < 1) & ~motion.any(axis=2)] = 0
+        return valid
+
+
+def _check(pattern: str, program: str, max_displace: float | None) -> None:
+    check_choice("`program`", program, PROGRAMS)
+    ends = (".exr", *_DEEP) if program == "rsmb" else (".exr",)
+    if not pattern.lower().endswith(ends):
+        raise InputError(f"output {pattern}: {program} vectors need {' or '.join(ends)}")
+    if max_displace is not None and program != "rsmb":
+        raise InputError(f"`max_displace` is for rsmb vectors, {program} vectors are in pixels")
+    if max_displace is not None and not 0 < max_displace < 1e6:
+        raise InputError(
+            f"`max_displace` must be over 0 and under 1000000 px, got {max_displace:g}"
+        )
+
+
+def _file(
+    source: FrameFile, channels: dict[str, np.ndarray], attributes: dict[str, Any], view: str | None
+) -> exr.Exr:
+    """A file of one part with the windows, and the time and camera, of the source's picture."""
+    kept = {
+        name: value
+        for name, value in (source.part.attributes if source.part else {}).items()
+        if name not in _OF_THE_PICTURE and not name.startswith("cryptomatte/")
+    }
+    kept |= attributes | ({"view": view} if view is not None else {})
+    part = exr.Part("", channels, kept, source.data_window, source.display_window)
+    return exr.Exr(source.path, [part])
+
+
+def _in_display(source: FrameFile, channels: dict[str, np.ndarray]) -> np.ndarray:
+    """RGBA in the display window; what lies around the data does not move, and is not valid."""
+    planes = [
+        laid(channels[c], source.data_window, source.display_window, empty=empty)
+        for c, empty in zip("RGBA", (0.5, 0.5, 0.0, 0.0), strict=True)
+    ]
+    return np.stack(planes, axis=2)
+
+
+def _as_data(rgba: np.ndarray, bits: int, over_black: bool = False) -> np.ndarray:
+    """Samples 0..1 as whole numbers, without any curve for display."""
+    return np.rint(rgba * (2**bits - 1)).astype(np.uint16)

@@ -1,0 +1,1 @@
+"""From a frame to a blurred picture: one method between preparation and sum."""

@@ -1,0 +1,75 @@
+"""The arguments of a Blur: defaults, limits and checks, without a device."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..errors import InputError, check_choice, did_you_mean
+from ..methods import METHODS
+from ..methods.options import options_of
+from ..shutter import Shutter
+
+MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
+SAMPLES = 16
+AUTO_SAMPLES = 64  # the most that "auto" takes a pixel
+OUTPUTS = ("rgba32float", "rgba16float")
+
+
+def checked(
+    method: str,
+    samples: int | str | None = None,
+    jitter: float = 0.0,
+    max_blur: float | None = None,
+    output: str = OUTPUTS[0],
+    options: Mapping[str, Any] | None = None,
+) -> tuple[int, bool]:
+    """The samples that a Blur of these arguments takes, and whether they are "auto".
+
+    InputError where one of them makes no sense; no device is opened.
+    """
+    if method not in METHODS:
+        known = f"available: {', '.join(METHODS)}{did_you_mean(method, METHODS)}"
+        raise InputError(f"unknown method {method!r}; {known}")
+    auto = samples == "auto" and getattr(METHODS[method], "adaptive", False)
+    if samples is None:
+        samples = getattr(METHODS[method], "samples", SAMPLES)
+    samples = AUTO_SAMPLES if samples == "auto" else samples
+    if not isinstance(samples, (int, np.integer)) or not 1 <= samples <= MOST_SAMPLES:
+        raise InputError(f"samples must be 1 to {MOST_SAMPLES} or auto, got {samples!r}")
+    if not 0 <= jitter <= 1:
+        raise InputError(f"jitter must be 0 to 1, got {jitter}")
+    if max_blur is not None and not max_blur >= 0:
+        raise InputError(f"`max_blur` must be 0 or more pixels, got {max_blur}")
+    check_choice("output", output, OUTPUTS)
+    known = options_of(METHODS[method].Options)
+    if unknown := (options or {}).keys() - known.keys():
+        raise InputError(
+            f"method {method!r} has no option {', '.join(sorted(unknown))}; "
+            f"it has {', '.join(known) or 'none'}"
+        )
+    return int(samples), auto
+
+
+def most_samples(method: str, device: wgpu.GPUDevice) -> int:
+    """The most samples that a pixel may take on the device."""
+    if device.adapter_info["adapter_type"] != gpu.SOFTWARE:
+        return MOST_SAMPLES
+    return getattr(METHODS[method], "most_in_software", MOST_SAMPLES)
+
+
+def shutter_of(shutter: Shutter | float) -> Shutter:
+    """The Shutter of these degrees; one that is a Shutter already stays as it is."""
+    if isinstance(shutter, Shutter):
+        return shutter
+    try:
+        degrees = float(shutter)
+    except (TypeError, ValueError):
+        raise InputError(f"shutter must be degrees or a Shutter, got {shutter!r}") from None
+    return Shutter(degrees)

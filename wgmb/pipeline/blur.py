@@ -1,0 +1,360 @@
+"""The pipeline: arrays -> textures -> velocity -> one method -> array."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Collection
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..camera import Window
+from ..errors import InputError
+from ..extent import Extent
+from ..frame import Frame
+from ..gpu.textures import TexturePool
+from ..gpu.timing import Clock
+from ..gpu_frame.bindings import AUTO_STRATA, FrameConstants
+from ..gpu_frame.preparation import Preparation
+from ..gpu_frame.residency import Residency
+from ..gpu_frame.velocity import VelocityPass
+from ..gpu_frame.views import (
+    FrameViews,
+    View,
+    check_output,
+    check_view,
+)
+from ..methods import METHODS
+from ..methods.contract import (
+    Inputs,
+    PreparedFrame,
+    extent_of,
+    frames_around,
+    reach_of,
+)
+from ..scene.gbuffer import SceneOnGpu
+from ..shutter import Shutter
+from .arguments import checked, most_samples, shutter_of
+
+
+class Blur:
+    """A compiled blur method. Call it with arrays, or `encode` it into your own command encoder.
+
+    `method`: a name in METHODS; its own options follow as keywords.
+    `shutter`: degrees (180 is open for half a frame interval), or a Shutter.
+    `samples`: samples per pixel, 1 to 4096 (gather without a GPU: 512); by default 16, or the
+    method's own default; "auto" uses one per pixel of blur length, at most 64 (methods with one
+    count for the whole image use 64).
+    `jitter`: 0 to 1, trades banding for noise: random shift of a sample within its share of time.
+    `max_blur`: maximum blur length [px]; None: unlimited.
+    `device`: your own wgpu device, the name of an adapter, or None for the best one.
+    `output`: texel format of the result, rgba32float or rgba16float.
+
+    Several threads may call one Blur: they take turns, as its textures are shared. Use one Blur per
+    thread to work in parallel. `encode` records and does not wait: callers that encode from
+    several threads must order the submissions themselves.
+    """
+
+    def __init__(
+        self,
+        method: str,
+        *,
+        shutter: Shutter | float = 180,
+        samples: int | str | None = None,
+        jitter: float = 0.0,
+        max_blur: float | None = None,
+        device: wgpu.GPUDevice | str | None = None,
+        output: str = "rgba32float",
+        **options: Any,
+    ):
+        samples, self.auto = checked(method, samples, jitter, max_blur, output, options)
+        self._options = METHODS[method].Options(**options)
+        gpu.claim()
+        self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
+        if samples > (most := most_samples(method, self.device)):
+            raise InputError(f"{method} takes 1 to {most} samples without a GPU, got {samples}")
+        self.method = METHODS[method](self.device, self._options, output=output)
+        self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
+        self._lock = threading.RLock()
+        strata = AUTO_STRATA if self.auto else samples
+        self._constants = FrameConstants(self.device, samples, strata, jitter, max_blur)
+        self._images = TexturePool(self.device)
+        wanted = self.method.needs | self.method.uses
+        self._residency = Residency(self._images, wanted, 2 * reach_of(self.method) + 1)
+        self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
+        self._unbound = self._images.view("unbound", (1, 1), gpu.texel(self.device, 4))
+        no_object = self._images.view("no object", (1, 1), "r32uint")
+        self._velocity = VelocityPass(self.device, self._unbound, no_object)
+        limited = max_blur is not None
+        self._prepared = Preparation(self._images, self._velocity, self._unbound, limited)
+        self.shutter = shutter
+
+    def __repr__(self) -> str:
+        shutter = self._shutter
+        curve = shutter.curve if isinstance(shutter.curve, str) else "own curve"
+        words = f"shutter {shutter.degrees:g}{'' if curve == 'box' else f' {curve}'}"
+        samples = "auto" if self.auto else self.samples
+        gpu_name = self.device.adapter_info["device"]
+        return f'Blur("{self.method.name}", {words}, {samples} samples, {gpu_name})'
+
+    @property
+    def confidence(self) -> tuple[str, ...]:
+        """Names of the `with_confidence` layers; InputError if the method has none."""
+        if names := getattr(self.method, "confidence", ()):
+            return names
+        able = ", ".join(n for n, m in METHODS.items() if hasattr(m, "confidence"))
+        raise InputError(f"method {self.method.name!r} cannot report confidence; use {able}")
+
+    @cached_property
+    def _judge(self):
+        """The same method, compiled to report its confidence."""
+        options = replace(self._options, show="confidence")
+        return METHODS[self.method.name](self.device, options, output=self.output)
+
+    @property
+    def extent(self) -> Extent:
+        """Distance over which it moves colours, for frames that hold a part of their picture; see
+        Clip.with_neighbours."""
+        return extent_of(self.method, self._shutter, self.max_blur)
+
+    @property
+    def shutter(self) -> Shutter:
+        """The current Shutter; can be set between frames, to degrees or a Shutter."""
+        return self._shutter
+
+    @shutter.setter
+    def shutter(self, shutter: Shutter | float) -> None:
+        self._shutter = shutter_of(shutter)
+        self._constants.expose(self._shutter)
+
+    def encode(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        frame: FrameViews,
+        output: View,
+        *,
+        prev: FrameViews | None = None,
+        next: FrameViews | None = None,
+        prev_prev: FrameViews | None = None,
+        next_next: FrameViews | None = None,
+        confidence: View | None = None,
+        number: int = 0,
+        timing: Clock | None = None,
+    ) -> None:
+        """Record the passes into `encoder`; nothing is submitted or waited for.
+
+        The views refer to your own textures on this Blur's device, with the usage TEXTURE_BINDING
+        and one sample per pixel; an InputError names the input that does not fit. Tried are
+        `color` as rgba8unorm, rgba8unorm-srgb, bgra8unorm-srgb, rgb10a2unorm, rg11b10ufloat,
+        rgba16float and rgba32float (with the feature float32-filterable); vectors as rg16float,
+        rg32float, rgba16float and rgba32float; `depth` as r16float, r32float and as the depth
+        buffers depth16unorm, depth24plus and depth32float (a view of the aspect "depth-only" where
+        there is a stencil); `object_id` as r8uint, r16uint, r32uint and rg32uint; masks also as
+        r8unorm. `output`: a texture of this Blur's output format with the usage STORAGE_BINDING.
+        `prev`, `next`: the previous and the next frame, for methods that use neighbours,
+        with the same inputs as the frame; `prev_prev`, `next_next`: those beyond them, for methods
+        that take two to either side. `confidence`: a texture like `output` for the channels
+        of `with_confidence`. `number`: frame number, which varies the jitter.
+
+        `timing` takes the time of every pass: `timing.clock(device)`, whose WallClock runs the
+        passes at once instead of recording them.
+        """
+        size = frame.size
+        around = {"": (0, frame)}
+        near = {"prev.": (-1, prev), "next.": (1, next)}
+        near |= {"prev.prev.": (-2, prev and prev_prev), "next.next.": (2, next and next_next)}
+        reach = reach_of(self.method)
+        around |= {w: (o, f) for w, (o, f) in near.items() if f is not None and abs(o) <= reach}
+        for name, view in (("output", output), ("confidence", confidence)):
+            if view is not None:
+                check_view(name, view, self.device, size)
+                check_output(name, view, self.output)
+        for whose, (_, one) in around.items():
+            one.check_fit(self.device, size, whose)
+            self._require(one.has, whose)
+        bindings = self.frame_bindings(size, number, frame.window)
+        encoder = timing.watch(encoder) if timing else encoder
+        frames = self._prepared.frames(encoder, bindings, list(around.values()))
+        inputs = self._inputs(bindings, number, frames=frames)
+        if inputs.frame.weight is None:
+            self._record(encoder, inputs, output, confidence)
+            return
+        result = self._images.view("blurred", size, self.output)
+        self._record(encoder, inputs, result, confidence)
+        self._prepared.put_back(encoder, bindings, frame, result, output, self.output)
+
+    def encode_scene(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        scene: SceneOnGpu,
+        output: View,
+        *,
+        progress: tuple[int, int] | None = None,
+        number: int = 0,
+        timing: Clock | None = None,
+    ) -> None:
+        """The same for the methods that need a scene instead of a frame.
+
+        Samples may be recorded in portions: `progress` is the number of samples done so far and
+        the number to add.
+        """
+        gpu.check_size(self.device, *scene.size)
+        check_view("output", output, self.device, scene.size)
+        check_output("output", output, self.output)
+        self._require({"scene"})
+        encoder = timing.watch(encoder) if timing else encoder
+        bindings = self.frame_bindings(scene.size, number)
+        self._record(
+            encoder, self._inputs(bindings, number, scene=scene, progress=progress), output
+        )
+
+    def _inputs(
+        self,
+        bindings: gpu.FrameBindings,
+        number: int,
+        *,
+        frames: tuple[PreparedFrame, ...] = (),
+        scene: SceneOnGpu | None = None,
+        progress: tuple[int, int] | None = None,
+    ) -> Inputs:
+        return Inputs(
+            bindings=bindings,
+            samples=self.samples,
+            number=number,
+            jitter=self.jitter,
+            shutter=self._shutter,
+            frames=frames,
+            unbound=self._unbound,
+            linear=self._linear,
+            even=self._shutter.curve == "box",
+            auto=self.auto,
+            scene=scene,
+            progress=progress or (0, self.samples),
+        )
+
+    def _record(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        inputs: Inputs,
+        output: View,
+        confidence: View | None = None,
+    ):
+        self.method.encode(encoder, inputs, output)
+        if confidence is not None and self.confidence:
+            self._judge.encode(encoder, inputs, confidence)
+
+    def __call__(
+        self, color: np.ndarray | Frame, to_next: np.ndarray | None = None, **passes: Any
+    ) -> np.ndarray:
+        """Blur one frame: a Frame, or a colour array and its passes (see Frame).
+
+        Returns float32 of color's shape. Raises InputError if inputs are missing or inconsistent.
+        Frames with read-only arrays (Frame.locked) are uploaded once, even if they are used
+        again as neighbours.
+        """
+        frame = color if isinstance(color, Frame) else Frame(color, to_next, **passes)
+        self._require(frame.has)
+        with self._working(frame.size):
+            output = self._images.texture("output", frame.size, self.output)
+            encoder = self.device.create_command_encoder(label="wgmb")
+            self.encode(encoder, output=output.create_view(), **self._views(frame))
+            picture = self._images.download(encoder, output)
+        return picture[..., : frame.color.shape[2]].astype("f4", copy=False)
+
+    def draw(self, frame: Frame, output: View) -> None:
+        """Submit the blur of a frame into `output`, a texture as for `encode`, without waiting."""
+        self._require(frame.has)
+        with self._working(frame.size):
+            encoder = self.device.create_command_encoder(label="wgmb")
+            self.encode(encoder, output=output, **self._views(frame))
+            gpu.submit(self.device, encoder)
+
+    def with_confidence(self, frame: Frame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Return the blurred frame and the confidence of every pixel, at twice the cost.
+
+        The confidence layers are (height, width) float32, by the names in `confidence`; their
+        meaning is documented with the method's `show`.
+        """
+        names = self.confidence
+        self._require(frame.has)
+        size, channels = frame.size, frame.color.shape[2]
+        with self._working(size):
+            output = self._images.texture("output", size, self.output)
+            sure = self._images.texture("confidence", size, self.output)
+            encoder = self.device.create_command_encoder(label="wgmb")
+            views = {"output": output.create_view(), "confidence": sure.create_view()}
+            self.encode(encoder, **views, **self._views(frame))
+            picture = self._images.download(encoder, output)[..., :channels]
+            told = self._images.download(self.device.create_command_encoder(), sure)
+        planes = np.moveaxis(told.astype("f4", copy=False), 2, 0)
+        return picture.astype("f4", copy=False), dict(zip(names, planes, strict=True))
+
+    def motion(self, frame: Frame) -> np.ndarray:
+        """The motion that the methods follow: (height, width, 4), to_prev and to_next [px]."""
+        if "motion" not in frame.has:
+            raise InputError("no motion: pass to_next, to_prev, or depth and a camera")
+        with self._working(frame.size):
+            encoder = self.device.create_command_encoder(label="wgmb motion")
+            motion = self._images.texture("motion", frame.size, "rgba32float")
+            views = self._residency.views_of({0: frame})[0]
+            self.encode_motion(encoder, views, motion.create_view(), frame.number)
+            return self._images.download(encoder, motion)
+
+    def encode_motion(
+        self, encoder: wgpu.GPUCommandEncoder, frame: FrameViews, output: View, number: int = 0
+    ) -> None:
+        """Record to_prev and to_next [px] into `output`, rgba32float."""
+        frame.check_fit(self.device, output.size[:2])
+        check_view("output", output, self.device, frame.size)
+        check_output("output", output, "rgba32float")
+        bindings = self.frame_bindings(frame.size, number, frame.window)
+        self._prepared.encode_motion(encoder, bindings, frame, output)
+
+    def upload(self, frame: Frame) -> dict[str, Any]:
+        """Upload a frame and its neighbours; returns the keywords of `encode`.
+
+        The textures are reused by the next frame.
+        """
+        with self._working(frame.size):
+            self._residency.forget()
+            inputs = self._views(frame)
+            self._residency.forget()
+        # These views may be encoded again, and all is to be done again.
+        return {
+            name: replace(value, key=None) if isinstance(value, FrameViews) else value
+            for name, value in inputs.items()
+        }
+
+    @contextmanager
+    def _working(self, size: tuple[int, int]):
+        """Admit one thread at a time; convert wgpu errors, after which all is uploaded again."""
+        with self._lock, gpu.reported(size):
+            try:
+                yield
+            except BaseException:
+                self._residency.forget()
+                raise
+
+    def _views(self, frame: Frame) -> dict[str, Any]:
+        """The frame and the neighbours that the method takes, as keywords of `encode`."""
+        names = {0: "frame", -1: "prev", 1: "next", -2: "prev_prev", 2: "next_next"}
+        views = self._residency.views_of(frames_around(frame, self.method))
+        return {"number": frame.number} | {names[offset]: one for offset, one in views.items()}
+
+    def _require(self, there: Collection[str], whose: str = "") -> None:
+        if missing := self.method.needs - set(there):
+            what = ", ".join(whose + name for name in sorted(missing))
+            raise InputError(f"method {self.method.name!r} needs {what}")
+
+    def frame_bindings(
+        self, size: tuple[int, int], number: int = 0, window: Window | None = None
+    ) -> gpu.FrameBindings:
+        """Return the bindings shared by all passes: frame, shutter, times of the samples."""
+        return self._constants.bindings(size, number, window)

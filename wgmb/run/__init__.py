@@ -1,0 +1,1 @@
+"""Runs: a request becomes a job, and a job becomes files."""

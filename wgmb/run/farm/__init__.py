@@ -1,0 +1,1 @@
+"""A job done by many processes, on this machine or others."""

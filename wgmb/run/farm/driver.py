@@ -1,0 +1,347 @@
+"""One run over a cluster: workers are given parts of the frames until all are done.
+
+A worker that dies costs what it was doing; a frame that kills its worker twice is named, and all
+others are done.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import socket
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ...errors import DeviceError, Error, InputError
+from ...io.frame_numbers import frame_list
+from ...sequence.findings import ranges
+from ..batch_report import Progress
+from ..job import Job
+from ..report import Outcome
+from ..sequence import ON_REQUEST
+from .workers import (
+    Part,
+    Place,
+    Worker,
+    size_of_part,
+)
+
+_LOOK = 0.5  # seconds after which the driver looks who is there
+_TWICE = "its worker died twice"
+_GONE = "the scheduler is gone; start it and its workers again, and go on with `resume=True`"
+
+
+class Driver:
+    """One run on a cluster."""
+
+    def __init__(self, farm: Place, client: Any, job: Job, text: str, progress: Progress):
+        from .plugin import Blurring, plugin_name
+
+        self._farm, self._client, self._job, self._progress = farm, client, job, progress
+        self._id = uuid.uuid4().hex[:8]
+        self._topic = plugin_name(self._id)
+        embedded = farm.cluster is None
+        adapters = farm.adapters() if embedded else [farm.adapter] if farm.adapter else []
+        make = farm.plugin or Blurring
+        self._plugin = make(self._id, text, adapters, embedded)
+        self._events: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
+        self._workers: dict[str, Worker] = {}
+        self._named: set[tuple[str, str]] = set()
+        self._refusals: list[tuple[bool, str]] = []
+        self._parts: deque[Part] = deque()
+        self._divided = False
+        self._order = np.sort(np.asarray(job.numbers, np.int64))
+        self._ticked = np.zeros(len(job.numbers), bool)
+        self._looked, self._idle_since = 0.0, time.monotonic()
+        self._deaths, self._tasks = 0, 0
+        self.outcome = Outcome.begun(job.clip)
+
+    def run(self) -> Outcome:
+        """Do all parts."""
+        client = self._client
+        try:
+            client.subscribe_topic(self._topic, lambda event: self._events.put(("told", event[1])))
+            with contextlib.suppress(Exception):  # each worker is asked how it went
+                client.register_plugin(self._plugin, name=self._topic)
+            self._go_on()
+        except (KeyboardInterrupt, SystemExit):
+            self._end()
+            raise
+        except _LostError:
+            self.outcome.report.stopped = _GONE
+            self.outcome.end()
+            return self.outcome
+        self._tidy()
+        self.outcome.end()
+        return self.outcome
+
+    def _go_on(self) -> None:
+        while True:
+            self._look()
+            self._give()
+            busy = any(worker.part for worker in self._workers.values())
+            if busy or self._is_anybody_ready():
+                self._idle_since = time.monotonic()
+            if self._divided and not self._parts and not busy:
+                break
+            if not busy and self._is_hopeless():
+                break
+            with contextlib.suppress(queue.Empty):
+                kind, event = self._events.get(timeout=0.1)
+                while True:
+                    self._heard(kind, event)
+                    kind, event = self._events.get_nowait()
+        self._drain()
+
+    # ---- who is there ----------------------------------------------------------------------
+
+    def _look(self) -> None:
+        """Ask who is there; parts of those who are gone are given to others."""
+        from . import plugin
+
+        if self._client.status != "running":
+            raise _LostError
+        if time.monotonic() < self._looked + _LOOK:
+            return
+        self._looked = time.monotonic()
+        there = self._asked(self._client.run_on_scheduler, plugin.addresses)
+        for address in [a for a in self._workers if a not in there]:
+            self._gone(self._workers.pop(address))
+        for address in there:
+            self._workers.setdefault(address, Worker(address))
+        unknown = [w for w in self._workers.values() if w.why_not is None]
+        if unknown:
+            states = self._asked(
+                self._client.run,
+                plugin.state_of,
+                self._id,
+                workers=[w.address for w in unknown],
+                on_error="return",
+            )
+            for worker in unknown:
+                self._learn(worker, states.get(worker.address))
+
+    def _asked(self, ask: Callable[..., Any], *given: Any, **named: Any) -> Any:
+        """An answer of the scheduler or of workers; _LostError where there is none."""
+        try:
+            return ask(*given, **named)
+        except (OSError, RuntimeError, ValueError):
+            if self._client.status != "running":
+                raise _LostError from None
+            time.sleep(_LOOK)
+            if self._client.status != "running":
+                raise _LostError from None
+            return ask(*given, **named)
+
+    def _learn(self, worker: Worker, state: Any) -> None:
+        if state is None or isinstance(state, (OSError, TimeoutError)):
+            return  # not ready yet, or gone
+        if isinstance(state, BaseException):
+            worker.name, worker.why_not = worker.address, f"{type(state).__name__}: {state}"
+            self._refuse(worker, False)
+            return
+        worker.name, worker.host, worker.why_not = state.name, state.host, state.why_not
+        if state.why_not:
+            self._refuse(worker, state.lacks_gpu)
+
+    def _refuse(self, worker: Worker, lacks_gpu: bool) -> None:
+        """Name a worker that is given nothing, once."""
+        why = worker.why_not or ""
+        self._refusals.append((lacks_gpu, why))
+        if (key := (worker.name, why)) not in self._named:
+            self._named.add(key)
+            where = f" on {worker.host}" if worker.host else ""
+            self._farm.note(f"worker {worker.name}{where} does nothing: {why}")
+
+    def _gone(self, worker: Worker) -> None:
+        part, worker.part = worker.part, None
+        if worker.future is not None:
+            worker.future.release()
+        if part is None:
+            return
+        self._deaths += 1
+        part.deaths += 1
+        self._farm.details(f"worker {worker.name} died at {frame_list(part.numbers)}")
+        if part.deaths < 2:
+            self._parts.appendleft(part)
+        elif len(part.numbers) > 1:
+            self._parts.extendleft(Part([n]) for n in reversed(part.numbers))
+        else:
+            self._fail(part, _TWICE)
+
+    def _is_anybody_ready(self) -> bool:
+        return any(worker.why_not == "" for worker in self._workers.values())
+
+    def _is_hopeless(self) -> bool:
+        """Return True if no worker has been able to work for too long; the outcome says so then."""
+        now = time.monotonic()
+        if self._is_anybody_ready():
+            return False
+        waits = not self._workers or any(w.why_not is None for w in self._workers.values())
+        patience = self._farm.patience
+        if (waits or self._farm.cluster is not None) and now < self._idle_since + patience:
+            return False
+        why = self._refusals[-1][1] if self._refusals else f"no worker in {patience:.0f} s"
+        if not self._tasks:
+            lacks_gpu = bool(self._refusals) and all(lacks for lacks, _ in self._refusals)
+            raise (DeviceError if lacks_gpu else InputError)(f"no worker can do this: {why}")
+        self.outcome.report.stopped = f"no worker is left: {why}"
+        return True
+
+    # ---- parts -----------------------------------------------------------------------------
+
+    def _give(self) -> None:
+        ready = [w for w in self._workers.values() if w.why_not == ""]
+        if not self._divided and ready:
+            self._divide(len(self._workers))
+        others = {worker.address for worker in ready}
+        for worker in ready:
+            if worker.part is not None:
+                continue
+            for i, part in enumerate(self._parts):
+                if worker.address not in part.refused_by or others <= part.refused_by:
+                    del self._parts[i]
+                    self._hand_over(worker, part)
+                    break
+
+    def _divide(self, workers: int) -> None:
+        numbers = self._job.numbers
+        size = size_of_part(len(numbers), workers)
+        self._parts.extend(Part(numbers[i : i + size]) for i in range(0, len(numbers), size))
+        self._divided = True
+
+    def _hand_over(self, worker: Worker, part: Part) -> None:
+        from .plugin import blur_part
+
+        self._tasks += 1
+        worker.part = part
+        worker.future = future = self._client.submit(
+            blur_part,
+            self._id,
+            ranges(part.numbers),
+            key=f"{self._topic}-{self._tasks}",
+            workers=[worker.address],
+            pure=False,
+        )
+        address = worker.address
+        future.add_done_callback(lambda done: self._events.put(("done", (address, done))))
+
+    def _heard(self, kind: str, event: Any) -> None:
+        if kind == "told":
+            for number, state in event["told"]:
+                self._tick(number, state)
+            return
+        address, future = event
+        worker = self._workers.get(address)
+        if worker is None or worker.future is not future or worker.part is None:
+            return  # it was given up
+        part, worker.part, worker.future = worker.part, None, None
+        if future.status == "finished":
+            try:
+                self._took(worker, part, future.result(timeout=30))
+            except (OSError, TimeoutError):  # it died with its result
+                self._vanished(worker, part)
+        elif future.status == "error":
+            self._fault(worker, part, future.exception(timeout=30))
+        else:  # cancelled: the worker, or the scheduler, is gone
+            self._vanished(worker, part)
+        future.release()
+
+    def _vanished(self, worker: Worker, part: Part) -> None:
+        """A worker died before the scheduler noticed; given another part, it would die twice."""
+        del self._workers[worker.address]
+        worker.part = part
+        self._gone(worker)
+
+    def _took(self, worker: Worker, part: Part, outcome: Outcome) -> None:
+        report = outcome.report
+        worker.faults = 0
+        done = [*report.done, *report.skipped]
+        self._farm.details(f"worker {worker.name}: frames {frame_list(part.numbers)}")
+        if report.stopped and report.stopped != ON_REQUEST:
+            # It cannot write here; others may.
+            worker.why_not = report.stopped
+            self._refuse(worker, False)
+            kept = set(done)
+            rest = [n for n in part.numbers if n not in kept]
+            report.failed = {}
+            if part.refused_by:
+                report.failed = dict.fromkeys(rest, report.stopped)
+            else:
+                self._parts.append(Part(rest, refused_by={worker.address}))
+        outcome.share(part.numbers)
+        self.outcome.add(outcome)
+        for number in (*done, *report.failed):
+            self._tick(number, "failed" if number in report.failed else "done")
+
+    def _fault(self, worker: Worker, part: Part, error: BaseException | None) -> None:
+        """The part could not even be begun."""
+        why = str(error) if isinstance(error, Error) else f"{type(error).__name__}: {error}"
+        why = " ".join(why.split())
+        is_second = bool(part.refused_by)
+        part.refused_by.add(worker.address)
+        worker.faults += 1
+        if worker.faults > 1:
+            worker.why_not = why
+            self._refuse(worker, isinstance(error, DeviceError))
+        if is_second:
+            self._fail(part, why)
+        else:
+            self._parts.append(part)
+
+    def _fail(self, part: Part, why: str) -> None:
+        for number in part.numbers:
+            self.outcome.report.failed[number] = why
+            self._tick(number, "failed")
+
+    def _tick(self, number: int, state: str) -> None:
+        at = int(np.searchsorted(self._order, number))
+        if not self._ticked[at]:
+            self._ticked[at] = True
+            self._progress(number, state)
+
+    # ---- the end ---------------------------------------------------------------------------
+
+    def _drain(self) -> None:
+        with contextlib.suppress(queue.Empty):
+            while True:
+                self._heard(*self._events.get_nowait())
+
+    def _end(self) -> None:
+        """After an interruption: every worker ends the frame that it is at."""
+        from . import plugin
+
+        with contextlib.suppress(Exception):
+            for worker in self._workers.values():
+                if worker.future is not None:
+                    worker.future.cancel()
+            self._client.run(plugin.end, self._id, on_error="ignore")
+            self._tidy()
+
+    def _tidy(self) -> None:
+        """Remove what killed workers left, by a worker of each host; and the plugin."""
+        from . import plugin
+
+        if self._deaths:
+            with contextlib.suppress(OSError):
+                self._job.sweep()
+        here = socket.gethostname()
+        hosts = {w.host: w.address for w in self._workers.values() if w.why_not == ""}
+        hosts.pop(here, None)
+        with contextlib.suppress(Exception):
+            if self._deaths and hosts:
+                self._client.run(
+                    plugin.sweep, self._id, workers=list(hosts.values()), on_error="ignore"
+                )
+        with contextlib.suppress(Exception):
+            if self._farm.cluster is not None:
+                self._client.unregister_worker_plugin(self._topic)
+
+
+class _LostError(Exception):
+    """The scheduler does not answer."""

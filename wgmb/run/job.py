@@ -1,0 +1,313 @@
+"""A run over rendered frames, settled: its settings, and what the whole sequence says of a frame.
+
+`settle` looks at the sequence once. Any of the frames can then be blurred by any process, in a run
+of its own, and have the bytes that one run over all of them gives.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from .. import gpu
+from .._version import __version__
+from ..color.highlights import check as check_highlights
+from ..color.spaces import ColorSpace, Display
+from ..errors import InputError
+from ..io import atomic
+from ..io.frame_numbers import (
+    frame_list,
+    frame_path,
+    has_view,
+    in_view,
+)
+from ..io.suffixes import STILLS
+from ..methods import METHODS
+from ..output.output import Output
+from ..pipeline.blur import Blur
+from ..sequence.clip import Clip
+from ..sequence.findings import Settled
+from ..sequence.frame_file import about
+from ..sequence.input_color import space_of
+from ..sequence.layers.masks import is_file, with_amount
+from ..settings import OutputSettings, plain
+from ..settings.video import VideoSettings
+from .batch_report import Progress
+from .conversion import Conversion
+from .report import Outcome
+from .request import Asked
+from .sequence import blur_sequence, convert_sequence
+
+_OWN = 0.5  # frame intervals around a frame that it stands for
+_NO_LOOK = "frames", "skip_missing", "max_mb"  # of InputSettings: they change no frame
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A run whose every frame is settled; `settle` makes one, run/job_file.py keeps it in a file.
+
+    `asked`: with the method, the shutter and the way to motion that were chosen. `settings`: the
+    record of every frame. `flow`: where motion comes from, in words, if the frames hold none.
+    `since`: files in the output that are older [ns since 1970] are not done; None: they may be.
+    `is_part_of_run`: another process has looked at the outputs that exist.
+    """
+
+    asked: Asked
+    settings: dict[str, Any]
+    numbers: list[int]
+    flow: str = ""
+    since: int | None = None
+    findings: Settled | None = None
+    is_part_of_run: bool = False
+    clip_opened: tuple[Clip, Display | None] | None = field(default=None, repr=False)
+    remarks: tuple[str, ...] = ()
+
+    @cached_property
+    def _opened(self) -> tuple[Clip, Display | None]:
+        if self.clip_opened is not None:
+            return self.clip_opened
+        clip, shown = self.asked.opened(self.findings)
+        self._check_machine(shown)
+        return clip.part(self.numbers), shown
+
+    @property
+    def clip(self) -> Clip:
+        """The frames; of a job from a file they are opened by this."""
+        return self._opened[0]
+
+    @property
+    def is_shown(self) -> bool:
+        """True if a config of OpenColorIO is in use."""
+        return self._opened[1] is not None
+
+    @cached_property
+    def settled(self) -> Settled:
+        """The findings about the whole sequence."""
+        return self.findings or self.clip.settle()
+
+    def _check_machine(self, shown: Display | None) -> None:
+        """InputError if colours or the shutter's curve are others here than they were."""
+        for name, value in self.asked.color_record(shown).items():
+            if self.settings.get(name) != value:
+                was = self.settings.get(name)
+                raise InputError(f"{name.replace('_', ' ')} is {value} here, but {was} in the job")
+        curve = self.asked.when.curve_read()
+        if curve and curve.rpartition(" (")[2] != str(self.settings["curve"]).rpartition(" (")[2]:
+            raise InputError(f"{self.asked.when.curve} has changed since the job was written")
+
+    def chosen(self, numbers: Sequence[int]) -> list[int]:
+        """These frames; InputError if the job has not all of them."""
+        if strange := sorted(set(numbers) - set(self.numbers)):
+            raise InputError(
+                f"`frames` {frame_list(strange)} are not in the job, "
+                f"which has {frame_list(self.numbers)}"
+            )
+        return list(numbers)
+
+    def run(self, adapter: str | None = None, numbers: Sequence[int] | None = None) -> Run:
+        """Open the GPU and the output, for all frames or for some of them."""
+        return self.run_with(self.made_blur(adapter), numbers)
+
+    def made_blur(self, adapter: str | None = None) -> Blur:
+        """The method, compiled on an adapter."""
+        return self.asked.look.make(self.asked.when.make(), adapter)
+
+    def run_with(self, blur: Blur, numbers: Sequence[int] | None = None) -> Run:
+        """`run` with a Blur that may serve many runs."""
+        clip, _ = self._opened
+        if numbers is not None:
+            clip = clip.part(self.chosen(numbers))
+        if self.flow:
+            clip.move_by(self.asked.video.source(blur.device)[0])
+        if self.asked.video.highlights != 1:
+            clip.expand_highlights(self.asked.video.highlights)
+        files = self.make_output(None if numbers is None else clip)
+        asked = self.asked
+        return Run(clip, blur, files, self._resumes, asked.confidence, asked.conversion)
+
+    @property
+    def _resumes(self) -> bool:
+        return self.asked.output.resume or self.is_part_of_run
+
+    def make_output(self, part: Clip | None = None) -> Output:
+        """The files of all frames, or of a `part` of them; see there what is refused."""
+        clip, shown = self._opened
+        output = replace(self.asked.output, resume=self._resumes)
+        conversion = self.asked.conversion
+        inputs, numbers = clip.inputs, conversion.numbers(clip) if conversion else clip.numbers
+        if part is not None:  # those of the others were looked at when the job was made
+            inputs, numbers = (p for n in part.numbers for p in part.files(n)), part.numbers
+        return output.make(self.settings, numbers, inputs, clip.chosen, shown, self.since)
+
+    def sweep(self) -> None:
+        """Remove what dead processes of this host left of the job's own files; see atomic.sweep."""
+        pattern = self.asked.output.output
+        for view in self.clip.chosen if has_view(pattern) else (None,):
+            of_view = in_view(pattern, view)
+            names = [frame_path(of_view, n).name for n in self.numbers]
+            if of_view.parent.is_dir():
+                atomic.sweep(of_view.parent, names)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Frames, a Blur and an output; call it."""
+
+    clip: Clip
+    blur: Blur
+    output: Output
+    resume: bool
+    confidence: bool
+    conversion: Conversion | None = None
+
+    @property
+    def numbers(self) -> list[int]:
+        """The frames of the output."""
+        return self.conversion.numbers(self.clip) if self.conversion else self.clip.numbers
+
+    def __call__(
+        self, progress: Progress | None = None, stop: threading.Event | None = None
+    ) -> Outcome:
+        """Blur every frame; see blur_sequence and convert_sequence."""
+        files = self.clip, self.blur, self.output
+        how: dict[str, Any] = {"resume": self.resume, "progress": progress, "stop": stop}
+        if self.conversion is not None:
+            report = convert_sequence(*files, self.conversion, **how)
+            return Outcome.of(self.clip, report, self.numbers)
+        report = blur_sequence(*files, confidence=self.confidence, **how)
+        return Outcome.of(self.clip, report)
+
+
+def settle(asked: Asked, adapter: str | None = None) -> Job:
+    """Look at the frames, and choose what was left to them: method, motion, what vectors mean.
+
+    A GPU is opened only where the frames hold no motion and `flow` is "auto". InputError where the
+    settings make no sense together.
+    """
+    asked = replace(asked, when=asked.when.resolved())
+    clip, shown = asked.opened()
+    clip.check_layers()
+    remarks = list(map(_of_scale, asked.look.scale))
+    if asked.color.space(shown) is None:
+        remarks.append(_check_space(clip, shown))
+    asked = replace(asked, averages=_averages(clip, asked))
+    conversion = asked.conversion
+    if conversion:
+        remarks.append(_of_conversion(conversion, clip, asked.output))
+        asked = replace(asked, output=replace(asked.output, layers="picture"))
+    video, how = _motion(clip, asked, adapter)
+    if how:
+        look = replace(asked.look, method=asked.look.method or video.method).for_pictures()
+    else:
+        look = asked.look.resolved(clip=clip)
+    asked = replace(asked, look=look, video=video)
+    look, output = asked.look, asked.output
+    asked.when.make()  # says what is wrong with it
+    settings = {"wgmb": __version__} | plain(look) | plain(asked.when) | plain(asked.given)
+    for name in _NO_LOOK:
+        del settings[name]
+    settings |= {"samples": look.settled_samples()} | output.looks
+    settings["curve"] = asked.when.curve_read()
+    settings |= asked.color_record(shown)
+    if asked.confidence:
+        check_confidence(look.method or "", output)
+        settings["confidence"] = True
+    if conversion:
+        settings |= {"fps_in": str(conversion.fps_in), "fps": str(conversion.fps)}
+    if asked.color.remark and not output.is_exr:
+        remarks.append(asked.color.remark)
+    if video.highlights != 1:
+        check_highlights(video.highlights)
+        if Path(asked.pattern).suffix.lower() not in STILLS:
+            raise InputError(
+                f"{asked.pattern}: `highlights` is for pictures clipped at white, such as PNG; "
+                "EXR holds light above it"
+            )
+        if asked.color.space(shown) is not None:
+            raise InputError("`highlights`, for sRGB pictures, cannot be combined with `from_`")
+        settings["highlights"] = video.highlights
+    if how:
+        settings["flow"] = how
+        remarks.append(f"the frames have no vectors; motion: {how}")
+    told = tuple(filter(None, remarks))
+    return Job(asked, settings, clip.numbers, how, clip_opened=(clip, shown), remarks=told)
+
+
+def _of_scale(scale: str) -> str:
+    if "=" not in scale or with_amount(scale)[1] is not None or is_file(scale):
+        return ""
+    return f"`scale` {scale}: no amount such as {scale}:0.5, so all else stands still"
+
+
+def _of_conversion(conversion: Conversion, clip: Clip, output: OutputSettings) -> str:
+    said = []
+    if conversion.step != 1:
+        said.append(
+            f"frames {frame_list(clip.numbers)} at {conversion.fps_in} frames per second become "
+            f"frames {frame_list(conversion.numbers(clip))} at {conversion.fps}"
+        )
+    if output.is_exr and output.layers == "all":
+        said.append(
+            "only the picture is written, as the other layers belong to single input frames"
+        )
+    return "; ".join(said)
+
+
+def _check_space(clip: Clip, shown: Display | None) -> str:
+    """InputError where frames say that they are not linear; a remark on a space of no config."""
+    if shown is None:
+        return ""
+    source = clip.source(clip.numbers[0])
+    if source.part is None:
+        return ""
+    said = shown.config.unknown(source.part.attributes)
+    found: ColorSpace = space_of(source, shown.config)
+    with about(source.name):
+        found.check_linear()
+    if not said:
+        return ""
+    return f"{source.path}: {said} is not in {shown.config.name}, so it is taken as {found.text}"
+
+
+def _motion(clip: Clip, asked: Asked, adapter: str | None) -> tuple[VideoSettings, str]:
+    """Source of the motion for frames without vectors, decided, and in words."""
+    if not _lacks_motion(clip):
+        return asked.video, ""
+    return asked.video.settled(gpu.open_device(adapter))
+
+
+def _lacks_motion(clip: Clip) -> bool:
+    """Return True if the frames can be read, and motion must come from their pictures."""
+    has = clip.has if len(clip.on_disk) > 1 else ()
+    return bool(has) and "motion" not in has
+
+
+def _averages(clip: Clip, asked: Asked) -> bool:
+    """Return True if frames without motion are averaged; InputError where that changes nothing."""
+    if asked.video.flow != "none" or not _lacks_motion(clip):
+        return False
+    if asked.look.holdout:
+        raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
+    opens, closes = asked.when.make().span
+    if asked.conversion is None and max(-opens, closes) <= _OWN:
+        raise InputError(
+            "the frames have no vectors, and `flow` none would leave each as it is: it averages "
+            "frames of a higher rate, such as `fps_in` 240 and `fps` 60, or over a `shutter` above "
+            "360"
+        )
+    return True
+
+
+def check_confidence(method: str, output: OutputSettings) -> None:
+    """Raise InputError unless the method reports confidence and the output can store it."""
+    names = getattr(METHODS[method], "confidence", ())
+    if not names:
+        able = ", ".join(n for n, m in METHODS.items() if hasattr(m, "confidence"))
+        raise InputError(f"method {method!r} cannot report confidence; use {able}")
+    if not output.is_exr:
+        what = ", ".join(names)
+        raise InputError(f"`confidence` ({what}) needs an .exr output, got {output.output}")

@@ -1,0 +1,66 @@
+"""A video as it is perceived: each picture is held until the next, and earlier ones fade."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import wgpu
+
+from ..color.coding import CodedPicture, Coding
+from ..cone import Cone
+from ..observer import Observer
+from ..video.clock import Clock
+from ..video.linear_frames import VideoPictures
+from ..video.read.reader import Footage
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A video that is looked at; after each picture, what is seen of it."""
+
+    footage: Footage
+    clock: Clock
+    pictures: VideoPictures
+    observer: Observer
+
+    @property
+    def device(self) -> wgpu.GPUDevice:
+        """The device that holds the pictures."""
+        return self.observer.device
+
+    def light(self) -> wgpu.GPUTexture:
+        """The perceived image in the middle of the last picture's time, as linear light
+        (rgba32float)."""
+        return self.observer.texture()
+
+    def coded(self, coding: Coding) -> CodedPicture:
+        """The same in the planes of a video."""
+        encoder = self.device.create_command_encoder(label="encode")
+        return self.pictures.planes.encode(encoder, self.light().create_view(), coding)
+
+    def shown(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray, float]]:
+        """Pictures with their numbers, and how long each is held [s]: until the next one."""
+        times, before = self.footage.times, None
+        for number, color in self.pictures.read(first, last):
+            if before is not None:
+                yield *before, float(times[number] - times[before[0]])
+            before = number, color
+        if before is not None:
+            number = before[0]
+            ends = (
+                times[number + 1]
+                if number + 1 < len(times)
+                else times[number] + 1 / self.footage.rate
+            )
+            yield *before, float(ends - times[number])
+
+
+def densest_rate(footage: Footage, cone: Cone) -> float:
+    """Images per second where they are densest, over as long as a cone cell remembers."""
+    times = footage.times.seconds
+    ends = np.searchsorted(times, times + cone.memory, side="right")
+    return float((ends - np.arange(len(times))).max()) / cone.memory

@@ -1,0 +1,1 @@
+"""Rendered frames on disk: a pattern in, Frames out."""

@@ -1,0 +1,349 @@
+"""Frame sequences on disk: a pattern in, Frames out."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import contextlib
+import copy
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..color.highlights import check as check_highlights
+from ..color.spaces import ColorSpace
+from ..errors import InputError
+from ..extent import Extent
+from ..flow.source import MotionSource
+from ..frame import Frame
+from ..io import limits
+from ..io.frame_numbers import frame_list
+from ..shots.cut_list import CutList
+from .data_windows import Placement
+from .dependencies import Ingredients
+from .files import SequenceFiles
+from .findings import Settled
+from .flow_motion import FAR, PictureMotion, standing
+from .frame_builder import FrameMaker
+from .frame_cache import StoredFrames
+from .frame_file import FrameFile
+from .layers.light import LightPasses
+from .layers.masks import Masks
+from .layers.passes import Passes
+from .layers.vector_convention import Meaning
+from .neighbours import Neighbours, extras
+
+
+class Clip:
+    """Reader of a frame sequence or a single image.
+
+    Iteration gives Frames. `numbers` are the requested frames, `on_disk` all existing ones.
+    `finding` describes the detected vector convention; `stray_cuts` are the given cuts at frames
+    that do not exist. Of the frames read so far, `cuts` are those after a camera cut, `unread` the
+    neighbours that could not be read, `sizes` the sizes, `notes` messages for the user, each with
+    its frames, and `absent` the masks by index or id (`IndexOB=4`, `CryptoObject=0x...`) that none
+    of them has.
+
+    Stereo frames have `views`. Each view has its own picture, vectors, depth and masks; cuts and
+    the vector convention are determined from the default view.
+    """
+
+    def __init__(
+        self,
+        pattern: str | Path,
+        *,
+        frames: str | None = None,
+        passes: Passes | None = None,
+        skip_missing: bool = False,
+        cuts: str | None = None,
+        view: str | None = None,
+        space: ColorSpace | None = None,
+        max_mb: float = limits.MAX_MB,
+        settled: Settled | None = None,
+    ):
+        """`frames`: "1-100x2", "1,3,5-8"; by default all existing ones, without gaps unless
+        `skip_missing`. `cuts`: frames that begin a new shot, in the same form, or a file with them
+        (see CutList), in addition to the detected ones. `view`: the only view to blur; by default
+        all. `space`: colour space of the pictures, instead of that in their files; pictures that
+        are not linear are converted. `max_mb`: largest decoded size of a file in megabytes. In
+        `pattern`, %V stands for the view, with one file for each. `settled`: the findings of
+        another Clip of the same sequence (`settle()`), which are then not determined again.
+        InputError for missing files, gaps and settings that do not fit.
+        """
+        self._space, self._settled, self._max_mb = space, settled, max_mb
+        self._cut_list = CutList(cuts or "")
+        self.pattern, self.passes, self.view = str(pattern), passes or Passes(), view
+        self._files = SequenceFiles(self.pattern, self.passes.also, settled)
+        self.on_disk = self._files.on_disk
+        self.numbers = self._files.chosen(frames, skip_missing)
+        self._files.check_view(view)
+        self._cameras = self._files.cameras(self.passes.camera, view)
+        known = settled.cuts if settled else self._cut_list.frames(self.on_disk[0])
+        self._known_cuts, there = frozenset(known), frozenset(self.on_disk)
+        self.stray_cuts = sorted(cut for cut in known if not there & {cut, cut - 1})
+        self._begin()
+
+    def _begin(self) -> None:
+        """Nothing has been read yet."""
+        settled, files, passes = self._settled, self._files, self.passes
+        self._stored = stored = StoredFrames(
+            files,
+            passes,
+            numbers=self.numbers,
+            known_cuts=self._known_cuts,
+            view=self.view,
+            space=self._space,
+            max_mb=self._max_mb,
+        )
+        self.sizes, self.notes, self.unread = stored.sizes, stored.notes, stored.unread
+        patterns = [str(pattern) for pattern in files.every_pattern]
+        self._masks = Masks(
+            passes.holdout, passes.scale, patterns, self.numbers, self._max_mb, files.of_views
+        )
+        self._meaning = Meaning(stored, settled.finding if settled else None)
+        self._ingredients = Ingredients(files, self._masks, (passes.camera, self._cut_list.path))
+        self._maker = FrameMaker(stored, self._meaning, self._masks, self._cameras)
+        self._around = Neighbours(stored, self._maker, self._cut_list.is_search)
+        if settled is not None:
+            self._around.settle(settled.beyond)
+            self._masks.take_names_as_found()
+            self.notes |= {text: list(self.numbers) for text in settled.notes}
+
+    def settle(self) -> Settled:
+        """Determine all findings that depend on the whole sequence, for `Clip(settled=)`.
+
+        Parts of the sequence that are blurred separately then give the same pictures as the whole,
+        even if the files on disk have changed.
+        """
+        if self._settled is None:
+            self.check_names()
+            beyond = self._around.beyond
+            notes = tuple(text for text, at in self.notes.items() if len(at) == len(self.numbers))
+            self._settled = Settled(
+                tuple(self.on_disk),
+                self.views,
+                self._meaning.found,
+                tuple(sorted(self._known_cuts)),
+                beyond,
+                notes,
+            )
+            self._files.settle(self._settled)
+        return self._settled
+
+    def part(self, numbers: Sequence[int]) -> Clip:
+        """A Clip of some of the frames, with the findings of this one and nothing read yet."""
+        self.settle()
+        made = copy.copy(self)
+        made.numbers = list(numbers)
+        made._begin()
+        return made
+
+    def __repr__(self) -> str:
+        known = self._meaning.known or self.passes
+        name = (known.vectors or self.passes.vectors).convention
+        vectors = {"auto": "", "none": ", no vectors"}.get(name, f", {name} vectors")
+        pattern = self.pattern if len(self.pattern) <= 200 else f"...{self.pattern[-200:]}"
+        frames = f"frame{'s' if len(self.numbers) > 1 else ''} {frame_list(self.numbers)}"
+        return f'Clip("{pattern}", {frames}{vectors})'
+
+    def move_by(self, motion: MotionSource | None) -> None:
+        """Find motion in the pictures (see wgmb/flow) if the files hold none; None: all stand."""
+        self._maker.picture_motion = PictureMotion(self._stored, motion) if motion else standing
+        self._stored.around = FAR if motion else 0
+        self._around.forget_all()
+
+    def expand_highlights(self, highlights: float) -> None:
+        """Brighten white by this factor in frames, for the blur alone (color/highlights.py).
+
+        `blurred` and `blur_sequence` compress it again. InputError unless it is 1 (off) to 32.
+        Frames that hold light above white can then not be read.
+        """
+        check_highlights(highlights)
+        self._maker.highlights = highlights
+        self._around.forget_all()
+
+    @property
+    def highlights(self) -> float:
+        """Times white that white is in frames."""
+        return self._maker.highlights
+
+    def is_there(self, number: int) -> bool:
+        """Return True if frame `number` is on disk."""
+        return self._files.is_there(number)
+
+    def begins_shot(self, number: int) -> bool:
+        """Return True if the user said that a new shot begins with the frame."""
+        return self._stored.is_known_cut(number, -1)
+
+    def __iter__(self) -> Iterator[Frame]:
+        for number in self.numbers:
+            yield self.frame(self.source(number))
+
+    @property
+    def views(self) -> tuple[str, ...]:
+        """Names of the views of the first readable frame, the default one first; none if its
+        files do not name any.
+        """
+        return self._files.views
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """Names of the views to blur: all, or the one chosen."""
+        return self.views if self.view is None else (self.view,)
+
+    @property
+    def has(self) -> frozenset[str]:
+        """Inputs available in the first readable frame (see Frame.has).
+
+        All frames on disk are considered, so that the result is independent of `frames`.
+        """
+        for number in self.on_disk:
+            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                return self.frame(self.source(number), picture=False, normal=False, light=False).has
+        return frozenset()
+
+    def files(self, number: int) -> list[Path]:
+        """Every file that the result of frame `number` depends on."""
+        return self._ingredients.of(number)
+
+    @property
+    def inputs(self) -> Iterator[Path]:
+        """Iterate over all files that may be read, of all frames on disk."""
+        for number in self.on_disk:
+            yield from self.files(number)
+
+    def made_of(self, number: int, reach: int) -> dict[str, Any]:
+        """Return the inputs of frame `number` apart from the settings, as values for JSON.
+
+        Name, size [bytes] and time of change [ns] of every file, those of up to `reach` frames
+        before and after too; and the detected vector convention.
+        """
+        meaning = self._meaning.found.vectors
+        return {
+            "files": self._ingredients.states(number, reach),
+            "vectors_mean": str(meaning) if meaning else None,
+        }
+
+    def source(self, number: int, view: str | None = None) -> FrameFile:
+        """Frame `number` as stored: `view`, by default the chosen view, or else the default one."""
+        return self._stored.source(number, view)
+
+    def sources(self, number: int) -> list[FrameFile]:
+        """The views of frame `number` that are to be blurred, the default one first.
+
+        These are all views with a picture, or the chosen one.
+        """
+        return self._stored.sources(number)
+
+    def leader(self, number: int) -> FrameFile:
+        """The default view, from which the findings for all views of a frame are determined."""
+        return self._stored.leader(number)
+
+    def forget(self, number: int) -> None:
+        """Drop a frame from the cache."""
+        self._stored.forget(number)
+        self._around.forget(number)
+
+    @property
+    def finding(self) -> str:
+        """Readable description of the detected vector convention."""
+        return self._meaning.found.text
+
+    @property
+    def is_finding_notable(self) -> bool:
+        """True if the vectors do not follow the convention of their names, or should be checked."""
+        return self._meaning.found.notable
+
+    def vector_mask(self, source: FrameFile) -> str | None:
+        """The channel of a frame that is 1 where its vectors are valid, if there is one."""
+        return self._meaning.mask_of(source)
+
+    def neighbour(self, source: FrameFile, side: int) -> FrameFile | None:
+        """The same view of the frame before (`side` -1) or after (1).
+
+        None beyond a known cut, and if the file does not exist or cannot be read.
+        """
+        return self._stored.neighbour(source, side)
+
+    def with_neighbours(
+        self,
+        source: FrameFile,
+        normal: bool = True,
+        extent: Extent | None = None,
+        light: bool = True,
+        reach: int = 1,
+    ) -> Frame:
+        """`frame`, and the same view of `reach` frames before and after it, as its `prev` and
+        `next`, and theirs, as far as they can be read; none beyond a camera cut.
+
+        Frames whose files hold parts of the picture (data windows) are placed on one canvas
+        (Frame.window); `extent`, that of the Blur, makes room for streaks that leave them. The
+        arrays are read-only (Frame.locked): a frame is made, and uploaded by a Blur, only once,
+        although three or five outputs use it.
+        """
+        return self._around.between(source, extras(normal, light), extent, reach)[0]
+
+    def placed(
+        self,
+        source: FrameFile,
+        extent: Extent,
+        reach: int,
+        normal: bool = True,
+        light: bool = True,
+    ) -> tuple[Frame, Placement]:
+        """Input of a Blur of this `extent`: with_neighbours, or `frame` for a `reach` of 0; and its
+        placement."""
+        if not reach:
+            return self._around.alone(source, extras(normal, light), extent)
+        return self._around.between(source, extras(normal, light), extent, reach)
+
+    def frame(
+        self,
+        source: FrameFile,
+        picture: bool = True,
+        normal: bool = True,
+        light: bool = True,
+    ) -> Frame:
+        """Return the Frame of `source`; without `picture`, its colour is 0; without `normal`, it
+        has no normals; without `light`, no passes of light.
+
+        Motion across a camera cut is omitted (see cuts.jumps).
+        """
+        return self._around.frame(source, picture, extras(normal, light))
+
+    @property
+    def cuts(self) -> set[int]:
+        """Frames after a camera cut, of those read so far."""
+        return self._around.cuts
+
+    def light_passes(self, source: FrameFile) -> LightPasses:
+        """The passes of light of a frame's picture."""
+        return self._maker.light_passes(source)
+
+    def passes_of(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
+        """The Frame of `source` as its layers have it; see `frame`. `also`: "normal", "light"."""
+        return self._maker.made(source, picture, also)
+
+    @property
+    def unseen(self) -> list[str]:
+        """Masks by name that are in manifests, but in no pixel of the frames read so far."""
+        return self._masks.unseen
+
+    @property
+    def absent(self) -> list[str]:
+        """Masks by index or id that no frame read so far has."""
+        return self._masks.absent
+
+    def check_names(self) -> None:
+        """InputError if a mask names an object that no frame's Cryptomatte has.
+
+        The headers of the frames are searched once, up to the first with the name.
+        """
+        self._masks.check_names()
+
+    def check_layers(self) -> None:
+        """InputError if a layer that is given by its name is in none of the frames.
+
+        The first frame is examined, and the middle and the last one only if it lacks a layer.
+        """
+        self._maker.check_layers()

@@ -1,0 +1,90 @@
+"""Decisions about a whole sequence, made once, so that parts of it can be blurred apart.
+
+Everything here is plain values that JSON can hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from .data_windows import Sides
+from .layers.vector_test import Finding
+from .layers.vectors import Vectors
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A Clip's findings: the same for every part of the sequence, whatever is on disk later."""
+
+    on_disk: tuple[int, ...]
+    """Every frame that there is."""
+    views: tuple[str, ...]
+    """Names of the views, the default one first."""
+    finding: Finding
+    """Meaning of the vectors."""
+    cuts: tuple[int, ...]
+    """Frames that begin a shot, as the user or an edit says."""
+    beyond: Sides
+    """Sides of the data window beyond which the picture is unknown: left, top, right, bottom."""
+    notes: tuple[str, ...] = ()
+    """Messages for the user about all frames."""
+
+    def plain(self) -> dict[str, Any]:
+        """As JSON can hold it."""
+        finding = asdict(self.finding)
+        return {
+            "on_disk": ranges(self.on_disk),
+            "views": list(self.views),
+            "finding": finding,
+            "cuts": list(self.cuts),
+            "beyond": list(self.beyond),
+            "notes": list(self.notes),
+        }
+
+    @classmethod
+    def of(cls, plain: dict[str, Any]) -> Settled:
+        """From what `plain` returned."""
+        finding = dict(plain["finding"])
+        meaning = finding.pop("vectors")
+        left, top, right, bottom = plain["beyond"]
+        return cls(
+            on_disk=tuple(numbers(plain["on_disk"])),
+            views=tuple(plain["views"]),
+            finding=Finding(Vectors(**meaning) if meaning else None, **finding),
+            cuts=tuple(plain["cuts"]),
+            beyond=(left, top, right, bottom),
+            notes=tuple(plain["notes"]),
+        )
+
+
+Range = tuple[int, int, int]
+"""First, last and step; the step is negative where numbers go down."""
+
+
+def ranges(numbers: Sequence[int]) -> list[Range]:
+    """Numbers, in their order, as few ranges; two that stand alone are not made one."""
+    found: list[Range] = []
+    at = 0
+    while at < len(numbers):
+        end, step = at, 0
+        while end + 1 < len(numbers):
+            apart = numbers[end + 1] - numbers[end]
+            if not apart or (step and apart != step):
+                break
+            end, step = end + 1, apart
+        if end == at + 1 and abs(step) != 1:  # the second one may begin a longer range
+            end = at
+        found.append((numbers[at], numbers[end], step if end > at else 1))
+        at = end + 1
+    return found
+
+
+def numbers(ranges: Iterable[Sequence[int]]) -> list[int]:
+    """The numbers of ranges, in their order."""
+    return [
+        n
+        for first, last, step in ranges
+        for n in range(first, last + (1 if step > 0 else -1), step)
+    ]

@@ -1,0 +1,87 @@
+"""Motion of a clip's frames from their pictures, where the files hold none."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import InputError
+from ..flow.source import MotionSource
+from ..shots.cuts import pictures_differ
+from .frame_cache import StoredFrames
+from .frame_file import FrameFile
+
+Found = tuple[np.ndarray, np.ndarray]
+FAR = 5  # frames around one that its motion may depend on
+
+
+def standing(source: FrameFile) -> Found:
+    """No motion (height, width, 4) [px], and one depth: at another rate, pictures are averaged."""
+    shape = source.rgba.shape[:2]
+    return np.zeros((*shape, 4), np.float32), np.ones(shape, np.float32)
+
+
+class PictureMotion:
+    """Motion (height, width, 4) [px] and depth order of frames by a source of motion.
+
+    A frame's motion depends on pictures of its own shot alone, and of its own size and window.
+    """
+
+    def __init__(self, stored: StoredFrames, motion: MotionSource):
+        self._stored, self._motion = stored, motion
+        self._cuts: dict[tuple[int, str | None], bool] = {}
+        self._shots: dict[str | None, tuple[int, Callable[[int], Found | None]]] = {}
+
+    def __call__(self, source: FrameFile) -> Found | None:
+        """None where a frame is alone in its shot."""
+        number, view = source.number, source.view
+        began = self._shots.get(view)
+        if began is None or not self._same_shot(began[0], number, view):
+            self._shots[view] = number, self._motion.shot(self._loader(source))
+        self._shots[view] = number, self._shots[view][1]
+        return self._shots[view][1](number)
+
+    def _loader(self, first: FrameFile) -> Callable[[int], np.ndarray | None]:
+        """Loads the pictures of the shot that the frame is in."""
+        anchor, view = first.number, first.view
+
+        def load(number: int) -> np.ndarray | None:
+            nonlocal anchor
+            if not self._same_shot(anchor, number, view):
+                return None
+            other = self._source(number, view)
+            if other is None or other.data_window != first.data_window:
+                return None
+            anchor = number
+            return other.rgba
+
+        return load
+
+    def _same_shot(self, a: int, b: int, view: str | None) -> bool:
+        """True if no cut lies between two frames; frames far apart count as different shots."""
+        if abs(a - b) > 2 * FAR:
+            return False
+        return not any(self._is_cut(n, view) for n in range(min(a, b) + 1, max(a, b) + 1))
+
+    def _is_cut(self, number: int, view: str | None) -> bool:
+        """True if a cut, or a gap, lies before a frame."""
+        key = number, view
+        if key not in self._cuts:
+            while len(self._cuts) > 8 * FAR:
+                self._cuts.pop(next(iter(self._cuts)))
+            before, after = (self._source(n, view) for n in (number - 1, number))
+            lacking = before is None or after is None or self._stored.is_known_cut(number, -1)
+            self._cuts[key] = lacking or pictures_differ(before.rgba, after.rgba)  # pyright: ignore
+        return self._cuts[key]
+
+    def _source(self, number: int, view: str | None) -> FrameFile | None:
+        if not self._stored.files.is_there(number):
+            return None
+        try:
+            found = self._stored.source(number, view)
+            return found if found.beside is not None else None
+        except (InputError, OSError):  # its turn to fail comes
+            return None

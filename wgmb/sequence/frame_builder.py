@@ -1,0 +1,155 @@
+"""A frame's file to a Frame: picture, vectors, depth and masks by their layers."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..camera import MAX_INDEX
+from ..color.highlights import expanded
+from ..errors import InputError
+from ..frame import Frame
+from .flow_motion import Found
+from .frame_cache import StoredFrames
+from .frame_file import FrameFile, about
+from .layers import light, vectors
+from .layers import names as layers
+from .layers.camera_file import CameraFile
+from .layers.masks import Masks
+from .layers.vector_convention import Meaning
+
+_OBJECT_STEMS = ("indexob", "objectindex", "object_id")
+
+
+class FrameMaker:
+    """Makes Frames of the files in `stored`, as its Passes ask for.
+
+    `cameras`: those of every view to blur. `picture_motion`: motion where the files hold none.
+    `highlights`: times white that white is in frames (see wgmb/color/highlights.py).
+    """
+
+    def __init__(
+        self,
+        stored: StoredFrames,
+        meaning: Meaning,
+        masks: Masks,
+        cameras: Mapping[str | None, CameraFile],
+    ):
+        self._stored, self._meaning, self._masks = stored, meaning, masks
+        self._cameras = cameras
+        self.picture_motion: Callable[[FrameFile], Found | None] | None = None
+        self.highlights = 1.0
+
+    def made(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
+        """The Frame of `source` as its layers have it; without `picture`, its colour is 0.
+        `also`: "normal", "light".
+        """
+        passes, own = self._stored.passes, self._stored.own(source)
+        meaning = self._meaning.found.vectors
+        with about(source.name):
+            if meaning is None:  # where a layer was asked for, this says why there is none
+                meaning = vectors.named(own, passes.vectors, source.beside)
+            motion = reprojections = ids = None
+            depth = self._depth(source)
+            if meaning is not None:
+                motion = vectors.read(own, meaning, source.beside)
+            camera = self._cameras.get(source.view)
+            if motion is None and camera is None and self.picture_motion is not None:
+                motion, guessed = self.picture_motion(source) or (None, None)
+                depth = guessed if depth is None else depth
+            if camera is not None:
+                if depth is None:
+                    there = ", ".join(layers.layers(source.channels))
+                    raise InputError(f"motion from a camera needs depth; available layers: {there}")
+                kind = "clip" if passes.depth_kind == "clip" else "planar"
+                reprojections = camera.around(
+                    source.number, depth_kind=kind, far=passes.far, window=source.window
+                )
+                ids = self._object_ids(source) if reprojections.here.bodies else None
+            return Frame(
+                self._bright(source.rgba)
+                if picture
+                else np.zeros((*source.size[::-1], 3), np.float16),
+                motion=motion,
+                depth=depth,
+                normal=self._normal(source) if "normal" in also else None,
+                **(self._light(source) if "light" in also else {}),
+                window=source.window,
+                camera=reprojections,
+                object_id=ids,
+                holdout=self._masks.holdout(source),
+                scale=self._masks.scale(source),
+                object_motion=passes.object_motion,
+                number=source.number,
+            )
+
+    def check_layers(self) -> None:
+        """InputError where a layer that is asked for by its name is in none of the frames.
+
+        The first frame is looked at, and only if it lacks one the middle and the last one.
+        """
+        stored, passes = self._stored, self._stored.passes
+        is_any = any((passes.color, *passes.layers))
+        if not is_any and passes.vectors.convention in ("auto", "none"):
+            return
+        first: layers.MissingLayerError | None = None
+        numbers = stored.numbers
+        for number in dict.fromkeys(numbers[i] for i in (0, len(numbers) // 2, -1)):
+            try:
+                for source in stored.sources(number):
+                    self.made(source, True, frozenset({"normal", "light"}))
+                return
+            except layers.MissingLayerError as error:
+                first = first or error
+            except (InputError, OSError):  # its turn to fail comes
+                return
+        if first is not None:
+            raise first
+
+    def light_passes(self, source: FrameFile) -> light.LightPasses:
+        """The passes of light of a frame's picture."""
+        return light.find(self._stored.own(source), source.beside)
+
+    def _bright(self, rgba: np.ndarray) -> np.ndarray:
+        return rgba if self.highlights == 1 else expanded(rgba, self.highlights)
+
+    def _depth(self, source: FrameFile) -> np.ndarray | None:
+        passes = self._stored.passes
+        name = layers.find_depth(self._stored.own(source), passes.depth, source.beside)
+        if name is None:
+            return None
+        depth = source.channels[name].astype(np.float32, copy=False)
+        if passes.depth_kind == "inverse":
+            with np.errstate(divide="ignore"):
+                depth = np.where(depth > 0, 1 / depth, np.inf).astype(np.float32)
+        return depth
+
+    def _normal(self, source: FrameFile) -> np.ndarray | None:
+        names = layers.find_normal(self._stored.own(source), source.beside)
+        if not names:
+            return None
+        return np.stack([source.channels[name] for name in names], 2, dtype=np.float32)
+
+    def _light(self, source: FrameFile) -> dict[str, Any]:
+        """Fields of Frame; what is there in vain is noted."""
+        found, notes = self.light_passes(source), self._stored.notes
+        if found.lacking and source.number not in (on := notes.setdefault(found.lacking, [])):
+            on.append(source.number)
+        return light.read(source.channels, found)
+
+    def _object_ids(self, source: FrameFile) -> np.ndarray | None:
+        by_layer = layers.layers(source.channels, near=source.beside)
+        name = self._stored.passes.object_layer
+        if name is None:
+            named = [k for k in by_layer if layers.stem(k) in _OBJECT_STEMS]
+            if not named:
+                return None
+            name = named[0]
+        plane = source.channels[layers.one_channel(by_layer, name, "object index layer")]
+        with np.errstate(invalid="ignore"):
+            index = np.rint(plane.astype(np.float64))
+            return np.where(index > 0, np.minimum(index, MAX_INDEX), 0).astype(np.uint32)

@@ -1,0 +1,325 @@
+"""One frame as stored on disk: the layers of all its files, in one data window."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..color.spaces import ColorSpace
+from ..errors import InputError, size_text
+from ..io import exr, limits, stills
+from ..io.frame_numbers import (
+    frame_range,
+    has_view,
+    in_view,
+    readable,
+)
+from .data_windows import Window, laid
+from .layers import names, stereo, vectors
+
+_NO_PICTURE = "view {} has no picture and is left as it is"
+
+
+@dataclass(frozen=True, eq=False)
+class FrameFile:
+    """One frame as it came from disk: one view of it, if its file names views."""
+
+    number: int
+    path: Path
+    file: exr.Exr | None  # None: a still. All views of a file share it.
+    channels: dict[str, np.ndarray]  # of all its files, in the picture's data window
+    attributes: dict[str, Any]
+    wanted: str | None = None  # the picture's layer, if its name does not say so
+    part: exr.Part | None = None  # of the file, that the picture is in
+    view: str | None = None  # channels have their names without it
+    origin: stereo.Places = field(default_factory=dict)  # of the channels that are in `file`
+    shared: frozenset[str] = frozenset()  # names of channels in no view
+    space: ColorSpace | None = None  # of the picture, where it is not for attributes to say
+    made_linear: bool = False  # the picture is not as it is stored, but in `space`
+    notes: tuple[str, ...] = ()  # what a user should know about it
+
+    @property
+    def name(self) -> str:
+        """The file, and the view if it has one, for messages."""
+        return str(self.path) if self.view is None else f"{self.path}: view {self.view}"
+
+    @cached_property
+    def color(self) -> list[str]:
+        """Names of the picture's channels, 3 or 4 (see layers.find_color)."""
+        with about(self.name):
+            own = [name for name in self.channels if name not in self.shared]
+            return names.find_color(own, self.wanted)
+
+    @property
+    def beside(self) -> str | None:
+        """A channel whose neighbours are preferred: the picture's first, if there is one."""
+        with contextlib.suppress(InputError):
+            return next(name for name in self.color if name)
+        return None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [px]."""
+        height, width = next(iter(self.channels.values())).shape
+        return width, height
+
+    @property
+    def data_window(self) -> Window:
+        """The window that the picture fills."""
+        if self.part is not None:
+            return self.part.data_window
+        return 0, 0, self.size[0] - 1, self.size[1] - 1
+
+    @property
+    def display_window(self) -> Window:
+        """The window of the whole picture, of which the data window may be a part, or more."""
+        return self.part.display_window if self.part is not None else self.data_window
+
+    @property
+    def whole(self) -> tuple[int, int]:
+        """Width and height [px] of the whole picture, of which an EXR may hold a window."""
+        return self.size if self.window is None else self.window[2:]
+
+    @property
+    def rgba(self) -> np.ndarray:
+        """The picture, (height, width, 3 or 4), as stored (float16 or float32)."""
+        planes = [self.channels[name] if name else np.float16(0) for name in self.color]
+        kind = np.float16 if all(p.dtype == np.float16 for p in planes) else np.float32
+        rgba = np.empty((*self.size[::-1], len(planes)), kind)
+        for i, plane in enumerate(planes):
+            rgba[..., i] = plane
+        return rgba
+
+    @property
+    def window(self) -> Window | None:
+        """Offset of the image in the full image, and the full size: x, y, width, height [px]."""
+        if self.part is None:
+            return None
+        left, top, right, bottom = self.part.display_window
+        x, y = self.part.data_window[:2]
+        return x - left, y - top, right - left + 1, bottom - top + 1
+
+
+def is_video(pattern: str | Path) -> bool:
+    """Return True for a file that is neither an EXR nor a still."""
+    path = Path(pattern)
+    return path.suffix.lower() not in (".exr", *stills.SUFFIXES) and readable(path)
+
+
+def odd_sizes(sizes: dict[int, tuple[int, int]]) -> str | None:
+    """Return a message about frames of an unusual size; None if all have the same size."""
+    by_size: dict[tuple[int, int], list[int]] = {}
+    for number in sorted(sizes):
+        by_size.setdefault(sizes[number], []).append(number)
+    if len(by_size) < 2:
+        return None
+    usual = max(by_size, key=lambda size: len(by_size[size]))
+    odd = [f"{frame_range(n)}: {size_text(s)}" for s, n in by_size.items() if s != usual]
+    return f"frames of another size than most, {size_text(usual)}: {'; '.join(odd)}"
+
+
+@contextlib.contextmanager
+def about(name: str | Path):
+    """Name the file in errors that do not."""
+    try:
+        yield
+    except InputError as error:
+        if str(name) in str(error):
+            raise
+        raise type(error)(f"{name}: {error}") from None
+
+
+def read(
+    paths: list[Path],
+    number: int,
+    wanted: str | None,
+    max_mb: float = limits.MAX_MB,
+    named: Sequence[str] = (),
+    space: ColorSpace | None = None,
+    asked: Sequence[str] = (),
+) -> tuple[FrameFile, ...]:
+    """Every view of a frame, the default one first; the channels of its files together.
+
+    `wanted`: the picture's layer. `max_mb`: megabytes that each file may unpack to. `named`: the
+    views, if %V stands for them in the first path; else that file tells them. In the other paths
+    %V stands for them too; of a file without %V and without views, they are the default view's.
+    `space`: of the samples of a still (stills.read) that is the first path. `asked`: names of
+    layers that may begin with a part's (see views.by_view).
+    `InputError` names the file that is missing, damaged, too large, or of another size.
+    """
+    files = _Files(max_mb, (*asked, *((wanted,) if wanted else ())))
+    first = files.content(in_view(paths[0], named[0] if named else None), space)
+    full = tuple(view for view in first.named if first.views[view])
+    there = tuple(named) or full or (None,)
+    found = []
+    for view in there:
+        contents = [
+            (files.content(in_view(path, view), which), has_view(path) and view is not None)
+            for path, which in zip(paths, (space, *(None for _ in paths[1:])), strict=True)
+        ]
+        chosen = [(c, c.chosen(view, there[0], whole)) for c, whole in contents]
+        found.append(_together(chosen, number, wanted, view))
+    empty = () if named else tuple(v for v in first.named if not first.views[v])
+    return _noted(tuple(found), empty)
+
+
+@dataclass
+class _Content:
+    """Contents of one file: channels by view."""
+
+    path: Path
+    file: exr.Exr | None  # None: a still
+    planes: dict[str, np.ndarray]  # of a still
+    views: dict[str | None, stereo.Places]
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        return tuple(view for view in self.views if view is not None)
+
+    def chosen(self, view: str | None, default: str | None, whole: bool) -> list[str | None]:
+        """Keys in `views` of what belongs to a frame's `view`; `whole`: all of the file does."""
+        if whole and len(self.named) > 1:
+            raise InputError(
+                f"{self.path}: has the views {', '.join(self.named)}; write its name without %V"
+            )
+        if view is None or whole:
+            own = self.named[:1]
+        elif self.named:
+            own = (view,)
+        elif view == default:
+            own = ()
+        else:
+            return []
+        return [*(v for v in own if v in self.views), None]
+
+
+class _Files:
+    """The files of one frame, each read once."""
+
+    def __init__(self, max_mb: float, asked: Sequence[str]):
+        self._max_mb, self._asked = max_mb, asked
+        self._read: dict[Path, _Content] = {}
+
+    def content(self, path: Path, space: ColorSpace | None) -> _Content:
+        """Contents of the file; `space`: of a still."""
+        if path not in self._read:
+            self._read[path] = self._content(path, space)
+        return self._read[path]
+
+    def _content(self, path: Path, space: ColorSpace | None) -> _Content:
+        if path.suffix.lower() == ".exr":
+            file = exr.read(path, max_mb=self._max_mb, data_layers=vectors.STEMS)
+            return _Content(path, file, {}, stereo.by_view(file, self._asked))
+        if path.suffix.lower() in stills.SUFFIXES:
+            rgba = stills.read(path, max_mb=self._max_mb, space=space)
+            planes = {c: rgba[..., i] for i, c in enumerate("RGBA"[: rgba.shape[2]])}
+            return _Content(path, None, planes, {})
+        known = ", ".join((".exr", *stills.SUFFIXES))
+        raise InputError(f"{path}: cannot read this kind of file; frames may be {known}")
+
+
+def _together(
+    contents: list[tuple[_Content, list[str | None]]],
+    number: int,
+    wanted: str | None,
+    view: str | None,
+) -> FrameFile:
+    """One view of a frame: of each of its files what is under the given keys."""
+    main = contents[0][0]
+    channels: dict[str, np.ndarray] = {}
+    attributes: dict[str, Any] = {}
+    origin: stereo.Places = {}
+    shared: set[str] = set()
+    notes: dict[str, None] = {}
+    onto: exr.Part | None = None
+    size: tuple[int, int] | None = None
+    for content, keys in contents:
+        if not keys:
+            continue
+        more = content.planes
+        if content.file is not None:
+            own = {k: v for key in keys[:-1] for k, v in content.views[key].items()}
+            others = content.views.get(None, {})
+            onto = onto or _picture_part(content.file, own or others, wanted)
+            places = own | {name: at for name, at in others.items() if name not in own}
+            more = _one_window(content.file.path, places, onto)
+            if content is main:
+                origin, shared = (
+                    places,
+                    (set(others) - set(own) if view is not None and len(keys) > 1 else set()),
+                )
+            of_view = {id(part) for part, _ in own.values()}
+            notes |= dict.fromkeys(n for part, _ in places.values() for n in part.notes)
+            ranked = sorted(content.file.parts, key=lambda part: id(part) not in of_view)
+            for part in reversed(ranked):
+                attributes = {**part.attributes, **attributes}
+        for name, plane in more.items():
+            size = size or plane.shape[::-1]
+            if plane.shape[::-1] != size:
+                raise InputError(
+                    f"{content.path}: layer {name} is {size_text(plane)}, "
+                    f"{main.path.name} is {size_text(size)}"
+                )
+            channels.setdefault(name, plane)
+    return FrameFile(
+        number,
+        main.path,
+        main.file,
+        channels,
+        attributes,
+        wanted,
+        onto if main.file else None,
+        view,
+        origin,
+        frozenset(shared),
+        notes=tuple(notes),
+    )
+
+
+def _noted(found: tuple[FrameFile, ...], empty: Sequence[str]) -> tuple[FrameFile, ...]:
+    """The views of a frame with notes on those whose picture is not whole, if any has one."""
+    if all(f.beside is None for f in found):
+        return found
+    more = {f.view: _remarks(f) for f in found}
+    more[found[0].view] += [_NO_PICTURE.format(view) for view in empty]
+    return tuple(replace(f, notes=(*f.notes, *more[f.view])) if more[f.view] else f for f in found)
+
+
+def _remarks(frame: FrameFile) -> list[str]:
+    """Remarks on channels that a view's picture lacks."""
+    if frame.beside is None:
+        return [_NO_PICTURE.format(frame.view)]
+    lacks = ", ".join(c for c, name in zip("RGB", frame.color, strict=False) if not name)
+    of = f" of view {frame.view}" if frame.view else ""
+    return [f"the picture{of} has no {lacks}, counted as 0"] if lacks else []
+
+
+def _picture_part(file: exr.Exr, places: stereo.Places, wanted: str | None) -> exr.Part:
+    """The part that the picture is in; the first one where none is found."""
+    with contextlib.suppress(InputError):
+        return next(places[name][0] for name in names.find_color(places, wanted) if name)
+    return next((part for part, _ in places.values()), file.parts[0])
+
+
+def _one_window(path: Path, places: stereo.Places, onto: exr.Part) -> dict[str, np.ndarray]:
+    """The channels in the data window of the part `onto`; 0 where they have none."""
+    channels = {}
+    for full, (part, name) in places.items():
+        plane = part.channels[name]
+        if part.data_window != onto.data_window:
+            if part.display_window != onto.display_window:
+                raise InputError(
+                    f"{path}: layer {full}, {size_text(plane)}, has a different "
+                    f"display window from the image, {size_text(onto.size)}"
+                )
+            plane = laid(plane, part.data_window, onto.data_window)
+        channels[full] = plane
+    return channels

@@ -1,0 +1,146 @@
+"""Cryptomattes: the coverage of objects by name or id.
+
+Friedman and Jones 2015; Cryptomatte specification 1.2.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from fnmatch import fnmatchcase
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError, did_you_mean
+from .names import layers, stem
+
+Attributes = Mapping[str, str]
+"""Of one Cryptomatte: name, manifest, manif_file and so on."""
+
+_ID = re.compile(r"0[xX][0-9a-fA-F]{1,8}")
+_MOST_BYTES = 16 << 20  # of a manifest beside the file: 400,000 names
+_SHOWN = 8  # names in a message
+
+
+class NoSuchNameError(InputError):
+    """No object in the manifest has the name."""
+
+
+def find(attributes: Mapping, layer: str) -> Attributes | None:
+    """Metadata of the Cryptomatte called `layer` in a file's `attributes`; None without one."""
+    found: dict[str, dict[str, str]] = {}
+    for name, value in attributes.items():
+        m = re.fullmatch(r"cryptomatte/([^/]+)/(\w+)", name)
+        if m and isinstance(value, str):  # of another type it may not even be readable
+            found.setdefault(m[1], {})[m[2]] = value
+    for crypto in found.values():
+        name = crypto.get("name")
+        if name and (layer in (name, stem(name)) or stem(name) == layer.lower()):
+            return crypto
+    return None
+
+
+def is_id(value: str) -> bool:
+    """Return True for an id: 0x and up to eight digits."""
+    return _ID.fullmatch(value) is not None
+
+
+def ids(crypto: Attributes, value: str, folders: Iterable[Path] = ()) -> list[int]:
+    """The ids that `value` stands for: an id, a name in the manifest, or a pattern for several.
+
+    A name with *, ? or [ that is in the manifest as it stands is no pattern. `folders`: where the
+    file of the manifest may lie. NoSuchNameError if there is no such name.
+    """
+    if not value:
+        raise InputError(f"Cryptomatte {crypto['name']!r}: choose an object with LAYER=NAME")
+    if is_id(value):
+        return [int(value, 16)]
+    manifest = _manifest(crypto, folders)
+    names = [value]
+    if value not in manifest:
+        pattern = any(c in value for c in "*?[")
+        names = [n for n in manifest if fnmatchcase(n, value)] if pattern else []
+    if not names:
+        raise NoSuchNameError(
+            f"Cryptomatte {crypto['name']!r} has no {value!r}; its manifest has "
+            f"{_some(manifest) or 'nothing; give the id as 0x and eight digits'}"
+            f"{did_you_mean(value, manifest)}"
+        )
+    return [_as_id(crypto, name, manifest[name]) for name in names]
+
+
+def coverage(
+    channels: Mapping[str, np.ndarray], crypto: Attributes, wanted: Iterable[int]
+) -> np.ndarray:
+    """(height, width) float32 0..1: how much of each pixel the objects of these ids cover."""
+    name, known = crypto["name"], np.unique(np.fromiter(wanted, np.uint32))
+    ranks = {
+        k: v for k, v in layers(channels).items() if re.fullmatch(re.escape(name) + r"\d\d", k)
+    }
+    if not ranks:
+        raise InputError(f"Cryptomatte {name!r} has no layers {name}00, {name}01, ...")
+    total = np.zeros(next(iter(channels.values())).shape, np.float32)
+    if not len(known):
+        return total
+    for members in ranks.values():
+        for id_, share in zip(members[0::2], members[1::2], strict=False):
+            own = np.ascontiguousarray(channels[id_], np.float32).view(np.uint32)
+            place = np.searchsorted(known, own) if len(known) > 1 else np.zeros((1, 1), int)
+            is_wanted = known[np.minimum(place, len(known) - 1)] == own
+            total += np.where(is_wanted, np.asarray(channels[share], np.float32), 0)
+    return np.clip(total, 0, 1)
+
+
+def sidecar(crypto: Attributes, folders: Iterable[Path]) -> Path | None:
+    """The file of the manifest, beside the EXR; None if the manifest is in the EXR, or nowhere."""
+    name = crypto.get("manif_file")
+    if crypto.get("manifest") or not name:
+        return None
+    if name != Path(name).name or "\\" in name or not name.endswith(".json"):
+        raise InputError(
+            f"Cryptomatte {crypto['name']!r}: its manifest {name!r} must be a .json file beside "
+            "the EXR, without a folder"
+        )
+    places = [folder / name for folder in folders] or [Path(name)]
+    return next((path for path in places if path.is_file()), places[0])
+
+
+def _manifest(crypto: Attributes, folders: Iterable[Path]) -> dict[str, object]:
+    """Ids as text by name; empty where there is none, or it is damaged."""
+    path = sidecar(crypto, folders)
+    if path is None:
+        return _parsed(crypto.get("manifest") or "{}")
+    try:
+        if not path.is_file():
+            raise InputError(f"{path}: no such file; it is the manifest of {crypto['name']!r}")
+        if path.stat().st_size > _MOST_BYTES:
+            raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, too large for a manifest")
+        return _parsed(path.read_text("utf-8"))
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not UTF-8") from None
+    except OSError as error:
+        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+@lru_cache(maxsize=4)  # frame after frame has the same, of up to a hundred thousand names
+def _parsed(text: str) -> dict[str, object]:
+    try:
+        manifest = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return manifest if isinstance(manifest, dict) else {}
+
+
+def _some(names: Mapping[str, object]) -> str:
+    """The first names, and how many there are if these are not all."""
+    text = ", ".join(list(names)[:_SHOWN])
+    return f"{text}, ... ({len(names)} names)" if len(names) > _SHOWN else text
+
+
+def _as_id(crypto: Attributes, name: str, value: object) -> int:
+    if not isinstance(value, str) or not re.fullmatch(r"[0-9a-fA-F]{1,8}", value):
+        raise InputError(f"Cryptomatte {crypto['name']!r}: bad id for {name!r}")
+    return int(value, 16)

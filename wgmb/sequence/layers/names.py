@@ -1,0 +1,154 @@
+"""Finding the layers of a rendered frame by the names that renderers give them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from ...errors import InputError
+
+Channels = Mapping[str, np.ndarray]
+
+
+class MissingLayerError(InputError):
+    """A layer that was asked for by its name is not in a file."""
+
+
+_COMPONENTS = (
+    {"x": 0, "y": 1, "z": 2, "w": 3},
+    {"r": 0, "g": 1, "b": 2, "a": 3},
+    {"u": 0, "v": 1},
+    {"red": 0, "green": 1, "blue": 2, "alpha": 3},
+)
+_COLOR = ("combined", "rgba", "rgb", "beauty", "color", "colour", "image", "final", "noisy image")
+_NORMAL = ("normal", "normals", "n")
+_DEPTH = ("depth", "z", "zdepth", "vrayzdepth", "z-depth", "z_depth", "worlddepth")
+
+
+def layers(names: Iterable[str], near: str | None = None) -> dict[str, list[str]]:
+    """Channel names by layer, in the order x y z w, r g b a, or u v; the rest by name.
+
+    Layers beside the channel `near` (of the same view layer, say) come first.
+    """
+    found: dict[str, list[str]] = {}
+    for name in names:
+        found.setdefault(name.rpartition(".")[0], []).append(name)
+    beside = (near or "").rpartition(".")[0].rpartition(".")[0]
+    first = sorted(found, key=lambda layer: (layer.rpartition(".")[0] != beside, layer))
+    return {layer: sorted(found[layer], key=_order) for layer in first}
+
+
+def _order(channel: str) -> tuple[int, str]:
+    last = component(channel)
+    return next((c[last] for c in _COMPONENTS if last in c), 9), channel
+
+
+def component(channel: str) -> str:
+    """The last part of a channel's name, in lower case: "ViewLayer.Depth.Z" -> "z"."""
+    return channel.rpartition(".")[2].lower()
+
+
+def stem(layer: str) -> str:
+    """The last part of a layer's name, in lower case: "ViewLayer.Depth" -> "depth"."""
+    return layer.rpartition(".")[2].lower()
+
+
+def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
+    """The channels of the picture: 3, or 4 with alpha.
+
+    Where there are no R, G and B, a grey picture, three times Y; then one with R, G or B alone,
+    and "" for what it lacks.
+    """
+    names = list(names)
+    for channels_of in (rgb, _grey, _some_of_rgb):
+        by_layer = {k: channels_of(v) for k, v in layers(names).items()}
+        by_layer = {k: v for k, v in by_layer.items() if v}
+        if channels_of is not rgb and wanted is None:  # others may mean anything
+            by_layer = {k: v for k, v in by_layer.items() if k == "" or stem(k) in _COLOR}
+        if by_layer:
+            break
+    if wanted is not None:
+        chosen = pick(by_layer, wanted, "colour layer")
+    elif "" in by_layer:
+        chosen = ""
+    else:
+        named = [k for word in _COLOR for k in by_layer if stem(k) == word]
+        if not named and len(by_layer) != 1:
+            raise InputError(
+                "cannot tell which layer is the colour; `color` chooses one: "
+                f"{', '.join(by_layer) or '(no RGB layer)'}"
+            )
+        chosen = named[0] if named else next(iter(by_layer))
+    return by_layer[chosen]
+
+
+def rgb(members: list[str]) -> list[str]:
+    """The channels of red, green, blue and alpha of a layer's; none if it is not coloured."""
+    by_component = {component(m): m for m in members}
+    for r, g, b, a in (("r", "g", "b", "a"), ("red", "green", "blue", "alpha")):
+        if {r, g, b} <= by_component.keys():
+            return [by_component[c] for c in (r, g, b, a) if c in by_component]
+    return []
+
+
+def _grey(members: list[str]) -> list[str]:
+    own = {m.rpartition(".")[2]: m for m in members}
+    if "Y" not in own or "X" in own:  # a vector
+        return []
+    return 3 * [own["Y"]] + [own[c] for c in "A" if c in own]
+
+
+def _some_of_rgb(members: list[str]) -> list[str]:
+    own = {m.rpartition(".")[2]: m for m in members}
+    if not own.keys() & set("RGB"):
+        return []
+    return [own.get(c, "") for c in "RGB"] + [own[c] for c in "A" if c in own]
+
+
+def find_depth(
+    names: Iterable[str], wanted: str | None = None, near: str | None = None
+) -> str | None:
+    """The channel that holds depth, beside the channel `near`; None if no name says so."""
+    by_layer = layers(names, near)
+    if wanted is not None:
+        return one_channel(by_layer, wanted, "depth layer")
+    if "Z" in by_layer.get("", ()):
+        return "Z"
+    named = [k for word in _DEPTH for k in by_layer if stem(k) == word]
+    return by_layer[named[0]][0] if named else None
+
+
+def find_normal(names: Iterable[str], near: str | None = None) -> list[str]:
+    """The three channels (x, y, z or r, g, b) of a layer called normal, normals or n, in any
+    case, beside the channel `near`; none if no name says so.
+    """
+    for layer, members in layers(names, near).items():
+        if stem(layer) in _NORMAL and len(members) == 3:
+            return members
+    return []
+
+
+def pick(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:
+    """The layer called `wanted`: its full name, or its last part if that is unambiguous."""
+    if wanted in by_layer:
+        return wanted
+    alike = [k for k in by_layer if stem(k) == wanted.lower()]
+    if len(alike) == 1:
+        return alike[0]
+    there = ", ".join(map(repr, by_layer))
+    raise MissingLayerError(f"no {what} {wanted!r}; available: {there}")
+
+
+def one_channel(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:
+    """The channel called `wanted`, or the first of the layer of that name."""
+    everything = [name for members in by_layer.values() for name in members]
+    return wanted if wanted in everything else by_layer[pick(by_layer, wanted, what)][0]
+
+
+def grey(channels: Channels) -> np.ndarray:
+    """The one channel of a grey picture, or the red one of a coloured one."""
+    for name in ("Y", "R"):
+        if name in channels:
+            return channels[name]
+    return channels[next(iter(layers(channels).values()))[0]]

@@ -1,0 +1,61 @@
+"""Layers of a sequence's files, and their conventions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ...errors import InputError, check_choice
+from . import vectors
+
+DEPTHS = ("planar", "inverse", "clip")
+
+
+@dataclass(frozen=True)
+class Passes:
+    """Layers to read from the files, and their conventions.
+
+    `color`, `depth`: names of layers that cannot be found automatically. `depth_kind`: "planar"
+    (distance along the view axis), "inverse" (its reciprocal, Nuke), or "clip" (z after
+    projection). `camera`: JSON file (see CameraFile) for motion where vectors are missing.
+    `object_layer`: index layer that identifies the camera file's objects. `object_motion`:
+    vectors exclude the camera's motion. `holdout`, `scale`: masks, each a layer, `LAYER=VALUE`,
+    or an image file or pattern; VALUE is an index, or a name (with wildcards) or id of a
+    Cryptomatte. The holdout is the union of all masks. The scales multiply; `MASK:AMOUNT`
+    stands for 1 + (AMOUNT - 1) * mask. `also`: patterns of files with additional layers of the
+    same frames. In the names of files, %V stands for the view (see Clip.views). `far`: depth from
+    which a pixel counts as empty. `outside`: the picture beyond a data window that ends within the
+    display window: "nothing", "edge" (unknown: the pixels at its edge are repeated) or "auto"
+    (unknown if the window cuts through the picture).
+    """
+
+    color: str | None = None
+    vectors: vectors.Vectors = field(default_factory=vectors.Vectors)
+    depth: str | None = None
+    depth_kind: str = "planar"
+    far: float = 1e9
+    camera: Path | None = None
+    object_layer: str | None = None
+    object_motion: bool = False
+    holdout: str | tuple[str, ...] = ()
+    scale: str | tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
+    outside: str = "auto"
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """Names of the requested layers, other than the picture's."""
+        masks = (mask.partition("=")[0] for mask in (*self.holdout, *self.scale))
+        named = self.vectors.layer, self.depth, self.object_layer, *masks
+        return tuple(name for name in named if name)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.vectors, vectors.Vectors):
+            given = f"got {self.vectors!r}"
+            raise InputError(f"`vectors` must be Vectors, such as Vectors('none'), {given}")
+        for name in ("holdout", "scale"):
+            given = getattr(self, name)
+            object.__setattr__(self, name, (given,) if isinstance(given, str) else tuple(given))
+        check_choice("`depth_kind`", self.depth_kind, DEPTHS)
+        if not self.far > 0:
+            raise InputError(f"far must be over 0, got {self.far}")

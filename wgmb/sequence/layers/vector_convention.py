@@ -1,0 +1,102 @@
+"""Meaning of a sequence's vectors, decided once for all of its frames."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+
+from ...errors import InputError
+from ..data_windows import (
+    Window,
+    laid,
+    near_enough,
+    union,
+)
+from ..frame_cache import StoredFrames
+from ..frame_file import FrameFile
+from . import vector_test, vectors
+
+
+class Meaning:
+    """The vector convention of the frames in `stored`. `known`: what was found before, if
+    anything.
+    """
+
+    def __init__(self, stored: StoredFrames, known: vector_test.Finding | None):
+        self._stored, self.known = stored, known
+        self._wanted = stored.passes.vectors
+
+    @property
+    def found(self) -> vector_test.Finding:
+        """The vector convention, determined once for all frames.
+
+        By name, then tested on the first frame on disk; unless that shows what the name says, on
+        the middle and the last one together with it. So the result does not depend on the
+        requested frames.
+        """
+        if self.known is None:
+            self.known = self._find_out()
+        return self.known
+
+    def mask_of(self, source: FrameFile) -> str | None:
+        """The channel of a frame that is 1 where its vectors are valid, if there is one."""
+        meaning = self.found.vectors
+        with contextlib.suppress(InputError):  # its turn to fail comes
+            return vectors.mask_of(source.channels, meaning, source.beside) if meaning else None
+        return None
+
+    def _find_out(self) -> vector_test.Finding:
+        wanted, there = self._wanted, self._stored.files.on_disk
+        if wanted.convention == "none":
+            return vector_test.Finding(None, False, "none requested")
+        found = vector_test.Finding(None, False, "no vector layer found")
+        evidence: list[vector_test.Evidence] = []
+        for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
+            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                source, named = self._named(number)
+                if named is None:
+                    continue
+                if wanted.convention != "auto":
+                    return vector_test.Finding(named, True, str(named))
+                evidence.append(self._evidence(source, named))
+                found = vector_test.decide(named, evidence)
+                if found.sure and found.vectors == named:
+                    break
+        return found
+
+    def _named(self, number: int) -> tuple[FrameFile, vectors.Vectors | None]:
+        """The vectors that the layers' names speak for, in the first view that has any."""
+        first = self._stored.leader(number)
+        for source in dict.fromkeys((first, *self._stored.all(number))):
+            if named := vectors.named(self._stored.own(source), self._wanted, source.beside):
+                return source, named
+        return first, None
+
+    def _evidence(self, source: FrameFile, named: vectors.Vectors) -> vector_test.Evidence:
+        if source.beside is None:
+            return vector_test.Evidence(doubt="no picture to test it on")
+        motion = vectors.read(self._stored.own(source), named, source.beside)
+        near = [self._probe(source, side) for side in (-1, 1)]
+        near = [one if one and near_enough(source.data_window, one[1]) else None for one in near]
+        onto = union([source.data_window, *(window for _, window in filter(None, near))])
+        color, motion = (laid(a, source.data_window, onto) for a in (source.rgba, motion))
+        prev, next_ = (one and laid(*one, onto) for one in near)
+        return vector_test.gathered(color, motion, prev, next_)
+
+    def _probe(self, source: FrameFile, side: int) -> tuple[np.ndarray, Window] | None:
+        """The picture of a neighbour and its data window, to test vectors on."""
+        number = source.number + side
+        if not self._stored.has_neighbour(source.number, side):
+            return None
+        try:
+            other = self._stored.find(number, source.view)
+            same = other.display_window == source.display_window
+            return (other.rgba, other.data_window) if same else None
+        except (InputError, OSError):
+            return None
+        finally:
+            if number not in self._stored.numbers:
+                self._stored.forget(number)

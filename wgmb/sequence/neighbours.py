@@ -1,0 +1,308 @@
+"""Frames among their neighbours: camera cuts left out, different data windows on one canvas."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import contextlib
+from collections import OrderedDict
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+from ..errors import InputError, check_choice
+from ..extent import Extent
+from ..frame import Frame
+from ..shots.cuts import (
+    is_cut,
+    jumps,
+    still,
+    straightened,
+)
+from .data_windows import (
+    OUTSIDE,
+    Placement,
+    Sides,
+    Window,
+    allowed,
+    canvas,
+    common,
+    covered,
+    moved_by,
+    placed,
+    union,
+    unknown,
+)
+from .frame_builder import FrameMaker
+from .frame_cache import StoredFrames
+from .frame_file import FrameFile
+
+_SIDES = "left", "top", "right", "bottom"
+
+
+def extras(normal: bool, light: bool) -> frozenset[str]:
+    """Names of the inputs that only some methods take."""
+    return frozenset(n for n, wanted in (("normal", normal), ("light", light)) if wanted)
+
+
+class Neighbours:
+    """The frames in `stored` as a blur takes them, made by `maker`.
+
+    `is_search`: cuts that nobody told of are looked for. `cuts`: those found so far, and those
+    known.
+    """
+
+    def __init__(self, stored: StoredFrames, maker: FrameMaker, is_search: bool):
+        check_choice("outside", stored.passes.outside, OUTSIDE)
+        self._stored, self._maker, self._is_search = stored, maker, is_search
+        self._outside = stored.passes.outside
+        self.cuts: set[int] = set()
+        self._alone: OrderedDict[
+            tuple[int, str | None], tuple[FrameFile, frozenset[str], Frame]
+        ] = OrderedDict()
+        self._placed: OrderedDict[tuple[int, str | None], tuple[Frame, Window, Frame]] = (
+            OrderedDict()
+        )
+        self._jumps: dict[int, list[int]] = {}
+        self._cuts_to: dict[tuple[int, int], bool] = {}
+
+    def forget(self, number: int) -> None:
+        """Drop what was made of a frame."""
+        for kept in (self._alone, self._placed):
+            for key in [key for key in kept if key[0] == number]:
+                del kept[key]
+
+    def forget_all(self) -> None:
+        """Drop what was made of every frame."""
+        self._alone.clear()
+        self._placed.clear()
+
+    @property
+    def beyond(self) -> Sides:
+        """Sides of the data window beyond which the picture is unknown."""
+        return self._cut_through
+
+    def settle(self, beyond: Sides) -> None:
+        """Take what was found out about all frames as `beyond`."""
+        self._cut_through = beyond
+
+    # ---- frames ----------------------------------------------------------------------------
+
+    def frame(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
+        """The Frame of `source` in its own window, without motion that leads across a cut."""
+        frame = self._maker.made(source, picture, also)
+        if all(self._stored.is_known_cut(source.number, side) for side in (-1, 1)):
+            self.cuts |= {source.number, source.number + 1}
+            return still(frame)
+        for side in self._sides_cut(source, frame):
+            self.cuts.add(source.number + (side > 0))
+            frame = straightened(frame, side)
+        return frame
+
+    def alone(
+        self, source: FrameFile, also: frozenset[str], extent: Extent | None
+    ) -> tuple[Frame, Placement]:
+        """The frame by itself, on a canvas with room for `extent`."""
+        frame = self.frame(source, True, also)
+        onto = self._canvas({0: (source, frame)}, extent)
+        frame = placed(frame, source.data_window, onto, self._edges(source, onto))
+        return frame, Placement(onto, self._bounds(source))
+
+    def between(
+        self, source: FrameFile, also: frozenset[str], extent: Extent | None, reach: int
+    ) -> tuple[Frame, Placement]:
+        """The frame with `reach` before and after it, on a canvas with room for `extent`.
+
+        Their arrays cannot be written to (Frame.locked): every frame is made, and uploaded by a
+        Blur, once, though it is shown in three, or five.
+        """
+        self._stored.reach = max(self._stored.reach, reach)
+        frames = {0: (source, self._locked(source, also))}
+        for side in (-1, 1):
+            for offset in range(side, side * (reach + 1), side):
+                found = self._beside(*frames[offset - side], side, also)
+                if found is None:
+                    break
+                frames[offset] = found
+        onto = self._canvas(frames, extent)
+        made = {side: self._on(onto, *one) for side, one in frames.items()}
+        beside: list[Frame | None] = []
+        for side in (-1, 1):
+            near, beyond = made.get(side), made.get(2 * side)
+            if near is not None and beyond is not None:
+                near = near.between(beyond, None) if side < 0 else near.between(None, beyond)
+            beside.append(near)
+        return made[0].between(*beside), Placement(onto, self._bounds(source))
+
+    def _beside(
+        self, source: FrameFile, frame: Frame, side: int, also: frozenset[str]
+    ) -> tuple[FrameFile, Frame] | None:
+        """The frame before or after, and its file; None where there is none of the same shot."""
+        other = self._stored.neighbour(source, side)
+        if other is None or other.display_window != source.display_window:
+            return None
+        try:
+            near = self._locked(other, also)
+        except InputError:  # its turn to fail comes
+            self._stored.unread.add(other.number)
+            return None
+        if self._is_cut(source, frame, near, side, also):
+            self.cuts.add(source.number + (side > 0))
+            return None
+        return other, near
+
+    def _locked(self, source: FrameFile, also: frozenset[str]) -> Frame:
+        """`frame`, made once for the three frames, or five, that it is shown in."""
+        key = source.number, source.view
+        made, with_also, frame = self._alone.get(key, (None, None, None))
+        if frame is None or made is not source or with_also != also:
+            self._alone.pop(key, None)
+            self._make_room(self._alone)
+            frame = self.frame(source, True, also).locked()
+            self._alone[key] = source, also, frame
+        return frame
+
+    def _on(self, onto: Window, source: FrameFile, frame: Frame) -> Frame:
+        """`frame` on a canvas, made once while the canvas stays the same."""
+        if source.data_window == onto:
+            return frame
+        key = source.number, source.view
+        made, then, result = self._placed.get(key, (None, None, None))
+        if result is None or made is not frame or then != onto:
+            self._placed.pop(key, None)
+            self._make_room(self._placed)
+            edges = self._edges(source, onto)
+            result = placed(frame, source.data_window, onto, edges).locked()
+            self._placed[key] = frame, onto, result
+        return result
+
+    def _make_room(self, kept: OrderedDict[tuple[int, str | None], Any]) -> None:
+        while len(kept) >= (2 * self._stored.reach + 1) * max(len(self._stored.views), 1):
+            kept.popitem(last=False)
+
+    # ---- cuts ------------------------------------------------------------------------------
+
+    def _sides_cut(self, source: FrameFile, frame: Frame) -> list[int]:
+        """Sides of a frame on which its motion leads across a cut, by that of the default view."""
+        number = source.number
+        if source.view is not None and source.view != self._stored.leader(number).view:
+            with contextlib.suppress(InputError):  # then this view decides
+                if number not in self._jumps:
+                    self.frame(self._stored.leader(number), False, frozenset())
+                return self._jumps[number]
+        sides: list[int] = []
+        for side in (-1, 1):
+            if self._stored.is_known_cut(number, side) or (self._is_search and jumps(frame, side)):
+                sides.append(side)
+                frame = straightened(frame, side)
+        if source.view is not None:
+            self._jumps[number] = sides
+        return sides
+
+    def _is_cut(
+        self, source: FrameFile, frame: Frame, near: Frame, side: int, also: frozenset[str]
+    ) -> bool:
+        """True if a cut lies between `frame` and `near`, as decided on the default view."""
+        if not self._is_search:  # known ones are not asked
+            return False
+        if source.view is None:
+            return is_cut(frame, near, side)
+        key = source.number, side
+        if key not in self._cuts_to:
+            leader = self._stored.leader(source.number)
+            if leader.view != source.view:
+                with contextlib.suppress(InputError, OSError):  # then this view decides
+                    other = self._stored.neighbour(leader, side)
+                    if other is not None and other.display_window == leader.display_window:
+                        frame, near = self._locked(leader, also), self._locked(other, also)
+            self._cuts_to[key] = is_cut(frame, near, side)
+        return self._cuts_to[key]
+
+    # ---- data windows ----------------------------------------------------------------------
+
+    def _canvas(
+        self, frames: Mapping[int, tuple[FrameFile, Frame]], extent: Extent | None
+    ) -> Window:
+        """The window that the frames, by their offset, are placed on for a blur of this `extent`.
+
+        It depends on them alone, so that parts of a sequence give the same pictures as the whole.
+        """
+        source, _ = frames[0]
+        display, windows = source.display_window, [file.data_window for file, _ in frames.values()]
+        held = union(windows)
+        if extent is None or held == display == source.data_window:
+            return held
+        limit = allowed(windows, display, self._cut_through)
+        if held == limit or extent.spread == "everywhere":
+            return limit
+        needed: list[Window] = []
+        for offset, (file, frame) in frames.items():
+            if (box := extent.box(frame, offset)) is not None:
+                needed += [file.data_window, moved_by(box, file.data_window[:2])]
+        if not needed:
+            return source.data_window
+        within = common(union(needed), limit)
+        try:
+            return canvas(within or limit, limit, windows, display)
+        except InputError as error:
+            raise InputError(f"{source.path}: {error}") from None
+
+    def _edges(self, source: FrameFile, onto: Window) -> Sides:
+        """The sides of a frame beyond which its edge stands for what is unknown there."""
+        if onto == source.data_window:
+            return False, False, False, False
+        return unknown(source.data_window, source.display_window, self._cut_through)
+
+    def _bounds(self, source: FrameFile) -> Window:
+        """The largest window of the frame's result: it does not grow into the unknown."""
+        own, display = source.data_window, source.display_window
+        if own == display:
+            return own
+        far = 1 << 31
+        left, top, right, bottom = (
+            end if known else (-far, -far, far, far)[i]
+            for i, (end, known) in enumerate(
+                zip(own, unknown(own, display, self._cut_through), strict=True)
+            )
+        )
+        return left, top, right, bottom
+
+    @cached_property
+    def _cut_through(self) -> Sides:
+        """The sides at which data windows cut through the picture.
+
+        The first, the middle and the last frame on disk tell, so that the result is independent
+        of `frames`: such a side lies in the same place in all of them, and is covered.
+        """
+        if self._outside != "auto":
+            edge = self._outside == "edge"
+            return edge, edge, edge, edge
+        there = self._stored.files.on_disk
+        places: list[set[int]] = [set(), set(), set(), set()]
+        closed, within = [True] * 4, [True] * 4
+        for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
+            try:
+                source = self._stored.leader(number)
+                rgba = source.rgba
+            except (InputError, OSError):  # its turn to fail comes
+                continue
+            if not rgba.any():
+                continue
+            sides = zip(source.data_window, source.display_window, covered(rgba), strict=True)
+            for i, (end, border, full) in enumerate(sides):
+                places[i].add(end)
+                closed[i] &= full and end != border
+                within[i] &= end > border if i < 2 else end < border
+        left, top, right, bottom = (
+            full and len(ends) == 1 for full, ends in zip(closed, places, strict=True)
+        )
+        found = left, top, right, bottom
+        told = [name for name, *both in zip(_SIDES, found, within, strict=True) if all(both)]
+        if told:
+            where = ", ".join(told)
+            text = (
+                f"the picture goes on beyond the data window ({where}): what lies there is taken "
+                "as unknown; `outside='nothing'` takes it as empty"
+            )
+            self._stored.notes[text] = list(self._stored.numbers)
+        return found

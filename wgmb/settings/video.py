@@ -1,0 +1,143 @@
+"""User settings of videos as plain values; the string under a field is its help."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Literal, Self
+
+import wgpu
+
+from .. import gpu
+from ..errors import InputError
+from ..extras import is_installed
+from ..flow.source import MotionSource
+from ..io.frame_numbers import frame_numbers
+from ..video.clock import Clock
+
+if TYPE_CHECKING:
+    from ..video.read.reader import Footage
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlowSettings:
+    """Source of the motion of pictures."""
+
+    flow: Literal["auto", "search", "dis", "none"] = "auto"
+    "Source of the motion: search (best), dis (quick, OpenCV), none (pictures are averaged)."
+    flow_quality: Literal["best", "fast"] = "best"
+    "Quality of the motion: best or fast."
+
+    @property
+    def method(self) -> str:
+        """The blur method that suits this motion: dense inverse search is to be quick.
+
+        Of settings that are `settled`, as "auto" may become either.
+        """
+        return "gather" if self.flow in ("auto", "search") else "tap"
+
+    def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
+        """The source of the motion, and its description in words."""
+        settled, how = self.settled(device)
+        if settled.flow == "none":
+            return None, how
+        if settled.flow == "dis":
+            from ..flow.dis import Dis  # only where it is needed
+
+            return Dis(settled.flow_quality), how
+        from ..flow import Flow
+
+        return Flow(quality=settled.flow_quality, device=device), how
+
+    def settled(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
+        """A copy in which `flow` is chosen as it suits the device, and the choice in words."""
+        if self.flow == "none":
+            return self, "none: pictures are averaged"
+        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        quality, why = self.flow_quality, ""
+        if self.flow == "auto" and software:
+            quality, why = "fast", " (fast, because there is no GPU)"
+        if self.flow == "dis" or (self.flow == "auto" and software and is_installed("cv2")):
+            return replace(self, flow="dis", flow_quality=quality), f"dense inverse search{why}"
+        return replace(self, flow="search", flow_quality=quality), f"search{why}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class VideoSettings(FlowSettings):
+    """Motion, time and encoding of videos."""
+
+    begin: str | None = None
+    "Time in the video to begin at: 12.5 (seconds) or 1:02:03."
+    end: str | None = None
+    "Time in the video to end at."
+    speed: str = "1"
+    "Speed of the output, such as 0.5 for slow motion."
+    pitch: Literal["keep", "follow"] = "keep"
+    "Pitch of the sound at another speed: keep it, or let it follow, as on a tape."
+    streams: Literal["all", "video"] = "all"
+    "Streams of the output: all (sound, subtitles, chapters are copied), or the video alone."
+    duplicates: Literal["keep", "fill"] = "keep"
+    "Repeated pictures: keep, or fill (motion continues over them)."
+    highlights: float = 1.0
+    "Videos, 8-bit pictures: brightness of white in the blur, in multiples of white, 1 (off) to 32."
+    codec: str | None = None
+    "Codec of the video: h264, h265, av1, vp9, prores, ffv1; default: by the suffix of the name."
+    quality: int | None = None
+    "Constant quality on the encoder's scale: a smaller number is a better and larger video."
+    encoder: Literal["nvenc", "qsv", "amf", "videotoolbox", "v4l2m2m"] | None = None
+    "Hardware encoder; by default the encoding is done in software."
+
+    @property
+    def pace(self) -> Fraction:
+        """The speed, exactly."""
+        try:
+            found = Fraction(self.speed)
+        except (ValueError, ZeroDivisionError):
+            raise InputError(f"`speed` must be a number, got {self.speed!r}") from None
+        if not Fraction(1, 100) <= found <= 100:
+            raise InputError(f"`speed` must be 0.01 to 100, got {self.speed}")
+        return found
+
+    @property
+    def range(self) -> tuple[Fraction | None, Fraction | None]:
+        """Times to begin and to end at [s]."""
+        begin, end = time_of("begin", self.begin), time_of("end", self.end)
+        if begin is not None and end is not None and begin >= end:
+            raise InputError(f"`end` must be after `begin`, got {self.begin} to {self.end}")
+        return begin, end
+
+    def clock(self, footage: Footage, frames: str | None) -> Clock:
+        """The clock of the part that is asked for; InputError if there is no such part.
+
+        `frames`: numbers of the video's pictures, such as 120-480.
+        """
+        start, (first, end) = footage.times[0], self.range
+        first, end = (None if t is None else start + t for t in (first, end))
+        if frames is not None:
+            if self.begin or self.end:
+                raise InputError("choose either `frames`, or `begin` and `end`")
+            numbers = frame_numbers(frames)
+            there = f"{footage.path} has pictures 0 to {len(footage) - 1}"
+            if not 0 <= numbers[0] <= numbers[-1] < len(footage):
+                raise InputError(f"frames {frames}: {there}")
+            if numbers != list(range(numbers[0], numbers[-1] + 1)):
+                raise InputError(f"frames of a video must be one range, got {frames}")
+            first = footage.times[numbers[0]]
+            end = None if numbers[-1] + 1 == len(footage) else footage.times[numbers[-1] + 1]
+        origin = start if first is None else Fraction(0)
+        return Clock(first or start, self.pace, origin, first, end)
+
+
+def time_of(name: str, text: str | None) -> Fraction | None:
+    """`12.5`, `2:05` or `1:02:03.5` -> seconds, exactly."""
+    if text is None:
+        return None
+    if not re.fullmatch(r"(\d{1,6}:){0,2}\d{1,9}(\.\d{1,9})?", text):
+        raise InputError(f"`{name}` must be seconds, or like 1:02:03.5, got {text!r}")
+    total = Fraction(0)
+    for part in text.split(":"):
+        total = 60 * total + Fraction(part)
+    return total

@@ -1,0 +1,1 @@
+"""Shots: where they begin, and their pictures read once from first to last."""

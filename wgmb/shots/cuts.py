@@ -1,0 +1,213 @@
+"""Camera cuts, detected from colour and motion; frames across a cut are never used."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from ..color.srgb import srgb
+from ..extent import displacement
+from ..frame import Frame
+
+_PROBES = 2000  # pixels looked at
+_CUT = (
+    0.5  # of the difference of unrelated places; measured: 0.0 to 0.3 without a cut, 0.6 to 1 with
+)
+_INSIDE = 0.05  # share of probes that must still be in the neighbour's picture
+_MOST = 0.5  # difference of tones beyond which a pixel has merely changed
+_JUMP = 8  # times the motion to the other side
+_FAR = 0.1  # of the picture's width
+SMALL = 96  # pixels of width of the copies that are compared where there are no vectors
+_BLOCK = 8  # pixels a side
+_SEARCH = 0.2  # of the width: farther nothing is looked for
+_STEP = 2  # pixels between places where a block is looked for
+SAMPLED = 480  # pixels of width that are compared to tell a copy
+_COPY = 0.5 / 255  # mean difference of display values in a copy
+_COPY_WORST = 2 / 255  # the same in one block
+_ALIKE = 0.02  # difference of display values under which there is no cut
+_UNLIKE = 0.78  # of the contrast
+_FADED = 0.6  # of the contrast, when one picture is as bright as the other
+_FADE = 0.125  # of display values: what a fade adds to the mean from one picture to the next
+_FADE_CONTRAST = 1.5  # times the contrast of the picture before
+
+
+def pictures_differ(before: np.ndarray, after: np.ndarray) -> bool:
+    """Return True if a cut lies between two pictures (height, width, 3 or 4) without vectors."""
+    return smalls_differ(_small(before), _small(after))
+
+
+def smalls_differ(a: np.ndarray, b: np.ndarray) -> bool:
+    """Return True if a cut lies between two pictures, of which these are small copies.
+
+    Copies are display values (height, width, 3), about SMALL pixels wide. Blocks of one are looked
+    for in the other within a fifth of the width. Measured: what is left is 0.55 to 0.63 of the
+    blocks' own contrast where all moves, by up to 118 of 640 px, and 0.97 to 1.48 between unrelated
+    pictures. A fade is no cut: its pictures are compared at equal brightness and contrast, where
+    0.2 to 0.45 is left, and 0.73 to 2.3 of unrelated pictures.
+    """
+    if a.shape != b.shape:
+        return True
+    if np.abs(a - b).mean() < _ALIKE:
+        return False
+    if min(a.shape[:2]) < _BLOCK:
+        return True
+    if _follows(a, b, _UNLIKE, _ALIKE):
+        return False
+    contrast = float(b.std()) / max(float(a.std()), 1e-6)
+    brighter = float(b.mean() - a.mean())
+    if abs(brighter) > _FADE or not 1 / _FADE_CONTRAST <= contrast <= _FADE_CONTRAST:
+        return True
+    return not _follows(a, (b - b.mean()) / contrast + a.mean(), _FADED, 0)
+
+
+def _follows(a: np.ndarray, b: np.ndarray, share: float, least: float) -> bool:
+    """Return True if blocks of `a`, found again in `b`, leave at most a share of their contrast.
+
+    A contrast below `least` counts as that.
+    """
+    height, width = (n // _BLOCK for n in a.shape[:2])
+    a = a[: height * _BLOCK, : width * _BLOCK]
+    blocks = _blocks(a)
+    contrast = np.abs(blocks - blocks.mean(axis=(1, 3), keepdims=True)).sum(axis=4).mean()
+    most = share * max(float(contrast), least)
+    reach = round(_SEARCH * b.shape[1] / _STEP) * _STEP
+    a = np.ascontiguousarray(np.moveaxis(a, 2, 0))  # planes: sums along rows are quick
+    b = np.pad(np.moveaxis(b, 2, 0), ((0, 0), (reach, reach), (reach, reach)), mode="edge")
+    left, apart = np.full((height, width), np.inf), np.empty_like(a)
+    for y, x in _ways(reach):
+        there = b[:, reach + y : reach + y + a.shape[1], reach + x : reach + x + a.shape[2]]
+        np.abs(np.subtract(a, there, out=apart), out=apart)
+        rows = apart.sum(axis=0).reshape(height, _BLOCK, -1).sum(axis=1)
+        left = np.minimum(left, rows.reshape(height, width, _BLOCK).sum(axis=2) / _BLOCK**2)
+        if left.mean() <= most:  # it can only become less
+            return True
+    return False
+
+
+@cache
+def _ways(reach: int) -> list[tuple[int, int]]:
+    """Displacements up to `reach` pixels down and across, the shortest first."""
+    ways = range(-reach, reach + 1, _STEP)
+    return sorted(((y, x) for y in ways for x in ways), key=lambda way: way[0] ** 2 + way[1] ** 2)
+
+
+def copies(a: np.ndarray, b: np.ndarray) -> bool:
+    """Return True if two pictures, of which these are pixels in even distances, are one.
+
+    Pixels are display values (height, width, 3). Codecs change a little in a copy; what moves
+    changes some place clearly.
+    """
+    if a.shape != b.shape:
+        return False
+    off = np.abs(a.astype(np.float32) - b).max(axis=2)
+    height, width = (n // _BLOCK * _BLOCK for n in off.shape)
+    worst = _blocks(off[:height, :width]).mean(axis=(1, 3)).max() if height and width else off.max()
+    return bool(off.mean() < _COPY and worst < _COPY_WORST)
+
+
+def _blocks(plane: np.ndarray) -> np.ndarray:
+    """(rows, _BLOCK, columns, _BLOCK, ...) of a plane whose sides are multiples of _BLOCK."""
+    height, width = (n // _BLOCK for n in plane.shape[:2])
+    return plane.reshape(height, _BLOCK, width, _BLOCK, *plane.shape[2:])
+
+
+def _small(color: np.ndarray) -> np.ndarray:
+    """Display values of a copy that is at least SMALL pixels wide, if the picture is."""
+    step = max(1, color.shape[1] // SMALL)
+    height, width = (n // step for n in color.shape[:2])
+    cut = color[: height * step, : width * step, :3]
+    parts = cut.reshape(height, step, width * step, 3).mean(axis=1, dtype=np.float32)
+    return srgb(np.clip(parts.reshape(height, width, step, 3).mean(axis=2), 0, 1))
+
+
+def jumps(frame: Frame, side: int) -> bool:
+    """Return True if the motion to the previous (`side` -1) or next (1) frame indicates a cut.
+
+    Half of the picture moves over a tenth of its width, and 8 times as far as to the other side.
+    """
+    x, y, width, _ = _probes(frame, np.random.default_rng(0))
+    with np.errstate(all="ignore"):
+        here, other = (np.median(np.hypot(*_way(frame, s, x, y).T)) for s in (side, -side))
+    return bool(here > max(_FAR * width, _JUMP * other))
+
+
+def straightened(frame: Frame, side: int) -> Frame:
+    """The frame without its motion to one side: paths go on there as they do on the other."""
+    motion = frame.motion
+    if motion is not None:
+        back, ahead = motion[..., :2], motion[..., 2:]
+        motion = np.concatenate([-ahead, ahead] if side < 0 else [back, -back], axis=2)
+    camera = frame.camera
+    if camera is not None and camera.prev is not None and camera.next is not None:
+        camera = replace(camera, **{"prev" if side < 0 else "next": None})
+    return replace(frame, motion=motion, camera=camera)
+
+
+def still(frame: Frame) -> Frame:
+    """The frame without motion: cuts lie on both of its sides."""
+    motion = np.zeros((*frame.color.shape[:2], 4), np.float32) if "motion" in frame.has else None
+    return replace(frame, motion=motion, camera=None, object_id=None, object_motion=False)
+
+
+def is_cut(frame: Frame, near: Frame, side: int) -> bool:
+    """Return True if a cut lies between `frame` and its neighbour `near` on `side` (-1 or 1).
+
+    2,000 pixels, each the mean of 3 x 3, are compared with where their motion puts them in
+    `near`, and with places picked at random: across a cut the two differ alike. The images may
+    be different parts of one display window; outside them is nothing.
+    """
+    rng = np.random.default_rng(0)
+    x, y, width, height = _probes(frame, rng)
+    first, other = (np.array((one.window or (0, 0))[:2]) for one in (frame, near))
+    with np.errstate(all="ignore"):
+        where = np.stack([x, y], axis=1) + _way(frame, side, x, y)
+        at = where + first
+        inside = ((at >= 0) & (at <= (width - 1, height - 1))).all(axis=1)
+    if inside.mean() < _INSIDE:
+        return True
+    there = np.rint(where[inside]).astype(int) + first - other
+    here = _tones(frame.color, x[inside], y[inside])
+    follows = _difference(here, _tones(near.color, *there.T))
+    unrelated = _difference(here, _tones(near.color, *rng.permutation(there).T))
+    return bool(follows > _CUT * unrelated)
+
+
+def _probes(frame: Frame, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, int, int]:
+    """Pixels x, y picked at random from the display window, and its width and height [px].
+
+    They are counted from the image's first pixel; where the image has none, nothing is there.
+    """
+    left, top, width, height = frame.window or (0, 0, *frame.size)
+    x, y = rng.integers(0, width, _PROBES), rng.integers(0, height, _PROBES)
+    return x - left, y - top, width, height
+
+
+def _way(frame: Frame, side: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(n, 2) way [px] of pixels x, y to a neighbouring frame; 0 outside the image."""
+    there = _within(frame.color, x, y)
+    way = np.zeros((len(x), 2))
+    way[there] = displacement(frame, side, x[there], y[there])
+    return way
+
+
+def _within(color: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    height, width = color.shape[:2]
+    return (x >= 0) & (x < width) & (y >= 0) & (y < height)
+
+
+def _tones(color: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(n, 3) means of 3 x 3 pixels, held below 1 so that no highlight decides; 0 outside."""
+    height, width = color.shape[:2]
+    total = np.zeros((len(x), 3))
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            at = np.clip(y + dy, 0, height - 1), np.clip(x + dx, 0, width - 1)
+            light = np.clip(np.nan_to_num(color[at][:, :3].astype(np.float64)), 0, 1e6)
+            total += light / (1 + light)
+    return np.where(_within(color, x, y)[:, None], total / 9, 0.0)
+
+
+def _difference(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.minimum(np.abs(a - b).sum(axis=1), _MOST).mean())

@@ -1,0 +1,205 @@
+"""Pictures in time, read once from first to last; cut into shots.
+
+A video is a reel, and so is a sequence of pictures whose rate is to change. Only the pictures
+around the present one are kept, however long it is.
+
+A flash is no shot: a picture, or some for up to a 24th of a second, that differ from those around
+them, which agree with each other. They are exposed with those around, but no motion leads to them.
+"""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+from ..exposure import Cell, cells
+from ..shutter import Shutter
+
+_BEYOND = 6  # pictures read beyond an exposure: as far as flow looks
+_TO_KEEP = 6  # pictures kept before an exposure
+FLASH = 1.01 / 24  # seconds that a flash of several pictures lasts at most
+LONGEST = 10  # pictures of a flash at most
+
+T = TypeVar("T")
+
+
+@dataclass
+class Picture(Generic[T]):
+    """One picture of a reel."""
+
+    time: float
+    """Time at which it is first shown [s]."""
+    content: T
+    """The picture itself: whatever the reel's tests for cuts and repeats take."""
+    number: int = 0
+    """Of the frame in its file."""
+    begins_shot: bool = False
+    breaks_motion: bool = False
+    """No motion leads to it from the one before: it begins a shot, or a flash, or ends one."""
+
+
+class Reel(Generic[T]):
+    """Reads `pictures` as far as is asked for; they count from 0 on, without those left out.
+
+    `is_cut(before, after)`: whether a cut lies between the contents of two pictures;
+    `known_cuts`: numbers of pictures that begin a shot all the same.
+    `is_double(before, after)`: whether a picture only repeats the one before; it is left out, and
+    its neighbours' cells reach over its time.
+    `flash`: how long a flash of several pictures lasts at most [s].
+    """
+
+    def __init__(
+        self,
+        pictures: Iterator[Picture[T]],
+        *,
+        is_cut: Callable[[T, T], bool] | None = None,
+        known_cuts: Collection[int] = (),
+        is_double: Callable[[T, T], bool] | None = None,
+        flash: float = FLASH,
+    ):
+        self._pictures = pictures
+        self._is_cut, self._is_double = is_cut, is_double
+        self._known_cuts, self._flash = known_cuts, flash
+        self._kept: dict[int, Picture[T]] = {}
+        self._count = 0
+        self._last: Picture[T] | None = None
+        self._waiting: deque[Picture[T]] = deque()  # read, to tell a flash from a shot
+        self._flash_ends = float("-inf")
+        self.cuts: list[int] = []
+        self.flashes: list[int] = []
+        self.doubles: list[int] = []
+
+    def __getitem__(self, index: int) -> Picture[T]:
+        """A picture that is kept; KeyError for others."""
+        return self._kept[index]
+
+    @property
+    def kept(self) -> range:
+        """Indices of the pictures that are kept."""
+        return range(min(self._kept, default=0), max(self._kept, default=-1) + 1)
+
+    def at(self, time: float, behind: int = _TO_KEEP) -> int:
+        """The index of the picture that is shown at `time`; some after it are kept, too.
+
+        Asked for in the order of time, or as far back as is kept: `behind` pictures. LookupError if
+        there are no pictures.
+        """
+        self._read_beyond(time)
+        here = self._index_at(time)
+        self._forget_before(here - behind)
+        return here
+
+    def cells(self, at: float, interval: float, shutter: Shutter) -> list[Cell]:
+        """The cells of an output frame (see exposure.cells); their indices are the reel's.
+
+        Asked for in the order of time, as what lies before is forgotten.
+        """
+        self._read_beyond(at + interval * max(shutter.span[1], 0.0))
+        here = self._index_at(at)
+        first, last = here, here
+        while first > min(self._kept) and self.same_shot(first, first - 1):
+            first -= 1
+        while self.same_shot(last, last + 1):
+            last += 1
+        times = [self._kept[i].time for i in range(first, last + 1)]
+        found = cells(times, at, interval, shutter)
+        self._forget_before(min(first + found[0].index, here) - _TO_KEEP)
+        return [replace(cell, index=first + cell.index) for cell in found]
+
+    def same_shot(self, index: int, other: int) -> bool:
+        """True if two pictures are kept, and no cut lies between them."""
+        between = self._up_to(index, other)
+        return between is not None and not any(picture.begins_shot for picture in between)
+
+    def moves_on(self, index: int, other: int) -> bool:
+        """True if two pictures are kept, and neither a cut nor a flash lies between them."""
+        between = self._up_to(index, other)
+        return between is not None and not any(picture.breaks_motion for picture in between)
+
+    def _up_to(self, index: int, other: int) -> list[Picture[T]] | None:
+        """The pictures after the first of two up to the other; None unless both are kept."""
+        first, last = min(index, other), max(index, other)
+        if first not in self._kept or last not in self._kept:
+            return None
+        return [self._kept[i] for i in range(first + 1, last + 1)]
+
+    def _index_at(self, time: float) -> int:
+        """The picture that is shown at `time`; before the first one, that."""
+        if not self._kept:
+            raise LookupError("no pictures")
+        shown = [i for i, picture in self._kept.items() if picture.time <= time]
+        return max(shown, default=min(self._kept))
+
+    def _read_beyond(self, time: float) -> None:
+        beyond = sum(picture.time > time for picture in self._kept.values())
+        while beyond < _BEYOND and self._read_one():
+            beyond += self._kept[self._count - 1].time > time
+
+    def _read_one(self) -> bool:
+        picture = self._next()
+        if picture is None:
+            return False
+        if self._last is not None:
+            self._compare(self._last, picture)
+        self._last = picture
+        self._kept[self._count] = picture
+        self._count += 1
+        return True
+
+    def _compare(self, before: Picture[T], picture: Picture[T]) -> None:
+        """Tell whether a shot or a flash begins with a picture."""
+        if picture.number in self._known_cuts:
+            picture.begins_shot = picture.breaks_motion = True
+        elif self._is_cut is not None and self._is_cut(before.content, picture.content):
+            picture.breaks_motion = True
+            ends = self._end_of_flash(before, picture, self._is_cut)
+            if ends is not None:
+                self.flashes.append(picture.number)
+                self._flash_ends = max(self._flash_ends, ends)
+            picture.begins_shot = picture.time > self._flash_ends
+        if picture.begins_shot:
+            self.cuts.append(picture.number)
+
+    def _end_of_flash(
+        self, before: Picture[T], begins: Picture[T], is_cut: Callable[[T, T], bool]
+    ) -> float | None:
+        """Time of the first picture that continues `before`; None if none does soon."""
+        for ahead in range(LONGEST):
+            picture = self._ahead(ahead)
+            if picture is None or picture.number in self._known_cuts:
+                return None
+            if ahead and picture.time > begins.time + self._flash:
+                return None
+            if not is_cut(before.content, picture.content):
+                return picture.time
+        return None
+
+    def _next(self) -> Picture[T] | None:
+        """The next picture that is not left out."""
+        if self._ahead(0) is None:
+            return None
+        return self._waiting.popleft()
+
+    def _ahead(self, count: int) -> Picture[T] | None:
+        """The picture that will be next after `count` others; None after the last one."""
+        while len(self._waiting) <= count:
+            picture = next(self._pictures, None)
+            if picture is None:
+                return None
+            before = self._waiting[-1] if self._waiting else self._last
+            if before is not None and self._repeats(before, picture):
+                self.doubles.append(picture.number)
+            else:
+                self._waiting.append(picture)
+        return self._waiting[count]
+
+    def _repeats(self, before: Picture[T], picture: Picture[T]) -> bool:
+        return self._is_double is not None and self._is_double(before.content, picture.content)
+
+    def _forget_before(self, index: int) -> None:
+        for old in [i for i in self._kept if i < index and i + 1 in self._kept]:
+            del self._kept[old]

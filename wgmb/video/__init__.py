@@ -1,0 +1,1 @@
+"""Videos: read, as linear light on the GPU, and written."""

@@ -1,0 +1,170 @@
+"""The pictures of a reel on the GPU, with the motion between them: nothing comes down."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..exposure import evened
+from ..flow import Shot
+from ..flow.source import MotionSource
+from ..gpu.textures import TexturePool
+from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
+from ..pipeline.blur import Blur
+from ..shots.reader import Reel
+from .planes import Planes
+from .thumbnail import Glance
+
+LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two that are summed
+_TEXEL = "rgba16float"
+_FRAMES = 3  # with motion: a frame and its neighbours
+
+
+class ReelViews:
+    """Textures of a reel's pictures, on the device of the Blur that takes them.
+
+    `motion`: where motion comes from, or None. `holdout` (height, width): 1 stays sharp.
+    `highlights`: times white that white becomes; motion is searched without.
+    """
+
+    def __init__(
+        self,
+        reel: Reel[Glance],
+        blur: Blur,
+        motion: MotionSource | None = None,
+        holdout: np.ndarray | None = None,
+        highlights: float = 1.0,
+    ):
+        self._reel, self._source = reel, motion
+        self._device = blur.device
+        self._planes, self._plain = Planes(blur.device, highlights), Planes(blur.device)
+        self._images = TexturePool(blur.device)
+        self._neighbours = "neighbours" in blur.method.uses
+        self._holdout: View | None = None
+        if holdout is not None and motion is not None:
+            texel = TEXTURES["holdout"]["format"]
+            self._holdout = self._images.upload("holdout", holdout, texel)
+        self._lights: dict[int, str] = {}  # names of textures by index, the latest last
+        self._frames: dict[int, FrameViews] = {}
+        self._shot: Callable[[int], Any] | None = None
+        self._first = 0  # a picture of the present shot
+
+    def shown(self, index: int) -> FrameInShot:
+        """A picture, between its neighbours if the method takes them.
+
+        What it refers to may be overwritten once two others have been asked for.
+        """
+        wanted = [index]
+        if self._source is not None and self._neighbours:
+            wanted = [i for i in (index - 1, index, index + 1) if self._reel.moves_on(index, i)]
+        found = {i: self._frame(i) for i in wanted}
+        near = (found.get(i) for i in (index - 1, index + 1))
+        before, after = (one if one is not None and one.has_vectors else None for one in near)
+        return FrameInShot(found[index], before, after, self._reel[index].number)
+
+    def _frame(self, index: int) -> FrameViews:
+        """The views of one picture."""
+        kept = self._frames.get(index)
+        light = self._light(index).create_view()
+        if kept is not None and index in self._lights and kept.color.texture is light.texture:
+            return kept
+        found = self._motion(index)
+        motion, depth = found or (None, None)
+        holdout = self._holdout if found else None
+        made = FrameViews(color=light, motion=motion, depth=depth, holdout=holdout, key=object())
+        while len(self._frames) >= _FRAMES:
+            self._frames.pop(next(iter(self._frames)))
+        self._frames[index] = made
+        return made
+
+    def _light(self, index: int) -> wgpu.GPUTexture:
+        """The texture of one picture, kept until others need its place."""
+        content = self._reel[index].content
+        if index in self._lights:
+            self._lights[index] = self._lights.pop(index)
+        else:
+            free = {f"light {n}" for n in range(LIGHTS)} - set(self._lights.values())
+            oldest = next(iter(self._lights), None)
+            self._lights[index] = min(free) if free else self._lights.pop(oldest or 0)
+            self._decode(self._planes, content, self._lights[index])
+        return self._images.texture(self._lights[index], content.coded.size, _TEXEL)
+
+    def _decode(self, planes: Planes, content: Glance, name: str) -> wgpu.GPUTexture:
+        texture = self._images.texture(name, content.coded.size, _TEXEL)
+        encoder = self._device.create_command_encoder(label="decode")
+        planes.decode(encoder, content.coded, texture.create_view())
+        gpu.submit(self._device, encoder)
+        return texture
+
+    def _motion(self, index: int) -> tuple[View, View] | None:
+        """Motion and depth of a picture, within its own interval of time."""
+        if self._source is None:
+            return None
+        if self._shot is None or not self._reel.moves_on(self._first, index):
+            # The first of a shot that is kept is the same, whatever was asked for before.
+            self._shot = self._source.shot(self._load)
+        self._first = index
+        factors = self._factors(index)
+        if isinstance(self._shot, Shot):
+            textures = self._shot.textures(index)
+            if textures is None:
+                return None
+            motion = textures.motion
+            if factors != (1.0, 1.0):
+                motion = self._paced(motion, index, factors)
+            return motion.create_view(), textures.depth.create_view()
+        arrays = self._shot(index)
+        if arrays is None:
+            return None
+        motion, depth = arrays
+        if factors != (1.0, 1.0):
+            motion = motion * np.repeat(factors, 2).astype(np.float32)
+        place = index % _FRAMES
+        return (
+            self._images.upload(f"motion {place}", motion, "rgba32float"),
+            self._images.upload(f"depth {place}", depth, "r32float"),
+        )
+
+    def _load(self, index: int) -> Any:
+        """The picture of an index of the present shot, None outside it."""
+        if not self._reel.moves_on(self._first, index):
+            return None
+        content = self._reel[index].content
+        if isinstance(self._shot, Shot):
+            return self._decode(self._plain, content, "searched")
+        return content.grey
+
+    def _factors(self, index: int) -> tuple[float, float]:
+        """See exposure.evened."""
+        near = [i for i in (index - 1, index, index + 1) if self._reel.same_shot(index, i)]
+        times = np.array([self._reel[i].time for i in near])
+        back, ahead = (self._reel.moves_on(index, i) for i in (index - 1, index + 1))
+        return evened(times, near.index(index), (back, ahead))
+
+    def _paced(
+        self, motion: wgpu.GPUTexture, index: int, factors: tuple[float, float]
+    ) -> wgpu.GPUTexture:
+        """A copy of a motion, multiplied."""
+        size = motion.size[0], motion.size[1]
+        output = self._images.texture(f"motion {index % _FRAMES}", size, "rgba32float")
+        kernel = gpu.kernel(self._device, "video/gpu_frames.wgsl")
+        pace = np.zeros((), kernel.source.dtype("Pace"))
+        pace["factors"] = np.repeat(factors, 2)
+        uniform, create = wgpu.BufferUsage.UNIFORM, self._device.create_buffer_with_data
+        encoder = self._device.create_command_encoder(label="pace")
+        kernel.run(
+            encoder,
+            "main",
+            gpu.FrameBindings.of_size(self._device, size),
+            pace=create(data=pace, usage=uniform),
+            motion=motion.create_view(),
+            output=output.create_view(),
+        )
+        gpu.submit(self._device, encoder)
+        return output

@@ -1,0 +1,41 @@
+"""Holdouts of a video: image files, or the pixels that never change while all around them do."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from ..color.srgb import srgb
+from ..errors import InputError, size_text
+from ..io import stills
+from .read.reader import Footage
+from .static_areas import overlay_of
+
+STATIC = "static"  # as a holdout: what never changes while all around it does
+
+
+def holdout_of(masks: Iterable[str], footage: Footage) -> np.ndarray | None:
+    """(height, width) float32, 1 stays sharp: all masks together; None without any.
+
+    A mask is STATIC or an image file of the video's size, of whose first channel the display values
+    count; InputError for others.
+    """
+    whole: np.ndarray | None = None
+    for mask in masks:
+        plane = overlay_of(footage) if mask == STATIC else _matte(mask)
+        if plane.shape[::-1] != footage.size:
+            expected = "{} x {}".format(*footage.size)
+            raise InputError(f"{mask} must be {expected} like the video, got {size_text(plane)}")
+        whole = plane if whole is None else np.maximum(whole, plane)
+    return whole
+
+
+def _matte(mask: str) -> np.ndarray:
+    if Path(mask).suffix.lower() not in stills.SUFFIXES:
+        known = f"{STATIC}, or an image file {' '.join(stills.SUFFIXES)}"
+        raise InputError(f"holdout of a video must be {known}; got {mask!r}")
+    return srgb(stills.read(mask)[..., 0])

@@ -1,0 +1,98 @@
+"""The output frames of a video: which part of it they are made from, and when each is shown."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import overload
+
+from ..errors import InputError
+from .clock import Clock
+from .read.reader import Footage
+
+_SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
+_HELD = Fraction(1, 2)  # of a picture's interval beyond it: less is rounding
+
+
+@dataclass(frozen=True)
+class Moment:
+    """An output frame: its number from 0 on; its time and interval [s], on the output's clock."""
+
+    number: int
+    time: Fraction
+    interval: Fraction
+
+
+class Moments(Sequence[Moment]):
+    """The output frames of a video: at `fps`, or at the times of its own pictures where it is None.
+
+    From the first picture that `clock` lets through to the end of the last one. A last picture that
+    is held is shown once more where its own interval ends, so that no time is lost. InputError if
+    `clock` lets none through.
+    """
+
+    def __init__(self, footage: Footage, clock: Clock, fps: Fraction | None):
+        times = footage.times
+        first = 0 if clock.first is None else _count_before(times, clock.first)
+        last = len(times) if clock.end is None else _count_before(times, clock.end)
+        if first >= last:
+            raise InputError(f"{footage.path}: has no pictures in this range")
+        self._clock = clock
+        self._own: list[Fraction] | None = None
+        self._begin = clock.out(times[first])
+        self._step = 1 / (fps or footage.rate * clock.speed)
+        end = footage.until if clock.end is None else min(footage.until, clock.end)
+        if fps is not None:
+            self._count = max(1, math.ceil((clock.out(end) - self._begin) * fps - _SPARE))
+            return
+        self._own, self._count = list(times[first:last]), last - first
+        again = footage.until - 1 / footage.rate
+        if times[-1] + _HELD / footage.rate < again < end:
+            self._own.append(again)
+            self._count += 1
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> Moment: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Moment]: ...
+    def __getitem__(self, index: int | slice) -> Moment | list[Moment]:
+        numbers = range(self._count)[index]
+        return (
+            [self._moment(k) for k in numbers]
+            if isinstance(numbers, range)
+            else self._moment(numbers)
+        )
+
+    def nearest(self, time: Fraction) -> int:
+        """The number of the output frame whose time is nearest to `time` [s], on its clock."""
+        if self._own is None:
+            return min(max(round((time - self._begin) / self._step), 0), self._count - 1)
+        after = _count_before(self._own, self._clock.back(time))
+        near = {min(max(n, 0), self._count - 1) for n in (after - 1, after)}
+        return min(near, key=lambda n: (abs(self[n].time - time), n))
+
+    def _moment(self, number: int) -> Moment:
+        if self._own is None:
+            return Moment(number, self._begin + number * self._step, self._step)
+        return Moment(number, self._clock.out(self._own[number]), self._step)
+
+
+def _count_before(times: Sequence[Fraction], time: Fraction) -> int:
+    """Number of the ascending times before one."""
+    low, high = 0, len(times)
+    while low < high:
+        middle = (low + high) // 2
+        low, high = (middle + 1, high) if times[middle] < time else (low, middle)
+    return low
+
+
+def moments(footage: Footage, clock: Clock, fps: Fraction | None) -> list[Moment]:
+    """All Moments of a video."""
+    return list(Moments(footage, clock, fps))

@@ -1,0 +1,140 @@
+"""Stored planes of videos to linear light and back, on the GPU: matrix, range, transfer, alpha."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import numpy as np
+import wgpu
+
+from ... import gpu
+from ...color.coding import CodedPicture, Coding
+from ...gpu.textures import TexturePool
+from .average import Average, averages
+from .matrices import from_samples
+from .packed import Packed, Place, places_of
+from .uniforms import curve_of, reading, writing
+
+__all__ = ["Average", "Planes", "averages", "check"]
+
+
+def check(coding: Coding) -> None:
+    """InputError where a picture's matrix or transfer is not known here."""
+    curve_of(coding)
+    from_samples(coding)
+
+
+class Planes:
+    """Converts pictures on one device; keeps its textures from picture to picture.
+
+    `highlights`: times white that white becomes in light (see color/highlights.py); 1 is off.
+    """
+
+    def __init__(self, device: wgpu.GPUDevice, highlights: float = 1.0):
+        self._highlights = highlights
+        self._device, self._images, self._packed = device, TexturePool(device), Packed(device)
+
+    def decode(
+        self, encoder: wgpu.GPUCommandEncoder, picture: CodedPicture, output: wgpu.GPUTextureView
+    ) -> None:
+        """Upload a picture and record its way into `output`, rgba16float or rgba32float."""
+        coding = picture.coding
+        check(coding)
+        deep = "r16uint" if coding.bits > 8 else "r8uint"
+        views = [
+            self._images.upload(f"plane {i}", plane, deep) for i, plane in enumerate(picture.planes)
+        ]
+        alpha = views.pop() if coding.alpha else None
+        kernel = gpu.kernel(
+            self._device,
+            "video/planes/decode.wgsl",
+            {"Output": output.texture.format},
+            CURVE=curve_of(coding),
+            HIGHLIGHTS=self._highlights,
+            GREY=coding.model == "grey",
+            ALPHA=coding.alpha,
+        )
+        kernel.run(
+            encoder,
+            "main",
+            gpu.FrameBindings.of_size(self._device, picture.size),
+            code=reading(self._device, coding),
+            plane0=views[0],
+            plane1=views[1 % len(views)],
+            plane2=views[2 % len(views)],
+            plane3=alpha or views[0],
+            output=output,
+        )
+
+    def encode(
+        self, encoder: wgpu.GPUCommandEncoder, light: wgpu.GPUTextureView, coding: Coding
+    ) -> CodedPicture:
+        """Record the way of a picture's light to its planes, submit all, and return them."""
+        check(coding)
+        size = light.size[0], light.size[1]
+        samples = self._images.texture("samples", size, "rgba32float")
+        kernel = gpu.kernel(
+            self._device,
+            "video/planes/encode.wgsl",
+            {"Output": "rgba32float"},
+            CURVE=curve_of(coding),
+            HIGHLIGHTS=self._highlights,
+            ALPHA=coding.alpha,
+        )
+        kernel.run(
+            encoder,
+            "main",
+            gpu.FrameBindings.of_size(self._device, size),
+            code=writing(self._device, coding),
+            light=light,
+            output=samples.create_view(),
+        )
+        places = places_of(size, coding)
+        for place in places:
+            self._pack(encoder, samples, place, places, coding)
+        return self._packed.read(encoder, places, coding)
+
+    def compress(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        light: wgpu.GPUTextureView,
+        output: wgpu.GPUTextureView,
+    ) -> None:
+        """Record the way of light with `highlights` into `output` without them, rgba32float."""
+        size = light.size[0], light.size[1]
+        kernel = gpu.kernel(
+            self._device,
+            "video/planes/compress.wgsl",
+            {"Output": "rgba32float"},
+            HIGHLIGHTS=self._highlights,
+        )
+        frame = gpu.FrameBindings.of_size(self._device, size)
+        kernel.run(encoder, "main", frame, light=light, output=output)
+
+    def _pack(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        samples: wgpu.GPUTexture,
+        place: Place,
+        places: list[Place],
+        coding: Coding,
+    ) -> None:
+        """Record a plane's bytes."""
+        kernel = gpu.kernel(
+            self._device,
+            "video/planes/pack.wgsl",
+            COMPONENT=place.component,
+            BITS=16 if coding.bits > 8 else 8,
+        )
+        data = np.zeros((), kernel.source.dtype("Plane"))
+        data["size"], data["step"] = place.size, place.step
+        data["words"], data["first"], data["most"] = place.words, place.first, 2**coding.bits - 1
+        uniform = wgpu.BufferUsage.UNIFORM
+        kernel.run(
+            encoder,
+            "main",
+            gpu.FrameBindings.of_size(self._device, (place.words, place.size[1])),
+            plane=self._device.create_buffer_with_data(data=data, usage=uniform),
+            samples=samples.create_view(),
+            packed=self._packed.buffer(places),
+        )

@@ -1,0 +1,96 @@
+"""Open video files for reading; what is wrong with one, in one line."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import av
+from av.container import InputContainer
+from av.error import FFmpegError
+from av.stream import Disposition
+from av.video.stream import VideoStream
+
+from ...errors import InputError
+from ...io.frame_numbers import readable
+
+_BEGINNING = 1 << 20  # bytes
+_BOXES = (b"ftyp", b"mdat", b"wide", b"free", b"skip", b"pnot")  # that begin an MP4 or MOV
+
+
+def opened(path: Path) -> InputContainer:
+    """The file, open for reading; InputError in one line that names it.
+
+    Nothing else is read: no other file, and nothing from a network, whatever it refers to.
+    """
+    if not readable(path):
+        raise InputError(f"{path}: {'is not a file' if path.exists() else 'no such file'}")
+    if not path.stat().st_size:
+        raise InputError(f"{path}: is empty")
+    try:
+        return av.open(
+            f"file:{os.fspath(path)}",
+            container_options={"protocol_whitelist": "file"},
+            metadata_errors="replace",
+        )
+    except (FFmpegError, OSError, UnicodeError) as error:
+        raise InputError(f"{path}: {_what_is_wrong(path, error)}") from None
+
+
+def picture_stream(container: InputContainer, path: Path) -> VideoStream:
+    """The stream of moving pictures: the one FFmpeg thinks best, but never a cover, nor the alpha.
+
+    Animated AVIF holds alpha as grey pictures in a stream of its own, which may be thought best.
+    """
+    streams = [s for s in container.streams.video if not s.disposition & Disposition.attached_pic]
+    if not streams:
+        there = ", ".join(dict.fromkeys(s.type for s in container.streams)) or "nothing"
+        raise InputError(f"{path}: has no pictures that move; it holds {there}")
+    best = container.streams.best("video")
+    chosen = next((s for s in streams if best is not None and s.index == best.index), streams[0])
+    if _is_grey(chosen):
+        colored = (s for s in streams if s.frames == chosen.frames and not _is_grey(s))
+        chosen = next(colored, chosen)
+    if chosen.codec_context is None:
+        raise InputError(f"{path}: its pictures are of a codec that is not known here")
+    return chosen
+
+
+def _is_grey(stream: VideoStream) -> bool:
+    context = stream.codec_context
+    return context is not None and (context.pix_fmt or "").startswith("gray")
+
+
+def _what_is_wrong(path: Path, error: Exception) -> str:
+    if _lacks_index(path):
+        return "is cut off: its index (moov), which comes last, is missing"
+    text = getattr(error, "strerror", None) or str(error)
+    if getattr(error, "errno", 0) and not isinstance(error, ValueError):
+        return text.lower()
+    with open(path, "rb") as file:
+        if b"encv" in file.read(_BEGINNING):
+            return "is encrypted"
+    return "is not a video, or its beginning is damaged"
+
+
+def _lacks_index(path: Path) -> bool:
+    """Return True for an MP4 or MOV whose boxes end without a moov."""
+    size, at, first = path.stat().st_size, 0, True
+    with open(path, "rb") as file:
+        while at + 8 <= size:
+            file.seek(at)
+            head = file.read(16)
+            length, kind = int.from_bytes(head[:4], "big"), head[4:8]
+            if first and kind not in _BOXES:
+                return False
+            if kind == b"moov":
+                return False
+            first = False
+            if length == 1:
+                length = int.from_bytes(head[8:16], "big")
+            if length == 0:  # to the end of the file
+                return True
+            if length < 8:
+                return False
+            at += length
+    return not first

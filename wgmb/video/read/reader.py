@@ -1,0 +1,362 @@
+"""Videos as pictures with times: any file that FFmpeg decodes.
+
+A video is read forwards once, from the key frame before the first picture asked for. Pictures come
+as they are stored (color/coding.py), upright and without interlacing. Colours are not converted.
+"""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import contextlib
+import struct
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import islice
+from pathlib import Path
+from typing import cast
+
+import av
+import numpy as np
+from av.audio.stream import AudioStream
+from av.sidedata.sidedata import SideData, Type
+from av.stream import Stream
+from av.video.reformatter import VideoReformatter
+from av.video.stream import VideoStream
+
+from ...color.coding import CodedPicture
+from ...errors import InputError
+from ...io import limits
+from ..hdr10 import LightLevel, Mastering, is_base_layer
+from ..pixels import (
+    THREADS,
+    Layout,
+    is_transparent,
+    layout,
+    planes_of,
+)
+from ..write.encoders import Facts
+from .color_tags import assumed, either, tags_of
+from .container import opened, picture_stream
+from .decoder import Decoder, decoded
+from .deinterlace import Fields
+from .rotation import turn_of
+from .timeline import Times, scanned
+
+_OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
+_REORDERED = 12  # pictures that are looked at to tell times of decoding from times of showing
+
+
+@dataclass(frozen=True)
+class OtherStream:
+    """A stream of sound, subtitles, attachments or data."""
+
+    index: int
+    kind: str
+    """audio, subtitle, attachment, data; video for covers and further pictures."""
+    codec: str
+    language: str
+    title: str
+    text: str
+    """Its kind in words, such as "aac, 48000 Hz, stereo"."""
+
+
+class Footage:
+    """A video file.
+
+    Pictures have numbers from 0 on and are at `times` [s], on the clock that the file's streams
+    share. `rate`: pictures a second, usually; `is_variable` if the times keep no steady rate.
+    `size` [px] is that of upright pictures. `assumed`: what the file does not say about its colours
+    and what is taken instead. `notes`: lines that a user should know. Numbers of the pictures,
+    of those asked for so far, that could not be decoded are `missing`; that the decoder mended,
+    `damaged`; that had another size, `scaled`. `index`: of their stream in the file.
+
+    InputError in one line for a file that cannot be read, that has no pictures, or whose pictures
+    would take more than `max_mb` megabytes each (see limits.py).
+    """
+
+    def __init__(self, path: str | Path, *, max_mb: float = limits.MAX_MB):
+        self.path = Path(path)
+        self.missing: set[int] = set()
+        self.damaged: set[int] = set()
+        self.scaled: set[int] = set()
+        self._is_at_end = False
+        self.notes: list[str] = []
+        with opened(self.path) as container:
+            stream = picture_stream(container, self.path)
+            self.index = stream.index
+            self._check_size(stream, max_mb)
+            self.container = container.format.name
+            self.codec = stream.codec_context.codec.canonical_name  # not that of the decoder
+            self.metadata = dict(container.metadata)
+            self.chapters = len(container.chapters())
+            self.streams = tuple(_described(s) for s in container.streams if s is not stream)
+            self._tagged = tags_of(stream.codec_context)
+            self._field_order = stream.codec_context.field_order
+            self._pixel_aspect = stream.sample_aspect_ratio or Fraction(1)
+            if stream.metadata.get("alpha_mode") == "1":
+                self.notes.append("its transparency (VP8 or VP9 alpha) is not read")
+            self._packets = scanned(container, stream)
+        if not len(self._packets.times):
+            raise InputError(f"{self.path}: {self._packets.problem or 'holds no pictures'}")
+        self._look()
+
+    def _check_size(self, stream: VideoStream, max_mb: float) -> None:
+        width, height = stream.codec_context.width, stream.codec_context.height
+        if not (width and height) and stream.codec_context.name == "webp":
+            raise InputError(f"{self.path}: animated WebP is not read; GIF, APNG and AVIF are")
+        if not (width and height):
+            raise InputError(f"{self.path}: its pictures have no size; it may be cut off")
+        if not 0 < min(width, height) <= max(width, height) <= limits.MOST_PIXELS_A_SIDE:
+            raise InputError(
+                f"{self.path}: pictures of {width} x {height}, expected 1 to "
+                f"{limits.MOST_PIXELS_A_SIDE} pixels a side"
+            )
+        promised = limits.unpacked((width, height), 4)
+        stored = self.path.stat().st_size
+        limits.check(self.path, f"{width} x {height}", promised, stored, max_mb)
+
+    def _look(self) -> None:
+        """Decode one picture: what it says of itself counts more than what the header says."""
+        if self._packets.is_encrypted:  # some of its noise may be taken for pictures
+            raise InputError(f"{self.path}: is encrypted")
+        with opened(self.path) as container:
+            stream = cast(VideoStream, container.streams[self.index])
+            frames = decoded(container, stream)
+            frame = next(frames, None)
+            if (counted := self._packets.counted) is not None:
+                shown = [one.pts for one in islice(frames, _REORDERED) if one.pts is not None]
+                if shown != sorted(shown):  # as in VC-1 and RealVideo: times of decoding
+                    self._packets = counted
+        if frame is None:
+            raise InputError(f"{self.path}: none of its pictures can be decoded ({self.codec})")
+        self.pixels = frame.format.name
+        found = layout(self.pixels, is_transparent(frame))
+        if found is None:
+            raise InputError(f"{self.path}: pixels of kind {self.pixels} are not supported")
+        self._layout: Layout = found
+        self._frame_size = frame.width, frame.height
+        side = _side_data(frame)
+        self._turn = turn_of(side.get(Type.DISPLAYMATRIX), frame.rotation)
+        self.mastering = _read(Mastering, side.get(Type.MASTERING_DISPLAY_METADATA))
+        self.light_level = _read(LightLevel, side.get(Type.CONTENT_LIGHT_LEVEL))
+        tags = either(tags_of(frame), self._tagged)
+        coding, self.assumed = assumed(found, self._frame_size, self.codec, tags)
+        turned = coding.steps[::-1] if self._turn.swaps else coding.steps
+        self.coding = replace(coding, steps=turned)
+        self.is_interlaced = frame.interlaced_frame or self._field_order in _OF_FIELDS
+        if not self._packets.in_order and frame.pts is not None:
+            first = int(np.searchsorted(self._packets.times.ticks, frame.pts))
+            if 0 < first < len(self._packets.times):
+                self._packets = self._packets.from_picture(first)
+                self.notes.append(f"its first {first} pictures lack the one they build on")
+        self._decoder = Decoder(self.path, self.index, self._packets)
+        self._timeline = self._packets.doubled() if self.is_interlaced else self._packets
+        self._note(side)
+
+    def _note(self, side: dict[Type, bytes]) -> None:
+        if self.assumed:
+            self.notes.append(f"does not state its colours: {', '.join(self.assumed)} assumed")
+        if self.is_interlaced:
+            self.notes.append(
+                f"interlaced: each of its {len(self._packets.times)} frames is taken as two "
+                f"pictures ({float(self.rate):g} a second)"
+            )
+        if self._packets.is_assumed:
+            self.notes.append(f"does not say when its pictures are shown: {float(self.rate):g} a "
+                              "second assumed")  # fmt: skip
+        if not is_base_layer(side.get(Type.DOVI_METADATA, b"")):
+            self.notes.append(
+                "is Dolby Vision without a base layer (profile 5): its colours come out wrong"
+            )
+        elif Type.DOVI_METADATA in side or Type.DOVI_RPU_BUFFER in side:
+            self.notes.append("Dolby Vision data is not used: pictures are those of its base layer")
+        if Type.DYNAMIC_HDR_PLUS in side:
+            self.notes.append("HDR10+ data is not kept")
+        if self._turn.odd:
+            self.notes.append("is turned by other than a multiple of 90 degrees, which is left out")
+        if self._packets.lacks:
+            end, whole = (float(self._packets.end + more) for more in (0, self._packets.lacks))
+            self.notes.append(f"is cut off: it ends at {end:.2f} s of {whole:.2f} s")
+        elif gaps := self._packets.gaps:
+            at, longest = gaps[0], max(length for _, length in gaps)
+            often = "once" if len(gaps) == 1 else f"{len(gaps)} times"
+            self.notes.append(
+                f"its pictures, steady elsewhere, pause {often} for up to {longest:.2f} s, "
+                f"first at {at[0]:.2f} s: perhaps some were lost"
+            )
+        if self._packets.problem:
+            at = float(self._packets.end)
+            self.notes.append(f"is damaged after {at:.2f} s: {self._packets.problem.lower()}")
+
+    @property
+    def times(self) -> Times:
+        """Times of the pictures [s]: ascending Fractions."""
+        return self._timeline.times
+
+    @property
+    def rate(self) -> Fraction:
+        """Pictures a second, without gaps and hitches; a known rate if within 0.1 % of one."""
+        return self._timeline.rate
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Shortest and longest time from a picture to the next [s]."""
+        steps = self._timeline.steps
+        base = float(self.times.base)
+        return (float(steps.min()) * base, float(steps.max()) * base) if len(steps) else (0.0, 0.0)
+
+    @property
+    def is_variable(self) -> bool:
+        """Return True if the pictures keep no steady rate."""
+        return self._timeline.is_variable
+
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """Begin and length of the pauses of a rate that is steady elsewhere [s]."""
+        return self._timeline.gaps
+
+    @property
+    def has_rate(self) -> bool:
+        """Return True if the steps are alike to a quarter, apart from a few pauses."""
+        return self._timeline.has_rate
+
+    @property
+    def duration(self) -> Fraction:
+        """From the first picture to the end of the last one [s]."""
+        return self.until - self.times[0]
+
+    @property
+    def until(self) -> Fraction:
+        """The end of the last picture [s]."""
+        return self._timeline.until
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of upright pictures [px]."""
+        width, height = self._frame_size
+        return (height, width) if self._turn.swaps else (width, height)
+
+    @property
+    def pixel_aspect(self) -> Fraction:
+        """Width of an upright pixel to its height."""
+        return 1 / self._pixel_aspect if self._turn.swaps else self._pixel_aspect
+
+    @property
+    def facts(self) -> Facts:
+        """Facts about the pictures besides their coding."""
+        return Facts(self.pixel_aspect, self.mastering, self.light_level)
+
+    @property
+    def rotation(self) -> int:
+        """Degrees by which pictures are turned clockwise to be upright."""
+        return self._turn.degrees
+
+    def loss(self) -> str:
+        """Requested pictures that could not be read, in one line; '' if there are none."""
+        said = []
+        if self.missing:
+            at, all_ = float(self.times[min(self.missing)]), len(self.times)
+            text = f"{len(self.missing)} of {all_} pictures could not be decoded"
+            said.append(f"{text}, the first at {at:.2f} s")
+        if self.damaged:
+            at = float(self.times[min(self.damaged)])
+            said.append(f"{len(self.damaged)} pictures are damaged, the first at {at:.2f} s")
+        if self._packets.lacks and self._is_at_end:
+            count, at = round(self._packets.lacks * self.rate), float(self._packets.end)
+            said.append(f"about {count} pictures after {at:.2f} s are lost, as it is cut off")
+        return f"{self.path}: {'; '.join(said)}" if said else ""
+
+    def scaling(self) -> str:
+        """Requested pictures that were scaled, in one line; '' if there are none."""
+        if not self.scaled:
+            return ""
+        at, size = float(self.times[min(self.scaled)]), "{} x {}".format(*self.size)
+        return f"{len(self.scaled)} pictures of another size were scaled to {size}, from {at:.2f} s"
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __iter__(self) -> Iterator[tuple[int, CodedPicture]]:
+        return self.pictures()
+
+    def pictures(
+        self, first: int = 0, last: int | None = None
+    ) -> Iterator[tuple[int, CodedPicture]]:
+        """The pictures from number `first` to `last`, both included, each with its number.
+
+        Those that cannot be decoded are left out, and listed in `missing`.
+        """
+        last = len(self) - 1 if last is None else min(last, len(self) - 1)
+        first = max(first, 0)
+        expected, by = first, VideoReformatter()
+        for number, frame in self._from(first):
+            if number < expected:
+                continue
+            self.missing.update(range(expected, min(number, last + 1)))
+            if number > last:
+                expected = number
+                break
+            if frame.is_corrupt:
+                self.damaged.add(number)
+            expected = number + 1
+            self._is_at_end |= expected == len(self)
+            planes = planes_of(self._fitted(frame, number, by), self._layout, by)
+            yield number, CodedPicture(tuple(map(self._turn, planes)), self.coding)
+            if number == last:
+                break
+        self.missing.update(range(expected, last + 1))
+        self._is_at_end |= last + 1 == len(self)
+
+    def _fitted(self, frame: av.VideoFrame, number: int, by: VideoReformatter) -> av.VideoFrame:
+        """The frame in the size of the first one."""
+        if (frame.width, frame.height) == self._frame_size:
+            return frame
+        self.scaled.add(number)
+        pixels, size = frame.format.name, self._frame_size
+        return by.reformat(frame, *size, format=pixels, interpolation="BICUBIC", threads=THREADS)
+
+    def _from(self, first: int) -> Iterator[tuple[int, av.VideoFrame]]:
+        """Frames with their numbers, in order, beginning at or before `first`."""
+        if not self.is_interlaced:
+            yield from self._decoder.frames(first)
+            return
+        before = max(first // 2 - 2, 0)  # what bwdif looks back on
+        fields = Fields(self._frame_size, self.pixels, self._packets.times.base)
+        by = VideoReformatter()
+        for number, frame in self._decoder.frames(before):
+            if number >= before:
+                yield from fields.of(self._fitted(frame, 2 * number, by), number)
+        yield from fields.of(None)
+
+
+def _side_data(frame: av.VideoFrame) -> dict[Type, bytes]:
+    """Side data of a frame; nothing if PyAV does not know all their kinds."""
+    with contextlib.suppress(ValueError):
+        data = cast(Iterable[SideData], frame.side_data)
+        return {one.type: bytes(one) for one in data}  # pyright: ignore[reportArgumentType]
+    return {}
+
+
+def _read(kind: type, data: bytes | None):
+    """The side data as `kind`, if there is any."""
+    with contextlib.suppress(struct.error):
+        return kind.read(data) if data else None
+
+
+def _described(stream: Stream) -> OtherStream:
+    context = stream.codec_context
+    codec = context.name if context is not None else "unknown"
+    text = codec
+    if isinstance(stream, AudioStream) and context is not None:
+        text += f", {stream.rate} Hz, {stream.layout.name}"
+    meta = stream.metadata
+    return OtherStream(
+        stream.index,
+        stream.type or "unknown",
+        codec,
+        meta.get("language", ""),
+        meta.get("title", "") or meta.get("filename", ""),
+        text,
+    )

@@ -1,0 +1,206 @@
+"""A video file being written: under a temporary name, then complete under its own, or absent."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, cast
+
+import av
+from av.container import OutputContainer
+from av.error import FFmpegError
+from av.packet import Packet
+from av.video.codeccontext import VideoCodecContext
+from av.video.stream import VideoStream
+
+from ...color.coding import Coding
+from ...errors import InputError
+from ...io import atomic
+from .encoders import (
+    CONTAINERS,
+    HARDWARE,
+    NO_FACTS,
+    Encoding,
+    Facts,
+)
+from .scheduling import kept_scheduling
+
+_RANGES = {False: 1, True: 2}  # limited, full, as FFmpeg counts them
+_FEW = 2  # frames: x265 states no decoding times for so few
+_NOT_KEPT = ("major_brand", "minor_version", "compatible_brands", "encoder")  # of another file
+_APPLE = "com.apple."
+
+
+class NewFile:
+    """A file of some container. Until `close` there is nothing at `path`.
+
+    `metadata`: texts of the whole file. OSError, whose text names `path`, if it cannot be written.
+    """
+
+    def __init__(self, path: Path, temporary: Path, suffix: str, metadata: dict[str, str]):
+        self.path, self.temporary = path, temporary
+        self._container: OutputContainer | None = None
+        self._lock: int | None = None
+        try:
+            self._lock = atomic.create(temporary)  # its own file, which nobody else writes to
+            kind = CONTAINERS[suffix]
+            self._container = av.open(
+                f"file:{temporary}", "w", format=kind, container_options=_muxing(kind, metadata)
+            )
+        except (FFmpegError, OSError) as error:
+            self.abandon()
+            raise atomic.about(path, error) from None
+        texts = {k: v for k, v in metadata.items() if k not in _NOT_KEPT}
+        self._container.metadata.update(texts)
+
+    @property
+    def container(self) -> OutputContainer:
+        """FFmpeg's container, to which streams are added before the first packet."""
+        assert self._container is not None
+        return self._container
+
+    def mux(self, packets: Iterable[Packet[Any]]) -> None:
+        """Write packets."""
+        try:
+            for packet in packets:
+                self.container.mux_one(packet)
+        except (FFmpegError, OSError) as error:
+            raise atomic.about(self.path, error) from None
+
+    def close(self) -> None:
+        """Complete the file and put it in place."""
+        try:
+            if self._container is not None:
+                self._container.close()
+                self._container = None
+            if self._lock is not None:
+                os.fsync(self._lock)
+            atomic.rename(self.temporary, self.path)
+        except (FFmpegError, OSError) as error:
+            self.abandon()
+            raise atomic.about(self.path, error) from None
+        self._unlock()
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            lock, self._lock = self._lock, None
+            os.close(lock)
+
+    def abandon(self) -> None:
+        """Leave nothing behind."""
+        if self._container is not None:
+            container, self._container = self._container, None
+            with contextlib.suppress(OSError, ValueError, FFmpegError):  # say, a full disk
+                container.close()
+        if self._lock is not None:
+            self._unlock()
+            self.temporary.unlink(missing_ok=True)
+
+
+class VideoFile(NewFile):
+    """A video with one stream of pictures, encoded here, and others beside it.
+
+    Frames are given with exact times, in ticks of `base`. InputError for an encoder that does not
+    start.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        temporary: Path,
+        encoding: Encoding,
+        coding: Coding,
+        size: tuple[int, int],
+        rate: Fraction,
+        base: Fraction,
+        facts: Facts = NO_FACTS,
+        metadata: dict[str, str] | None = None,
+    ):
+        super().__init__(path, temporary, encoding.suffix, metadata or {})
+        self._base, self._rate, self._given = base, rate, 0
+        self._late_times = encoding.encoder.name == "libx265"
+        try:
+            self._stream = self._begin(encoding, coding, size, facts)
+        except (FFmpegError, OSError) as error:
+            self.abandon()
+            raise _why(path, encoding, error) from None
+
+    def _begin(
+        self, encoding: Encoding, coding: Coding, size: tuple[int, int], facts: Facts
+    ) -> VideoStream:
+        if encoding.codec == "av1":
+            os.environ.setdefault("SVT_LOG", "1")  # it writes pages to the terminal otherwise
+        options, name = encoding.options(coding, facts), encoding.encoder.name
+        stream = self.container.add_stream(name, rate=self._rate, options=options)
+        stream = cast(VideoStream, stream)
+        stream.width, stream.height = size
+        context = stream.codec_context
+        context.pix_fmt, context.time_base = encoding.pixels(coding), self._base
+        if facts.pixel_aspect != 1:
+            context.sample_aspect_ratio = facts.pixel_aspect
+        if encoding.codec != "gif":
+            tag(context, coding)
+        name_codec(stream, encoding)
+        with kept_scheduling():
+            context.open()
+        return stream
+
+    def encode(self, frame: av.VideoFrame | None, tick: int = 0) -> None:
+        """Write what can be written once `frame`, of the encoder's format, is there."""
+        if frame is not None:
+            frame.pts, frame.time_base = tick, self._base
+            self._given += 1
+        try:
+            packets = self._stream.encode(frame)
+        except (FFmpegError, OSError) as error:
+            raise atomic.about(self.path, error) from None
+        self.mux(self._timed(packets))
+
+    def _timed(self, packets: list[Packet[VideoStream]]) -> list[Packet[VideoStream]]:
+        """The packets, with decoding times also where x265 leaves them to chance."""
+        if self._late_times and self._given <= _FEW:
+            delay = round(_FEW / (self._rate * self._base))
+            for packet in packets:
+                assert packet.pts is not None
+                packet.dts = packet.pts - delay
+        return packets
+
+    def finish(self) -> None:
+        """Write what the encoder still holds."""
+        self.encode(None)
+
+
+def name_codec(stream: VideoStream, encoding: Encoding) -> None:
+    """Give H.265 the name that Apple's players ask for."""
+    if encoding.codec == "h265" and encoding.suffix != ".mkv":
+        stream.codec_context.codec_tag = "hvc1"
+
+
+def tag(on: av.VideoFrame | VideoCodecContext, coding: Coding) -> None:
+    """Write the four tags of a Coding."""
+    on.color_range = _RANGES[coding.full_range]
+    on.colorspace, on.color_trc = coding.matrix, coding.transfer
+    on.color_primaries = coding.primaries
+
+
+def _muxing(container: str, metadata: dict[str, str]) -> dict[str, str]:
+    """Options of the container."""
+    if container in ("mp4", "mov") and any(key.startswith(_APPLE) for key in metadata):
+        return {"movflags": "use_metadata_tags"}  # which hold the dates of Apple's cameras
+    return {}
+
+
+def _why(path: Path, encoding: Encoding, error: Exception) -> Exception:
+    """The error in one line: where a hardware encoder does not start, it says so."""
+    kind = encoding.encoder.name.rsplit("_", 1)[-1]
+    if "avcodec_open" in str(getattr(error, "filename", "")) and kind in HARDWARE:
+        return InputError(
+            f"encoder {encoding.encoder.name} does not start: it needs the "
+            "hardware and the driver of its maker; a software encoder needs neither"
+        )
+    return atomic.about(path, error)

@@ -1,0 +1,153 @@
+"""Write MP4, MOV, MKV, WebM and GIF files frame by frame; complete or absent."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from av.error import FFmpegError
+from av.video.reformatter import Colorspace, VideoReformatter
+
+from ...color.coding import (
+    BT709,
+    SRGB,
+    UNSPECIFIED,
+    Coding,
+)
+from ...color.srgb import ToDisplay, to_display
+from ...errors import InputError
+from ...io import atomic
+from ..pixels import THREADS
+from .container import VideoFile, tag
+from .encoders import SUFFIXES as SUFFIXES
+from .encoders import Encoding, chosen
+from .gif import TICK, Palettes, check_rate
+
+SRGB_DISPLAY = frozenset({"srgb_rec709_display"})
+_DISPLAYS = {  # primaries and transfer of displays, by the names that configs give them
+    "srgb_rec709_display": (BT709, SRGB), "srgb_display": (BT709, SRGB),
+    "g22_rec709_display": (BT709, 4),
+    "g24_rec709_display": (BT709, 1), "rec1886_rec709_display": (BT709, 1),
+    "g24_rec2020_display": (9, 14), "rec1886_rec2020_display": (9, 14),
+    "srgb_p3d65_display": (12, SRGB), "displayp3_display": (12, SRGB),
+    "pq_rec2020_display": (9, 16), "rec2100_pq_display": (9, 16),
+    "pq_p3d65_display": (12, 16), "st2084_p3d65_display": (12, 16),
+    "hlg_rec2020_display": (9, 18), "rec2100_hlg_display": (9, 18),
+}  # fmt: skip
+_FINEST = 1_001_000  # denominator of a rate: FFmpeg counts in 32 bits
+_RATES = Fraction(1, 1000), Fraction(1000)
+
+
+class Video:
+    """A video being written under a temporary name; `close` gives it its own.
+
+    Alpha is dropped (the colour is premultiplied, so it lies over black). Encoders that share
+    colour between pixels may need even sizes: the last row or column is then repeated. A GIF has
+    256 colours per frame, dithered, and delays in steps of 1/100 s, which vary by a step to keep
+    the mean frame rate. `display`: names of the display's colour space, for the tags. `encoding`:
+    see encoders.chosen; by default that of the suffix.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        temporary: Path,
+        fps: Fraction,
+        settings: str,
+        display: Collection[str] = SRGB_DISPLAY,
+        encoding: Encoding | None = None,
+    ):
+        self.path, self.temporary, self.settings = path, temporary, settings
+        self._encoding = encoding or chosen(path)
+        self._is_gif = self._encoding.codec == "gif"
+        if self._is_gif:
+            check_rate(path, fps)
+        else:
+            check_rate(path, fps, _RATES)
+        self.fps = fps.limit_denominator(_FINEST)
+        self._coding = self._encoding.coding(_coding(display, self._encoding.codec == "ffv1"))[0]
+        self._pixels = self._encoding.pixels(self._coding)
+        self._by = VideoReformatter()
+        self._file: VideoFile | None = None
+        self._palettes: Palettes | None = None
+        self._frames = 0
+        self._size: tuple[int, ...] = ()
+
+    def add(self, rgba: np.ndarray, convert: ToDisplay = to_display) -> None:
+        """Append one frame of linear light, (height, width, 3 or 4); OSError if it cannot be."""
+        shown = convert(rgba, 8, over_black=True)
+        self._size = self._size or shown.shape
+        if shown.shape != self._size:
+            raise InputError(
+                f"frame of {shown.shape[1]} x {shown.shape[0]} in a video of "
+                f"{self._size[1]} x {self._size[0]}"
+            )
+        if self._encoding.encoder.even:
+            height, width = shown.shape[:2]
+            shown = np.pad(shown, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+        try:
+            self._file = self._file or self._begin(shown.shape[1], shown.shape[0])
+            self._encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(shown), format="rgb24"))
+        except FFmpegError as error:
+            raise atomic.about(self.path, error) from None
+
+    def _begin(self, width: int, height: int) -> VideoFile:
+        if self._is_gif:
+            self._palettes = Palettes(width, height)
+        return VideoFile(
+            self.path, self.temporary, self._encoding, self._coding, (width, height), self.fps,
+            TICK if self._is_gif else 1 / self.fps,
+            metadata={"comment": f"wgmb {self.settings}"},
+        )  # fmt: skip
+
+    def _encode(self, frame: av.VideoFrame | None) -> None:
+        """Write what can be written once `frame` is there; None: all the rest."""
+        assert self._file is not None
+        if self._palettes is None:
+            if frame is not None:
+                frame = self._by.reformat(
+                    frame, format=self._pixels, dst_colorspace=Colorspace.ITU709, threads=THREADS
+                )
+                tag(frame, self._coding)
+            self._file.encode(frame, self._frames)
+            self._frames += 1
+            return
+        for painted, tick in self._palettes.of(frame, self._tick(self._frames)):
+            self._file.encode(painted, tick)
+        self._frames += frame is not None
+        if frame is None:
+            self._file.encode(None)
+
+    def _tick(self, frame: int) -> int:
+        """Return the time at which a frame of a GIF is shown, in its ticks."""
+        return round(frame / (self.fps * TICK))
+
+    def close(self) -> None:
+        """Finish the file and put it in place; OSError if it cannot be."""
+        if self._file is None:
+            raise OSError(f"{self.path}: no frames")
+        try:
+            self._encode(None)
+        except (FFmpegError, OSError) as error:
+            self.abandon()
+            raise atomic.about(self.path, error) from None
+        self._file.close()
+
+    def abandon(self) -> None:
+        """Leave nothing behind."""
+        if self._file is not None:
+            self._file.abandon()
+        self.temporary.unlink(missing_ok=True)
+
+
+def _coding(display: Collection[str], lossless: bool) -> Coding:
+    """Coding of pictures for this display, if the encoder supports it."""
+    known = [_DISPLAYS[name] for name in sorted(display) if name in _DISPLAYS]
+    primaries, transfer = known[0] if known else (UNSPECIFIED, UNSPECIFIED)
+    if lossless:
+        return Coding("rgb", 8, (1, 1), full_range=True, matrix=0, transfer=transfer,
+                      primaries=primaries)  # fmt: skip
+    return Coding(transfer=transfer, primaries=primaries)

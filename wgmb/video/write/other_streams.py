@@ -1,0 +1,296 @@
+"""Streams of a video besides its pictures, copied beside other pictures.
+
+Sound, subtitles, covers and attachments are copied packet for packet, with languages, titles and
+dispositions; chapters and the file's own texts and dates come along. What the new container cannot
+hold is left out, and said. Times go by a Clock; at another speed, sound is encoded again.
+"""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import av
+from av.audio.stream import AudioStream
+from av.codec.codec import UnknownCodecError
+from av.container import OutputContainer
+from av.error import FFmpegError
+from av.packet import Packet
+from av.stream import Discard, Disposition, Stream
+
+from ..clock import AS_IT_IS, Clock
+from ..read.container import opened
+from .audio import Resounded, encoder
+
+if TYPE_CHECKING:
+    from av.container.core import Chapter
+
+_BEFORE = 20  # seconds before the part to copy, at which reading begins
+_PRIMING = Fraction(-1, 10)  # seconds before 0, in which decoders of sound begin
+_AFTER = 5  # seconds after it, at which reading ends
+_OF_THE_FILE = (  # texts that say what another file holds
+    "DURATION", "BPS", "NUMBER_OF_", "_STATISTICS", "HANDLER_NAME", "VENDOR_ID", "ENCODER",
+)  # fmt: skip
+_OWN = ("language", "title", "creation_time")  # texts of a stream of pictures
+
+
+class OtherStreams:
+    """The streams of the file `path` but the one with number `pictures`.
+
+    Use: `attach` to the new file before its first packet, then `until` the time of each picture
+    that is written, then `rest`, then `close`. `keeps_pitch`: of sound at another speed.
+    """
+
+    def __init__(
+        self, path: Path, pictures: int, clock: Clock = AS_IT_IS, keeps_pitch: bool = True
+    ):
+        self._path, self._pictures, self._clock = path, pictures, clock
+        self._keeps_pitch = keeps_pitch
+        self._container = opened(path)
+        self._ways: dict[int, _Copied | Resounded] = {}
+        self._packets: Iterator[Packet[Any]] = iter(())
+        self._next: Packet[Any] | None = None
+        self._texts = dict(self._container.metadata)
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """Texts of the whole file: title, dates, places, the user's comment."""
+        return self._texts
+
+    def attach(self, to: OutputContainer) -> list[str]:
+        """Add the streams and chapters; return what is left out, in words."""
+        said: list[str] = []
+        unknown: list[int] = []
+        for stream in self._container.streams:
+            if stream.index == self._pictures:
+                texts = stream.metadata
+                to.streams.video[0].metadata.update({k: texts[k] for k in _OWN if k in texts})
+                stream.discard = Discard.all  # it is read elsewhere
+                continue
+            if self._is_of_chapters(stream):
+                stream.discard = Discard.all
+                continue
+            if stream.type == "data" and stream.codec_context is None:
+                unknown.append(stream.index)
+                stream.discard = Discard.all
+                continue
+            why = self._why_not(stream) or self._add(stream, to)
+            if why:
+                stream.discard = Discard.all
+                said.append(f"{_named(stream)} is left out: {why}")
+        if unknown:
+            said.append(_of_no_known_kind(unknown))
+        chapters = list(_moved(self._container.chapters(), self._clock))
+        if chapters and to.format.name == "gif":
+            said.append(f"{len(chapters)} chapters are left out: a GIF holds none")
+        elif chapters:
+            to.set_chapters(chapters)
+        if self._clock.first is not None and self._clock.first > _BEFORE:
+            self._container.seek(int((self._clock.first - _BEFORE) * 1_000_000))
+        wanted = [self._container.streams[index] for index in self._ways]
+        self._packets = self._container.demux(wanted) if wanted else iter(())
+        self._next = next(self._packets, None)
+        return said
+
+    def _is_of_chapters(self, stream: Stream) -> bool:
+        """Return True for the track in which MP4 and MOV keep chapters."""
+        return stream.type == "data" and 0 < stream.frames == len(self._container.chapters())
+
+    def _why_not(self, stream: Stream) -> str:
+        """The reason why a stream cannot be copied, or ''."""
+        if stream.type == "video" and not stream.disposition & Disposition.attached_pic:
+            return "only one stream of pictures is written"
+        if stream.type in ("audio", "subtitle") and stream.codec_context is None:
+            return "its codec is not known"
+        return ""
+
+    def _add(self, stream: Stream, to: OutputContainer) -> str:
+        """Add a stream to the new file; returns why it cannot be, or ''."""
+        again = isinstance(stream, AudioStream) and self._clock.speed != 1
+        if why := _refusal(stream, to.format.name, again):
+            return why
+        if again:
+            source = cast(AudioStream, stream)
+            into = encoder(source, to)
+            _describe(into, stream)
+            self._ways[stream.index] = Resounded(source, into, self._clock, self._keeps_pitch)
+            return ""
+        made = _from_template(stream, to)
+        _describe(made, stream)
+        if stream.type != "attachment":
+            self._ways[stream.index] = _Copied(stream, made, self._clock)
+        return ""
+
+    def until(self, time: Fraction) -> Iterator[Packet[Any]]:
+        """The packets up to an output time, as far as they have not been returned yet."""
+        yield from self._up_to(self._clock.back(time))
+
+    def rest(self) -> Iterator[Packet[Any]]:
+        """The packets that are left."""
+        yield from self._up_to(None)
+        for way in self._ways.values():
+            yield from way.take(None)
+
+    def _up_to(self, time: Fraction | None) -> Iterator[Packet[Any]]:
+        while (packet := self._next) is not None:
+            at = packet.dts if packet.dts is not None else packet.pts
+            here = None if at is None else at * packet.time_base
+            if here is not None and time is not None and here > time:
+                return
+            self._next = self._following()
+            end = self._clock.end
+            if here is not None and end is not None and here > end + _AFTER:
+                self._next = None
+            if packet.size:  # the last ones only flush decoders
+                yield from self._ways[packet.stream_index].take(packet)
+
+    def _following(self) -> Packet[Any] | None:
+        try:
+            return next(self._packets, None)
+        except FFmpegError:  # said by the Footage of the same file
+            return None
+
+    def close(self) -> None:
+        """Close the file that is read."""
+        self._container.close()
+
+
+class _Copied:
+    """A stream whose packets are passed on as they are."""
+
+    def __init__(self, source: Stream, into: Stream, clock: Clock):
+        self._source, self._into, self._clock = source, into, clock
+        self._last: int | None = None
+        self._rate, self._frame = 0, 0
+        if isinstance(source, AudioStream) and source.codec_context is not None:
+            self._rate, self._frame = source.rate, source.codec_context.frame_size
+        self._expected: int | None = None  # sample that the next packet of sound begins with
+
+    def take(self, packet: Packet[Any] | None) -> Iterator[Packet[Any]]:
+        """The packet with its output times, unless it is outside of the clock's part."""
+        if packet is None:
+            return
+        packet.stream = self._into
+        if self._source.disposition & Disposition.attached_pic:
+            packet.pts = packet.dts = 0
+            yield packet
+            return
+        if packet.pts is None or _is_cut(packet) or not self._fits(packet):
+            return
+        self._time(packet)
+        assert packet.dts is not None and packet.pts is not None
+        if self._last is not None and packet.dts <= self._last:  # muxers take no time twice
+            packet.dts = self._last + 1
+            packet.pts = max(packet.pts, packet.dts)
+        self._last = packet.dts
+        yield packet
+
+    def _time(self, packet: Packet[Any]) -> None:
+        """Set the packet's output times."""
+        assert packet.pts is not None
+        base, shown = packet.time_base, packet.pts
+        exact = self._clock.out(shown * base)
+        if packet.duration:
+            packet.duration = round(packet.duration / self._clock.speed)
+        if self._rate and self._frame and base > Fraction(1, self._rate):
+            # Times are coarser than samples: count samples, as long as that agrees.
+            sample = round(exact * self._rate)
+            if self._expected is not None and abs(sample - self._expected) <= base * self._rate:
+                sample = self._expected
+            self._expected = sample + self._frame
+            packet.time_base, packet.duration = Fraction(1, self._rate), self._frame
+            packet.pts = packet.dts = sample
+            return
+        packet.pts = round(exact / base)
+        dts = packet.dts if packet.dts is not None else shown
+        packet.dts = dts + packet.pts - shown if self._clock.speed == 1 else packet.pts
+
+    def _fits(self, packet: Packet[Any]) -> bool:
+        """Shorten a subtitle to the clock's part; return False for what is outside."""
+        first, end = self._clock.first, self._clock.end
+        assert packet.pts is not None
+        begins = packet.pts * packet.time_base
+        if end is not None and begins >= end:
+            return False
+        if first is None or begins >= first:
+            return True
+        lasts = (packet.duration or 0) * packet.time_base
+        if self._source.type != "subtitle" or begins + lasts <= first:
+            return False
+        packet.pts = packet.dts = round(first / packet.time_base)
+        packet.duration = round((begins + lasts - first) / packet.time_base)
+        return True
+
+
+def _is_cut(packet: Packet[Any]) -> bool:
+    """Return True for what an edit list leaves out, but not for what decoders begin with."""
+    assert packet.pts is not None
+    return packet.is_discard and not _PRIMING <= packet.pts * packet.time_base < 0
+
+
+def _from_template(stream: Stream, to: OutputContainer) -> Stream:
+    return to.add_stream_from_template(stream, opaque=True)
+
+
+def _describe(made: Stream, like: Stream) -> None:
+    """Language, title, name, default and forced."""
+    for key, text in like.metadata.items():
+        if not key.upper().startswith(_OF_THE_FILE):
+            made.metadata[key] = text
+    if "name" in like.metadata:  # what MP4 calls a title
+        made.metadata.setdefault("title", like.metadata["name"])
+    made.disposition = like.disposition
+
+
+def _refusal(stream: Stream, container: str, again: bool) -> str:
+    """Try a file with this stream alone; returns why it cannot be written, or ''."""
+    trial = av.open(io.BytesIO(), "w", format=container)
+    try:
+        if again:
+            encoder(cast(AudioStream, stream), trial)
+        else:
+            _describe(_from_template(stream, trial), stream)
+        trial.start_encoding()
+    except (ValueError, UnknownCodecError, FFmpegError, NotImplementedError):
+        name = stream.codec_context.name if stream.codec_context is not None else stream.type
+        holds = " (.mkv holds it)" if container != "matroska" else ""
+        return f"{_SUFFIXES.get(container, container)} cannot hold {name}{holds}"
+    finally:
+        with contextlib.suppress(FFmpegError, OSError, ValueError):
+            trial.close()
+    return ""
+
+
+_SUFFIXES = {"matroska": ".mkv", "mp4": ".mp4", "mov": ".mov", "webm": ".webm", "gif": ".gif"}
+
+
+def _named(stream: Stream) -> str:
+    kind = {"audio": "sound", "subtitle": "subtitles"}.get(stream.type or "", stream.type)
+    language = stream.metadata.get("language", "und")
+    text = f"stream {stream.index} ({kind}"
+    return text + (f", {language})" if language != "und" else ")")
+
+
+def _of_no_known_kind(indices: list[int]) -> str:
+    """That streams are left out of which nothing is known, in words; phones write several."""
+    several = len(indices) > 1
+    numbers = f"streams {', '.join(map(str, indices))}" if several else f"stream {indices[0]}"
+    return f"{numbers} (data of unknown kind) {'are' if several else 'is'} left out"
+
+
+def _moved(chapters: list[Chapter], clock: Clock) -> Iterator[Chapter]:
+    """The chapters within the clock's part, at output times."""
+    for chapter in chapters:
+        base = chapter["time_base"] or Fraction(1, 1000)
+        begin, end = chapter["start"] * base, chapter["end"] * base
+        begin = begin if clock.first is None else max(begin, clock.first)
+        end = end if clock.end is None else min(end, clock.end)
+        if begin < end:
+            start, stop = (round(clock.out(time) / base) for time in (begin, end))
+            yield {**chapter, "start": start, "end": stop, "time_base": base}

@@ -1,0 +1,133 @@
+"""Write coded pictures as a video, at exact times, with the other streams beside them."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from av.video.reformatter import VideoReformatter
+
+from ...color.coding import CodedPicture, Coding
+from ...errors import InputError
+from ..pixels import THREADS, frame_of, pixel_format
+from .container import VideoFile, tag
+from .encoders import NO_FACTS, Encoding, Facts
+from .gif import TICK, Palettes, check_rate
+from .other_streams import OtherStreams
+
+
+class CodedVideo:
+    """A video of CodedPictures; complete under its name after `close`, or absent.
+
+    `coding` is what `encoding.coding` returned. `rate`: pictures a second, usually; `base`: the
+    tick of the file's clock [s], of which all times should be multiples (see clock.tick).
+    Encoders that share colour between pixels may need even sizes: the last row or column is then
+    repeated, which `padding` says. A GIF counts hundredths of a second, and has 256 colours a
+    picture. OSError if the file cannot be written, InputError for an encoder
+    that does not start. `others`: streams to put beside the pictures, with their texts and
+    dates; what of them the file cannot hold is in `left_out`.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        temporary: Path,
+        encoding: Encoding,
+        coding: Coding,
+        size: tuple[int, int],
+        rate: Fraction,
+        base: Fraction,
+        facts: Facts = NO_FACTS,
+        metadata: dict[str, str] | None = None,
+        others: OtherStreams | None = None,
+    ):
+        is_gif = encoding.codec == "gif"
+        if is_gif:
+            check_rate(path, rate)
+            base = TICK
+        self.path, self._coding, self._base = path, coding, base
+        self._others = others
+        self._size = size
+        self._last: int | None = None  # tick of the picture before
+        self.padding = padded(size, encoding, coding)
+        whole = size[0] + self.padding[0], size[1] + self.padding[1]
+        self._planar, self._pixels = pixel_format(coding), encoding.pixels(coding)
+        self._by = VideoReformatter()
+        self._palettes = Palettes(*whole) if is_gif else None
+        texts = (metadata or {}) | (others.metadata if others else {})
+        self.left_out = encoding.left_out(facts)
+        self.file = VideoFile(path, temporary, encoding, coding, whole, rate, base, facts, texts)
+        try:
+            if others is not None:
+                self.left_out += others.attach(self.file.container)
+        except BaseException:
+            self.abandon()
+            raise
+
+    def add(self, picture: CodedPicture, time: Fraction) -> None:
+        """Append a picture that is shown at `time` [s], later than the one before."""
+        if picture.coding != self._coding or picture.size != self._size:
+            raise InputError(
+                f"{self.path}: picture of {picture.size} as {picture.coding} in a video of "
+                f"{self._size} as {self._coding}"
+            )
+        now = round(time / self._base)
+        if self._last is not None and now <= self._last:
+            raise InputError(f"{self.path}: pictures at times that do not ascend ({float(time)} s)")
+        self._last = now
+        frame = frame_of(self._filled(picture.planes), self._planar)
+        if self._palettes is not None:
+            frame = self._by.reformat(frame, format="rgb24", threads=THREADS)
+            self._paint(self._palettes, frame, now)
+        else:
+            tag(frame, self._coding)
+            if self._pixels != self._planar:
+                frame = self._by.reformat(frame, format=self._pixels, threads=THREADS)
+            self.file.encode(frame, now)
+        if self._others is not None:
+            self.file.mux(self._others.until(time))
+
+    def _paint(self, palettes: Palettes, frame: av.VideoFrame | None, tick: int = 0) -> None:
+        """Encode a picture of a GIF, or what is left of it."""
+        for painted, at in palettes.of(frame, tick):
+            self.file.encode(painted, at)
+
+    def _filled(self, planes: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+        across, down = self.padding
+        if not (across or down):
+            return planes
+        full = planes[0].shape  # chroma was rounded up already
+        return tuple(
+            np.pad(p, ((0, down), (0, across)), "edge") if p.shape == full else p for p in planes
+        )
+
+    def close(self) -> None:
+        """Complete the file and put it in place; InputError if it has no pictures."""
+        if self._last is None:
+            self.abandon()
+            raise InputError(f"output {self.path}: no pictures to write")
+        if self._palettes is not None:
+            self._paint(self._palettes, None)
+        self.file.finish()
+        if self._others is not None:
+            self.file.mux(self._others.rest())
+            self._others.close()
+        self.file.close()
+
+    def abandon(self) -> None:
+        """Leave nothing behind."""
+        self.file.abandon()
+        if self._others is not None:
+            self._others.close()
+
+
+def padded(size: tuple[int, int], encoding: Encoding, coding: Coding) -> tuple[int, int]:
+    """Columns and rows that the encoder needs beyond `size`."""
+    if not encoding.encoder.even:
+        return 0, 0
+    across, down = (-length % step for length, step in zip(size, coding.steps, strict=True))
+    return across, down

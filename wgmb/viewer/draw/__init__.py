@@ -1,0 +1,1 @@
+"""A State becomes images on the screen."""

@@ -1,0 +1,299 @@
+"""A State becomes one or two images on the GPU, a bit at a time, so that no frame takes long.
+
+While something moves, scenes are drawn as small as keeps the window quick (Pace); when all
+is still the picture is drawn in full, and what converges (rays, the reference) goes on.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from ... import gpu
+from ...errors import InputError
+from ...gpu.textures import TexturePool
+from ...gpu.timing import TimestampClock
+from ...methods import METHODS
+from ...sequence.input_color import chromaticities
+from ..capabilities import Choices
+from ..state.state import BOTH_EYES, REFERENCE, State
+from ..subjects.subject import SceneSubject, Subject
+from ..subjects.video import FootageSubject
+from .adaptive import Pace
+from .blurs import Blurs, shutter_of
+from .perception import Perceived, seen_frames
+from .quality import Measured, Quality
+from .screen import (
+    Box,
+    Image,
+    fit,
+    whole,
+)
+from .slot import Report, Shown
+from .video_light import VideoLight, primaries_of
+
+_STEP = 0.07  # seconds of work on what converges, between two frames of the window
+_QUICK_STEP = 0.03  # while something moves
+_SETTLE = 0.35  # seconds of stillness before antialiasing
+_SHORT = 0.02  # seconds
+_PASSES = {"sharp": "color", "depth": "depth", "velocity": "motion"}
+
+
+class Renderer:
+    """The textures of what is shown, and the passes that draw them."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self.device = device
+        self.choices, self.quality = Choices(device), Quality()
+        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        self.pace = Pace(5 if software else 0)
+        self.report = Report()
+        self._images, self._video_light = TexturePool(device), VideoLight(device)
+        self._perceived = {slot: Perceived(device) for slot in ("first", "second")}
+        self._past: SceneSubject | None = None
+        self._blurs = Blurs(device, self.choices, self.pace)
+        self._shown = {"first": Shown(), "second": Shown()}
+        self._coming = dict(self._shown)  # takes the place of what is shown
+        self._seen: dict[str, Image] = {}
+        self.chromaticities: dict[str, Any] = {}  # of what is shown, as an attribute of an EXR
+        self._level, self._still_since, self._still = 0, 0.0, ()
+        self._moved = False
+        self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
+        self._timing = TimestampClock(device) if TimestampClock.usable(device) else None
+
+    def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> Report:
+        """Go on with what `state` shows in `area` [px] of the canvas, `now` [s].
+
+        `moving`: quick is better than fine. `full`: everything now, however long it takes.
+        """
+        started = time.perf_counter()
+        subject = self.choices.subject(state)
+        shape = subject.size(state)
+        is_video = isinstance(subject, FootageSubject)
+        place = fit(subject.shape if is_video else shape, area, state)
+        size, antialias = self._quality(state, shape, place, now, moving, full)
+        report = Report(shape if not state.is_scene else whole(place), place, area, moving)
+        quick = moving and not full
+        names = self._wanted(state)
+        slots = ("first", "second")[: len(names)]
+        for slot, (name, eye) in zip(slots, names, strict=True):
+            if name != "perceived":
+                self._perceived[slot].forget()
+            self._advance(slot, name, eye, state, subject, size, antialias, quick, full, report)
+        first, last = self._shown["first"], self._shown[slots[-1]]
+        assert first.texture is not None
+        report.size, report.kind = first.texture.size[:2], first.kind
+        report.labels = (first.label, last.label)
+        self._seen = self._displayed(slots, state, subject)
+        unfinished = not all(self._coming[slot].ready for slot in slots)
+        report.busy = moving or unfinished or self._level > 0
+        if isinstance(subject, FootageSubject):
+            report.made_of = subject.made_of(state, shutter_of(state))
+            if any(name != "sharp" for name, _ in names):
+                report.waiting = subject.waiting
+                report.busy |= subject.busy
+        if names[-1][0] == REFERENCE:
+            report.reference = last.done, last.total
+            report.measured = measured = self._measure(first, last)
+            if measured and measured.flip and not measured.flip.done():
+                report.busy = True
+        report.seconds["draw"] = time.perf_counter() - started
+        self.report = report
+        return report
+
+    def images(self, flicked: bool) -> tuple[Image, Image]:
+        """Return the images of both sides; `flicked`: the second one for both."""
+        first, second = self._seen["first"], self._seen.get("second", Image(None, "COLOR", ()))
+        return (second if flicked else first), second
+
+    def _displayed(
+        self, slots: tuple[str, ...], state: State, subject: Subject
+    ) -> dict[str, Image]:
+        """The images by slot, colours as the display of an OpenColorIO config shows them."""
+        images = {slot: self._shown[slot].image for slot in slots}
+        displayed, self.chromaticities = self.choices.displayed, {}
+        if isinstance(subject, FootageSubject):
+            self.chromaticities = {"chromaticities": primaries_of(subject.coding)}
+            for slot, image in images.items():
+                if image.kind == "COLOR" and not self._is_data(self._shown[slot], state):
+                    images[slot] = self._video_light.image(slot, image, subject.coding)
+        if (display := displayed.display(state)) is None:
+            return images
+        space, exposure = subject.space(display.config), 2.0**state.exposure
+        self.chromaticities = self.chromaticities or chromaticities(space)
+        for slot, image in images.items():
+            if image.kind == "COLOR":
+                images[slot] = displayed.image(slot, image, display, space, exposure)
+        return images
+
+    def _is_data(self, shown: Shown, state: State) -> bool:
+        """Return True for an image of a method's own data, whose colours are no light."""
+        return shown.key[0] in self.choices.shows(state)
+
+    def download(self, shown: Shown | None = None) -> np.ndarray:
+        """(height, width, channels) float32 of the first image, or of another."""
+        shown = shown or self._shown["first"]
+        assert shown.texture is not None
+        encoder = self.device.create_command_encoder(label="download")
+        return self._images.download(encoder, shown.texture)
+
+    def finished(self, seconds: float, antialias: int) -> None:
+        """The window's frame took so long; moving frames set the pace."""
+        if not self.report.moving:
+            self._moved = False
+        elif self.report.changed:
+            if self._moved:  # the first one may have had shaders to compile
+                self.pace.observe(seconds, self.report.seconds["draw"], antialias)
+            self._moved = True
+
+    def _quality(self, state, shape, place, now, moving, full) -> tuple[tuple[int, int], int]:
+        """Size to draw [px] and rays: coarse while moving, then in full, then antialiased."""
+        if not state.is_scene:
+            self._level = 0
+            return shape, 1
+        if full:
+            self._level = 0
+        elif moving:
+            self._level, self._still_since = self.pace.level, now
+        elif (key := (state.picture, place)) != self._still:
+            self._still, self._still_since = key, now
+            self._level = min(self._level, 1) if self._level else min(self.pace.level, 1)
+        elif self._level > 1:
+            self._level = 1
+        elif self._level == 1 and now - self._still_since > _SETTLE:
+            self._level = 0
+        scale, antialias = self.pace.quality(self._level, state.antialias)
+        width, height = whole(place)
+        return (max(round(width * scale), 1), max(round(height * scale), 1)), antialias
+
+    def _wanted(self, state: State) -> list[tuple[str, str | None]]:
+        """One or two names, of a look, a method or the reference, each with the view it is of."""
+        if state.mode == "error":
+            return [("result", None), (REFERENCE, None)]
+        if state.mode in BOTH_EYES:
+            return [(state.look, eye) for eye in self.choices.sides(state)]
+        eye = None if state.eyes in ("", *BOTH_EYES) else state.eyes
+        return (
+            [(state.look, eye)]
+            if state.mode == "off"
+            else [(name, eye) for name in (state.look, state.against)]
+        )
+
+    def _advance(
+        self,
+        slot,
+        name,
+        view,
+        state,
+        subject,
+        size,
+        antialias,
+        quick: bool,
+        full: bool,
+        report: Report,
+    ) -> None:
+        """Draw some of `name`; it is shown once it is no coarser than what it replaces."""
+        shown, coming = self._shown[slot], self._coming[slot]
+        eye = state.eye if name in ("perceived", REFERENCE) else None
+        known = self._known(name, state, subject, full)
+        frame = state.frame if name == "perceived" else None
+        key = (name, view, state.picture, eye, frame, tuple(known))
+        fine = (size, antialias, self._level if quick else None)
+        if (coming.key, coming.fine) != (key, fine):
+            if self._level and shown.key == key and not _coarser(shown.fine, fine):
+                return
+            texture = f"{slot} {1 + shown.name.endswith('1')}"
+            label = self._label(name, state) + (f", {view}" if view else "")
+            coming = Shown(label, key, fine, texture)
+            self._coming[slot] = coming
+        if coming.ready:
+            return
+        started = time.perf_counter()
+        seconds = float("inf") if full else _QUICK_STEP if quick else _STEP
+        subject.look_at(state, size, antialias, view)
+        self._draw(coming, slot, name, view, state, subject, seconds, quick, known)
+        if self._timing:
+            report.passes |= self._timing.read()
+        self.device.queue.read_buffer(self._token)  # waits
+        if shown.key != key or coming.done >= min(shown.done, coming.total):
+            self._shown[slot] = coming
+        report.changed = True
+        report.seconds[coming.label] = time.perf_counter() - started
+
+    def _known(self, name: str, state: State, subject: Subject, full: bool) -> list[tuple]:
+        """The findings about a video's motion, all that are needed if `full`.
+
+        One entry for each output frame that is needed, the present one first.
+        """
+        if not isinstance(subject, FootageSubject) or name == "sharp":
+            return []
+        method = METHODS[name if name in METHODS else state.method]
+        states = seen_frames(state) if name == "perceived" else [state]
+        asked = states, shutter_of(state), "neighbours" in method.uses
+        known = subject.stamp(*asked)
+        while full and subject.busy:
+            time.sleep(_SHORT)
+            known = subject.stamp(*asked)
+        return known
+
+    def _draw(
+        self,
+        coming,
+        slot,
+        name,
+        view,
+        state,
+        subject: Subject,
+        seconds: float,
+        quick: bool,
+        known: list[tuple],
+    ) -> None:
+        size, antialias, _ = coming.fine
+        volumes = state.is_scene and "volume" in self.choices.methods(state)
+        if name in _PASSES and not (name == "sharp" and volumes):
+            passes = subject.passes()
+            if _PASSES[name] not in passes:
+                raise InputError(f"these frames have no {name}")
+            coming.texture, coming.done = passes[_PASSES[name]], 1
+            coming.kind = {"depth": "DEPTH", "velocity": "MOTION"}.get(name, "COLOR")
+            return
+        blur = self._blurs(slot, name, state, self._level if quick else None)
+        coming.texture = self._images.texture(coming.name, size, blur.output)
+        if name == "perceived" and (eye := state.eye):
+            if state.is_scene:  # of its own, so that what else is drawn keeps its moment
+                subject = self._past = self._past or SceneSubject(self.device)
+            coming.total = len(seen_frames(state))
+            by = view, blur, antialias
+            coming.done = self._perceived[slot].draw(
+                coming.texture, state, eye, subject, *by, seconds, self._timing, known
+            )
+            return
+        budget = coming.done, float("inf") if quick else seconds
+        coming.total = blur.samples
+        coming.done = subject.draw(blur, coming.texture, budget, self._timing)
+
+    def _label(self, name: str, state: State) -> str:
+        if name == "result":
+            return state.method
+        if name == "perceived":
+            return f"{state.method}, perceived"
+        if name == REFERENCE and state.eye:
+            return "nature, perceived"
+        return f"{state.method}: {name}" if name in self.choices.shows(state) else name
+
+    def _measure(self, first: Shown, last: Shown) -> Measured | None:
+        """Return the difference between the first image and the reference, once both are ready."""
+        key = (first.key, first.fine, last.key, last.fine)
+        if first.kind == "COLOR" and first.ready:
+            self.quality.measure(
+                key, last.done, last.total, lambda: [self.download(s) for s in (first, last)]
+            )
+        return self.quality.found(key)
+
+
+def _coarser(a: tuple, b: tuple) -> bool:
+    """Return True if an image of quality `a` is coarser than one of quality `b`."""
+    return a[0][0] < b[0][0] or a[1] < b[1]

@@ -1,0 +1,86 @@
+"""Text over the image: labels, colour key, messages, help."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from ..controls import KEYS, MOUSE, Box
+from ..state.state import State
+from .theme import ACCENT, INK, packed
+
+_RED = (0.95, 0.3, 0.25, 1.0)
+_BEHIND = (0.05, 0.05, 0.06, 0.72)
+
+
+def name_images(
+    state: State, labels: tuple[str, str], flicked: bool, x: float, y: float, width: float
+) -> None:
+    """Label the images in an area `width` wide from `x`, `y` [logical px]."""
+    first, second = labels
+    left, right = x + 12, x + width - 12
+    if state.mode == "error":
+        tag(f"error of {first}, x {state.gain:.0f}", left, y)
+    elif state.mode == "flicker":
+        tag(second if flicked else first, left, y)
+    elif state.mode == "wipe":
+        tag(first, left, y)
+        tag(second, right, y, right=True)
+    elif state.mode in ("split", "pair"):
+        tag(first, left, y)
+        tag(second, x + width / 2 + 12, y)
+    elif state.mode == "red-cyan":
+        tag(f"red: {first}; cyan: {second}", left, y)
+    elif state.mode == "difference":
+        tag(f"{first} - {second}, x {state.gain:.0f}", left, y)
+    elif state.look != "result" or not state.panel:
+        tag(first, left, y)
+
+
+def explain(state: State, box: Box, height: int) -> None:
+    """Words beside the colours' key in `box` [logical px]; the picture is `height` px high."""
+    x, y, wide, high = box
+    if state.look == "velocity":
+        speed = state.fastest * height
+        tag(f"{speed:.0f} px per frame", x - 10, y + high - 24, right=True)
+        return
+    tag("0", x, y - 26)
+    if state.look == "depth":
+        tag(f"{state.middle:.1f}", x + wide / 2, y - 26, middle=True)
+        tag("far", x + wide, y - 26, right=True)
+    else:
+        tag(f"{1 / state.gain:.2f}", x + wide, y - 26, right=True)
+
+
+def tell(recording: str, message: str, area: Box) -> None:
+    """Show the recording state and the message."""
+    x, y, width, height = area
+    if recording:
+        tag(recording, x + width / 2, y + 12, middle=True, color=_RED)
+    if message:
+        tag(message, x + width / 2, y + height - 40, middle=True)
+
+
+def tag(text: str, x: float, y: float, *, right=False, middle=False, color=INK) -> None:
+    """`text` from `x` on, before it, or about it."""
+    size = imgui.calc_text_size(text)
+    x -= size.x * (1.0 if right else 0.5 if middle else 0.0)
+    ink = imgui.get_background_draw_list()
+    ink.add_rect_filled((x - 7, y - 3), (x + size.x + 7, y + size.y + 3), packed(_BEHIND), 5)
+    ink.add_text((x, y), packed(color), text)
+
+
+def give_help(area: Box) -> None:
+    """All that the mouse and the keys do."""
+    x, y, width, height = area
+    imgui.set_next_window_pos((x + width / 2, y + height / 2), pivot=(0.5, 0.5))
+    imgui.set_next_window_bg_alpha(0.94)
+    flags = imgui.WindowFlags_
+    fixed = flags.no_title_bar | flags.always_auto_resize | flags.no_move | flags.no_nav
+    imgui.begin("help", None, fixed | flags.no_inputs)
+    for table in (MOUSE, KEYS):
+        for name, what in table.items():
+            imgui.text_colored(ACCENT, name)
+            imgui.same_line(160)
+            imgui.text(what)
+        imgui.spacing()
+    imgui.end()

@@ -1,0 +1,53 @@
+"""Options that do not fit what is shown: each is refused in one line, none is ignored."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+from ...errors import InputError
+from ...settings import InputSettings
+from ...settings.color import option_name
+from ...settings.video import VideoSettings
+
+if TYPE_CHECKING:
+    from .state import State
+
+VIDEO = frozenset(f.name for f in fields(VideoSettings))
+"""Options of videos."""
+INPUTS = frozenset({*(f.name for f in fields(InputSettings)), "holdout", "scale"} - {"frames"})
+"""Options that say what files hold."""
+OF_VIDEOS = frozenset({"holdout", "max_mb", "cuts"})
+"""Those of them that videos have."""
+_BLURRED = frozenset({"flow", "flow_quality", "highlights"})  # that `wgmb blur` has for frames, too
+
+
+def check_said(state: State, said: Collection[str]) -> None:
+    """InputError for an option of the command line that the state's source has no use for."""
+    for name in said:
+        option = option_name(name)
+        if name in VIDEO and not state.is_video:
+            if name in _BLURRED and not state.is_scene:
+                raise InputError(
+                    f"{option} of frames is for `wgmb blur`: the viewer shows it of videos only"
+                )
+            raise InputError(f"{option} is for videos, not for {state.source}")
+        if state.is_scene and (name in INPUTS or name == "from_"):
+            kinds = "frames and videos" if name in OF_VIDEOS else "frames"
+            raise InputError(f"{option} is for {kinds}, {state.source} is a scene")
+        if state.is_video and name == "from_":
+            raise InputError(f"{option} is for rendered frames, a video says what its colours are")
+        if state.is_video:
+            _check_layers(name)
+
+
+def check_video(state: State) -> None:
+    """InputError if the state of a video holds what only rendered frames have."""
+    for name, _ in state.given:
+        _check_layers(name)
+
+
+def _check_layers(name: str) -> None:
+    if name in INPUTS - OF_VIDEOS:
+        raise InputError(f"{option_name(name)} is for rendered frames, a video has no layers")

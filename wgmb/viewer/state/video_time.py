@@ -1,0 +1,154 @@
+"""The time of a video that a State is about: its output frames, and how they pass."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+from ...color.coding import HLG, PQ
+from ...color.highlights import check as check_highlights
+from ...color.highlights import check_coding
+from ...io import limits
+from ...io.frame_numbers import frame_numbers
+from ...settings import rate_of
+from ...settings.video import VideoSettings
+from ...video.output_times import Moment
+from .files import (
+    Output,
+    footage_of,
+    frames_of,
+    output_of,
+)
+
+if TYPE_CHECKING:
+    from .state import State
+
+SOURCE = "source"
+"""As a rate: an output frame for each picture of a video, at its time."""
+
+
+def settings_of(state: State) -> VideoSettings:
+    """All options of a video's motion, time and encoding."""
+    found: dict[str, Any] = dict(state.video)
+    found |= {"flow": state.flow, "flow_quality": state.flow_quality}
+    return VideoSettings(speed=state.pace, **found)
+
+
+def check(state: State) -> None:
+    """InputError for options that make no sense."""
+    settings = settings_of(state)
+    check_highlights(settings.highlights)
+    if settings.highlights != 1:
+        footage = footage_of(state.source, most_mb(state))
+        check_coding(settings.highlights, footage.path, footage.coding)
+    _ = settings.pace, settings.range
+
+
+def most_mb(state: State) -> float:
+    """The largest picture that is read (see InputSettings)."""
+    found: Any = dict(state.given).get("max_mb", limits.MAX_MB)
+    return found
+
+
+def own_rate(state: State) -> Fraction:
+    """Pictures a second of the video."""
+    return footage_of(state.source, most_mb(state)).rate
+
+
+def is_own_rate(state: State) -> bool:
+    """Return True if the video keeps a steady rate, and the output has it too."""
+    has_rate = footage_of(state.source, most_mb(state)).has_rate
+    return has_rate and rate(state) == own_rate(state)
+
+
+def at_own_rate(state: State) -> State:
+    """The same at the rate of the video, or at the times of its pictures if it keeps no rate."""
+    footage = footage_of(state.source, most_mb(state))
+    return replace(state, own_times=not footage.has_rate, fps=float(footage.rate))
+
+
+def is_hdr(state: State) -> bool:
+    """Return True if the video holds light above white."""
+    return footage_of(state.source, most_mb(state)).coding.transfer in (PQ, HLG)
+
+
+def rate(state: State) -> Fraction:
+    """Output frames a second, exactly; of a scene or frames too."""
+    if state.is_video and state.fps == float(own := own_rate(state)):
+        return own
+    return Fraction(state.fps).limit_denominator(1001)
+
+
+def completed(state: State, said: Collection[str]) -> State:
+    """The same with the video's own rate and all of its pictures, unless others were said."""
+    if "fps" not in said:
+        state = at_own_rate(state)
+    elif state.own_times:
+        state = replace(state, fps=float(own_rate(state)))
+    if "frames" not in said:
+        state = replace(state, frames=frames_of(state.source, most_mb(state)))
+    return state
+
+
+def output(state: State) -> Output:
+    """The output frames; InputError if the part that is chosen holds none."""
+    most = most_mb(state)
+    frames = None if state.frames == frames_of(state.source, most) else state.frames
+    footage, fps = footage_of(state.source, most), None if state.own_times else rate(state)
+    return output_of(footage, frames, settings_of(state), fps)
+
+
+def moment(state: State) -> Moment:
+    """The output frame that is shown."""
+    moments = output(state).moments
+    return moments[min(max(math.ceil(state.frame - 0.5), 0), len(moments) - 1)]
+
+
+def held_for(state: State, number: int) -> float:
+    """Duration of an output frame [s]: until the next one."""
+    moments = output(state).moments
+    if number + 1 < len(moments):
+        return float(moments[number + 1].time - moments[number].time)
+    return float(moments[number].interval)
+
+
+def retimed(state: State, **changes: Any) -> State:
+    """The same with other options, at the same time in the video."""
+    at = output(state).clock.back(moment(state).time)
+    state = replace(state, **changes)
+    now = output(state)
+    return replace(state, frame=float(now.moments.nearest(now.clock.out(at))))
+
+
+def in_frames(state: State, text: str) -> State:
+    """The same with other frames, or, of a video, other pictures to make the output from."""
+    frame_numbers(text)
+    if state.is_video:
+        return retimed(state, frames=text)
+    return replace(state, frames=text).settled()
+
+
+def at_rate(state: State, text: str) -> State:
+    """The same at another rate: a number of frames per second, or, of a video, SOURCE."""
+    if state.is_video and text == SOURCE:
+        return retimed(state, own_times=True, fps=float(own_rate(state)))
+    fps = float(rate_of(text))
+    return retimed(state, own_times=False, fps=fps) if state.is_video else replace(state, fps=fps)
+
+
+def passed(state: State, seconds: float) -> float:
+    """The frame that is shown `seconds` later, without an end; of a scene or frames too."""
+    frames = float(rate(state))
+    if not (state.is_video and state.own_times):
+        return state.frame + seconds * frames
+    moments, frame = output(state).moments, state.frame
+    for number in range(max(math.floor(frame), 0), len(moments) - 1):
+        step = float(moments[number + 1].time - moments[number].time)
+        left = (number + 1 - frame) * step
+        if seconds < left:
+            return frame + seconds / step
+        frame, seconds = float(number + 1), seconds - left
+    return frame + seconds * frames

@@ -1,0 +1,1 @@
+"""Subjects of the viewer: scenes, frames and videos, drawn into textures."""

@@ -1,0 +1,115 @@
+"""Motion of a video's pictures, made in a thread of its own while the window goes on.
+
+The thread has its own device and its own reader, so that the window never waits for it. What it
+has found of a picture is kept, as far as memory allows.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Iterator
+from pathlib import Path
+
+import wgpu
+
+from ... import gpu
+from ...errors import Error
+from ...flow.source import MotionSource
+from ...settings.video import FlowSettings
+from ...video.read.reader import Footage
+from .video_motion import Finder, Known, Wish
+
+_MEMORY = 1 << 30  # bytes of motion kept
+_FEWEST = 48  # pictures whose motion is kept at least
+_POLL = 0.2  # seconds after which the thread looks whether it should end
+
+
+class MotionMaker:
+    """Makes the motion of the pictures that are wanted, the first of them first.
+
+    What is static is found before the first motion. `how`: where motion comes from, in words.
+    `problem`: why there will be no more.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        max_mb: float,
+        settings: FlowSettings,
+        device: wgpu.GPUDevice,
+        wish: Wish,
+    ):
+        self._path, self._max_mb, self._wish = path, max_mb, wish
+        beside = gpu.second_device(device)
+        motion, self.how = settings.source(beside)
+        self.problem = ""
+        self._known: OrderedDict[int, Known] = OrderedDict()
+        self._lock = threading.Lock()
+        self._changed = threading.Event()
+        self._ended = threading.Event()
+        self._wanted: tuple[int, ...] = ()
+        self._making: tuple[int, float] | None = None
+        work = self._work, (beside, motion)
+        self._thread = threading.Thread(target=work[0], args=work[1], name="motion", daemon=True)
+        self._thread.start()
+
+    def known(self, number: int) -> Known | None:
+        """The finding about a picture; None until there is one."""
+        with self._lock:
+            if number in self._known:
+                self._known.move_to_end(number)
+            return self._known.get(number)
+
+    def want(self, numbers: tuple[int, ...]) -> None:
+        """Make these next, in this order, instead of what was wanted before."""
+        with self._lock:
+            if numbers != self._wanted:
+                self._wanted = numbers
+                self._changed.set()
+
+    @property
+    def making(self) -> tuple[int, float] | None:
+        """The picture whose motion is being made, and for how long [s]."""
+        with self._lock:
+            return self._making and (self._making[0], time.perf_counter() - self._making[1])
+
+    def close(self) -> None:
+        """Let the thread end with what it is doing."""
+        self._ended.set()
+        self._changed.set()
+
+    def _work(self, device: wgpu.GPUDevice, motion: MotionSource | None) -> None:
+        try:
+            footage = Footage(self._path, max_mb=self._max_mb)
+            find = Finder(footage, device, motion, self._wish)
+            for number in self._to_do():
+                known = find(number)
+                with self._lock:
+                    self._making = None
+                    self._keep(number, known)
+        except (Error, OSError, MemoryError, wgpu.GPUError) as error:
+            self.problem = " ".join(str(error).split()) or "not enough memory"
+        finally:
+            self._making = None
+
+    def _to_do(self) -> Iterator[int]:
+        """The next picture that is wanted and not known, until the thread is to end."""
+        while not self._ended.is_set():
+            with self._lock:
+                number = next((n for n in self._wanted if n not in self._known), None)
+                if number is not None:
+                    self._making = number, time.perf_counter()
+                self._changed.clear()
+            if number is None:
+                self._changed.wait(_POLL)
+            else:
+                yield number
+
+    def _keep(self, number: int, known: Known) -> None:
+        self._known[number] = known
+        size = sum(a.nbytes for a in (known.motion, known.depth) if a is not None)
+        most = max(_MEMORY // max(size, 1), _FEWEST)
+        while len(self._known) > most:
+            self._known.popitem(last=False)

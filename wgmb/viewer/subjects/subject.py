@@ -1,0 +1,282 @@
+"""Subjects of the viewer: a built-in scene or frames on disk, drawn into GPU textures."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from ... import gpu
+from ...color.spaces import ColorConfig, ColorSpace, Display
+from ...extent import EVERYWHERE
+from ...frame import Frame
+from ...gpu.textures import TexturePool
+from ...gpu.timing import TimestampClock
+from ...methods import METHODS
+from ...methods.contract import reach_of
+from ...pipeline.blur import Blur
+from ...render import Render
+from ...scene import builtin
+from ...scene.scene import Scene
+from ...sequence.data_windows import (
+    NONE,
+    Window,
+    placed,
+    union,
+)
+from ...sequence.frame_file import FrameFile
+from ...sequence.input_color import space_of, without_pixels
+from ...settings import InputSettings, SceneSettings, size_of
+from ..state.state import BOTH_EYES, State
+from ..state.words import set_words
+from .video import FootageSubject
+
+_MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
+_FRAMES_KEPT = 2, 16  # but so many at least, at most
+# A frame's number, its view, if it is one of a pair, and frames that are read to either side of it.
+_Which = tuple[int, str | None, bool, int]
+Texture = wgpu.GPUTexture
+Budget = tuple[int, float]
+"""Samples done before, and seconds to spend on more."""
+
+
+class SceneSubject:
+    """A built-in scene: any size, any moment, every method that it has what to show for."""
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._render = Render(builtin.make(next(iter(builtin.SCENES))), Blur("tap", device=device))
+        self._seen: tuple = ()
+        self._made = self._render.scene
+
+    def has(self, state: State) -> frozenset[str]:
+        """Inputs that a method may ask for; figures are flat: they have no pictures of instants."""
+        flat = self._scene(state).figure is not None
+        return frozenset({"scene"} if flat else {"color", "motion", "depth", "scene"})
+
+    def methods(self, state: State) -> list[str]:
+        """Names of the methods that can draw it."""
+        scene, can = self._scene(state), methods_for(self.has(state))
+        if scene.figure is not None:
+            return ["volume"]
+        return can if scene.has_volumes else [name for name in can if name != "volume"]
+
+    def nature(self, state: State) -> str | None:
+        """The method that shows it under a shutter of any length, if there is one."""
+        scene = self._scene(state)
+        if scene.figure is not None:
+            perceived = scene.figure.kind in ("NATURAL", "SCREEN")  # already
+            return None if perceived else "volume"
+        if callable(scene.volumes):  # their speeds are those of a moment
+            return None
+        return "volume" if scene.volumes and state.method == "volume" else "distributed"
+
+    def size(self, state: State) -> tuple[int, int]:
+        """Width and height that give the picture its shape [px]."""
+        return size_of(state.size)
+
+    def space(self, config: ColorConfig) -> ColorSpace:
+        """The colour space."""
+        return config.space_of({})
+
+    def look_at(
+        self, state: State, size: tuple[int, int], antialias: int, eye: str | None = None
+    ) -> None:
+        """Set the content of the next draws."""
+        self._render.scene = self._scene(state)
+        self._render.size, self._render.antialias, self._render.fps = size, antialias, state.fps
+        self._time, self._number = state.frame / state.fps, int(state.frame // 1)
+
+    def _scene(self, state: State) -> Scene:
+        seen = (state.source, state.settings, state.orbit, state.pan, state.dolly)
+        if seen != self._seen:
+            given = SceneSettings(
+                set=set_words(state.settings),
+                orbit=state.orbit,
+                pan=state.pan,
+                dolly=state.dolly,
+            )
+            self._made, self._seen = given.make(state.source), seen
+        return self._made
+
+    def passes(self) -> dict[str, Texture]:
+        """The sharp picture and what lies under it, by name."""
+        return self._render.passes(self._time, self._number)
+
+    def draw(
+        self, blur: Blur, output: Texture, budget: Budget, timing: TimestampClock | None
+    ) -> int:
+        """Draw with `blur`; samples done, which may be less than it has where it is slow."""
+        view, (done, seconds) = output.create_view(), budget
+        if "progress" in blur.method.uses:
+            return self._render.refine(
+                view, self._time, self._number, done=done, seconds=seconds, blur=blur
+            )
+        self._render.draw(view, self._time, self._number, blur=blur, timing=timing)
+        return blur.samples
+
+
+class ClipSubject:
+    """Frames on disk: their own size, their own moments, the methods they have passes for."""
+
+    def __init__(self, device: wgpu.GPUDevice, state: State, display: Display | None):
+        self._device, self._images = device, TexturePool(device)
+        given: dict[str, Any] = dict(state.given)
+        masks = given.pop("holdout", ()), given.pop("scale", ())
+        space = state.colors.space(display)
+        self._clip = InputSettings(**given).open(state.source, *masks, space)
+        self._said: dict[tuple, FrameFile] = {}  # what the frames say of their colours
+        self._frames: OrderedDict[_Which, Frame] = OrderedDict()
+        self._sharp = Blur("tap", device=device)
+        self._uploaders: dict[tuple, Blur] = {}
+        self._uploaded: dict[tuple, tuple[_Which | None, dict]] = {}
+        self.finding = f"vectors: {self._clip.finding}"
+        self._now = self._which(state)
+        if "motion" not in self.has(state):
+            self.finding += "; shown sharp, `wgmb blur` finds the motion in such frames"
+
+    def has(self, state: State) -> frozenset[str]:
+        """Inputs that a method may ask for."""
+        return self._frame(self._which(state)).has
+
+    def methods(self, state: State) -> list[str]:
+        """Names of the methods that can be fed."""
+        return methods_for(self.has(state))
+
+    def nature(self, state: State) -> str | None:
+        """The method that shows it under a shutter of any length: nobody knows more than frames."""
+        return None
+
+    def size(self, state: State) -> tuple[int, int]:
+        """Width and height of the frames [px]."""
+        return self._frame(self._which(state)).size
+
+    def space(self, config: ColorConfig) -> ColorSpace:
+        """The colour space of the frame; InputError if it is unknown."""
+        self._frame(self._now)
+        return space_of(self._said[self._now[:2]], config)
+
+    @property
+    def eyes(self) -> list[str]:
+        """Names of the views, the default one first; none of frames with one picture."""
+        views = self._clip.views
+        return [*self._clip.chosen, *(v for v in views if v not in self._clip.chosen)]
+
+    def sides(self) -> tuple[str, str]:
+        """The views for the left and the right eye: by their names, else the first two."""
+        left, right = (
+            next((v for v in self.eyes if v.lower() in (word, word[0])), None)
+            for word in ("left", "right")
+        )
+        left = left or next(v for v in self.eyes if v != right)
+        return left, right or next(v for v in self.eyes if v != left)
+
+    def look_at(
+        self, state: State, size: tuple[int, int], antialias: int, eye: str | None = None
+    ) -> None:
+        """Set the content of the next draws; `eye`: the view."""
+        self._now = self._which(state, eye)
+
+    def _which(self, state: State, eye: str | None = None) -> _Which:
+        number = min(self._clip.numbers, key=lambda n: abs(n - state.frame))
+        default = self.eyes[0] if self.eyes else None
+        eye = eye or (state.eyes if state.eyes in self.eyes else default)
+        reach = dict(state.options).get("reach", 1)
+        is_pair = state.mode in BOTH_EYES and len(self.eyes) > 1
+        return number, eye, is_pair, reach if isinstance(reach, int) else 1
+
+    def _frame(self, which: _Which) -> Frame:
+        """A frame; of a pair, on a canvas that holds both."""
+        number, eye, is_pair, reach = which
+        frame = self._kept((number, eye, False, reach))
+        if is_pair and which not in self._frames:
+            both = [self._kept((number, side, False, reach)) for side in self.sides()]
+            self._frames[which] = _on_canvas(frame, union(map(_canvas, both)))
+        return self._frames[which] if is_pair else frame
+
+    def _kept(self, key: _Which) -> Frame:
+        """A frame, by its number and view, and its neighbours."""
+        if key not in self._frames:
+            source = self._clip.source(*key[:2])
+            frame = self._clip.with_neighbours(source, extent=EVERYWHERE, reach=key[3])
+            self._said[key[:2]] = without_pixels(source)
+            least, most = _FRAMES_KEPT
+            around = 2 * key[3] + 1
+            kept = min(max(_MEMORY // (around * _bytes(frame)), least), most)
+            while len(self._frames) >= kept:
+                self._frames.popitem(last=False)
+            self._frames[key] = frame
+        self._frames.move_to_end(key)
+        return self._frames[key]
+
+    def _inputs(self, blur: Blur) -> dict:
+        """The frame's textures, one set for all methods that take the same."""
+        key = blur.method.needs, blur.method.uses, reach_of(blur.method)
+        which, inputs = self._uploaded.get(key, (None, {}))
+        if which != self._now:
+            inputs = self._uploaders.setdefault(key, blur).upload(self._frame(self._now))
+            self._uploaded[key] = self._now, inputs
+        return dict(inputs)
+
+    def passes(self) -> dict[str, Texture]:
+        """The sharp picture and what lies under it, by name; only what there is."""
+        frame, images = self._frame(self._now), self._images
+        inputs = self._inputs(self._sharp)
+        color, depth, motion_ = (f"{name} {self._now[1]}" for name in ("color", "depth", "motion"))
+        images.upload(color, self._sharp_rgba(frame), "rgba32float")
+        found = {"color": images.texture(color, frame.size, "rgba32float")}
+        if frame.depth is not None:
+            images.upload(depth, frame.depth, "r32float")
+            found["depth"] = images.texture(depth, frame.size, "r32float")
+        if "motion" in frame.has:
+            motion = images.texture(motion_, frame.size, "rgba32float")
+            encoder = self._device.create_command_encoder(label="motion")
+            self._sharp.encode_motion(encoder, inputs["frame"], motion.create_view())
+            gpu.submit(self._device, encoder)
+            found["motion"] = motion
+        return found
+
+    def _sharp_rgba(self, frame: Frame) -> np.ndarray:
+        rgba = np.ones((*frame.color.shape[:2], 4), np.float32)
+        rgba[..., : frame.color.shape[2]] = frame.color
+        return rgba
+
+    def draw(
+        self, blur: Blur, output: Texture, budget: Budget, timing: TimestampClock | None
+    ) -> int:
+        """Draw with `blur`, all its samples."""
+        encoder = self._device.create_command_encoder(label="blur")
+        view = output.create_view()
+        blur.encode(encoder, output=view, timing=timing, **self._inputs(blur))
+        gpu.submit(self._device, encoder)
+        return blur.samples
+
+
+def _canvas(frame: Frame) -> Window:
+    """Position of a frame's pixels, counted from the display window's corner."""
+    x, y = frame.window[:2] if frame.window else (0, 0)
+    return x, y, x + frame.size[0] - 1, y + frame.size[1] - 1
+
+
+def _on_canvas(frame: Frame, onto: Window) -> Frame:
+    """A frame and its neighbours on a canvas that holds them; beyond them is nothing."""
+    window = _canvas(frame)
+    if window == onto:
+        return frame
+    near = (f and _on_canvas(f, onto) for f in (frame.prev, frame.next))
+    return placed(replace(frame, prev=None, next=None), window, onto, NONE).between(*near)
+
+
+def _bytes(frame: Frame) -> int:
+    arrays = (getattr(frame, f.name) for f in fields(frame))
+    return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
+
+
+Subject = SceneSubject | ClipSubject | FootageSubject
+
+
+def methods_for(has: frozenset[str]) -> list[str]:
+    """The methods that can be fed with what there is."""
+    return [name for name, method in METHODS.items() if method.needs <= has]

@@ -1,0 +1,247 @@
+"""A video as the viewer's subject: pictures at once, their blur once their motion is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from ... import gpu
+from ...color.coding import Coding
+from ...color.highlights import check_coding
+from ...color.spaces import ColorConfig, ColorSpace
+from ...frame import Frame
+from ...gpu.textures import TexturePool
+from ...gpu.timing import TimestampClock
+from ...methods import METHODS
+from ...pipeline.blur import Blur
+from ...shutter import Shutter
+from ...video.holdouts import STATIC, holdout_of
+from ...video.planes import Planes
+from ..state.allowed import check_video
+from ..state.files import footage_of
+from ..state.state import State
+from ..state.video_time import (
+    moment,
+    most_mb,
+    output,
+    settings_of,
+)
+from .cell_sum import CellSum
+from .motion_thread import MotionMaker
+from .video_exposure import Exposed, exposed, reach
+from .video_frames import FootageFrames
+from .video_motion import Wish
+
+_PASSES = frozenset({"color", "motion", "depth"})
+_AHEAD = 48  # pictures whose motion is made while playing
+
+
+class FootageSubject:
+    """A video: its output frames, as `wgmb blur` makes them.
+
+    Where the motion of a picture is not known yet the picture is shown as it is; `stamp` changes
+    when more is known. `finding`: where motion comes from, and what is odd about the file.
+    """
+
+    def __init__(self, device: wgpu.GPUDevice, state: State):
+        check_video(state)
+        given: dict[str, Any] = dict(state.given)
+        max_mb, masks = most_mb(state), given.get("holdout", ())
+        self._device, self._images = device, TexturePool(device)
+        self._footage = footage_of(state.source, max_mb)
+        self._times, settings = self._footage.times, settings_of(state)
+        holdout_of([mask for mask in masks if mask != STATIC], self._footage)  # says what is wrong
+        wish = Wish(masks, settings.duplicates == "fill", given.get("cuts") or "")
+        self._maker = MotionMaker(self._footage.path, max_mb, settings, device, wish)
+        self._moves = settings.flow != "none"
+        self.finding = "\n".join([f"motion: {self._maker.how}", *self._footage.notes])
+        self._frames = FootageFrames(self._footage, device, self._maker.known, 1.0)
+        self._sums: dict[int, CellSum] = {}
+        self._state = state
+        self._exposed: Exposed | None = None
+        self._lacking: list[int] = []
+
+    # ---- what can be shown -----------------------------------------------------------------
+
+    def has(self, state: State) -> frozenset[str]:
+        """Inputs that a method may ask for."""
+        return _PASSES if self._moves else frozenset({"color"})
+
+    def methods(self, state: State) -> list[str]:
+        """Names of the methods that can be fed; all are the same where pictures are averaged."""
+        return [name for name, method in METHODS.items() if method.needs <= _PASSES]
+
+    def nature(self, state: State) -> str | None:
+        """The method that shows it under a shutter of any length: there is none."""
+        return None
+
+    def size(self, state: State) -> tuple[int, int]:
+        """Width and height of the pictures [px]."""
+        return self._footage.size
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """Width and height in square pixels, as a picture is shown."""
+        width, height = self._footage.size
+        return width * float(self._footage.pixel_aspect), height
+
+    @property
+    def coding(self) -> Coding:
+        """The coding of its colours; its light is linear in these primaries."""
+        return self._footage.coding
+
+    def space(self, config: ColorConfig) -> ColorSpace:
+        """The colour space of the pictures that VideoLight makes: linear Rec. 709."""
+        return config.space_of({})
+
+    # ---- what is known --------------------------------------------------------------------
+
+    def stamp(self, states: Sequence[State], shutter: Shutter, neighbours: bool) -> list[tuple]:
+        """Findings about the pictures that contribute to the output frames, one entry for each.
+
+        What lacks is asked for, that of the first output frame first, and while playing also that
+        of the pictures to come.
+        """
+        beside = 1 if neighbours and self._moves else 0
+        asked: dict[int, None] = {}
+        stamps, lacking = [], []
+        for state in states:
+            found = self._exposure(state, shutter)
+            of_motion = [n for cell in found.cells for n in self._near(cell.index, beside)]
+            needed = [*found.lacking, *of_motion]
+            first, last = reach(self._times, output(state).clock, moment(state), shutter)
+            soon = range(max(first - beside, 0), min(last + beside + 1, len(self._times)))
+            asked |= dict.fromkeys([*needed, *sorted(soon, key=lambda n: abs(n - found.here))])
+            lacking += [n for n in needed if self._maker.known(n) is None]
+            stamps.append(tuple(n for n in needed if self._maker.known(n) is not None))
+        if states[0].playing and asked:
+            newest = max(asked)
+            asked |= dict.fromkeys(range(newest, min(newest + _AHEAD, len(self._times))))
+        self._maker.want(tuple(asked))
+        self._lacking = list(dict.fromkeys(lacking))
+        return stamps
+
+    def _near(self, number: int, beside: int) -> list[int]:
+        """A picture, and with `beside` those that its motion leads to."""
+        known = self._maker.known(number)
+        if known is None or not beside:
+            return [number]
+        before = None if known.begins else known.before
+        after = None if known.ends else known.after
+        return [n for n in (number, before, after) if n is not None]
+
+    @property
+    def busy(self) -> bool:
+        """True while what is shown lacks motion that is being made."""
+        return bool(self._lacking) and not self._maker.problem
+
+    @property
+    def waiting(self) -> str:
+        """Name of the picture that is shown instead of the blur, and the reason; '' if all is
+        ready."""
+        if not self._lacking:
+            return ""
+        if self._maker.problem:
+            return f"sharp: {self._maker.problem}"
+        making = self._maker.making
+        if making is None or making[0] not in self._lacking:
+            making = self._lacking[0], 0.0
+        number, took = making
+        what = "the motion" if self._moves else "the shot"
+        since = f" ({took:.0f} s)" if took >= 1 else ""
+        here = self._exposed and self._exposed.here
+        sharp = "sharp: " if here in self._lacking else ""
+        return f"{sharp}finding {what} of picture {number}{since}"
+
+    def made_of(self, state: State, shutter: Shutter) -> tuple[int, ...]:
+        """Numbers of the pictures that share the exposure of the present output frame."""
+        return tuple(cell.index for cell in self._exposure(state, shutter).cells)
+
+    def close(self) -> None:
+        """Let the search for motion end."""
+        self._maker.close()
+
+    def _exposure(self, state: State, shutter: Shutter) -> Exposed:
+        known, clock = self._maker.known, output(state).clock
+        return exposed(self._times, clock, moment(state), shutter, known)
+
+    # ---- drawing --------------------------------------------------------------------------
+
+    def look_at(
+        self, state: State, size: tuple[int, int], antialias: int, eye: str | None = None
+    ) -> None:
+        """Set the content of the next draws."""
+        self._state = state
+        highlights = settings_of(state).highlights
+        if highlights != self._frames.highlights:
+            check_coding(highlights, self._footage.path, self.coding)
+            known = self._maker.known
+            self._frames = FootageFrames(self._footage, self._device, known, highlights)
+        self._exposed = self._exposure(state, Shutter(0))
+
+    def passes(self) -> dict[str, wgpu.GPUTexture]:
+        """The sharp picture and what lies under it; 0 everywhere as long as it is not known."""
+        assert self._exposed is not None
+        frame, images = self._frames(self._exposed.here), self._images
+        width, height = frame.size
+        motion = frame.motion if frame.motion is not None else np.zeros((height, width, 4), "f4")
+        depth = frame.depth if frame.depth is not None else np.zeros((height, width), "f4")
+        found = {"color": self._sharp(frame)}
+        for name, array in (("motion", motion), ("depth", depth)):
+            texel = "r32float" if name == "depth" else "rgba32float"
+            images.upload(name, array, texel)
+            found[name] = images.texture(name, frame.size, texel)
+        return found
+
+    def _sharp(self, frame: Frame) -> wgpu.GPUTexture:
+        width, height = frame.size
+        rgba = np.ones((height, width, 4), np.float32)
+        rgba[..., : frame.color.shape[2]] = frame.color
+        self._images.upload("color", rgba, "rgba32float")
+        color = self._images.texture("color", frame.size, "rgba32float")
+        if self._frames.highlights == 1:
+            return color
+        shown = self._images.texture("shown", frame.size, "rgba32float")
+        self._compress(color, shown)
+        return shown
+
+    def draw(
+        self,
+        blur: Blur,
+        target: wgpu.GPUTexture,
+        budget: tuple[int, float],
+        timing: TimestampClock | None,
+    ) -> int:
+        """Draw the exposure of the present output frame with `blur`, all its samples."""
+        shutter, light = blur.shutter, target
+        if self._frames.highlights != 1:
+            size = target.size[0], target.size[1]
+            light = self._images.texture("light", size, "rgba32float")
+        neighbours = "neighbours" in blur.method.uses
+        found = self._exposure(self._state, shutter).cells
+        try:
+            parts = [(cell, self._frames(cell.index, neighbours)) for cell in found]
+            self._sum(blur).draw(parts, light)
+        finally:
+            blur.shutter = shutter
+        if light is not target:
+            self._compress(light, target)
+        return blur.samples
+
+    def _compress(self, light: wgpu.GPUTexture, output: wgpu.GPUTexture) -> None:
+        """Take expanded highlights back."""
+        encoder = self._device.create_command_encoder(label="compress")
+        planes = Planes(self._device, self._frames.highlights)
+        planes.compress(encoder, light.create_view(), output.create_view())
+        gpu.submit(self._device, encoder)
+
+    def _sum(self, blur: Blur) -> CellSum:
+        held = self._sums.get(id(blur))
+        if held is None or held.blur is not blur:
+            while len(self._sums) >= 4:
+                del self._sums[next(iter(self._sums))]
+            held = self._sums[id(blur)] = CellSum(blur)
+        return held

@@ -1,0 +1,109 @@
+"""The pictures that an output frame of a video is exposed from, as far as they are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from ...exposure import Cell, cells
+from ...shutter import Shutter
+from ...video.clock import Clock
+from ...video.output_times import Moment
+from ...video.read.timeline import Times
+from .video_motion import Known
+
+Knowledge = Callable[[int], Known | None]
+"""The finding about a picture, by its number; None until there is one."""
+
+
+@dataclass(frozen=True)
+class Exposed:
+    """An output frame, made of pictures of one shot."""
+
+    here: int
+    """The picture that is shown at its time."""
+    numbers: tuple[int, ...]
+    """`here` and those around it, ascending: all that share the exposure, and one on each side."""
+    cells: tuple[Cell, ...]
+    """Their parts of the exposure; the indices are pictures' numbers."""
+    lacking: tuple[int, ...]
+    """Pictures nothing is known of, on which the exposure depends."""
+
+
+def exposed(
+    times: Times, clock: Clock, moment: Moment, shutter: Shutter, known: Knowledge
+) -> Exposed:
+    """The exposure of an output frame; where too little is known, of what is known."""
+    shown = picture_at(times, clock, moment)
+    here, lacking = _kept(shown, known)
+    at, interval = float(moment.time), float(moment.interval)
+    opens, closes = (at + interval * t for t in shutter.span)
+
+    def time(number: int) -> float:
+        return float(clock.out(times[number]))
+
+    numbers = [here]
+    while (numbers[0] == here or time(numbers[0]) + time(numbers[1]) > 2 * opens) and (
+        before := _beside(numbers[0], -1, known, lacking)
+    ) is not None:
+        numbers.insert(0, before)
+    while (numbers[-1] == here or time(numbers[-1]) + time(numbers[-2]) < 2 * closes) and (
+        after := _beside(numbers[-1], 1, known, lacking)
+    ) is not None:
+        numbers.append(after)
+    found = cells([time(n) for n in numbers], at, interval, shutter)
+    parts = tuple(Cell(numbers[cell.index], cell.share, cell.shutter) for cell in found)
+    return Exposed(here, tuple(numbers), parts, tuple(dict.fromkeys(lacking)))
+
+
+def picture_at(times: Times, clock: Clock, moment: Moment) -> int:
+    """The picture that is shown at an output frame's time; before the first one, that."""
+    tick = clock.back(moment.time) / times.base
+    after = int(np.searchsorted(times.ticks, tick.numerator // tick.denominator, side="right"))
+    return max(after - 1, 0)
+
+
+def reach(times: Times, clock: Clock, moment: Moment, shutter: Shutter) -> tuple[int, int]:
+    """First and last picture of an exposure, if there is no cut and no repeat among them."""
+    at = clock.back(moment.time)
+    opens, closes = (
+        float((at + Fraction(t) * moment.interval * clock.speed) / times.base) for t in shutter.span
+    )
+    first = last = picture_at(times, clock, moment)
+    while first > 0 and _middle(times, first) > opens:
+        first -= 1
+    while last + 1 < len(times) and _middle(times, last + 1) < closes:
+        last += 1
+    return first, last
+
+
+def _middle(times: Times, number: int) -> float:
+    """Half-way from the picture before one [ticks]."""
+    return (int(times.ticks[number]) + int(times.ticks[number - 1])) / 2
+
+
+def _kept(shown: int, known: Knowledge) -> tuple[int, list[int]]:
+    """The picture that stands for one: itself, or where it is left out the one before."""
+    found = known(shown)
+    if found is None:
+        return shown, [shown]
+    if not found.is_left_out:
+        return shown, []
+    before = found.after if found.before is None else found.before
+    if before is None:
+        return shown, []
+    return before, [] if known(before) is not None else [before]
+
+
+def _beside(number: int, side: int, known: Knowledge, lacking: list[int]) -> int | None:
+    """The picture before (-1) or after (1) one in its shot; None if there is none, or unknown."""
+    here = known(number)
+    if here is None:
+        lacking.append(number)
+        return None
+    if side < 0:
+        return None if here.begins_shot else here.before
+    return None if here.ends_shot else here.after

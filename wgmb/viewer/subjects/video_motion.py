@@ -1,0 +1,166 @@
+"""Finding of a video's picture: its motion, and the end of its shot, as in `wgmb blur`.
+
+The pictures around it go through the same Reel, so that cuts, flashes, repeated pictures and
+those that cannot be decoded mean the same. Any picture may be asked for; neighbours are quick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import wgpu
+
+from ... import gpu
+from ...flow import Shot
+from ...flow.source import MotionSource
+from ...gpu.textures import TexturePool
+from ...shots.cut_list import CutList
+from ...shots.reader import Picture, Reel
+from ...video.holdouts import holdout_of
+from ...video.planes import Planes
+from ...video.read.reader import Footage
+from ...video.thumbnail import Glance, is_cut, is_double
+
+_BEFORE = 10  # pictures before one that may have a say in its motion, or in where its shot begins
+_EARLIER = 8  # more of them read at first, so that going back does not begin anew at each step
+_BEHIND = 24  # pictures kept behind one
+_NEAR = 48  # pictures ahead that are read on to
+
+
+@dataclass(frozen=True)
+class Known:
+    """The finding about a picture; `before` and `after` are the numbers of its neighbours."""
+
+    motion: np.ndarray | None
+    """(height, width, 4) to_prev, to_next [px]; None without a source of motion, or alone."""
+    depth: np.ndarray | None
+    before: int | None
+    after: int | None
+    begins: bool = True
+    """No motion leads to it from the picture before: that is of another shot, or of a flash."""
+    ends: bool = True
+    """No motion leads from it to the next picture."""
+    begins_shot: bool = True
+    ends_shot: bool = True
+    is_left_out: bool = False
+    """It repeats the picture before, or cannot be decoded: those beside it reach over its time."""
+    holdout: np.ndarray | None = None
+    """(height, width): 1 stays sharp; of pictures with motion."""
+
+
+@dataclass(frozen=True)
+class Wish:
+    """Settings on which the pictures' neighbours depend, besides the source of the motion.
+
+    `masks`: what stays sharp (see video/holdouts.py). `fill`: repeated pictures are left out.
+    `cuts`: see shots/cut_list.py.
+    """
+
+    masks: tuple[str, ...] = ()
+    fill: bool = False
+    cuts: str = ""
+
+
+class Finder:
+    """Finds what can be known of pictures, one after the other, on a device."""
+
+    def __init__(
+        self, footage: Footage, device: wgpu.GPUDevice, motion: MotionSource | None, wish: Wish
+    ):
+        self._footage, self._device, self._motion = footage, device, motion
+        self._times = footage.times.seconds
+        self._fill, self._cuts = wish.fill, CutList(wish.cuts)
+        self._holdout = holdout_of(wish.masks, footage) if motion is not None else None
+        self._planes, self._images = Planes(device), TexturePool(device)
+        self._reel: Reel[Glance] | None = None
+        self._numbers: WeakKeyDictionary[Glance, int] = WeakKeyDictionary()
+        self._told: dict[tuple[int, int], bool] = {}
+        self._shot: Callable[[int], Any] | None = None
+        self._first = 0  # index of a picture of the present shot
+
+    def __call__(self, number: int) -> Known:
+        """The finding about a picture, as far as possible."""
+        reel = self._reel_around(number)
+        try:
+            here = reel.at(self._times[number], _BEHIND)
+        except LookupError:  # from some pictures before it on, none can be decoded
+            return Known(None, None, None, None, is_left_out=True)
+        near = {i: reel[i].number for i in (here - 1, here, here + 1) if i in reel.kept}
+        if near.get(here) != number:
+            beside = sorted(near.values())
+            before = max((n for n in beside if n < number), default=None)
+            after = min((n for n in beside if n > number), default=None)
+            return Known(None, None, before, after, is_left_out=True)
+        found = self._found(reel, here)
+        motion, depth = found or (None, None)
+        return Known(
+            motion,
+            depth,
+            near.get(here - 1),
+            near.get(here + 1),
+            begins=not reel.moves_on(here, here - 1),
+            ends=not reel.moves_on(here, here + 1),
+            begins_shot=not reel.same_shot(here, here - 1),
+            ends_shot=not reel.same_shot(here, here + 1),
+            holdout=None if found is None else self._holdout,
+        )
+
+    def _found(self, reel: Reel[Glance], index: int) -> tuple[np.ndarray, np.ndarray] | None:
+        """Motion and depth."""
+        if self._motion is None:
+            return None
+        if self._shot is None or not reel.moves_on(self._first, index):
+            self._shot = self._motion.shot(self._load)
+        self._first = index
+        return self._shot(index)
+
+    def _reel_around(self, number: int) -> Reel[Glance]:
+        """A reel that can tell all of a picture: another one where the last is far from it."""
+        reel = self._reel
+        if reel is not None and len(reel.kept):
+            kept = reel.kept
+            first, last = reel[kept[0]].number, reel[kept[-1]].number
+            at_start = first == 0 or (kept[0] == 0 and first > number)
+            behind = sum(reel[i].number < number for i in kept)
+            if number <= last + _NEAR and (at_start or behind >= _BEFORE):
+                return reel
+        first = max(number - _BEFORE - _EARLIER, 0)
+        self._shot = None
+        self._reel = Reel(
+            self._pictures(first),
+            is_cut=self._is_cut if self._cuts.is_search else None,
+            known_cuts=self._cuts.frames(0),
+            is_double=is_double if self._fill else None,
+        )
+        return self._reel
+
+    def _pictures(self, first: int) -> Iterator[Picture[Glance]]:
+        for number, coded in self._footage.pictures(first):
+            glance = Glance(coded)
+            self._numbers[glance] = number
+            yield Picture(float(self._times[number]), glance, number)
+
+    def _is_cut(self, before: Glance, after: Glance) -> bool:
+        """The same as is_cut, told once for two pictures: to tell costs more than to decode."""
+        key = self._numbers[before], self._numbers[after]
+        if key not in self._told:
+            self._told[key] = is_cut(before, after)
+        return self._told[key]
+
+    def _load(self, index: int) -> Any:
+        """The picture of an index of the present shot, None outside it."""
+        assert self._reel is not None
+        if not self._reel.moves_on(self._first, index):
+            return None
+        content = self._reel[index].content
+        if not isinstance(self._shot, Shot):
+            return content.grey
+        texture = self._images.texture("searched", content.coded.size, "rgba16float")
+        encoder = self._device.create_command_encoder(label="decode")
+        self._planes.decode(encoder, content.coded, texture.create_view())
+        gpu.submit(self._device, encoder)
+        return texture
