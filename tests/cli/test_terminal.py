@@ -240,7 +240,7 @@ def test_the_command_of_the_package_hears_interruptions_first():
 )
 def test_blur_is_the_function_in_whatever_order_modules_are_loaded(imports):
     script = f"import sys\n{imports}\nassert callable(wgmb.blur), wgmb.blur\n"
-    script += "assert wgmb.blur.__module__ == 'wgmb.pipeline.blur.one_frame'\n"
+    script += "assert wgmb.blur.__module__ == 'wgmb.pipeline.one_frame'\n"
     script += "assert wgmb.methods.METHODS is wgmb.METHODS\n"
     if imports == "import wgmb":
         script = f"import sys, wgmb\nassert 'numpy' not in sys.modules\n{script}"

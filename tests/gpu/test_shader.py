@@ -153,7 +153,7 @@ def test_what_is_not_supported_is_refused(kind, text):
 
 
 def test_a_missing_constant_is_named():
-    with pytest.raises(ShaderError, match="no constant NOPE in holdout"):
+    with pytest.raises(ShaderError, match="no constant NOPE in gpu_frame/holdout"):
         wgsl.load("gpu_frame/holdout.wgsl").constant("NOPE")
 
 

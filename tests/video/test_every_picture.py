@@ -11,6 +11,7 @@ import raw_exr
 from wgmb import Clip, InputError
 from wgmb.io import chroma, deep, exr
 from wgmb.sequence.layers import names as layers
+from wgmb.sequence.layers import vectors
 
 REC709 = np.array([0.2126, 0.7152, 0.0722])
 AP1 = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
@@ -365,7 +366,7 @@ def test_vectors_stored_as_colours_are_not_mixed():
     channels["motionvector.R"] = one_pixel(x=(8, 2))["x"]
     channels["velocity.y"] = one_pixel(x=(8, 2))["x"]
     channels["CryptoObject00.r"] = one_pixel(x=(8, 2))["x"]
-    flat = deep.flatten(channels)
+    flat = deep.flatten(channels, vectors.STEMS)
     assert {flat[name].item() for name in channels if "." in name} == {8}
 
 
@@ -446,7 +447,7 @@ def test_damaged_deep_files_are_one_line(tmp_path):
 def test_too_little_memory_for_deep_pixels_is_one_line(tmp_path, monkeypatch):
     path = write_deep(tmp_path / "a.exr", deep_channels(np.ones((4, 4), int)))
 
-    def fail(channels):
+    def fail(*_):
         raise MemoryError
 
     monkeypatch.setattr(deep, "flatten", fail)

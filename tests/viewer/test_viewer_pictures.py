@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from viewer_hand import ALONE, BARE, PLAIN, library, seen
+from wgmb.color import srgb as color
 from wgmb.color.srgb import srgb
-from wgmb.color.srgb import srgb as color
 from wgmb.methods import METHODS
 from wgmb.scene import builtin
 from wgmb.viewer import State

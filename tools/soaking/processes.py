@@ -7,6 +7,7 @@ has neither a device nor threads, so that it can be forked.
 from __future__ import annotations
 
 import importlib
+import inspect
 import json
 import os
 import resource
@@ -112,7 +113,9 @@ def apart(work: Callable, *given, **options) -> Ended:
     with tempfile.NamedTemporaryFile("w", suffix=".json") as file:  # arguments have a limit
         json.dump(given, file)
         file.flush()
-        ended = run([sys.executable, "-m", __name__, name, file.name], **options)
+        folder = Path(inspect.getfile(work)).parent
+        line = [sys.executable, "-m", __name__, name, file.name, folder]
+        ended = run(line, **options)
     said, _, value = ended.out.rpartition(_ENDS)
     value = json.loads(value) if value and ended.code == 0 else None
     return Ended(**{**vars(ended), "out": said, "value": value})
@@ -165,6 +168,7 @@ def growth(step: Callable[[int], object], warm: int = 40, count: int = 120) -> f
 
 
 if __name__ == "__main__":
+    sys.path.append(sys.argv[3])
     _module, _, _function = sys.argv[1].partition(":")
     _work = getattr(importlib.import_module(_module), _function)
     _value = _work(*json.loads(Path(sys.argv[2]).read_text()))

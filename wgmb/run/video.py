@@ -18,7 +18,6 @@ from ..color.coding import CodedPicture, Coding
 from ..color.highlights import check_coding
 from ..errors import InputError
 from ..exposure import Cell
-from ..flow.source import MotionSource
 from ..gpu.textures import TexturePool
 from ..methods.contract import reach_of
 from ..output.output import Output
@@ -26,6 +25,7 @@ from ..output.result import Result
 from ..pipeline.blur import Blur
 from ..pipeline.exposure_sum import Exposer
 from ..sequence.frame_file import FrameFile
+from ..shots.motion_source import MotionSource
 from ..shots.reader import FLASH, Picture, Reel
 from ..shutter import Shutter
 from ..threads import Behind, ahead

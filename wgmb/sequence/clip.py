@@ -14,11 +14,11 @@ from ..color.highlights import check as check_highlights
 from ..color.spaces import ColorSpace
 from ..errors import InputError
 from ..extent import Extent
-from ..flow.source import MotionSource
 from ..frame import Frame
 from ..io import limits
 from ..io.frame_numbers import frame_list
 from ..shots.cut_list import CutList
+from ..shots.motion_source import MotionSource
 from .data_windows import Placement
 from .dependencies import Ingredients
 from .files import SequenceFiles

@@ -9,8 +9,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import InputError
-from ..flow.source import MotionSource
 from ..shots.cuts import pictures_differ
+from ..shots.motion_source import MotionSource
 from .frame_cache import StoredFrames
 from .frame_file import FrameFile
 

@@ -14,8 +14,8 @@ import wgpu
 from .. import gpu
 from ..errors import InputError
 from ..extras import is_installed
-from ..flow.source import MotionSource
 from ..io.frame_numbers import frame_numbers
+from ..shots.motion_source import MotionSource
 from ..video.clock import Clock
 
 if TYPE_CHECKING:

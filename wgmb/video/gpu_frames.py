@@ -13,10 +13,10 @@ import wgpu
 from .. import gpu
 from ..exposure import evened
 from ..flow import Shot
-from ..flow.source import MotionSource
 from ..gpu.textures import TexturePool
 from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
+from ..shots.motion_source import MotionSource
 from ..shots.reader import Reel
 from .planes import Planes
 from .thumbnail import Glance

@@ -15,7 +15,6 @@ from ..._version import __version__
 from ...color.highlights import check as check_highlights
 from ...errors import InputError
 from ...extras import install_command, is_installed
-from ...flow.source import MotionSource
 from ...pipeline.blur import Blur
 from ...run.video import FootageBlur, Sink, blur_footage
 from ...run.video_output import write
@@ -28,6 +27,7 @@ from ...settings import (
 )
 from ...settings.video import VideoSettings
 from ...shots.cut_list import CutList
+from ...shots.motion_source import MotionSource
 from ...video.clock import Clock
 from ...video.holdouts import holdout_of
 from ...video.output_times import Moment, moments

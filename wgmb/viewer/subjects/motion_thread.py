@@ -16,8 +16,8 @@ import wgpu
 
 from ... import gpu
 from ...errors import Error
-from ...flow.source import MotionSource
 from ...settings.video import FlowSettings
+from ...shots.motion_source import MotionSource
 from ...video.read.reader import Footage
 from .video_motion import Finder, Known, Wish
 

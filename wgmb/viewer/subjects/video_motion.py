@@ -16,9 +16,9 @@ import wgpu
 
 from ... import gpu
 from ...flow import Shot
-from ...flow.source import MotionSource
 from ...gpu.textures import TexturePool
 from ...shots.cut_list import CutList
+from ...shots.motion_source import MotionSource
 from ...shots.reader import Picture, Reel
 from ...video.holdouts import holdout_of
 from ...video.planes import Planes
