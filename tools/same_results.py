@@ -21,7 +21,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-SAMPLE = str(ROOT / "sample" / "crossing.####.exr")
+SAMPLE = "sample/crossing.####.exr"
 METHODS = {
     "tap": ["", "--path five", "--path straight", "--variant published", "--jitter 1 --samples 4"],
     "tiles": ["", "--show tiles", "--variant published"],
@@ -95,6 +95,7 @@ def make_inputs(folder: Path) -> None:
     import make_frames as make
     import make_stereo
 
+    shutil.copytree(ROOT / "sample", folder / "sample", ignore=shutil.ignore_patterns("*[!r]"))
     for name in ("stereo", "cropped", "plain"):
         (folder / name).mkdir(parents=True)
     for n in range(1, 4):
@@ -145,11 +146,23 @@ def run(line: str, folder: Path) -> dict:
 
 def _files(folder: Path) -> dict[str, str]:
     return {
-        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        str(path.relative_to(folder)): hashlib.sha256(_content(path)).hexdigest()
         for path in sorted(folder.rglob("*"))
         if path.is_file() and path.suffix not in (".html", ".csv", ".svg")  # which hold times
         and path.name not in ("report.json", "record.json")
     }  # fmt: skip
+
+
+def _content(path: Path) -> bytes:
+    """Its bytes; of a Matroska file, which has random numbers in it, what FFmpeg reads."""
+    if path.suffix not in (".mkv", ".webm"):
+        return path.read_bytes()
+    import av
+
+    with av.open(str(path)) as file:
+        tags = [file.metadata, *(stream.metadata for stream in file.streams)]
+        packets = [(p.stream_index, p.pts, p.duration, bytes(p)) for p in file.demux()]
+    return repr((tags, packets)).encode()
 
 
 def _still(text: str, folder: Path) -> str:
