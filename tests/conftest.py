@@ -2,7 +2,6 @@
 
 import json
 import os
-from pathlib import Path
 
 import imageio.v3 as iio
 import numpy as np
@@ -17,13 +16,6 @@ np.seterr(all="raise", under="ignore")
 collect_ignore = ["blender"]  # test_blender.py runs them in Blender's own Python
 if "PYTEST_XDIST_WORKER" in os.environ:  # the workers have shared out the cores already
     os.environ["LP_NUM_THREADS"] = "1"
-# Lavapipe compiles kernels of narrow vectors in two thirds of the time; the pictures are small.
-# They have a cache of their own, as Mesa takes those of another width for its own, and crashes.
-if "LP_NATIVE_VECTOR_WIDTH" not in os.environ:
-    os.environ["LP_NATIVE_VECTOR_WIDTH"] = "128"
-    kernels = Path.home() / ".cache" / "wgmb" / "test_kernels"
-    kernels.mkdir(parents=True, exist_ok=True)
-    os.environ["MESA_SHADER_CACHE_DIR"] = str(kernels)
 
 os.environ.pop("OCIO", None)  # a config of whoever runs the tests
 pytest.register_assert_rewrite("viewer_hand")

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import make_frames as make
 from wgmb.run.batch_report import BatchReport
-from wgmb.run.farm.plugin import Blurring
+from wgmb.run.farm.plugin import BlurPlugin
 from wgmb.run.job import Job, settle
 from wgmb.run.report import Outcome
-from wgmb.run.request import Asked
-from wgmb.sequence.findings import Settled
+from wgmb.run.request import BlurRequest
+from wgmb.sequence.findings import SequenceFindings
 from wgmb.settings import (
     BlurSettings,
     InputSettings,
@@ -26,12 +26,12 @@ from wgmb.settings.video import VideoSettings
 
 def job_of(pattern: str, out: Path, method: str = "tap") -> Job:
     """The job of `wgmb blur`."""
-    asked = Asked(
+    asked = BlurRequest(
         pattern=pattern,
         output=OutputSettings(output=str(out / "o.####.exr")),
-        look=BlurSettings(method=method),
-        when=ShutterSettings(),
-        given=InputSettings(vectors="blender"),
+        blur=BlurSettings(method=method),
+        shutter=ShutterSettings(),
+        input=InputSettings(vectors="blender"),
         color=ColorSettings(),
         video=VideoSettings(),
     )
@@ -43,11 +43,11 @@ def long_job(folder: Path, count: int) -> Job:
     pattern = make.write_sequence(folder, (1, 2, 3))
     short = job_of(pattern, folder / "out")
     every = list(range(1, count + 1))
-    found: Settled = replace(short.settled, on_disk=tuple(every))
+    found: SequenceFindings = replace(short.settled, on_disk=tuple(every))
     return replace(short, numbers=every, findings=found, clip_opened=None)
 
 
-class Timed(Blurring):
+class Timed(BlurPlugin):
     """A worker that writes down its CPU seconds after every part."""
 
     def prepare(self, adapter: str | None) -> None:
@@ -67,7 +67,7 @@ class Timed(Blurring):
             file.write(f"{os.getpid()} {time.process_time() - self._cpu}\n")
 
 
-class Waiting(Blurring):
+class Waiting(BlurPlugin):
     """A worker that waits for every frame as for a GPU."""
 
     def prepare(self, adapter: str | None) -> None:

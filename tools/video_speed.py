@@ -110,11 +110,11 @@ def length(clip: Path) -> Fraction:
 
 def codecs_alone(clip: Path, exact: Path, scratch: Path) -> None:
     """Decode the clip, and encode the pictures of `exact`, which were decoded before."""
-    from wgmb.video.read.reader import Footage
+    from wgmb.video.read.reader import VideoReader
     from wgmb.video.write.encoders import chosen
     from wgmb.video.write.pictures import CodedVideo
 
-    footage = Footage(exact)
+    footage = VideoReader(exact)
     pictures = [picture for _, picture in footage]
     writer = CodedVideo(
         scratch, scratch.with_suffix(".part.mp4"), chosen(scratch), footage.coding, footage.size,
@@ -125,7 +125,7 @@ def codecs_alone(clip: Path, exact: Path, scratch: Path) -> None:
     with av.open(str(clip)) as container:
         stream = container.streams.video[0]
         stream.thread_type = "AUTO"
-        share = len(pictures) / max(1, len(Footage(clip)))
+        share = len(pictures) / max(1, len(VideoReader(clip)))
         done = 0
         for _ in container.decode(stream):
             every += 1
@@ -144,9 +144,9 @@ def kernel_alone(clip: Path, fps: int) -> None:
     """
     from wgmb import gpu
     from wgmb.video.planes import Average
-    from wgmb.video.read.reader import Footage
+    from wgmb.video.read.reader import VideoReader
 
-    footage = Footage(clip)
+    footage = VideoReader(clip)
     count = max(1, round(float(footage.rate) / fps))
     pictures = [picture for _, picture in footage.pictures(0, count - count % 2)]
     shares = [1 / count] * len(pictures)

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from .run.batch_report import BatchReport
     from .run.sequence import blur_sequence, vectors_sequence
     from .run.stages import BlurredFrame, blurred
+    from .run.video import VideoReport, blur_video
     from .scene import Body, CameraPath, Scene
     from .sequence.clip import Clip, Passes
     from .sequence.layers.camera_file import CameraFile
@@ -77,8 +78,10 @@ __all__ = [
     "Shutter",
     "VectorOutput",
     "Vectors",
+    "VideoReport",
     "blur",
     "blur_sequence",
+    "blur_video",
     "blurred",
     "explore",
     "show",
@@ -105,6 +108,7 @@ _PLACES = {
     "render": ("Render",),
     "run.batch_report": ("BatchReport",),
     "run.sequence": ("blur_sequence", "vectors_sequence"),
+    "run.video": ("VideoReport", "blur_video"),
     "run.stages": ("BlurredFrame", "blurred"),
     "scene": ("Body", "Scene", "CameraPath"),
     "sequence.clip": ("Clip", "Passes"),

@@ -13,7 +13,7 @@ from .errors import InputError
 WIDEST = 960  # [px]; wider pictures are shown smaller
 
 
-class Shown:
+class NotebookImage:
     """A picture that a notebook shows; `png` is the file."""
 
     def __init__(self, png: bytes, size: tuple[int, int]):
@@ -26,7 +26,7 @@ class Shown:
         return self.png
 
 
-def show(image: np.ndarray, exposure: float = 0.0) -> Shown:
+def show(image: np.ndarray, exposure: float = 0.0) -> NotebookImage:
     """A picture for a notebook: the last value of a cell is shown.
 
     `image`: (height, width) or (height, width, 1, 3 or 4) float, linear, premultiplied alpha.
@@ -52,7 +52,7 @@ def show(image: np.ndarray, exposure: float = 0.0) -> Shown:
         if light.shape[2] == 1:
             light = np.repeat(light, 3, axis=2)
         samples = to_display(light, 8)
-    return Shown(encode(samples), (light.shape[1], light.shape[0]))
+    return NotebookImage(encode(samples), (light.shape[1], light.shape[0]))
 
 
 def _smaller(light: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from wgmb.color.highlights import compressed, expanded
 from wgmb.color.srgb import linear, to_display
 from wgmb.gpu.textures import TexturePool
 from wgmb.video.planes import Planes
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 
 KNEE = 0.92
 
@@ -152,7 +152,7 @@ def video(path, signals):
 
 
 def lumas(path):
-    return [coded.planes[0].astype(int) for _, coded in Footage(path)]
+    return [coded.planes[0].astype(int) for _, coded in VideoReader(path)]
 
 
 @pytest.mark.parametrize("flow", ["none", "dis"])

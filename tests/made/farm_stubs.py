@@ -6,10 +6,10 @@ from pathlib import Path
 
 from wgmb import DeviceError
 from wgmb.io import atomic
-from wgmb.run.farm.plugin import Blurring
+from wgmb.run.farm.plugin import BlurPlugin
 
 
-class WithoutGpu(Blurring):
+class WithoutGpu(BlurPlugin):
     """Worker 1 has no GPU."""
 
     def prepare(self, adapter):
@@ -18,11 +18,11 @@ class WithoutGpu(Blurring):
         super().prepare(adapter)
 
 
-class Killing(Blurring):
+class Killing(BlurPlugin):
     """Frame 5 kills its worker, always; frame 9 does so once. Both leave an unfinished file."""
 
     def blur(self, chosen, tell, stop):
-        folder = Path(self._job.asked.output.output).parent
+        folder = Path(self._job.request.output.output).parent
         sources = self._job.clip.__class__.sources
 
         def deadly(clip, number):

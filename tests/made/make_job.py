@@ -1,7 +1,7 @@
 """A job as the command line asks for it."""
 
 from wgmb.run.job import settle
-from wgmb.run.request import Asked
+from wgmb.run.request import BlurRequest
 from wgmb.settings import (
     BlurSettings,
     InputSettings,
@@ -15,12 +15,12 @@ from wgmb.settings.video import VideoSettings
 def job_of(pattern, folder, **more):
     """Frames blurred by four taps into `folder`; `more`: further settings of the output."""
     return settle(
-        Asked(
+        BlurRequest(
             pattern=str(pattern),
             output=OutputSettings(output=str(folder / "o.####.exr"), **more),
-            look=BlurSettings(method="tap", samples=4),
-            when=ShutterSettings(),
-            given=InputSettings(),
+            blur=BlurSettings(method="tap", samples=4),
+            shutter=ShutterSettings(),
+            input=InputSettings(),
             color=ColorSettings(),
             video=VideoSettings(),
         )

@@ -18,12 +18,12 @@ from wgmb.camera import Camera, Reprojections
 from wgmb.color.coding import CodedPicture, Coding
 from wgmb.methods import METHODS
 from wgmb.observer import Observer
-from wgmb.pipeline.exposure_sum import Exposer
+from wgmb.pipeline.exposure_sum import ExposureSum
 from wgmb.scene import builtin
-from wgmb.shots.reader import Picture, Reel
-from wgmb.video.gpu_frames import ReelViews
+from wgmb.shots.reader import Picture, ShotReader
+from wgmb.video.gpu_frames import VideoFrames
 from wgmb.video.planes import Average
-from wgmb.video.thumbnail import Glance
+from wgmb.video.thumbnail import Thumbnail
 from wgmb.viewer import State
 from wgmb.viewer.draw.renderer import Renderer
 
@@ -201,8 +201,8 @@ def test_memory_does_not_grow_with_frames(fresh, name):
 def test_exposures_of_cells_leave_nothing_behind():
     """Also where shutters, shares and numbers of cells change from one to the next."""
     blur = Blur("tap", samples=4)
-    reel = Reel(Picture(n / 144, _coded(n), n) for n in range(10_000))
-    views, exposer, number = ReelViews(reel, blur, _Sideways()), Exposer(blur), 0
+    reel = ShotReader(Picture(n / 144, _coded(n), n) for n in range(10_000))
+    views, exposer, number = VideoFrames(reel, blur, _Sideways()), ExposureSum(blur), 0
 
     def step():
         nonlocal number
@@ -227,11 +227,11 @@ def test_averages_of_planes_leave_nothing_behind():
     assert growth(step) <= MOST
 
 
-def _coded(number: int) -> Glance:
+def _coded(number: int) -> Thumbnail:
     width, height = SIZE
     luma = np.random.default_rng(number % 7).integers(40, 200, (height, width), np.uint8)
     chroma = np.full((height // 2, width // 2), 128, np.uint8)
-    return Glance(CodedPicture((luma, chroma, chroma), Coding()))
+    return Thumbnail(CodedPicture((luma, chroma, chroma), Coding()))
 
 
 class _Sideways:

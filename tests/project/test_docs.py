@@ -11,6 +11,7 @@ from urllib.parse import unquote
 import cyclopts
 import pytest
 
+import make_clips
 from wgmb import METHODS
 from wgmb.cli import app as cli
 from wgmb.scene import builtin
@@ -53,6 +54,7 @@ LINES = [
 @pytest.mark.parametrize("page", WITH_PYTHON)
 def test_python_blocks_run_in_their_order(page, tmp_path, monkeypatch):
     (tmp_path / "sample").symlink_to(HERE / "sample")
+    make_clips.write(tmp_path / "in.mp4", tone=0.1)
     monkeypatch.chdir(tmp_path)
     names: dict = {}
     for i, block in enumerate(blocks(PAGES[page], "python"), 1):

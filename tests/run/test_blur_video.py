@@ -1,5 +1,6 @@
 """`wgmb blur` of videos, and of pictures without vectors: times, shares, motion, files."""
 
+from dataclasses import fields
 from fractions import Fraction
 
 import av
@@ -9,15 +10,16 @@ from PIL import Image
 
 import make_clips as clips
 import make_frames as make
-from wgmb import gpu
+from wgmb import InputError, gpu
 from wgmb.cli import app
-from wgmb.cli.commands.blur_video import make_wish, tell_how
+from wgmb.cli.commands.blur_video import tell_how
 from wgmb.color.srgb import linear, srgb, to_display
 from wgmb.extras import install_command
-from wgmb.run import video as video_batch
-from wgmb.settings import BlurSettings, InputSettings, ShutterSettings
+from wgmb.run import video_output
+from wgmb.run.video import VideoOptions, VideoRequest, blur_video
+from wgmb.settings import BlurSettings, OutputSettings, ShutterSettings
 from wgmb.settings.video import FlowSettings, VideoSettings
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 
 SIZE = 96, 64  # width, height
 
@@ -64,7 +66,7 @@ def write(path, frames, fps=240, **more):
 
 
 def lumas(path):
-    return [picture.planes[0] for _, picture in Footage(path)]
+    return [picture.planes[0] for _, picture in VideoReader(path)]
 
 
 @pytest.mark.parametrize(("pixels", "bits"), [("yuv420p", 8), ("yuv422p10le", 10)])
@@ -76,7 +78,7 @@ def test_a_still_video_comes_back_to_the_sample(tmp_path, capsys, pixels, bits):
     for flow in ("none", "dis"):
         out = tmp_path / f"{flow}.mkv"
         run(capsys, "blur", source, "-o", out, "--codec", "ffv1", "--fps", 24, "--flow", flow, "-q")
-        got = Footage(out)
+        got = VideoReader(out)
         assert len(got) == 4 and got.coding.bits == bits
         for _, picture in got:
             for want, plane in zip(planes, picture.planes, strict=True):
@@ -117,7 +119,7 @@ def test_output_frames_are_at_their_times(tmp_path, capsys, words, times):
     source = write(tmp_path / "a.mp4", grey_frames(range(20, 44)))
     out = tmp_path / "b.mp4"
     run(capsys, "blur", source, "-o", out, "--flow", "none", "-q", *words)
-    got = Footage(out).times
+    got = VideoReader(out).times
     assert [t - got[0] for t in got] == times
 
 
@@ -127,7 +129,7 @@ def test_variable_rates_keep_their_times_or_become_even(tmp_path, capsys):
     for fps, want in (("source", times), ("50", [Fraction(k, 50) for k in range(11)])):
         out = tmp_path / f"{fps}.mkv"
         run(capsys, "blur", source, "-o", out, "--fps", fps, "--flow", "none", "-q")
-        got = [round(float(t) * 1000) for t in Footage(out).times]
+        got = [round(float(t) * 1000) for t in VideoReader(out).times]
         assert got == [round(float(t) * 1000) for t in want][: len(got)]
         assert abs(len(got) - len(want)) <= 1
 
@@ -140,12 +142,12 @@ def test_without_a_rate_pictures_of_a_variable_one_keep_their_times_and_a_line_s
     text = run(capsys, "blur", source, "-o", tmp_path / "b.mp4", "--flow", "none")
     said = "variable rate (10.0 to 80.0 ms)"
     assert f"a.mp4: {said}: each picture keeps its own time; --fps 60 sets a steady rate\n" in text
-    assert list(Footage(tmp_path / "b.mp4").times) == times
+    assert list(VideoReader(tmp_path / "b.mp4").times) == times
     both = [source, source.rename(tmp_path / "c.mp4")][1:]
     text = run(capsys, "blur", *both, "-o", f"{tmp_path}/{{name}}.out.mkv", "--flow", "none")
     assert said in text
     text = run(capsys, "blur", *both, "-o", tmp_path / "d.##.png", "--flow", "none")
-    assert f"{said}: {float(Footage(both[0]).rate):g} frames a second, as on average" in text
+    assert f"{said}: {float(VideoReader(both[0]).rate):g} frames a second, as on average" in text
     run(capsys, "blur", *both, "-o", tmp_path / "e.##.png", "--flow", "none", "--fps", "source")
     assert len(list(tmp_path.glob("e.*.png"))) == 8
 
@@ -155,7 +157,7 @@ def test_a_pause_of_a_steady_rate_is_filled(tmp_path, capsys):
     source = write(tmp_path / "a.mp4", grey_frames([*range(30, 110)]), times=times)
     text = run(capsys, "blur", source, "-o", tmp_path / "b.mp4", "--flow", "none")
     assert "variable" not in text and "pause once" in text
-    assert list(Footage(tmp_path / "b.mp4").times) == [Fraction(n, 50) for n in range(85)]
+    assert list(VideoReader(tmp_path / "b.mp4").times) == [Fraction(n, 50) for n in range(85)]
 
 
 def test_jitter_and_pulldown_are_made_even(tmp_path, capsys):
@@ -163,7 +165,7 @@ def test_jitter_and_pulldown_are_made_even(tmp_path, capsys):
     source = write(tmp_path / "a.mp4", grey_frames(range(30, 120, 10)), times=times)
     text = run(capsys, "blur", source, "-o", tmp_path / "b.mp4", "--flow", "none")
     assert "variable rate (33.3 to 50.0 ms): 24 frames a second, as on average" in text
-    assert list(Footage(tmp_path / "b.mp4").times) == [Fraction(n, 24) for n in range(9)]
+    assert list(VideoReader(tmp_path / "b.mp4").times) == [Fraction(n, 24) for n in range(9)]
 
 
 def test_motion_smears_what_moves_and_leaves_the_rest_to_the_sample(tmp_path, capsys):
@@ -278,20 +280,17 @@ def test_the_method_suits_where_motion_comes_from(tmp_path, capsys, flow, asked,
     job = tmp_path / "a.json"
     run(capsys, "job", tmp_path / "a.#.png", "-o", tmp_path / "b.#.png", "-j", job, *words)
     assert f'"method": "{method}"' in job.read_text()
-    look, when = BlurSettings(method=asked), ShutterSettings().resolved()
-    wish = make_wish(look, when, InputSettings(), VideoSettings(flow=flow), None)
-    assert wish.blur.method.name == method
+    request = VideoRequest(blur=BlurSettings(method=asked), video=VideoSettings(flow=flow))
+    assert request.open().blur.method.name == method
 
 
 def test_without_a_gpu_and_opencv_a_line_says_what_would_be_quicker(capsys, monkeypatch):
-    for module in ("wgmb.settings.video", "wgmb.cli.commands.blur_video"):
+    for module in ("wgmb.settings.video", "wgmb.run.video"):
         monkeypatch.setattr(f"{module}.is_installed", lambda package: False)
     for flow in ("auto", "search"):
-        video = VideoSettings(flow=flow)
-        look, when = BlurSettings(), ShutterSettings().resolved()
-        wish = make_wish(look, when, InputSettings(), video, None)
-        tell_how(wish, quiet=False, verbose=False)
-        slow = wish.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        run = VideoRequest(video=VideoSettings(flow=flow)).open()
+        tell_how(run, quiet=False, verbose=False)
+        slow = run.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
         said = install_command("flow") in capsys.readouterr().err
         assert said == (slow and flow == "auto")
 
@@ -329,7 +328,7 @@ def test_a_run_that_was_killed_goes_on_and_gives_the_same_video(tmp_path, capsys
     whole, out = tmp_path / "whole.mp4", tmp_path / "out.mp4"
     words = ["--flow", "none", "-q"]
     run(capsys, "blur", source, "-o", whole, *words)
-    add, count = video_batch.VideoSink.put, [0]
+    add, count = video_output.VideoSink.put, [0]
 
     def killed(self, taken):
         count[0] += 1
@@ -337,13 +336,13 @@ def test_a_run_that_was_killed_goes_on_and_gives_the_same_video(tmp_path, capsys
             raise KeyboardInterrupt
         add(self, taken)
 
-    monkeypatch.setattr(video_batch.VideoSink, "put", killed)
+    monkeypatch.setattr(video_output.VideoSink, "put", killed)
     run(capsys, "blur", source, "-o", out, *words, "--resume", code=130)
     assert make.names_in(tmp_path) == ["a.mp4", "out.mp4.segments", "whole.mp4"]
     run(capsys, "blur", source, "-o", out, *words, "--resume")
     assert 60 <= count[0] <= 64  # 33, of which 20 were kept, and the 30 others
     assert make.names_in(tmp_path) == ["a.mp4", "out.mp4", "whole.mp4"]
-    one, other = Footage(whole), Footage(out)
+    one, other = VideoReader(whole), VideoReader(out)
     assert list(one.times) == list(other.times)
     assert packets(whole, "audio") == packets(out, "audio")
     for (_, a), (_, b) in zip(one, other, strict=True):
@@ -366,7 +365,7 @@ def test_segments_of_a_killed_run_go_when_the_video_is_made_again(tmp_path, caps
         out.write_bytes(b"older")
     run(capsys, "blur", source, "-o", out, "--flow", "none", "-q", *words)
     assert make.names_in(tmp_path) == ["a.mp4", "b.mp4", "c.mp4.segments"]
-    assert (other / "00000.mp4").is_file() and len(Footage(out)) == 6
+    assert (other / "00000.mp4").is_file() and len(VideoReader(out)) == 6
 
 
 def test_slow_motion_has_slow_sound(tmp_path, capsys):
@@ -377,7 +376,7 @@ def test_slow_motion_has_slow_sound(tmp_path, capsys):
         run(capsys, "blur", source, "-o", out, *words)
         with av.open(str(out)) as container:
             sound = sum(f.samples for f in container.decode(audio=0)) / 48000
-        assert abs(sound - 2) < 0.1 and abs(float(Footage(out).duration) - 2) < 0.1
+        assert abs(sound - 2) < 0.1 and abs(float(VideoReader(out).duration) - 2) < 0.1
 
 
 @pytest.mark.parametrize(
@@ -408,3 +407,57 @@ def test_what_does_not_fit_is_one_line_and_leaves_nothing(
     assert said in text and text.count("\n") == 1
     assert make.names_in(tmp_path) == ["a.mp4", "there.mp4"]
     assert (tmp_path / "there.mp4").read_bytes() == b"mine"
+
+
+# ---- from Python ----------------------------------------------------------------------------
+
+
+def test_python_makes_what_the_command_line_makes(tmp_path, capsys):
+    source = clips.write(tmp_path / "in.mp4")
+    run(capsys, "blur", source, "-o", tmp_path / "a.mp4", "--fps", "12", "--shutter", "270")
+    told = []
+    report = blur_video(
+        source, tmp_path / "b.mp4", fps=12, shutter=270, progress=lambda *one: told.append(one)
+    )
+    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+    assert told == [(n, "done") for n in range(6)]
+    assert (report.frames, report.method, report.loss, report.is_new) == (6, "tap", "", True)
+    assert blur_video(source, tmp_path / "c.mkv", resume=True, fps=12).is_new
+    frames = blur_video(source, tmp_path / "f.#.png", end=0.2, holdout="static", flow="dis")
+    assert len(list(tmp_path.glob("f.*.png"))) == frames.frames
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"ftps": 12}, "unknown setting 'ftps'; did you mean 'fps'"),
+        ({"vectors": "nuke"}, "unknown setting 'vectors'"),
+        ({"fps": "fast"}, "fps must be a number"),
+        ({"speed": 0}, "`speed` must be 0.01 to 100, got 0"),
+        ({"flow": "none", "holdout": "static"}, "`holdout` needs motion"),
+        ({}, "exists; `overwrite=True` replaces it"),
+    ],
+)
+def test_python_is_told_what_does_not_fit_and_nothing_is_written(tmp_path, settings, said):
+    source, out = clips.write(tmp_path / "in.mp4"), tmp_path / "out.mp4"
+    out.write_text("mine")
+    with pytest.raises(InputError, match=said):
+        blur_video(source, out, **settings)
+    assert out.read_text() == "mine"
+
+
+def test_a_progress_that_raises_ends_the_run_and_leaves_nothing(tmp_path):
+    def stop(number, state):
+        if number == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        blur_video(clips.write(tmp_path / "in.mp4"), tmp_path / "out.mp4", progress=stop)
+    assert [path.name for path in tmp_path.iterdir()] == ["in.mp4"]
+
+
+def test_every_setting_of_a_video_is_a_keyword():
+    groups = BlurSettings, ShutterSettings, OutputSettings, VideoSettings
+    names = {field.name for group in groups for field in fields(group)}
+    only_frames = {"scale", "output", "layers", "window"}
+    assert VideoOptions.__annotations__.keys() == names - only_frames | {"frames", "cuts", "max_mb"}

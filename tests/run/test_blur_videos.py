@@ -7,7 +7,7 @@ import make_clips as clips
 import make_frames as make
 from wgmb.cli import app
 from wgmb.cli.names import outputs_of, videos_of
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 
 
 def run(capsys, *words, code=0):
@@ -35,7 +35,7 @@ def folder(tmp_path, monkeypatch):
 def test_every_video_gets_its_own_output_and_its_own_line(folder, capsys, given):
     lines = run(capsys, *given, "-o", "out/")
     assert make.names_in(folder / "out") == ["a.mp4", "b.mkv", "c.mkv"]
-    assert [len(Footage(folder / "out" / n)) for n in ("a.mp4", "b.mkv", "c.mkv")] == [5, 7, 6]
+    assert [len(VideoReader(folder / "out" / n)) for n in ("a.mp4", "b.mkv", "c.mkv")] == [5, 7, 6]
     assert lines[0].startswith("motion: ") and lines[-1] == "3 of 3 videos done"
     for line, name, count in zip(lines[1:-1], ("a.mp4", "b.mkv", "c.avi"), (5, 7, 6), strict=True):
         assert line.startswith(f"in/{name}: {count} frames in ") and " -> out/" in line
@@ -45,14 +45,14 @@ def test_a_name_may_stand_for_the_inputs(folder, capsys):
     run(capsys, "in/a.mp4", "in/b.mkv", "-o", "{name}_48.mkv", "--fps", "48", "-q")
     run(capsys, "in/a.mp4", "-o", "{name}/f.##.png", "-q")
     assert make.names_in(folder) == ["a", "a_48.mkv", "b_48.mkv", "in"]
-    assert [len(Footage(folder / f"{n}_48.mkv")) for n in "ab"] == [10, 14]
+    assert [len(VideoReader(folder / f"{n}_48.mkv")) for n in "ab"] == [10, 14]
     assert make.names_in(folder / "a") == [f"f.{k:02d}.png" for k in range(1, 6)]
 
 
 def test_the_same_video_comes_out_alone_and_among_others(folder, capsys):
     run(capsys, "in/b.mkv", "-o", "alone.mkv", "--codec", "ffv1", "-q")
     run(capsys, "in/a.mp4", "in/b.mkv", "-o", "{name}_.mkv", "--codec", "ffv1", "-q")
-    one, other = Footage(folder / "alone.mkv"), Footage(folder / "b_.mkv")
+    one, other = VideoReader(folder / "alone.mkv"), VideoReader(folder / "b_.mkv")
     for (_, a), (_, b) in zip(one, other, strict=True):
         assert all(np.array_equal(p, q) for p, q in zip(a.planes, b.planes, strict=True))
 

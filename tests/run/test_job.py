@@ -14,7 +14,7 @@ from make_stereo import single_part, with_stereo
 from wgmb import Clip, InputError
 from wgmb._version import __version__
 from wgmb.run.job_file import of_text
-from wgmb.sequence.findings import Settled, numbers, ranges
+from wgmb.sequence.findings import SequenceFindings, numbers, ranges
 
 COUNT = 10
 
@@ -388,7 +388,7 @@ def test_numbers_as_ranges_and_back(given, as_ranges):
 def test_findings_are_plain_values_and_come_back(shot):
     clip = Clip(shot, cuts="3")
     settled = clip.settle()
-    again = Settled.of(json.loads(json.dumps(settled.plain())))
+    again = SequenceFindings.of(json.loads(json.dumps(settled.plain())))
     assert again == settled
     other = Clip(shot, cuts="3", settled=again)
     assert (other.finding, other.on_disk, other.views) == (clip.finding, clip.on_disk, ())

@@ -13,7 +13,7 @@ from wgmb.cli import app
 from wgmb.color.srgb import linear, srgb
 from wgmb.cone import Cone
 from wgmb.observer import Observer
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 
 VALUES = [16, 235, 60, 200, 90, 150, 30, 220, 120, 40]
 UNEVEN = [Fraction(n, 100) for n in (0, 1, 2, 5, 6, 11, 12, 14, 15, 19)]
@@ -42,7 +42,7 @@ def test_every_picture_counts_for_as_long_as_it_is_shown(tmp_path, capsys, even)
     times = [Fraction(n, 48) for n in range(10)] if even else UNEVEN
     source, out = write(tmp_path / "a.mkv", times), tmp_path / "b.mkv"
     assert app.main(["perceive", str(source), "-o", str(out), "-q"]) == 0, capsys.readouterr().err
-    footage, got = Footage(source), Footage(out)
+    footage, got = VideoReader(source), VideoReader(out)
     shown = np.array([float(t) for t in footage.times])
     assert [round(1000 * float(t - got.times[0])) for t in got.times] == [
         round(1000 * t) for t in shown - shown[0]

@@ -11,7 +11,7 @@ import make_frames as make
 import make_stereo as stereo
 from wgmb import InputError, Shutter
 from wgmb.io import exr
-from wgmb.run.conversion import Conversion
+from wgmb.run.conversion import RateConversion
 
 FAST = 2.0, 1.0  # pixels per frame
 SLOW = 8.0, 4.0  # the same motion at a quarter of the rate
@@ -46,7 +46,7 @@ def contents(folder) -> dict[str, bytes]:
 @pytest.mark.parametrize("rates", [(240, 60), (120, 24), (24, 60), (144, 60), (60, 144), (24, 25)])
 @pytest.mark.parametrize("degrees", [0, 90, 180, 360, 700])
 def test_shares_of_every_exposure_add_up_to_1(rates, degrees):
-    made = Conversion(*map(Fraction, rates))
+    made = RateConversion(*map(Fraction, rates))
     there, shutter = range(1, 61), Shutter(degrees, "start", "triangle")
     for k in range(12):
         found = made.cells(made.at(1 + k, 1), shutter, there, ())
@@ -56,7 +56,7 @@ def test_shares_of_every_exposure_add_up_to_1(rates, degrees):
 
 @pytest.mark.fast
 def test_an_exposure_stays_in_its_shot_and_before_a_gap():
-    made, shutter = Conversion(Fraction(240), Fraction(60)), Shutter(720)
+    made, shutter = RateConversion(Fraction(240), Fraction(60)), Shutter(720)
     there = [*range(1, 12), *range(14, 30)]
     indices = [c.index for c in made.cells(Fraction(9), shutter, there, {8})]
     assert indices == [8, 9, 10, 11]
@@ -65,13 +65,13 @@ def test_an_exposure_stays_in_its_shot_and_before_a_gap():
 @pytest.mark.fast
 def test_output_frames_count_from_the_first_input_frame_on():
     clip = SimpleNamespace(numbers=list(range(101, 149)))
-    assert Conversion(Fraction(240), Fraction(60)).numbers(clip) == list(range(101, 113))
-    assert len(Conversion(Fraction(24), Fraction(60)).numbers(clip)) == 120
-    assert len(Conversion(Fraction(24000, 1001), Fraction(24)).numbers(clip)) == 48
-    assert Conversion(Fraction(240), Fraction(1)).numbers(clip) == [101]
+    assert RateConversion(Fraction(240), Fraction(60)).numbers(clip) == list(range(101, 113))
+    assert len(RateConversion(Fraction(24), Fraction(60)).numbers(clip)) == 120
+    assert len(RateConversion(Fraction(24000, 1001), Fraction(24)).numbers(clip)) == 48
+    assert RateConversion(Fraction(240), Fraction(1)).numbers(clip) == [101]
     clip.numbers = [1, 2, 4]
     with pytest.raises(InputError, match="without gaps"):
-        Conversion(Fraction(240), Fraction(60)).numbers(clip)
+        RateConversion(Fraction(240), Fraction(60)).numbers(clip)
 
 
 # ---- pictures -------------------------------------------------------------------------------

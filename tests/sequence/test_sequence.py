@@ -5,9 +5,11 @@ import pytest
 from PIL import Image
 
 import make_frames as make
+import wgmb
 from wgmb import Blur, Frame, InputError
 from wgmb.io import frame_numbers
 from wgmb.output.output import Output
+from wgmb.sequence import frame_cache
 from wgmb.sequence.clip import Clip, Passes
 from wgmb.sequence.layers.vectors import Vectors
 
@@ -444,3 +446,53 @@ def test_the_folder_of_the_output_is_made(tmp_path, capsys, shot):
     folder = tmp_path / "new" / "deep"
     assert run(capsys, shot, folder, "--frames", "1")[0] == 0
     assert make.names_in(folder) == ["b.0001.exr"]
+
+
+# ---- frames by iteration and by number ------------------------------------------------------
+
+
+def test_frames_of_a_loop_have_neighbours_that_are_read_when_they_are_asked_for(tmp_path):
+    clip = Clip(make.write_sequence(tmp_path, (1, 2, 3, 4)))
+    assert (len(clip), 3 in clip, 7 in clip) == (4, True, False)
+    frames = list(clip)
+    assert [frame.number for frame in frames] == [1, 2, 3, 4]
+    assert (frames[0].prev, frames[3].next) == (None, None)
+    third = clip[3]
+    assert (third.prev.number, third.next.number, third.prev.prev.number) == (2, 4, 1)
+    np.testing.assert_array_equal(third.next.color, frames[3].color)
+    assert third.between(None, third.next).prev is None
+    (tmp_path / "shot.0002.exr").unlink()
+    lonely = Clip(str(tmp_path / "shot.####.exr"), skip_missing=True)[3]
+    assert lonely.prev is None and lonely.next is not None
+    with pytest.raises(InputError, match=r"frame 9 is not in Clip\("):
+        clip[9]
+
+
+def test_a_frame_alone_reads_no_other(tmp_path, monkeypatch):
+    pattern = make.write_sequence(tmp_path, (1, 2, 3))
+    read, real = [], frame_cache.FrameCache.source
+    clip = Clip(pattern, passes=Passes(vectors=Vectors("blender")))
+    monkeypatch.setattr(
+        frame_cache.FrameCache,
+        "source",
+        lambda self, number, *more: (read.append(number), real(self, number, *more))[1],
+    )
+    frame = clip[2]
+    assert "prev" in repr(clip[2].between(frame, None)) and "prev" not in repr(frame)
+    assert set(read) == {2}
+    wgmb.Blur("tap", samples=2)(frame)
+    assert set(read) == {2}
+
+
+def test_a_loop_with_gather_gives_what_files_get(tmp_path):
+    pattern = make.write_sequence(tmp_path, (1, 2, 3))
+    blur = wgmb.Blur("gather", samples=4)
+    clip = Clip(pattern)
+    looped = [blur(frame) for frame in clip]
+    for one, want in zip(looped, wgmb.blurred(Clip(pattern), blur), strict=True):
+        np.testing.assert_array_equal(one, want.views[0].picture)
+
+
+def test_no_neighbour_lies_beyond_a_cut(tmp_path):
+    clip = Clip(make.write_sequence(tmp_path, (1, 2, 3)), cuts="only:2")
+    assert clip[1].next is None and clip[2].prev is None and clip[2].next is not None

@@ -9,16 +9,16 @@ from wgmb.color.coding import CodedPicture, Coding
 from wgmb.color.srgb import linear
 from wgmb.flow import Flow
 from wgmb.gpu.textures import TexturePool
-from wgmb.pipeline.exposure_sum import Exposer
+from wgmb.pipeline.exposure_sum import ExposureSum
 from wgmb.shots.cuts import pictures_differ
-from wgmb.shots.reader import Picture, Reel
-from wgmb.video.gpu_frames import ReelViews
-from wgmb.video.thumbnail import Glance, is_double
+from wgmb.shots.reader import Picture, ShotReader
+from wgmb.video.gpu_frames import VideoFrames
+from wgmb.video.thumbnail import Thumbnail, is_double
 
 LINEAR = Coding(model="rgb", bits=16, steps=(1, 1), full_range=True, matrix=0, transfer=8)
 
 
-class Known:
+class PictureFinding:
     """A source of motion that knows the frames of make_frames, and who was asked for."""
 
     def __init__(self):
@@ -43,7 +43,7 @@ class Known:
 def coded(picture):
     """A picture in linear light as planes of 16 bits."""
     planes = np.rint(np.clip(picture, 0, 1) * 65535).astype(np.uint16)
-    return Glance(
+    return Thumbnail(
         CodedPicture(tuple(np.ascontiguousarray(planes[..., i]) for i in range(3)), LINEAR)
     )
 
@@ -53,11 +53,15 @@ def pictures(count, fps=240.0, times=None):
         yield Picture(n / fps if times is None else times[n], coded(make.picture(n % 12)), n)
 
 
-class Exposed:
+class VideoExposure:
     """Exposures of a reel as arrays."""
 
     def __init__(self, reel, blur, motion=None):
-        self.reel, self.views, self._exposer = reel, ReelViews(reel, blur, motion), Exposer(blur)
+        self.reel, self.views, self._exposer = (
+            reel,
+            VideoFrames(reel, blur, motion),
+            ExposureSum(blur),
+        )
         self._images = TexturePool(blur.device)
 
     def __call__(self, at, interval, shutter):
@@ -89,15 +93,15 @@ def linear_average(at, interval, degrees, fps=240.0, count=40):
 
 @pytest.mark.parametrize("degrees", [90, 180, 360, 720])
 def test_without_motion_an_exposure_is_the_average_of_its_cells(degrees):
-    exposed = Exposed(Reel(pictures(40)), Blur("tap"))
+    exposed = VideoExposure(ShotReader(pictures(40)), Blur("tap"))
     for k in range(6):
         got = exposed(k / 60, 1 / 60, Shutter(degrees))
         np.testing.assert_allclose(got, linear_average(k / 60, 1 / 60, degrees), atol=6e-4)
 
 
 def test_with_motion_it_is_the_sum_of_blurs_over_the_cells():
-    motion, blur = Known(), Blur("gather", samples=8)
-    got = Exposed(Reel(pictures(20)), blur, motion)(8 / 240, 1 / 60, Shutter(180))
+    motion, blur = PictureFinding(), Blur("gather", samples=8)
+    got = VideoExposure(ShotReader(pictures(20)), blur, motion)(8 / 240, 1 / 60, Shutter(180))
     to_prev, to_next = make.motion(0)
     want, flat = 0.0, np.ones((make.HEIGHT, make.WIDTH), "f4")
     for n, opens, closes in ((7, 0.0, 0.5), (8, -0.5, 0.5), (9, -0.5, 0.0)):
@@ -120,10 +124,10 @@ def test_with_motion_it_is_the_sum_of_blurs_over_the_cells():
 def test_exposures_that_overlap_and_reach_back_are_the_same_as_alone():
     """Pictures kept on the GPU for the frame before do no harm."""
     blur, shutter = Blur("gather", samples=4), Shutter(720)
-    after = Exposed(Reel(pictures(24)), blur, Known())
+    after = VideoExposure(ShotReader(pictures(24)), blur, PictureFinding())
     for k in range(3):
         got = after(k / 60, 1 / 60, shutter)
-    alone = Exposed(Reel(pictures(24)), blur, Known())(2 / 60, 1 / 60, shutter)
+    alone = VideoExposure(ShotReader(pictures(24)), blur, PictureFinding())(2 / 60, 1 / 60, shutter)
     np.testing.assert_array_equal(got, alone)
 
 
@@ -131,7 +135,7 @@ def test_motion_that_stays_on_the_gpu_is_that_of_arrays():
     blur = Blur("tap")
     flow = Flow(quality="fast", device=blur.device)
     times = [0.0, 0.1, 0.2, 0.5, 0.6, 0.7, 0.8, 0.9]
-    exposed = Exposed(Reel(pictures(8, times=times)), blur, flow)
+    exposed = VideoExposure(ShotReader(pictures(8, times=times)), blur, flow)
     exposed.reel.cells(0.2, 0.1, Shutter(180))
     light = [np.clip(make.picture(n)[..., :3], 0, 1).astype("f2").astype("f4") for n in range(8)]
     want, _ = flow.shot(lambda n: light[n] if 0 <= n < 8 else None)(2)
@@ -141,14 +145,14 @@ def test_motion_that_stays_on_the_gpu_is_that_of_arrays():
 
 
 def test_a_cut_ends_exposures_and_motion():
-    motion = Known()
+    motion = PictureFinding()
     first = {coded(make.picture(n)).sampled.tobytes() for n in range(10)}
 
     def is_cut(before, after):
         return before.sampled.tobytes() in first and after.sampled.tobytes() not in first
 
-    reel = Reel(pictures(12), is_cut=is_cut)  # later ones would be the first again
-    exposed = Exposed(reel, Blur("gather"), motion)
+    reel = ShotReader(pictures(12), is_cut=is_cut)  # later ones would be the first again
+    exposed = VideoExposure(reel, Blur("gather"), motion)
     cells = exposed.reel.cells(9 / 240, 1 / 60, Shutter(360))
     assert max(cell.index for cell in cells) <= 9 and exposed.reel.cuts == [10]
     exposed(9 / 240, 1 / 60, Shutter(360))
@@ -182,7 +186,7 @@ def brightens(before, after):
          "up to the end"],
 )  # fmt: skip
 def test_a_flash_is_no_shot(fps, flashes, cuts):
-    reel = Reel(with_flash(40, flashes, fps), is_cut=brightens)
+    reel = ShotReader(with_flash(40, flashes, fps), is_cut=brightens)
     for k in range(30):
         reel.cells(k / fps, 1 / fps, Shutter(180))
     assert reel.cuts == cuts
@@ -190,10 +194,10 @@ def test_a_flash_is_no_shot(fps, flashes, cuts):
 
 
 def test_a_flash_is_exposed_by_its_share_and_has_no_part_in_motion():
-    motion, shutter = Known(), Shutter(360)
-    reel = Reel(with_flash(24, [8], 240), is_cut=brightens)
-    exposed = Exposed(reel, Blur("gather", samples=8), motion)
-    without = Exposed(Reel(pictures(24)), Blur("gather", samples=8), Known())
+    motion, shutter = PictureFinding(), Shutter(360)
+    reel = ShotReader(with_flash(24, [8], 240), is_cut=brightens)
+    exposed = VideoExposure(reel, Blur("gather", samples=8), motion)
+    without = VideoExposure(ShotReader(pictures(24)), Blur("gather", samples=8), PictureFinding())
     found = [(exposed(k / 60, 1 / 60, shutter), without(k / 60, 1 / 60, shutter)) for k in range(5)]
     sharp = np.clip(make.picture(8)[..., :3], 0, 1)
     for k, (got, want) in enumerate(found):
@@ -210,7 +214,7 @@ def test_motion_beside_a_flash_goes_on_as_on_the_other_side():
     many = [
         Picture(t, p.content, p.number) for t, p in zip(times, with_flash(10, [3], 1), strict=True)
     ]
-    exposed = Exposed(Reel(iter(many), is_cut=brightens), Blur("tap"), Known())
+    exposed = VideoExposure(ShotReader(iter(many), is_cut=brightens), Blur("tap"), PictureFinding())
     exposed.reel.cells(0.2, 0.1, Shutter(180))
     to_prev, to_next = make.motion(0)
     motion = exposed.motion(2)  # its own interval is 0.2 s, and it moved for 0.1 s
@@ -223,7 +227,7 @@ def test_a_repeated_picture_is_left_out_and_its_neighbours_reach_over_it():
         for n in range(12):
             yield Picture(n / 60, coded(make.picture(n // 2)), n)
 
-    reel = Reel(doubled(), is_double=is_double)
+    reel = ShotReader(doubled(), is_double=is_double)
     cell, *_ = reel.cells(2 / 60, 1 / 60, Shutter(180))
     assert reel[cell.index].number == 2 and reel.doubles[:3] == [1, 3, 5]
     assert cell.shutter.span == pytest.approx((-0.125, 0.125))  # its own interval is twice as long
@@ -231,7 +235,7 @@ def test_a_repeated_picture_is_left_out_and_its_neighbours_reach_over_it():
 
 def test_uneven_times_stretch_the_motion():
     times = [0.0, 0.1, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1]
-    exposed = Exposed(Reel(pictures(10, times=times)), Blur("tap"), Known())
+    exposed = VideoExposure(ShotReader(pictures(10, times=times)), Blur("tap"), PictureFinding())
     (cell,) = exposed.reel.cells(0.1, 0.05, Shutter(180))
     motion = exposed.motion(cell.index)
     to_prev, to_next = make.motion(0)
@@ -241,7 +245,7 @@ def test_uneven_times_stretch_the_motion():
 
 def test_however_long_the_reel_only_what_is_around_is_kept():
     content = coded(make.picture(0))
-    reel = Reel(Picture(n / 240, content, n) for n in range(400))
+    reel = ShotReader(Picture(n / 240, content, n) for n in range(400))
     most = 0
     for k in range(90):
         reel.cells(k / 60, 1 / 60, Shutter(360))
@@ -291,7 +295,7 @@ def test_a_glance_at_planes_is_one_at_the_picture(bits):
     tone = make.texture(x / 40, y / 40, 1.0)
     luma = np.rint((16 + 219 * tone.mean(axis=2)) * unit).astype("u1" if bits == 8 else "u2")
     flat = np.full((135, 242), 128 * unit, luma.dtype)
-    seen = Glance(CodedPicture((luma, flat, flat), Coding(bits=bits)))
+    seen = Thumbnail(CodedPicture((luma, flat, flat), Coding(bits=bits)))
     shown = (luma / unit - 16) / 219
     step = 484 // 96
     want = shown[: 270 // step * step, : 484 // step * step]

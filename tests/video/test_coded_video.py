@@ -14,7 +14,7 @@ from wgmb import InputError
 from wgmb.color.coding import CodedPicture, Coding
 from wgmb.video.clock import Clock, tick
 from wgmb.video.hdr10 import LightLevel, Mastering
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 from wgmb.video.write import encoders
 from wgmb.video.write.container import VideoFile
 from wgmb.video.write.encoders import CODECS, Facts, chosen
@@ -156,7 +156,7 @@ def test_apples_encoder_counts_its_quality_the_other_way():
 @pytest.mark.parametrize("coding", [c for c in EVERY if c.bits in (8, 10, 12, 16)], ids=str)
 def test_ffv1_keeps_every_sample(tmp_path, coding):
     written = write(tmp_path / "v.mkv", coding, "ffv1")
-    footage = Footage(tmp_path / "v.mkv")
+    footage = VideoReader(tmp_path / "v.mkv")
     assert footage.coding == written[0].coding
     for (_, got), want in zip(footage, written, strict=True):
         for a, b in zip(got.planes, want.planes, strict=True):
@@ -179,7 +179,7 @@ def test_pictures_and_their_tags_come_back(tmp_path, name, codec, bits, steps, n
     matrix, transfer, primaries = colours
     coding = Coding("yuv", bits, steps, False, False, matrix, transfer, primaries)
     written = write(tmp_path / name, coding, codec, quality=4 if CODECS[codec].quality else None)
-    footage = Footage(tmp_path / name)
+    footage = VideoReader(tmp_path / name)
     held = footage.coding
     if codec == "prores" and steps == (1, 1):  # FFmpeg decodes 4444 to 12 bits
         held, near = replace(held, bits=10), near << 2
@@ -197,13 +197,13 @@ def test_pictures_and_their_tags_come_back(tmp_path, name, codec, bits, steps, n
                                              ("v.mp4", "av1"), ("v.webm", "vp9")])  # fmt: skip
 def test_the_range_is_kept(tmp_path, name, codec, full):
     write(tmp_path / name, Coding(full_range=full), codec)
-    assert Footage(tmp_path / name).coding.full_range == full
+    assert VideoReader(tmp_path / name).coding.full_range == full
 
 
 def test_alpha_goes_into_prores_4444(tmp_path):
     coding = Coding("yuv", 10, (1, 1), True)
     written = write(tmp_path / "v.mov", coding)
-    footage = Footage(tmp_path / "v.mov")
+    footage = VideoReader(tmp_path / "v.mov")
     assert footage.coding.alpha
     shift = footage.coding.bits - 10  # FFmpeg decodes it to 12 bits
     for (_, got), want in zip(footage, written, strict=True):
@@ -217,7 +217,7 @@ def test_alpha_goes_into_prores_4444(tmp_path):
 def test_hdr10_data_is_what_it_was(tmp_path, name, codec):
     facts = Facts(mastering=Mastering(P3, (0.0005, 1000.0)), light_level=LightLevel(993, 412))
     write(tmp_path / name, PQ, codec, facts=facts)
-    footage = Footage(tmp_path / name)
+    footage = VideoReader(tmp_path / name)
     assert footage.coding == PQ
     assert footage.light_level == facts.light_level
     assert footage.mastering is not None
@@ -236,7 +236,7 @@ def test_pixels_that_are_not_square_are_tagged(tmp_path, name, codec):
     facts = Facts(pixel_aspect=Fraction(64, 45))
     write(tmp_path / name, Coding(), codec, facts=facts)
     told = chosen(name, codec).left_out(facts)
-    assert Footage(tmp_path / name).pixel_aspect == (1 if told else Fraction(64, 45))
+    assert VideoReader(tmp_path / name).pixel_aspect == (1 if told else Fraction(64, 45))
     assert not told or "64/45 times as wide as high" in told[0]
 
 
@@ -248,7 +248,7 @@ def test_odd_sizes(tmp_path, name, codec):
     coding = encoding.coding(Coding())[0]
     made = pictures(coding, size=(65, 49))
     write(tmp_path / name, coding, codec, made=made)
-    ((_, got), *_) = Footage(tmp_path / name)
+    ((_, got), *_) = VideoReader(tmp_path / name)
     assert got.size == ((66, 50) if encoding.encoder.even else (65, 49))
     assert np.abs(got.planes[0][:49, :65].astype(int) - made[0].planes[0]).mean() < 3
     if encoding.encoder.even:  # the last column and row are there twice
@@ -264,7 +264,7 @@ def test_a_few_pictures_are_a_video(tmp_path, name, codec, count):
     encoding = chosen(name, codec)
     made = pictures(encoding.coding(Coding())[0], count)
     write(tmp_path / name, Coding(), codec, made=made)
-    assert [n for n, _ in Footage(tmp_path / name)] == list(range(count))
+    assert [n for n, _ in VideoReader(tmp_path / name)] == list(range(count))
 
 
 @pytest.mark.parametrize(("name", "codec"), [("v.mp4", "h264"), ("v.mp4", "h265"),
@@ -277,7 +277,7 @@ def test_times_are_exact(tmp_path, name, codec):
     encoding = chosen(name, codec)
     made = pictures(encoding.coding(Coding())[0], len(times))
     write(tmp_path / name, Coding(), codec, times, made)
-    footage = Footage(tmp_path / name)
+    footage = VideoReader(tmp_path / name)
     assert list(footage.times) == times
     assert footage.is_variable
 

@@ -16,7 +16,7 @@ from wgmb.video.pixels import (
     pixel_format,
     planes_of,
 )
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 from wgmb.video.write.scheduling import kept_scheduling
 
 pytestmark = pytest.mark.fast
@@ -44,7 +44,7 @@ def test_every_sample_is_the_one_that_was_stored(tmp_path, codec, pixels, want):
     tags = (2 if want.full_range else 1, 1, 1, 1)
     path = clips.write(tmp_path / "c.mkv", [clips.frame(d, pixels) for d in data], codec=codec,
                        pixels=pixels, tags=tags)  # fmt: skip
-    footage = Footage(path)
+    footage = VideoReader(path)
     assert footage.coding == want
     assert footage.assumed == ()
     for (number, picture), stored in zip(list(footage), data, strict=True):
@@ -75,7 +75,7 @@ def test_pixels_that_are_not_planes_are_sorted_into_them(tmp_path, pixels, codec
     path = clips.write(
         tmp_path / ("c.mov" if codec == "png" else "c.mkv"), [made], codec=codec, pixels=pixels
     )
-    footage = Footage(path)
+    footage = VideoReader(path)
     ((_, picture),) = footage
     coding = footage.coding
     assert (coding.model, coding.alpha, coding.full_range) == (model, alpha, True)
@@ -147,7 +147,7 @@ def test_planes_become_a_frame_and_come_back(coding):
      ((720, 576), (6, 1, 5))],
 )  # fmt: skip
 def test_untagged_colours_go_by_the_size(tmp_path, size, want):
-    footage = Footage(clips.write(tmp_path / "c.mp4", [clips.grey(size)]))
+    footage = VideoReader(clips.write(tmp_path / "c.mp4", [clips.grey(size)]))
     coding = footage.coding
     assert (coding.matrix, coding.transfer, coding.primaries) == want
     name = "BT.709" if want[0] == 1 else "BT.601"
@@ -161,7 +161,7 @@ def test_colours_that_are_tagged_are_taken_as_tagged(tmp_path, kind, tags):
     frames = [clips.frame(clips.planes(n, bits=10), "yuv420p10le") for n in range(3)]
     path = clips.write(tmp_path / f"c.{kind}", frames, codec="libx265", pixels="yuv420p10le",
                        tags=tags)  # fmt: skip
-    footage, coding = Footage(path), Footage(path).coding
+    footage, coding = VideoReader(path), VideoReader(path).coding
     assert footage.assumed == ()
     assert coding.full_range == (tags[0] == 2)
     assert (coding.matrix, coding.transfer, coding.primaries) == tags[1:]
@@ -171,7 +171,7 @@ def test_the_display_that_an_hdr10_video_was_graded_on_is_read(tmp_path):
     options = {"x265-params": "log-level=none:max-cll=1000,400:master-display="
                "G(13250,34500)B(7500,3000)R(34000,16000)WP(15635,16450)L(10000000,1)"}  # fmt: skip
     frames = [clips.frame(clips.planes(n, bits=10), "yuv420p10le") for n in range(3)]
-    footage = Footage(clips.write(tmp_path / "c.mp4", frames, codec="libx265",
+    footage = VideoReader(clips.write(tmp_path / "c.mp4", frames, codec="libx265",
                                   pixels="yuv420p10le", options=options))  # fmt: skip
     assert footage.mastering is not None and footage.light_level is not None
     assert footage.mastering.for_x265() in options["x265-params"]
@@ -190,7 +190,7 @@ def test_the_display_that_an_hdr10_video_was_graded_on_is_read(tmp_path):
 def test_a_codec_has_its_own_name_not_that_of_a_decoder(tmp_path):
     with kept_scheduling():
         path = clips.write(tmp_path / "c.mp4", codec="libsvtav1", options={"svtav1-params": "lp=1"})
-    assert Footage(path).codec == "av1"
+    assert VideoReader(path).codec == "av1"
 
 
 # ---- which way is up, fields ----------------------------------------------------------------
@@ -204,7 +204,7 @@ def test_pictures_are_upright(tmp_path, degrees, mirror):
         tmp_path / "c.mov", [clips.frame(clips.planes(1, steps=(2, 1)), "yuv422p")],
         pixels="yuv422p", setup=lambda s: s.set_display_rotation(degrees, hflip=mirror),
     )  # fmt: skip
-    footage = Footage(path)
+    footage = VideoReader(path)
     ((_, picture),) = footage
     stored = clips.planes(1, steps=(2, 1))[0]
     want = np.rot90(stored, degrees // 90)
@@ -229,7 +229,7 @@ def test_an_interlaced_frame_is_two_pictures(tmp_path):
     path = clips.write(tmp_path / "c.ts", frames, codec="mpeg2video", tick=Fraction(1, 25),
                        times=[Fraction(n, 25) for n in range(8)],
                        options={"flags": "+ilme+ildct", "qmin": "1", "qmax": "2"})  # fmt: skip
-    footage = Footage(path)
+    footage = VideoReader(path)
     assert footage.is_interlaced
     assert footage.rate == 50
     assert len(footage) == 16

@@ -10,7 +10,7 @@ from PIL import Image
 import make_clips as clips
 from wgmb import InputError
 from wgmb.video.read.container import picture_stream
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 
 pytestmark = pytest.mark.fast
 
@@ -31,7 +31,7 @@ def test_an_mp4_without_its_end_says_what_is_missing(tmp_path):
     path = long(tmp_path, "mp4")
     path.write_bytes(path.read_bytes()[:-3000])
     with pytest.raises(InputError, match=r"c\.mp4: is cut off: its index \(moov\)") as error:
-        Footage(path)
+        VideoReader(path)
     assert str(error.value).count("\n") == 0
 
 
@@ -42,9 +42,9 @@ def test_a_file_that_was_cut_off_says_where(tmp_path, kind, muxing):
     tick = Fraction(1, 24)
     path = long(tmp_path, kind, muxing=muxing, tick=tick)
     whole = path.read_bytes()
-    assert not any("cut off" in note for note in Footage(path).notes)
+    assert not any("cut off" in note for note in VideoReader(path).notes)
     path.write_bytes(whole[: len(whole) // 2])
-    footage = Footage(path)
+    footage = VideoReader(path)
     got = [n for n, _ in footage]
     assert 10 < len(got) < 40
     (note,) = [note for note in footage.notes if "is cut off: it ends at" in note]
@@ -58,7 +58,7 @@ def test_damaged_bytes_are_counted_in_pictures(tmp_path, kind):
     at = len(data) // 3
     data[at : at + 400] = np.random.default_rng(4).bytes(400)
     path.write_bytes(data)
-    footage = Footage(path)
+    footage = VideoReader(path)
     got = [n for n, _ in footage]
     assert len(got) + len(footage.missing) == len(footage)
     said = " ".join((footage.loss(), *footage.notes))
@@ -74,7 +74,7 @@ def test_what_is_no_video_is_one_line(tmp_path, content, said):
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(InputError, match=rf"c\.mp4: {said}") as error:
-        Footage(path)
+        VideoReader(path)
     assert "\n" not in str(error.value)
 
 
@@ -87,13 +87,13 @@ def test_sound_alone_has_no_pictures(tmp_path):
             out.mux(sound.encode(block))
         out.mux(sound.encode(None))
     with pytest.raises(InputError, match="no pictures that move; it holds audio"):
-        Footage(path)
+        VideoReader(path)
 
 
 def test_absurd_sizes_are_refused(tmp_path):
     path = clips.write(tmp_path / "c.mp4", [clips.grey((1280, 720))])
     with pytest.raises(InputError, match="max_mb"):
-        Footage(path, max_mb=2)
+        VideoReader(path, max_mb=2)
 
 
 def test_names_that_look_like_addresses_are_files(tmp_path, monkeypatch):
@@ -101,14 +101,14 @@ def test_names_that_look_like_addresses_are_files(tmp_path, monkeypatch):
     (tmp_path / "http:").mkdir()
     path = clips.write(tmp_path / "x.mp4")
     path.rename(tmp_path / "http:" / "a%02d.mp4")
-    assert len(Footage("http:/a%02d.mp4")) == 12
+    assert len(VideoReader("http:/a%02d.mp4")) == 12
 
 
 def test_a_playlist_leads_nowhere(tmp_path):
     (tmp_path / "c.m3u8").write_text("#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n"
                                      "http://127.0.0.1:9/a.ts\n#EXT-X-ENDLIST\n")  # fmt: skip
     with pytest.raises(InputError, match=r"c\.m3u8: "):
-        Footage(tmp_path / "c.m3u8")
+        VideoReader(tmp_path / "c.m3u8")
 
 
 def test_pictures_of_another_size_are_scaled_to_that_of_the_first(tmp_path):
@@ -118,7 +118,7 @@ def test_pictures_of_another_size_are_scaled_to_that_of_the_first(tmp_path):
         frames = [clips.frame(clips.planes(n, size), "yuv420p") for n in range(4)]
         parts.append(clips.write(tmp_path / f"{size[0]}.h264", frames, kind="h264").read_bytes())
     (tmp_path / "both.h264").write_bytes(b"".join(parts))
-    footage = Footage(tmp_path / "both.h264")
+    footage = VideoReader(tmp_path / "both.h264")
     assert not footage.scaling()
     pictures = dict(footage)
     assert footage.scaled == {4, 5, 6, 7} and len(pictures) == 8 and not footage.loss()
@@ -131,7 +131,7 @@ def test_pictures_of_another_size_are_scaled_to_that_of_the_first(tmp_path):
 
 def test_a_single_picture_has_the_rate_that_its_file_states(tmp_path):
     one = [clips.frame(clips.planes(0), "yuv420p")]
-    assert Footage(clips.write(tmp_path / "a.mp4", one, rate=Fraction(50))).rate == 50
+    assert VideoReader(clips.write(tmp_path / "a.mp4", one, rate=Fraction(50))).rate == 50
 
 
 def test_a_stream_of_alpha_is_not_taken_for_the_pictures(tmp_path):
@@ -171,4 +171,4 @@ def test_animated_webp_is_refused_by_its_name(tmp_path):
     path = tmp_path / "a.webp"
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=40)
     with pytest.raises(InputError, match=r"a\.webp: animated WebP is not read; GIF, APNG and AVIF"):
-        Footage(path)
+        VideoReader(path)

@@ -10,13 +10,13 @@ from av.sidedata.sidedata import Type
 
 import make_clips as clips
 from wgmb.video.read.decoder import decoded
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 from wgmb.video.read.timeline import Timeline, Times
 
 pytestmark = pytest.mark.fast
 
 
-def shown(footage: Footage, *which) -> list[int]:
+def shown(footage: VideoReader, *which) -> list[int]:
     """The numbers of the pictures, told by their levels, which repeat after 6."""
     found = []
     for number, picture in footage.pictures(*which):
@@ -32,7 +32,7 @@ def test_times_are_those_in_the_file(tmp_path, kind, late):
     late = 0 if kind == "avi" else late  # which has no times
     tick = Fraction(1, clips.RATE) if kind == "avi" else clips.TICK
     path = clips.write(tmp_path / f"c.{kind}", tone=0.5, late=late, tick=tick)
-    footage = Footage(path)
+    footage = VideoReader(path)
     with av.open(str(path)) as container:
         first = next(container.decode(audio=0))
         sound = first.pts * first.time_base
@@ -51,7 +51,7 @@ def test_times_are_those_in_the_file(tmp_path, kind, late):
 @pytest.mark.parametrize("kind", ["mp4", "mkv"])
 def test_a_variable_rate_is_seen_in_the_times_alone(tmp_path, kind):
     times = [Fraction(n, 60) for n in (0, 1, 3, 4, 7, 8, 9, 10, 13, 14, 15, 16)]
-    footage = Footage(clips.write(tmp_path / f"c.{kind}", times=times))
+    footage = VideoReader(clips.write(tmp_path / f"c.{kind}", times=times))
     assert footage.is_variable
     assert footage.rate == 60
     assert [float(t) for t in footage.times] == pytest.approx([float(t) for t in times], abs=6e-4)
@@ -67,7 +67,7 @@ def test_a_variable_rate_is_seen_in_the_times_alone(tmp_path, kind):
 def test_a_rate_that_is_rounded_to_milliseconds_is_known_again(tmp_path, rate, want):
     times = [n / Fraction(rate) for n in range(40)]
     frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(40)]
-    footage = Footage(clips.write(tmp_path / "c.mkv", frames, times))
+    footage = VideoReader(clips.write(tmp_path / "c.mkv", frames, times))
     assert float(footage.rate) == pytest.approx(float(Fraction(want)), rel=2e-4)
     assert want == "37" or footage.rate == Fraction(want)
     assert not footage.is_variable
@@ -81,7 +81,7 @@ def test_a_few_times_of_milliseconds_have_the_rate_that_the_file_states(tmp_path
     path = clips.write(tmp_path / "c.mkv", frames, rate=Fraction(rate))
     with av.open(str(path)) as container:
         assert container.streams.video[0].time_base == Fraction(1, 1000)
-    footage = Footage(path)
+    footage = VideoReader(path)
     assert footage.rate == Fraction(rate) and not footage.is_variable
 
 
@@ -92,7 +92,7 @@ def test_a_rate_that_the_times_do_not_keep_is_not_believed(tmp_path):
     path = clips.write(tmp_path / "c.mkv", frames, times, rate=Fraction(60))
     with av.open(str(path)) as container:
         assert container.streams.video[0].average_rate == 60
-    assert Footage(path).rate == 24
+    assert VideoReader(path).rate == 24
 
 
 def test_steps_of_two_lengths_alone_have_a_rate():
@@ -123,7 +123,7 @@ def test_pictures_whose_times_are_those_of_decoding_are_counted(tmp_path, suffix
     with av.open(str(path)) as container:
         raw = [frame.pts for frame in container.decode(video=0)]
     assert raw != sorted(raw)
-    footage, wanted = Footage(path), Footage(plain)
+    footage, wanted = VideoReader(path), VideoReader(plain)
     assert shown(footage) == shown(wanted)
     assert footage.loss() == ""
     assert footage.rate == 24
@@ -143,7 +143,7 @@ def test_dolby_vision_without_a_base_layer_is_said(
     monkeypatch.setattr(
         "wgmb.video.read.reader._side_data", lambda frame: {Type.DOVI_METADATA: data}
     )
-    assert any(want in note for note in Footage(clips.write(tmp_path / "c.mp4")).notes)
+    assert any(want in note for note in VideoReader(clips.write(tmp_path / "c.mp4")).notes)
 
 
 def test_packets_without_data_do_not_end_a_stream():
@@ -171,7 +171,7 @@ def test_what_an_edit_list_leaves_out_is_left_out(tmp_path):
                        muxing={"use_editlist": "1", "avoid_negative_ts": "disabled"})  # fmt: skip
     with av.open(str(path)) as container:
         assert container.streams.video[0].frames == 12
-    footage = Footage(path)
+    footage = VideoReader(path)
     assert len(footage) == 9
     assert footage.times[0] == 0
     levels = [float(np.median(p.planes[0])) for _, p in footage.pictures()]
@@ -186,7 +186,7 @@ def test_pictures_from_the_middle_are_those_of_a_whole_pass(tmp_path, kind, g):
     """With B-frames and open groups, whose first pictures build on the group before."""
     frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(30)]
     options = {"g": g, "bf": "3", "x264-params": "open-gop=1:keyint-min=1:scenecut=0", "qp": "8"}
-    footage = Footage(clips.write(tmp_path / f"c.{kind}", frames, options=options))
+    footage = VideoReader(clips.write(tmp_path / f"c.{kind}", frames, options=options))
     whole = dict(footage)
     for first in (0, 3, 4, 11, 17, 29):
         part = dict(footage.pictures(first, first + 2))

@@ -7,14 +7,14 @@ from PIL import Image
 
 from wgmb.settings.video import VideoSettings
 from wgmb.video.output_times import moments
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 
 
 def animation(path, delays):
     """A file of one colour a picture, shown for so many milliseconds each."""
     pictures = [Image.new("RGB", (16, 16), (40 * n, 90, 200 - 30 * n)) for n in range(len(delays))]
     pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=list(delays))
-    return Footage(path)
+    return VideoReader(path)
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".apng"])

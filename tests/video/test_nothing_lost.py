@@ -5,7 +5,7 @@ import pytest
 import make_clips as clips
 import make_frames as make
 from wgmb.cli import app
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 
 PLAIN = "--flow", "none", "-q"
 
@@ -28,7 +28,7 @@ def cut(tmp_path):
 
 def test_a_cut_off_video_says_how_many_pictures_are_lost(tmp_path, capsys, cut):
     text = run(capsys, cut, "-o", tmp_path / "b.mkv", code=1)
-    made = len(Footage(tmp_path / "b.mkv"))
+    made = len(VideoReader(tmp_path / "b.mkv"))
     (count,) = [int(w) for w in text.split() if w.isdigit()]
     assert 10 < made < 40 and abs(made + count - 48) <= 2, text
     assert "pictures after" in text and text.count("\n") == 1

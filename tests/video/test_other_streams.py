@@ -8,11 +8,11 @@ import pytest
 
 import make_clips as clips
 from wgmb.video.clock import Clock, tick
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 from wgmb.video.write.encoders import chosen
 from wgmb.video.write.other_streams import OtherStreams
 from wgmb.video.write.pictures import CodedVideo
-from wgmb.video.write.time_stretch import Stretch
+from wgmb.video.write.time_stretch import TimeStretch
 
 pytestmark = pytest.mark.fast
 
@@ -38,7 +38,7 @@ def flashing(path, times=None, late=0.0, rate=48000, codec="aac", count=36, **mo
 def copied(source, path, clock=None, keeps_pitch=True, others=True) -> list[str]:
     """The clip with its pictures encoded anew; what was left out."""
     clock = clock or Clock()
-    footage = Footage(source)
+    footage = VideoReader(source)
     encoding = chosen(path, "h264" if path.suffix == ".mov" else None)
     coding, _ = encoding.coding(footage.coding)
     beside = OtherStreams(source, footage.index, clock, keeps_pitch) if others else None
@@ -99,7 +99,7 @@ def test_a_flash_and_a_click_stay_together_and_sound_stays_as_it_is(
     assert copied(source, path) == []
     shown, heard = flash_and_click(path)
     assert heard - shown == pytest.approx(click - white, abs=0.0015)
-    assert len(Footage(path)) == len(Footage(source))
+    assert len(VideoReader(path)) == len(VideoReader(source))
     before, after = packets(source), packets(path)
     if kind != "ts":  # in which AAC has headers of its own
         assert before[1] == after[1]
@@ -150,7 +150,7 @@ def test_a_part_begins_at_its_beginning_with_its_sound(tmp_path):
     shown, heard = flash_and_click(path)
     assert shown == pytest.approx(0.5 - 0.33, abs=0.001)
     assert heard - shown == pytest.approx(0.002, abs=0.0015)
-    footage = Footage(path)
+    footage = VideoReader(path)
     assert len(footage) == 16
     with av.open(str(path)) as container:
         times = [f.time for f in container.decode(audio=0)]
@@ -288,7 +288,7 @@ def test_a_gap_in_the_sound_stays_one_at_another_speed(tmp_path):
 def test_a_stretched_tone_keeps_its_pitch_loudness_and_length(speed):
     rate, count = 8000, 16000
     tone = np.sin(2 * np.pi * 440 * np.arange(count) / rate)[None].astype(np.float32)
-    stretch = Stretch(rate, 1, Fraction(speed))
+    stretch = TimeStretch(rate, 1, Fraction(speed))
     made = [stretch.add(tone[:, n : n + 700]) for n in range(0, count, 700)]
     heard = np.concatenate([*made, stretch.rest()], 1)[0]
     assert len(heard) == round(count / Fraction(speed))
@@ -305,7 +305,7 @@ def test_clicks_do_not_drift_when_stretched():
     rate, speed = 8000, Fraction(2, 5)
     wave = np.random.default_rng(0).normal(0, 0.01, (1, 60 * rate)).astype(np.float32)
     wave[0, rate // 2 :: rate] = 0.9
-    stretch = Stretch(rate, 1, speed)
+    stretch = TimeStretch(rate, 1, speed)
     heard = np.concatenate([stretch.add(wave), stretch.rest()], 1)[0]
     loud = np.flatnonzero(heard > 0.4)
     want = (np.arange(60) + 0.5) * rate / float(speed)

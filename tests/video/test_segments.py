@@ -16,7 +16,7 @@ from wgmb import InputError
 from wgmb.color.coding import CodedPicture, Coding
 from wgmb.video.clock import tick
 from wgmb.video.hdr10 import LightLevel
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 from wgmb.video.write import segments as segmenting
 from wgmb.video.write.encoders import Facts, chosen
 from wgmb.video.write.other_streams import OtherStreams
@@ -92,7 +92,7 @@ def test_segments_are_joined_into_what_one_run_makes(tmp_path, name, codec, bits
     assert parts.join() == []
     assert not parts.folder.exists()
     in_one_run(other, codec, times, bits)
-    joined, one = Footage(path), Footage(other)
+    joined, one = VideoReader(path), VideoReader(other)
     assert list(joined.times) == list(one.times)
     assert len(joined) == COUNT
     assert joined.coding == one.coding
@@ -115,7 +115,7 @@ def test_what_was_finished_before_a_kill_is_not_made_again(tmp_path, stop):
     whole = stop // 15 * 15
     assert fill(parts, coding, times) == list(range(whole, COUNT))
     parts.join()
-    assert [n for n, _ in Footage(path)] == list(range(COUNT))
+    assert [n for n, _ in VideoReader(path)] == list(range(COUNT))
 
 
 def test_a_process_that_is_killed_leaves_nothing_in_the_way(tmp_path):
@@ -148,7 +148,7 @@ def test_a_process_that_is_killed_leaves_nothing_in_the_way(tmp_path):
     assert len(own) == 1 and now - own == {"00000.mp4", "00000.json"}
     fill(parts, coding, times)
     parts.join()
-    assert list(Footage(path).times) == times
+    assert list(VideoReader(path).times) == times
     assert [p.name for p in tmp_path.iterdir()] == ["v.mp4"]
 
 
@@ -176,7 +176,7 @@ def test_a_damaged_segment_is_made_again(tmp_path, what):
     assert parts.to_do() == [range(15, 30)]
     assert fill(parts, coding, times) == list(range(15, 30))
     parts.join()
-    assert len(Footage(path)) == COUNT
+    assert len(VideoReader(path)) == COUNT
 
 
 def test_a_join_that_fails_leaves_the_segments(tmp_path):
@@ -216,7 +216,7 @@ def test_sound_is_as_in_one_run(tmp_path, kind):
         heard = [[(p.pts, bytes(p)) for p in c.demux(audio=0) if p.size] for c in (a, b)]
     assert heard[0] == heard[1]
     assert len(heard[0]) > 50
-    assert list(Footage(path).times) == list(Footage(other).times)
+    assert list(VideoReader(path).times) == list(VideoReader(other).times)
 
 
 def test_hdr10_data_outlives_the_join(tmp_path):
@@ -224,7 +224,7 @@ def test_hdr10_data_outlives_the_join(tmp_path):
     parts, coding, times = segmented(tmp_path / "v.mp4", "h265", bits=10, facts=facts)
     fill(parts, coding, times)
     parts.join()
-    footage = Footage(tmp_path / "v.mp4")
+    footage = VideoReader(tmp_path / "v.mp4")
     assert footage.light_level == LightLevel(993, 412)
     assert footage.pixel_aspect == Fraction(4, 3)
 
@@ -281,4 +281,4 @@ def test_another_run_that_ends_first_takes_no_segments_away(tmp_path):
     assert quick.to_do() == []
     quick.join()
     slow.join()
-    assert len(Footage(tmp_path / "a.mp4")) == COUNT and not slow.folder.exists()
+    assert len(VideoReader(tmp_path / "a.mp4")) == COUNT and not slow.folder.exists()

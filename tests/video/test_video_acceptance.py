@@ -19,7 +19,7 @@ from wgmb.color.coding import CodedPicture, Coding
 from wgmb.color.srgb import linear
 from wgmb.video.clock import tick
 from wgmb.video.hdr10 import LightLevel, Mastering
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 from wgmb.video.write.encoders import Facts, chosen
 from wgmb.video.write.pictures import CodedVideo
 
@@ -54,7 +54,7 @@ def test_sound_is_the_same_and_at_the_same_time(tmp_path, capsys, name, late, ti
     blur(capsys, source, "-o", out, "--fps", fps, "--shutter", 360, "-q")
     assert packets(out)[1] == packets(source)[1]
     shown, heard = brightest(out), sounded(out)
-    first = float(Footage(source).times[0] - Footage(out).times[0])
+    first = float(VideoReader(source).times[0] - VideoReader(out).times[0])
     assert heard == pytest.approx(click - first, abs=0.002)
     lasts = float(times[FLASH + 1] - times[FLASH])
     assert abs(shown - heard) <= 0.5 / fps + max(lasts - 1 / fps, 0) + 0.002
@@ -62,7 +62,7 @@ def test_sound_is_the_same_and_at_the_same_time(tmp_path, capsys, name, late, ti
 
 def brightest(path):
     """Time of the brightest picture [s]."""
-    footage = Footage(path)
+    footage = VideoReader(path)
     means = [float(picture.planes[0].mean()) for _, picture in footage]
     return float(footage.times[int(np.argmax(means))])
 
@@ -101,7 +101,7 @@ def still(path, coding, facts, codec, size=(64, 48)):
 def test_colours_come_back_with_their_tags(tmp_path, capsys, coding, codec, allowed):
     source, out = still(tmp_path / "a.mkv", coding, Facts(), codec), tmp_path / "b.mkv"
     blur(capsys, source, "-o", out, "--codec", codec, "--fps", 24, "-q")
-    one, other = Footage(source), Footage(out)
+    one, other = VideoReader(source), VideoReader(out)
     assert other.coding == one.coding == coding
     (_, want), (_, got) = next(iter(one)), next(iter(other))
     for a, b in zip(want.planes, got.planes, strict=True):
@@ -112,7 +112,7 @@ def test_untagged_hd_comes_back(tmp_path, capsys):
     planes = clips.planes(2, (1280, 720))
     source = clips.write(tmp_path / "a.mkv", [clips.frame(planes, "yuv420p")] * 2, codec="ffv1")
     assert "does not state" in blur(capsys, source, "-o", tmp_path / "b.mkv", "--codec", "ffv1")
-    _, got = next(iter(Footage(tmp_path / "b.mkv")))
+    _, got = next(iter(VideoReader(tmp_path / "b.mkv")))
     for a, b in zip(planes, got.planes, strict=True):
         assert np.abs(a.astype(int) - b).max() <= 1
 
@@ -121,7 +121,7 @@ def test_hdr10_data_are_the_same_after_a_blur(tmp_path, capsys):
     facts = Facts(mastering=Mastering(P3, (0.0005, 1000.0)), light_level=LightLevel(993, 412))
     source, out = still(tmp_path / "a.mp4", PQ, facts, "h265"), tmp_path / "b.mp4"
     blur(capsys, source, "-o", out, "--codec", "h265", "-q")
-    one, other = Footage(source), Footage(out)
+    one, other = VideoReader(source), VideoReader(out)
     assert other.coding == one.coding == PQ
     assert other.light_level == one.light_level and other.mastering == one.mastering
 
@@ -151,7 +151,7 @@ def test_a_recording_of_a_game(tmp_path, capsys):
     got = app.main([*map(str, ["blur", source, "-o", out, *words]), "--flow", "dis"])
     text = capsys.readouterr().err
     assert got == 0 and "8 repeated pictures left out" in text, text
-    before, after = Footage(source), Footage(out)
+    before, after = VideoReader(source), VideoReader(out)
     assert before.is_variable and not after.is_variable and after.rate == 60
     assert abs(float(after.duration - before.duration)) < 1 / 30
     lumas = [picture.planes[0].astype(int) for _, picture in before]
@@ -179,7 +179,7 @@ def test_a_flash_counts_by_its_share(tmp_path, capsys, flow):
     assert app.main([*map(str, ["blur", source, "-o", out, *words])]) == 0
     text = capsys.readouterr().err
     assert "flash at picture 9" in text and "cut" not in text
-    light = [float(linear((p.planes[0] - 16.0) / 219).mean()) for _, p in Footage(out)]
+    light = [float(linear((p.planes[0] - 16.0) / 219).mean()) for _, p in VideoReader(out)]
     added = np.array(light) - np.median(light)
     white = 1 - np.median(light)
     assert added[2] == pytest.approx(white / 4, abs=0.02)
@@ -214,7 +214,7 @@ def test_what_cannot_be_read_is_one_line(tmp_path, capsys, name):
 def test_a_wrong_suffix_does_not_matter(tmp_path, capsys):
     source = clips.write(tmp_path / "a.mkv").rename(tmp_path / "a.mp4")
     blur(capsys, source, "-o", tmp_path / "b.mp4", "-q")
-    assert len(Footage(tmp_path / "b.mp4")) == 12
+    assert len(VideoReader(tmp_path / "b.mp4")) == 12
 
 
 def test_sound_without_pictures_is_one_line(tmp_path, capsys):
@@ -240,7 +240,7 @@ def test_lost_pictures_are_counted_and_nothing_else_is_lost(tmp_path, capsys):
     text = blur(capsys, source, "-o", tmp_path / "b.mkv", "-q", code=1)
     assert text.count("\n") == 1
     assert "could not be decoded" in text or "are damaged" in text
-    assert len(Footage(tmp_path / "b.mkv")) > 36
+    assert len(VideoReader(tmp_path / "b.mkv")) > 36
 
 
 def encrypted(source, path):
@@ -325,7 +325,7 @@ def test_a_video_becomes_a_gif(tmp_path, capsys):
     source, out = clips.write(tmp_path / "a.mp4", tone=1), tmp_path / "b.gif"
     text = blur(capsys, source, "-o", out, "--fps", 12)
     assert "b.gif: stream 1 (sound) is left out" in text
-    found = Footage(out)
+    found = VideoReader(out)
     assert (len(found), found.rate) == (6, 12)
     for n, (_, picture) in enumerate(found):
         grey = (clips.level(2 * n) - 16) / 219

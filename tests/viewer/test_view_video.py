@@ -25,17 +25,17 @@ from wgmb.flow.dis import Dis
 from wgmb.gpu.textures import TexturePool
 from wgmb.io import stills
 from wgmb.observer import Observer
-from wgmb.run.video import FootageBlur
 from wgmb.settings.video import FlowSettings, VideoSettings
 from wgmb.shots.cut_list import CutList
+from wgmb.video.exposures import VideoBlur
 from wgmb.video.holdouts import holdout_of
 from wgmb.video.linear_frames import VideoPictures
 from wgmb.video.output_times import moments
-from wgmb.video.read.reader import Footage
+from wgmb.video.read.reader import VideoReader
 from wgmb.viewer import State, controls, offscreen
 from wgmb.viewer.state.state import video_time
-from wgmb.viewer.subjects.video import FootageSubject
-from wgmb.viewer.subjects.video_motion import Finder, Known, Wish
+from wgmb.viewer.subjects.video import VideoSubject
+from wgmb.viewer.subjects.video_motion import MotionRequest, PictureFinder, PictureFinding
 from wgmb.viewer.window import frame
 
 SIZE = 96, 64
@@ -125,10 +125,10 @@ def command_line(
     clip, number, fps=48, method="tap", masks=(), frames=None, cuts="", video=BY_DIS, **shutter
 ):
     """The output frame of that number that `wgmb blur` makes; `fps` None: at the video's times."""
-    footage, blur = Footage(clip), Blur(method, samples=8)
+    footage, blur = VideoReader(clip), Blur(method, samples=8)
     clock = video.clock(footage, frames)
     cut_list = CutList(cuts)
-    run = FootageBlur(
+    run = VideoBlur(
         footage,
         blur,
         motion_of(video, blur.device),
@@ -243,7 +243,7 @@ def test_what_is_held_out_stays_sharp_as_by_the_command_line(clip, tmp_path):
     got = settled(viewer)
     want = command_line(clip, 4, masks=(str(matte), "static"))
     np.testing.assert_allclose(got, want, atol=2e-5)
-    sharp = VideoPictures(Footage(clip), gpu.open_device()).at(4)
+    sharp = VideoPictures(VideoReader(clip), gpu.open_device()).at(4)
     kept = np.abs(got - sharp)[:, : SIZE[0] // 4 - 2]
     assert kept.max() < 1e-3 < 0.02 < np.abs(got - command_line(clip, 4)).max()
     viewer.stage.choices.close()
@@ -302,7 +302,7 @@ def test_the_sharp_picture_comes_first_and_says_so(clip, held):
         frame(viewer)
     report = viewer.stage.report
     assert report.waiting.startswith("sharp: finding the motion of picture 5")
-    sharp = VideoPictures(Footage(clip), gpu.open_device()).at(5)
+    sharp = VideoPictures(VideoReader(clip), gpu.open_device()).at(5)
     np.testing.assert_allclose(viewer.stage.download()[..., :3], sharp, atol=1e-6)
     held.free = True
     assert np.abs(settled(viewer) - sharp).max() > 0.05
@@ -358,8 +358,8 @@ def test_options_of_rendered_frames_are_refused(clip):
 
 
 def test_pictures_are_found_in_any_order(clip):
-    pictures, want = VideoPictures(Footage(clip), gpu.open_device()), {}
-    for number, light in VideoPictures(Footage(clip), gpu.open_device()).read():
+    pictures, want = VideoPictures(VideoReader(clip), gpu.open_device()), {}
+    for number, light in VideoPictures(VideoReader(clip), gpu.open_device()).read():
         want[number] = light
     for number in (3, 4, 5, 9, 2, 2, 13, 0, 12):
         np.testing.assert_array_equal(pictures.at(number), want[number])
@@ -384,12 +384,12 @@ def wide(path, transfer):
 @pytest.mark.parametrize("transfer", [PQ, HLG], ids=["PQ", "HLG"])
 def test_hdr_is_shown_in_the_colours_of_the_display(tmp_path, transfer):
     path = wide(tmp_path / "a.mkv", transfer)
-    assert Footage(path).coding.transfer == transfer
+    assert VideoReader(path).coding.transfer == transfer
     assert State().opened(str(path)).tone == "soft"  # the sky of a phone's video is not all white
     viewer = opened(path, look="sharp", flow="none", tone="clip")
     for _ in range(3):
         frame(viewer)
-    light = VideoPictures(Footage(path), gpu.open_device()).at(0).astype(np.float64)
+    light = VideoPictures(VideoReader(path), gpu.open_device()).at(0).astype(np.float64)
     if transfer == HLG:
         light *= (light @ [0.2627, 0.678, 0.0593])[..., None] ** 0.2  # BT.2100, table 5
     want = srgb(light @ conversion(REC2020, REC709).T)
@@ -449,7 +449,7 @@ def test_a_file_that_vanishes_while_it_plays_is_said_and_the_picture_stays(tmp_p
     shown = settled(viewer)
     clip.unlink()
     subject = viewer.stage.choices.subject(viewer.state)
-    assert isinstance(subject, FootageSubject)
+    assert isinstance(subject, VideoSubject)
     subject._frames._colors.clear()  # as if there had been many more
     for frame_wanted in (12.0, 0.0, 13.0):
         viewer.state = replace(viewer.state, frame=frame_wanted, playing=True)
@@ -488,18 +488,18 @@ def test_where_nothing_can_be_decoded_a_picture_is_left_out_or_the_run_says_so(
 ):
     frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(24)]
     clip = clips.write(tmp_path / "a.mp4", frames)
-    decoded = Footage.pictures
+    decoded = VideoReader.pictures
 
     def begin_only(self, first=0, last=None):
         return ((n, picture) for n, picture in decoded(self, first, last) if n < 4)
 
-    monkeypatch.setattr(Footage, "pictures", begin_only)
-    device, footage = gpu.open_device(), Footage(clip)
-    find = Finder(footage, device, None, Wish())
-    assert find(23) == Known(None, None, None, None, is_left_out=True)
+    monkeypatch.setattr(VideoReader, "pictures", begin_only)
+    device, footage = gpu.open_device(), VideoReader(clip)
+    find = PictureFinder(footage, device, None, MotionRequest())
+    assert find(23) == PictureFinding(None, None, None, None, is_left_out=True)
     assert find(10).is_left_out and find(10).before == 3
     assert not find(2).is_left_out and find(2).after == 3
     clock = VideoSettings(begin="0.9").clock(footage, None)
-    run = FootageBlur(footage, Blur("tap", device=device), None, clock=clock)
+    run = VideoBlur(footage, Blur("tap", device=device), None, clock=clock)
     with pytest.raises(InputError, match=r"from 0\.[0-9]* s on can be decoded"):
         next(run.exposures(Shutter(180), moments(footage, clock, Fraction(24))))

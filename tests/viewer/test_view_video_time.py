@@ -12,8 +12,8 @@ from wgmb.cli.app import main
 from wgmb.cone import Cone
 from wgmb.settings.video import VideoSettings
 from wgmb.video.clock import Clock
-from wgmb.video.output_times import Moment, Moments
-from wgmb.video.read.reader import Footage
+from wgmb.video.output_times import OutputFrame, OutputFrames
+from wgmb.video.read.reader import VideoReader
 from wgmb.video.read.timeline import Times
 from wgmb.viewer import State, controls
 from wgmb.viewer.draw.perception import seen_frames
@@ -22,7 +22,7 @@ from wgmb.viewer.panel.video_section import at_pace, in_part
 from wgmb.viewer.panel.widgets import shortened
 from wgmb.viewer.state.state import video_time
 from wgmb.viewer.subjects.video_exposure import exposed, picture_at
-from wgmb.viewer.subjects.video_motion import Known
+from wgmb.viewer.subjects.video_motion import PictureFinding
 
 pytestmark = pytest.mark.fast
 
@@ -96,7 +96,7 @@ def test_playing_begins_anew_after_the_last_output_frame(state):
     slow = replace(at_pace(state, "0.5"), frame=47.0)
     assert controls.played(slow, 1 / 24).frame == pytest.approx(0)
     assert controls.stepped(slow, 1).frame == 0 and controls.stepped(slow, -1).frame == 46
-    layout = controls.Layout((0, 0, 9, 9), (0, 0, 9, 9))
+    layout = controls.WindowLayout((0, 0, 9, 9), (0, 0, 9, 9))
     assert controls.key(slow, layout, "Home")[0].frame == 0
     assert controls.key(replace(slow, frame=3.0), layout, "End")[0].frame == 47
 
@@ -110,9 +110,9 @@ def test_the_panel_says_which_output_frame_it_is_and_what_it_is_made_of(state):
 @pytest.mark.parametrize("fps", [None, Fraction(30), Fraction(24000, 1001)])
 @pytest.mark.parametrize("part", [{}, {"begin": "0.1"}, {"begin": "0.1", "end": "0.25"}])
 def test_moments_are_all_there_and_ascend(uneven, fps, part):
-    footage = Footage(uneven)
+    footage = VideoReader(uneven)
     clock = VideoSettings(speed="0.7", **part).clock(footage, None)
-    found = Moments(footage, clock, fps)
+    found = OutputFrames(footage, clock, fps)
     times = [moment.time for moment in found]
     assert len(times) == len(found) and times == sorted(set(times))
     assert [found.nearest(time) for time in times] == [m.number for m in found]
@@ -146,15 +146,15 @@ def chain(numbers, cuts=(), without=()):
         before = max((k for k in numbers if k < n), default=None)
         after = min((k for k in numbers if k > n), default=None)
         if n not in numbers:
-            return Known(None, None, before, after, is_left_out=True)
+            return PictureFinding(None, None, before, after, is_left_out=True)
         begins, ends = before is None or n in cuts, after is None or after in cuts
-        return Known(None, None, before, after, begins, ends, begins, ends)
+        return PictureFinding(None, None, before, after, begins, ends, begins, ends)
 
     return known
 
 
 def made(known, frame, fps=48, degrees=180, speed=Fraction(1), count=20):
-    moment = Moment(frame, Fraction(frame, fps), Fraction(1, fps))
+    moment = OutputFrame(frame, Fraction(frame, fps), Fraction(1, fps))
     return exposed(shown_at(range(count)), Clock(speed=speed), moment, Shutter(degrees), known)
 
 
@@ -190,7 +190,9 @@ def test_what_is_not_known_yet_is_asked_for():
 def test_the_picture_at_a_time_is_found_exactly():
     times = shown_at(range(0, 40, 2))
     for frame, want in [(0, 0), (1, 0), (2, 1), (3, 1), (39, 19)]:
-        assert picture_at(times, Clock(), Moment(frame, Fraction(frame, 48), Fraction(1))) == want
+        assert (
+            picture_at(times, Clock(), OutputFrame(frame, Fraction(frame, 48), Fraction(1))) == want
+        )
 
 
 # ---- options that do not fit ----------------------------------------------------------------

@@ -75,7 +75,7 @@ def test_the_error_is_shown_however_others_are_compared(bare):
             bare.look(0.5)
             shown.append(bare.viewer.screen.picture())
         assert key_box(bare.state, "COLOR", (0, 0, 9, 9), (0, 0, 9, 9), 1.0)
-        layout = controls.Layout((0, 0, 320, 1010), (0, 400, 320, 180))
+        layout = controls.WindowLayout((0, 0, 320, 1010), (0, 400, 320, 180))
         assert controls.grip(bare.state, layout, 160, 500, 1, ()) == "orbit"
     assert all(picture.max() > 0.3 for picture in shown)  # flicker would show black in between
 

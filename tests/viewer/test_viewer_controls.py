@@ -48,7 +48,7 @@ def test_wheel_comes_nearer_and_is_continuous(bare):
 
 
 def test_elevation_and_distance_are_held(hand):
-    layout = controls.Layout((0, 0, 320, 1010), (0, 400, 320, 180))
+    layout = controls.WindowLayout((0, 0, 320, 1010), (0, 400, 320, 180))
     up = controls.drag(PLAIN, layout, "orbit", 0, 5000)
     down = controls.drag(PLAIN, layout, "orbit", 0, -5000)
     assert (down.orbit[1], up.orbit[1]) == controls.ELEVATION
@@ -80,7 +80,7 @@ def test_a_scene_with_a_camera_of_its_own_is_turned_by_it(monkeypatch):
         return builtin.crossing()
 
     monkeypatch.setitem(builtin.SCENES, "own", own)
-    state, layout = State(source="own"), controls.Layout((0, 0, 400, 200), (0, 0, 400, 200))
+    state, layout = State(source="own"), controls.WindowLayout((0, 0, 400, 200), (0, 0, 400, 200))
     moved = controls.drag(state, layout, "orbit", 100, 20)
     assert dict(moved.settings) == pytest.approx({"cam_x": -1.0, "cam_y": 0.4})
     assert moved.orbit == (0, 0)
@@ -128,7 +128,7 @@ def test_an_arrow_that_is_held_down_repeats(hand):
 
 
 def test_every_key_of_the_help_does_something():
-    layout = controls.Layout((0, 0, 9, 9), (0, 0, 9, 9), tuple(METHODS), ("result", "sharp"),
+    layout = controls.WindowLayout((0, 0, 9, 9), (0, 0, 9, 9), tuple(METHODS), ("result", "sharp"),
                              ("off", "wipe"), ("left", "pair"))  # fmt: skip
     names = {"space": " ", "left, right": "ArrowLeft", "home, end": "End", "up, down": "ArrowUp",
              "1 - 9": "2", "Esc": "Escape", "r": "R"}  # fmt: skip

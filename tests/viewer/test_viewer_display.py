@@ -16,7 +16,7 @@ from wgmb.gpu.textures import TexturePool
 from wgmb.io import exr
 from wgmb.viewer import State
 from wgmb.viewer.draw import display as displayed
-from wgmb.viewer.draw.ocio_shader import OUTPUT, GpuDisplay
+from wgmb.viewer.draw.ocio_shader import OUTPUT, OcioShader
 
 ACES13 = "ocio://cg-config-v1.0.0_aces-v1.3_ocio-v2.1"
 NEARLY_ALL = 0.9999  # of the pixels are within 1/255
@@ -27,7 +27,7 @@ def on_the_gpu(device, display, space, rgba: np.ndarray, exposure: float) -> np.
     size, pool = rgba.shape[1::-1], TexturePool(device)
     pool.upload("light", rgba, "rgba32float")
     light, shown = pool.texture("light", size, "rgba32float"), pool.texture("o", size, OUTPUT)
-    GpuDisplay(device, display, space).show(light, exposure, shown)
+    OcioShader(device, display, space).show(light, exposure, shown)
     return pool.download(device.create_command_encoder(), shown)[..., :3].astype("f4")
 
 
@@ -71,7 +71,7 @@ def cannot(*_) -> None:
 @pytest.mark.parametrize("gpu_can", [True, False])
 def test_a_scene_is_shown_as_the_view_shows_it(tmp_path, monkeypatch, gpu_can):
     if not gpu_can:
-        monkeypatch.setattr(displayed, "GpuDisplay", cannot)
+        monkeypatch.setattr(displayed, "OcioShader", cannot)
     state = ALONE.with_color(ocio=str(film_config(tmp_path)))
     hand = Hand(replace(state, exposure=1.0), BARE)
     hand.look_until(lambda: not hand.viewer.stage.report.busy)
@@ -85,9 +85,9 @@ def test_a_scene_is_shown_as_the_view_shows_it(tmp_path, monkeypatch, gpu_can):
 
 def test_what_does_not_change_is_not_shown_anew(tmp_path, monkeypatch):
     drawn = []
-    draw = displayed.Displayed._draw
+    draw = displayed.DisplayCache._draw
     monkeypatch.setattr(
-        displayed.Displayed, "_draw", lambda *given: (drawn.append(1), draw(*given))
+        displayed.DisplayCache, "_draw", lambda *given: (drawn.append(1), draw(*given))
     )
     hand = Hand(ALONE.with_color(ocio=str(film_config(tmp_path))), BARE)
     hand.look_until(lambda: not hand.viewer.stage.report.busy)

@@ -95,7 +95,7 @@ def test_e_goes_through_the_eyes_and_does_nothing_without_any(bare):
         bare.press("e")
         seen.append(bare.state.eyes)
     assert seen == ["left", "pair", "red-cyan", "right", "left"]
-    assert controls.key(PLAIN, controls.Layout((0, 0, 9, 9), (0, 0, 9, 9)), "e")[0] == PLAIN
+    assert controls.key(PLAIN, controls.WindowLayout((0, 0, 9, 9), (0, 0, 9, 9)), "e")[0] == PLAIN
 
 
 def test_the_panel_has_a_choice_of_eyes_for_stereo_frames_only(frames):

@@ -112,12 +112,12 @@ class OutputOptions(OutputSettings):
     ] = "zip"
 
 
-Given = Annotated[InputOptions, Parameter(name="*", group=Group("Input", sort_key=1))]
-Moments = Annotated[SceneSettings, Parameter(name="*", group=Group("Input", sort_key=1))]
-Look = Annotated[BlurOptions, Parameter(name="*", group=Group("Blur", sort_key=2))]
-When = Annotated[ShutterOptions, Parameter(name="*", group=Group("Shutter", sort_key=3))]
+Inputs = Annotated[InputOptions, Parameter(name="*", group=Group("Input", sort_key=1))]
+SceneTimes = Annotated[SceneSettings, Parameter(name="*", group=Group("Input", sort_key=1))]
+Blurs = Annotated[BlurOptions, Parameter(name="*", group=Group("Blur", sort_key=2))]
+Shutters = Annotated[ShutterOptions, Parameter(name="*", group=Group("Shutter", sort_key=3))]
 Colors = Annotated[ColorSettings, Parameter(name="*", group=Group("Colour", sort_key=4))]
-Shown = Annotated[DisplaySettings, Parameter(name="*", group=Group("Colour", sort_key=4))]
+DisplayOptions = Annotated[DisplaySettings, Parameter(name="*", group=Group("Colour", sort_key=4))]
 Videos = Annotated[VideoSettings, Parameter(name="*", group=Group("Video", sort_key=4))]
-Target = Annotated[OutputOptions, Parameter(name="*", group=Group("Output", sort_key=5))]
+Outputs = Annotated[OutputOptions, Parameter(name="*", group=Group("Output", sort_key=5))]
 SceneName = Annotated[str, Parameter(help=f"Scene: {', '.join(builtin.SCENES)}.")]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import wgpu
 
 from ..gpu import wgsl
-from .passes import STATES, Passes
+from .passes import STATES, FlowPasses
 
 
 def carry(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     states: wgpu.GPUTexture,

@@ -6,7 +6,7 @@ import numpy as np
 import wgpu
 
 from .homography import TOLERANCE, columns, dominant_homography
-from .passes import STATES, Passes
+from .passes import STATES, FlowPasses
 from .views import AROUND, Views
 
 WHOLE, PARTS = 1.0, 0.5  # how far off the motion of most displacements may be [px]
@@ -16,7 +16,7 @@ ACROSS = 40  # pixels along a side that take part in them
 
 
 def follow_most(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     views: Views,
@@ -85,7 +85,7 @@ def _bends(views: Views, most: tuple[np.ndarray, np.ndarray], centres, ways) -> 
 
 
 def settle(
-    passes: Passes, size: tuple[int, int], matched: dict, views: Views, states: wgpu.GPUTexture
+    passes: FlowPasses, size: tuple[int, int], matched: dict, views: Views, states: wgpu.GPUTexture
 ) -> wgpu.GPUTexture:
     """States of a frame, those that the picture hardly tells taken from the motion of most of it.
 
@@ -107,7 +107,7 @@ def settle(
 
 
 def settled(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     states: wgpu.GPUTexture,
@@ -122,12 +122,14 @@ def settled(
     return output
 
 
-def _read(passes: Passes, thin: wgpu.GPUTexture) -> np.ndarray:
+def _read(passes: FlowPasses, thin: wgpu.GPUTexture) -> np.ndarray:
     """(count, 4) what a pass wrote of a few pixels."""
     return passes.images.download(passes.device.create_command_encoder(), thin).reshape(-1, 4)
 
 
-def _run(passes: Passes, entry: str, size, most: tuple[np.ndarray, np.ndarray], **bound) -> None:
+def _run(
+    passes: FlowPasses, entry: str, size, most: tuple[np.ndarray, np.ndarray], **bound
+) -> None:
     values = dict(zip(("to_near", "to_far"), map(columns, most), strict=True))
     uniform = passes.uniform("dominant.wgsl", "Dominant", **values)
     passes.run("dominant.wgsl", entry, size, dominant=uniform, **bound)

@@ -7,7 +7,7 @@ import wgpu
 
 from .. import gpu
 from ..errors import InputError, did_you_mean
-from .passes import Passes
+from .passes import FlowPasses
 from .shot import EFFORTS, Load, Shot
 
 
@@ -44,7 +44,7 @@ class Flow:
         The motion of a frame depends on its number and on `load`, and on nothing that was asked
         for before.
         """
-        return Shot(Passes(self.device), load, self._effort)
+        return Shot(FlowPasses(self.device), load, self._effort)
 
     def __call__(
         self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None

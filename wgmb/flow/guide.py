@@ -8,7 +8,7 @@ import numpy as np
 import wgpu
 
 from .homography import columns, enlarged
-from .passes import STATES, Passes
+from .passes import STATES, FlowPasses
 
 REACH = 0.2  # of the longer side: how far around the motion of most the coarsest level is searched
 AROUND = 2  # px around the displacements of the coarser level
@@ -16,7 +16,7 @@ FINER_AROUND = 1  # the same on a level finer than the coarsest that is swept
 
 
 def guide(
-    passes: Passes,
+    passes: FlowPasses,
     sizes: list[tuple[int, int]],
     matched: Sequence[dict],
     most: tuple[np.ndarray, np.ndarray],
@@ -37,7 +37,7 @@ def guide(
 
 
 def finer(
-    passes: Passes,
+    passes: FlowPasses,
     sizes: list[tuple[int, int]],
     matched: Sequence[dict],
     coarser: wgpu.GPUTexture,
@@ -52,7 +52,7 @@ def finer(
 
 
 def begun(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     most: tuple[np.ndarray, np.ndarray],
@@ -67,7 +67,7 @@ def begun(
 
 
 def descended(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     coarser: wgpu.GPUTexture,
@@ -78,7 +78,7 @@ def descended(
 
 
 def median(
-    passes: Passes, size: tuple[int, int], matched: dict, ways: wgpu.GPUTexture
+    passes: FlowPasses, size: tuple[int, int], matched: dict, ways: wgpu.GPUTexture
 ) -> wgpu.GPUTexture:
     """Of the displacements of 3 x 3 pixels, the one nearest to all."""
     return _run(passes, "median", size, matched, ways)

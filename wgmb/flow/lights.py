@@ -6,7 +6,7 @@ import numpy as np
 import wgpu
 
 from ..gpu import wgsl
-from .passes import STATES, Passes
+from .passes import STATES, FlowPasses
 
 WHITE = 245  # of 255: the least of all colours of a light
 LEAST = 3  # px across a light
@@ -96,7 +96,7 @@ def _ways(light: np.ndarray, others: np.ndarray, reach: float) -> Ways:
 
 
 def move_lights(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     states: wgpu.GPUTexture,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import wgpu
 
-from .passes import STATES, Passes
+from .passes import STATES, FlowPasses
 from .views import Views
 
 
 def mend(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     views: Views,

@@ -17,7 +17,7 @@ AT_ONCE = 1 << 15  # invocations of a submission without a GPU, where a pass is 
 STATES, FEATURES = ("rgba32float", 2), ("rgba8unorm", 2)  # format, layers
 
 
-class Passes:
+class FlowPasses:
     """Runs passes, and lends textures that may be given back for the next frame's.
 
     Every pass is submitted by itself, and without a GPU the long ones in bands: a frame takes

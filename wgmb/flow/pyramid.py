@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import wgpu
 
-from .passes import FEATURES, Passes
+from .passes import FEATURES, FlowPasses
 
 COARSEST = 160  # px along the longer side of the coarsest level that is swept, about
 COARSER = 2  # levels beyond it
@@ -30,12 +30,12 @@ def all_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
     return sizes
 
 
-def features(passes: Passes, picture: wgpu.GPUTextureView, size) -> list[wgpu.GPUTexture]:
+def features(passes: FlowPasses, picture: wgpu.GPUTextureView, size) -> list[wgpu.GPUTexture]:
     """Features of every level of a linear picture."""
     return list(_levels(passes, picture, size))
 
 
-def _levels(passes: Passes, picture, size) -> Iterator[wgpu.GPUTexture]:
+def _levels(passes: FlowPasses, picture, size) -> Iterator[wgpu.GPUTexture]:
     none = passes.scratch((1, 1), "rgba32float", "none")
     unwritten = passes.take((1, 1), FEATURES)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import wgpu
 
-from .passes import STATES, Passes
+from .passes import STATES, FlowPasses
 
 
 def follow_guide(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     states: wgpu.GPUTexture,

@@ -8,7 +8,7 @@ import numpy as np
 import wgpu
 
 from .homography import columns, dominant_homography
-from .passes import Passes
+from .passes import FlowPasses
 from .views import AROUND, Views
 
 ACROSS = 40  # points along the longer side from which the motion of most is found
@@ -23,7 +23,7 @@ class Motion:
 
 
 def result(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     views: Views,
     states: wgpu.GPUTexture,
@@ -66,7 +66,9 @@ def result(
     return Motion(motion, depth)
 
 
-def _homographies(passes: Passes, thin: wgpu.GPUTexture, size, spacing: int) -> list[np.ndarray]:
+def _homographies(
+    passes: FlowPasses, thin: wgpu.GPUTexture, size, spacing: int
+) -> list[np.ndarray]:
     """The motion of most of the picture to the previous frame and to the next one."""
     some = passes.images.download(passes.device.create_command_encoder(), thin)
     y, x = np.mgrid[: some.shape[0], : some.shape[1]]

@@ -8,7 +8,7 @@ import wgpu
 from ..gpu import wgsl
 from ..gpu.textures import ScratchBuffer
 from .dominant import ACROSS, spaced
-from .passes import STATES, Passes
+from .passes import STATES, FlowPasses
 
 REACH = 0.2  # of the longer side: the longest displacement along an axis
 
@@ -16,7 +16,7 @@ REACH = 0.2  # of the longer side: the longest displacement along an axis
 class FullSearch:
     """The best whole displacement of every block of pixels; `block`: its side [px]."""
 
-    def __init__(self, passes: Passes, block: int):
+    def __init__(self, passes: FlowPasses, block: int):
         self._passes, self._block = passes, block
         self._best = ScratchBuffer(passes.device)
 

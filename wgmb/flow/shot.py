@@ -27,7 +27,7 @@ from .homography import enlarged
 from .lights import find_lights, follow_lights, move_lights
 from .match import matched
 from .mend import mend
-from .passes import STATES, Passes
+from .passes import STATES, FlowPasses
 from .pyramid import all_sizes, features, level_sizes
 from .repeats import follow_guide
 from .result import Motion, result
@@ -97,7 +97,7 @@ class Shot:
     Frames that are asked for one after the other share their stages: each is searched once.
     """
 
-    def __init__(self, passes: Passes, load: Load, effort: Effort):
+    def __init__(self, passes: FlowPasses, load: Load, effort: Effort):
         self._passes, self._load, self._effort = passes, load, effort
         self._full_search = FullSearch(passes, effort.block)
         self._size: tuple[int, int] | None = None

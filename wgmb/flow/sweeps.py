@@ -7,7 +7,7 @@ import wgpu
 
 from ..gpu import wgsl
 from .homography import columns
-from .passes import STATES, Passes
+from .passes import STATES, FlowPasses
 
 NEAR_BY = 0.05  # of the longer side: how far off random pixels are tried
 STEP, FINEST_STEP = 1.0, 2.0  # greatest random change [px], on coarse levels and the finest
@@ -19,7 +19,7 @@ MOST_PASSES = 1000  # on one level
 
 
 def sweep(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     states: wgpu.GPUTexture,
@@ -46,7 +46,7 @@ def sweep(
 
 
 def half_sweep(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     states: wgpu.GPUTexture,
@@ -69,7 +69,7 @@ def half_sweep(
 
 
 def polish(
-    passes: Passes,
+    passes: FlowPasses,
     size: tuple[int, int],
     matched: dict,
     states: wgpu.GPUTexture,

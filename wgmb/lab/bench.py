@@ -24,7 +24,7 @@ from ..frame import Frame
 from ..gpu import timing
 from ..shutter import Shutter
 from .baselines import numba_tap
-from .bench_figures import Bench, Figure
+from .bench_figures import Bench, BenchFigure
 from .cases import Candidate, Tell
 from .results import machine
 from .timed import TimedFrame, TimedScene
@@ -105,7 +105,7 @@ class _Matrix:
     def __init__(self, device, candidates, rounds: int, limit: float, tell: Tell):
         self.device, self.candidates, self.rounds, self.limit = device, candidates, rounds, limit
         self.tell, self.clock = tell, timing.clock(device)
-        self.figures: list[Figure] = []
+        self.figures: list[BenchFigure] = []
         self.notes: list[str] = []
 
     def note(self, text: str) -> None:
@@ -143,7 +143,7 @@ class _Matrix:
         for name, one in timed.items():
             parts = {part: median.get(f"{name} {part}") for part in ("call", "upload", "readback")}
             self.figures.append(
-                Figure(
+                BenchFigure(
                     name,
                     *size,
                     samples,

@@ -12,7 +12,7 @@ from ..io.atomic import write_file
 
 
 @dataclass(frozen=True)
-class Figure:
+class BenchFigure:
     """One method at one size with one number of samples; milliseconds."""
 
     method: str
@@ -60,7 +60,7 @@ class Bench:
 
     machine: dict[str, str]
     copy: float
-    figures: list[Figure]
+    figures: list[BenchFigure]
     clock: str = TimestampClock.name
     """Clock of the passes: "timestamps" of the GPU, or "wall clock" around each one."""
     empty: float = 0.0
@@ -77,7 +77,7 @@ class Bench:
         """Load a file written by `save`; errors name the file."""
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
-            figures = [Figure(**f) for f in data["figures"]]
+            figures = [BenchFigure(**f) for f in data["figures"]]
             return cls(**data | {"copy": float(data["copy"]), "figures": figures})
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             raise InputError(f"{path}: not a saved bench: {error}") from None

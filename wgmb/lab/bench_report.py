@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..gpu.timing import TimestampClock
-from .bench_figures import Bench, Figure
+from .bench_figures import Bench, BenchFigure
 from .results import Plot, Report, Table
 
 
@@ -32,7 +32,7 @@ def text(run: Bench) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _times(f: Figure, label: str) -> str:
+def _times(f: BenchFigure, label: str) -> str:
     """A pass and how often it ran."""
     return label if f.counts.get(label, 1) == 1 else f"{label} x {f.counts[label]}"
 
@@ -98,7 +98,7 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
     return made
 
 
-def _curves(figures: Sequence[Figure]) -> list[Plot]:
+def _curves(figures: Sequence[BenchFigure]) -> list[Plot]:
     """Time a pixel against size, time and passes against samples, where there are several."""
     sizes = sorted({(f.width * f.height, f.width, f.height) for f in figures})
     counts = sorted({f.samples for f in figures})
@@ -122,7 +122,7 @@ def _curves(figures: Sequence[Figure]) -> list[Plot]:
     return plots
 
 
-def _pass_curves(figures: Sequence[Figure]) -> list[Plot]:
+def _pass_curves(figures: Sequence[BenchFigure]) -> list[Plot]:
     """Every pass against samples, of each method that has several."""
     plots: dict[str, Plot] = {}
     for f in figures:
@@ -134,7 +134,7 @@ def _pass_curves(figures: Sequence[Figure]) -> list[Plot]:
     return [p for p in several if any(len(curve) > 1 for curve in p.curves.values())]
 
 
-def _first(f: Figure) -> list:
+def _first(f: BenchFigure) -> list:
     return [f.method, f"{f.width} x {f.height}", f.samples]
 
 

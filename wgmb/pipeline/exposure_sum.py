@@ -19,7 +19,7 @@ from .blur import Blur
 _AT_ONCE = 2  # pictures that are summed in one pass
 
 
-class Exposer:
+class ExposureSum:
     """Makes one picture of the cells of an exposure (see exposure.py), on the Blur's device.
 
     A cell whose frame has no motion, or whose shutter is closed, counts as it is.

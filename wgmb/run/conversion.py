@@ -37,7 +37,7 @@ _SPARE = Fraction(1, 20)  # of an output frame: less at the end of the sequence 
 
 
 @dataclass(frozen=True)
-class Conversion:
+class RateConversion:
     """From `fps_in` to `fps` frames per second.
 
     The first output frame has the number and the time of the first input frame.
@@ -84,14 +84,14 @@ class Conversion:
         return [replace(cell, index=first + cell.index) for cell in found]
 
 
-class ConversionStages(Stages):
+class RateConversionStages(Stages):
     """Output frames at another rate; their `numbers` are not those of the clip.
 
     The frames of an exposure are read one after the other while it is made, so that no more are in
     memory than for one. Neighbours are always read, as they tell where a cut is.
     """
 
-    def __init__(self, clip: Clip, blur: Blur, conversion: Conversion, all_views: bool = True):
+    def __init__(self, clip: Clip, blur: Blur, conversion: RateConversion, all_views: bool = True):
         super().__init__(clip, blur, all_views=all_views)
         self.numbers = conversion.numbers(clip)
         self.reach = max(self.reach, 1)

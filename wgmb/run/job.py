@@ -30,16 +30,16 @@ from ..methods import METHODS
 from ..output.output import Output
 from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
-from ..sequence.findings import Settled
+from ..sequence.findings import SequenceFindings
 from ..sequence.frame_file import about
 from ..sequence.input_color import space_of
 from ..sequence.layers.masks import is_file, with_amount
 from ..settings import OutputSettings, plain
 from ..settings.video import VideoSettings
 from .batch_report import Progress
-from .conversion import Conversion
+from .conversion import RateConversion
 from .report import Outcome
-from .request import Asked
+from .request import BlurRequest
 from .sequence import blur_sequence, convert_sequence
 
 _OWN = 0.5  # frame intervals around a frame that it stands for
@@ -56,12 +56,12 @@ class Job:
     `is_part_of_run`: another process has looked at the outputs that exist.
     """
 
-    asked: Asked
+    request: BlurRequest
     settings: dict[str, Any]
     numbers: list[int]
     flow: str = ""
     since: int | None = None
-    findings: Settled | None = None
+    findings: SequenceFindings | None = None
     is_part_of_run: bool = False
     clip_opened: tuple[Clip, Display | None] | None = field(default=None, repr=False)
     remarks: tuple[str, ...] = ()
@@ -70,7 +70,7 @@ class Job:
     def _opened(self) -> tuple[Clip, Display | None]:
         if self.clip_opened is not None:
             return self.clip_opened
-        clip, shown = self.asked.opened(self.findings)
+        clip, shown = self.request.opened(self.findings)
         self._check_machine(shown)
         return clip.part(self.numbers), shown
 
@@ -85,19 +85,19 @@ class Job:
         return self._opened[1] is not None
 
     @cached_property
-    def settled(self) -> Settled:
+    def settled(self) -> SequenceFindings:
         """The findings about the whole sequence."""
         return self.findings or self.clip.settle()
 
     def _check_machine(self, shown: Display | None) -> None:
         """InputError if colours or the shutter's curve are others here than they were."""
-        for name, value in self.asked.color_record(shown).items():
+        for name, value in self.request.color_record(shown).items():
             if self.settings.get(name) != value:
                 was = self.settings.get(name)
                 raise InputError(f"{name.replace('_', ' ')} is {value} here, but {was} in the job")
-        curve = self.asked.when.curve_read()
+        curve = self.request.shutter.curve_read()
         if curve and curve.rpartition(" (")[2] != str(self.settings["curve"]).rpartition(" (")[2]:
-            raise InputError(f"{self.asked.when.curve} has changed since the job was written")
+            raise InputError(f"{self.request.shutter.curve} has changed since the job was written")
 
     def chosen(self, numbers: Sequence[int]) -> list[int]:
         """These frames; InputError if the job has not all of them."""
@@ -114,7 +114,7 @@ class Job:
 
     def made_blur(self, adapter: str | None = None) -> Blur:
         """The method, compiled on an adapter."""
-        return self.asked.look.make(self.asked.when.make(), adapter)
+        return self.request.blur.make(self.request.shutter.make(), adapter)
 
     def run_with(self, blur: Blur, numbers: Sequence[int] | None = None) -> Run:
         """`run` with a Blur that may serve many runs."""
@@ -122,22 +122,22 @@ class Job:
         if numbers is not None:
             clip = clip.part(self.chosen(numbers))
         if self.flow:
-            clip.move_by(self.asked.video.source(blur.device)[0])
-        if self.asked.video.highlights != 1:
-            clip.expand_highlights(self.asked.video.highlights)
+            clip.move_by(self.request.video.source(blur.device)[0])
+        if self.request.video.highlights != 1:
+            clip.expand_highlights(self.request.video.highlights)
         files = self.make_output(None if numbers is None else clip)
-        asked = self.asked
-        return Run(clip, blur, files, self._resumes, asked.confidence, asked.conversion)
+        request = self.request
+        return Run(clip, blur, files, self._resumes, request.confidence, request.conversion)
 
     @property
     def _resumes(self) -> bool:
-        return self.asked.output.resume or self.is_part_of_run
+        return self.request.output.resume or self.is_part_of_run
 
     def make_output(self, part: Clip | None = None) -> Output:
         """The files of all frames, or of a `part` of them; see there what is refused."""
         clip, shown = self._opened
-        output = replace(self.asked.output, resume=self._resumes)
-        conversion = self.asked.conversion
+        output = replace(self.request.output, resume=self._resumes)
+        conversion = self.request.conversion
         inputs, numbers = clip.inputs, conversion.numbers(clip) if conversion else clip.numbers
         if part is not None:  # those of the others were looked at when the job was made
             inputs, numbers = (p for n in part.numbers for p in part.files(n)), part.numbers
@@ -145,7 +145,7 @@ class Job:
 
     def sweep(self) -> None:
         """Remove what dead processes of this host left of the job's own files; see atomic.sweep."""
-        pattern = self.asked.output.output
+        pattern = self.request.output.output
         for view in self.clip.chosen if has_view(pattern) else (None,):
             of_view = in_view(pattern, view)
             names = [frame_path(of_view, n).name for n in self.numbers]
@@ -162,7 +162,7 @@ class Run:
     output: Output
     resume: bool
     confidence: bool
-    conversion: Conversion | None = None
+    conversion: RateConversion | None = None
 
     @property
     def numbers(self) -> list[int]:
@@ -182,59 +182,59 @@ class Run:
         return Outcome.of(self.clip, report)
 
 
-def settle(asked: Asked, adapter: str | None = None) -> Job:
+def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     """Look at the frames, and choose what was left to them: method, motion, what vectors mean.
 
     A GPU is opened only where the frames hold no motion and `flow` is "auto". InputError where the
     settings make no sense together.
     """
-    asked = replace(asked, when=asked.when.resolved())
-    clip, shown = asked.opened()
+    request = replace(request, shutter=request.shutter.resolved())
+    clip, shown = request.opened()
     clip.check_layers()
-    remarks = list(map(_of_scale, asked.look.scale))
-    if asked.color.space(shown) is None:
+    remarks = list(map(_of_scale, request.blur.scale))
+    if request.color.space(shown) is None:
         remarks.append(_check_space(clip, shown))
-    asked = replace(asked, averages=_averages(clip, asked))
-    conversion = asked.conversion
+    request = replace(request, averages=_averages(clip, request))
+    conversion = request.conversion
     if conversion:
-        remarks.append(_of_conversion(conversion, clip, asked.output))
-        asked = replace(asked, output=replace(asked.output, layers="picture"))
-    video, how = _motion(clip, asked, adapter)
+        remarks.append(_of_conversion(conversion, clip, request.output))
+        request = replace(request, output=replace(request.output, layers="picture"))
+    video, how = _motion(clip, request, adapter)
     if how:
-        look = replace(asked.look, method=asked.look.method or video.method).for_pictures()
+        blur = replace(request.blur, method=request.blur.method or video.method).for_pictures()
     else:
-        look = asked.look.resolved(clip=clip)
-    asked = replace(asked, look=look, video=video)
-    look, output = asked.look, asked.output
-    asked.when.make()  # says what is wrong with it
-    settings = {"wgmb": __version__} | plain(look) | plain(asked.when) | plain(asked.given)
+        blur = request.blur.resolved(clip=clip)
+    request = replace(request, blur=blur, video=video)
+    blur, output = request.blur, request.output
+    request.shutter.make()  # says what is wrong with it
+    settings = {"wgmb": __version__} | plain(blur) | plain(request.shutter) | plain(request.input)
     for name in _NO_LOOK:
         del settings[name]
-    settings |= {"samples": look.settled_samples()} | output.looks
-    settings["curve"] = asked.when.curve_read()
-    settings |= asked.color_record(shown)
-    if asked.confidence:
-        check_confidence(look.method or "", output)
+    settings |= {"samples": blur.settled_samples()} | output.looks
+    settings["curve"] = request.shutter.curve_read()
+    settings |= request.color_record(shown)
+    if request.confidence:
+        check_confidence(blur.method or "", output)
         settings["confidence"] = True
     if conversion:
         settings |= {"fps_in": str(conversion.fps_in), "fps": str(conversion.fps)}
-    if asked.color.remark and not output.is_exr:
-        remarks.append(asked.color.remark)
+    if request.color.remark and not output.is_exr:
+        remarks.append(request.color.remark)
     if video.highlights != 1:
         check_highlights(video.highlights)
-        if Path(asked.pattern).suffix.lower() not in STILLS:
+        if Path(request.pattern).suffix.lower() not in STILLS:
             raise InputError(
-                f"{asked.pattern}: `highlights` is for pictures clipped at white, such as PNG; "
+                f"{request.pattern}: `highlights` is for pictures clipped at white, such as PNG; "
                 "EXR holds light above it"
             )
-        if asked.color.space(shown) is not None:
+        if request.color.space(shown) is not None:
             raise InputError("`highlights`, for sRGB pictures, cannot be combined with `from_`")
         settings["highlights"] = video.highlights
     if how:
         settings["flow"] = how
         remarks.append(f"the frames have no vectors; motion: {how}")
     told = tuple(filter(None, remarks))
-    return Job(asked, settings, clip.numbers, how, clip_opened=(clip, shown), remarks=told)
+    return Job(request, settings, clip.numbers, how, clip_opened=(clip, shown), remarks=told)
 
 
 def _of_scale(scale: str) -> str:
@@ -243,7 +243,7 @@ def _of_scale(scale: str) -> str:
     return f"`scale` {scale}: no amount such as {scale}:0.5, so all else stands still"
 
 
-def _of_conversion(conversion: Conversion, clip: Clip, output: OutputSettings) -> str:
+def _of_conversion(conversion: RateConversion, clip: Clip, output: OutputSettings) -> str:
     said = []
     if conversion.step != 1:
         said.append(
@@ -273,11 +273,11 @@ def _check_space(clip: Clip, shown: Display | None) -> str:
     return f"{source.path}: {said} is not in {shown.config.name}, so it is taken as {found.text}"
 
 
-def _motion(clip: Clip, asked: Asked, adapter: str | None) -> tuple[VideoSettings, str]:
+def _motion(clip: Clip, request: BlurRequest, adapter: str | None) -> tuple[VideoSettings, str]:
     """Source of the motion for frames without vectors, decided, and in words."""
     if not _lacks_motion(clip):
-        return asked.video, ""
-    return asked.video.settled(gpu.open_device(adapter))
+        return request.video, ""
+    return request.video.settled(gpu.open_device(adapter))
 
 
 def _lacks_motion(clip: Clip) -> bool:
@@ -286,14 +286,14 @@ def _lacks_motion(clip: Clip) -> bool:
     return bool(has) and "motion" not in has
 
 
-def _averages(clip: Clip, asked: Asked) -> bool:
+def _averages(clip: Clip, request: BlurRequest) -> bool:
     """Return True if frames without motion are averaged; InputError where that changes nothing."""
-    if asked.video.flow != "none" or not _lacks_motion(clip):
+    if request.video.flow != "none" or not _lacks_motion(clip):
         return False
-    if asked.look.holdout:
+    if request.blur.holdout:
         raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
-    opens, closes = asked.when.make().span
-    if asked.conversion is None and max(-opens, closes) <= _OWN:
+    opens, closes = request.shutter.make().span
+    if request.conversion is None and max(-opens, closes) <= _OWN:
         raise InputError(
             "the frames have no vectors, and `flow` none would leave each as it is: it averages "
             "frames of a higher rate, such as `fps_in` 240 and `fps` 60, or over a `shutter` above "

@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..io import atomic
 from ..io.frame_numbers import is_pattern, readable
 from ..io.suffixes import VIDEOS
-from ..sequence.findings import Settled, numbers, ranges
+from ..sequence.findings import SequenceFindings, numbers, ranges
 from ..sequence.flow_motion import FAR
 from ..sequence.layers.masks import is_file, with_amount
 from ..settings import (
@@ -33,7 +33,7 @@ from ..settings.video import VideoSettings
 from ..shots.cut_list import CutList
 from ..shutter import CURVES
 from .job import Job
-from .request import Asked
+from .request import BlurRequest
 
 FORMAT = 1
 _KEY = "wgmb_job"
@@ -70,17 +70,17 @@ class Stored:
     def text(self) -> str:
         """The file's text."""
         job = self.job
-        asked = job.asked
+        request = job.request
         content: dict[str, Any] = {
             "wgmb": __version__,
-            "pattern": asked.pattern,
-            "output": _plain(asked.output),
-            "look": _plain(asked.look),
-            "when": _plain(asked.when),
-            "given": _plain(asked.given),
-            "color": _plain(asked.color),
-            "video": _plain(asked.video),
-            "confidence": asked.confidence,
+            "pattern": request.pattern,
+            "output": _plain(request.output),
+            "look": _plain(request.blur),
+            "when": _plain(request.shutter),
+            "given": _plain(request.input),
+            "color": _plain(request.color),
+            "video": _plain(request.video),
+            "confidence": request.confidence,
             "settings": job.settings,
             "flow": job.flow,
             "since": job.since,
@@ -100,12 +100,12 @@ def stored(job: Job, chunk: int, *, frames: Sequence[int] | None = None) -> Stor
 
     `frames`: those whose files are to be known; by default all.
     """
-    if Path(job.asked.output.output).suffix.lower() in VIDEOS:
+    if Path(job.request.output.output).suffix.lower() in VIDEOS:
         raise InputError(
-            f"output {job.asked.output.output}: a video is written by one process; "
+            f"output {job.request.output.output}: a video is written by one process; "
             "write frames, such as out.####.exr"
         )
-    asked = anchored(_with_config(job), Path.cwd())
+    request = anchored(_with_config(job), Path.cwd())
     settled, clip = job.settled, job.clip
     there = set(settled.on_disk)
     inputs = {
@@ -114,7 +114,7 @@ def stored(job: Job, chunk: int, *, frames: Sequence[int] | None = None) -> Stor
     }
     part = replace(
         job,
-        asked=asked,
+        request=request,
         findings=settled,
         is_part_of_run=True,
         clip_opened=None,
@@ -123,12 +123,12 @@ def stored(job: Job, chunk: int, *, frames: Sequence[int] | None = None) -> Stor
     return Stored(part, chunk, inputs)
 
 
-def _with_config(job: Job) -> Asked:
+def _with_config(job: Job) -> BlurRequest:
     """The request, with the config of OpenColorIO that $OCIO names here."""
-    color = job.asked.color
+    color = job.request.color
     if color.ocio is None:
         color = replace(color, ocio=os.environ["OCIO"] if job.is_shown else "off")
-    return replace(job.asked, color=color)
+    return replace(job.request, color=color)
 
 
 def read_job(path: Path) -> Stored:
@@ -160,23 +160,23 @@ def of_text(text: str, name: str) -> Stored:
         )
     if seal != _seal({"wgmb": version} | content):
         raise InputError(f"{name}: was changed after it had been written; {_AGAIN}")
-    asked = Asked(
+    request = BlurRequest(
         pattern=content["pattern"],
         output=_restored(OutputSettings, content["output"]),
-        look=_restored(BlurSettings, content["look"]),
-        when=_restored(ShutterSettings, content["when"]),
-        given=_restored(InputSettings, content["given"]),
+        blur=_restored(BlurSettings, content["look"]),
+        shutter=_restored(ShutterSettings, content["when"]),
+        input=_restored(InputSettings, content["given"]),
         color=_restored(ColorSettings, content["color"]),
         video=_restored(VideoSettings, content["video"]),
         confidence=content["confidence"],
     )
     job = Job(
-        asked,
+        request,
         content["settings"],
         numbers(content["numbers"]),
         content["flow"],
         content["since"],
-        Settled.of(content["settled"]),
+        SequenceFindings.of(content["settled"]),
         is_part_of_run=True,
     )
     inputs = {int(n): known for n, known in content["inputs"].items()}
@@ -199,7 +199,7 @@ def time_there(folder: Path) -> int:
         probe.unlink(missing_ok=True)
 
 
-def anchored(asked: Asked, folder: Path) -> Asked:
+def anchored(request: BlurRequest, folder: Path) -> BlurRequest:
     """The same with names of files that do not depend on the folder one is in."""
 
     def of_path(path: str) -> str:
@@ -212,25 +212,27 @@ def anchored(asked: Asked, folder: Path) -> Asked:
         mask, amount = with_amount(scale)
         return of_mask(mask) + ("" if amount is None else scale[len(mask) :])
 
-    look, given, when, color = asked.look, asked.given, asked.when, asked.color
-    curve, camera = when.curve, given.camera
+    blur, input, shutter, color = request.blur, request.input, request.shutter, request.color
+    curve, camera = shutter.curve, input.camera
     if color.ocio is not None and Path(color.ocio).is_file():
         color = replace(color, ocio=of_path(color.ocio))
     return replace(
-        asked,
-        pattern=of_path(asked.pattern),
-        output=replace(asked.output, output=of_path(asked.output.output)),
-        look=replace(
-            look,
-            holdout=tuple(map(of_mask, look.holdout)),
-            scale=tuple(map(of_scale, look.scale)),
+        request,
+        pattern=of_path(request.pattern),
+        output=replace(request.output, output=of_path(request.output.output)),
+        blur=replace(
+            blur,
+            holdout=tuple(map(of_mask, blur.holdout)),
+            scale=tuple(map(of_scale, blur.scale)),
         ),
-        when=when if curve is None or curve in CURVES else replace(when, curve=of_path(curve)),
-        given=replace(
-            given,
-            also=tuple(map(of_path, given.also)),
+        shutter=shutter
+        if curve is None or curve in CURVES
+        else replace(shutter, curve=of_path(curve)),
+        input=replace(
+            input,
+            also=tuple(map(of_path, input.also)),
             camera=camera and folder / camera,
-            cuts=given.cuts and CutList(given.cuts).anchored(folder).text,
+            cuts=input.cuts and CutList(input.cuts).anchored(folder).text,
         ),
         color=color,
     )

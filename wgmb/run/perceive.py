@@ -15,14 +15,14 @@ from ..cone import Cone
 from ..observer import Observer
 from ..video.clock import Clock
 from ..video.linear_frames import VideoPictures
-from ..video.read.reader import Footage
+from ..video.read.reader import VideoReader
 
 
 @dataclass(frozen=True)
-class Watched:
+class PerceivedVideo:
     """A video that is looked at; after each picture, what is seen of it."""
 
-    footage: Footage
+    footage: VideoReader
     clock: Clock
     pictures: VideoPictures
     observer: Observer
@@ -59,7 +59,7 @@ class Watched:
             yield *before, float(ends - times[number])
 
 
-def densest_rate(footage: Footage, cone: Cone) -> float:
+def densest_rate(footage: VideoReader, cone: Cone) -> float:
     """Images per second where they are densest, over as long as a cone cell remembers."""
     times = footage.times.seconds
     ends = np.searchsorted(times, times + cone.memory, side="right")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from ..color.spaces import Display
 from ..errors import InputError
 from ..sequence.clip import Clip
-from ..sequence.findings import Settled
+from ..sequence.findings import SequenceFindings
 from ..settings import (
     BlurSettings,
     InputSettings,
@@ -19,18 +19,18 @@ from ..settings import (
 )
 from ..settings.color import ColorSettings, color_record
 from ..settings.video import VideoSettings
-from .conversion import Conversion
+from .conversion import RateConversion
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class BlurRequest:
     """Request to blur rendered frames, as `wgmb blur` receives it."""
 
     pattern: str
     output: OutputSettings
-    look: BlurSettings
-    when: ShutterSettings
-    given: InputSettings
+    blur: BlurSettings
+    shutter: ShutterSettings
+    input: InputSettings
     color: ColorSettings
     video: VideoSettings
     confidence: bool = False
@@ -39,7 +39,7 @@ class Asked:
     """The frames have no motion, and `flow` is "none"; found out by `settle`."""
 
     @property
-    def conversion(self) -> Conversion | None:
+    def conversion(self) -> RateConversion | None:
         """To the output's rate, if the frames have another one; InputError where it cannot be.
 
         Frames that are averaged are also converted to their own rate.
@@ -50,26 +50,26 @@ class Asked:
         by = "`flow` none" if made.step == 1 else "`fps_in`"
         if self.confidence:
             raise InputError(f"`confidence` cannot be combined with {by}")
-        if self.when.make().rolling is not None:
+        if self.shutter.make().rolling is not None:
             raise InputError(f"a rolling shutter needs frames of the output's own rate, not {by}")
         return made
 
     @property
-    def _rates(self) -> Conversion | None:
+    def _rates(self) -> RateConversion | None:
         """Rates of the frames and of the output; None if they are not to differ."""
         if self.fps_in is None:
-            return Conversion(self.output.rate, self.output.rate) if self.averages else None
+            return RateConversion(self.output.rate, self.output.rate) if self.averages else None
         if self.output.fps is None:
             raise InputError("`fps_in` needs `fps`, the rate of the output, such as 60")
-        return Conversion(rate_of(self.fps_in, "`fps_in`"), self.output.rate)
+        return RateConversion(rate_of(self.fps_in, "`fps_in`"), self.output.rate)
 
-    def opened(self, settled: Settled | None = None) -> tuple[Clip, Display | None]:
+    def opened(self, settled: SequenceFindings | None = None) -> tuple[Clip, Display | None]:
         """The Clip, and how it is shown."""
         shown = self.color.open(needed=not self.output.is_exr)
-        given = replace(self.given, frames=None, skip_missing=True) if settled else self.given
+        input = replace(self.input, frames=None, skip_missing=True) if settled else self.input
         space = self.color.space(shown)
-        masks = self.look.holdout, self.look.scale
-        return given.open(self.pattern, *masks, space, settled), shown
+        masks = self.blur.holdout, self.blur.scale
+        return input.open(self.pattern, *masks, space, settled), shown
 
     def color_record(self, shown: Display | None) -> dict[str, str | None]:
         """Colour settings that change the contents of the files."""

@@ -18,7 +18,7 @@ from ..output.vectors import VectorOutput
 from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
 from .batch_report import BatchReport, Progress
-from .conversion import Conversion, ConversionStages
+from .conversion import RateConversion, RateConversionStages
 from .stages import (
     IN_FLIGHT,
     Handover,
@@ -66,7 +66,7 @@ def convert_sequence(
     clip: Clip,
     blur: Blur,
     output: Output,
-    conversion: Conversion,
+    conversion: RateConversion,
     *,
     resume: bool = False,
     progress: Progress | None = None,
@@ -77,7 +77,7 @@ def convert_sequence(
     Everything else is as for `blur_sequence`; conversion.py tells the inputs of an output frame.
     """
     _check_names(clip, output)
-    stages = ConversionStages(clip, blur, conversion, output.takes_views)
+    stages = RateConversionStages(clip, blur, conversion, output.takes_views)
     return _Pipeline(stages, output, resume, progress, stop).run()
 
 

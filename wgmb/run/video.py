@@ -1,236 +1,314 @@
-"""Videos through a Blur: pictures in time, their motion, exposures at the output's own times."""
+"""Videos from file to file: a request, what it opens once, and the run of each video."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, TypedDict, Unpack, get_type_hints
 
-import numpy as np
 import wgpu
 
 from .. import gpu
-from ..color.coding import CodedPicture, Coding
-from ..color.highlights import check_coding
-from ..errors import InputError
-from ..exposure import Cell
-from ..gpu.textures import TexturePool
-from ..methods.contract import reach_of
-from ..output.output import Output
-from ..output.result import Result
+from .._version import __version__
+from ..color.highlights import check as check_highlights
+from ..errors import InputError, did_you_mean
+from ..extras import install_command, is_installed
 from ..pipeline.blur import Blur
-from ..pipeline.exposure_sum import Exposer
-from ..sequence.frame_file import FrameFile
+from ..settings import (
+    BlurSettings,
+    InputSettings,
+    OutputSettings,
+    ShutterSettings,
+    plain,
+)
+from ..settings.video import VideoSettings
+from ..shots.cut_list import CutList
 from ..shots.motion_source import MotionSource
-from ..shots.reader import FLASH, Picture, Reel
-from ..shutter import Shutter
-from ..threads import Behind, ahead
 from ..video.clock import Clock
-from ..video.gpu_frames import ReelViews
-from ..video.output_times import Moment
-from ..video.planes import Average, Planes, averages
-from ..video.read.reader import Footage
-from ..video.thumbnail import Glance, is_cut, is_double
-from ..video.write.pictures import CodedVideo
-from ..video.write.segments import Segment
+from ..video.exposures import VideoBlur
+from ..video.holdouts import holdout_of
+from ..video.output_times import OutputFrame, moments
+from ..video.read.reader import VideoReader
+from ..video.write.encoders import SUFFIXES
 from .batch_report import Progress
+from .video_output import Sink, put_exposures, write
 
-_READ_AHEAD = 2  # coded pictures
-_BEFORE = 10  # pictures decoded before the first exposure, which its motion may depend on
+_TAKEN = "frames", "cuts", "max_mb"  # of InputSettings
 
 
-class FootageBlur:
-    """The exposures of a video, one after the other.
+@dataclass
+class VideoReport:
+    """Result of a run over a video."""
 
-    `motion`: where motion comes from (wgmb/flow); None: pictures are averaged as they are.
-    `holdout` (height, width): 1 stays sharp. `fill`: repeated pictures are left out, and motion
-    goes on over the gap. `cuts`: whether cuts are looked for, beside
-    `known_cuts`, the numbers of pictures that begin a shot. `highlights`: times white that white
-    counts as while it is blurred; InputError where the video holds light above white, and where
-    the method takes two frames to either side.
-    """
-
-    def __init__(
-        self,
-        footage: Footage,
-        blur: Blur,
-        motion: MotionSource | None,
-        *,
-        clock: Clock = Clock(),  # noqa: B008  it is frozen
-        holdout: np.ndarray | None = None,
-        fill: bool = False,
-        cuts: bool = True,
-        known_cuts: Collection[int] = (),
-        highlights: float = 1.0,
-    ):
-        check_coding(highlights, footage.path, footage.coding)
-        if reach_of(blur.method) > 1:
-            raise InputError("a `reach` of 2 is for rendered frames, a video takes 1")
-        self._highlights = highlights
-        self.footage, self.clock, self._holdout = footage, clock, holdout
-        self._blur, self._motion = blur, motion
-        self._exposer, self._planes = Exposer(blur), Planes(blur.device, highlights)
-        self._average, self._images = Average(blur.device), TexturePool(blur.device)
-        self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
-        self.reel: Reel[Glance] | None = None
-
-    @property
-    def device(self) -> wgpu.GPUDevice:
-        """The Blur's."""
-        return self._blur.device
-
-    def exposures(
-        self, shutter: Shutter, wanted: Sequence[Moment]
-    ) -> Iterator[tuple[Moment, Exposure]]:
-        """Every moment and its exposure, which is valid until the next is asked for."""
-        self.reel = reel = Reel(
-            self._pictures(shutter, wanted),
-            is_cut=is_cut if self._cuts else None,
-            known_cuts=self._known_cuts,
-            is_double=is_double if self._fill else None,
-            flash=FLASH / float(self.clock.speed),
-        )
-        views = ReelViews(reel, self._blur, self._motion, self._holdout, self._highlights)
-        for moment in wanted:
-            cells = reel.cells(float(moment.time), float(moment.interval), shutter)
-            yield moment, Exposure(self, reel, views, cells)
-
-    def light(self, views: ReelViews, cells: Sequence[Cell]) -> wgpu.GPUTexture:
-        """The exposure of these cells as linear light (rgba32float)."""
-        light = self._light(views, cells)
-        if self._highlights == 1:
-            return light
-        encoder = self.device.create_command_encoder(label="compress")
-        output = self._images.texture("compressed", self.footage.size, "rgba32float")
-        self._planes.compress(encoder, light.create_view(), output.create_view())
-        gpu.submit(self.device, encoder)
-        return output
-
-    def coded(
-        self, reel: Reel[Glance], views: ReelViews, cells: Sequence[Cell], coding: Coding
-    ) -> CodedPicture:
-        """The exposure of these cells in planes."""
-        plain = self._motion is None and self._highlights == 1
-        if plain and averages(self.footage.coding, coding):
-            pictures = [reel[cell.index].content.coded for cell in cells]
-            return self._average(pictures, [cell.share for cell in cells], coding)
-        light = self._light(views, cells)
-        encoder = self.device.create_command_encoder(label="encode")
-        return self._planes.encode(encoder, light.create_view(), coding)
-
-    def _light(self, views: ReelViews, cells: Sequence[Cell]) -> wgpu.GPUTexture:
-        """The same with highlights expanded."""
-        parts = ((cell, views.shown(cell.index)) for cell in cells)
-        return self._exposer.texture(self.footage.size, parts)
-
-    def _pictures(self, shutter: Shutter, wanted: Sequence[Moment]) -> Iterator[Picture[Glance]]:
-        """The video's pictures from before the first exposure to the end, on the output's clock."""
-        times = self.footage.times
-        opens = (
-            self.clock.back(wanted[0].time)
-            + Fraction(shutter.span[0]) * wanted[0].interval * self.clock.speed
-        )
-        first = int(np.searchsorted(times.seconds, float(opens)))
-        first, none = max(first - _BEFORE, 0), True
-        for number, picture in ahead(self.footage.pictures(first), _READ_AHEAD):
-            none = False
-            yield Picture(float(self.clock.out(times[number])), Glance(picture), number)
-        if none:
-            at = float(times[min(first, len(times) - 1)])
-            raise InputError(
-                f"{self.footage.path}: none of its pictures from {at:.2f} s on can be decoded"
-            )
+    path: Path
+    """The input."""
+    output: str
+    frames: int
+    """Number of output frames."""
+    seconds: float
+    method: str
+    """The blur method; "" if pictures were averaged."""
+    notes: list[str] = field(default_factory=list)
+    """Assumptions about the input."""
+    left_out: list[str] = field(default_factory=list)
+    """Contents of the input that the output cannot hold."""
+    cuts: list[int] = field(default_factory=list)
+    """Numbers of the input's pictures that begin a shot."""
+    flashes: list[int] = field(default_factory=list)
+    repeated: int = 0
+    """Number of repeated pictures that were left out."""
+    scaling: str = ""
+    """Pictures of another size, if there are any."""
+    loss: str = ""
+    """Pictures that could not be read, or are damaged, if there are any."""
+    is_new: bool = True
+    """False if it had been finished before (`resume`)."""
 
 
 @dataclass(frozen=True)
-class Exposure:
-    """An output frame, made when it is asked for as what is wanted."""
+class VideoPlan:
+    """One video and the output frames that are wanted of it."""
 
-    _run: FootageBlur
-    _reel: Reel[Glance]
-    _views: ReelViews
-    _cells: Sequence[Cell]
+    reader: VideoReader
+    output: OutputSettings
+    clock: Clock
+    wanted: list[OutputFrame]
+    rate: str
+    """A line about the output's rate where it was chosen for the user, or ''."""
 
-    def light(self) -> wgpu.GPUTexture:
-        """As linear light (rgba32float)."""
-        return self._run.light(self._views, self._cells)
+    @property
+    def notes(self) -> list[str]:
+        """Lines that a user should know."""
+        return [*self.reader.notes, self.rate] if self.rate else self.reader.notes
 
-    def coded(self, coding: Coding) -> CodedPicture:
-        """In the planes of a video."""
-        return self._run.coded(self._reel, self._views, self._cells, coding)
-
-
-class Seen(Protocol):
-    """A picture that is made when it is asked for; an Exposure is one."""
-
-    def light(self) -> wgpu.GPUTexture:
-        """As linear light (rgba32float)."""
-        ...
-
-    def coded(self, coding: Coding) -> CodedPicture:
-        """In the planes of a video."""
-        ...
+    @property
+    def name(self) -> str:
+        """The output's name."""
+        return self.output.output
 
 
-class Sink(Protocol):
-    """Destination of exposures: `take` on the main thread, then `put` in a thread of its own."""
+@dataclass(frozen=True, kw_only=True)
+class VideoRequest:
+    """Request to blur videos, as `wgmb blur` receives it: the settings that all of them share."""
 
-    def take(self, moment: Moment, exposure: Seen) -> Any:
-        """The data of a picture that will be written."""
-        ...
+    blur: BlurSettings = field(default_factory=BlurSettings)
+    shutter: ShutterSettings = field(default_factory=ShutterSettings)
+    input: InputSettings = field(default_factory=InputSettings)
+    video: VideoSettings = field(default_factory=VideoSettings)
 
-    def put(self, taken: Any) -> None:
-        """Write it."""
-        ...
-
-
-class VideoSink:
-    """Exposures as coded pictures into a video."""
-
-    def __init__(self, video: CodedVideo | Segment, coding: Coding):
-        self._video, self._coding = video, coding
-
-    def take(self, moment: Moment, exposure: Seen) -> tuple[CodedPicture, Fraction]:
-        """The picture in the video's own planes."""
-        return exposure.coded(self._coding), moment.time
-
-    def put(self, taken: tuple[CodedPicture, Fraction]) -> None:
-        """Append it."""
-        self._video.add(*taken)
+    def open(self, device: wgpu.GPUDevice | str | None = None) -> VideoRun:
+        """Open the GPU and what all videos share; InputError for settings that do not fit."""
+        check_fits(self.input, self.blur)
+        check_highlights(self.video.highlights)
+        if self.blur.holdout and self.video.flow == "none":
+            raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
+        opened = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
+        chosen, how = self.video.settled(opened)
+        shutter = self.shutter.resolved()
+        look = replace(self.blur, method=self.blur.method or chosen.method).for_pictures()
+        blur = look.make(shutter.make(), device)
+        motion, _ = chosen.source(blur.device)
+        return VideoRun(replace(self, blur=look, shutter=shutter), blur, motion, how)
 
 
-class FramesSink:
-    """Exposures as image files, numbered from `first` on."""
+@dataclass(frozen=True)
+class VideoRun:
+    """A request with what is opened once for all its videos."""
 
-    def __init__(self, output: Output, device: wgpu.GPUDevice, channels: int, first: int = 1):
-        self._output, self._device, self._channels, self._first = output, device, channels, first
-        self._images = TexturePool(device)
+    request: VideoRequest
+    blur: Blur
+    motion: MotionSource | None
+    how: str
+    """The source of the motion, in words."""
 
-    def take(self, moment: Moment, exposure: Seen) -> Result:
-        """The picture as an array."""
-        encoder = self._device.create_command_encoder(label="frame")
-        picture = self._images.download(encoder, exposure.light())[..., : self._channels]
-        return Result(FrameFile(self._first + moment.number, Path(), None, {}, {}), picture)
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings on which a result depends, for the record of a video."""
+        asked = self.request
+        found = {"wgmb": __version__} | plain(asked.blur) | plain(asked.shutter)
+        return found | plain(asked.video) | {"curve": asked.shutter.curve_read()}
 
-    def put(self, taken: Result) -> None:
-        """Write its file."""
-        self._output.write_views([taken])
+    @property
+    def advice(self) -> str:
+        """A line on what would find the motion sooner, or ''."""
+        is_slow = self.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        if self.request.video.flow == "auto" and is_slow and not is_installed("cv2"):
+            return f"without a GPU, OpenCV finds motion much sooner: {install_command('flow')}"
+        return ""
+
+    def plan(self, path: str | Path, output: OutputSettings) -> VideoPlan:
+        """Open a video; InputError if it cannot be read or has no pictures in the range."""
+        reader = VideoReader(path, max_mb=self.request.input.max_mb)
+        clock = self.request.video.clock(reader, self.request.input.frames)
+        fps, said = _rate(reader, output)
+        return VideoPlan(reader, output, clock, moments(reader, clock, fps), said)
+
+    def __call__(self, plan: VideoPlan, progress: Progress | None = None) -> VideoReport:
+        """Blur a video into its output, which is complete, or is not there."""
+        begun, request = time.perf_counter(), self.request
+        cuts, shutter = CutList(request.input.cuts or ""), request.shutter.make()
+        exposures = VideoBlur(
+            plan.reader,
+            self.blur,
+            self.motion,
+            clock=plan.clock,
+            holdout=holdout_of(request.blur.holdout, plan.reader),
+            fill=request.video.duplicates == "fill",
+            cuts=cuts.is_search,
+            known_cuts=cuts.frames(0),
+            highlights=request.video.highlights,
+        )
+
+        def blur_part(moments: Sequence[OutputFrame], sink: Sink) -> None:
+            put_exposures(exposures, shutter, moments, sink, progress)
+
+        left_out = write(
+            exposures, plan.output, request.video, plan.wanted, self.settings, blur_part
+        )
+        found = exposures.reel
+        return VideoReport(
+            plan.reader.path,
+            plan.name,
+            len(plan.wanted),
+            time.perf_counter() - begun,
+            self.blur.method.name if self.motion is not None else "",
+            plan.notes,
+            left_out,
+            sorted(found.cuts) if found else [],
+            found.flashes if found else [],
+            len(found.doubles) if found else 0,
+            plan.reader.scaling(),
+            plan.reader.loss(),
+            found is not None,
+        )
 
 
-def blur_footage(
-    run: FootageBlur,
-    shutter: Shutter,
-    wanted: Sequence[Moment],
-    sink: Sink,
-    progress: Progress | None = None,
-) -> None:
-    """Every exposure of a video into `sink`; the caller closes or abandons what it writes."""
-    tell = progress or (lambda number, state: None)
-    with Behind(sink.put) as put:
-        for moment, exposure in run.exposures(shutter, wanted):
-            put(sink.take(moment, exposure))
-            tell(moment.number, "done")
+def check_fits(input: InputSettings, blur: BlurSettings) -> None:
+    """InputError for settings that only rendered frames have."""
+    for one in fields(InputSettings):
+        if one.name not in _TAKEN and getattr(input, one.name) != one.default:
+            raise InputError(f"`{one.name}` is for rendered frames, a video has no layers")
+    if blur.scale:
+        raise InputError("`scale` is for rendered frames, a video has no layers")
+
+
+def _rate(reader: VideoReader, output: OutputSettings) -> tuple[Fraction | None, str]:
+    """Output frames per second, None for the times of the pictures; and a line if not wished for.
+
+    Image files have no times, so that they need a rate.
+    """
+    if output.fps == "source":
+        return None, ""
+    if output.fps is not None or not reader.is_variable or reader.gaps:
+        return output.rate_or(reader.rate), ""
+    steps = "{:.1f} to {:.1f} ms".format(*(1000 * step for step in reader.steps))
+    if not reader.has_rate and Path(output.output).suffix.lower() in SUFFIXES:
+        return None, (
+            f"variable rate ({steps}): each picture keeps its own time; `fps=60` sets a steady rate"
+        )
+    return reader.rate, (
+        f"variable rate ({steps}): {float(reader.rate):g} frames a second, as on average; "
+        "`fps` sets another rate"
+    )
+
+
+class VideoOptions(TypedDict, total=False):
+    """Keywords of `blur_video`: the options of `wgmb blur`, each with its meaning and default."""
+
+    method: Literal["tap", "tiles", "gather", "fusion", "reproject"]
+    samples: int | Literal["auto"]
+    jitter: float
+    holdout: str | Sequence[str]
+    max_blur: float
+    path: Literal["curved", "straight", "five"]
+    variant: Literal["shutter", "published", "even", "slices"]
+    show: Literal["color", "tiles", "confidence", "count"]
+    shading: Literal["auto", "off", "passes", "frames"]
+    reach: int
+    weights: Literal["normalised", "published"]
+    alpha_front: float
+    alpha_back: float
+    tau: float
+    facing: bool
+    depth_test: bool
+    splat: Literal["point", "line"]
+    seed: int
+    shutter: float
+    phase: Literal["start", "centre", "center", "end"] | float
+    curve: str
+    rolling: Literal["up", "down", "left", "right"]
+    rolling_duration: float
+    frames: str
+    cuts: str
+    max_mb: float
+    flow: Literal["auto", "search", "dis", "none"]
+    flow_quality: Literal["best", "fast"]
+    begin: str | float
+    end: str | float
+    speed: str | float | Fraction
+    pitch: Literal["keep", "follow"]
+    streams: Literal["all", "video"]
+    duplicates: Literal["keep", "fill"]
+    highlights: float
+    codec: Literal["h264", "h265", "av1", "vp9", "prores", "ffv1"]
+    quality: int
+    encoder: Literal["nvenc", "qsv", "amf", "videotoolbox", "v4l2m2m"]
+    bits: Literal[8, 16]
+    fps: str | float | Fraction
+    overwrite: bool
+    resume: bool
+    compression: str
+
+
+_AS_TEXT = "phase", "begin", "end", "speed", "fps"  # numbers that the settings hold as text
+
+
+def blur_video(
+    source: str | Path,
+    output: str | Path,
+    *,
+    device: wgpu.GPUDevice | str | None = None,
+    progress: Callable[[int, str], None] | None = None,
+    **settings: Unpack[VideoOptions],
+) -> VideoReport:
+    """Blur a video into a video, or into frames: `wgmb blur` from Python.
+
+    `output`: a video (.mp4 .mov .mkv .webm .gif) or a pattern of frames such as out.####.png.
+    `settings`: the command's options with underscores, such as fps=60, shutter=180, flow="search".
+    `device`: your own wgpu device, the name of an adapter, or None for the best one. `progress` is
+    called with each output frame's number and "done", and may raise to end the run. A video is
+    complete under its name, or not there. InputError for settings that do not fit, a file that is
+    no video, or an output that exists, unless `overwrite` or `resume` is set.
+
+    Example: wgmb.blur_video("in.mp4", "out.mp4", fps=60, shutter=180)
+    """
+    given: dict[str, Any] = dict(settings)
+    if unknown := sorted(given.keys() - VideoOptions.__annotations__.keys()):
+        known = list(VideoOptions.__annotations__)
+        raise InputError(f"unknown setting {unknown[0]!r}{did_you_mean(unknown[0], known)}")
+    for name, kind in get_type_hints(VideoOptions).items():
+        if name in given and name in _AS_TEXT:
+            given[name] = str(given[name])
+        elif name in given and kind is float:
+            given[name] = float(given[name])
+    if isinstance(given.get("holdout"), str):
+        given["holdout"] = (given["holdout"],)
+    given |= {"holdout": tuple(given["holdout"])} if "holdout" in given else {}
+
+    def group(kind: type) -> dict[str, Any]:
+        return {one.name: given[one.name] for one in fields(kind) if one.name in given}
+
+    request = VideoRequest(
+        blur=BlurSettings(**group(BlurSettings)),
+        shutter=ShutterSettings(**group(ShutterSettings)),
+        input=InputSettings(**group(InputSettings)),
+        video=VideoSettings(**group(VideoSettings)),
+    )
+    run = request.open(device)
+    plan = run.plan(source, OutputSettings(output=str(output), **group(OutputSettings)))
+    return run(plan, progress)

@@ -6,33 +6,103 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..color.coding import Coding
+import wgpu
+
+from ..color.coding import CodedPicture, Coding
 from ..errors import InputError
+from ..gpu.textures import TexturePool
 from ..io import atomic
 from ..output.names import refuse_inputs
+from ..output.output import Output
+from ..output.result import Result
+from ..sequence.frame_file import FrameFile
 from ..settings import OutputSettings
 from ..settings.video import VideoSettings
+from ..shutter import Shutter
+from ..threads import Behind
 from ..video.clock import Clock, tick
-from ..video.output_times import Moment
-from ..video.read.reader import Footage
+from ..video.exposures import ExposedPicture, VideoBlur
+from ..video.output_times import OutputFrame
+from ..video.read.reader import VideoReader
 from ..video.write.encoders import SUFFIXES, chosen
 from ..video.write.other_streams import OtherStreams
 from ..video.write.pictures import CodedVideo
 from ..video.write.segments import Segment, Segments, remove_left
-from .video import FramesSink, Sink, VideoSink
+from .batch_report import Progress
 
 FIRST = 1  # number of the first frame, where they are image files
 _RECORD = "comment", "description", "synopsis"  # texts of a video; the first that is free
 
 
-class Made(Protocol):
-    """Maker of the pictures of a video, such as FootageBlur."""
+class Sink(Protocol):
+    """Destination of exposures: `take` on the main thread, then `put` in a thread of its own."""
+
+    def take(self, moment: OutputFrame, exposure: ExposedPicture) -> Any:
+        """The data of a picture that will be written."""
+        ...
+
+    def put(self, taken: Any) -> None:
+        """Write it."""
+        ...
+
+
+class VideoSink:
+    """Exposures as coded pictures into a video."""
+
+    def __init__(self, video: CodedVideo | Segment, coding: Coding):
+        self._video, self._coding = video, coding
+
+    def take(self, moment: OutputFrame, exposure: ExposedPicture) -> tuple[CodedPicture, Fraction]:
+        """The picture in the video's own planes."""
+        return exposure.coded(self._coding), moment.time
+
+    def put(self, taken: tuple[CodedPicture, Fraction]) -> None:
+        """Append it."""
+        self._video.add(*taken)
+
+
+class FramesSink:
+    """Exposures as image files, numbered from `first` on."""
+
+    def __init__(self, output: Output, device: wgpu.GPUDevice, channels: int, first: int = 1):
+        self._output, self._device, self._channels, self._first = output, device, channels, first
+        self._images = TexturePool(device)
+
+    def take(self, moment: OutputFrame, exposure: ExposedPicture) -> Result:
+        """The picture as an array."""
+        encoder = self._device.create_command_encoder(label="frame")
+        picture = self._images.download(encoder, exposure.light())[..., : self._channels]
+        return Result(FrameFile(self._first + moment.number, Path(), None, {}, {}), picture)
+
+    def put(self, taken: Result) -> None:
+        """Write its file."""
+        self._output.write_views([taken])
+
+
+def put_exposures(
+    run: VideoBlur,
+    shutter: Shutter,
+    wanted: Sequence[OutputFrame],
+    sink: Sink,
+    progress: Progress | None = None,
+) -> None:
+    """Every exposure of a video into `sink`; the caller closes or abandons what it writes."""
+    tell = progress or (lambda number, state: None)
+    with Behind(sink.put) as put:
+        for moment, exposure in run.exposures(shutter, wanted):
+            put(sink.take(moment, exposure))
+            tell(moment.number, "done")
+
+
+class PictureMaker(Protocol):
+    """Maker of the pictures of a video, such as VideoBlur."""
 
     @property
-    def footage(self) -> Footage:
+    def footage(self) -> VideoReader:
         """The input."""
         ...
 
@@ -47,15 +117,15 @@ class Made(Protocol):
         ...
 
 
-MakePart = Callable[[Sequence[Moment], Sink], None]
+MakePart = Callable[[Sequence[OutputFrame], Sink], None]
 """Makes the pictures of some of the moments, and gives them to a sink."""
 
 
 def write(
-    run: Made,
+    run: PictureMaker,
     output: OutputSettings,
     video: VideoSettings,
-    wanted: list[Moment],
+    wanted: list[OutputFrame],
     settings: dict[str, Any],
     make_part: MakePart,
 ) -> list[str]:
@@ -66,10 +136,10 @@ def write(
 
 
 def _write_video(
-    run: Made,
+    run: PictureMaker,
     output: OutputSettings,
     video: VideoSettings,
-    wanted: list[Moment],
+    wanted: list[OutputFrame],
     settings: dict[str, Any],
     make_part: MakePart,
 ) -> list[str]:
@@ -83,7 +153,7 @@ def _write_video(
     texts = _texts(footage, made_of)
     there = [path] if os.path.exists(os.path.realpath(path)) else []
     refuse_inputs(path.parent, [path.name], there, [footage.path])
-    if there and output.resume and texts.items() <= Footage(path).metadata.items():
+    if there and output.resume and texts.items() <= VideoReader(path).metadata.items():
         remove_left(path)
         return ["is already done"]
     if there and not output.overwrite:
@@ -115,9 +185,9 @@ def _write_video(
 
 def _fill(
     writer: CodedVideo | Segment,
-    run: Made,
+    run: PictureMaker,
     coding: Coding,
-    moments: Sequence[Moment],
+    moments: Sequence[OutputFrame],
     make_part: MakePart,
 ) -> None:
     """Write pictures and close the file, or leave nothing of it."""
@@ -129,17 +199,17 @@ def _fill(
         raise
 
 
-def _texts(footage: Footage, made_of: dict[str, Any]) -> dict[str, str]:
+def _texts(footage: VideoReader, made_of: dict[str, Any]) -> dict[str, str]:
     """The record of a video, under the first text that its input leaves free."""
     free = next((name for name in _RECORD if name not in footage.metadata), _RECORD[0])
     return {free: f"wgmb {json.dumps(made_of, sort_keys=True)}"}
 
 
 def _write_frames(
-    run: Made,
+    run: PictureMaker,
     output: OutputSettings,
     video: VideoSettings,
-    wanted: list[Moment],
+    wanted: list[OutputFrame],
     settings: dict[str, Any],
     make_part: MakePart,
 ) -> list[str]:

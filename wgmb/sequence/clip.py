@@ -20,29 +20,30 @@ from ..io.frame_numbers import frame_list
 from ..shots.cut_list import CutList
 from ..shots.motion_source import MotionSource
 from .data_windows import Placement
-from .dependencies import Ingredients
+from .dependencies import Dependencies
 from .files import SequenceFiles
-from .findings import Settled
+from .findings import SequenceFindings
 from .flow_motion import FAR, PictureMotion, standing
-from .frame_builder import FrameMaker
-from .frame_cache import StoredFrames
+from .frame_builder import FrameBuilder
+from .frame_cache import FrameCache
 from .frame_file import FrameFile
 from .layers.light import LightPasses
 from .layers.masks import Masks
 from .layers.passes import Passes
-from .layers.vector_convention import Meaning
+from .layers.vector_convention import ConventionFinder
 from .neighbours import Neighbours, extras
 
 
 class Clip:
     """Reader of a frame sequence or a single image.
 
-    Iteration gives Frames. `numbers` are the requested frames, `on_disk` all existing ones.
-    `finding` describes the detected vector convention; `stray_cuts` are the given cuts at frames
-    that do not exist. Of the frames read so far, `cuts` are those after a camera cut, `unread` the
-    neighbours that could not be read, `sizes` the sizes, `notes` messages for the user, each with
-    its frames, and `absent` the masks by index or id (`IndexOB=4`, `CryptoObject=0x...`) that none
-    of them has.
+    Iteration gives Frames in the order of `numbers`, and `clip[7]` frame 7, each with its
+    neighbours; `len(clip)` counts them. `numbers` are the requested frames, `on_disk` all existing
+    ones. `finding` describes the detected vector convention; `stray_cuts` are the given cuts at
+    frames that do not exist. Of the frames read so far, `cuts` are those after a camera cut,
+    `unread` the neighbours that could not be read, `sizes` the sizes, `notes` messages for the
+    user, each with its frames, and `absent` the masks by index or id (`IndexOB=4`,
+    `CryptoObject=0x...`) that none of them has.
 
     Stereo frames have `views`. Each view has its own picture, vectors, depth and masks; cuts and
     the vector convention are determined from the default view.
@@ -59,7 +60,7 @@ class Clip:
         view: str | None = None,
         space: ColorSpace | None = None,
         max_mb: float = limits.MAX_MB,
-        settled: Settled | None = None,
+        settled: SequenceFindings | None = None,
     ):
         """`frames`: "1-100x2", "1,3,5-8"; by default all existing ones, without gaps unless
         `skip_missing`. `cuts`: frames that begin a new shot, in the same form, or a file with them
@@ -86,7 +87,7 @@ class Clip:
     def _begin(self) -> None:
         """Nothing has been read yet."""
         settled, files, passes = self._settled, self._files, self.passes
-        self._stored = stored = StoredFrames(
+        self._stored = stored = FrameCache(
             files,
             passes,
             numbers=self.numbers,
@@ -100,16 +101,16 @@ class Clip:
         self._masks = Masks(
             passes.holdout, passes.scale, patterns, self.numbers, self._max_mb, files.of_views
         )
-        self._meaning = Meaning(stored, settled.finding if settled else None)
-        self._ingredients = Ingredients(files, self._masks, (passes.camera, self._cut_list.path))
-        self._maker = FrameMaker(stored, self._meaning, self._masks, self._cameras)
+        self._meaning = ConventionFinder(stored, settled.finding if settled else None)
+        self._ingredients = Dependencies(files, self._masks, (passes.camera, self._cut_list.path))
+        self._maker = FrameBuilder(stored, self._meaning, self._masks, self._cameras)
         self._around = Neighbours(stored, self._maker, self._cut_list.is_search)
         if settled is not None:
             self._around.settle(settled.beyond)
             self._masks.take_names_as_found()
             self.notes |= {text: list(self.numbers) for text in settled.notes}
 
-    def settle(self) -> Settled:
+    def settle(self) -> SequenceFindings:
         """Determine all findings that depend on the whole sequence, for `Clip(settled=)`.
 
         Parts of the sequence that are blurred separately then give the same pictures as the whole,
@@ -119,7 +120,7 @@ class Clip:
             self.check_names()
             beyond = self._around.beyond
             notes = tuple(text for text, at in self.notes.items() if len(at) == len(self.numbers))
-            self._settled = Settled(
+            self._settled = SequenceFindings(
                 tuple(self.on_disk),
                 self.views,
                 self._meaning.found,
@@ -175,9 +176,25 @@ class Clip:
         """Return True if the user said that a new shot begins with the frame."""
         return self._stored.is_known_cut(number, -1)
 
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __contains__(self, number: object) -> bool:
+        return number in self.numbers
+
     def __iter__(self) -> Iterator[Frame]:
-        for number in self.numbers:
-            yield self.frame(self.source(number))
+        return map(self.__getitem__, self.numbers)
+
+    def __getitem__(self, number: int) -> Frame:
+        """The frame with this number, of the default view or the chosen one.
+
+        Its arrays are read-only (Frame.locked). Its `prev` and `next` are read when they are asked
+        for, as by a Blur whose method uses neighbours; none lie beyond a camera cut. InputError for
+        a number that is not among `numbers`.
+        """
+        if number not in self.numbers:
+            raise InputError(f"frame {number} is not in {self}")
+        return self._around.opened(self.source(number), extras(normal=True, light=True))
 
     @property
     def views(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from .files import SequenceFiles
 from .layers.masks import Masks
 
 
-class Ingredients:
+class Dependencies:
     """The files of a sequence's frames, their masks, and `others`, on which all of them depend."""
 
     def __init__(self, files: SequenceFiles, masks: Masks, others: tuple[Path | None, ...]):

@@ -21,7 +21,7 @@ from ..io.frame_numbers import (
     readable,
     views_on_disk,
 )
-from .findings import Settled
+from .findings import SequenceFindings
 from .layers import stereo
 from .layers.camera_file import CameraFile
 
@@ -33,14 +33,14 @@ class SequenceFiles:
     pattern stands for. `settled`: what was found out before, instead of looking again.
     """
 
-    def __init__(self, pattern: str, also: tuple[str, ...], settled: Settled | None):
+    def __init__(self, pattern: str, also: tuple[str, ...], settled: SequenceFindings | None):
         self.pattern, self._also, self._settled = pattern, also, settled
         self.view_names = self._view_names()
         self._leading = str(in_view(pattern, self.view_names[0] if self.view_names else None))
         self.on_disk = self._on_disk()
         self._there = frozenset(self.on_disk)
 
-    def settle(self, settled: Settled) -> None:
+    def settle(self, settled: SequenceFindings) -> None:
         """Keep to what was found, whatever lies on disk from now on."""
         self._settled = settled
 

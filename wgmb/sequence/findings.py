@@ -10,19 +10,19 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from .data_windows import Sides
-from .layers.vector_test import Finding
+from .layers.vector_test import ConventionFinding
 from .layers.vectors import Vectors
 
 
 @dataclass(frozen=True)
-class Settled:
+class SequenceFindings:
     """A Clip's findings: the same for every part of the sequence, whatever is on disk later."""
 
     on_disk: tuple[int, ...]
     """Every frame that there is."""
     views: tuple[str, ...]
     """Names of the views, the default one first."""
-    finding: Finding
+    finding: ConventionFinding
     """Meaning of the vectors."""
     cuts: tuple[int, ...]
     """Frames that begin a shot, as the user or an edit says."""
@@ -44,7 +44,7 @@ class Settled:
         }
 
     @classmethod
-    def of(cls, plain: dict[str, Any]) -> Settled:
+    def of(cls, plain: dict[str, Any]) -> SequenceFindings:
         """From what `plain` returned."""
         finding = dict(plain["finding"])
         meaning = finding.pop("vectors")
@@ -52,7 +52,7 @@ class Settled:
         return cls(
             on_disk=tuple(numbers(plain["on_disk"])),
             views=tuple(plain["views"]),
-            finding=Finding(Vectors(**meaning) if meaning else None, **finding),
+            finding=ConventionFinding(Vectors(**meaning) if meaning else None, **finding),
             cuts=tuple(plain["cuts"]),
             beyond=(left, top, right, bottom),
             notes=tuple(plain["notes"]),

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..shots.cuts import pictures_differ
 from ..shots.motion_source import MotionSource
-from .frame_cache import StoredFrames
+from .frame_cache import FrameCache
 from .frame_file import FrameFile
 
 Found = tuple[np.ndarray, np.ndarray]
@@ -30,7 +30,7 @@ class PictureMotion:
     A frame's motion depends on pictures of its own shot alone, and of its own size and window.
     """
 
-    def __init__(self, stored: StoredFrames, motion: MotionSource):
+    def __init__(self, stored: FrameCache, motion: MotionSource):
         self._stored, self._motion = stored, motion
         self._cuts: dict[tuple[int, str | None], bool] = {}
         self._shots: dict[str | None, tuple[int, Callable[[int], Found | None]]] = {}

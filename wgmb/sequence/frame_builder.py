@@ -14,18 +14,18 @@ from ..color.highlights import expanded
 from ..errors import InputError
 from ..frame import Frame
 from .flow_motion import Found
-from .frame_cache import StoredFrames
+from .frame_cache import FrameCache
 from .frame_file import FrameFile, about
 from .layers import light, vectors
 from .layers import names as layers
 from .layers.camera_file import CameraFile
 from .layers.masks import Masks
-from .layers.vector_convention import Meaning
+from .layers.vector_convention import ConventionFinder
 
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
 
 
-class FrameMaker:
+class FrameBuilder:
     """Makes Frames of the files in `stored`, as its Passes ask for.
 
     `cameras`: those of every view to blur. `picture_motion`: motion where the files hold none.
@@ -34,8 +34,8 @@ class FrameMaker:
 
     def __init__(
         self,
-        stored: StoredFrames,
-        meaning: Meaning,
+        stored: FrameCache,
+        meaning: ConventionFinder,
         masks: Masks,
         cameras: Mapping[str | None, CameraFile],
     ):

@@ -17,7 +17,7 @@ from .input_color import in_space
 from .layers.passes import Passes
 
 
-class StoredFrames:
+class FrameCache:
     """Reads the frames of `files`, in all their views.
 
     `numbers`: the requested ones. `known_cuts`: frames that begin a new shot. `view`: the only one

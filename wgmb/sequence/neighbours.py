@@ -19,6 +19,7 @@ from ..shots.cuts import (
     still,
     straightened,
 )
+from .clip_frame import ClipFrame
 from .data_windows import (
     OUTSIDE,
     Placement,
@@ -33,8 +34,8 @@ from .data_windows import (
     union,
     unknown,
 )
-from .frame_builder import FrameMaker
-from .frame_cache import StoredFrames
+from .frame_builder import FrameBuilder
+from .frame_cache import FrameCache
 from .frame_file import FrameFile
 
 _SIDES = "left", "top", "right", "bottom"
@@ -52,7 +53,7 @@ class Neighbours:
     known.
     """
 
-    def __init__(self, stored: StoredFrames, maker: FrameMaker, is_search: bool):
+    def __init__(self, stored: FrameCache, maker: FrameBuilder, is_search: bool):
         check_choice("outside", stored.passes.outside, OUTSIDE)
         self._stored, self._maker, self._is_search = stored, maker, is_search
         self._outside = stored.passes.outside
@@ -133,6 +134,18 @@ class Neighbours:
                 near = near.between(beyond, None) if side < 0 else near.between(None, beyond)
             beside.append(near)
         return made[0].between(*beside), Placement(onto, self._bounds(source))
+
+    def opened(
+        self, source: FrameFile, also: frozenset[str], onto: Window | None = None
+    ) -> ClipFrame:
+        """The frame on a canvas, by default its own window; its neighbours are read when needed."""
+        frame, canvas = self._locked(source, also), onto or source.data_window
+
+        def load(side: int) -> Frame | None:
+            found = self._beside(source, frame, side, also)
+            return self.opened(found[0], also, canvas) if found else None
+
+        return ClipFrame.of(self._on(canvas, source, frame), load)
 
     def _beside(
         self, source: FrameFile, frame: Frame, side: int, also: frozenset[str]

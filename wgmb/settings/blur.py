@@ -3,6 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Literal, Self, TypeVar
 
+import wgpu
+
 from ..methods import METHODS, default_method
 from ..methods.options import Option, options_of
 from ..pipeline.arguments import checked
@@ -77,7 +79,7 @@ class BlurSettings:
         adaptive = self.method in METHODS and getattr(METHODS[self.method], "adaptive", False)
         return replace(self, samples="auto") if adaptive and self.samples is None else self
 
-    def make(self, shutter_: Shutter, adapter: str | None) -> Blur:
+    def make(self, shutter_: Shutter, device: wgpu.GPUDevice | str | None = None) -> Blur:
         """Return the Blur these settings describe; an option of another method is an error."""
         return Blur(
             self.method or default_method({"motion", "depth"}),
@@ -85,7 +87,7 @@ class BlurSettings:
             samples=self.samples,
             jitter=self.jitter,
             max_blur=self.max_blur,
-            device=adapter,
+            device=device,
             **self._method_options(),
         )
 

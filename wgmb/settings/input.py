@@ -8,7 +8,7 @@ from ..color.spaces import ColorSpace
 from ..io import limits
 from ..io.frame_numbers import is_pattern, readable
 from ..sequence.clip import Clip, Passes
-from ..sequence.findings import Settled
+from ..sequence.findings import SequenceFindings
 from ..sequence.layers import vectors
 from ..sequence.layers.masks import is_file, with_amount
 
@@ -64,7 +64,7 @@ class InputSettings:
         holdout: tuple[str, ...] = (),
         scale: tuple[str, ...] = (),
         space: ColorSpace | None = None,
-        settled: Settled | None = None,
+        settled: SequenceFindings | None = None,
     ) -> Clip:
         """Return the Clip these settings describe; `space` of its pictures (ColorSettings.space).
 

@@ -19,7 +19,7 @@ from ..shots.motion_source import MotionSource
 from ..video.clock import Clock
 
 if TYPE_CHECKING:
-    from ..video.read.reader import Footage
+    from ..video.read.reader import VideoReader
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,7 +109,7 @@ class VideoSettings(FlowSettings):
             raise InputError(f"`end` must be after `begin`, got {self.begin} to {self.end}")
         return begin, end
 
-    def clock(self, footage: Footage, frames: str | None) -> Clock:
+    def clock(self, footage: VideoReader, frames: str | None) -> Clock:
         """The clock of the part that is asked for; InputError if there is no such part.
 
         `frames`: numbers of the video's pictures, such as 120-480.

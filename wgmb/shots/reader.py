@@ -42,7 +42,7 @@ class Picture(Generic[T]):
     """No motion leads to it from the one before: it begins a shot, or a flash, or ends one."""
 
 
-class Reel(Generic[T]):
+class ShotReader(Generic[T]):
     """Reads `pictures` as far as is asked for; they count from 0 on, without those left out.
 
     `is_cut(before, after)`: whether a cut lies between the contents of two pictures;

@@ -17,16 +17,16 @@ from ..gpu.textures import TexturePool
 from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
 from ..shots.motion_source import MotionSource
-from ..shots.reader import Reel
+from ..shots.reader import ShotReader
 from .planes import Planes
-from .thumbnail import Glance
+from .thumbnail import Thumbnail
 
 LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two that are summed
 _TEXEL = "rgba16float"
 _FRAMES = 3  # with motion: a frame and its neighbours
 
 
-class ReelViews:
+class VideoFrames:
     """Textures of a reel's pictures, on the device of the Blur that takes them.
 
     `motion`: where motion comes from, or None. `holdout` (height, width): 1 stays sharp.
@@ -35,7 +35,7 @@ class ReelViews:
 
     def __init__(
         self,
-        reel: Reel[Glance],
+        reel: ShotReader[Thumbnail],
         blur: Blur,
         motion: MotionSource | None = None,
         holdout: np.ndarray | None = None,
@@ -95,7 +95,7 @@ class ReelViews:
             self._decode(self._planes, content, self._lights[index])
         return self._images.texture(self._lights[index], content.coded.size, _TEXEL)
 
-    def _decode(self, planes: Planes, content: Glance, name: str) -> wgpu.GPUTexture:
+    def _decode(self, planes: Planes, content: Thumbnail, name: str) -> wgpu.GPUTexture:
         texture = self._images.texture(name, content.coded.size, _TEXEL)
         encoder = self._device.create_command_encoder(label="decode")
         planes.decode(encoder, content.coded, texture.create_view())

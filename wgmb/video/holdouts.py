@@ -12,13 +12,13 @@ import numpy as np
 from ..color.srgb import srgb
 from ..errors import InputError, size_text
 from ..io import stills
-from .read.reader import Footage
+from .read.reader import VideoReader
 from .static_areas import overlay_of
 
 STATIC = "static"  # as a holdout: what never changes while all around it does
 
 
-def holdout_of(masks: Iterable[str], footage: Footage) -> np.ndarray | None:
+def holdout_of(masks: Iterable[str], footage: VideoReader) -> np.ndarray | None:
     """(height, width) float32, 1 stays sharp: all masks together; None without any.
 
     A mask is STATIC or an image file of the video's size, of whose first channel the display values

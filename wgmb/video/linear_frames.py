@@ -13,7 +13,7 @@ from ..color.coding import CodedPicture
 from ..gpu.textures import TexturePool
 from ..threads import ahead
 from .planes import Planes
-from .read.reader import Footage
+from .read.reader import VideoReader
 
 _READ_AHEAD = 2  # coded pictures
 _NEAR = 48  # pictures that are decoded rather than sought
@@ -25,7 +25,7 @@ class VideoPictures:
     `highlights`: times white that white becomes (see color/highlights.py); 1 is off.
     """
 
-    def __init__(self, footage: Footage, device: wgpu.GPUDevice, highlights: float = 1.0):
+    def __init__(self, footage: VideoReader, device: wgpu.GPUDevice, highlights: float = 1.0):
         self.footage, self.planes = footage, Planes(device, highlights)
         self._device, self._images = device, TexturePool(device)
         self._going: Iterator[tuple[int, CodedPicture]] = iter(())

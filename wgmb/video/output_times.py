@@ -12,14 +12,14 @@ from typing import overload
 
 from ..errors import InputError
 from .clock import Clock
-from .read.reader import Footage
+from .read.reader import VideoReader
 
 _SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
 _HELD = Fraction(1, 2)  # of a picture's interval beyond it: less is rounding
 
 
 @dataclass(frozen=True)
-class Moment:
+class OutputFrame:
     """An output frame: its number from 0 on; its time and interval [s], on the output's clock."""
 
     number: int
@@ -27,7 +27,7 @@ class Moment:
     interval: Fraction
 
 
-class Moments(Sequence[Moment]):
+class OutputFrames(Sequence[OutputFrame]):
     """The output frames of a video: at `fps`, or at the times of its own pictures where it is None.
 
     From the first picture that `clock` lets through to the end of the last one. A last picture that
@@ -35,7 +35,7 @@ class Moments(Sequence[Moment]):
     `clock` lets none through.
     """
 
-    def __init__(self, footage: Footage, clock: Clock, fps: Fraction | None):
+    def __init__(self, footage: VideoReader, clock: Clock, fps: Fraction | None):
         times = footage.times
         first = 0 if clock.first is None else _count_before(times, clock.first)
         last = len(times) if clock.end is None else _count_before(times, clock.end)
@@ -59,10 +59,10 @@ class Moments(Sequence[Moment]):
         return self._count
 
     @overload
-    def __getitem__(self, index: int) -> Moment: ...
+    def __getitem__(self, index: int) -> OutputFrame: ...
     @overload
-    def __getitem__(self, index: slice) -> list[Moment]: ...
-    def __getitem__(self, index: int | slice) -> Moment | list[Moment]:
+    def __getitem__(self, index: slice) -> list[OutputFrame]: ...
+    def __getitem__(self, index: int | slice) -> OutputFrame | list[OutputFrame]:
         numbers = range(self._count)[index]
         return (
             [self._moment(k) for k in numbers]
@@ -78,10 +78,10 @@ class Moments(Sequence[Moment]):
         near = {min(max(n, 0), self._count - 1) for n in (after - 1, after)}
         return min(near, key=lambda n: (abs(self[n].time - time), n))
 
-    def _moment(self, number: int) -> Moment:
+    def _moment(self, number: int) -> OutputFrame:
         if self._own is None:
-            return Moment(number, self._begin + number * self._step, self._step)
-        return Moment(number, self._clock.out(self._own[number]), self._step)
+            return OutputFrame(number, self._begin + number * self._step, self._step)
+        return OutputFrame(number, self._clock.out(self._own[number]), self._step)
 
 
 def _count_before(times: Sequence[Fraction], time: Fraction) -> int:
@@ -93,6 +93,6 @@ def _count_before(times: Sequence[Fraction], time: Fraction) -> int:
     return low
 
 
-def moments(footage: Footage, clock: Clock, fps: Fraction | None) -> list[Moment]:
-    """All Moments of a video."""
-    return list(Moments(footage, clock, fps))
+def moments(footage: VideoReader, clock: Clock, fps: Fraction | None) -> list[OutputFrame]:
+    """All OutputFrames of a video."""
+    return list(OutputFrames(footage, clock, fps))

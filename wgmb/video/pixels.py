@@ -30,7 +30,7 @@ _UNREADABLE = re.compile(r"bayer_|xyz|.*f(16|32)(le|be)$")
 
 
 @dataclass(frozen=True)
-class Layout:
+class PlaneLayout:
     """A planar format, and what the format of a frame says about its samples."""
 
     name: str
@@ -46,7 +46,7 @@ class Layout:
 
 
 @cache
-def layout(name: str, transparent: bool = False) -> Layout | None:
+def layout(name: str, transparent: bool = False) -> PlaneLayout | None:
     """The planes that a frame of pixel format `name` becomes; None if it cannot be read.
 
     `transparent`: the palette of a format that has one has transparent colours.
@@ -66,19 +66,19 @@ def layout(name: str, transparent: bool = False) -> Layout | None:
         if alpha:  # grey with alpha has no planar format
             return _rgb(bits, True, "rgba" if bits == 8 else "rgba64le")
         planar = "gray" if bits == 8 else f"gray{bits}le"
-        return Layout(planar, None, "grey", bits, (1, 1), False, False)
+        return PlaneLayout(planar, None, "grey", bits, (1, 1), False, False)
     steps = 16 // pixels.chroma_width(16), 16 // pixels.chroma_height(16)
     planar = _yuv(bits, steps, alpha)
-    return Layout(planar, None, "yuv", bits, steps, alpha, name.startswith("yuvj"))
+    return PlaneLayout(planar, None, "yuv", bits, steps, alpha, name.startswith("yuvj"))
 
 
 def _depth(bits: int) -> int:
     return next(depth for depth in _DEPTHS if bits <= depth)
 
 
-def _rgb(bits: int, alpha: bool, via: str | None) -> Layout:
+def _rgb(bits: int, alpha: bool, via: str | None) -> PlaneLayout:
     name = ("gbrap" if alpha else "gbrp") + ("" if bits == 8 else f"{bits}le")
-    return Layout(name, via, "rgb", bits, (1, 1), alpha, True)
+    return PlaneLayout(name, via, "rgb", bits, (1, 1), alpha, True)
 
 
 def _yuv(bits: int, steps: tuple[int, int], alpha: bool) -> str:
@@ -102,7 +102,9 @@ def is_transparent(frame: av.VideoFrame) -> bool:
     return bool((colors >> 24 < 255).any())
 
 
-def planes_of(frame: av.VideoFrame, into: Layout, by: VideoReformatter) -> tuple[np.ndarray, ...]:
+def planes_of(
+    frame: av.VideoFrame, into: PlaneLayout, by: VideoReformatter
+) -> tuple[np.ndarray, ...]:
     """The samples of a frame: Y, Cb, Cr or R, G, B or grey, then alpha; (height, width) each.
 
     They are the frame's own, not to be written to, with gaps between their rows. `by` is

@@ -5,27 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from ..io.frame_numbers import frame_list
-from ..shots.reader import Picture, Reel
+from ..shots.reader import Picture, ShotReader
 from ..threads import ahead
-from .read.reader import Footage
-from .thumbnail import Glance, is_cut, is_double
+from .read.reader import VideoReader
+from .thumbnail import Thumbnail, is_cut, is_double
 
 _READ_AHEAD = 2  # coded pictures
 
 
-def scan_video(footage: Footage, tell: Callable[[int, str, str], None]) -> list[tuple[str, str]]:
+def scan_video(
+    footage: VideoReader, tell: Callable[[int, str, str], None]
+) -> list[tuple[str, str]]:
     """(name, text) lines about all pictures of a video, which are decoded for them.
 
     `tell`: called after every picture, see `terminal.progress`.
     """
     times = footage.times
 
-    def pictures() -> Iterator[Picture[Glance]]:
+    def pictures() -> Iterator[Picture[Thumbnail]]:
         for number, coded in ahead(footage.pictures(), _READ_AHEAD):
-            yield Picture(float(times[number]), Glance(coded), number)
+            yield Picture(float(times[number]), Thumbnail(coded), number)
             tell(number, "done", "picture")
 
-    reel = Reel(pictures(), is_cut=is_cut, is_double=is_double)
+    reel = ShotReader(pictures(), is_cut=is_cut, is_double=is_double)
     for time in times:
         reel.at(float(time))
     lines = [("cuts", _cuts(footage, sorted(reel.cuts)))]
@@ -36,7 +38,7 @@ def scan_video(footage: Footage, tell: Callable[[int, str, str], None]) -> list[
     return lines
 
 
-def _cuts(footage: Footage, numbers: Sequence[int]) -> str:
+def _cuts(footage: VideoReader, numbers: Sequence[int]) -> str:
     """Every cut with its time."""
     if not numbers:
         return "none found"

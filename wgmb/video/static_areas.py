@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..color.coding import CodedPicture
-from .read.reader import Footage
+from .read.reader import VideoReader
 
 _SAMPLES = 48  # pictures looked at
 _NOISE = 4 / 255  # of the range of a sample, that codecs change in what is still
@@ -15,7 +15,7 @@ _AROUND = 16  # pixels to each side
 _CHANGES = 0.25  # share of changes around a pixel from which it stands out by not changing
 
 
-def overlay_of(footage: Footage) -> np.ndarray:
+def overlay_of(footage: VideoReader) -> np.ndarray:
     """(height, width) float32: 1 where nothing changes although what is around it does.
 
     Looked for in pictures from all over the video.

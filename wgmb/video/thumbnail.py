@@ -29,7 +29,7 @@ _CHROMA = 2  # rows and columns of a block, for the other planes
 _WHITE = {PQ: 0.58, HLG: 0.75}  # signal of the white of text and paper (ITU-R BT.2408)
 
 
-class Glance:
+class Thumbnail:
     """A coded picture, and what is seen of it at a glance: each made once, when it is asked for."""
 
     def __init__(self, coded: CodedPicture):
@@ -139,11 +139,11 @@ def _sum(parts: list[np.ndarray], kind: type) -> np.ndarray:
     return total
 
 
-def is_cut(before: Glance, after: Glance) -> bool:
+def is_cut(before: Thumbnail, after: Thumbnail) -> bool:
     """Return True if a cut lies between two pictures."""
     return smalls_differ(before.small, after.small)
 
 
-def is_double(before: Glance, after: Glance) -> bool:
+def is_double(before: Thumbnail, after: Thumbnail) -> bool:
     """Return True if a picture only repeats the one before."""
     return copies(before.sampled, after.sampled)

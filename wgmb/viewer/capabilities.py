@@ -8,7 +8,7 @@ import wgpu
 
 from ..methods import METHODS
 from ..methods.options import Option, options_of
-from .draw.display import Displayed
+from .draw.display import DisplayCache
 from .state.files import footage_of
 from .state.state import (
     BOTH_EYES,
@@ -18,16 +18,16 @@ from .state.state import (
 )
 from .state.video_time import most_mb, settings_of
 from .subjects.subject import ClipSubject, SceneSubject, Subject
-from .subjects.video import FootageSubject
+from .subjects.video import VideoSubject
 
 
 class Choices:
     """Choices available with the device and the scene or frames."""
 
     def __init__(self, device: wgpu.GPUDevice):
-        self._device, self.displayed = device, Displayed(device)
+        self._device, self.displayed = device, DisplayCache(device)
         self._scene: SceneSubject | None = None
-        self._clip: tuple[tuple, ClipSubject | FootageSubject] | None = None
+        self._clip: tuple[tuple, ClipSubject | VideoSubject] | None = None
 
     def subject(self, state: State) -> Subject:
         """The scene or the frames that the state is about."""
@@ -39,10 +39,10 @@ class Choices:
             self._clip = key, self._opened(state)
         return self._clip[1]
 
-    def _opened(self, state: State) -> ClipSubject | FootageSubject:
+    def _opened(self, state: State) -> ClipSubject | VideoSubject:
         """The video or the frames; what was shown before is let go of."""
         if state.is_video:
-            made = FootageSubject(self._device, state)
+            made = VideoSubject(self._device, state)
         else:
             made = ClipSubject(self._device, state, self.displayed.display(state))
         self.close()
@@ -50,7 +50,7 @@ class Choices:
 
     def close(self) -> None:
         """End what goes on beside the window."""
-        if self._clip is not None and isinstance(self._clip[1], FootageSubject):
+        if self._clip is not None and isinstance(self._clip[1], VideoSubject):
             self._clip[1].close()
 
     def methods(self, state: State) -> list[str]:

@@ -50,7 +50,7 @@ MOUSE = {
 
 
 @dataclass(frozen=True)
-class Layout:
+class WindowLayout:
     """Layout of the window [logical px], and the available choices."""
 
     area: Box
@@ -61,7 +61,9 @@ class Layout:
     eyes: tuple[str, ...] = ()
 
 
-def grip(state: State, layout: Layout, x: float, y: float, button: int, modifiers) -> str | None:
+def grip(
+    state: State, layout: WindowLayout, x: float, y: float, button: int, modifiers
+) -> str | None:
     """Return the drag that a press at x, y starts: "wipe", "orbit", "pan", or None."""
     if not _inside(layout.area, x, y):
         return None
@@ -73,7 +75,7 @@ def grip(state: State, layout: Layout, x: float, y: float, button: int, modifier
     return "orbit" if button == 1 else None
 
 
-def drag(state: State, layout: Layout, held: str, dx: float, dy: float) -> State:
+def drag(state: State, layout: WindowLayout, held: str, dx: float, dy: float) -> State:
     """Return the state after dragging by dx, dy [logical px]."""
     _, _, width, height = layout.place
     x, y = dx / max(width, 1), dy / max(height, 1)
@@ -99,7 +101,7 @@ def drag(state: State, layout: Layout, held: str, dx: float, dy: float) -> State
     return replace(state, pan=(right - dx * per_px, over + dy * per_px))
 
 
-def wheel(state: State, layout: Layout, x: float, y: float, dx: float, dy: float) -> State:
+def wheel(state: State, layout: WindowLayout, x: float, y: float, dx: float, dy: float) -> State:
     """Nearer or farther by dy / 100 notches; frames on disk: larger or smaller about x, y."""
     if not _inside(layout.area, x, y):
         return state
@@ -115,7 +117,7 @@ def wheel(state: State, layout: Layout, x: float, y: float, dx: float, dy: float
     return replace(state, zoom=zoom, center=center)
 
 
-def key(state: State, layout: Layout, name: str) -> tuple[State, str | None]:
+def key(state: State, layout: WindowLayout, name: str) -> tuple[State, str | None]:
     """A pressed key; with it an action: "screenshot", "record", "fullscreen" or "quit"."""
     low = name.lower()
     actions = {"s": "screenshot", "v": "record", "f": "fullscreen", "escape": "quit"}

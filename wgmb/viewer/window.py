@@ -156,12 +156,12 @@ class Viewer:
         width, height = self.canvas.get_logical_size()
         return 0.0, 0.0, max(width - self.panel.width(self.state, (width, height)), 1.0), height
 
-    def _layout(self) -> controls.Layout:
+    def _layout(self) -> controls.WindowLayout:
         ratio, info = self.canvas.get_pixel_ratio(), self._info
         x, y, width, height = (v / ratio for v in self.stage.report.place)
         methods, looks, eyes = (info.methods, info.looks, info.eyes) if info else ((), (), ())
         place = x, y, width, height
-        return controls.Layout(
+        return controls.WindowLayout(
             self._area(), place, tuple(methods), tuple(looks), COMPARE, tuple(eyes)
         )
 

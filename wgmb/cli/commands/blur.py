@@ -15,7 +15,7 @@ from ...extras import needed_by
 from ...io.frame_numbers import frame_numbers
 from ...run.job import Job, settle
 from ...run.job_file import read_job
-from ...run.request import Asked
+from ...run.request import BlurRequest
 from ...sequence.frame_file import is_video
 from ...settings.color import ColorSettings, option_name
 from ...settings.video import VideoSettings
@@ -23,14 +23,14 @@ from ..conclusion import conclude
 from ..names import is_batch
 from ..options import (
     BlurOptions,
+    Blurs,
     Colors,
-    Given,
     InputOptions,
-    Look,
+    Inputs,
+    Outputs,
     ShutterOptions,
-    Target,
+    Shutters,
     Videos,
-    When,
 )
 from ..spelling import as_options
 from ..terminal import muted, note, progress
@@ -38,10 +38,10 @@ from ..terminal import muted, note, progress
 
 def blur(
     patterns: Annotated[tuple[str, ...], Parameter(name="pattern")] = (),
-    output: Target | None = None,
-    look: Look = BlurOptions(),
-    when: When = ShutterOptions(),
-    given: Given = InputOptions(),
+    output: Outputs | None = None,
+    blur: Blurs = BlurOptions(),
+    shutter: Shutters = ShutterOptions(),
+    input: Inputs = InputOptions(),
     color: Colors = ColorSettings(),
     video: Videos = VideoSettings(),
     *,
@@ -98,22 +98,23 @@ def blur(
     """
     crew = _crew(workers, cluster)
     if job is not None:
-        rest = replace(given, frames=None), look, when, color, video, output
+        rest = replace(input, frames=None), blur, shutter, color, video, output
         plain = InputOptions(), BlurOptions(), ShutterOptions(), ColorSettings(), VideoSettings()
         if patterns or confidence or fps_in or config or rest != (*plain, None):
             raise InputError(
                 "--job holds all settings; only --frames, --workers, --cluster, --adapter, "
                 "--verbose and --quiet can be combined with it"
             )
-        return blur_job(job, given.frames, crew, adapter, verbose, quiet)
+        return blur_job(job, input.frames, crew, adapter, verbose, quiet)
     if not patterns:
         raise InputError("no input: name frames such as 'shot.####.exr', or a video")
     if output is None:
         such = "out.mp4" if is_video(patterns[0]) else "'blurred.####.exr'"
         raise InputError(f"--output is missing, such as -o {such}")
-    when, pattern = when.resolved(), patterns[0]
+    shutter, pattern = shutter.resolved(), patterns[0]
     if is_batch(patterns, output.output) or is_video(pattern):
         with needed_by(pattern, "video"):
+            from ...run.video import VideoRequest
             from .blur_video import blur_video
             from .blur_videos import blur_videos
         if confidence or fps_in or crew:
@@ -122,23 +123,24 @@ def blur(
                 option = "--workers" if workers else "--cluster"
             raise InputError(f"{option} is for rendered frames")
         _tell_unused(color, quiet)
-        settings = look, when, given, video, adapter, quiet, verbose
+        wanted = VideoRequest(blur=blur, shutter=shutter, input=input, video=video)
+        how = wanted, adapter, quiet, verbose
         if is_batch(patterns, output.output):
-            return blur_videos(patterns, output, *settings)
-        return blur_video(pattern, output, *settings)
-    asked = Asked(
+            return blur_videos(patterns, output, *how)
+        return blur_video(pattern, output, *how)
+    request = BlurRequest(
         pattern=pattern,
         output=output,
-        look=look,
-        when=when,
-        given=given,
+        blur=blur,
+        shutter=shutter,
+        input=input,
         color=color,
         video=video,
         confidence=confidence,
         fps_in=fps_in,
     )
-    made = settle(asked, adapter)
-    if crew and made.asked.conversion:
+    made = settle(request, adapter)
+    if crew and made.request.conversion:
         option = "--fps-in" if fps_in else "--flow none"
         raise InputError(f"{option} cannot be combined with --workers or --cluster")
     if crew:
@@ -213,8 +215,8 @@ def blur_on_farm(
     started = time.perf_counter()
     with progress(len(job.numbers), quiet) as tick, muted():
         outcome = farm.blur(job, tick)
-    took = f"{time.perf_counter() - started:.1f} s with {job.asked.look.method}"
-    return conclude(outcome, Path(job.asked.output.output), took, quiet, verbose)
+    took = f"{time.perf_counter() - started:.1f} s with {job.request.blur.method}"
+    return conclude(outcome, Path(job.request.output.output), took, quiet, verbose)
 
 
 def blur_frames(

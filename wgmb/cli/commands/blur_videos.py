@@ -3,35 +3,25 @@
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from ...errors import GpuMemoryError, InputError
 from ...io import stills
 from ...io.frame_numbers import is_pattern
-from ...settings import (
-    BlurSettings,
-    InputSettings,
-    OutputSettings,
-    ShutterSettings,
-)
+from ...run.video import VideoPlan, VideoRequest, VideoRun
+from ...settings import OutputSettings
 from ...settings.video import VideoSettings
 from ...video.write.encoders import SUFFIXES, chosen
 from ..exit_codes import DONE, SOME_FAILED
 from ..names import outputs_of, videos_of
+from ..spelling import as_options
 from ..terminal import complain, note, progress
-from .blur_video import (
-    Plan,
-    Tell,
-    Wish,
-    blurred,
-    make_wish,
-    planned,
-    tell_how,
-)
+from .blur_video import tell_how
 
+Tell = Callable[..., None]
+"""A function that `terminal.progress` yields."""
 _FAILURES = InputError, GpuMemoryError, OSError, MemoryError
 """Errors of one video, after which others may be done."""
 
@@ -39,10 +29,7 @@ _FAILURES = InputError, GpuMemoryError, OSError, MemoryError
 def blur_videos(
     patterns: Sequence[str],
     output: OutputSettings,
-    look: BlurSettings,
-    when: ShutterSettings,
-    given: InputSettings,
-    video: VideoSettings,
+    request: VideoRequest,
     adapter: str | None,
     quiet: bool,
     verbose: bool,
@@ -54,16 +41,16 @@ def blur_videos(
     paths = videos_of(patterns)
     outputs = [replace(output, output=name) for name in outputs_of(paths, output.output)]
     for one in outputs:
-        _check_output(one, video)
-    wish = make_wish(look, when, given, video, adapter)
-    tell_how(wish, quiet, verbose)
-    plans: list[Plan | str] = []
+        _check_output(one, request.video)
+    run = request.open(adapter)
+    tell_how(run, quiet, verbose)
+    plans: list[VideoPlan | str] = []
     for path, one in zip(paths, outputs, strict=True):
         try:
-            plans.append(planned(path, one, wish))
+            plans.append(run.plan(path, one))
         except _FAILURES as error:
             plans.append(_reason(error, path))
-    total = sum(len(plan.wanted) for plan in plans if isinstance(plan, Plan))
+    total = sum(len(plan.wanted) for plan in plans if isinstance(plan, VideoPlan))
     failed = 0
     with progress(total, quiet) as tell:
         for plan in plans:
@@ -71,22 +58,22 @@ def blur_videos(
                 complain(plan)
                 failed += 1
             else:
-                failed += not _one_of_many(plan, wish, tell, quiet)
+                failed += not _one_of_many(plan, run, tell, quiet)
     if not quiet:
         note(f"{len(plans) - failed} of {len(plans)} videos done")
     return SOME_FAILED if failed else DONE
 
 
-def _one_of_many(plan: Plan, wish: Wish, tell: Tell, quiet: bool) -> bool:
+def _one_of_many(plan: VideoPlan, run: VideoRun, tell: Tell, quiet: bool) -> bool:
     """Blur a video and say so in a line; returns whether all of it is done."""
-    path, started, told = plan.footage.path, time.perf_counter(), [0]
+    path, told = plan.reader.path, [0]
 
     def tell_name(number: int, what: str) -> None:
         told[0] += 1
         tell(number, what, f"{path.name}, frame")
 
     try:
-        run, left_out = blurred(plan, wish, tell_name)
+        report = run(plan, tell_name)
     except _FAILURES as error:
         complain(_reason(error, path))
         return False
@@ -94,14 +81,14 @@ def _one_of_many(plan: Plan, wish: Wish, tell: Tell, quiet: bool) -> bool:
         for moment in plan.wanted[told[0] :]:
             tell_name(moment.number, "skipped")
     if not quiet:
-        took = f"{len(plan.wanted)} frames in {time.perf_counter() - started:.1f} s"
-        words = [took if run.reel is not None else "", *left_out, *plan.notes]
-        if run.reel is not None and run.reel.doubles:
-            words.append(f"{len(run.reel.doubles)} repeated pictures left out")
-        words.append(plan.footage.scaling())
-        note(f"{path}: {'; '.join(filter(None, words))} -> {plan.name}")
-    if loss := plan.footage.loss():
-        complain(loss)
+        took = f"{report.frames} frames in {report.seconds:.1f} s"
+        words = [took if report.is_new else "", *report.left_out, *report.notes]
+        if report.repeated:
+            words.append(f"{report.repeated} repeated pictures left out")
+        words.append(report.scaling)
+        note(as_options(f"{path}: {'; '.join(filter(None, words))} -> {report.output}"))
+    if report.loss:
+        complain(report.loss)
         return False
     return True
 

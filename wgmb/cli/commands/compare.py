@@ -30,10 +30,10 @@ from ...scene.scene import Scene
 from ...settings import ShutterSettings, size_of
 from ...shutter import Shutter
 from ..options import (
-    Given,
     InputOptions,
+    Inputs,
     ShutterOptions,
-    When,
+    Shutters,
 )
 from ..pages import (
     command_line,
@@ -79,9 +79,9 @@ class CompareSettings:
         seconds = self.budget / 1e3
         return lambda report, case: [seconds]
 
-    def exposures(self, when: ShutterSettings, scene: Scene | None = None) -> dict[str, Shutter]:
+    def exposures(self, shutter: ShutterSettings, scene: Scene | None = None) -> dict[str, Shutter]:
         """Return the shutters by label; unset fields are taken from the scene."""
-        settled = when.resolved(scene)
+        settled = shutter.resolved(scene)
         try:
             degrees = [float(d) for d in (self.shutters or str(settled.shutter)).split(",")]
         except ValueError:
@@ -89,15 +89,15 @@ class CompareSettings:
         return {f"{d:g}°": replace(settled, shutter=d).make() for d in degrees}
 
 
-Who = Annotated[CompareSettings, Parameter(name="*", group=Group("Compare", sort_key=2))]
+Comparison = Annotated[CompareSettings, Parameter(name="*", group=Group("Compare", sort_key=2))]
 
 
 def compare(
     *scene: str,
     output: Annotated[Path, Parameter(alias="-o")],
-    who: Who = CompareSettings(),
-    when: When = ShutterOptions(),
-    given: Given = InputOptions(),
+    comparison: Comparison = CompareSettings(),
+    shutter: Shutters = ShutterOptions(),
+    input: Inputs = InputOptions(),
     size: str = "480x270",
     time: float = 0.0,
     antialias: int = 3,
@@ -155,10 +155,10 @@ def compare(
     check_flip()  # before a reference is rendered for minutes
     device = gpu.open_device(adapter)
     tell = teller(quiet)
-    lab = Laboratory(device, rounds=who.rounds, tell=tell)
-    report = Report("", command_line(), machine(device), who.samples)
-    wanted, candidates = size_of(size), who.candidates()
-    steps, budgets = who.steps(), who.budgets()
+    lab = Laboratory(device, rounds=comparison.rounds, tell=tell)
+    report = Report("", command_line(), machine(device), comparison.samples)
+    wanted, candidates = size_of(size), comparison.candidates()
+    steps, budgets = comparison.steps(), comparison.budgets()
     if experiment:
         check_choice("--experiment", experiment, EXPERIMENTS)
         report.title = f"{experiment.capitalize()}'s experiment"
@@ -166,20 +166,22 @@ def compare(
         write(report, output)
         tell(f"-> {output}")
         return 0
-    reference = Candidate.parse(who.reference)
+    reference = Candidate.parse(comparison.reference)
     baselines = {name: Path(file) for name, _, file in (p.partition("=") for p in peer)}
     cases: list[Callable[[], Case]] = []
     for name, made in map(make_scene, scene):
         scene_frame = SceneFrame(made, time, wanted, antialias=antialias)
-        for degrees, shutter in who.exposures(when, made).items():
-            cases.append(partial(scene_case, f"{name}, {degrees}", shutter, reference,
+        for degrees, exposed in comparison.exposures(shutter, made).items():
+            cases.append(partial(scene_case, f"{name}, {degrees}", exposed, reference,
                                  scene_frame, device, tell))  # fmt: skip
     if truth is not None and inputs:
         name = truth[0].parent.name or truth[0].stem
-        for degrees, shutter in who.exposures(when).items():
-            cases.append(partial(clip_case, f"{name}, {degrees}", shutter, inputs, frame,
-                                 truth, baselines, given.open))  # fmt: skip
-    able = candidates if who.methods or scene else [c for c in candidates if not c.needs_scene]
+        for degrees, exposed in comparison.exposures(shutter).items():
+            cases.append(partial(clip_case, f"{name}, {degrees}", exposed, inputs, frame,
+                                 truth, baselines, input.open))  # fmt: skip
+    able = (
+        candidates if comparison.methods or scene else [c for c in candidates if not c.needs_scene]
+    )
     for make in cases:
         case = make()
         lab.compare(report, case, able, steps, budgets)

@@ -23,7 +23,7 @@ from ...sequence.input_color import space_of
 from ...sequence.layers import names
 from ...settings.color import ColorSettings
 from ..exit_codes import DONE
-from ..options import Colors, Given, InputOptions
+from ..options import Colors, InputOptions, Inputs
 from ..terminal import note, out
 
 _MUCH = 0.25  # of the width: a 99th percentile of speed above it is worth a warning
@@ -32,7 +32,7 @@ _MUCH = 0.25  # of the width: a 99th percentile of speed above it is worth a war
 def info(
     pattern: str,
     /,
-    given: Given = InputOptions(),
+    input: Inputs = InputOptions(),
     color: Colors = ColorSettings(),
     *,
     output: Annotated[Path | None, Parameter(alias="-o")] = None,
@@ -63,10 +63,10 @@ def info(
             from .info_video import tell_about
         if output is not None:
             raise InputError("`output` draws the motion of rendered frames, a video holds none")
-        return tell_about(pattern, given.max_mb, scan)
+        return tell_about(pattern, input.max_mb, scan)
     if scan:
         raise InputError("`scan` is for videos")
-    clip = given.open(pattern, space=color.space(shown))
+    clip = input.open(pattern, space=color.space(shown))
     if color.remark:
         note(color.remark)
     if output is not None and output.exists() and not overwrite:

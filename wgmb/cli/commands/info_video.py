@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...color.coding import Coding
-from ...video.read.reader import Footage
+from ...video.read.reader import VideoReader
 from ...video.scan import scan_video
 from ..exit_codes import DONE, SOME_FAILED
 from ..terminal import note, out, progress
@@ -34,7 +34,7 @@ def _colors(coding: Coding) -> str:
 
 def tell_about(path: str, max_mb: float, scan: bool) -> int:
     """Print the lines about a video; returns the exit code. `scan`: those of all its pictures."""
-    footage = Footage(path, max_mb=max_mb)
+    footage = VideoReader(path, max_mb=max_mb)
     _print(describe_video(footage))
     if not scan:
         _print([("cuts", "not looked for; --scan decodes the video and lists them")])
@@ -55,7 +55,7 @@ def _print(lines: list[tuple[str, str]]) -> None:
         out(f"{name:10}{text}")
 
 
-def describe_video(footage: Footage) -> list[tuple[str, str]]:
+def describe_video(footage: VideoReader) -> list[tuple[str, str]]:
     """(name, text) lines about a video."""
     coding = footage.coding
     kind = _KINDS[coding.model] + (_STEPS.get(coding.steps, "") if coding.model == "yuv" else "")
@@ -91,7 +91,7 @@ def describe_video(footage: Footage) -> list[tuple[str, str]]:
     return lines + [("note", note) for note in footage.notes]
 
 
-def _rate(footage: Footage) -> str:
+def _rate(footage: VideoReader) -> str:
     """The rate, and how steady it is."""
     text = f"{float(footage.rate):g} pictures a second"
     if not footage.is_variable:

@@ -14,7 +14,7 @@ from ...io.atomic import write_file
 from ...io.frame_numbers import frame_list
 from ...run.job import settle
 from ...run.job_file import is_job, stored, time_there
-from ...run.request import Asked
+from ...run.request import BlurRequest
 from ...sequence.frame_file import is_video
 from ...settings.color import ColorSettings
 from ...settings.video import VideoSettings
@@ -22,14 +22,14 @@ from .. import submit
 from ..exit_codes import DONE
 from ..options import (
     BlurOptions,
+    Blurs,
     Colors,
-    Given,
     InputOptions,
-    Look,
+    Inputs,
+    Outputs,
     ShutterOptions,
-    Target,
+    Shutters,
     Videos,
-    When,
 )
 from ..spelling import as_options
 from ..submit import is_ours
@@ -38,10 +38,10 @@ from ..terminal import note
 
 def job(
     pattern: str,
-    output: Target,
-    look: Look = BlurOptions(),
-    when: When = ShutterOptions(),
-    given: Given = InputOptions(),
+    output: Outputs,
+    blur: Blurs = BlurOptions(),
+    shutter: Shutters = ShutterOptions(),
+    input: Inputs = InputOptions(),
     color: Colors = ColorSettings(),
     video: Videos = VideoSettings(),
     *,
@@ -95,18 +95,18 @@ def job(
     _check_target("--job", file, (".json",), is_job)
     _check_target("--openjd", openjd, (".yaml", ".yml"), is_ours)
     _check_target("--slurm", slurm, (".sh",), is_ours)
-    asked = Asked(
+    request = BlurRequest(
         pattern=pattern,
         output=output,
-        look=look,
-        when=when,
-        given=given,
+        blur=blur,
+        shutter=shutter,
+        input=input,
         color=color,
         video=video,
         confidence=confidence,
     )
-    made = settle(asked, adapter)
-    if made.asked.averages:
+    made = settle(request, adapter)
+    if made.request.averages:
         raise InputError("job files do not support `flow` none; use `wgmb blur` for averages")
     kept = stored(made, chunk)
     texts = {file: ""}
@@ -127,7 +127,7 @@ def job(
         if made.clip.is_finding_notable:
             note(f"vectors: {made.clip.finding}")
         frames = f"{len(made.numbers)} frames {frame_list(made.numbers)}"
-        note(f"{file}: {frames} with {made.asked.look.method}, not blurred yet")
+        note(f"{file}: {frames} with {made.request.blur.method}, not blurred yet")
     return DONE
 
 

@@ -34,7 +34,7 @@ from ...settings import (
     plain,
     size_of,
 )
-from ..options import Given, InputOptions, Target
+from ..options import InputOptions, Inputs, Outputs
 from ..terminal import note, out, progress
 
 
@@ -66,9 +66,9 @@ def perceive(
     pattern: str | None = None,
     /,
     *,
-    output: Target,
-    given: Given = InputOptions(),
-    who: Who = PerceptionSettings(),
+    output: Outputs,
+    input: Inputs = InputOptions(),
+    perception: Who = PerceptionSettings(),
     report: bool = False,
     speed: float | None = None,
     adapter: str | None = None,
@@ -101,7 +101,7 @@ def perceive(
     if report:
         if pattern is not None:
             raise InputError(f"--report takes no input, got {pattern!r}")
-        return _report(output, who, speed, quiet)
+        return _report(output, perception, speed, quiet)
     if pattern is None:
         raise InputError("perceive needs frames, a video, a scene, or --report")
     if speed is not None:
@@ -113,17 +113,21 @@ def perceive(
     if pattern not in builtin.SCENES and is_video(pattern):
         with needed_by(pattern, "video"):
             from .perceive_video import perceive_video
-        return perceive_video(pattern, output, given, who.cone, plain(who), adapter, quiet)
+        return perceive_video(
+            pattern, output, input, perception.cone, plain(perception), adapter, quiet
+        )
     if pattern in builtin.SCENES:
-        numbers, pictures, rate = _nature(pattern, given, who, float(output.rate), adapter)
+        numbers, pictures, rate = _nature(pattern, input, perception, float(output.rate), adapter)
         inputs = ()
     else:
-        clip = given.open(pattern)
+        clip = input.open(pattern)
         numbers, rate = clip.numbers, float(output.rate)
         pictures = _shown(clip)
         inputs = clip.inputs
-    observer = Observer(rate, who.cone, device=adapter)
-    settings = {"wgmb": __version__} | plain(who) | {"input": pattern, "fps": str(output.rate)}
+    observer = Observer(rate, perception.cone, device=adapter)
+    settings = (
+        {"wgmb": __version__} | plain(perception) | {"input": pattern, "fps": str(output.rate)}
+    )
     files = output.make(settings, numbers, inputs)
     started = time.perf_counter()
     with progress(len(numbers), quiet, "perceiving") as tick:
@@ -160,18 +164,18 @@ def _shown(clip: Clip):
         yield number, source, [picture], Placement(canvas, canvas)
 
 
-def _nature(name: str, given: InputSettings, who: PerceptionSettings, fps: float, adapter):
+def _nature(name: str, input: InputSettings, perception: PerceptionSettings, fps: float, adapter):
     """Return frame numbers, the images between successive frames, and the rate of the images."""
-    numbers = frame_numbers(given.frames or "0")
-    steps = max(1, round(who.nature / fps))
+    numbers = frame_numbers(input.frames or "0")
+    steps = max(1, round(perception.nature / fps))
     rate = fps * steps
     renderer = Render(
-        builtin.make(name, **parameters_of(who.set)),
+        builtin.make(name, **parameters_of(perception.set)),
         Blur("tap", device=adapter),
-        size=size_of(who.size),
+        size=size_of(perception.size),
         fps=fps,
     )
-    before = math.ceil(who.cone.memory * rate)
+    before = math.ceil(perception.cone.memory * rate)
 
     def pictures():
         done = numbers[0] * steps - before - 1
@@ -186,16 +190,16 @@ def _nature(name: str, given: InputSettings, who: PerceptionSettings, fps: float
 
 
 def _report(
-    output: OutputSettings, who: PerceptionSettings, speed: float | None, quiet: bool
+    output: OutputSettings, perception: PerceptionSettings, speed: float | None, quiet: bool
 ) -> int:
     fps, path = float(output.rate), Path(output.output)
     if path.suffix.lower() != ".svg":
         raise InputError(f"output {path}: the name of a report must end in .svg")
     if path.exists() and not output.overwrite:
         raise InputError(f"{path} exists; --overwrite replaces it")
-    best = best_shutter(speed, fps, who.cone) if speed is not None else None
+    best = best_shutter(speed, fps, perception.cone) if speed is not None else None
     speeds = np.linspace(fps / 12, fps * 5 / 3, 20)
-    found = compare(fps, speeds, who.cone)
+    found = compare(fps, speeds, perception.cone)
     write_file(path, charts.svg(*perception_charts(found, speeds, fps)).encode())
     if not quiet:
         out("rad/s    " + "".join(f"{name:>11}" for name in found))

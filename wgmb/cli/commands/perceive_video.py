@@ -11,39 +11,38 @@ from ..._version import __version__
 from ...cone import Cone
 from ...errors import InputError
 from ...observer import Observer
-from ...run.perceive import Watched, densest_rate
-from ...run.video import Sink
-from ...run.video_output import write
+from ...run.perceive import PerceivedVideo, densest_rate
+from ...run.video import check_fits
+from ...run.video_output import Sink, write
 from ...settings import BlurSettings, InputSettings, OutputSettings
 from ...settings.video import VideoSettings
 from ...threads import Behind
 from ...video.linear_frames import VideoPictures
-from ...video.output_times import Moment, moments
-from ...video.read.reader import Footage
+from ...video.output_times import OutputFrame, moments
+from ...video.read.reader import VideoReader
 from ..exit_codes import DONE, SOME_FAILED
 from ..terminal import note, progress
-from .blur_video import check_fits
 
 
 def perceive_video(
     path: str,
     output: OutputSettings,
-    given: InputSettings,
+    input: InputSettings,
     cone: Cone,
     settings: dict[str, Any],
     adapter: str | None,
     quiet: bool,
 ) -> int:
     """Write what is seen of each picture, at its time; returns the exit code."""
-    check_fits(given, BlurSettings())
+    check_fits(input, BlurSettings())
     if output.fps is not None:
         raise InputError("`fps` is for frames, the pictures of a video have their own times")
-    footage = Footage(path, max_mb=given.max_mb)
-    clock = VideoSettings().clock(footage, given.frames)
+    footage = VideoReader(path, max_mb=input.max_mb)
+    clock = VideoSettings().clock(footage, input.frames)
     wanted = moments(footage, clock, None)
     device = gpu.open_device(adapter)
     observer = Observer(densest_rate(footage, cone), cone, device=device)
-    seen = Watched(footage, clock, VideoPictures(footage, device), observer)
+    seen = PerceivedVideo(footage, clock, VideoPictures(footage, device), observer)
     first = next(n for n, t in enumerate(footage.times) if clock.out(t) == wanted[0].time)
     if not quiet:
         for text in footage.notes:
@@ -51,7 +50,7 @@ def perceive_video(
     started = time.perf_counter()
     with progress(len(wanted), quiet, "perceiving") as tell:
 
-        def make_part(moments: Sequence[Moment], sink: Sink) -> None:
+        def make_part(moments: Sequence[OutputFrame], sink: Sink) -> None:
             shown = seen.shown(first, first + len(moments) - 1)
             with Behind(sink.put) as put:
                 for number, color, held in shown:

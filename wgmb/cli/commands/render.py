@@ -18,24 +18,24 @@ from ...settings.color import DisplaySettings, color_record
 from ..exit_codes import DONE
 from ..options import (
     BlurOptions,
-    Look,
-    Moments,
+    Blurs,
+    DisplayOptions,
+    Outputs,
     SceneName,
-    Shown,
+    SceneTimes,
     ShutterOptions,
-    Target,
-    When,
+    Shutters,
 )
 from ..terminal import note, progress
 
 
 def render(
     scene: SceneName,
-    output: Target,
-    what: Moments = SceneSettings(),
-    look: Look = BlurOptions(),
-    when: When = ShutterOptions(),
-    color: Shown = DisplaySettings(),
+    output: Outputs,
+    what: SceneTimes = SceneSettings(),
+    blur: Blurs = BlurOptions(),
+    shutter: Shutters = ShutterOptions(),
+    color: DisplayOptions = DisplaySettings(),
     *,
     sharp: bool = False,
     passes: bool = False,
@@ -68,8 +68,8 @@ def render(
     """
     fps = float(output.rate)
     picture = what.make(scene)
-    look, when = look.resolved(picture), when.resolved(picture, fps)
-    if look.holdout or look.scale:
+    blur, shutter = blur.resolved(picture), shutter.resolved(picture, fps)
+    if blur.holdout or blur.scale:
         raise InputError("--holdout and --scale need input files; use them with wgmb blur")
     if passes and not output.is_exr:
         raise InputError(f"--passes needs an .exr output, got {output.output}")
@@ -78,11 +78,11 @@ def render(
     moments = what.moments(fps)
     if confidence and sharp:
         raise InputError("--confidence cannot be combined with --sharp")
-    made = look.make(when.make(), adapter)
+    made = blur.make(shutter.make(), adapter)
     renderer = Render(picture, made, size=size_of(what.size), fps=fps, antialias=what.antialias)
     settings = {"scene": scene, "sharp": sharp, "passes": passes} | output.looks
-    settings |= plain(look) | plain(when) | plain(what) | {"wgmb": __version__, "fps": fps}
-    settings["samples"], settings["curve"] = look.settled_samples(), when.curve_read()
+    settings |= plain(blur) | plain(shutter) | plain(what) | {"wgmb": __version__, "fps": fps}
+    settings["samples"], settings["curve"] = blur.settled_samples(), shutter.curve_read()
     if confidence:
         check_confidence(made.method.name, output)
         settings["confidence"] = True

@@ -13,12 +13,12 @@ from ... import charts
 from ...errors import InputError
 from ...io.atomic import write_file
 from ...shutter import OVERLAPS
-from ..options import ShutterOptions, When
+from ..options import ShutterOptions, Shutters
 from ..terminal import out
 
 
 def shutter(
-    when: When = ShutterOptions(),
+    shutter: Shutters = ShutterOptions(),
     *,
     output: Annotated[Path, Parameter(alias="-o")],
     overwrite: bool = False,
@@ -40,9 +40,9 @@ def shutter(
         raise InputError(f"output {output}: the name must end in .svg")
     if output.exists() and not overwrite:
         raise InputError(f"{output} exists; --overwrite replaces it")
-    if when.shutter is None:
-        when = replace(when, shutter=OVERLAPS.get(when.curve or "box", 360.0))
-    made, name = when.resolved().make(), when.curve or "box"
+    if shutter.shutter is None:
+        shutter = replace(shutter, shutter=OVERLAPS.get(shutter.curve or "box", 360.0))
+    made, name = shutter.resolved().make(), shutter.curve or "box"
     write_file(output, charts.svg(*charts.shutter_charts(made, Path(name).name)).encode())
     total = made.overlap(np.linspace(0, 1, 2001))
     low, high = round(float(total.min()), 3), round(float(total.max()), 3)

@@ -15,14 +15,14 @@ from ...run.report import Outcome
 from ...run.sequence import vectors_sequence
 from ...settings import plain
 from ..conclusion import conclude
-from ..options import Given, InputOptions
+from ..options import InputOptions, Inputs
 from ..terminal import note, progress
 
 
 def vectors(
     pattern: str,
     /,
-    given: Given = InputOptions(),
+    input: Inputs = InputOptions(),
     *,
     output: Annotated[str, Parameter(alias="-o")],
     program: Annotated[
@@ -58,8 +58,8 @@ def vectors(
     quiet
         Print errors only.
     """
-    clip = given.open(pattern)
-    settings = {"wgmb": __version__, "as": program, "max_displace": max_displace} | plain(given)
+    clip = input.open(pattern)
+    settings = {"wgmb": __version__, "as": program, "max_displace": max_displace} | plain(input)
     for not_a_look in ("frames", "skip_missing", "max_mb"):
         del settings[not_a_look]
     has = clip.has

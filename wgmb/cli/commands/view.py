@@ -13,22 +13,22 @@ from ...settings.video import VideoSettings
 from ..exit_codes import DONE
 from ..options import (
     BlurOptions,
+    Blurs,
     Colors,
-    Given,
     InputOptions,
-    Look,
+    Inputs,
     ShutterOptions,
+    Shutters,
     Videos,
-    When,
 )
 from ..terminal import note
 
 
 def view(
     what: str | None = None,
-    given: Given = InputOptions(),
-    look: Look = BlurOptions(),
-    when: When = ShutterOptions(),
+    input: Inputs = InputOptions(),
+    blur: Blurs = BlurOptions(),
+    shutter: Shutters = ShutterOptions(),
     color: Colors = ColorSettings(),
     video: Videos = VideoSettings(),
     *,
@@ -73,9 +73,9 @@ def view(
     if config is not None:
         state = viewer.State.read(config)
     if what is not None:
-        state = state.opened(what, given.max_mb)
-    state = state.told(vars(given) | vars(look) | vars(when) | vars(color) | vars(video))
-    if state.is_video and config is None and look.method is None:
+        state = state.opened(what, input.max_mb)
+    state = state.told(vars(input) | vars(blur) | vars(shutter) | vars(color) | vars(video))
+    if state.is_video and config is None and blur.method is None:
         settled, _ = video.settled(gpu.open_device(adapter))
         state = state.with_method(settled.method)
     if fps is not None:

@@ -13,7 +13,7 @@ from .kinds import PASSES, Shading, kinds_of
 from .layers import Layers
 from .scatter import Scatter
 from .search import Search
-from .shading import MovingLight, Times
+from .shading import LightTimes, MovingLight
 from .tile_motions import TileMotions
 
 
@@ -104,7 +104,7 @@ class Gather:
         added = None
         if kinds := kinds_of(inputs, self._shading):
             opens, closes = inputs.exposed
-            times = Times.within(opens, closes, inputs.samples)
+            times = LightTimes.within(opens, closes, inputs.samples)
             added = self._light.encode(encoder, inputs.bindings, kinds, times, inputs.frame.weight)
         starts = candidates, scattered
         self._search.encode(encoder, inputs, textures, starts, worklists, output, added)

@@ -6,7 +6,7 @@ from typing import Literal
 
 from ...errors import InputError
 from ..contract import Inputs, PreparedFrame
-from .shading import Kind, Seen
+from .shading import Kind, SurfaceLight
 
 Shading = Literal["auto", "off", "passes", "frames"]
 PAIRS = ("diffuse_light", "diffuse_color"), ("glossy_light", "glossy_color")
@@ -44,8 +44,8 @@ def _has(frame: PreparedFrame, *names: str) -> bool:
     return all(getattr(frame, name) is not None for name in names)
 
 
-def _seen(frame: PreparedFrame, light: str) -> Seen | None:
+def _seen(frame: PreparedFrame, light: str) -> SurfaceLight | None:
     view = getattr(frame, light)
     if view is None or frame.motion is None or frame.depth is None:
         return None
-    return Seen(view, frame.depth, frame.motion)
+    return SurfaceLight(view, frame.depth, frame.motion)

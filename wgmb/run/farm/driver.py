@@ -25,9 +25,9 @@ from ..job import Job
 from ..report import Outcome
 from ..sequence import ON_REQUEST
 from .workers import (
-    Part,
-    Place,
+    Chunk,
     Worker,
+    WorkerPool,
     size_of_part,
 )
 
@@ -39,21 +39,21 @@ _GONE = "the scheduler is gone; start it and its workers again, and go on with `
 class Driver:
     """One run on a cluster."""
 
-    def __init__(self, farm: Place, client: Any, job: Job, text: str, progress: Progress):
-        from .plugin import Blurring, plugin_name
+    def __init__(self, farm: WorkerPool, client: Any, job: Job, text: str, progress: Progress):
+        from .plugin import BlurPlugin, plugin_name
 
         self._farm, self._client, self._job, self._progress = farm, client, job, progress
         self._id = uuid.uuid4().hex[:8]
         self._topic = plugin_name(self._id)
         embedded = farm.cluster is None
         adapters = farm.adapters() if embedded else [farm.adapter] if farm.adapter else []
-        make = farm.plugin or Blurring
+        make = farm.plugin or BlurPlugin
         self._plugin = make(self._id, text, adapters, embedded)
         self._events: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
         self._workers: dict[str, Worker] = {}
         self._named: set[tuple[str, str]] = set()
         self._refusals: list[tuple[bool, str]] = []
-        self._parts: deque[Part] = deque()
+        self._parts: deque[Chunk] = deque()
         self._divided = False
         self._order = np.sort(np.asarray(job.numbers, np.int64))
         self._ticked = np.zeros(len(job.numbers), bool)
@@ -170,7 +170,7 @@ class Driver:
         if part.deaths < 2:
             self._parts.appendleft(part)
         elif len(part.numbers) > 1:
-            self._parts.extendleft(Part([n]) for n in reversed(part.numbers))
+            self._parts.extendleft(Chunk([n]) for n in reversed(part.numbers))
         else:
             self._fail(part, _TWICE)
 
@@ -212,10 +212,10 @@ class Driver:
     def _divide(self, workers: int) -> None:
         numbers = self._job.numbers
         size = size_of_part(len(numbers), workers)
-        self._parts.extend(Part(numbers[i : i + size]) for i in range(0, len(numbers), size))
+        self._parts.extend(Chunk(numbers[i : i + size]) for i in range(0, len(numbers), size))
         self._divided = True
 
-    def _hand_over(self, worker: Worker, part: Part) -> None:
+    def _hand_over(self, worker: Worker, part: Chunk) -> None:
         from .plugin import blur_part
 
         self._tasks += 1
@@ -252,13 +252,13 @@ class Driver:
             self._vanished(worker, part)
         future.release()
 
-    def _vanished(self, worker: Worker, part: Part) -> None:
+    def _vanished(self, worker: Worker, part: Chunk) -> None:
         """A worker died before the scheduler noticed; given another part, it would die twice."""
         del self._workers[worker.address]
         worker.part = part
         self._gone(worker)
 
-    def _took(self, worker: Worker, part: Part, outcome: Outcome) -> None:
+    def _took(self, worker: Worker, part: Chunk, outcome: Outcome) -> None:
         report = outcome.report
         worker.faults = 0
         done = [*report.done, *report.skipped]
@@ -273,13 +273,13 @@ class Driver:
             if part.refused_by:
                 report.failed = dict.fromkeys(rest, report.stopped)
             else:
-                self._parts.append(Part(rest, refused_by={worker.address}))
+                self._parts.append(Chunk(rest, refused_by={worker.address}))
         outcome.share(part.numbers)
         self.outcome.add(outcome)
         for number in (*done, *report.failed):
             self._tick(number, "failed" if number in report.failed else "done")
 
-    def _fault(self, worker: Worker, part: Part, error: BaseException | None) -> None:
+    def _fault(self, worker: Worker, part: Chunk, error: BaseException | None) -> None:
         """The part could not even be begun."""
         why = str(error) if isinstance(error, Error) else f"{type(error).__name__}: {error}"
         why = " ".join(why.split())
@@ -294,7 +294,7 @@ class Driver:
         else:
             self._parts.append(part)
 
-    def _fail(self, part: Part, why: str) -> None:
+    def _fail(self, part: Chunk, why: str) -> None:
         for number in part.numbers:
             self.outcome.report.failed[number] = why
             self._tick(number, "failed")

@@ -16,12 +16,12 @@ from ..job_file import stored, time_there
 from ..report import Outcome
 from .driver import Driver
 from .local import closing, local_client
-from .workers import SMALLEST, Place, hardware_adapters
+from .workers import SMALLEST, WorkerPool, hardware_adapters
 
 _CONNECT = 10  # seconds to reach a scheduler
 
 
-class Farm(Place):
+class Farm(WorkerPool):
     """A Place whose workers blur jobs."""
 
     def blur(self, job: Job, progress: Progress | None = None) -> Outcome:
@@ -56,7 +56,7 @@ def as_farm_job(job: Job) -> Job:
     if job.is_part_of_run:
         return job
     job.make_output()
-    output = job.asked.output
+    output = job.request.output
     if output.overwrite and not output.resume and job.since is None:
         return replace(job, since=time_there(Path(output.output).parent))
     return job

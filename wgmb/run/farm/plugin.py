@@ -44,7 +44,7 @@ class WorkerState:
     lacks_gpu: bool = False
 
 
-class Blurring(WorkerPlugin):
+class BlurPlugin(WorkerPlugin):
     """One run in one worker process; `setup` opens the device before anything else is done.
 
     `text`: of the job file. `adapters`: of workers that are named 0, 1, 2 and so on; without,

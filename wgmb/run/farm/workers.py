@@ -15,7 +15,7 @@ PATIENCE = 60.0
 
 
 @dataclass
-class Place:
+class WorkerPool:
     """The place of the workers, and the receivers of messages.
 
     `cluster`: address of a scheduler; without, `workers` processes are started here, by default
@@ -39,7 +39,7 @@ class Place:
 
 
 @dataclass
-class Part:
+class Chunk:
     """Frames that are given to a worker together."""
 
     numbers: list[int]
@@ -56,7 +56,7 @@ class Worker:
     name: str = ""
     host: str = ""
     why_not: str | None = None  # "": it can work; None: it is not known yet
-    part: Part | None = None
+    part: Chunk | None = None
     future: Any = None
     faults: int = 0
 

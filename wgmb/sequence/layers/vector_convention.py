@@ -15,22 +15,22 @@ from ..data_windows import (
     near_enough,
     union,
 )
-from ..frame_cache import StoredFrames
+from ..frame_cache import FrameCache
 from ..frame_file import FrameFile
 from . import vector_test, vectors
 
 
-class Meaning:
+class ConventionFinder:
     """The vector convention of the frames in `stored`. `known`: what was found before, if
     anything.
     """
 
-    def __init__(self, stored: StoredFrames, known: vector_test.Finding | None):
+    def __init__(self, stored: FrameCache, known: vector_test.ConventionFinding | None):
         self._stored, self.known = stored, known
         self._wanted = stored.passes.vectors
 
     @property
-    def found(self) -> vector_test.Finding:
+    def found(self) -> vector_test.ConventionFinding:
         """The vector convention, determined once for all frames.
 
         By name, then tested on the first frame on disk; unless that shows what the name says, on
@@ -48,11 +48,11 @@ class Meaning:
             return vectors.mask_of(source.channels, meaning, source.beside) if meaning else None
         return None
 
-    def _find_out(self) -> vector_test.Finding:
+    def _find_out(self) -> vector_test.ConventionFinding:
         wanted, there = self._wanted, self._stored.files.on_disk
         if wanted.convention == "none":
-            return vector_test.Finding(None, False, "none requested")
-        found = vector_test.Finding(None, False, "no vector layer found")
+            return vector_test.ConventionFinding(None, False, "none requested")
+        found = vector_test.ConventionFinding(None, False, "no vector layer found")
         evidence: list[vector_test.Evidence] = []
         for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
             with contextlib.suppress(InputError, OSError):  # its turn to fail comes
@@ -60,7 +60,7 @@ class Meaning:
                 if named is None:
                     continue
                 if wanted.convention != "auto":
-                    return vector_test.Finding(named, True, str(named))
+                    return vector_test.ConventionFinding(named, True, str(named))
                 evidence.append(self._evidence(source, named))
                 found = vector_test.decide(named, evidence)
                 if found.sure and found.vectors == named:

@@ -40,7 +40,7 @@ _CHANGES = 4, 0.001  # such squares: so many at least, and this share of all
 
 
 @dataclass(frozen=True)
-class Finding:
+class ConventionFinding:
     """Result of testing vectors on the neighbouring frames."""
 
     vectors: Vectors | None  # the reading that explains the neighbours; None: there are none
@@ -108,7 +108,7 @@ _ZERO = (
 )
 
 
-def decide(vectors: Vectors, evidence: Sequence[Evidence]) -> Finding:
+def decide(vectors: Vectors, evidence: Sequence[Evidence]) -> ConventionFinding:
     """Test `vectors`, as which all motion in the evidence was read; frames are taken together.
 
     Every reading warps the neighbours; the one that leaves the least difference is meant. The
@@ -118,28 +118,28 @@ def decide(vectors: Vectors, evidence: Sequence[Evidence]) -> Finding:
     tested = [e for e in evidence if e.lookups]
     if not tested:
         if evidence and all(e.zero for e in evidence) and any(e.differs for e in evidence):
-            return Finding(vectors, False, f"{vectors}, {_ZERO}", notable=True)
+            return ConventionFinding(vectors, False, f"{vectors}, {_ZERO}", notable=True)
         doubts = [e.doubt for e in evidence if e.doubt] or ["no frame to test it on"]
-        return Finding(vectors, False, f"{vectors}, by name ({doubts[-1]})")
+        return ConventionFinding(vectors, False, f"{vectors}, by name ({doubts[-1]})")
     probes = _Probes(tested, _PROBES)
     still = probes.difference("", 0.0)
     if still == 0:
         text = f"{vectors}, by name (moving parts look the same in all frames: not testable)"
-        return Finding(vectors, False, text)
+        return ConventionFinding(vectors, False, text)
     stated = probes.difference("", 1.0)
     flip, scale, left = _best(tested, probes, vectors, stated)
     if left > min(_CLEARLY * stated, stated - _MATTERS * still):
         flip, scale, left = "", 1.0, stated
     if left > _EXPLAINS * still:
         text = f"{vectors}, by name; no interpretation of them predicts the neighbouring frame"
-        return Finding(vectors, False, text + ": check them", notable=True)
+        return ConventionFinding(vectors, False, text + ": check them", notable=True)
     then = _LEFT.format(stated / still)
     if (flip, scale) == ("", 1.0):
-        return Finding(vectors, True, f"{vectors}, tested: {then}")
+        return ConventionFinding(vectors, True, f"{vectors}, tested: {then}")
     meant = replace(vectors, flip=_combine(vectors.flip, flip), scale=vectors.scale * scale)
     shown = f"{meant} (vectors of {1 / scale:.3g} frames)" if scale != 1 else f"{meant}"
     text = f"{shown}, because with {vectors} {then}, with this {left / still:.0%}"
-    return Finding(meant, True, text, notable=True)
+    return ConventionFinding(meant, True, text, notable=True)
 
 
 def _best(

@@ -12,7 +12,7 @@ from ...color.coding import CodedPicture, Coding
 from ...gpu.textures import TexturePool
 from .average import Average, averages
 from .matrices import from_samples
-from .packed import Packed, Place, places_of
+from .packed import Packed, PlaneSlot, places_of
 from .uniforms import curve_of, reading, writing
 
 __all__ = ["Average", "Planes", "averages", "check"]
@@ -115,8 +115,8 @@ class Planes:
         self,
         encoder: wgpu.GPUCommandEncoder,
         samples: wgpu.GPUTexture,
-        place: Place,
-        places: list[Place],
+        place: PlaneSlot,
+        places: list[PlaneSlot],
         coding: Coding,
     ) -> None:
         """Record a plane's bytes."""

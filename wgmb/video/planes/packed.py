@@ -15,7 +15,7 @@ from ...gpu.textures import ScratchBuffer
 
 
 @dataclass(frozen=True)
-class Place:
+class PlaneSlot:
     """Position of a plane in the buffer."""
 
     component: int
@@ -37,12 +37,12 @@ class Packed:
         self._device, self._buffer = device, ScratchBuffer(device)
         self._staging: wgpu.GPUBuffer | None = None
 
-    def buffer(self, places: list[Place]) -> wgpu.GPUBuffer:
+    def buffer(self, places: list[PlaneSlot]) -> wgpu.GPUBuffer:
         """The buffer for these planes; what is in it is undefined."""
         return self._buffer.at_least(4 * _words(places))
 
     def read(
-        self, encoder: wgpu.GPUCommandEncoder, places: list[Place], coding: Coding
+        self, encoder: wgpu.GPUCommandEncoder, places: list[PlaneSlot], coding: Coding
     ) -> CodedPicture:
         """Submit what wrote the buffer, and return the planes."""
         size, usage = 4 * _words(places), wgpu.BufferUsage
@@ -67,16 +67,16 @@ class Packed:
         return CodedPicture(tuple(planes), coding)
 
 
-def _words(places: list[Place]) -> int:
+def _words(places: list[PlaneSlot]) -> int:
     return places[-1].first + places[-1].words * places[-1].size[1]
 
 
-def places_of(size: tuple[int, int], coding: Coding) -> list[Place]:
+def places_of(size: tuple[int, int], coding: Coding) -> list[PlaneSlot]:
     """Positions of the planes of a picture of `size` (width, height), in their order."""
     per, found, first = (2 if coding.bits > 8 else 4), [], 0
     for component, step in _components(coding):
         width, height = (-(-n // s) for n, s in zip(size, step, strict=True))
-        place = Place(component, step, (width, height), -(-width // per), first)
+        place = PlaneSlot(component, step, (width, height), -(-width // per), first)
         found.append(place)
         first += place.words * height
     return found

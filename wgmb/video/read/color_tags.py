@@ -15,7 +15,7 @@ from ...color.coding import (
     UNSPECIFIED,
     Coding,
 )
-from ..pixels import Layout
+from ..pixels import PlaneLayout
 
 _PAL = 5  # primaries of 625 lines
 _LIMITED, _FULL = 1, 2  # ranges, as FFmpeg counts them
@@ -50,7 +50,7 @@ def _is_told(tag: int, which: int) -> bool:
 
 
 def assumed(
-    of: Layout, size: tuple[int, int], codec: str, tags: Tags
+    of: PlaneLayout, size: tuple[int, int], codec: str, tags: Tags
 ) -> tuple[Coding, tuple[str, ...]]:
     """The Coding with these tags, and what had to be assumed, in words.
 

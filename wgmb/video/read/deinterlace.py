@@ -13,7 +13,7 @@ from av.error import BlockingIOError, EOFError
 from av.filter import Graph
 
 
-class Fields:
+class Deinterlaced:
     """Makes two pictures of an interlaced frame (bwdif)."""
 
     def __init__(self, size: tuple[int, int], pixels: str, base: Fraction):

@@ -31,7 +31,7 @@ from ...io import limits
 from ..hdr10 import LightLevel, Mastering, is_base_layer
 from ..pixels import (
     THREADS,
-    Layout,
+    PlaneLayout,
     is_transparent,
     layout,
     planes_of,
@@ -40,8 +40,8 @@ from ..write.encoders import Facts
 from .color_tags import assumed, either, tags_of
 from .container import opened, picture_stream
 from .decoder import Decoder, decoded
-from .deinterlace import Fields
-from .rotation import turn_of
+from .deinterlace import Deinterlaced
+from .rotation import rotation_of
 from .timeline import Times, scanned
 
 _OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
@@ -62,7 +62,7 @@ class OtherStream:
     """Its kind in words, such as "aac, 48000 Hz, stereo"."""
 
 
-class Footage:
+class VideoReader:
     """A video file.
 
     Pictures have numbers from 0 on and are at `times` [s], on the clock that the file's streams
@@ -135,10 +135,10 @@ class Footage:
         found = layout(self.pixels, is_transparent(frame))
         if found is None:
             raise InputError(f"{self.path}: pixels of kind {self.pixels} are not supported")
-        self._layout: Layout = found
+        self._layout: PlaneLayout = found
         self._frame_size = frame.width, frame.height
         side = _side_data(frame)
-        self._turn = turn_of(side.get(Type.DISPLAYMATRIX), frame.rotation)
+        self._turn = rotation_of(side.get(Type.DISPLAYMATRIX), frame.rotation)
         self.mastering = _read(Mastering, side.get(Type.MASTERING_DISPLAY_METADATA))
         self.light_level = _read(LightLevel, side.get(Type.CONTENT_LIGHT_LEVEL))
         tags = either(tags_of(frame), self._tagged)
@@ -323,7 +323,7 @@ class Footage:
             yield from self._decoder.frames(first)
             return
         before = max(first // 2 - 2, 0)  # what bwdif looks back on
-        fields = Fields(self._frame_size, self.pixels, self._packets.times.base)
+        fields = Deinterlaced(self._frame_size, self.pixels, self._packets.times.base)
         by = VideoReformatter()
         for number, frame in self._decoder.frames(before):
             if number >= before:

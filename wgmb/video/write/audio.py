@@ -21,7 +21,7 @@ from av.filter import Graph
 from av.packet import Packet
 
 from ..clock import Clock
-from .time_stretch import Stretch
+from .time_stretch import TimeStretch
 
 _ENCODERS = {"opus": "libopus", "vorbis": "libopus", "mp3": "libmp3lame", "mp3float": "libmp3lame"}
 _SAME = ("aac", "flac", "alac", "ac3", "eac3", "pcm_")  # whose encoders have the decoders' names
@@ -30,7 +30,7 @@ _PER_CHANNEL = 96_000  # bits a second, at least
 _GAP = Fraction(1, 20)  # of the input's times [s], that silence fills
 
 
-class Resounded:
+class SoundAtSpeed:
     """A stream of sound at a Clock's speed, at its own pitch or (`keeps_pitch` False) as a tape.
 
     Gaps in the input's times stay gaps, as silence. `into` is the output's stream that `encoder`
@@ -42,9 +42,9 @@ class Resounded:
         self._rate = source.rate
         self._fltp = AudioResampler("fltp", source.layout, self._rate)
         if keeps_pitch:
-            self._changed = Stretch(self._rate, source.layout.nb_channels, clock.speed)
+            self._changed = TimeStretch(self._rate, source.layout.nb_channels, clock.speed)
         else:
-            self._changed = Tape(self._rate, source.layout, clock.speed)
+            self._changed = Resampled(self._rate, source.layout, clock.speed)
         self._begin: Fraction | None = None  # input time of the first sample that is taken
         self._given = self._made = 0
 
@@ -111,7 +111,7 @@ class Resounded:
         yield from self._into.encode(frame)
 
 
-class Tape:
+class Resampled:
     """Sound that is resampled: its pitch follows its speed. The same words as Stretch."""
 
     def __init__(self, rate: int, layout: AudioLayout, speed: Fraction):

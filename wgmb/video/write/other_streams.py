@@ -26,7 +26,7 @@ from av.stream import Discard, Disposition, Stream
 
 from ..clock import AS_IT_IS, Clock
 from ..read.container import opened
-from .audio import Resounded, encoder
+from .audio import SoundAtSpeed, encoder
 
 if TYPE_CHECKING:
     from av.container.core import Chapter
@@ -53,7 +53,7 @@ class OtherStreams:
         self._path, self._pictures, self._clock = path, pictures, clock
         self._keeps_pitch = keeps_pitch
         self._container = opened(path)
-        self._ways: dict[int, _Copied | Resounded] = {}
+        self._ways: dict[int, _Copied | SoundAtSpeed] = {}
         self._packets: Iterator[Packet[Any]] = iter(())
         self._next: Packet[Any] | None = None
         self._texts = dict(self._container.metadata)
@@ -119,7 +119,7 @@ class OtherStreams:
             source = cast(AudioStream, stream)
             into = encoder(source, to)
             _describe(into, stream)
-            self._ways[stream.index] = Resounded(source, into, self._clock, self._keeps_pitch)
+            self._ways[stream.index] = SoundAtSpeed(source, into, self._clock, self._keeps_pitch)
             return ""
         made = _from_template(stream, to)
         _describe(made, stream)

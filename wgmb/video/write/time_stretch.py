@@ -28,7 +28,7 @@ _GUARD = 0.003  # round an onset, that no other piece enters [s]
 _NEAR = 1.25  # half pieces from an onset, within which pieces are copied
 
 
-class Stretch:
+class TimeStretch:
     """Streams sound through WSOLA: (channels, samples) float32 in and out.
 
     `speed` 0.5 makes it twice as long. All output together has samples / speed samples.

@@ -9,17 +9,17 @@ from ...color.spaces import ColorSpace, Display
 from ...errors import DeviceError, InputError
 from ...gpu.textures import TexturePool
 from ..state.state import State
-from .ocio_shader import OUTPUT, GpuDisplay
+from .ocio_shader import OUTPUT, OcioShader
 from .screen import Image
 
 
-class Displayed:
+class DisplayCache:
     """The displayed picture, kept until the picture or its display changes."""
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)
         self._opened: tuple[tuple | None, Display | None] = None, None
-        self._compiled: dict[tuple[Display, ColorSpace], GpuDisplay | None] = {}
+        self._compiled: dict[tuple[Display, ColorSpace], OcioShader | None] = {}
         self._shown: dict[str, tuple[tuple, Image]] = {}
 
     def display(self, state: State) -> Display | None:
@@ -55,7 +55,7 @@ class Displayed:
         space.check_linear()
         if (display, space) not in self._compiled:
             try:
-                self._compiled[display, space] = GpuDisplay(self._device, display, space)
+                self._compiled[display, space] = OcioShader(self._device, display, space)
             except (DeviceError, InputError):  # the same picture, only slower
                 self._compiled[display, space] = None
         if (compiled := self._compiled[display, space]) is not None:

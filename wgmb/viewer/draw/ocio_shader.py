@@ -48,7 +48,7 @@ _FIRST_TABLE = 5
 _MOST_LISTS = 8  # storage buffers that WebGPU guarantees
 
 
-class GpuDisplay:
+class OcioShader:
     """The compiled shader of a display for pictures in one colour space.
 
     DeviceError where the device or its compiler cannot have it.

@@ -21,7 +21,7 @@ from ...sequence.input_color import chromaticities
 from ..capabilities import Choices
 from ..state.state import BOTH_EYES, REFERENCE, State
 from ..subjects.subject import SceneSubject, Subject
-from ..subjects.video import FootageSubject
+from ..subjects.video import VideoSubject
 from .adaptive import Pace
 from .blurs import Blurs, shutter_of
 from .perception import Perceived, seen_frames
@@ -32,7 +32,7 @@ from .screen import (
     fit,
     whole,
 )
-from .slot import Report, Shown
+from .slot import FrameStatus, Slot
 from .video_light import VideoLight, primaries_of
 
 _STEP = 0.07  # seconds of work on what converges, between two frames of the window
@@ -50,12 +50,12 @@ class Renderer:
         self.choices, self.quality = Choices(device), Quality()
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self.pace = Pace(5 if software else 0)
-        self.report = Report()
+        self.report = FrameStatus()
         self._images, self._video_light = TexturePool(device), VideoLight(device)
         self._perceived = {slot: Perceived(device) for slot in ("first", "second")}
         self._past: SceneSubject | None = None
         self._blurs = Blurs(device, self.choices, self.pace)
-        self._shown = {"first": Shown(), "second": Shown()}
+        self._shown = {"first": Slot(), "second": Slot()}
         self._coming = dict(self._shown)  # takes the place of what is shown
         self._seen: dict[str, Image] = {}
         self.chromaticities: dict[str, Any] = {}  # of what is shown, as an attribute of an EXR
@@ -64,7 +64,7 @@ class Renderer:
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._timing = TimestampClock(device) if TimestampClock.usable(device) else None
 
-    def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> Report:
+    def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> FrameStatus:
         """Go on with what `state` shows in `area` [px] of the canvas, `now` [s].
 
         `moving`: quick is better than fine. `full`: everything now, however long it takes.
@@ -72,10 +72,10 @@ class Renderer:
         started = time.perf_counter()
         subject = self.choices.subject(state)
         shape = subject.size(state)
-        is_video = isinstance(subject, FootageSubject)
+        is_video = isinstance(subject, VideoSubject)
         place = fit(subject.shape if is_video else shape, area, state)
         size, antialias = self._quality(state, shape, place, now, moving, full)
-        report = Report(shape if not state.is_scene else whole(place), place, area, moving)
+        report = FrameStatus(shape if not state.is_scene else whole(place), place, area, moving)
         quick = moving and not full
         names = self._wanted(state)
         slots = ("first", "second")[: len(names)]
@@ -90,7 +90,7 @@ class Renderer:
         self._seen = self._displayed(slots, state, subject)
         unfinished = not all(self._coming[slot].ready for slot in slots)
         report.busy = moving or unfinished or self._level > 0
-        if isinstance(subject, FootageSubject):
+        if isinstance(subject, VideoSubject):
             report.made_of = subject.made_of(state, shutter_of(state))
             if any(name != "sharp" for name, _ in names):
                 report.waiting = subject.waiting
@@ -115,7 +115,7 @@ class Renderer:
         """The images by slot, colours as the display of an OpenColorIO config shows them."""
         images = {slot: self._shown[slot].image for slot in slots}
         displayed, self.chromaticities = self.choices.displayed, {}
-        if isinstance(subject, FootageSubject):
+        if isinstance(subject, VideoSubject):
             self.chromaticities = {"chromaticities": primaries_of(subject.coding)}
             for slot, image in images.items():
                 if image.kind == "COLOR" and not self._is_data(self._shown[slot], state):
@@ -129,11 +129,11 @@ class Renderer:
                 images[slot] = displayed.image(slot, image, display, space, exposure)
         return images
 
-    def _is_data(self, shown: Shown, state: State) -> bool:
+    def _is_data(self, shown: Slot, state: State) -> bool:
         """Return True for an image of a method's own data, whose colours are no light."""
         return shown.key[0] in self.choices.shows(state)
 
-    def download(self, shown: Shown | None = None) -> np.ndarray:
+    def download(self, shown: Slot | None = None) -> np.ndarray:
         """(height, width, channels) float32 of the first image, or of another."""
         shown = shown or self._shown["first"]
         assert shown.texture is not None
@@ -193,7 +193,7 @@ class Renderer:
         antialias,
         quick: bool,
         full: bool,
-        report: Report,
+        report: FrameStatus,
     ) -> None:
         """Draw some of `name`; it is shown once it is no coarser than what it replaces."""
         shown, coming = self._shown[slot], self._coming[slot]
@@ -207,7 +207,7 @@ class Renderer:
                 return
             texture = f"{slot} {1 + shown.name.endswith('1')}"
             label = self._label(name, state) + (f", {view}" if view else "")
-            coming = Shown(label, key, fine, texture)
+            coming = Slot(label, key, fine, texture)
             self._coming[slot] = coming
         if coming.ready:
             return
@@ -228,7 +228,7 @@ class Renderer:
 
         One entry for each output frame that is needed, the present one first.
         """
-        if not isinstance(subject, FootageSubject) or name == "sharp":
+        if not isinstance(subject, VideoSubject) or name == "sharp":
             return []
         method = METHODS[name if name in METHODS else state.method]
         states = seen_frames(state) if name == "perceived" else [state]
@@ -284,7 +284,7 @@ class Renderer:
             return "nature, perceived"
         return f"{state.method}: {name}" if name in self.choices.shows(state) else name
 
-    def _measure(self, first: Shown, last: Shown) -> Measured | None:
+    def _measure(self, first: Slot, last: Slot) -> Measured | None:
         """Return the difference between the first image and the reference, once both are ready."""
         key = (first.key, first.fine, last.key, last.fine)
         if first.kind == "COLOR" and first.ready:

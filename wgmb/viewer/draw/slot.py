@@ -11,7 +11,7 @@ from .screen import Box, Image
 
 
 @dataclass
-class Shown:
+class Slot:
     """One image and how far it has come."""
 
     label: str = ""
@@ -35,7 +35,7 @@ class Shown:
 
 
 @dataclass
-class Report:
+class FrameStatus:
     """Result of one update, for the panel."""
 
     full: tuple[int, int] = (0, 0)

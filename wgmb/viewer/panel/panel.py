@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from ...color.spaces import Display
 from ...methods.options import Option
 from ..controls import Box
-from ..draw.slot import Report
+from ..draw.slot import FrameStatus
 from ..state.state import State
 from ..state.video_time import moment, output
 from ..state.words import for_shell
@@ -25,7 +25,7 @@ _HIGH, _TALL = 830.0, 1000.0  # windows so high show more opened, and all [logic
 class Info:
     """Contents of the panel: status, measurements and available choices."""
 
-    report: Report
+    report: FrameStatus
     adapter: str
     methods: list[str]
     looks: list[str]

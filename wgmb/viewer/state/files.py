@@ -16,12 +16,12 @@ from ...io import frame_numbers
 from ...sequence.frame_file import is_video
 from ...settings.video import VideoSettings
 from ...video.clock import Clock
-from ...video.output_times import Moments
-from ...video.read.reader import Footage
+from ...video.output_times import OutputFrames
+from ...video.read.reader import VideoReader
 
 _VIDEOS = 8  # that are remembered
 
-_known: OrderedDict[tuple[str, float], tuple[int, Footage]] = OrderedDict()
+_known: OrderedDict[tuple[str, float], tuple[int, VideoReader]] = OrderedDict()
 
 
 @lru_cache(maxsize=64)
@@ -30,7 +30,7 @@ def is_video_file(source: str) -> bool:
     return is_video(source)
 
 
-def footage_of(source: str, max_mb: float) -> Footage:
+def footage_of(source: str, max_mb: float) -> VideoReader:
     """The video in a file; the same object as long as the file does not change."""
     key, held = (source, max_mb), _known.get((source, max_mb))
     try:
@@ -40,7 +40,7 @@ def footage_of(source: str, max_mb: float) -> Footage:
             raise
         return held[1]
     if held is None or held[0] != changed:
-        _known[key] = held = changed, Footage(source, max_mb=max_mb)
+        _known[key] = held = changed, VideoReader(source, max_mb=max_mb)
         while len(_known) > _VIDEOS:
             _known.popitem(last=False)
     return held[1]
@@ -51,16 +51,16 @@ class Output:
     """The output frames of a video, and the clock that they are on."""
 
     clock: Clock
-    moments: Moments
+    moments: OutputFrames
 
 
 @lru_cache(maxsize=32)
 def output_of(
-    footage: Footage, frames: str | None, settings: VideoSettings, fps: Fraction | None
+    footage: VideoReader, frames: str | None, settings: VideoSettings, fps: Fraction | None
 ) -> Output:
     """The output of a video at a rate, or, where it is None, at the times of its own pictures."""
     clock = settings.clock(footage, frames)
-    return Output(clock, Moments(footage, clock, fps))
+    return Output(clock, OutputFrames(footage, clock, fps))
 
 
 def frames_of(source: str, max_mb: float) -> str:

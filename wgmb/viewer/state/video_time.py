@@ -15,7 +15,7 @@ from ...io import limits
 from ...io.frame_numbers import frame_numbers
 from ...settings import rate_of
 from ...settings.video import VideoSettings
-from ...video.output_times import Moment
+from ...video.output_times import OutputFrame
 from .files import (
     Output,
     footage_of,
@@ -101,7 +101,7 @@ def output(state: State) -> Output:
     return output_of(footage, frames, settings_of(state), fps)
 
 
-def moment(state: State) -> Moment:
+def moment(state: State) -> OutputFrame:
     """The output frame that is shown."""
     moments = output(state).moments
     return moments[min(max(math.ceil(state.frame - 0.5), 0), len(moments) - 1)]

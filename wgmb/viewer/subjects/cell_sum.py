@@ -17,7 +17,7 @@ from ...pipeline.blur import Blur
 _AT_ONCE = 2  # pictures that are on the GPU
 
 
-class CellSum:
+class PictureCellSum:
     """Blurs frames over their cells, and adds them by their shares."""
 
     def __init__(self, blur: Blur):

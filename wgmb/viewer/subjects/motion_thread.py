@@ -18,15 +18,15 @@ from ... import gpu
 from ...errors import Error
 from ...settings.video import FlowSettings
 from ...shots.motion_source import MotionSource
-from ...video.read.reader import Footage
-from .video_motion import Finder, Known, Wish
+from ...video.read.reader import VideoReader
+from .video_motion import MotionRequest, PictureFinder, PictureFinding
 
 _MEMORY = 1 << 30  # bytes of motion kept
 _FEWEST = 48  # pictures whose motion is kept at least
 _POLL = 0.2  # seconds after which the thread looks whether it should end
 
 
-class MotionMaker:
+class MotionThread:
     """Makes the motion of the pictures that are wanted, the first of them first.
 
     What is static is found before the first motion. `how`: where motion comes from, in words.
@@ -39,13 +39,13 @@ class MotionMaker:
         max_mb: float,
         settings: FlowSettings,
         device: wgpu.GPUDevice,
-        wish: Wish,
+        wish: MotionRequest,
     ):
         self._path, self._max_mb, self._wish = path, max_mb, wish
         beside = gpu.second_device(device)
         motion, self.how = settings.source(beside)
         self.problem = ""
-        self._known: OrderedDict[int, Known] = OrderedDict()
+        self._known: OrderedDict[int, PictureFinding] = OrderedDict()
         self._lock = threading.Lock()
         self._changed = threading.Event()
         self._ended = threading.Event()
@@ -55,7 +55,7 @@ class MotionMaker:
         self._thread = threading.Thread(target=work[0], args=work[1], name="motion", daemon=True)
         self._thread.start()
 
-    def known(self, number: int) -> Known | None:
+    def known(self, number: int) -> PictureFinding | None:
         """The finding about a picture; None until there is one."""
         with self._lock:
             if number in self._known:
@@ -82,8 +82,8 @@ class MotionMaker:
 
     def _work(self, device: wgpu.GPUDevice, motion: MotionSource | None) -> None:
         try:
-            footage = Footage(self._path, max_mb=self._max_mb)
-            find = Finder(footage, device, motion, self._wish)
+            footage = VideoReader(self._path, max_mb=self._max_mb)
+            find = PictureFinder(footage, device, motion, self._wish)
             for number in self._to_do():
                 known = find(number)
                 with self._lock:
@@ -107,7 +107,7 @@ class MotionMaker:
             else:
                 yield number
 
-    def _keep(self, number: int, known: Known) -> None:
+    def _keep(self, number: int, known: PictureFinding) -> None:
         self._known[number] = known
         size = sum(a.nbytes for a in (known.motion, known.depth) if a is not None)
         most = max(_MEMORY // max(size, 1), _FEWEST)

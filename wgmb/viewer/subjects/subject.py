@@ -32,7 +32,7 @@ from ...sequence.input_color import space_of, without_pixels
 from ...settings import InputSettings, SceneSettings, size_of
 from ..state.state import BOTH_EYES, State
 from ..state.words import set_words
-from .video import FootageSubject
+from .video import VideoSubject
 
 _MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
 _FRAMES_KEPT = 2, 16  # but so many at least, at most
@@ -274,7 +274,7 @@ def _bytes(frame: Frame) -> int:
     return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
 
 
-Subject = SceneSubject | ClipSubject | FootageSubject
+Subject = SceneSubject | ClipSubject | VideoSubject
 
 
 def methods_for(has: frozenset[str]) -> list[str]:

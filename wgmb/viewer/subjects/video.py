@@ -29,17 +29,17 @@ from ..state.video_time import (
     output,
     settings_of,
 )
-from .cell_sum import CellSum
-from .motion_thread import MotionMaker
-from .video_exposure import Exposed, exposed, reach
+from .cell_sum import PictureCellSum
+from .motion_thread import MotionThread
+from .video_exposure import VideoExposure, exposed, reach
 from .video_frames import FootageFrames
-from .video_motion import Wish
+from .video_motion import MotionRequest
 
 _PASSES = frozenset({"color", "motion", "depth"})
 _AHEAD = 48  # pictures whose motion is made while playing
 
 
-class FootageSubject:
+class VideoSubject:
     """A video: its output frames, as `wgmb blur` makes them.
 
     Where the motion of a picture is not known yet the picture is shown as it is; `stamp` changes
@@ -54,14 +54,14 @@ class FootageSubject:
         self._footage = footage_of(state.source, max_mb)
         self._times, settings = self._footage.times, settings_of(state)
         holdout_of([mask for mask in masks if mask != STATIC], self._footage)  # says what is wrong
-        wish = Wish(masks, settings.duplicates == "fill", given.get("cuts") or "")
-        self._maker = MotionMaker(self._footage.path, max_mb, settings, device, wish)
+        wish = MotionRequest(masks, settings.duplicates == "fill", given.get("cuts") or "")
+        self._maker = MotionThread(self._footage.path, max_mb, settings, device, wish)
         self._moves = settings.flow != "none"
         self.finding = "\n".join([f"motion: {self._maker.how}", *self._footage.notes])
         self._frames = FootageFrames(self._footage, device, self._maker.known, 1.0)
-        self._sums: dict[int, CellSum] = {}
+        self._sums: dict[int, PictureCellSum] = {}
         self._state = state
-        self._exposed: Exposed | None = None
+        self._exposed: VideoExposure | None = None
         self._lacking: list[int] = []
 
     # ---- what can be shown -----------------------------------------------------------------
@@ -164,7 +164,7 @@ class FootageSubject:
         """Let the search for motion end."""
         self._maker.close()
 
-    def _exposure(self, state: State, shutter: Shutter) -> Exposed:
+    def _exposure(self, state: State, shutter: Shutter) -> VideoExposure:
         known, clock = self._maker.known, output(state).clock
         return exposed(self._times, clock, moment(state), shutter, known)
 
@@ -238,10 +238,10 @@ class FootageSubject:
         planes.compress(encoder, light.create_view(), output.create_view())
         gpu.submit(self._device, encoder)
 
-    def _sum(self, blur: Blur) -> CellSum:
+    def _sum(self, blur: Blur) -> PictureCellSum:
         held = self._sums.get(id(blur))
         if held is None or held.blur is not blur:
             while len(self._sums) >= 4:
                 del self._sums[next(iter(self._sums))]
-            held = self._sums[id(blur)] = CellSum(blur)
+            held = self._sums[id(blur)] = PictureCellSum(blur)
         return held

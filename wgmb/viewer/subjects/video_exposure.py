@@ -11,16 +11,16 @@ import numpy as np
 from ...exposure import Cell, cells
 from ...shutter import Shutter
 from ...video.clock import Clock
-from ...video.output_times import Moment
+from ...video.output_times import OutputFrame
 from ...video.read.timeline import Times
-from .video_motion import Known
+from .video_motion import PictureFinding
 
-Knowledge = Callable[[int], Known | None]
+Knowledge = Callable[[int], PictureFinding | None]
 """The finding about a picture, by its number; None until there is one."""
 
 
 @dataclass(frozen=True)
-class Exposed:
+class VideoExposure:
     """An output frame, made of pictures of one shot."""
 
     here: int
@@ -34,8 +34,8 @@ class Exposed:
 
 
 def exposed(
-    times: Times, clock: Clock, moment: Moment, shutter: Shutter, known: Knowledge
-) -> Exposed:
+    times: Times, clock: Clock, moment: OutputFrame, shutter: Shutter, known: Knowledge
+) -> VideoExposure:
     """The exposure of an output frame; where too little is known, of what is known."""
     shown = picture_at(times, clock, moment)
     here, lacking = _kept(shown, known)
@@ -56,17 +56,17 @@ def exposed(
         numbers.append(after)
     found = cells([time(n) for n in numbers], at, interval, shutter)
     parts = tuple(Cell(numbers[cell.index], cell.share, cell.shutter) for cell in found)
-    return Exposed(here, tuple(numbers), parts, tuple(dict.fromkeys(lacking)))
+    return VideoExposure(here, tuple(numbers), parts, tuple(dict.fromkeys(lacking)))
 
 
-def picture_at(times: Times, clock: Clock, moment: Moment) -> int:
+def picture_at(times: Times, clock: Clock, moment: OutputFrame) -> int:
     """The picture that is shown at an output frame's time; before the first one, that."""
     tick = clock.back(moment.time) / times.base
     after = int(np.searchsorted(times.ticks, tick.numerator // tick.denominator, side="right"))
     return max(after - 1, 0)
 
 
-def reach(times: Times, clock: Clock, moment: Moment, shutter: Shutter) -> tuple[int, int]:
+def reach(times: Times, clock: Clock, moment: OutputFrame, shutter: Shutter) -> tuple[int, int]:
     """First and last picture of an exposure, if there is no cut and no repeat among them."""
     at = clock.back(moment.time)
     opens, closes = (

@@ -11,9 +11,9 @@ from ...errors import InputError
 from ...exposure import evened
 from ...frame import Frame
 from ...video.linear_frames import VideoPictures
-from ...video.read.reader import Footage
+from ...video.read.reader import VideoReader
 from .video_exposure import Knowledge
-from .video_motion import Known
+from .video_motion import PictureFinding
 
 _MEMORY = 1 << 29  # bytes of pictures kept
 _FEWEST = 12  # pictures kept at least
@@ -26,13 +26,13 @@ class FootageFrames:
     """
 
     def __init__(
-        self, footage: Footage, device: wgpu.GPUDevice, known: Knowledge, highlights: float
+        self, footage: VideoReader, device: wgpu.GPUDevice, known: Knowledge, highlights: float
     ):
         self._footage, self._known, self.highlights = footage, known, highlights
         self._pictures = VideoPictures(footage, device, highlights)
         self._times = footage.times.seconds
         self._colors: OrderedDict[int, np.ndarray] = OrderedDict()
-        self._frames: OrderedDict[int, tuple[Known | None, Frame]] = OrderedDict()
+        self._frames: OrderedDict[int, tuple[PictureFinding | None, Frame]] = OrderedDict()
 
     def __call__(self, number: int, neighbours: bool = False) -> Frame:
         """A picture with its motion; with `neighbours` between them, where motion leads there."""
@@ -56,7 +56,7 @@ class FootageFrames:
         self._frames.move_to_end(number)
         return held[1]
 
-    def _made(self, number: int, known: Known | None) -> Frame:
+    def _made(self, number: int, known: PictureFinding | None) -> Frame:
         color = self._color(number)
         if known is None or known.motion is None:
             return Frame(color, number=number).locked()

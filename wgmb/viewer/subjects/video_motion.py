@@ -19,11 +19,11 @@ from ...flow import Shot
 from ...gpu.textures import TexturePool
 from ...shots.cut_list import CutList
 from ...shots.motion_source import MotionSource
-from ...shots.reader import Picture, Reel
+from ...shots.reader import Picture, ShotReader
 from ...video.holdouts import holdout_of
 from ...video.planes import Planes
-from ...video.read.reader import Footage
-from ...video.thumbnail import Glance, is_cut, is_double
+from ...video.read.reader import VideoReader
+from ...video.thumbnail import Thumbnail, is_cut, is_double
 
 _BEFORE = 10  # pictures before one that may have a say in its motion, or in where its shot begins
 _EARLIER = 8  # more of them read at first, so that going back does not begin anew at each step
@@ -32,7 +32,7 @@ _NEAR = 48  # pictures ahead that are read on to
 
 
 @dataclass(frozen=True)
-class Known:
+class PictureFinding:
     """The finding about a picture; `before` and `after` are the numbers of its neighbours."""
 
     motion: np.ndarray | None
@@ -53,7 +53,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Wish:
+class MotionRequest:
     """Settings on which the pictures' neighbours depend, besides the source of the motion.
 
     `masks`: what stays sharp (see video/holdouts.py). `fill`: repeated pictures are left out.
@@ -65,39 +65,43 @@ class Wish:
     cuts: str = ""
 
 
-class Finder:
+class PictureFinder:
     """Finds what can be known of pictures, one after the other, on a device."""
 
     def __init__(
-        self, footage: Footage, device: wgpu.GPUDevice, motion: MotionSource | None, wish: Wish
+        self,
+        footage: VideoReader,
+        device: wgpu.GPUDevice,
+        motion: MotionSource | None,
+        wish: MotionRequest,
     ):
         self._footage, self._device, self._motion = footage, device, motion
         self._times = footage.times.seconds
         self._fill, self._cuts = wish.fill, CutList(wish.cuts)
         self._holdout = holdout_of(wish.masks, footage) if motion is not None else None
         self._planes, self._images = Planes(device), TexturePool(device)
-        self._reel: Reel[Glance] | None = None
-        self._numbers: WeakKeyDictionary[Glance, int] = WeakKeyDictionary()
+        self._reel: ShotReader[Thumbnail] | None = None
+        self._numbers: WeakKeyDictionary[Thumbnail, int] = WeakKeyDictionary()
         self._told: dict[tuple[int, int], bool] = {}
         self._shot: Callable[[int], Any] | None = None
         self._first = 0  # index of a picture of the present shot
 
-    def __call__(self, number: int) -> Known:
+    def __call__(self, number: int) -> PictureFinding:
         """The finding about a picture, as far as possible."""
         reel = self._reel_around(number)
         try:
             here = reel.at(self._times[number], _BEHIND)
         except LookupError:  # from some pictures before it on, none can be decoded
-            return Known(None, None, None, None, is_left_out=True)
+            return PictureFinding(None, None, None, None, is_left_out=True)
         near = {i: reel[i].number for i in (here - 1, here, here + 1) if i in reel.kept}
         if near.get(here) != number:
             beside = sorted(near.values())
             before = max((n for n in beside if n < number), default=None)
             after = min((n for n in beside if n > number), default=None)
-            return Known(None, None, before, after, is_left_out=True)
+            return PictureFinding(None, None, before, after, is_left_out=True)
         found = self._found(reel, here)
         motion, depth = found or (None, None)
-        return Known(
+        return PictureFinding(
             motion,
             depth,
             near.get(here - 1),
@@ -109,7 +113,9 @@ class Finder:
             holdout=None if found is None else self._holdout,
         )
 
-    def _found(self, reel: Reel[Glance], index: int) -> tuple[np.ndarray, np.ndarray] | None:
+    def _found(
+        self, reel: ShotReader[Thumbnail], index: int
+    ) -> tuple[np.ndarray, np.ndarray] | None:
         """Motion and depth."""
         if self._motion is None:
             return None
@@ -118,7 +124,7 @@ class Finder:
         self._first = index
         return self._shot(index)
 
-    def _reel_around(self, number: int) -> Reel[Glance]:
+    def _reel_around(self, number: int) -> ShotReader[Thumbnail]:
         """A reel that can tell all of a picture: another one where the last is far from it."""
         reel = self._reel
         if reel is not None and len(reel.kept):
@@ -130,7 +136,7 @@ class Finder:
                 return reel
         first = max(number - _BEFORE - _EARLIER, 0)
         self._shot = None
-        self._reel = Reel(
+        self._reel = ShotReader(
             self._pictures(first),
             is_cut=self._is_cut if self._cuts.is_search else None,
             known_cuts=self._cuts.frames(0),
@@ -138,13 +144,13 @@ class Finder:
         )
         return self._reel
 
-    def _pictures(self, first: int) -> Iterator[Picture[Glance]]:
+    def _pictures(self, first: int) -> Iterator[Picture[Thumbnail]]:
         for number, coded in self._footage.pictures(first):
-            glance = Glance(coded)
+            glance = Thumbnail(coded)
             self._numbers[glance] = number
             yield Picture(float(self._times[number]), glance, number)
 
-    def _is_cut(self, before: Glance, after: Glance) -> bool:
+    def _is_cut(self, before: Thumbnail, after: Thumbnail) -> bool:
         """The same as is_cut, told once for two pictures: to tell costs more than to decode."""
         key = self._numbers[before], self._numbers[after]
         if key not in self._told:

@@ -1,11 +1,11 @@
 """Light that moves over surfaces: what to add to a frame's colours at other times."""
 
-from .changes import Seen
+from .changes import SurfaceLight
 from .light import (
     Added,
     Kind,
+    LightTimes,
     MovingLight,
-    Times,
 )
 
-__all__ = ["Added", "Kind", "MovingLight", "Seen", "Times"]
+__all__ = ["Added", "Kind", "LightTimes", "MovingLight", "SurfaceLight"]

@@ -13,7 +13,7 @@ View = wgpu.GPUTextureView
 
 
 @dataclass(frozen=True)
-class Seen:
+class SurfaceLight:
     """Inputs of the passes from one frame: its light, without its albedo, and its surfaces."""
 
     light: View
@@ -23,7 +23,7 @@ class Seen:
 
 def changes(
     stage: Stage,
-    frames: Mapping[int, Seen],
+    frames: Mapping[int, SurfaceLight],
     albedo: View | None,
     by_color: bool,
     found: wgpu.GPUBuffer,

@@ -16,7 +16,7 @@ SPREAD, GUARD = 5.0, 4.0  # [px] sigma of the fill, and of where motion has to e
 
 
 @dataclass(frozen=True)
-class Flow:
+class LightFlow:
     """Flow from the frame to a neighbour and back [px], with trust; and what it explains."""
 
     ahead: View
@@ -60,7 +60,7 @@ def pyramid(stage: Stage, name: str, source: View) -> list[View]:
 def flow(
     stage: Stage, side: int, here: tuple[View, list[View]], there: tuple[View, list[View]],
     depth: View, linear: wgpu.GPUSampler,
-) -> Flow:  # fmt: skip
+) -> LightFlow:  # fmt: skip
     """Flow to the neighbour at the offset `side`; `here`, `there`: values and their pyramid.
 
     `depth`: of the frame itself, over whose surfaces both move.
@@ -94,7 +94,7 @@ def flow(
             values_there=there[0], linear=linear, differences=differences,
         )  # fmt: skip
         blurred(stage, differences, GUARD, explained)
-    return Flow(trusted[True], trusted[False], explained)
+    return LightFlow(trusted[True], trusted[False], explained)
 
 
 def blurred(stage: Stage, source: View, sigma: float, output: View) -> None:

@@ -11,9 +11,9 @@ import wgpu
 
 from ....gpu import wgsl
 from ....gpu.textures import ScratchBuffer, TexturePool
-from .changes import Seen, View, changes
+from .changes import SurfaceLight, View, changes
 from .flow import (
-    Flow,
+    LightFlow,
     flow,
     grids,
     pyramid,
@@ -25,7 +25,7 @@ NODES = 8  # times of an exposure at which light is known, at most
 
 
 @dataclass(frozen=True)
-class Times:
+class LightTimes:
     """Times of the nodes: `first`, and from one to the next [frame intervals]."""
 
     first: float
@@ -33,7 +33,7 @@ class Times:
     count: int
 
     @classmethod
-    def within(cls, opens: float, closes: float, samples: int) -> Times:
+    def within(cls, opens: float, closes: float, samples: int) -> LightTimes:
         """The middles of as many equal parts of an exposure as there are samples, or NODES."""
         count = min(samples, NODES)
         step = max(closes - opens, 1e-6) / count
@@ -52,7 +52,7 @@ class Kind:
     """
 
     pulled: bool
-    frames: Mapping[int, Seen]
+    frames: Mapping[int, SurfaceLight]
     albedo: View | None
     by_color: bool = False
 
@@ -70,7 +70,7 @@ class Added:
     """
 
     layers: wgpu.GPUTexture
-    times: Times
+    times: LightTimes
     found: wgpu.GPUBuffer
 
 
@@ -83,7 +83,7 @@ class MovingLight:
         self._linear = device.create_sampler(mag_filter="linear", min_filter="linear")
 
     def encode(
-        self, encoder, bindings, kinds: Sequence[Kind], times: Times, weight: View | None
+        self, encoder, bindings, kinds: Sequence[Kind], times: LightTimes, weight: View | None
     ) -> Added:
         """Record all passes. `weight`: of every pixel (see PreparedFrame)."""
         usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
@@ -112,7 +112,7 @@ class MovingLight:
         stage: Stage,
         kind: Kind,
         changed: Mapping[int, View],
-        times: Times,
+        times: LightTimes,
         weight: View | None,
         earlier: wgpu.GPUTexture | None,
         found: wgpu.GPUBuffer,
@@ -145,7 +145,7 @@ class MovingLight:
             entry = "main" if i < times.count else "add_neighbour"
             if side not in changed:
                 entry = "rest" if i < times.count else "add_nothing"
-            way = flows.get(side, Flow(none, none, none))
+            way = flows.get(side, LightFlow(none, none, none))
             there = present.get(side, none)
             if entry == "main" and not kind.pulled:
                 for name, along, value, by in (

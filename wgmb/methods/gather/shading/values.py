@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .changes import Seen, View
+from .changes import SurfaceLight, View
 from .stage import Stage
 
 STEPS = 12  # [px] that the brightest light around is looked for
 
 
 def values(
-    stage: Stage, here: Seen, changed: Mapping[int, View], by_color: bool
+    stage: Stage, here: SurfaceLight, changed: Mapping[int, View], by_color: bool
 ) -> dict[int, View]:
     """Darkness, or levels of light, by the offset of the frame: see values.wgsl.
 
@@ -35,7 +35,7 @@ def values(
     return result
 
 
-def _closed(stage: Stage, here: Seen, sides: Mapping[str, Any], steps: int) -> View:
+def _closed(stage: Stage, here: SurfaceLight, sides: Mapping[str, Any], steps: int) -> View:
     """The light without its shadows."""
     state, other = (stage.texture(f"closing {k}", "rgba32float") for k in "ab")
     for entry in ("begin", *("grow",) * steps, *("shrink",) * steps):

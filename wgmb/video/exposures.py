@@ -1,0 +1,171 @@
+"""Exposures of a video at the output's own times, from its pictures and their motion."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Protocol
+
+import numpy as np
+import wgpu
+
+from .. import gpu
+from ..color.coding import CodedPicture, Coding
+from ..color.highlights import check_coding
+from ..errors import InputError
+from ..exposure import Cell
+from ..gpu.textures import TexturePool
+from ..methods.contract import reach_of
+from ..pipeline.blur import Blur
+from ..pipeline.exposure_sum import ExposureSum
+from ..shots.motion_source import MotionSource
+from ..shots.reader import FLASH, Picture, ShotReader
+from ..shutter import Shutter
+from ..threads import ahead
+from .clock import Clock
+from .gpu_frames import VideoFrames
+from .output_times import OutputFrame
+from .planes import Average, Planes, averages
+from .read.reader import VideoReader
+from .thumbnail import Thumbnail, is_cut, is_double
+
+_READ_AHEAD = 2  # coded pictures
+_BEFORE = 10  # pictures decoded before the first exposure, which its motion may depend on
+
+
+class VideoBlur:
+    """The exposures of a video, one after the other.
+
+    `motion`: where motion comes from (wgmb/flow); None: pictures are averaged as they are.
+    `holdout` (height, width): 1 stays sharp. `fill`: repeated pictures are left out, and motion
+    goes on over the gap. `cuts`: whether cuts are looked for, beside
+    `known_cuts`, the numbers of pictures that begin a shot. `highlights`: times white that white
+    counts as while it is blurred; InputError where the video holds light above white, and where
+    the method takes two frames to either side.
+    """
+
+    def __init__(
+        self,
+        footage: VideoReader,
+        blur: Blur,
+        motion: MotionSource | None,
+        *,
+        clock: Clock = Clock(),  # noqa: B008  it is frozen
+        holdout: np.ndarray | None = None,
+        fill: bool = False,
+        cuts: bool = True,
+        known_cuts: Collection[int] = (),
+        highlights: float = 1.0,
+    ):
+        check_coding(highlights, footage.path, footage.coding)
+        if reach_of(blur.method) > 1:
+            raise InputError("a `reach` of 2 is for rendered frames, a video takes 1")
+        self._highlights = highlights
+        self.footage, self.clock, self._holdout = footage, clock, holdout
+        self._blur, self._motion = blur, motion
+        self._exposer, self._planes = ExposureSum(blur), Planes(blur.device, highlights)
+        self._average, self._images = Average(blur.device), TexturePool(blur.device)
+        self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
+        self.reel: ShotReader[Thumbnail] | None = None
+
+    @property
+    def device(self) -> wgpu.GPUDevice:
+        """The Blur's."""
+        return self._blur.device
+
+    def exposures(
+        self, shutter: Shutter, wanted: Sequence[OutputFrame]
+    ) -> Iterator[tuple[OutputFrame, Exposure]]:
+        """Every moment and its exposure, which is valid until the next is asked for."""
+        self.reel = reel = ShotReader(
+            self._pictures(shutter, wanted),
+            is_cut=is_cut if self._cuts else None,
+            known_cuts=self._known_cuts,
+            is_double=is_double if self._fill else None,
+            flash=FLASH / float(self.clock.speed),
+        )
+        views = VideoFrames(reel, self._blur, self._motion, self._holdout, self._highlights)
+        for moment in wanted:
+            cells = reel.cells(float(moment.time), float(moment.interval), shutter)
+            yield moment, Exposure(self, reel, views, cells)
+
+    def light(self, views: VideoFrames, cells: Sequence[Cell]) -> wgpu.GPUTexture:
+        """The exposure of these cells as linear light (rgba32float)."""
+        light = self._light(views, cells)
+        if self._highlights == 1:
+            return light
+        encoder = self.device.create_command_encoder(label="compress")
+        output = self._images.texture("compressed", self.footage.size, "rgba32float")
+        self._planes.compress(encoder, light.create_view(), output.create_view())
+        gpu.submit(self.device, encoder)
+        return output
+
+    def coded(
+        self, reel: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell], coding: Coding
+    ) -> CodedPicture:
+        """The exposure of these cells in planes."""
+        plain = self._motion is None and self._highlights == 1
+        if plain and averages(self.footage.coding, coding):
+            pictures = [reel[cell.index].content.coded for cell in cells]
+            return self._average(pictures, [cell.share for cell in cells], coding)
+        light = self._light(views, cells)
+        encoder = self.device.create_command_encoder(label="encode")
+        return self._planes.encode(encoder, light.create_view(), coding)
+
+    def _light(self, views: VideoFrames, cells: Sequence[Cell]) -> wgpu.GPUTexture:
+        """The same with highlights expanded."""
+        parts = ((cell, views.shown(cell.index)) for cell in cells)
+        return self._exposer.texture(self.footage.size, parts)
+
+    def _pictures(
+        self, shutter: Shutter, wanted: Sequence[OutputFrame]
+    ) -> Iterator[Picture[Thumbnail]]:
+        """The video's pictures from before the first exposure to the end, on the output's clock."""
+        times = self.footage.times
+        opens = (
+            self.clock.back(wanted[0].time)
+            + Fraction(shutter.span[0]) * wanted[0].interval * self.clock.speed
+        )
+        first = int(np.searchsorted(times.seconds, float(opens)))
+        first, none = max(first - _BEFORE, 0), True
+        for number, picture in ahead(self.footage.pictures(first), _READ_AHEAD):
+            none = False
+            yield Picture(float(self.clock.out(times[number])), Thumbnail(picture), number)
+        if none:
+            at = float(times[min(first, len(times) - 1)])
+            raise InputError(
+                f"{self.footage.path}: none of its pictures from {at:.2f} s on can be decoded"
+            )
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """An output frame, made when it is asked for as what is wanted."""
+
+    _run: VideoBlur
+    _reel: ShotReader[Thumbnail]
+    _views: VideoFrames
+    _cells: Sequence[Cell]
+
+    def light(self) -> wgpu.GPUTexture:
+        """As linear light (rgba32float)."""
+        return self._run.light(self._views, self._cells)
+
+    def coded(self, coding: Coding) -> CodedPicture:
+        """In the planes of a video."""
+        return self._run.coded(self._reel, self._views, self._cells, coding)
+
+
+class ExposedPicture(Protocol):
+    """A picture that is made when it is asked for; an Exposure is one."""
+
+    def light(self) -> wgpu.GPUTexture:
+        """As linear light (rgba32float)."""
+        ...
+
+    def coded(self, coding: Coding) -> CodedPicture:
+        """In the planes of a video."""
+        ...
