@@ -1,10 +1,11 @@
 """wgmb: motion blur on the GPU.
 
-frames on disk ── io ─────────┐
-arrays you have ── Frame ─────┼─ velocity ── one of methods/ ── array | batch ── io ── files
-your own textures ─ FrameViews┤                   │
-Scene ── scene/gbuffer ───────┘                   │
-Shutter ── times of the samples ──────────────────┘
+input          exposure      blur                      sum            output
+sequence/ ─┐                                         ┌ pipeline/ ─┬─ output/ ── files
+video/ ────┼── exposure ──┬─ gpu_frame/ ── methods/ ─┘            ├─ video/write/
+Frame ─────┤    shutter   │  textures,     one blur               └─ arrays, textures
+Scene ─────┘              └─ motion
+                run/ drives the road from a request to files
 
 `blur` blurs a single frame; `Blur` is compiled once, for many frames or your own encoder.
 """

@@ -222,15 +222,15 @@ def test_command_lines_make_the_same_bytes(answers, monkeypatch):
         fps = float(output.rate)
         shown = what.make("torusphere")
         ((_, time),) = what.moments(fps).items()
-        shutter = render["when"].resolved(shown, fps).make()
+        shutter = render["shutter"].resolved(shown, fps).make()
         told = kernel(shown, shutter, time, fps, size_of(what.size), monkeypatch)
         assert told == kernel_of(state, monkeypatch)
-        assert render["look"].resolved(shown).method == "volume"
-        assert blur["when"].resolved().make() == shutter
-        look = blur["look"]
-        assert (look.method, look.samples, look.jitter) == (
+        assert render["blur"].resolved(shown).method == "volume"
+        assert blur["shutter"].resolved().make() == shutter
+        options = blur["blur"]
+        assert (options.method, options.samples, options.jitter) == (
             "tap",
             state["samples"],
             state["jitter"],
         )
-        assert look.max_blur == state["maxBlur"]
+        assert options.max_blur == state["maxBlur"]

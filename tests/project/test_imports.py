@@ -166,3 +166,12 @@ def test_shaders_lie_where_their_python_does(file):
         begun = PACKAGE / own.parent / own.stem.split("_")[0]
         places = stem.with_suffix(".py"), begun.with_suffix(".py"), PACKAGE / own.parent
         assert any(p.exists() and p != PACKAGE for p in places)
+
+
+def test_the_page_on_architecture_lists_every_room():
+    page = (ROOT / "docs/development/architecture.md").read_text("utf-8")
+    rows = re.findall(r"^\| ([^|]*`[^|]*) \|", page.split("## Declarations")[0], re.M)
+    listed = [name.rstrip("/") for row in rows for name in re.findall(r"`(\w+/?)`", row)]
+    assert sorted(listed) == sorted(set(PLACE) - {"_version", "__init__", "__main__"})
+    order = [PLACE[name] for name in listed]
+    assert order == sorted(order)

@@ -1,1 +1,1 @@
-"""Files: images, videos, layers, sequences. Independent of the GPU."""
+"""One file: EXR, still images, names and numbers of frames, atomic writing; no GPU."""
