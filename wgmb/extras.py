@@ -32,6 +32,7 @@ EXTRAS = {
     "cyclopts": Package("cli", "cyclopts", "cyclopts"),
     "dask": Package("cluster", "dask", "dask"),
     "distributed": Package("cluster", "dask.distributed", "distributed"),
+    "cryptography": Package("cluster", "cryptography", "cryptography"),
     "flip_evaluator": Package("compare", "flip-evaluator", "flip-evaluator"),
     "glfw": Package("view", "glfw", "glfw"),
     "imageio": Package("images", "imageio", "imageio"),

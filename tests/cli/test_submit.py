@@ -144,3 +144,10 @@ def test_an_array_has_no_more_tasks_than_slurm_takes(tmp_path):
     assert f"--array=0-{MOST_TASKS - 1}\n" in text
     assert "    1-100\n" in text
     assert "    99901-100000\n" in text
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("name", ["s\ntouch pwned #.sh", "y\r#SBATCH --wrap=x.sh", "\x1b[2J.sh"])
+def test_the_name_of_a_script_is_no_command_in_it(tmp_path, name):
+    with pytest.raises(InputError, match="its name has control characters"):
+        slurm(tmp_path / name, tmp_path / "a.json", [1, 2], 16)

@@ -19,7 +19,7 @@ from wgmb.flow.dominant import follow_most, settled
 from wgmb.flow.homography import dominant_homography
 from wgmb.flow.match import matched
 from wgmb.flow.mend import mend
-from wgmb.flow.passes import STATES, Passes
+from wgmb.flow.passes import STATES, FlowPasses
 from wgmb.flow.pyramid import COARSER, features, level_sizes
 from wgmb.flow.result import result
 from wgmb.flow.search import FullSearch
@@ -62,7 +62,7 @@ def shifted(size, dx, dy, **more):
 
 @cache
 def kit():
-    return Passes(Flow().device)
+    return FlowPasses(Flow().device)
 
 
 def read(texture):

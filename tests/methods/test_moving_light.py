@@ -18,9 +18,9 @@ from wgmb import scene as scenes
 from wgmb.gpu.textures import TexturePool
 from wgmb.methods.gather.shading import (
     Kind,
+    LightTimes,
     MovingLight,
-    Seen,
-    Times,
+    SurfaceLight,
 )
 from wgmb.methods.gather.shading.flow import level_sizes, patch_grid
 from wgmb.render import Render
@@ -95,7 +95,7 @@ class Stages:
             folded = frame.depth * (1 + fold * np.maximum(np.arange(SIZE[1]) - 36, 0))
             depth = np.where(edges, 14, folded).astype("f4")
             light_there = np.dstack([given, np.ones(SIZE, "f4")])
-            seen[offset] = Seen(
+            seen[offset] = SurfaceLight(
                 pool.upload(f"light {offset}", light_there, "rgba32float"),
                 pool.upload(f"depth {offset}", depth, "r32float"),
                 pool.upload(f"motion {offset}", frame.motion, "rgba32float"),
@@ -106,7 +106,7 @@ class Stages:
         self.albedo = color
         albedo = pool.upload("albedo", np.dstack([color, color[..., :1]]), "rgba32float")
         bindings = Blur("gather", device=device).frame_bindings(SIZE[::-1])
-        self.times = Times.within(-0.5, 0.5, 4)
+        self.times = LightTimes.within(-0.5, 0.5, 4)
         encoder = device.create_command_encoder()
         kinds = [Kind(pulled, seen, albedo)]
         done = light.encode(encoder, bindings, kinds, self.times, None)

@@ -105,6 +105,21 @@ def test_workers_have_the_environment_of_today(shot, whole, tmp_path, monkeypatc
 
 
 @DASK_LEAVES_SOCKETS
+def test_nobody_else_gives_local_workers_something_to_do():
+    """Whoever reaches a scheduler can run code in it, and ports are reached by all users."""
+    from distributed import Client
+
+    from wgmb.run.farm.local import local_client
+
+    with local_client(1) as client:
+        address = client.scheduler.address
+        assert address.startswith("tls://127.0.0.1:")
+        assert client.submit(int, "7").result(timeout=60) == 7
+        for other in (address, address.replace("tls", "tcp")):
+            with pytest.raises((OSError, TypeError)):
+                Client(other, timeout=2, set_as_default=False)
+
+
 def test_a_worker_that_is_named_is_so_in_the_words_of_the_command_line(
     shot, tmp_path, capsys, monkeypatch
 ):

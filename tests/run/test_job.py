@@ -13,8 +13,9 @@ import make_frames as make
 from make_stereo import single_part, with_stereo
 from wgmb import Clip, InputError
 from wgmb._version import __version__
-from wgmb.run.job_file import of_text
-from wgmb.sequence.findings import SequenceFindings, numbers, ranges
+from wgmb.run import job_file
+from wgmb.run.job_file import findings_of, of_text
+from wgmb.sequence.findings import numbers, ranges
 
 COUNT = 10
 
@@ -388,10 +389,40 @@ def test_numbers_as_ranges_and_back(given, as_ranges):
 def test_findings_are_plain_values_and_come_back(shot):
     clip = Clip(shot, cuts="3")
     settled = clip.settle()
-    again = SequenceFindings.of(json.loads(json.dumps(settled.plain())))
+    again = findings_of(json.loads(json.dumps(settled.plain())))
     assert again == settled
     other = Clip(shot, cuts="3", settled=again)
     assert (other.finding, other.on_disk, other.views) == (clip.finding, clip.on_disk, ())
+
+
+def test_a_job_that_somebody_changed_and_sealed_again_is_one_line(desk, capsys, shot):
+    make_job(capsys, shot)
+    whole = json.loads(Path("shot.json").read_text())
+
+    def places(value, at=()):
+        yield at
+        if isinstance(value, dict):
+            for name in value:
+                yield from places(value[name], (*at, name))
+
+    for at in places({k: v for k, v in whole.items() if k not in ("wgmb_job", "seal", "wgmb")}):
+        for wrong in (None, 0, -1, "x", [], {}, [[0, 1, 0]], 1e400, "gone"):
+            content = json.loads(json.dumps(whole))
+            del content["seal"], content["wgmb_job"]
+            inner = content
+            for name in at[:-1]:
+                inner = inner[name]
+            if wrong == "gone" and at:
+                del inner[at[-1]]
+            elif at:
+                inner[at[-1]] = wrong
+            sealed = json.dumps({"wgmb_job": 1, "seal": job_file._seal(content)} | content)
+            try:
+                found = of_text(sealed, "x")
+            except InputError as error:
+                assert str(error).startswith("x: ")
+            else:
+                assert isinstance(found.job.numbers, list)
 
 
 def test_a_part_of_a_clip_begins_with_nothing_read(shot):

@@ -130,6 +130,12 @@ def test_the_same_channel_of_two_views_is_no_clash():
         ([part_of("x", "R"), part_of("y", "R", view="left")], "'x', must name its view.*: left"),
         ([part_of("", "R a.b.R", multiView=["right", "a.b"])], "no periods or blanks.*'a.b'"),
         ([part_of("", "R", multiView=["right", "le ft"])], "no periods or blanks.*'le ft'"),
+        ([part_of("", "R", multiView=["left", "/abs/x"])], "'/abs/x', cannot be part of a file's"),
+        ([part_of("", "R", multiView=["left", "a\\b"])], "cannot be part of a file's name"),
+        ([part_of("", "R", view="left"), part_of("b", "R", view="../../x")], "'../../x', cannot"),
+        ([part_of("", "R", view="left"), part_of("b", "R", view="..")], "'..', cannot be part"),
+        ([part_of("", "R", view="left"), part_of("b", "R", view="a/b")], "'a/b', cannot be part"),
+        ([part_of("", "R", view="\x1b[2J")], "cannot be part of a file's name"),
     ],
 )
 def test_what_contradicts_the_documentation_is_named(parts, says):

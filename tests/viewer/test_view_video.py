@@ -30,7 +30,7 @@ from wgmb.shots.cut_list import CutList
 from wgmb.video.exposures import VideoBlur
 from wgmb.video.holdouts import holdout_of
 from wgmb.video.linear_frames import VideoPictures
-from wgmb.video.output_times import moments
+from wgmb.video.output_times import OutputFrames
 from wgmb.video.read.reader import VideoReader
 from wgmb.viewer import State, controls, offscreen
 from wgmb.viewer.state.state import video_time
@@ -139,7 +139,7 @@ def command_line(
         known_cuts=cut_list.frames(0),
         highlights=video.highlights,
     )
-    wanted = moments(footage, clock, None if fps is None else Fraction(fps))
+    wanted = list(OutputFrames(footage, clock, None if fps is None else Fraction(fps)))
     for moment, exposure in run.exposures(Shutter(**shutter), wanted):
         if moment.number == number:
             encoder = blur.device.create_command_encoder()
@@ -502,4 +502,4 @@ def test_where_nothing_can_be_decoded_a_picture_is_left_out_or_the_run_says_so(
     clock = VideoSettings(begin="0.9").clock(footage, None)
     run = VideoBlur(footage, Blur("tap", device=device), None, clock=clock)
     with pytest.raises(InputError, match=r"from 0\.[0-9]* s on can be decoded"):
-        next(run.exposures(Shutter(180), moments(footage, clock, Fraction(24))))
+        next(run.exposures(Shutter(180), list(OutputFrames(footage, clock, Fraction(24)))))

@@ -101,8 +101,11 @@ def openjd_ranges(found: Sequence[Range]) -> str:
 def slurm(script: Path, job_file: Path, numbers: Sequence[int], chunk: int) -> str:
     """A script for `sbatch`: an array of tasks, each of which does a part of the job.
 
+    InputError for a name with a line break or another control character, which a script reads.
     Of very many frames the parts are larger than `chunk`, so that there are at most MOST_TASKS.
     """
+    if not script.name.isprintable():
+        raise InputError(f"SLURM script {script.name!r}: its name has control characters")
     chunk = max(chunk, -(-len(numbers) // MOST_TASKS))
     parts = [numbers[i : i + chunk] for i in range(0, len(numbers), chunk)]
     texts = [",".join(map(_of_wgmb, ranges(part))) for part in parts]

@@ -8,6 +8,7 @@ into one folder: whoever opens a finished name reads a whole file.
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import re
 import secrets
@@ -77,8 +78,13 @@ def create(temporary: Path) -> int:
     return descriptor
 
 
-def rename(temporary: Path, path: Path) -> None:
-    """Give a finished file its name, and wait until the folder is on disk."""
+def rename(temporary: Path, path: Path, *, is_new: bool = False) -> None:
+    """Give a finished file its name, and wait until the folder is on disk.
+
+    `is_new`: raises FileExistsError where there is anything under that name.
+    """
+    if is_new and os.path.lexists(path):
+        raise FileExistsError(errno.EEXIST, "was written by another process during this run")
     os.replace(temporary, path)
     if os.name == "nt":  # folders cannot be opened there
         return

@@ -34,8 +34,8 @@ def checked(
 
     InputError where one of them makes no sense; no device is opened.
     """
-    if method not in METHODS:
-        known = f"available: {', '.join(METHODS)}{did_you_mean(method, METHODS)}"
+    if not isinstance(method, str) or method not in METHODS:
+        known = f"available: {', '.join(METHODS)}{did_you_mean(str(method), METHODS)}"
         raise InputError(f"unknown method {method!r}; {known}")
     auto = samples == "auto" and getattr(METHODS[method], "adaptive", False)
     if samples is None:

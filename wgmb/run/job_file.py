@@ -10,9 +10,9 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from .._version import __version__
 from ..errors import InputError
@@ -29,6 +29,7 @@ from ..settings import (
     ShutterSettings,
 )
 from ..settings.color import ColorSettings
+from ..settings.typed import restored, typed
 from ..settings.video import VideoSettings
 from ..shots.cut_list import CutList
 from ..shutter import CURVES
@@ -39,8 +40,6 @@ FORMAT = 1
 _KEY = "wgmb_job"
 _MOST_BYTES = 512 << 20
 _AGAIN = "write the job again"
-
-_Settings = TypeVar("_Settings")
 
 
 @dataclass(frozen=True)
@@ -160,27 +159,42 @@ def of_text(text: str, name: str) -> Stored:
         )
     if seal != _seal({"wgmb": version} | content):
         raise InputError(f"{name}: was changed after it had been written; {_AGAIN}")
+    try:
+        return _stored_of(content)
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, InputError):
+        raise InputError(f"{name}: not as wgmb writes a job; {_AGAIN}") from None
+
+
+def _stored_of(content: dict[str, Any]) -> Stored:
+    """The job from the tables of its file; the errors of Python where they are of other types."""
     request = BlurRequest(
-        pattern=content["pattern"],
-        output=_restored(OutputSettings, content["output"]),
-        blur=_restored(BlurSettings, content["look"]),
-        shutter=_restored(ShutterSettings, content["when"]),
-        input=_restored(InputSettings, content["given"]),
-        color=_restored(ColorSettings, content["color"]),
-        video=_restored(VideoSettings, content["video"]),
-        confidence=content["confidence"],
+        pattern=typed("pattern", content["pattern"], str),
+        output=restored(OutputSettings, content["output"]),
+        blur=restored(BlurSettings, content["look"]),
+        shutter=restored(ShutterSettings, content["when"]),
+        input=restored(InputSettings, content["given"]),
+        color=restored(ColorSettings, content["color"]),
+        video=restored(VideoSettings, content["video"]),
+        confidence=typed("confidence", content["confidence"], bool),
     )
     job = Job(
         request,
-        content["settings"],
+        dict(content["settings"]),
         numbers(content["numbers"]),
-        content["flow"],
-        content["since"],
-        SequenceFindings.of(content["settled"]),
+        typed("flow", content["flow"], str),
+        typed("since", content["since"], int | None),
+        findings_of(content["settled"]),
         is_part_of_run=True,
     )
-    inputs = {int(n): known for n, known in content["inputs"].items()}
-    return Stored(job, content["chunk"], inputs)
+    inputs = {
+        int(n): [typed("inputs", v, int) for v in known] for n, known in content["inputs"].items()
+    }
+    return Stored(job, typed("chunk", content["chunk"], int), inputs)
+
+
+def findings_of(plain: dict[str, Any]) -> SequenceFindings:
+    """From what `SequenceFindings.plain` returned."""
+    return restored(SequenceFindings, plain | {"on_disk": numbers(plain["on_disk"])})
 
 
 def is_job(path: Path) -> bool:
@@ -257,16 +271,6 @@ def _size_and_time(path: Path) -> list[int]:
 
 def _plain(settings: Any) -> dict[str, Any]:
     return {k: str(v) if isinstance(v, Path) else v for k, v in asdict(settings).items()}
-
-
-def _restored(kind: type[_Settings], values: dict[str, Any]) -> _Settings:
-    """The settings from what `_plain` made of them."""
-    made: dict[str, Any] = {}
-    for name in (field.name for field in fields(kind)):  # pyright: ignore[reportArgumentType]
-        value = values[name]
-        value = tuple(value) if isinstance(value, list) else value
-        made[name] = Path(str(value)) if name == "camera" and value is not None else value
-    return kind(**made)
 
 
 def _seal(content: dict[str, Any]) -> str:

@@ -26,13 +26,13 @@ from ..settings import (
     ShutterSettings,
     plain,
 )
-from ..settings.video import VideoSettings
+from ..settings.video import VideoSettings, check_pause
 from ..shots.cut_list import CutList
 from ..shots.motion_source import MotionSource
 from ..video.clock import Clock
 from ..video.exposures import VideoBlur
-from ..video.holdouts import holdout_of
-from ..video.output_times import OutputFrame, moments
+from ..video.holdouts import files_of, holdout_of
+from ..video.output_times import OutputFrame, OutputFrames
 from ..video.read.reader import VideoReader
 from ..video.write.encoders import SUFFIXES
 from .batch_report import Progress
@@ -105,6 +105,7 @@ class VideoRequest:
         """Open the GPU and what all videos share; InputError for settings that do not fit."""
         check_fits(self.input, self.blur)
         check_highlights(self.video.highlights)
+        check_pause(self.video.longest_pause)
         if self.blur.holdout and self.video.flow == "none":
             raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
         opened = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
@@ -146,7 +147,9 @@ class VideoRun:
         reader = VideoReader(path, max_mb=self.request.input.max_mb)
         clock = self.request.video.clock(reader, self.request.input.frames)
         fps, said = _rate(reader, output)
-        return VideoPlan(reader, output, clock, moments(reader, clock, fps), said)
+        longest = self.request.video.longest_pause
+        wanted = list(OutputFrames(reader, clock, fps, longest))
+        return VideoPlan(reader, output, clock, wanted, said)
 
     def __call__(self, plan: VideoPlan, progress: Progress | None = None) -> VideoReport:
         """Blur a video into its output, which is complete, or is not there."""
@@ -168,7 +171,13 @@ class VideoRun:
             put_exposures(exposures, shutter, moments, sink, progress)
 
         left_out = write(
-            exposures, plan.output, request.video, plan.wanted, self.settings, blur_part
+            exposures,
+            plan.output,
+            request.video,
+            plan.wanted,
+            self.settings,
+            blur_part,
+            files_of(request.blur.holdout),
         )
         found = exposures.reel
         return VideoReport(
@@ -250,6 +259,7 @@ class VideoOptions(TypedDict, total=False):
     flow_quality: Literal["best", "fast"]
     begin: str | float
     end: str | float
+    longest_pause: float
     speed: str | float | Fraction
     pitch: Literal["keep", "follow"]
     streams: Literal["all", "video"]
@@ -265,7 +275,8 @@ class VideoOptions(TypedDict, total=False):
     compression: str
 
 
-_AS_TEXT = "phase", "begin", "end", "speed", "fps"  # numbers that the settings hold as text
+_TIMES = "begin", "end"
+_AS_TEXT = "phase", "speed", "fps"  # numbers that the settings hold as text
 
 
 def blur_video(
@@ -292,7 +303,9 @@ def blur_video(
         known = list(VideoOptions.__annotations__)
         raise InputError(f"unknown setting {unknown[0]!r}{did_you_mean(unknown[0], known)}")
     for name, kind in get_type_hints(VideoOptions).items():
-        if name in given and name in _AS_TEXT:
+        if name in given and name in _TIMES and not isinstance(given[name], str):
+            given[name] = f"{given[name]:.9f}"
+        elif name in given and name in _AS_TEXT:
             given[name] = str(given[name])
         elif name in given and kind is float:
             given[name] = float(given[name])

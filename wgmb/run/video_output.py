@@ -128,11 +128,16 @@ def write(
     wanted: list[OutputFrame],
     settings: dict[str, Any],
     make_part: MakePart,
+    masks: Sequence[Path] = (),
 ) -> list[str]:
-    """Write the pictures of the moments; returns what the output cannot hold, in lines."""
+    """Write the pictures of the moments; returns what the output cannot hold, in lines.
+
+    `masks`: further files that are read, which are never written.
+    """
     is_video = Path(output.output).suffix.lower() in SUFFIXES
     to = _write_video if is_video else _write_frames
-    return to(run, output, video, wanted, settings, make_part)
+    inputs = [run.footage.path, *masks]
+    return to(run, output, video, wanted, settings, make_part, inputs)
 
 
 def _write_video(
@@ -142,6 +147,7 @@ def _write_video(
     wanted: list[OutputFrame],
     settings: dict[str, Any],
     make_part: MakePart,
+    inputs: Sequence[Path],
 ) -> list[str]:
     """Write a video, with `resume` in segments; returns what it cannot hold, in lines."""
     path, footage = Path(output.output), run.footage
@@ -152,7 +158,7 @@ def _write_video(
     made_of = settings | {"input": [footage.path.name, found.st_size, found.st_mtime_ns]}
     texts = _texts(footage, made_of)
     there = [path] if os.path.exists(os.path.realpath(path)) else []
-    refuse_inputs(path.parent, [path.name], there, [footage.path])
+    refuse_inputs(path.parent, [path.name], there, inputs)
     if there and output.resume and texts.items() <= VideoReader(path).metadata.items():
         remove_left(path)
         return ["is already done"]
@@ -177,7 +183,9 @@ def _write_video(
             return [*lost, *segments.join(texts, others)]
         finally:
             segments.release()
-    writer = CodedVideo(path, atomic.temporary_name(path), *shape, facts, texts, others)
+    writer = CodedVideo(
+        path, atomic.temporary_name(path), *shape, facts, texts, others, is_new=not there
+    )
     _fill(writer, run, coding, wanted, make_part)
     remove_left(path)
     return [*lost, *writer.left_out]
@@ -212,10 +220,11 @@ def _write_frames(
     wanted: list[OutputFrame],
     settings: dict[str, Any],
     make_part: MakePart,
+    inputs: Sequence[Path],
 ) -> list[str]:
     """Write image files."""
     numbers = [FIRST + moment.number for moment in wanted]
-    files = replace(output, fps=None).make(settings, numbers, [run.footage.path])
+    files = replace(output, fps=None).make(settings, numbers, inputs)
     channels = 4 if run.footage.coding.alpha else 3
     try:
         make_part(wanted, FramesSink(files, run.device, channels, FIRST))

@@ -11,7 +11,6 @@ from typing import Any
 
 from .data_windows import Sides
 from .layers.vector_test import ConventionFinding
-from .layers.vectors import Vectors
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class SequenceFindings:
     """Messages for the user about all frames."""
 
     def plain(self) -> dict[str, Any]:
-        """As JSON can hold it."""
+        """As JSON can hold it; `on_disk` as ranges."""
         finding = asdict(self.finding)
         return {
             "on_disk": ranges(self.on_disk),
@@ -42,21 +41,6 @@ class SequenceFindings:
             "beyond": list(self.beyond),
             "notes": list(self.notes),
         }
-
-    @classmethod
-    def of(cls, plain: dict[str, Any]) -> SequenceFindings:
-        """From what `plain` returned."""
-        finding = dict(plain["finding"])
-        meaning = finding.pop("vectors")
-        left, top, right, bottom = plain["beyond"]
-        return cls(
-            on_disk=tuple(numbers(plain["on_disk"])),
-            views=tuple(plain["views"]),
-            finding=ConventionFinding(Vectors(**meaning) if meaning else None, **finding),
-            cuts=tuple(plain["cuts"]),
-            beyond=(left, top, right, bottom),
-            notes=tuple(plain["notes"]),
-        )
 
 
 Range = tuple[int, int, int]

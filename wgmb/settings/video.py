@@ -73,6 +73,8 @@ class VideoSettings(FlowSettings):
     "Time in the video to begin at: 12.5 (seconds) or 1:02:03."
     end: str | None = None
     "Time in the video to end at."
+    longest_pause: float = 600.0
+    "Longest time from one picture to the next in seconds; what is longer is refused."
     speed: str = "1"
     "Speed of the output, such as 0.5 for slow motion."
     pitch: Literal["keep", "follow"] = "keep"
@@ -129,6 +131,12 @@ class VideoSettings(FlowSettings):
             end = None if numbers[-1] + 1 == len(footage) else footage.times[numbers[-1] + 1]
         origin = start if first is None else Fraction(0)
         return Clock(first or start, self.pace, origin, first, end)
+
+
+def check_pause(longest: float) -> None:
+    """InputError for a `longest_pause` that is no duration."""
+    if not longest > 0:
+        raise InputError(f"`longest_pause` must be above 0 seconds, got {longest:g}")
 
 
 def time_of(name: str, text: str | None) -> Fraction | None:

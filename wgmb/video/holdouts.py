@@ -34,6 +34,11 @@ def holdout_of(masks: Iterable[str], footage: VideoReader) -> np.ndarray | None:
     return whole
 
 
+def files_of(masks: Iterable[str]) -> list[Path]:
+    """The files among the masks."""
+    return [Path(mask) for mask in masks if mask != STATIC]
+
+
 def _matte(mask: str) -> np.ndarray:
     if Path(mask).suffix.lower() not in stills.SUFFIXES:
         known = f"{STATIC}, or an image file {' '.join(stills.SUFFIXES)}"

@@ -10,9 +10,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import overload
 
+import numpy as np
+
 from ..errors import InputError
 from .clock import Clock
 from .read.reader import VideoReader
+from .read.timeline import Times
 
 _SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
 _HELD = Fraction(1, 2)  # of a picture's interval beyond it: less is rounding
@@ -32,10 +35,17 @@ class OutputFrames(Sequence[OutputFrame]):
 
     From the first picture that `clock` lets through to the end of the last one. A last picture that
     is held is shown once more where its own interval ends, so that no time is lost. InputError if
-    `clock` lets none through.
+    `clock` lets none through, or if two pictures that it lets through are more than `longest_pause`
+    [s] apart and frames of a steady rate would fill the time between.
     """
 
-    def __init__(self, footage: VideoReader, clock: Clock, fps: Fraction | None):
+    def __init__(
+        self,
+        footage: VideoReader,
+        clock: Clock,
+        fps: Fraction | None,
+        longest_pause: float = math.inf,
+    ):
         times = footage.times
         first = 0 if clock.first is None else _count_before(times, clock.first)
         last = len(times) if clock.end is None else _count_before(times, clock.end)
@@ -47,6 +57,7 @@ class OutputFrames(Sequence[OutputFrame]):
         self._step = 1 / (fps or footage.rate * clock.speed)
         end = footage.until if clock.end is None else min(footage.until, clock.end)
         if fps is not None:
+            _check_pauses(footage, clock, times[first:last], longest_pause)
             self._count = max(1, math.ceil((clock.out(end) - self._begin) * fps - _SPARE))
             return
         self._own, self._count = list(times[first:last]), last - first
@@ -93,6 +104,15 @@ def _count_before(times: Sequence[Fraction], time: Fraction) -> int:
     return low
 
 
-def moments(footage: VideoReader, clock: Clock, fps: Fraction | None) -> list[OutputFrame]:
-    """All OutputFrames of a video."""
-    return list(OutputFrames(footage, clock, fps))
+def _check_pauses(footage: VideoReader, clock: Clock, shown: Times, longest: float) -> None:
+    """InputError where a picture is held for longer, up to the next one or to the end."""
+    end = footage.until if clock.end is None else min(footage.until, clock.end)
+    begins = np.append(shown.ticks, int(end / shown.base))
+    number = int(np.argmax(np.diff(begins)))
+    held = int(begins[number + 1] - begins[number]) * shown.base
+    if held > longest:
+        raise InputError(
+            f"{footage.path}: a pause of {math.ceil(held):,} s after "
+            f"{float(shown[number] - footage.times[0]):.2f} s, which frames of a steady rate would "
+            f"fill; `longest_pause={math.ceil(held)}` allows it, `begin` and `end` choose a part"
+        )

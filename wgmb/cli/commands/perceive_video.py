@@ -18,7 +18,7 @@ from ...settings import BlurSettings, InputSettings, OutputSettings
 from ...settings.video import VideoSettings
 from ...threads import Behind
 from ...video.linear_frames import VideoPictures
-from ...video.output_times import OutputFrame, moments
+from ...video.output_times import OutputFrame, OutputFrames
 from ...video.read.reader import VideoReader
 from ..exit_codes import DONE, SOME_FAILED
 from ..terminal import note, progress
@@ -39,7 +39,7 @@ def perceive_video(
         raise InputError("`fps` is for frames, the pictures of a video have their own times")
     footage = VideoReader(path, max_mb=input.max_mb)
     clock = VideoSettings().clock(footage, input.frames)
-    wanted = moments(footage, clock, None)
+    wanted = list(OutputFrames(footage, clock, None))
     device = gpu.open_device(adapter)
     observer = Observer(densest_rate(footage, cone), cone, device=device)
     seen = PerceivedVideo(footage, clock, VideoPictures(footage, device), observer)

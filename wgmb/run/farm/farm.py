@@ -64,4 +64,5 @@ def as_farm_job(job: Job) -> Job:
 
 def _need_distributed() -> None:
     with needed_by("`workers` and `cluster`"):
+        import cryptography  # noqa: F401
         import distributed  # noqa: F401

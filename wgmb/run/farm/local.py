@@ -1,7 +1,9 @@
 """Worker processes on this machine, for a farm without a scheduler elsewhere.
 
 What dask.distributed measures all the time for its dashboard, and what moves data between workers,
-is of no use to a run whose frames lie in files: it is switched off. On Linux the modules are
+is of no use to a run whose frames lie in files: it is switched off. Whoever reaches a scheduler or
+a worker can run code in it, and every user of a machine reaches its ports: all connections are
+encrypted, with keys that are made for the run and never written to disk. On Linux the modules are
 loaded once, by a process that the workers are forked from before anything else happens in it.
 """
 
@@ -43,6 +45,7 @@ def local_client(count: int) -> Iterator[Any]:
     """A client of `count` new workers of one thread each; they end with it."""
     import dask.config
     from distributed import Client, LocalCluster
+    from distributed.security import Security
 
     method = "forkserver" if sys.platform.startswith("linux") else "spawn"
     settings = {**_QUIET, "distributed.worker.multiprocessing-method": method}
@@ -58,7 +61,8 @@ def local_client(count: int) -> Iterator[Any]:
             dashboard_address="127.0.0.1:0",
             silence_logs=50,
             memory_limit=0,
-            host="127.0.0.1",
+            host="tls://127.0.0.1",
+            security=Security.temporary(),
             local_directory=folder,
             env=dict(os.environ),  # that of the first process that loaded modules may be older
         )

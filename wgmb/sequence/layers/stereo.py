@@ -83,6 +83,10 @@ def names_of(file: Exr) -> tuple[str, ...]:
                 raise InputError(
                     f"{file.path}: the name of a view must have no periods or blanks, got {name!r}"
                 )
+            if not name.isprintable() or name in ("", ".", "..") or set(name) & set("/\\:"):
+                raise InputError(
+                    f"{file.path}: the name of a view, {name!r}, cannot be part of a file's name"
+                )
     if found and _view(file.parts[0]) is None and not _multi(file.parts[0]):
         raise InputError(
             f"{file.path}: the first part, {file.parts[0].name!r}, must name its view, "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
@@ -15,6 +16,19 @@ from ...errors import InputError
 from ...io.frame_numbers import readable
 
 _BEGINNING = 1 << 20  # bytes
+_LONGEST = 60.0, 60.0  # seconds that opening, and reading once, may take
+_LISTS = b"ffconcat", b"#EXTM3U", b"v=0", b"<?xml", b"<MPD"  # that name other files
+# FFmpeg's readers of one file that holds moving pictures. No reader of lists (concat, hls, dash,
+# imf, sdp, image2, ...), of scripts or devices, nor one that opens more files by itself (mlv).
+_READERS = (
+    "4xm,anm,apng,asf,asf_o,av1,avi,avs,avs2,avs3,bethsoftvid,bfi,bink,c93,cavsvideo,cdg,cdxl,"
+    "cine,dfa,dhav,dirac,dnxhd,dsicin,dv,dxa,ea,evc,film_cpk,filmstrip,flic,flv,frm,gdv,gif,gxf,"
+    "h261,h263,h264,hevc,hnm,idcin,iff,ifv,ingenient,ipmovie,ipu,iv8,ivf,ivr,jpegxl_anim,jv,kux,"
+    "live_flv,lmlm4,lvf,lxf,m4v,matroska,mgsts,mjpeg,mjpeg_2000,mm,mods,moflex,mov,mpeg,mpegts,"
+    "mpegvideo,mpjpeg,msnwctcp,mtv,mv,mvi,mxf,mxg,nc,nsv,nut,nuv,obu,ogg,paf,pdv,pmp,pva,r3d,rl2,"
+    "rm,roq,rpl,sdr2,ser,sga,siff,simbiosis_imx,smjpeg,smk,smush,swf,thp,tiertexseq,tmv,txd,ty,"
+    "usm,v210,v210x,vc1,vc1test,vividas,vivo,vmd,vvc,wc3movie,webp_pipe,wsvqa,wtv,xmv,yop,yuv4mpegpipe"
+)
 _BOXES = (b"ftyp", b"mdat", b"wide", b"free", b"skip", b"pnot")  # that begin an MP4 or MOV
 
 
@@ -30,7 +44,11 @@ def opened(path: Path) -> InputContainer:
     try:
         return av.open(
             f"file:{os.fspath(path)}",
-            container_options={"protocol_whitelist": "file"},
+            container_options={
+                "protocol_whitelist": "file",
+                "format_whitelist": _READERS,
+            },
+            timeout=_LONGEST,
             metadata_errors="replace",
         )
     except (FFmpegError, OSError, UnicodeError) as error:
@@ -64,12 +82,17 @@ def _is_grey(stream: VideoStream) -> bool:
 def _what_is_wrong(path: Path, error: Exception) -> str:
     if _lacks_index(path):
         return "is cut off: its index (moov), which comes last, is missing"
+    with open(path, "rb") as file:
+        beginning = file.read(_BEGINNING)
+    if beginning.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(_LISTS):
+        return "is a list of other files, which is not opened; name the video itself"
+    if getattr(error, "errno", 0) == errno.EINVAL:
+        return "is no kind of video that is read"
     text = getattr(error, "strerror", None) or str(error)
     if getattr(error, "errno", 0) and not isinstance(error, ValueError):
         return text.lower()
-    with open(path, "rb") as file:
-        if b"encv" in file.read(_BEGINNING):
-            return "is encrypted"
+    if b"encv" in beginning:
+        return "is encrypted"
     return "is not a video, or its beginning is damaged"
 
 

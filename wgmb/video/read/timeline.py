@@ -120,7 +120,7 @@ class Timeline:
             return nearest
         if near := [known for known in off if off[known] < rounding]:
             return min(near, key=lambda known: (known.denominator, off[known]))
-        return exact.limit_denominator(_FINEST)
+        return max(exact.limit_denominator(_FINEST), Fraction(1, _FINEST))
 
     def _keeps(self, rate: Fraction) -> bool:
         """Return True if all times are those of a rate, rounded to ticks alike."""

@@ -39,11 +39,13 @@ _APPLE = "com.apple."
 class NewFile:
     """A file of some container. Until `close` there is nothing at `path`.
 
-    `metadata`: texts of the whole file. OSError, whose text names `path`, if it cannot be written.
+    `metadata`: texts of the whole file. `is_new`, which may be set: no file of another process is
+    replaced. OSError, whose text names `path`, if it cannot be written.
     """
 
     def __init__(self, path: Path, temporary: Path, suffix: str, metadata: dict[str, str]):
         self.path, self.temporary = path, temporary
+        self.is_new = False
         self._container: OutputContainer | None = None
         self._lock: int | None = None
         try:
@@ -80,7 +82,7 @@ class NewFile:
                 self._container = None
             if self._lock is not None:
                 os.fsync(self._lock)
-            atomic.rename(self.temporary, self.path)
+            atomic.rename(self.temporary, self.path, is_new=self.is_new)
         except (FFmpegError, OSError) as error:
             self.abandon()
             raise atomic.about(self.path, error) from None

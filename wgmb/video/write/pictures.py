@@ -19,6 +19,8 @@ from .encoders import NO_FACTS, Encoding, Facts
 from .gif import TICK, Palettes, check_rate
 from .other_streams import OtherStreams
 
+_WHOLE = 0, 3  # planes of luma and alpha: of all sizes, even where chroma has one sample
+
 
 class CodedVideo:
     """A video of CodedPictures; complete under its name after `close`, or absent.
@@ -29,7 +31,8 @@ class CodedVideo:
     repeated, which `padding` says. A GIF counts hundredths of a second, and has 256 colours a
     picture. OSError if the file cannot be written, InputError for an encoder
     that does not start. `others`: streams to put beside the pictures, with their texts and
-    dates; what of them the file cannot hold is in `left_out`.
+    dates; what of them the file cannot hold is in `left_out`. `is_new`: OSError, when it is
+    closed, where another process has made a file of this name meanwhile.
     """
 
     def __init__(
@@ -44,6 +47,8 @@ class CodedVideo:
         facts: Facts = NO_FACTS,
         metadata: dict[str, str] | None = None,
         others: OtherStreams | None = None,
+        *,
+        is_new: bool = False,
     ):
         is_gif = encoding.codec == "gif"
         if is_gif:
@@ -61,6 +66,7 @@ class CodedVideo:
         texts = (metadata or {}) | (others.metadata if others else {})
         self.left_out = encoding.left_out(facts)
         self.file = VideoFile(path, temporary, encoding, coding, whole, rate, base, facts, texts)
+        self.file.is_new = is_new
         try:
             if others is not None:
                 self.left_out += others.attach(self.file.container)
@@ -100,9 +106,9 @@ class CodedVideo:
         across, down = self.padding
         if not (across or down):
             return planes
-        full = planes[0].shape  # chroma was rounded up already
-        return tuple(
-            np.pad(p, ((0, down), (0, across)), "edge") if p.shape == full else p for p in planes
+        return tuple(  # chroma was rounded up already
+            np.pad(p, ((0, down), (0, across)), "edge") if n in _WHOLE else p
+            for n, p in enumerate(planes)
         )
 
     def close(self) -> None:

@@ -185,6 +185,8 @@ class Segments:
             return
         try:
             for _ in range(3):  # another run may remove it meanwhile
+                if self.folder.is_symlink():
+                    raise InputError(f"{self.folder}: is a link; it must be a folder")
                 self.folder.mkdir(exist_ok=True)
                 temporary = atomic.temporary_name(self.folder / _CLAIM)
                 with contextlib.suppress(FileNotFoundError):

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
-import types
 import typing
 from collections.abc import Collection
 from dataclasses import fields
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from ...errors import InputError
 from ...settings import (
@@ -23,6 +20,7 @@ from ...settings import (
 )
 from ...settings.color import ColorSettings
 from ...settings.toml import parse
+from ...settings.typed import typed
 from ...settings.video import VideoSettings
 from .allowed import INPUTS, VIDEO
 
@@ -80,7 +78,7 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
         name = "from_" if word == "from" else word
         if name not in allowed or word == "from_":
             raise InputError(f"settings: unknown name {word!r}")
-        fit = typed(name, value, known[name])
+        fit = typed(f"settings: {name}", value, known[name])
         if name == "speed":  # of the output; in [view] it is that of the playing
             found["pace"] = fit
         elif name == "set":
@@ -95,7 +93,7 @@ def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bo
     for name, value in view.items():
         if name not in VIEW:
             raise InputError(f"settings: [view] has no {name!r}; available: {', '.join(VIEW)}")
-        found[name] = typed(name, value, hints[name])
+        found[name] = typed(f"settings: {name}", value, hints[name])
     return found | {name: tuple(some) for name, some in pairs.items()}
 
 
@@ -122,51 +120,6 @@ def _hints(*groups: type) -> dict[str, Any]:
     for group in groups:
         found = typing.get_type_hints(group) | found
     return found
-
-
-def typed(name: str, value: object, hint: Any) -> Any:
-    """`value`, read from TOML, as an option of type `hint` holds it; InputError if it cannot be.
-
-    A whole number may stand for a float, a list for a tuple; numbers are finite.
-    """
-    union = typing.get_origin(hint) in (typing.Union, types.UnionType)
-    for one in typing.get_args(hint) if union else (hint,):
-        try:
-            return _as(value, one)
-        except (TypeError, ValueError, OverflowError):
-            continue
-    raise InputError(f"settings: {name} cannot be {_shown(value)}")
-
-
-def _as(value: Any, hint: Any) -> Any:
-    """`value` as one type that is no union; an exception if it is of another."""
-    arguments = typing.get_args(hint)
-    if typing.get_origin(hint) is Literal:
-        if isinstance(value, str) and value in arguments:
-            return value
-    elif typing.get_origin(hint) is tuple and isinstance(value, list):
-        if arguments[-1] is ...:
-            return tuple(_as(item, arguments[0]) for item in value)
-        return tuple(_as(item, one) for item, one in zip(value, arguments, strict=True))
-    elif hint is float and type(value) in (int, float):
-        if math.isfinite(number := float(value)):
-            return number
-    elif hint is int and type(value) is int:
-        if abs(value) < 2**63:  # as TOML has them
-            return value
-    elif hint in (bool, str) and type(value) is hint:
-        return value
-    elif hint is Path and isinstance(value, str):
-        return Path(value)
-    raise TypeError
-
-
-def _shown(value: object) -> str:
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # a number of thousands of digits, or lists as deep
-        return f"this {type(value).__name__}"
-    return text if len(text) <= 60 else f"{text[:60]}..."
 
 
 def check_words(state: object, **known: Collection[str]) -> None:
