@@ -4,6 +4,7 @@ import os
 import time
 from dataclasses import replace
 from fractions import Fraction
+from itertools import count
 
 import numpy as np
 import pytest
@@ -33,6 +34,7 @@ from wgmb.video.linear_frames import VideoPictures
 from wgmb.video.output_times import OutputFrames
 from wgmb.video.read.reader import VideoReader
 from wgmb.viewer import State, controls, offscreen
+from wgmb.viewer.draw.blurs import shutter_of
 from wgmb.viewer.state.state import video_time
 from wgmb.viewer.subjects.video import VideoSubject
 from wgmb.viewer.subjects.video_motion import MotionRequest, PictureFinder, PictureFinding
@@ -204,6 +206,23 @@ def test_it_shows_what_the_command_line_makes(clip, changes, made):
     state = viewer.state
     want = command_line(clip, int(state.frame), video=video_time.settings_of(state), **made)
     np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
+    viewer.stage.choices.close()
+
+
+def test_a_finding_that_comes_meanwhile_leaves_nothing_out(clip, monkeypatch):
+    """The thread may add findings while the exposure is worked out."""
+    viewer = opened(clip, flow="dis", frame=9.0, pace="0.5", shutter=720.0)
+    settled(viewer)
+    subject, shutter = viewer.stage.choices.subject(viewer.state), shutter_of(viewer.state)
+    known = subject._maker.known
+    whole = subject.stamp([viewer.state], shutter, False)
+    assert not subject.busy
+    for late in range(1, 40):
+        calls = count()
+        monkeypatch.setattr(
+            subject._maker, "known", lambda n, c=calls, k=late: known(n) if next(c) >= k else None
+        )
+        assert subject.stamp([viewer.state], shutter, False) == whole or subject.busy
     viewer.stage.choices.close()
 
 

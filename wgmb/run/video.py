@@ -34,7 +34,7 @@ from ..video.exposures import VideoBlur
 from ..video.holdouts import files_of, holdout_of
 from ..video.output_times import OutputFrame, OutputFrames
 from ..video.read.reader import VideoReader
-from ..video.write.encoders import SUFFIXES
+from ..video.write.encoders import FINEST_RATE, SUFFIXES
 from .batch_report import Progress
 from .video_output import Sink, put_exposures, write
 
@@ -214,7 +214,7 @@ def _rate(reader: VideoReader, output: OutputSettings) -> tuple[Fraction | None,
     if output.fps == "source":
         return None, ""
     if output.fps is not None or not reader.is_variable or reader.gaps:
-        return output.rate_or(reader.rate), ""
+        return output.rate_or(reader.rate).limit_denominator(FINEST_RATE), ""
     steps = "{:.1f} to {:.1f} ms".format(*(1000 * step for step in reader.steps))
     if not reader.has_rate and Path(output.output).suffix.lower() in SUFFIXES:
         return None, (

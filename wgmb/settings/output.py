@@ -82,9 +82,8 @@ class OutputSettings:
 
 
 def rate_of(text: str, name: str = "fps") -> Fraction:
-    """`24`, `23.976`, `30000/1001` -> frames per second; 0.001 to 1000.
+    """`24`, `23.976`, `30000/1001` -> frames per second, exactly; 0.001 to 1000.
 
-    Exactly, or the nearest fraction whose denominator is at most a million, as files hold it.
     `name`: of the setting, for messages.
     """
     try:
@@ -95,4 +94,4 @@ def rate_of(text: str, name: str = "fps") -> Fraction:
         raise InputError(f"{name} must be a number or a fraction, got {text!r}") from None
     if not Fraction(1, 1000) <= fps <= 1000:
         raise InputError(f"{name} must be 0.001 to 1000, got {text}")
-    return fps.limit_denominator(1_000_000)
+    return fps

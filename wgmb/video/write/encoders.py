@@ -22,6 +22,7 @@ from ...io.suffixes import VIDEOS as SUFFIXES
 from ..hdr10 import LightLevel, Mastering
 from ..pixels import layout
 
+FINEST_RATE = 1_001_000  # denominator of a rate: FFmpeg counts in 32 bits
 CONTAINERS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska", ".webm": "webm", ".gif": "gif"}
 """FFmpeg's names of the containers, by suffix; the first codec that has one is its default."""
 HARDWARE = ("nvenc", "qsv", "amf", "videotoolbox", "v4l2m2m")

@@ -22,8 +22,8 @@ from ...errors import InputError
 from ...io import atomic
 from ..pixels import THREADS
 from .container import VideoFile, tag
+from .encoders import FINEST_RATE, Encoding, chosen
 from .encoders import SUFFIXES as SUFFIXES
-from .encoders import Encoding, chosen
 from .gif import TICK, Palettes, check_rate
 
 SRGB_DISPLAY = frozenset({"srgb_rec709_display"})
@@ -37,7 +37,6 @@ _DISPLAYS = {  # primaries and transfer of displays, by the names that configs g
     "pq_p3d65_display": (12, 16), "st2084_p3d65_display": (12, 16),
     "hlg_rec2020_display": (9, 18), "rec2100_hlg_display": (9, 18),
 }  # fmt: skip
-_FINEST = 1_001_000  # denominator of a rate: FFmpeg counts in 32 bits
 _RATES = Fraction(1, 1000), Fraction(1000)
 
 
@@ -67,7 +66,7 @@ class Video:
             check_rate(path, fps)
         else:
             check_rate(path, fps, _RATES)
-        self.fps = fps.limit_denominator(_FINEST)
+        self.fps = fps.limit_denominator(FINEST_RATE)
         self._coding = self._encoding.coding(_coding(display, self._encoding.codec == "ffv1"))[0]
         self._pixels = self._encoding.pixels(self._coding)
         self._by = VideoReformatter()

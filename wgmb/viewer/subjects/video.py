@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ from ..state.video_time import (
 )
 from .cell_sum import PictureCellSum
 from .motion_thread import MotionThread
-from .video_exposure import VideoExposure, exposed, reach
+from .video_exposure import Knowledge, VideoExposure, exposed, reach
 from .video_frames import FootageFrames
 from .video_motion import MotionRequest
 
@@ -106,32 +107,24 @@ class VideoSubject:
         of the pictures to come.
         """
         beside = 1 if neighbours and self._moves else 0
+        known = lru_cache(maxsize=None)(self._maker.known)  # the same throughout: a thread adds
         asked: dict[int, None] = {}
         stamps, lacking = [], []
         for state in states:
-            found = self._exposure(state, shutter)
-            of_motion = [n for cell in found.cells for n in self._near(cell.index, beside)]
+            found = self._exposure(state, shutter, known)
+            of_motion = [n for cell in found.cells for n in _near(cell.index, beside, known)]
             needed = [*found.lacking, *of_motion]
             first, last = reach(self._times, output(state).clock, moment(state), shutter)
             soon = range(max(first - beside, 0), min(last + beside + 1, len(self._times)))
             asked |= dict.fromkeys([*needed, *sorted(soon, key=lambda n: abs(n - found.here))])
-            lacking += [n for n in needed if self._maker.known(n) is None]
-            stamps.append(tuple(n for n in needed if self._maker.known(n) is not None))
+            lacking += [n for n in needed if known(n) is None]
+            stamps.append(tuple(n for n in needed if known(n) is not None))
         if states[0].playing and asked:
             newest = max(asked)
             asked |= dict.fromkeys(range(newest, min(newest + _AHEAD, len(self._times))))
         self._maker.want(tuple(asked))
         self._lacking = list(dict.fromkeys(lacking))
         return stamps
-
-    def _near(self, number: int, beside: int) -> list[int]:
-        """A picture, and with `beside` those that its motion leads to."""
-        known = self._maker.known(number)
-        if known is None or not beside:
-            return [number]
-        before = None if known.begins else known.before
-        after = None if known.ends else known.after
-        return [n for n in (number, before, after) if n is not None]
 
     @property
     def busy(self) -> bool:
@@ -164,9 +157,11 @@ class VideoSubject:
         """Let the search for motion end."""
         self._maker.close()
 
-    def _exposure(self, state: State, shutter: Shutter) -> VideoExposure:
-        known, clock = self._maker.known, output(state).clock
-        return exposed(self._times, clock, moment(state), shutter, known)
+    def _exposure(
+        self, state: State, shutter: Shutter, known: Knowledge | None = None
+    ) -> VideoExposure:
+        clock = output(state).clock
+        return exposed(self._times, clock, moment(state), shutter, known or self._maker.known)
 
     # ---- drawing --------------------------------------------------------------------------
 
@@ -245,3 +240,13 @@ class VideoSubject:
                 del self._sums[next(iter(self._sums))]
             held = self._sums[id(blur)] = PictureCellSum(blur)
         return held
+
+
+def _near(number: int, beside: int, known: Knowledge) -> list[int]:
+    """A picture, and with `beside` those that its motion leads to."""
+    found = known(number)
+    if found is None or not beside:
+        return [number]
+    before = None if found.begins else found.before
+    after = None if found.ends else found.after
+    return [n for n in (number, before, after) if n is not None]
