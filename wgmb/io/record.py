@@ -1,16 +1,19 @@
 """The record that every result carries: settings, what was read, and a checksum of the file.
 
 A record is JSON and stands in the file as it is: in an EXR as the attribute `wgmb`, in a PNG as a
-text of that keyword, in a TIFF as its description, in a JPEG as its comment. It begins with the
-seal, the file's length in bytes and its CRC-32, both taken while the seal's digits are 0. A
-file whose seal holds is the whole file that was written, to the last bit.
+text of that keyword, in a TIFF as its description, in a JPEG as its comment, in a video as its
+comment or another text that is free, in a GIF behind its end. It begins with the seal, the file's
+length in bytes and its CRC-32, both taken while the seal's digits are 0. A file whose seal holds is
+the whole file that was written, to the last bit.
 """
 
 from __future__ import annotations
 
 import json
+import mmap
 import re
 import zlib
+from pathlib import Path
 
 KEY = "wgmb"  # attribute or keyword of the record
 _BLANK = b"0" * 12 + b"-" + b"0" * 8  # length, CRC-32
@@ -34,23 +37,65 @@ def seal(data: bytes, text: str) -> list[bytes | memoryview]:
     return _sealed(memoryview(data), at, at + len(record))
 
 
-def read(data: bytes) -> dict | None:
+def read(data: bytes | mmap.mmap) -> dict | None:
     """The content of the record of a file that is whole; None where there is none or it is not."""
     for found in _SEAL.finditer(data):
-        text = data[found.start() : found.start() + 65536].decode("latin-1")
-        try:
-            content, length = json.JSONDecoder().raw_decode(text)
-        except (ValueError, RecursionError):
+        if (stated := _stated(data, found.start())) is None:
             continue
+        content, length = stated
         at, whole = 0, memoryview(data)
         for piece in _sealed(whole, found.start(), found.start() + length):
             if whole[at : at + len(piece)] != piece:
                 break
             at += len(piece)
         else:
-            del content["seal"]
             return content
     return None
+
+
+def _stated(data: bytes | mmap.mmap, begin: int) -> tuple[dict, int] | None:
+    """The content of the record that begins there, and its length [bytes]; None if it is broken."""
+    text = data[begin : begin + 65536].decode("latin-1")
+    try:
+        content, length = json.JSONDecoder().raw_decode(text)
+    except (ValueError, RecursionError):
+        return None
+    del content["seal"]
+    return content, length
+
+
+def seal_file(path: Path, text: str) -> None:
+    """Set the digits of the seal of a large file, in place; `text` is the record in it."""
+    with open(path, "r+b") as file:
+        data = mmap.mmap(file.fileno(), 0)
+        at = data.find(text.encode())
+        if at < 0:
+            raise ValueError("the record is not in the file")
+        digits = _sealed(memoryview(data), at, at + len(text.encode()))[1]
+        begin = at + len(_BEGIN)
+        data[begin : begin + len(digits)] = digits
+
+
+def read_file(path: Path) -> tuple[dict | None, bool]:
+    """What the record of a large file says, and True if the file is whole; None without a record.
+
+    OSError if it cannot be read.
+    """
+    with open(path, "rb") as file:
+        if not path.stat().st_size:
+            return None, False
+        data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        if (content := read(data)) is not None:
+            return content, True
+        for found in _SEAL.finditer(data):
+            if (stated := _stated(data, found.start())) is not None:
+                return stated[0], False
+    return None, False
+
+
+def is_begun(text: str) -> bool:
+    """Return True for a text that `blank` made."""
+    return text.startswith(_BEGIN.decode())
 
 
 def is_ours(data: bytes) -> bool:

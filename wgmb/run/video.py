@@ -175,7 +175,7 @@ class VideoRun:
             plan.output,
             request.video,
             plan.wanted,
-            self.settings,
+            self.settings | {"cuts": [cuts.is_search, sorted(cuts.frames(0))]},
             blur_part,
             files_of(request.blur.holdout),
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -15,7 +16,7 @@ import wgpu
 from ..color.coding import CodedPicture, Coding
 from ..errors import InputError
 from ..gpu.textures import TexturePool
-from ..io import atomic
+from ..io import atomic, record
 from ..output.names import refuse_inputs
 from ..output.output import Output
 from ..output.result import Result
@@ -72,15 +73,17 @@ class FramesSink:
         self._output, self._device, self._channels, self._first = output, device, channels, first
         self._images = TexturePool(device)
 
-    def take(self, moment: OutputFrame, exposure: ExposedPicture) -> Result:
-        """The picture as an array."""
+    def take(self, moment: OutputFrame, exposure: ExposedPicture) -> tuple[Result, dict[str, str]]:
+        """The picture as an array, and what its record says of its own."""
         encoder = self._device.create_command_encoder(label="frame")
         picture = self._images.download(encoder, exposure.light())[..., : self._channels]
-        return Result(FrameFile(self._first + moment.number, Path(), None, {}, {}), picture)
+        file = FrameFile(self._first + moment.number, Path(), None, {}, {})
+        return Result(file, picture), _moment(moment)
 
-    def put(self, taken: Result) -> None:
+    def put(self, taken: tuple[Result, dict[str, str]]) -> None:
         """Write its file."""
-        self._output.write_views([taken])
+        result, made_of = taken
+        self._output.write_views([result], made_of)
 
 
 def put_exposures(
@@ -136,8 +139,8 @@ def write(
     """
     is_video = Path(output.output).suffix.lower() in SUFFIXES
     to = _write_video if is_video else _write_frames
-    inputs = [run.footage.path, *masks]
-    return to(run, output, video, wanted, settings, make_part, inputs)
+    inputs, made_of = [run.footage.path, *masks], settings | _made_of(run, masks)
+    return to(run, output, video, wanted, made_of, make_part, inputs)
 
 
 def _write_video(
@@ -154,15 +157,18 @@ def _write_video(
     encoding = chosen(path, video.codec, video.quality, video.encoder)
     coding, lost = encoding.coding(footage.coding)
     facts = footage.facts
-    found = os.stat(footage.path)
-    made_of = settings | {"input": [footage.path.name, found.st_size, found.st_mtime_ns]}
+    made_of = settings | {"times": _crc(str([(m.time, m.interval) for m in wanted]).encode())}
     texts = _texts(footage, made_of)
     there = [path] if os.path.exists(os.path.realpath(path)) else []
     refuse_inputs(path.parent, [path.name], there, inputs)
-    if there and output.resume and texts.items() <= VideoReader(path).metadata.items():
+    is_ours = is_whole = False
+    if there and output.resume:
+        stated, is_whole = _record_of(path)
+        is_ours = stated == json.loads(json.dumps(made_of))
+    if is_ours and is_whole:
         remove_left(path)
         return ["is already done"]
-    if there and not output.overwrite:
+    if there and not (output.overwrite or is_ours):
         more = " and was made otherwise" if output.resume else ""
         raise InputError(f"{path} exists{more}; `overwrite=True` replaces it")
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -174,7 +180,7 @@ def _write_video(
     if video.streams == "all":
         keeps_pitch = video.pitch == "keep"
         others = OtherStreams(footage.path, footage.index, run.clock, keeps_pitch)
-    if output.resume:
+    if output.resume and encoding.codec != "gif":  # which has one palette after another
         segments = Segments(path, *shape, times, made_of, facts)
         try:
             for numbers in segments.to_do():
@@ -210,7 +216,29 @@ def _fill(
 def _texts(footage: VideoReader, made_of: dict[str, Any]) -> dict[str, str]:
     """The record of a video, under the first text that its input leaves free."""
     free = next((name for name in _RECORD if name not in footage.metadata), _RECORD[0])
-    return {free: f"wgmb {json.dumps(made_of, sort_keys=True)}"}
+    return {free: record.blank(made_of)}
+
+
+def _record_of(path: Path) -> tuple[dict[str, Any] | None, bool]:
+    """What the record of a video says, and True if the video is whole."""
+    try:
+        return record.read_file(path)
+    except OSError as error:
+        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def _made_of(run: PictureMaker, masks: Sequence[Path]) -> dict[str, Any]:
+    """The files that every picture depends on, and the part of the input that is let through."""
+    found, clock = os.stat(run.footage.path), run.clock
+    return {
+        "input": [run.footage.path.name, found.st_size, found.st_mtime_ns],
+        "masks": [_crc(path.read_bytes()) for path in masks],
+        "part": [str(clock.first), str(clock.end)],
+    }
+
+
+def _crc(data: bytes) -> str:
+    return f"{zlib.crc32(data):08x}"
 
 
 def _write_frames(
@@ -226,10 +254,22 @@ def _write_frames(
     numbers = [FIRST + moment.number for moment in wanted]
     files = replace(output, fps=None).make(settings, numbers, inputs)
     channels = 4 if run.footage.coding.alpha else 3
+    left = wanted
+    if output.resume:
+        left = [m for m in wanted if not files.done(FIRST + m.number, _moment(m))]
     try:
-        make_part(wanted, FramesSink(files, run.device, channels, FIRST))
+        if left:
+            make_part(left, FramesSink(files, run.device, channels, FIRST))
         files.close()
     except BaseException:
         files.abandon()
         raise
-    return []
+    if not left:
+        return ["is already done"]
+    done = len(wanted) - len(left)
+    return [f"{done} of {len(wanted)} frames were done before"] if done else []
+
+
+def _moment(moment: OutputFrame) -> dict[str, str]:
+    """What a frame's record says of its own."""
+    return {"time": str(moment.time), "interval": str(moment.interval)}

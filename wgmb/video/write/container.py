@@ -20,7 +20,7 @@ from av.video.stream import VideoStream
 
 from ...color.coding import Coding
 from ...errors import InputError
-from ...io import atomic
+from ...io import atomic, record
 from .encoders import (
     CONTAINERS,
     HARDWARE,
@@ -40,12 +40,14 @@ class NewFile:
     """A file of some container. Until `close` there is nothing at `path`.
 
     `metadata`: texts of the whole file. `is_new`, which may be set: no file of another process is
-    replaced. OSError, whose text names `path`, if it cannot be written.
+    replaced. A text that is a record (see io/record.py) gets its seal. OSError, whose text names
+    `path`, if it cannot be written.
     """
 
     def __init__(self, path: Path, temporary: Path, suffix: str, metadata: dict[str, str]):
         self.path, self.temporary = path, temporary
         self.is_new = False
+        self._record = next(filter(record.is_begun, metadata.values()), "")
         self._container: OutputContainer | None = None
         self._lock: int | None = None
         try:
@@ -80,6 +82,8 @@ class NewFile:
             if self._container is not None:
                 self._container.close()
                 self._container = None
+            if self._record:
+                self._seal()
             if self._lock is not None:
                 os.fsync(self._lock)
             atomic.rename(self.temporary, self.path, is_new=self.is_new)
@@ -87,6 +91,13 @@ class NewFile:
             self.abandon()
             raise atomic.about(self.path, error) from None
         self._unlock()
+
+    def _seal(self) -> None:
+        """Complete the record in the file; what holds no texts gets it behind its end."""
+        if self.path.suffix.lower() == ".gif":
+            with open(self.temporary, "ab") as file:
+                file.write(self._record.encode())
+        record.seal_file(self.temporary, self._record)
 
     def _unlock(self) -> None:
         if self._lock is not None:
@@ -194,6 +205,8 @@ def _muxing(container: str, metadata: dict[str, str]) -> dict[str, str]:
     """Options of the container."""
     if container in ("mp4", "mov") and any(key.startswith(_APPLE) for key in metadata):
         return {"movflags": "use_metadata_tags"}  # which hold the dates of Apple's cameras
+    if container in ("matroska", "webm"):
+        return {"write_crc32": "0"}  # of the texts, which the seal changes
     return {}
 
 
