@@ -17,7 +17,8 @@ from wgmb.io import exr, exr_library
 
 def script(text: str, *arguments, timeout=60) -> subprocess.CompletedProcess:
     """A Python program as a process of its own."""
-    line = [sys.executable, "-c", textwrap.dedent(text), *map(str, arguments)]
+    quiet = "-W", "ignore::DeprecationWarning"  # of forks beside threads, which are the test
+    line = [sys.executable, *quiet, "-c", textwrap.dedent(text), *map(str, arguments)]
     return subprocess.run(line, capture_output=True, text=True, timeout=timeout)
 
 
