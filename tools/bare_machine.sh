@@ -91,7 +91,7 @@ inside() {
 table=() failed=0
 try() {  # try SYSTEM ROOT COMMAND [--offline]: run it and add a row to the table
     local log code took begun
-    log="$2.$(printf %s "$3$4" | tr -c 'a-z0-9\n' _ | cut -c 1-60).log"
+    log="$2.$(printf %s "$3$4" | tr -c 'a-z0-9' _ | cut -c 1-60).log"
     echo "bare_machine: $1: $3 $4" >&2
     begun=$(date +%s.%N)
     TIMEFORMAT='%U %S'

@@ -77,7 +77,7 @@ def seal_file(path: Path, text: str) -> None:
 
 
 def read_file(path: Path) -> tuple[dict | None, bool]:
-    """What the record of a large file says, and True if the file is whole; None without a record.
+    """The content of a large file's record, None without one; and True if the file is whole.
 
     OSError if it cannot be read.
     """

@@ -220,7 +220,7 @@ def _texts(footage: VideoReader, made_of: dict[str, Any]) -> dict[str, str]:
 
 
 def _record_of(path: Path) -> tuple[dict[str, Any] | None, bool]:
-    """What the record of a video says, and True if the video is whole."""
+    """The content of a video's record, and True if the video is whole."""
     try:
         return record.read_file(path)
     except OSError as error:
@@ -271,5 +271,5 @@ def _write_frames(
 
 
 def _moment(moment: OutputFrame) -> dict[str, str]:
-    """What a frame's record says of its own."""
+    """The part of a frame's record that is its own."""
     return {"time": str(moment.time), "interval": str(moment.interval)}
