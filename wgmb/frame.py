@@ -99,6 +99,10 @@ class Frame:
     """
 
     def __post_init__(self) -> None:
+        width, height = _size_of(self.color)
+        if max(width, height) > MOST_SIDE:  # before any value is looked at
+            raise InputError(f"color must be at most {MOST_SIDE} pixels a side, got "
+                             f"{width} x {height}")  # fmt: skip
         color = _float_array("color", self.color)
         if color.ndim != 3 or color.shape[2] not in (3, 4) or 0 in color.shape:
             raise InputError(f"color must be (height, width, 3 or 4), got {color.shape}")
@@ -206,9 +210,17 @@ class Frame:
         return frozenset(there)
 
 
+MOST_SIDE = 32768
+"""Pixels along a side of a frame at most."""
 _SHORT = ("to_next", "to_prev", "motion", "depth", "camera", "object_id", "normal", "holdout",
           "scale", "prev", "next")  # fmt: skip
 PASSES = tuple(f.name for f in fields(Frame) if f.init and f.name != "color")
+
+
+def _size_of(color: ArrayLike) -> tuple[int, int]:
+    """Width and height of a picture, 0 where it is none."""
+    shape = np.shape(color)
+    return (shape[1], shape[0]) if len(shape) == 3 else (0, 0)
 
 
 def _array(name: str, given: ArrayLike) -> np.ndarray:

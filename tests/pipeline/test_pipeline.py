@@ -43,6 +43,10 @@ def motion(x=6.0, y=2.0, size=(48, 64)):
         ),
         ({"color": np.zeros((48, 64), "f4")}, r"color must be \(height, width, 3 or 4\)"),
         ({"color": np.zeros((0, 64, 3), "f4")}, "color must be"),
+        (
+            {"color": np.broadcast_to(np.float32(1), (200_000, 200_000, 3))},
+            "color must be at most 32768 pixels a side, got 200000 x 200000",
+        ),
         ({"to_next": motion(size=(47, 64))}, r"to_next must be \(48, 64, 2\) like color, got \(47"),
         ({"to_prev": np.zeros((48, 64), "f4")}, r"to_prev must be \(48, 64, 2\)"),
         ({"motion": np.zeros((48, 64, 4), "f4")}, "either motion or to_next/to_prev"),

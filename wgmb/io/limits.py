@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import InputError
+from ..frame import MOST_SIDE
 
-MOST_PIXELS_A_SIDE = 32768
+MOST_PIXELS_A_SIDE = MOST_SIDE
 MOST_CHANNELS = 4096  # of a file
 MAX_MB = 4096
 """Megabytes that a file may unpack to unless another limit is given."""
