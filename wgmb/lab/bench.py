@@ -121,6 +121,11 @@ class _Matrix:
     def measure(self, size: tuple[int, int], samples: int) -> None:
         """All candidates that fit, in turns, and the numba peer with them."""
         gc.collect()  # what the last figures held
+        try:
+            gpu.check_size(self.device, *size)
+        except InputError as error:
+            self.note(f"{_what(size, samples)} skipped: {error}")
+            return
         frame, jobs, timed = synthetic_frame(*size), {}, {}
         for c in self.candidates:
             blur, name = c.blur(samples, Shutter(180), self.device), c.label
@@ -162,7 +167,6 @@ class _Matrix:
 
     def _check(self, name: str, size: tuple[int, int], samples: int, held: int) -> None:
         """Refuse what will take too long, or more memory than there is."""
-        gpu.check_size(self.device, *size)
         if (seconds := _HEAVY * self._frame(name, size, samples)) > self.limit:
             raise InputError(f"{_HEAVY} frames would take about {_about(seconds)}, more than "
                              f"{self.limit:g} s")  # fmt: skip
