@@ -82,6 +82,7 @@ inside() {
         mount -t proc proc "$root/proc"
         mount --rbind /dev "$root/dev"
         mount -t tmpfs tmpfs "$root/dev/shm" 2>/dev/null
+        ip link set lo up 2>/dev/null  # a machine without a network still reaches itself
         exec chroot --userspec="$user" "$root" env -i HOME="$home" USER="$user" LANG=C.UTF-8 \
             PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
             sh -c "cd \"\$1\" && shift && exec env \"\$@\"" sh "$home/$folder" "$@"

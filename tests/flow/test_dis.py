@@ -3,6 +3,7 @@
 import re
 import sys
 
+import cv2
 import numpy as np
 import pytest
 
@@ -54,6 +55,29 @@ def test_what_moves_otherwise_than_most_is_nearer():
 
     _, depth = Dis("best").shot({n: moved(n) for n in (-1, 0, 1)}.get)(0)
     assert depth[70:98, 110:138].mean() < 0.985 < 0.995 < depth[:40].mean()
+
+
+def test_motion_without_depth_is_the_same_and_depth_is_that_of_the_formula():
+    pictures = {n: textured(n) for n in (-1, 0, 1)}
+    motion, depth = Dis().shot(pictures.get)(0)
+    alone, none = Dis().shot(pictures.get, depth=False)(0)
+    assert none is None
+    np.testing.assert_array_equal(alone, motion)
+    want = np.minimum(slow_depth(motion[..., :2]), slow_depth(motion[..., 2:]))
+    np.testing.assert_allclose(depth, want, atol=1e-5)
+
+
+def slow_depth(way):
+    """By float64: how far each pixel is from the homography that most of them follow."""
+    height, width = way.shape[:2]
+    step = max(1, max(width, height) // 40)
+    y, x = np.mgrid[step // 2 : height : step, step // 2 : width : step]
+    points = np.stack([x.ravel(), y.ravel()], 1).astype(float)
+    most, _ = cv2.findHomography(points, points + way[y, x].reshape(-1, 2), cv2.RANSAC, 3.0)
+    y, x = np.mgrid[:height, :width].astype(float)
+    there = np.stack([x, y, np.ones_like(x)], 2) @ most.T
+    off = there[..., :2] / there[..., 2:] - np.stack([x, y], 2) - way
+    return cv2.medianBlur((1 / (1 + 0.005 * np.hypot(*np.moveaxis(off, 2, 0)))).astype("f4"), 5)
 
 
 def test_without_opencv_the_extra_is_named(monkeypatch):

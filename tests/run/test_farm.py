@@ -120,6 +120,32 @@ def test_nobody_else_gives_local_workers_something_to_do():
                 Client(other, timeout=2, set_as_default=False)
 
 
+@DASK_LEAVES_SOCKETS
+def test_workers_that_do_not_all_answer_are_started_again(monkeypatch):
+    """Seen where a worker lost its first connection: it ends, and no other takes its place."""
+    from distributed import Client
+
+    from wgmb.run.farm import local
+
+    waits, wait = [], Client.wait_for_workers
+
+    def lost_once(client, count, timeout):
+        waits.append(client.scheduler.address)
+        if len(waits) < answers:
+            raise TimeoutError
+        wait(client, count, timeout)
+
+    monkeypatch.setattr(Client, "wait_for_workers", lost_once)
+    answers = 2
+    with local.local_client(1) as client:
+        assert client.submit(int, "7").result(timeout=60) == 7
+        assert waits[1] == client.scheduler.address != waits[0]
+    answers = 99
+    with pytest.raises(DeviceError, match="1 workers should answer"), local.local_client(1):
+        pytest.fail("nobody answered")
+    assert len(waits) == 5
+
+
 def test_a_worker_that_is_named_is_so_in_the_words_of_the_command_line(
     shot, tmp_path, capsys, monkeypatch
 ):

@@ -512,8 +512,10 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
             z = frame.depth[int(back)][pixel]
             weight = (1.1 if f else 1.0) * (1.2 if back and frame.inferred[pixel] else 1.0)
             found = Sample(z * weight, z, residual, at, f, back, pixel)
-            if f not in far or is_hidden(layers[0], frame, found):
-                record(seen, found, is_opaque=back or frame.edgeless[pixel])
+            is_opaque = back or frame.edgeless[pixel]
+            again = f > 0 and not is_opaque and seen[1].frame == 0
+            if not (f in far or again) or is_hidden(layers[0], frame, found):
+                record(seen, found, is_opaque)
         return d if is_there else np.full(2, np.inf), is_there
 
     def search_front(f):
@@ -633,7 +635,7 @@ def fetch(frame, s):
             z, behind = frame.depth[0][p], frame.depth[1][p] > 0
             if s.back and behind:
                 color, cover = color + share * frame.color[1][p], cover + share
-            elif z <= 1.05 * s.true_depth and (not s.back or z >= s.true_depth / 1.05):
+            elif s.true_depth / 1.05 <= z <= 1.05 * s.true_depth:
                 color = color + share * frame.color[0][p]
                 cover += share * (1.0 if s.back else frame.coverage[p])
     if s.back and cover > 1e-4:

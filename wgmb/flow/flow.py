@@ -36,7 +36,7 @@ class Flow:
         self._effort = EFFORTS[quality]
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
 
-    def shot(self, load: Load) -> Shot:
+    def shot(self, load: Load, depth: bool = True) -> Shot:
         """Flow of the frames of a shot.
 
         `load(number)`: the picture (height, width, 3 or 4), linear, as an array, or as a texture of

@@ -10,11 +10,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..shots.cuts import pictures_differ
-from ..shots.motion_source import MotionSource
+from ..shots.motion_source import Found, MotionSource
 from .frame_cache import FrameCache
 from .frame_file import FrameFile
 
-Found = tuple[np.ndarray, np.ndarray]
 FAR = 5  # frames around one that its motion may depend on
 
 

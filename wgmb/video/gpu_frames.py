@@ -46,6 +46,7 @@ class VideoFrames:
         self._planes, self._plain = Planes(blur.device, highlights), Planes(blur.device)
         self._images = TexturePool(blur.device)
         self._neighbours = "neighbours" in blur.method.uses
+        self._wants_depth = "depth" in blur.method.needs | blur.method.uses
         self._holdout: View | None = None
         if holdout is not None and motion is not None:
             texel = TEXTURES["holdout"]["format"]
@@ -102,13 +103,13 @@ class VideoFrames:
         gpu.submit(self._device, encoder)
         return texture
 
-    def _motion(self, index: int) -> tuple[View, View] | None:
-        """Motion and depth of a picture, within its own interval of time."""
+    def _motion(self, index: int) -> tuple[View, View | None] | None:
+        """Motion of a picture within its own interval of time, and depth if the method reads it."""
         if self._source is None:
             return None
         if self._shot is None or not self._reel.moves_on(self._first, index):
             # The first of a shot that is kept is the same, whatever was asked for before.
-            self._shot = self._source.shot(self._load)
+            self._shot = self._source.shot(self._load, self._wants_depth)
         self._first = index
         factors = self._factors(index)
         if isinstance(self._shot, Shot):
@@ -128,7 +129,7 @@ class VideoFrames:
         place = index % _FRAMES
         return (
             self._images.upload(f"motion {place}", motion, "rgba32float"),
-            self._images.upload(f"depth {place}", depth, "r32float"),
+            None if depth is None else self._images.upload(f"depth {place}", depth, "r32float"),
         )
 
     def _load(self, index: int) -> Any:

@@ -16,6 +16,8 @@ from contextlib import contextmanager, suppress
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ...errors import DeviceError
+
 _NEVER = "1 hour"
 _QUIET: dict[str, Any] = {
     "distributed.worker.profile.enabled": False,
@@ -38,6 +40,8 @@ _QUIET: dict[str, Any] = {
 }
 _LOADED_ONCE = ["distributed", "wgpu.backends.wgpu_native", "wgmb.run.farm.plugin"]
 _CLOSING = 5.0  # seconds
+_STARTING = 20.0  # seconds, after all processes have begun
+_STARTS = 3
 
 
 @contextmanager
@@ -55,19 +59,33 @@ def local_client(count: int) -> Iterator[Any]:
     ):
         if method == "forkserver":
             _load_once()
-        cluster = LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            dashboard_address="127.0.0.1:0",
-            silence_logs=50,
-            memory_limit=0,
-            host="tls://127.0.0.1",
-            security=Security.temporary(),
-            local_directory=folder,
-            env=dict(os.environ),  # that of the first process that loaded modules may be older
-        )
-        with closing(cluster), closing(Client(cluster, set_as_default=False)) as client:
-            yield client
+        for _ in range(_STARTS):
+            cluster = LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                dashboard_address="127.0.0.1:0",
+                silence_logs=50,
+                memory_limit=0,
+                host="tls://127.0.0.1",
+                security=Security.temporary(),
+                local_directory=folder,
+                env=dict(os.environ),  # that of the first process that loaded modules may be older
+            )
+            with closing(cluster), closing(Client(cluster, set_as_default=False)) as client:
+                if _are_there(client, count):
+                    yield client
+                    return
+        raise DeviceError(f"{count} workers should answer on this machine; {_STARTS} times, some "
+                          "did not")  # fmt: skip
+
+
+def _are_there(client: Any, count: int) -> bool:
+    """True if all workers answer: one may lose its first connection where keys are new."""
+    try:
+        client.wait_for_workers(count, timeout=_STARTING)
+    except TimeoutError:
+        return False
+    return True
 
 
 def _load_once() -> None:

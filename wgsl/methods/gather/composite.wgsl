@@ -103,9 +103,9 @@ fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32) {
     let matte = matte_at(px, front / 2u);
     let from_back = is_back && matte.has_back;
     let z = matte.depth;
-    // Of a front layer: what is not behind it. Of a back layer: the other back layers, and what lies as deep.
+    // What lies as deep, and of a back layer the other back layers. What lies before it is composited by itself.
     let is_beyond = z > sample.true_depth * SURFACE_DEPTH_RATIO;
-    let is_before = is_back && z < sample.true_depth / SURFACE_DEPTH_RATIO;
+    let is_before = z < sample.true_depth / SURFACE_DEPTH_RATIO;
     let belongs = from_back || !(is_beyond || is_before);
     let amount = select(0.0, shares.x * shares.y, belongs);
     (*sum).color += amount * textureLoad(layer_colors, px, front + u32(from_back), 0);

@@ -196,7 +196,9 @@ fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
     let is_inferred = is_back && (state.word & SEEN) == 0u;
     let depth = abs(z) * query.handicap * select(1.0, INFERRED_DEPTH_BIAS, is_inferred);
     let found = Sample(depth, abs(z), state.residual2, query.x - state.d, query.layer);
-    let counts = !is_far(query.layer) || is_hidden(found);
+    // A silhouette of the frame's own is not found once more a frame interval away, where paths that bend are off.
+    let is_again = query.layer > 1u && z < 0.0 && (*visible).front_edge.layer < 2u;
+    let counts = !(is_far(query.layer) || is_again) || is_hidden(found);
     if counts && z > 0.0 && found.depth < (*visible).opaque.depth { (*visible).opaque = found; }
     if counts && z < 0.0 {
         let front_edge = (*visible).front_edge;
@@ -209,8 +211,8 @@ fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
     }
 }
 
-/// True if the frame itself hides a sample of a frame beyond its neighbours, or does not hold its place: else it would
-/// show it. What is far away is easily mistaken.
+/// True if the frame itself hides a sample of another frame, or does not hold its place: else it would show it. What is
+/// far away, and what it shows already, is easily mistaken.
 fn is_hidden(found: Sample) -> bool {
     let surface = surface_of(vec2i(nearest_pixel(found.at)), found.layer);
     let here = found.at + displacement5(unpack_trajectory(surface), -offset_of(found.layer / 2u));
