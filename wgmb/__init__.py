@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from .png import show
     from .render import Render
     from .run.batch_report import BatchReport
+    from .run.pictures import PictureBlur, blur_pictures
     from .run.sequence import blur_sequence, vectors_sequence
     from .run.stages import BlurredFrame, blurred
     from .run.video import VideoReport, blur_video
@@ -71,6 +72,7 @@ __all__ = [
     "Observer",
     "Output",
     "Passes",
+    "PictureBlur",
     "Render",
     "Reprojections",
     "Result",
@@ -81,6 +83,7 @@ __all__ = [
     "Vectors",
     "VideoReport",
     "blur",
+    "blur_pictures",
     "blur_sequence",
     "blur_video",
     "blurred",
@@ -108,6 +111,7 @@ _PLACES = {
     "png": ("show",),
     "render": ("Render",),
     "run.batch_report": ("BatchReport",),
+    "run.pictures": ("PictureBlur", "blur_pictures"),
     "run.sequence": ("blur_sequence", "vectors_sequence"),
     "run.video": ("VideoReport", "blur_video"),
     "run.stages": ("BlurredFrame", "blurred"),

@@ -17,7 +17,7 @@ GROUPS = {
         "Clip", "Passes", "Vectors", "Output", "blur_sequence", "BatchReport", "blurred",
         "BlurredFrame", "Result", "Flow", "VectorOutput", "vectors_sequence",
     ),
-    "videos": ("blur_video", "VideoReport"),
+    "videos": ("blur_video", "blur_pictures", "PictureBlur", "VideoReport"),
     "colours": ("ColorConfig", "ColorSpace", "Display"),
     "cameras": ("Camera", "Reprojections", "CameraFile"),
     "scenes": (

@@ -237,7 +237,7 @@ def _coded(number: int) -> Thumbnail:
 class _Sideways:
     """All moves by the same."""
 
-    def shot(self, load):
+    def shot(self, load, depth=True):
         width, height = SIZE
         motion = np.full((height, width, 4), (-3, 0, 3, 0), np.float32)
         return lambda number: (motion, np.ones((height, width), np.float32))

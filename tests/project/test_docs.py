@@ -9,9 +9,11 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import cyclopts
+import numpy as np
 import pytest
 
 import make_clips
+import wgmb
 from wgmb import METHODS
 from wgmb.cli import app as cli
 from wgmb.scene import builtin
@@ -59,6 +61,17 @@ def test_python_blocks_run_in_their_order(page, tmp_path, monkeypatch):
     names: dict = {}
     for i, block in enumerate(blocks(PAGES[page], "python"), 1):
         exec(compile(block, f"{page}, block {i}", "exec"), names)
+
+
+RECIPES = [block for text in PAGES.values() for block in blocks(text, "py")]
+
+
+@pytest.mark.parametrize("block", RECIPES, ids=lambda block: block.split()[1])
+def test_recipes_with_other_packages_run_where_those_are(block, tmp_path, monkeypatch):
+    pytest.importorskip(block.split()[1])
+    make_clips.write(tmp_path / "in.mp4", tone=0.1)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block, "recipe", "exec"), {"np": np, "wgmb": wgmb})
 
 
 def test_the_pages_that_teach_python_have_blocks():

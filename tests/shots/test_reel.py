@@ -25,7 +25,7 @@ class PictureFinding:
         self.shots = 0
         self.seen: dict[int, list[int]] = {}
 
-    def shot(self, load):
+    def shot(self, load, depth=True):
         self.shots += 1
 
         def found(number):

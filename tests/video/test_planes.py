@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wgmb import InputError, gpu
-from wgmb.color.coding import CodedPicture, Coding
+from wgmb.color.coding import FLOAT, CodedPicture, Coding
 from wgmb.gpu.textures import TexturePool
 from wgmb.video.planes import Average, Planes, averages
 from wgmb.video.planes.matrices import to_samples
@@ -138,6 +138,23 @@ def test_what_is_stored_comes_back(device, name, texel):
 
 
 YUV = [name for name, coding in CODINGS.items() if averages(coding, coding)]
+
+
+@pytest.mark.parametrize("transfer", [4, 5, 8, 13, 16, 18])
+def test_floats_are_signals_and_come_back(device, transfer):
+    rgba = np.random.default_rng(transfer).random((7, 13, 4), np.float32)
+    coding = Coding("rgb", FLOAT, (1, 1), alpha=True, full_range=True, transfer=transfer)
+    picture = CodedPicture((rgba,), coding)
+    assert picture.size == (13, 7)
+    light = decoded(device, picture)
+    want = np.vectorize(light_of)(rgba[..., :3].astype(float), transfer) * rgba[..., 3:]
+    np.testing.assert_allclose(light[..., :3], want, atol=2e-6, rtol=1e-4)
+    np.testing.assert_array_equal(light[..., 3], rgba[..., 3])
+    images, planes = TexturePool(device), Planes(device)
+    view = images.upload("light", light, "rgba32float")
+    encoder = device.create_command_encoder()
+    (back,) = planes.encode(encoder, view, coding).planes
+    np.testing.assert_allclose(back, rgba, atol=4e-5)
 
 
 def averaged(pictures, weights, wanted):

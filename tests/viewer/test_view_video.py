@@ -83,7 +83,7 @@ class Held:
         self.made, self.free = [], True
         self.dis = Dis("best")
 
-    def shot(self, load):
+    def shot(self, load, depth=True):
         found = self.dis.shot(load)
 
         def motion(number):

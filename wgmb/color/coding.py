@@ -13,6 +13,7 @@ UNSPECIFIED = 2  # as matrix, transfer or primaries
 BT709 = 1
 BT601 = 6  # matrix and primaries of 525 lines; 5 is that of 625 lines, with the same matrix
 BT2020 = 9
+FLOAT = 32  # bits
 SRGB, LINEAR, PQ, HLG = 13, 8, 16, 18  # transfers
 
 
@@ -23,7 +24,7 @@ class Coding:
     model: Literal["yuv", "rgb", "grey"] = "yuv"
     """Planes: Y, Cb, Cr; or R, G, B; or grey alone. Alpha comes last."""
     bits: int = 8
-    """8 to 16; over 8, samples are the low bits of 16."""
+    """8 to 16; over 8, samples are the low bits of 16. FLOAT: signals, 1 is white."""
     steps: tuple[int, int] = (2, 2)
     """Columns and rows of pixels to one sample of chroma: (2, 2) is 4:2:0, (1, 1) 4:4:4."""
     alpha: bool = False
@@ -40,11 +41,11 @@ class CodedPicture:
 
     planes: tuple[np.ndarray, ...]
     """(height, width) uint8 or uint16 each; chroma smaller by Coding.steps, rounded up.
-    Perhaps read-only, with gaps between their rows."""
+    Perhaps read-only, with gaps between their rows. Of FLOAT: one, (height, width, 4) float32."""
     coding: Coding
 
     @property
     def size(self) -> tuple[int, int]:
         """Width and height [px]."""
-        height, width = self.planes[0].shape
+        height, width = self.planes[0].shape[:2]
         return width, height

@@ -226,13 +226,12 @@ def _rate(reader: VideoReader, output: OutputSettings) -> tuple[Fraction | None,
     )
 
 
-class VideoOptions(TypedDict, total=False):
-    """Keywords of `blur_video`: the options of `wgmb blur`, each with its meaning and default."""
+class PictureOptions(TypedDict, total=False):
+    """Keywords of `blur_pictures`: options of `wgmb blur`, each with its meaning and default."""
 
     method: Literal["tap", "tiles", "gather", "fusion", "reproject"]
     samples: int | Literal["auto"]
     jitter: float
-    holdout: str | Sequence[str]
     max_blur: float
     path: Literal["curved", "straight", "five"]
     variant: Literal["shutter", "published", "even", "slices"]
@@ -252,19 +251,25 @@ class VideoOptions(TypedDict, total=False):
     curve: str
     rolling: Literal["up", "down", "left", "right"]
     rolling_duration: float
-    frames: str
     cuts: str
-    max_mb: float
     flow: Literal["auto", "search", "dis", "none"]
     flow_quality: Literal["best", "fast"]
+    duplicates: Literal["keep", "fill"]
+    highlights: float
+
+
+class VideoOptions(PictureOptions, total=False):
+    """Keywords of `blur_video`: the options of `wgmb blur`, each with its meaning and default."""
+
+    holdout: str | Sequence[str]
+    frames: str
+    max_mb: float
     begin: str | float
     end: str | float
     longest_pause: float
     speed: str | float | Fraction
     pitch: Literal["keep", "follow"]
     streams: Literal["all", "video"]
-    duplicates: Literal["keep", "fill"]
-    highlights: float
     codec: Literal["h264", "h265", "av1", "vp9", "prores", "ffv1"]
     quality: int
     encoder: Literal["nvenc", "qsv", "amf", "videotoolbox", "v4l2m2m"]
@@ -298,11 +303,24 @@ def blur_video(
 
     Example: wgmb.blur_video("in.mp4", "out.mp4", fps=60, shutter=180)
     """
-    given: dict[str, Any] = dict(settings)
-    if unknown := sorted(given.keys() - VideoOptions.__annotations__.keys()):
-        known = list(VideoOptions.__annotations__)
-        raise InputError(f"unknown setting {unknown[0]!r}{did_you_mean(unknown[0], known)}")
-    for name, kind in get_type_hints(VideoOptions).items():
+    request, given = request_of(dict(settings), VideoOptions)
+    run = request.open(device)
+    kept = {one.name: given[one.name] for one in fields(OutputSettings) if one.name in given}
+    return run(run.plan(source, OutputSettings(output=str(output), **kept)), progress)
+
+
+def request_of(
+    given: dict[str, Any], options: type[PictureOptions]
+) -> tuple[VideoRequest, dict[str, Any]]:
+    """The request of a user's keywords, and the keywords as the settings hold them.
+
+    InputError for one that is not among the `options`.
+    """
+    hints = get_type_hints(options)
+    if unknown := sorted(given.keys() - hints.keys()):
+        near = did_you_mean(unknown[0], list(hints))
+        raise InputError(f"unknown setting {unknown[0]!r}{near}")
+    for name, kind in hints.items():
         if name in given and name in _TIMES and not isinstance(given[name], str):
             given[name] = f"{given[name]:.9f}"
         elif name in given and name in _AS_TEXT:
@@ -322,6 +340,4 @@ def blur_video(
         input=InputSettings(**group(InputSettings)),
         video=VideoSettings(**group(VideoSettings)),
     )
-    run = request.open(device)
-    plan = run.plan(source, OutputSettings(output=str(output), **group(OutputSettings)))
-    return run(plan, progress)
+    return request, given

@@ -42,6 +42,10 @@ class Picture(Generic[T]):
     """No motion leads to it from the one before: it begins a shot, or a flash, or ends one."""
 
 
+class NoPicturesError(Exception):
+    """There is no picture at all."""
+
+
 class ShotReader(Generic[T]):
     """Reads `pictures` as far as is asked for; they count from 0 on, without those left out.
 
@@ -85,10 +89,10 @@ class ShotReader(Generic[T]):
     def at(self, time: float, behind: int = _TO_KEEP) -> int:
         """The index of the picture that is shown at `time`; some after it are kept, too.
 
-        Asked for in the order of time, or as far back as is kept: `behind` pictures. LookupError if
-        there are no pictures.
+        Asked for in the order of time, or as far back as is kept: `behind` pictures.
+        NoPicturesError if there are none.
         """
-        self._read_beyond(time)
+        self.read_beyond(time)
         here = self._index_at(time)
         self._forget_before(here - behind)
         return here
@@ -98,7 +102,7 @@ class ShotReader(Generic[T]):
 
         Asked for in the order of time, as what lies before is forgotten.
         """
-        self._read_beyond(at + interval * max(shutter.span[1], 0.0))
+        self.read_beyond(at + interval * max(shutter.span[1], 0.0))
         here = self._index_at(at)
         first, last = here, here
         while first > min(self._kept) and self.same_shot(first, first - 1):
@@ -130,11 +134,12 @@ class ShotReader(Generic[T]):
     def _index_at(self, time: float) -> int:
         """The picture that is shown at `time`; before the first one, that."""
         if not self._kept:
-            raise LookupError("no pictures")
+            raise NoPicturesError
         shown = [i for i, picture in self._kept.items() if picture.time <= time]
         return max(shown, default=min(self._kept))
 
-    def _read_beyond(self, time: float) -> None:
+    def read_beyond(self, time: float) -> None:
+        """Read some pictures after the one that is shown at `time`, as far as there are."""
         beyond = sum(picture.time > time for picture in self._kept.values())
         while beyond < _BEYOND and self._read_one():
             beyond += self._kept[self._count - 1].time > time

@@ -1,13 +1,13 @@
-"""Exposures of a video at the output's own times, from its pictures and their motion."""
+"""Exposures of pictures in time, and of a video, at the output's own times."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import wgpu
@@ -36,35 +36,32 @@ _READ_AHEAD = 2  # coded pictures
 _BEFORE = 10  # pictures decoded before the first exposure, which its motion may depend on
 
 
-class VideoBlur:
-    """The exposures of a video, one after the other.
+class Exposures:
+    """The exposures of pictures in time, one after the other, wherever the pictures come from.
 
     `motion`: where motion comes from (wgmb/flow); None: pictures are averaged as they are.
     `holdout` (height, width): 1 stays sharp. `fill`: repeated pictures are left out, and motion
-    goes on over the gap. `cuts`: whether cuts are looked for, beside
-    `known_cuts`, the numbers of pictures that begin a shot. `highlights`: times white that white
-    counts as while it is blurred; InputError where the video holds light above white, and where
-    the method takes two frames to either side.
+    goes on over the gap. `cuts`: whether cuts are looked for, beside `known_cuts`, the numbers of
+    pictures that begin a shot. `highlights`: times white that white counts as while it is blurred.
+    `flash`: how long a flash of several pictures lasts at most [s]. InputError where the method
+    takes two frames to either side.
     """
 
     def __init__(
         self,
-        footage: VideoReader,
         blur: Blur,
         motion: MotionSource | None,
         *,
-        clock: Clock = Clock(),  # noqa: B008  it is frozen
         holdout: np.ndarray | None = None,
         fill: bool = False,
         cuts: bool = True,
         known_cuts: Collection[int] = (),
         highlights: float = 1.0,
+        flash: float = FLASH,
     ):
-        check_coding(highlights, footage.path, footage.coding)
         if reach_of(blur.method) > 1:
             raise InputError("a `reach` of 2 is for rendered frames, a video takes 1")
-        self._highlights = highlights
-        self.footage, self.clock, self._holdout = footage, clock, holdout
+        self._highlights, self._flash, self._holdout = highlights, flash, holdout
         self._blur, self._motion = blur, motion
         self._exposer, self._planes = ExposureSum(blur), Planes(blur.device, highlights)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
@@ -76,29 +73,38 @@ class VideoBlur:
         """The Blur's."""
         return self._blur.device
 
-    def exposures(
-        self, shutter: Shutter, wanted: Sequence[OutputFrame]
+    def of(
+        self,
+        pictures: Iterator[Picture[Thumbnail]],
+        shutter: Shutter,
+        wanted: Iterable[OutputFrame],
     ) -> Iterator[tuple[OutputFrame, Exposure]]:
-        """Every moment and its exposure, which is valid until the next is asked for."""
+        """Every moment and its exposure, which is valid until the next is asked for.
+
+        `pictures` and `wanted`, in the order of their times, are read as far as is needed.
+        """
         self.reel = reel = ShotReader(
-            self._pictures(shutter, wanted),
+            pictures,
             is_cut=is_cut if self._cuts else None,
             known_cuts=self._known_cuts,
             is_double=is_double if self._fill else None,
-            flash=FLASH / float(self.clock.speed),
+            flash=self._flash,
         )
         views = VideoFrames(reel, self._blur, self._motion, self._holdout, self._highlights)
         for moment in wanted:
             cells = reel.cells(float(moment.time), float(moment.interval), shutter)
             yield moment, Exposure(self, reel, views, cells)
 
-    def light(self, views: VideoFrames, cells: Sequence[Cell]) -> wgpu.GPUTexture:
+    def light(
+        self, reel: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell]
+    ) -> wgpu.GPUTexture:
         """The exposure of these cells as linear light (rgba32float)."""
-        light = self._light(views, cells)
+        light = self._light(reel, views, cells)
         if self._highlights == 1:
             return light
         encoder = self.device.create_command_encoder(label="compress")
-        output = self._images.texture("compressed", self.footage.size, "rgba32float")
+        size = light.size[0], light.size[1]
+        output = self._images.texture("compressed", size, "rgba32float")
         self._planes.compress(encoder, light.create_view(), output.create_view())
         gpu.submit(self.device, encoder)
         return output
@@ -108,17 +114,47 @@ class VideoBlur:
     ) -> CodedPicture:
         """The exposure of these cells in planes."""
         plain = self._motion is None and self._highlights == 1
-        if plain and averages(self.footage.coding, coding):
+        if plain and averages(reel[cells[0].index].content.coded.coding, coding):
             pictures = [reel[cell.index].content.coded for cell in cells]
             return self._average(pictures, [cell.share for cell in cells], coding)
-        light = self._light(views, cells)
+        light = self._light(reel, views, cells)
         encoder = self.device.create_command_encoder(label="encode")
         return self._planes.encode(encoder, light.create_view(), coding)
 
-    def _light(self, views: VideoFrames, cells: Sequence[Cell]) -> wgpu.GPUTexture:
+    def _light(
+        self, reel: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell]
+    ) -> wgpu.GPUTexture:
         """The same with highlights expanded."""
         parts = ((cell, views.shown(cell.index)) for cell in cells)
-        return self._exposer.texture(self.footage.size, parts)
+        return self._exposer.texture(reel[cells[0].index].content.coded.size, parts)
+
+
+class VideoBlur(Exposures):
+    """The exposures of a video. `clock`: the time of its pictures in the output.
+
+    All else: see Exposures. InputError for `highlights` where the video holds light above white.
+    """
+
+    def __init__(
+        self,
+        footage: VideoReader,
+        blur: Blur,
+        motion: MotionSource | None,
+        *,
+        clock: Clock = Clock(),  # noqa: B008  it is frozen
+        highlights: float = 1.0,
+        **more: Any,
+    ):
+        check_coding(highlights, footage.path, footage.coding)
+        flash = FLASH / float(clock.speed)
+        super().__init__(blur, motion, highlights=highlights, flash=flash, **more)
+        self.footage, self.clock = footage, clock
+
+    def exposures(
+        self, shutter: Shutter, wanted: Sequence[OutputFrame]
+    ) -> Iterator[tuple[OutputFrame, Exposure]]:
+        """Every moment and its exposure, which is valid until the next is asked for."""
+        return self.of(self._pictures(shutter, wanted), shutter, wanted)
 
     def _pictures(
         self, shutter: Shutter, wanted: Sequence[OutputFrame]
@@ -145,14 +181,14 @@ class VideoBlur:
 class Exposure:
     """An output frame, made when it is asked for as what is wanted."""
 
-    _run: VideoBlur
+    _run: Exposures
     _reel: ShotReader[Thumbnail]
     _views: VideoFrames
     _cells: Sequence[Cell]
 
     def light(self) -> wgpu.GPUTexture:
         """As linear light (rgba32float)."""
-        return self._run.light(self._views, self._cells)
+        return self._run.light(self._reel, self._views, self._cells)
 
     def coded(self, coding: Coding) -> CodedPicture:
         """In the planes of a video."""

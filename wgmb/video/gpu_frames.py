@@ -22,7 +22,7 @@ from .planes import Planes
 from .thumbnail import Thumbnail
 
 LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two that are summed
-_TEXEL = "rgba16float"
+_HALF_BITS = 12  # of samples that come back exactly from light as half floats
 _FRAMES = 3  # with motion: a frame and its neighbours
 
 
@@ -94,14 +94,19 @@ class VideoFrames:
             oldest = next(iter(self._lights), None)
             self._lights[index] = min(free) if free else self._lights.pop(oldest or 0)
             self._decode(self._planes, content, self._lights[index])
-        return self._images.texture(self._lights[index], content.coded.size, _TEXEL)
+        return self._images.texture(self._lights[index], content.coded.size, self._texel(content))
 
     def _decode(self, planes: Planes, content: Thumbnail, name: str) -> wgpu.GPUTexture:
-        texture = self._images.texture(name, content.coded.size, _TEXEL)
+        texture = self._images.texture(name, content.coded.size, self._texel(content))
         encoder = self._device.create_command_encoder(label="decode")
         planes.decode(encoder, content.coded, texture.create_view())
         gpu.submit(self._device, encoder)
         return texture
+
+    def _texel(self, content: Thumbnail) -> str:
+        """Of a picture's light: 16 bits and floats need more than half floats hold."""
+        is_fine = content.coded.coding.bits > _HALF_BITS
+        return gpu.texel(self._device, 4) if is_fine else "rgba16float"
 
     def _motion(self, index: int) -> tuple[View, View | None] | None:
         """Motion of a picture within its own interval of time, and depth if the method reads it."""

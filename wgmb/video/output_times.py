@@ -17,7 +17,7 @@ from .clock import Clock
 from .read.reader import VideoReader
 from .read.timeline import Times
 
-_SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
+SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
 _HELD = Fraction(1, 2)  # of a picture's interval beyond it: less is rounding
 
 
@@ -58,7 +58,7 @@ class OutputFrames(Sequence[OutputFrame]):
         end = footage.until if clock.end is None else min(footage.until, clock.end)
         if fps is not None:
             _check_pauses(footage, clock, times[first:last], longest_pause)
-            self._count = max(1, math.ceil((clock.out(end) - self._begin) * fps - _SPARE))
+            self._count = max(1, math.ceil((clock.out(end) - self._begin) * fps - SPARE))
             return
         self._own, self._count = list(times[first:last]), last - first
         again = footage.until - 1 / footage.rate

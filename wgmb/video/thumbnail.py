@@ -9,9 +9,11 @@ from functools import cache, cached_property
 import numpy as np
 
 from ..color.coding import (
+    FLOAT,
     HLG,
     LINEAR,
     PQ,
+    SRGB,
     CodedPicture,
     Coding,
 )
@@ -34,6 +36,19 @@ class Thumbnail:
 
     def __init__(self, coded: CodedPicture):
         self.coded = coded
+
+    @cached_property
+    def _seen(self) -> CodedPicture:
+        """The picture as integers."""
+        coding = self.coded.coding
+        if coding.bits != FLOAT:
+            return self.coded
+        color = self.coded.planes[0][..., :3]
+        signal = srgb(color) if coding.transfer == LINEAR else color
+        samples = np.rint(np.clip(signal, 0, 1) * 65535).astype(np.uint16)
+        transfer = SRGB if coding.transfer == LINEAR else coding.transfer
+        whole = Coding("rgb", 16, (1, 1), full_range=True, transfer=transfer)
+        return CodedPicture(tuple(np.moveaxis(samples, 2, 0)), whole)
 
     @cached_property
     def small(self) -> np.ndarray:
@@ -62,8 +77,15 @@ class Thumbnail:
     @property
     def grey(self) -> np.ndarray:
         """(height, width) uint8: display values without colour."""
-        coding, planes = self.coded.coding, self._colors
+        coding, planes = self._seen.coding, self._colors
         most, unit = 2**coding.bits - 1, 2 ** (coding.bits - 8)
+        if coding.model == "rgb" and coding.bits == 8:
+            total = planes[1].astype(np.uint16)
+            total *= 5
+            total += planes[2]
+            total += planes[0]
+            total += planes[0]
+            return (total >> 3).astype(np.uint8)
         if coding.model == "rgb":
             mean = 0.25 * planes[0].astype(np.float32) + 0.625 * planes[1] + 0.125 * planes[2]
             return (mean * (255 / most)).astype(np.uint8)
@@ -74,17 +96,17 @@ class Thumbnail:
     @property
     def _colors(self) -> tuple[np.ndarray, ...]:
         """The planes without alpha."""
-        planes = self.coded.planes
-        return planes[:-1] if self.coded.coding.alpha else planes
+        planes = self._seen.planes
+        return planes[:-1] if self._seen.coding.alpha else planes
 
     def _steps(self, plane: np.ndarray) -> tuple[int, int]:
         """Columns and rows of pixels to one sample of a plane."""
-        whole = plane.shape == self.coded.planes[0].shape
-        return (1, 1) if whole else self.coded.coding.steps
+        whole = plane.shape == self._seen.planes[0].shape
+        return (1, 1) if whole else self._seen.coding.steps
 
     def _display(self, planes: list[np.ndarray]) -> np.ndarray:
         """Display values of samples, those of HDR up to the white of text."""
-        coding = self.coded.coding
+        coding = self._seen.coding
         samples = np.array(planes if len(planes) == 3 else [planes[0]] * 3, np.float32)
         rows = _rows(coding)
         signal = np.einsum("cp,pyx->yxc", rows[:, :3], samples) + rows[:, 3]

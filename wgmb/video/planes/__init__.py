@@ -8,7 +8,7 @@ import numpy as np
 import wgpu
 
 from ... import gpu
-from ...color.coding import CodedPicture, Coding
+from ...color.coding import FLOAT, CodedPicture, Coding
 from ...gpu.textures import TexturePool
 from .average import Average, averages
 from .matrices import from_samples
@@ -40,6 +40,8 @@ class Planes:
         """Upload a picture and record its way into `output`, rgba16float or rgba32float."""
         coding = picture.coding
         check(coding)
+        if coding.bits == FLOAT:
+            return self._decode_floats(encoder, picture, output)
         deep = "r16uint" if coding.bits > 8 else "r8uint"
         views = [
             self._images.upload(f"plane {i}", plane, deep) for i, plane in enumerate(picture.planes)
@@ -66,6 +68,21 @@ class Planes:
             output=output,
         )
 
+    def _decode_floats(
+        self, encoder: wgpu.GPUCommandEncoder, picture: CodedPicture, output: wgpu.GPUTextureView
+    ) -> None:
+        kernel = gpu.kernel(
+            self._device,
+            "video/planes/decode_floats.wgsl",
+            {"Output": output.texture.format},
+            CURVE=curve_of(picture.coding),
+            HIGHLIGHTS=self._highlights,
+            ALPHA=picture.coding.alpha,
+        )
+        signals = self._images.upload("signals", picture.planes[0], "rgba32float")
+        frame = gpu.FrameBindings.of_size(self._device, picture.size)
+        kernel.run(encoder, "main", frame, signals=signals, output=output)
+
     def encode(
         self, encoder: wgpu.GPUCommandEncoder, light: wgpu.GPUTextureView, coding: Coding
     ) -> CodedPicture:
@@ -89,6 +106,8 @@ class Planes:
             light=light,
             output=samples.create_view(),
         )
+        if coding.bits == FLOAT:
+            return CodedPicture((self._images.download(encoder, samples),), coding)
         places = places_of(size, coding)
         for place in places:
             self._pack(encoder, samples, place, places, coding)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...color.coding import Coding
+from ...color.coding import FLOAT, Coding
 from ...errors import InputError
 
 _RED_BLUE = {  # KR, KB by the number of the matrix
@@ -40,6 +40,8 @@ def to_samples(coding: Coding) -> np.ndarray:
 def _range(coding: Coding) -> tuple[np.ndarray, np.ndarray]:
     """Factor and offset of the samples, for each plane."""
     most, unit = 2**coding.bits - 1, 2 ** (coding.bits - 8)
+    if coding.bits == FLOAT:
+        return np.ones(3), np.zeros(3)
     if coding.full_range:
         scale, black, middle = np.full(3, 1 / most), 0.0, 2 ** (coding.bits - 1)
     else:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import wgpu
 
-from ...color.coding import Coding
+from ...color.coding import FLOAT, Coding
 from ...errors import InputError
 from ...gpu import wgsl
 from .matrices import from_samples, to_samples
@@ -26,12 +26,17 @@ def curve_of(coding: Coding) -> int:
 
 def reading(device: wgpu.GPUDevice, coding: Coding) -> wgpu.GPUBuffer:
     """The struct Code by which samples become signals."""
-    return _code(device, from_samples(coding), 1 / (2**coding.bits - 1), coding)
+    return _code(device, from_samples(coding), 1 / _most(coding), coding)
 
 
 def writing(device: wgpu.GPUDevice, coding: Coding) -> wgpu.GPUBuffer:
     """The struct Code by which signals become samples."""
-    return _code(device, to_samples(coding), 2**coding.bits - 1, coding)
+    return _code(device, to_samples(coding), _most(coding), coding)
+
+
+def _most(coding: Coding) -> int:
+    """The sample of full opacity."""
+    return 1 if coding.bits == FLOAT else 2**coding.bits - 1
 
 
 def _code(device: wgpu.GPUDevice, rows: np.ndarray, alpha: float, coding: Coding) -> wgpu.GPUBuffer:

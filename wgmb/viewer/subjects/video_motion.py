@@ -19,7 +19,7 @@ from ...flow import Shot
 from ...gpu.textures import TexturePool
 from ...shots.cut_list import CutList
 from ...shots.motion_source import MotionSource
-from ...shots.reader import Picture, ShotReader
+from ...shots.reader import NoPicturesError, Picture, ShotReader
 from ...video.holdouts import holdout_of
 from ...video.planes import Planes
 from ...video.read.reader import VideoReader
@@ -91,7 +91,7 @@ class PictureFinder:
         reel = self._reel_around(number)
         try:
             here = reel.at(self._times[number], _BEHIND)
-        except LookupError:  # from some pictures before it on, none can be decoded
+        except NoPicturesError:  # from some pictures before it on, none can be decoded
             return PictureFinding(None, None, None, None, is_left_out=True)
         near = {i: reel[i].number for i in (here - 1, here, here + 1) if i in reel.kept}
         if near.get(here) != number:

@@ -1,0 +1,226 @@
+"""Pictures from anywhere in Python, such as lists, generators and tensors, blurred one by one."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import suppress
+from fractions import Fraction
+from itertools import count
+from typing import Any, Literal, Unpack
+
+import numpy as np
+import wgpu
+
+from ..color.coding import BT709, FLOAT, HLG, LINEAR, PQ, SRGB, CodedPicture, Coding
+from ..errors import InputError, check_choice
+from ..settings.output import rate_of
+from ..shots.cut_list import CutList
+from ..shots.reader import Picture
+from ..shutter import Shutter
+from ..video.exposures import Exposure, Exposures
+from ..video.output_times import SPARE, OutputFrame
+from ..video.thumbnail import Thumbnail
+from ..video.write.encoders import FINEST_RATE
+from .video import PictureOptions, request_of
+
+TRANSFERS = {"srgb": SRGB, "linear": LINEAR, "pq": PQ, "hlg": HLG, "bt709": BT709}
+_BITS = {"uint8": 8, "uint16": 16, "float16": FLOAT, "float32": FLOAT, "float64": FLOAT}
+_CPU = 1, 3  # of DLPack: memory of the CPU, and what CUDA pinned of it
+_RATE = Fraction(24)  # of pictures whose rate is not told; only the length of a flash depends on it
+
+
+class PictureBlur(Iterator[Any]):
+    """Blurred pictures, each made when it is asked for; `blur_pictures` returns one."""
+
+    def __init__(
+        self,
+        pictures: Iterable[Any],
+        exposures: Exposures,
+        shutter: Shutter,
+        rates: tuple[Fraction, Fraction],
+        transfer: str,
+        how: str,
+    ):
+        self.how = how
+        """Where the motion comes from, in words."""
+        self.read = 0
+        """Number of pictures read so far: some more than were needed yet."""
+        self._rate, self._fps = rates
+        self._exposures, self._transfer = exposures, transfer
+        self._like: type = type(None)
+        self._shape, self._dtype, self._coding = (0, 0, 0), np.dtype(np.uint8), Coding()
+        self._ended = False
+        self._results = self._made(pictures, shutter)
+
+    def __next__(self) -> Any:
+        """The next picture, as an array or a tensor like those that were given."""
+        return next(self._results)
+
+    def close(self) -> None:
+        """End the run: no further picture comes, and none is held."""
+        self._results.close()
+
+    def count(self, pictures: int) -> int:
+        """Number of results of so many pictures."""
+        return max(1, math.ceil(pictures / self._rate * self._fps - SPARE)) if pictures else 0
+
+    @property
+    def cuts(self) -> list[int]:
+        """Numbers of the pictures read so far that begin a shot."""
+        return sorted(self._exposures.reel.cuts) if self._exposures.reel else []
+
+    @property
+    def flashes(self) -> list[int]:
+        """Numbers of the pictures read so far that begin a flash."""
+        return list(self._exposures.reel.flashes) if self._exposures.reel else []
+
+    @property
+    def repeated(self) -> list[int]:
+        """Numbers of the repeated pictures that were left out (`duplicates` "fill")."""
+        return list(self._exposures.reel.doubles) if self._exposures.reel else []
+
+    def _made(self, pictures: Iterable[Any], shutter: Shutter) -> Generator[Any, None, None]:
+        exposed = self._exposures.of(self._pictures(pictures), shutter, self._wanted())
+        for _, exposure in exposed:
+            yield self._result(exposure)
+
+    def _wanted(self) -> Iterator[OutputFrame]:
+        """The output frames, as many as the pictures turn out to fill."""
+        interval = 1 / self._fps
+        for number in count():
+            reel = self._exposures.reel
+            assert reel is not None
+            reel.read_beyond(float(number * interval))
+            if self._ended and number >= self.count(self.read):
+                return
+            yield OutputFrame(number, number * interval, interval)
+
+    def _pictures(self, pictures: Iterable[Any]) -> Iterator[Picture[Thumbnail]]:
+        for number, picture in enumerate(pictures):
+            coded = self._coded(number, picture)
+            self.read = number + 1
+            yield Picture(float(number / self._rate), Thumbnail(coded), number)
+        self._ended = True
+
+    def _coded(self, number: int, picture: Any) -> CodedPicture:
+        """A copy of a picture: its owner may fill the same memory again."""
+        array = _array(f"picture {number}", picture)
+        if self._like is type(None):
+            self._coding = Coding(
+                "rgb",
+                _BITS[array.dtype.name],
+                (1, 1),
+                alpha=array.shape[2] == 4,
+                full_range=True,
+                transfer=TRANSFERS[self._transfer],
+            )
+            self._shape, self._dtype, self._like = array.shape, array.dtype, type(picture)
+        if array.shape != self._shape or array.dtype != self._dtype:
+            want = _described(self._shape, self._dtype)
+            raise InputError(f"picture {number} must be {want} like the first one, "
+                             f"got {_described(array.shape, array.dtype)}")  # fmt: skip
+        if self._coding.bits < FLOAT:
+            planes = np.array(np.moveaxis(array, 2, 0), order="C")
+            return CodedPicture(tuple(planes), self._coding)
+        if not np.isfinite(array).all():
+            raise InputError(f"picture {number} must be finite, got NaN or infinity")
+        signals = np.ones((*array.shape[:2], 4), np.float32)
+        signals[..., : array.shape[2]] = array
+        return CodedPicture((signals,), self._coding)
+
+    def _result(self, exposure: Exposure) -> Any:
+        planes = exposure.coded(self._coding).planes
+        if self._coding.bits < FLOAT:
+            array = np.stack(planes, axis=2)
+        else:
+            channels = planes[0][..., : self._shape[2]]
+            array = np.ascontiguousarray(channels, self._dtype)
+        library = sys.modules.get(self._like.__module__.partition(".")[0])
+        if isinstance(array, self._like) or not hasattr(library, "from_dlpack"):
+            return array
+        return library.from_dlpack(array)  # pyright: ignore[reportOptionalMemberAccess]
+
+
+def blur_pictures(
+    pictures: Iterable[Any],
+    *,
+    fps_in: str | float | Fraction | None = None,
+    fps: str | float | Fraction | None = None,
+    transfer: Literal["srgb", "linear", "pq", "hlg", "bt709"] = "srgb",
+    holdout: np.ndarray | None = None,
+    device: wgpu.GPUDevice | str | None = None,
+    **settings: Unpack[PictureOptions],
+) -> PictureBlur:
+    """Blur pictures without vectors from anywhere: `wgmb blur` of a video, without the video.
+
+    `pictures`: an iterable of arrays (height, width, 3 or 4), all of one size and type: RGB, and
+    straight alpha; uint8, uint16 (of their whole range), or float, of which 1 is white. Tensors of
+    other libraries in the CPU's memory are taken by DLPack. They are copied, and read as far as the
+    next result needs: at most a dozen are held, and ten more while a flash is told from a cut.
+    `fps_in`, `fps`: pictures per second of the input and of the output; without `fps`, there is a
+    result for each picture. `transfer`: the meaning of the samples; floats that are "linear" are
+    not rounded and may exceed 1. `holdout` (height, width): 1 stays sharp. `settings`: options of
+    `wgmb blur` with underscores, such as shutter=180, flow="search", cuts="only:12".
+
+    Returns an iterator of pictures like those that were given. InputError for settings that do not
+    fit, and, with its number, for a picture of another size or type, one that is not finite, or one
+    on a GPU. Exceptions of `pictures` arrive unchanged.
+
+    Example: for picture in wgmb.blur_pictures(imageio.v3.imiter("in.mp4"), fps_in=30, fps=60): ...
+    """
+    if fps is not None and fps_in is None:
+        raise InputError("`fps` needs the rate of the pictures; set `fps_in`")
+    check_choice("transfer", transfer, TRANSFERS)
+    rate = _RATE if fps_in is None else _rate("fps_in", fps_in)
+    request, _ = request_of(dict(settings), PictureOptions)
+    if holdout is not None and request.video.flow == "none":
+        raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
+    if request.video.highlights != 1 and transfer in ("linear", "pq", "hlg"):
+        raise InputError("`highlights` is for pictures clipped at white, not for HDR")
+    run = request.open(device)
+    cuts = CutList(run.request.input.cuts or "")
+    exposures = Exposures(
+        run.blur,
+        run.motion,
+        holdout=None if holdout is None else _matte(holdout),
+        fill=request.video.duplicates == "fill",
+        cuts=cuts.is_search,
+        known_cuts=cuts.frames(0),
+        highlights=request.video.highlights,
+    )
+    rates = rate, rate if fps is None else _rate("fps", fps)
+    return PictureBlur(pictures, exposures, run.request.shutter.make(), rates, transfer, run.how)
+
+
+def _rate(name: str, rate: str | float | Fraction) -> Fraction:
+    return rate_of(str(rate), name).limit_denominator(FINEST_RATE)
+
+
+def _matte(holdout: np.ndarray) -> np.ndarray:
+    found = np.asarray(holdout, np.float32)
+    if found.ndim != 2:
+        raise InputError(f"holdout must be (height, width), got {found.shape}")
+    return found
+
+
+def _array(name: str, picture: Any) -> np.ndarray:
+    """The picture as an array, without a copy if possible."""
+    if not isinstance(picture, np.ndarray) and hasattr(picture, "__dlpack_device__"):
+        if picture.__dlpack_device__()[0] not in _CPU:
+            raise InputError(f"{name} is on a GPU; bring it to the CPU first: `.cpu()`")
+        with suppress(BufferError, RuntimeError, TypeError):  # else numpy's own way, or its words
+            picture = np.from_dlpack(picture)
+    array = np.asarray(picture)
+    if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
+        raise InputError(f"{name} must be (height, width, 3 or 4), got {array.shape}")
+    if array.dtype.name not in _BITS:
+        raise InputError(f"{name} must be {', '.join(_BITS)}; got {array.dtype}")
+    return array
+
+
+def _described(shape: tuple[int, ...], kind: np.dtype) -> str:
+    return f"{shape[1]} x {shape[0]} with {shape[2]} channels of {kind}"
