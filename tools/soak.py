@@ -30,6 +30,7 @@ from soaking import (
     numbers,
     resuming,
     stopping,
+    strangers,
     videos,
 )
 from soaking.processes import wgmb
@@ -37,6 +38,7 @@ from soaking.table import HEAD, ROWS, Row, run_rows, write_whole
 
 MODULES = (
     memory, stopping, damage, hostile, resuming, numbers, devices, disks, names, videos, footage,
+    strangers,
 )  # fmt: skip
 LISTED = [
     row for module in MODULES for row in ROWS.values() if row.run.__module__ == module.__name__

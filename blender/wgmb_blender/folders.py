@@ -30,12 +30,18 @@ def put_in_place(file: Path, path: Path) -> None:
     """Move a file to its place, on another disk too, so that it is there whole or not at all."""
     with _told(f"write {path}"):
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside = path.with_name(f".{path.name}.part")
-        try:
-            shutil.copyfile(file, beside)
-            os.replace(beside, path)
-        finally:
-            beside.unlink(missing_ok=True)
+        # A new file with a name of its own: never one, or a link, that lies there already.
+        with tempfile.NamedTemporaryFile(
+            prefix=f".{path.name}.", suffix=".part", dir=path.parent, delete=False
+        ) as beside:
+            try:
+                with file.open("rb") as source:
+                    shutil.copyfileobj(source, beside)
+                beside.close()
+                shutil.copymode(file, beside.name)
+                os.replace(beside.name, path)
+            finally:
+                Path(beside.name).unlink(missing_ok=True)
         file.unlink()
 
 

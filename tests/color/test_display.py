@@ -371,3 +371,20 @@ def test_videos_are_tagged_as_their_display(tmp_path, aces, display, primaries, 
     assert (frame.color_primaries, frame.color_trc) == (primaries, transfer)
     want = shown.of(aces.space_of({}))(rgb, 8) if shown else to_display(rgb, 8)
     assert np.abs(frame.to_ndarray(format="rgb24")[8, 8].astype(int) - want[8, 8]).max() <= 3
+
+
+@pytest.mark.parametrize("change, said", [
+    (lambda text: text.replace(b"Screen", b"Scr\xf7en"), "must be text in UTF-8, byte"),
+    (lambda text: text.replace(b"scene_linear: lin_rec709", b"scene_linear: none"),
+     "the role scene_linear of config.ocio names no colour space"),
+    (lambda text: text.replace(b"Screen", b"\"\\xf7\""), "config.ocio"),
+])  # fmt: skip
+def test_a_config_that_is_damaged_behind_its_beginning_is_one_line(tmp_path, change, said):
+    path = film_config(tmp_path)
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(InputError, match=said) as error:
+        config = ColorConfig(path)
+        config.space("log").linear(np.ones((2, 2, 3), np.float32))
+        config.display(view="Film").shown(np.ones((2, 2, 3)), config.space("lin_rec709"))
+        raise InputError("config.ocio: read")
+    assert "\n" not in str(error.value)

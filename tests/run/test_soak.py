@@ -15,7 +15,18 @@ import numpy as np
 import pytest
 import soak
 
-from soaking import CRASHERS, damage, hostile, kinds, numbers, parts, resuming, stopping, table
+from soaking import (
+    CRASHERS,
+    damage,
+    hostile,
+    kinds,
+    numbers,
+    parts,
+    resuming,
+    stopping,
+    strangers,
+    table,
+)
 from soaking.forked import forked
 from soaking.processes import Ended, apart, growth, limits, run, use, wgmb
 from soaking.table import Line, Tally, Trial
@@ -43,6 +54,14 @@ def test_damaged_files_are_read_or_refused_by_name_and_nothing_else(tmp_path):
 
 def test_files_that_were_cut_off_are_refused(tmp_path):
     check(damage.truncations, 15, tmp_path)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("rows", "count"), [(strangers.lists, 6), (strangers.jumps, 3), (strangers.outdated_videos, 2)]
+)
+def test_strangers_videos_do_no_harm(rows, count, tmp_path):
+    check(rows, count, tmp_path)
 
 
 @pytest.fixture(scope="module")

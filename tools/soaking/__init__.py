@@ -8,7 +8,7 @@ shots      frames on disk, and what an unbroken run makes of them
 parts      all that may draw a frame: every method and variant, scenes, the viewer
 
 memory, damage, hostile, stopping, resuming, numbers, devices, disks, names, videos,
-footage: the rows
+footage, strangers: the rows
 """
 
 import sys

@@ -84,7 +84,7 @@ def _outcome(kind: str, path: Path, sound: str) -> tuple[str, str]:
         holds = kinds.read(kind, path)
     except InputError as error:
         text = str(error)
-        if str(path) not in text:
+        if path.name not in text:
             return "unnamed", f"does not name the file: {text}"
         return ("lines", f"more than a line: {text}") if "\n" in text else (_REFUSED, "")
     except Exception as error:

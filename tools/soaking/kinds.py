@@ -12,6 +12,7 @@ import io
 import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +21,13 @@ import opentimelineio as otio
 import tifffile
 from PIL import Image
 
+import make_clips as clips
 import make_frames as make
+from make_config import film_config
 from wgmb import (
     CameraFile,
     Clip,
+    ColorConfig,
     InputError,
     Passes,
     viewer,
@@ -32,7 +36,10 @@ from wgmb.cli import app
 from wgmb.color.srgb import to_display
 from wgmb.io import exr, stills
 from wgmb.shots.cut_list import CutList
+from wgmb.video.read.reader import VideoReader
 from wgmb.viewer import State
+
+_VIDEOS = ".mov", ".ts", ".mkv"  # one that is cut off is read as far as it goes
 
 
 @dataclass(frozen=True)
@@ -48,7 +55,7 @@ class Kind:
     @property
     def is_text(self) -> bool:
         """True if a truncated file may be sound, with another meaning."""
-        return self.suffix in (".csv", ".edl", ".toml")
+        return self.suffix in (".csv", ".edl", ".toml", ".ocio", *_VIDEOS)
 
 
 def read(kind: str, path: Path) -> str:
@@ -117,6 +124,18 @@ def _read_settings(path: Path) -> str:
     finally:
         viewer.view = shown
     return hashlib.sha256(states[0].toml().encode()).hexdigest()
+
+
+def _read_video(path: Path) -> str:
+    return _digest(plane for _, picture in VideoReader(path) for plane in picture.planes)
+
+
+def _read_ocio(path: Path) -> str:
+    """The config, and colours through two of its spaces and a display with a table."""
+    config, color = ColorConfig(path), make.picture(1)[..., :3]
+    space = config.space("lin_rec709")
+    linear = [space.linear(color), config.space("log").linear(color)]
+    return _digest([*linear, config.display(view="Film").shown(color, space)])
 
 
 def _command(path: Path, *words) -> None:
@@ -215,6 +234,21 @@ def _camera(path: Path) -> None:
     make.write_cameras(path, range(1, 4), objects=lambda n: {"car": body})
 
 
+def _video(**options) -> Callable[[Path], object]:
+    return lambda path: clips.write(path, **options)
+
+
+def _interlaced(path: Path) -> None:
+    times = [Fraction(n, 25) for n in range(8)]
+    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(8)]
+    clips.write(path, frames, times, codec="mpeg2video", tick=Fraction(1, 25),
+                options={"flags": "+ilme+ildct", "qmin": "1", "qmax": "2"})  # fmt: skip
+
+
+def _ocio(path: Path) -> None:
+    film_config(path.parent).rename(path)
+
+
 KINDS = {
     "exr-none": Kind(".exr", _exr("NO"), _read_exr),
     "exr-rle": Kind(".exr", _exr("RLE"), _read_exr),
@@ -243,5 +277,9 @@ KINDS = {
     "curve": Kind(".csv", _curve, _read_curve),
     "edl": Kind(".edl", _edl, _read_cuts),
     "otio": Kind(".otio", _otio, _read_cuts),
+    "video-rotated": Kind(".mov", _video(setup=lambda s: s.set_display_rotation(90)), _read_video),
+    "video-interlaced": Kind(".ts", _interlaced, _read_video),
+    "video-ffv1": Kind(".mkv", _video(codec="ffv1"), _read_video),
+    "ocio": Kind(".ocio", _ocio, _read_ocio),
     "viewer": Kind(".toml", _settings, _read_settings),
 }

@@ -14,7 +14,7 @@ from .processes import WGMB, Use, apart, environment, growth, use
 from .table import Line, Trial, row
 
 MOST = 24.0  # KiB a frame of 96 x 54: what allocators scatter about
-_WARM = 60  # frames, until the viewer has found its quality
+_WARM = 300  # frames, until pools, the quality of the viewer and the allocator have settled
 _SETTLED = 0.15  # share of a run after which memory counts
 _MOST_A_THOUSAND = 4.0  # MiB per 1,000 frames of a long run
 
@@ -30,7 +30,7 @@ def leaks(trial: Trial) -> Iterator[Line]:
     warm = max(_WARM, trial.count // 2)
 
     def tried(name: str) -> Line:
-        ended = apart(grown, name, warm, trial.count, seconds=60 + 3 * trial.count)
+        ended = apart(grown, name, warm, trial.count, seconds=60 + 3 * (warm + trial.count))
         what, frames = f"memory a frame, {name}", f"{trial.count} frames after {warm}"
         if ended.value is None:
             return Line(what, frames, "no", ended.wrong(0), False)

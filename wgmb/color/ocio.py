@@ -42,6 +42,8 @@ def told(about: str) -> Iterator[None]:
     ocio.SetLoggingLevel(ocio.LOGGING_LEVEL_NONE)
     try:
         yield
+    except UnicodeDecodeError:  # of names, or of its own message
+        raise InputError(f"{about}: holds text that is not UTF-8") from None
     except (ocio.Exception, ocio.ExceptionMissingFile) as error:
         raise InputError(f"{about}: {' '.join(str(error).split())}") from None
     finally:

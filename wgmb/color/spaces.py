@@ -87,6 +87,7 @@ class ColorConfig:
 
     def __init__(self, config: str | Path):
         self._ocio, place = ocio.load(), ocio.config_file(str(config))
+        _check_text(str(config), Path(place))
         with ocio.told(str(config)):
             self._config: Any = self._ocio.Config.CreateFromFile(place)
         self.name: str = self._config.getName() or Path(place).name
@@ -140,8 +141,10 @@ class ColorConfig:
         """The space of the role scene_linear, in which pictures of other spaces are blurred."""
         if not self._config.hasRole("scene_linear"):
             raise InputError(f"{self.name} has no role scene_linear, in which pictures are blurred")
-        name = self._config.getColorSpace("scene_linear").getName()
-        return ColorSpace(self, name, "the role scene_linear")
+        found = self._config.getColorSpace("scene_linear")
+        if found is None:
+            raise InputError(f"the role scene_linear of {self.name} names no colour space it has")
+        return ColorSpace(self, found.getName(), "the role scene_linear")
 
     def chromaticities(self, space: ColorSpace) -> tuple[float, ...] | None:
         """Chromaticities of that linear space for an EXR: x, y of red, green, blue and white; None
@@ -345,6 +348,17 @@ class Display:
             return samples
         covered = np.rint(np.clip(rgba[..., 3:], 0, 1).astype(np.float32) * most).astype(kind)
         return np.concatenate([samples, covered], axis=2)
+
+
+def _check_text(config: str, path: Path) -> None:
+    """InputError for a file whose names could not be read; archives hold none of that kind."""
+    if path.suffix == ".ocio" and path.is_file():
+        try:
+            path.read_text("utf-8")
+        except UnicodeDecodeError as error:
+            raise InputError(
+                f"{config}: must be text in UTF-8, byte {error.start} is not"
+            ) from None
 
 
 def _same(name: str, known: list[str]) -> str | None:

@@ -24,8 +24,11 @@ def check(path: Path, what: str, promised: int, stored: int, max_mb: float) -> N
     """Raise InputError where `promised` bytes are more than a file of `stored` bytes may ask for.
 
     `what`: how large the picture is, for the message. A file that unpacks to over 500 times its
-    size may take a quarter of `max_mb`: a black frame does so, and so does a bomb.
+    size may take a quarter of `max_mb`: a black frame does so, and so does a bomb. InputError for a
+    limit that is none.
     """
+    if not max_mb > 0:
+        raise InputError(f"`max_mb` must be above 0 megabytes, got {max_mb:g}")
     thin = promised > _TIMES * stored
     most = max_mb / _SHARE if thin else max_mb
     if promised <= most * 2**20:

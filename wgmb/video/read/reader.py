@@ -62,6 +62,9 @@ class OtherStream:
     """Its kind in words, such as "aac, 48000 Hz, stereo"."""
 
 
+_HELD_CHANNELS = 12  # as float32, of what a blur holds: coded pictures, five as light, the sums
+
+
 class VideoReader:
     """A video file.
 
@@ -113,7 +116,7 @@ class VideoReader:
                 f"{self.path}: pictures of {width} x {height}, expected 1 to "
                 f"{limits.MOST_PIXELS_A_SIDE} pixels a side"
             )
-        promised = limits.unpacked((width, height), 4)
+        promised = limits.unpacked((width, height), _HELD_CHANNELS)
         stored = self.path.stat().st_size
         limits.check(self.path, f"{width} x {height}", promised, stored, max_mb)
 
