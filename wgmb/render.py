@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import wgpu
+from numpy.typing import NDArray
 
 from . import gpu
 from .errors import InputError
@@ -69,7 +70,7 @@ class Render:
 
     def __call__(
         self, time: float, number: int = 0, progress: Progress | None = None
-    ) -> np.ndarray:
+    ) -> NDArray[np.float32]:
         """The blurred frame whose instant is `time` [s]: (height, width, 4) float32, linear."""
         with self._working():
             output = self._images.texture("output", self.size, self.blur.output)
@@ -84,7 +85,7 @@ class Render:
 
     def with_confidence(
         self, time: float, number: int = 0
-    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    ) -> tuple[NDArray[np.float32], dict[str, NDArray[np.float32]]]:
         """Return the blurred frame at `time` [s] and its confidence; see Blur.with_confidence."""
         names = self.blur.confidence
         with self._working():
@@ -225,7 +226,7 @@ class Render:
             **passes,
         )
 
-    def sharp(self, time: float) -> np.ndarray:
+    def sharp(self, time: float) -> NDArray[np.float32]:
         """The sharp picture at `time` [s]: (height, width, 4) float32, linear."""
         if not self.scene.has_volumes:
             return self.frame(time).color

@@ -8,7 +8,7 @@ import pytest
 
 import scenes
 from test_put_back import difference, everything, small
-from wgmb_blender import command, job, process
+from wgmb_blender import command, folders, job, process
 from wgmb_blender.settings import wanted_of
 from wgmb_blender.wanted import Report
 from wgmb_blender.wgmb_worker.problem import ProblemError, plain
@@ -294,3 +294,13 @@ def test_the_command_has_no_window(tmp_path):
     with bpy.context.temp_override(window=None):
         assert command.command(["--frames", "4"]) == 0
     assert [p.name for p in tmp_path.glob("*.png")] == ["blurred_0004.png"]
+
+
+def test_a_link_that_lies_in_the_way_is_not_written_through(tmp_path):
+    made, victim, place = (tmp_path / name for name in ("made", "victim", "out.exr"))
+    made.write_bytes(b"new")
+    victim.write_bytes(b"precious")
+    (tmp_path / ".out.exr.part").symlink_to(victim)
+    folders.put_in_place(made, place)
+    assert (victim.read_bytes(), place.read_bytes()) == (b"precious", b"new")
+    assert not made.exists()

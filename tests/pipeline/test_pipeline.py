@@ -274,3 +274,11 @@ def test_f16_textures_take_the_greatest_number_they_have(device):
         device.create_command_encoder(), images.texture("half", (2, 2), "rgba16float")
     )
     np.testing.assert_array_equal(got[0, 0], np.array([65504, -65504, np.inf, 1], "f2"))
+
+
+def test_a_curve_stands_beside_degrees():
+    blur = wgmb.Blur("tap", shutter=360, curve="cosine")
+    assert blur.shutter == wgmb.Shutter(360, curve="cosine")
+    assert wgmb.Blur("tap", curve=np.ones_like).shutter.curve is np.ones_like
+    with pytest.raises(InputError, match="`curve` is for degrees; a Shutter has its own"):
+        wgmb.Blur("tap", shutter=wgmb.Shutter(90), curve="box")

@@ -175,3 +175,12 @@ def test_the_page_on_architecture_lists_every_room():
     assert sorted(listed) == sorted(set(PLACE) - {"_version", "__init__", "__main__"})
     order = [PLACE[name] for name in listed]
     assert order == sorted(order)
+
+
+def test_no_two_public_classes_have_one_name():
+    found: dict[str, list[str]] = {}
+    for file in FILES:
+        for node in ast.parse(file.read_text()).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(str(file.relative_to(PACKAGE)))
+    assert not {name: files for name, files in found.items() if len(files) > 1}

@@ -172,3 +172,18 @@ def test_animated_webp_is_refused_by_its_name(tmp_path):
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=40)
     with pytest.raises(InputError, match=r"a\.webp: animated WebP is not read; GIF, APNG and AVIF"):
         VideoReader(path)
+
+
+@pytest.mark.full
+def test_a_small_video_of_enormous_pictures_is_refused(tmp_path):
+    """Its blur would hold 3 GiB."""
+    frames, options = [clips.grey((8192, 8192))], {"preset": "ultrafast"}
+    path = clips.write(tmp_path / "c.mp4", frames, options=options)
+    assert path.stat().st_size < 1 << 20
+    with pytest.raises(InputError, match=r"c\.mp4: image of 8192 x 8192 .* `max_mb=\d+` allows it"):
+        VideoReader(path)
+
+
+def test_a_limit_that_is_none_is_refused(tmp_path):
+    with pytest.raises(InputError, match="`max_mb` must be above 0 megabytes, got nan"):
+        VideoReader(clips.write(tmp_path / "c.mp4"), max_mb=float("nan"))

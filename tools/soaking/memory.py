@@ -14,7 +14,7 @@ from .processes import WGMB, Use, apart, environment, growth, use
 from .table import Line, Trial, row
 
 MOST = 24.0  # KiB a frame of 96 x 54: what allocators scatter about
-_WARM = 300  # frames, until pools, the quality of the viewer and the allocator have settled
+_WARM = 500  # frames, until pools, the quality of the viewer and the allocator have settled
 _SETTLED = 0.15  # share of a run after which memory counts
 _MOST_A_THOUSAND = 4.0  # MiB per 1,000 frames of a long run
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import wgpu
@@ -20,6 +20,7 @@ from ..gpu import wgsl
 from ..gpu.textures import TexturePool
 from ..gpu_frame.views import FrameViews
 from ..methods import METHODS
+from ..methods.keywords import MethodName
 from ..pipeline.blur import Blur
 from ..shutter import Shutter
 
@@ -54,12 +55,12 @@ class MotionBlurPass(EffectPass):
     def __init__(
         self,
         camera: pygfx.Camera,
-        method: str = "tap",
+        method: MethodName = "tap",
         *,
         renderer: pygfx.WgpuRenderer | None = None,
         scene: pygfx.WorldObject | None = None,
         shutter: Shutter | float = 180,
-        samples: int | str | None = None,
+        samples: int | Literal["auto"] | None = None,
         **options: Any,
     ):
         super().__init__()

@@ -74,7 +74,11 @@ class Candidate:
     def blur(self, samples: int, shutter: Shutter, device) -> Blur:
         """Compiled for one number of samples."""
         return Blur(
-            self.method, shutter=shutter, samples=samples, device=device, **dict(self.options)
+            self.method,  # pyright: ignore[reportArgumentType]
+            shutter=shutter,
+            samples=samples,
+            device=device,
+            **dict(self.options),
         )
 
 

@@ -8,6 +8,7 @@ from .accumulate import Accumulate
 from .distributed import Distributed
 from .fusion import Fusion
 from .gather import Gather
+from .keywords import MethodName
 from .reproject import Reproject
 from .tap import Tap
 from .tiles import Tiles
@@ -17,6 +18,6 @@ _ALL = (Tap, Tiles, Gather, Fusion, Reproject, Volume, Accumulate, Distributed)
 METHODS: dict[str, type] = {m.name: m for m in _ALL}
 
 
-def default_method(has: Collection[str]) -> str:
+def default_method(has: Collection[str]) -> MethodName:
     """Return the default method for these inputs: gather if they suffice, else tap."""
-    return Gather.name if Gather.needs <= {"color", *has} else Tap.name
+    return "gather" if Gather.needs <= {"color", *has} else "tap"

@@ -14,7 +14,7 @@ from .. import gpu
 from ..errors import InputError, check_choice, did_you_mean
 from ..methods import METHODS
 from ..methods.options import options_of
-from ..shutter import Shutter
+from ..shutter import Shutter, Weight
 
 MOST_SAMPLES = 4096  # lavapipe ends every loop after 65,535 turns an invocation, silently
 SAMPLES = 16
@@ -64,12 +64,16 @@ def most_samples(method: str, device: wgpu.GPUDevice) -> int:
     return getattr(METHODS[method], "most_in_software", MOST_SAMPLES)
 
 
-def shutter_of(shutter: Shutter | float) -> Shutter:
+def shutter_of(shutter: Shutter | float, curve: str | Weight | None = None) -> Shutter:
     """The Shutter of these degrees; one that is a Shutter already stays as it is."""
     if isinstance(shutter, Shutter):
+        if curve is not None:
+            raise InputError(
+                "`curve` is for degrees; a Shutter has its own: Shutter(90, curve=...)"
+            )
         return shutter
     try:
         degrees = float(shutter)
     except (TypeError, ValueError):
         raise InputError(f"shutter must be degrees or a Shutter, got {shutter!r}") from None
-    return Shutter(degrees)
+    return Shutter(degrees) if curve is None else Shutter(degrees, curve=curve)

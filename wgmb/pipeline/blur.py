@@ -9,10 +9,11 @@ from collections.abc import Collection
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import wgpu
+from numpy.typing import NDArray
 
 from .. import gpu
 from ..camera import Window
@@ -39,8 +40,9 @@ from ..methods.contract import (
     frames_around,
     reach_of,
 )
+from ..methods.keywords import Curve, MethodKeywords, MethodName
 from ..scene.gbuffer import SceneOnGpu
-from ..shutter import Shutter
+from ..shutter import Shutter, Weight
 from .arguments import checked, most_samples, shutter_of
 
 
@@ -48,7 +50,8 @@ class Blur:
     """A compiled blur method. Call it with arrays, or `encode` it into your own command encoder.
 
     `method`: a name in METHODS; its own options follow as keywords.
-    `shutter`: degrees (180 is open for half a frame interval), or a Shutter.
+    `shutter`: degrees (180 is open for half a frame interval), or a Shutter. `curve`: with degrees,
+    the weight of each instant, a name or a function; see Shutter.
     `samples`: samples per pixel, 1 to 4096 (gather without a GPU: 512); by default 16, or the
     method's own default; "auto" uses one per pixel of blur length, at most 64 (methods with one
     count for the whole image use 64).
@@ -64,15 +67,16 @@ class Blur:
 
     def __init__(
         self,
-        method: str,
+        method: MethodName,
         *,
         shutter: Shutter | float = 180,
-        samples: int | str | None = None,
+        curve: Curve | Weight | None = None,
+        samples: int | Literal["auto"] | None = None,
         jitter: float = 0.0,
         max_blur: float | None = None,
         device: wgpu.GPUDevice | str | None = None,
-        output: str = "rgba32float",
-        **options: Any,
+        output: Literal["rgba32float", "rgba16float"] = "rgba32float",
+        **options: Unpack[MethodKeywords],
     ):
         samples, self.auto = checked(method, samples, jitter, max_blur, output, options)
         self._options = METHODS[method].Options(**options)
@@ -94,7 +98,7 @@ class Blur:
         self._velocity = VelocityPass(self.device, self._unbound, no_object)
         limited = max_blur is not None
         self._prepared = Preparation(self._images, self._velocity, self._unbound, limited)
-        self.shutter = shutter
+        self.shutter = shutter_of(shutter, curve)
 
     def __repr__(self) -> str:
         shutter = self._shutter
@@ -251,8 +255,8 @@ class Blur:
             self._judge.encode(encoder, inputs, confidence)
 
     def __call__(
-        self, color: np.ndarray | Frame, to_next: np.ndarray | None = None, **passes: Any
-    ) -> np.ndarray:
+        self, color: NDArray[Any] | Frame, to_next: NDArray[Any] | None = None, **passes: Any
+    ) -> NDArray[np.float32]:
         """Blur one frame: a Frame, or a colour array and its passes (see Frame).
 
         Returns float32 of color's shape. Raises InputError if inputs are missing or inconsistent.
@@ -276,7 +280,9 @@ class Blur:
             self.encode(encoder, output=output, **self._views(frame))
             gpu.submit(self.device, encoder)
 
-    def with_confidence(self, frame: Frame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    def with_confidence(
+        self, frame: Frame
+    ) -> tuple[NDArray[np.float32], dict[str, NDArray[np.float32]]]:
         """Return the blurred frame and the confidence of every pixel, at twice the cost.
 
         The confidence layers are (height, width) float32, by the names in `confidence`; their
@@ -296,7 +302,7 @@ class Blur:
         planes = np.moveaxis(told.astype("f4", copy=False), 2, 0)
         return picture.astype("f4", copy=False), dict(zip(names, planes, strict=True))
 
-    def motion(self, frame: Frame) -> np.ndarray:
+    def motion(self, frame: Frame) -> NDArray[np.float32]:
         """The motion that the methods follow: (height, width, 4), to_prev and to_next [px]."""
         if "motion" not in frame.has:
             raise InputError("no motion: pass to_next, to_prev, or depth and a camera")

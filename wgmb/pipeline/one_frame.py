@@ -4,33 +4,64 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, Unpack
 
 import numpy as np
+import wgpu
+from numpy.typing import NDArray
 
+from ..camera import Reprojections, Window
 from ..frame import PASSES, Frame
 from ..methods import default_method
-from ..shutter import Shutter
+from ..methods.keywords import Curve, MethodKeywords, MethodName
+from ..shutter import Shutter, Weight
 from .blur import Blur
 
 
+class FrameKeywords(MethodKeywords, total=False):
+    """Keywords of `blur`: the passes of a Frame, and the options of a Blur."""
+
+    jitter: float
+    max_blur: float | None
+    device: wgpu.GPUDevice | str | None
+    output: Literal["rgba32float", "rgba16float"]
+    to_prev: NDArray[Any] | None
+    motion: NDArray[Any] | None
+    depth: NDArray[Any] | None
+    window: Window | None
+    camera: Reprojections | None
+    object_id: NDArray[Any] | None
+    normal: NDArray[Any] | None
+    holdout: NDArray[Any] | None
+    scale: NDArray[Any] | None
+    object_motion: bool
+    prev: Frame | None
+    next: Frame | None
+    number: int
+    diffuse_light: NDArray[Any] | None
+    diffuse_color: NDArray[Any] | None
+    glossy_light: NDArray[Any] | None
+    glossy_color: NDArray[Any] | None
+
+
 def blur(
-    color: np.ndarray,
-    to_next: np.ndarray | None = None,
+    color: NDArray[Any],
+    to_next: NDArray[Any] | None = None,
     *,
-    method: str | None = None,
+    method: MethodName | None = None,
     shutter: Shutter | float = 180,
-    samples: int | str | None = None,
-    **more: Any,
-) -> np.ndarray:
+    curve: Curve | Weight | None = None,
+    samples: int | Literal["auto"] | None = None,
+    **more: Unpack[FrameKeywords],
+) -> NDArray[np.float32]:
     """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.
 
     `method`: a name in METHODS; by default gather if depth is available, else tap. `more`: the
     passes of Frame (to_prev, depth, camera, holdout, ...) and the options of Blur (jitter,
     max_blur, device, and those of the method).
     """
-    passes = {name: more.pop(name) for name in PASSES if name in more}
+    options: dict[str, Any] = dict(more)
+    passes = {name: options.pop(name) for name in PASSES if name in options}
     frame = Frame(color, to_next, **passes)
-    return Blur(method or default_method(frame.has), shutter=shutter, samples=samples, **more)(
-        frame
-    )
+    name = method or default_method(frame.has)
+    return Blur(name, shutter=shutter, curve=curve, samples=samples, **options)(frame)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal, TypedDict, Unpack, get_type_hints
+from typing import Any, Literal, Unpack, get_type_hints
 
 import wgpu
 
@@ -18,6 +18,7 @@ from .._version import __version__
 from ..color.highlights import check as check_highlights
 from ..errors import InputError, did_you_mean
 from ..extras import install_command, is_installed
+from ..methods.keywords import MethodKeywords
 from ..pipeline.blur import Blur
 from ..settings import (
     BlurSettings,
@@ -226,26 +227,13 @@ def _rate(reader: VideoReader, output: OutputSettings) -> tuple[Fraction | None,
     )
 
 
-class PictureOptions(TypedDict, total=False):
+class PictureOptions(MethodKeywords, total=False):
     """Keywords of `blur_pictures`: options of `wgmb blur`, each with its meaning and default."""
 
     method: Literal["tap", "tiles", "gather", "fusion", "reproject"]
     samples: int | Literal["auto"]
     jitter: float
     max_blur: float
-    path: Literal["curved", "straight", "five"]
-    variant: Literal["shutter", "published", "even", "slices"]
-    show: Literal["color", "tiles", "confidence", "count"]
-    shading: Literal["auto", "off", "passes", "frames"]
-    reach: int
-    weights: Literal["normalised", "published"]
-    alpha_front: float
-    alpha_back: float
-    tau: float
-    facing: bool
-    depth_test: bool
-    splat: Literal["point", "line"]
-    seed: int
     shutter: float
     phase: Literal["start", "centre", "center", "end"] | float
     curve: str

@@ -82,7 +82,7 @@ class BlurSettings:
     def make(self, shutter_: Shutter, device: wgpu.GPUDevice | str | None = None) -> Blur:
         """Return the Blur these settings describe; an option of another method is an error."""
         return Blur(
-            self.method or default_method({"motion", "depth"}),
+            self.method or default_method({"motion", "depth"}),  # pyright: ignore[reportArgumentType]
             shutter=shutter_,
             samples=self.samples,
             jitter=self.jitter,

@@ -13,7 +13,7 @@ _MATRIX = struct.Struct("=9i")  # of a display, in 1/65536
 
 
 @dataclass(frozen=True)
-class Rotation:
+class Orientation:
     """Turn of stored pictures: transposed or not, then mirrored."""
 
     swaps: bool = False
@@ -22,7 +22,7 @@ class Rotation:
 
     def __call__(self, plane: np.ndarray) -> np.ndarray:
         """The plane, upright."""
-        if self == Rotation(odd=self.odd):
+        if self == Orientation(odd=self.odd):
             return plane
         plane = plane.T if self.swaps else plane
         down, across = (slice(None, None, -1 if flip else 1) for flip in self.flips)
@@ -36,19 +36,19 @@ class Rotation:
         return 180 if self.flips[0] else 0
 
 
-def rotation_of(data: bytes | None, degrees: int = 0) -> Rotation:
+def rotation_of(data: bytes | None, degrees: int = 0) -> Orientation:
     """The turn that a display matrix demands: x' = a x + c y, y' = b x + d y.
 
     Without one, that by `degrees` counter-clockwise.
     """
     if data is None:
-        found = {0: Rotation(), 90: Rotation(True, (True, False)),
-                 270: Rotation(True, (False, True)),
-                 180: Rotation(False, (True, True))}  # fmt: skip
-        return found.get(degrees % 360, Rotation(odd=True))
+        found = {0: Orientation(), 90: Orientation(True, (True, False)),
+                 270: Orientation(True, (False, True)),
+                 180: Orientation(False, (True, True))}  # fmt: skip
+        return found.get(degrees % 360, Orientation(odd=True))
     a, b, _, c, d = (np.sign(v) if abs(v) > 0x8000 else 0 for v in _MATRIX.unpack_from(data)[:5])
     if a and d and not b and not c:
-        return Rotation(False, (bool(d < 0), bool(a < 0)))
+        return Orientation(False, (bool(d < 0), bool(a < 0)))
     if b and c and not a and not d:
-        return Rotation(True, (bool(b < 0), bool(c < 0)))
-    return Rotation(odd=True)
+        return Orientation(True, (bool(b < 0), bool(c < 0)))
+    return Orientation(odd=True)

@@ -59,8 +59,8 @@ class Blurs:
             while len(self._made) >= _KEPT:
                 del self._made[next(iter(self._made))]
             self._made[key] = Blur(
-                method,
-                samples=samples,
+                method,  # pyright: ignore[reportArgumentType]
+                samples=samples,  # pyright: ignore[reportArgumentType]
                 jitter=state.jitter,
                 max_blur=state.max_blur,
                 device=self._device,

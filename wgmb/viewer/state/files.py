@@ -47,7 +47,7 @@ def footage_of(source: str, max_mb: float) -> VideoReader:
 
 
 @dataclass(frozen=True)
-class Output:
+class VideoOutput:
     """The output frames of a video, and the clock that they are on."""
 
     clock: Clock
@@ -57,10 +57,10 @@ class Output:
 @lru_cache(maxsize=32)
 def output_of(
     footage: VideoReader, frames: str | None, settings: VideoSettings, fps: Fraction | None
-) -> Output:
+) -> VideoOutput:
     """The output of a video at a rate, or, where it is None, at the times of its own pictures."""
     clock = settings.clock(footage, frames)
-    return Output(clock, OutputFrames(footage, clock, fps))
+    return VideoOutput(clock, OutputFrames(footage, clock, fps))
 
 
 def frames_of(source: str, max_mb: float) -> str:

@@ -17,7 +17,7 @@ from ...settings import rate_of
 from ...settings.video import VideoSettings
 from ...video.output_times import OutputFrame
 from .files import (
-    Output,
+    VideoOutput,
     footage_of,
     frames_of,
     output_of,
@@ -93,7 +93,7 @@ def completed(state: State, said: Collection[str]) -> State:
     return state
 
 
-def output(state: State) -> Output:
+def output(state: State) -> VideoOutput:
     """The output frames; InputError if the part that is chosen holds none."""
     most = most_mb(state)
     frames = None if state.frames == frames_of(state.source, most) else state.frames

@@ -1,0 +1,83 @@
+"""Type checkers find a typo in a user's program, and accept what is right."""
+
+import re
+import subprocess
+import sys
+from typing import get_args, get_type_hints
+
+import pytest
+
+from wgmb.frame import PASSES
+from wgmb.methods import METHODS
+from wgmb.methods.keywords import Curve, MethodKeywords, MethodName
+from wgmb.methods.options import options_of
+from wgmb.pipeline.one_frame import FrameKeywords
+from wgmb.run.video import PictureOptions, VideoOptions
+from wgmb.shutter import CURVES
+
+RIGHT = """
+import numpy as np
+import wgmb
+
+color = np.zeros((8, 8, 3), np.float32)
+motion = np.zeros((8, 8, 2), np.float32)
+blur = wgmb.Blur("gather", shutter=180, curve="cosine", samples="auto", reach=2)
+picture = blur(color, to_next=motion, depth=np.ones((8, 8)))
+total: float = float(wgmb.blur(color, motion, path="straight", samples=8).sum())
+wgmb.blur_video("in.mp4", "out.mp4", fps=60, shutter=180, holdout="mask.png", flow="dis")
+for one in wgmb.blur_pictures([color], fps_in=24, fps="60000/1001", transfer="linear"):
+    print(one)
+for frame in wgmb.Clip("shot.####.exr"):
+    print(blur(frame).shape, wgmb.Shutter(360, curve=np.ones_like))
+"""
+WRONG = """
+import numpy as np
+import wgmb
+
+color = np.zeros((8, 8, 3), np.float32)
+wgmb.Blur("gathr")  # wrong
+wgmb.Blur("tap", shuter=180)  # wrong
+wgmb.Blur("tap", path="strait")  # wrong
+wgmb.Blur("tap", curve="cosin")  # wrong
+wgmb.Blur("tap", samples="many")  # wrong
+wgmb.blur(color, method="tapp")  # wrong
+wgmb.blur(color, dept=color)  # wrong
+wgmb.blur_video("in.mp4", "out.mp4", flow="diss")  # wrong
+wgmb.blur_video("in.mp4", "out.mp4", sutter=180)  # wrong
+wgmb.blur_pictures([color], transfer="log")  # wrong
+wgmb.blur_pictures([color], codec="h264")  # wrong
+"""
+CHECKERS = {
+    "pyright": ["-m", "pyright", "--pythonpath", sys.executable],
+    "mypy": ["-m", "mypy", "--strict", "--no-error-summary", "--cache-dir"],
+}
+
+
+@pytest.mark.covers(1)
+@pytest.mark.parametrize("checker", CHECKERS)
+def test_a_typo_is_found_and_what_is_right_is_not(checker, tmp_path):
+    (tmp_path / "right.py").write_text(RIGHT)
+    (tmp_path / "wrong.py").write_text(WRONG)
+    (tmp_path / "pyrightconfig.json").write_text('{"typeCheckingMode": "strict"}')
+    more = [str(tmp_path / "cache")] if checker == "mypy" else []
+    words = [sys.executable, *CHECKERS[checker], *more, "right.py", "wrong.py"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    found = re.findall(r"(right|wrong)\.py:(\d+):.*?error", done.stdout)
+    wanted = [n for n, line in enumerate(WRONG.splitlines(), 1) if line.endswith("# wrong")]
+    assert {int(n) for name, n in found if name == "wrong"} == set(wanted), done.stdout
+    assert not [n for name, n in found if name == "right"], done.stdout
+
+
+def test_keywords_are_the_options_of_the_methods():
+    assert set(get_args(MethodName)) == set(METHODS)
+    assert set(get_args(Curve)) == set(CURVES)
+    known = [option for m in METHODS.values() for option in options_of(m.Options).values()]
+    hints = get_type_hints(MethodKeywords)
+    assert {option.name for option in known} == set(hints)
+    for name, hint in hints.items():
+        same = [option for option in known if option.name == name]
+        choices = {choice for option in same for choice in option.choices}
+        assert set(get_args(hint)) == choices, name
+        assert choices or {hint} == {option.kind for option in same}, name
+    assert set(PASSES) - {"to_next"} <= set(get_type_hints(FrameKeywords))
+    assert set(get_type_hints(PictureOptions)) < set(get_type_hints(VideoOptions))
