@@ -69,6 +69,13 @@ def lumas(path):
     return [picture.planes[0] for _, picture in VideoReader(path)]
 
 
+def test_the_first_picture_of_a_shot_is_shown_where_the_file_rounds_its_time(tmp_path):
+    """Matroska counts milliseconds: 1/24 s is 42, a third of one late."""
+    source = clips.write(tmp_path / "a.mkv", codec="ffv1")
+    blur_video(source, tmp_path / "b.mkv", codec="ffv1", flow="none", cuts="only:1,2,3,4,5,6")
+    assert [p.tolist() for p in lumas(tmp_path / "b.mkv")] == [p.tolist() for p in lumas(source)]
+
+
 @pytest.mark.parametrize(("pixels", "bits"), [("yuv420p", 8), ("yuv422p10le", 10)])
 def test_a_still_video_comes_back_to_the_sample(tmp_path, capsys, pixels, bits):
     steps = (2, 2) if bits == 8 else (2, 1)

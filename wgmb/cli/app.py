@@ -26,6 +26,7 @@ from ..errors import (
     did_you_mean,
 )
 from ..extras import EXTRAS, reason
+from ..io.pipes import named
 from . import terminal
 from .exit_codes import (
     DONE,
@@ -92,7 +93,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     terminal.own_streams()
     terminal.interrupted.clear()
-    words = sys.argv[1:] if arguments is None else arguments
+    words = named(sys.argv[1:] if arguments is None else arguments)
     try:
         signal.signal(signal.SIGTERM, terminal.interrupt)
         signal.signal(signal.SIGINT, terminal.interrupt)  # a shell may have set it to be ignored

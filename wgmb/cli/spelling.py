@@ -14,6 +14,7 @@ _OTHERWISE = {
     "confidence": "--confidence",
     "convention": "--vectors",
     "device": "--adapter",
+    "color_in": "--color-in",
     "fps_in": "--fps-in",
     "number": "--frame",
     "program": "--as",

@@ -33,32 +33,69 @@ _CPU = 1, 3  # of DLPack: memory of the CPU, and what CUDA pinned of it
 _RATE = Fraction(24)  # of pictures whose rate is not told; only the length of a flash depends on it
 
 
+class SteadyExposures:
+    """Exposures of pictures at a steady rate, whose number nobody knows before the end."""
+
+    def __init__(self, exposures: Exposures, rate: Fraction, fps: Fraction):
+        self.exposures, self._rate, self._fps = exposures, rate, fps
+        self.read = 0
+        """Number of pictures read so far."""
+        self._ended = False
+
+    def of(
+        self, pictures: Iterable[CodedPicture], shutter: Shutter
+    ) -> Iterator[tuple[OutputFrame, Exposure]]:
+        """Every output frame and its exposure, which is valid until the next is asked for."""
+        return self.exposures.of(self._timed(pictures), shutter, self._wanted())
+
+    def count(self, pictures: int) -> int:
+        """Number of output frames of so many pictures."""
+        return max(1, math.ceil(pictures / self._rate * self._fps - SPARE)) if pictures else 0
+
+    def _timed(self, pictures: Iterable[CodedPicture]) -> Iterator[Picture[Thumbnail]]:
+        for number, picture in enumerate(pictures):
+            self.read = number + 1
+            yield Picture(float(number / self._rate), Thumbnail(picture), number)
+        self._ended = True
+
+    def _wanted(self) -> Iterator[OutputFrame]:
+        """The output frames, as many as the pictures turn out to fill."""
+        interval = 1 / self._fps
+        for number in count():
+            reel = self.exposures.reel
+            assert reel is not None
+            reel.read_beyond(float(number * interval))
+            if self._ended and number >= self.count(self.read):
+                return
+            yield OutputFrame(number, number * interval, interval)
+
+
 class PictureBlur(Iterator[Any]):
     """Blurred pictures, each made when it is asked for; `blur_pictures` returns one."""
 
     def __init__(
         self,
         pictures: Iterable[Any],
-        exposures: Exposures,
+        steady: SteadyExposures,
         shutter: Shutter,
-        rates: tuple[Fraction, Fraction],
         transfer: str,
         how: str,
     ):
         self.how = how
         """Where the motion comes from, in words."""
-        self.read = 0
-        """Number of pictures read so far: some more than were needed yet."""
-        self._rate, self._fps = rates
-        self._exposures, self._transfer = exposures, transfer
+        self._steady, self._transfer = steady, transfer
         self._like: type = type(None)
         self._shape, self._dtype, self._coding = (0, 0, 0), np.dtype(np.uint8), Coding()
-        self._ended = False
         self._results = self._made(pictures, shutter)
 
     def __next__(self) -> Any:
         """The next picture, as an array or a tensor like those that were given."""
         return next(self._results)
+
+    @property
+    def read(self) -> int:
+        """Number of pictures read so far: some more than were needed yet."""
+        return self._steady.read
 
     def close(self) -> None:
         """End the run: no further picture comes, and none is held."""
@@ -66,45 +103,27 @@ class PictureBlur(Iterator[Any]):
 
     def count(self, pictures: int) -> int:
         """Number of results of so many pictures."""
-        return max(1, math.ceil(pictures / self._rate * self._fps - SPARE)) if pictures else 0
+        return self._steady.count(pictures)
 
     @property
     def cuts(self) -> list[int]:
         """Numbers of the pictures read so far that begin a shot."""
-        return sorted(self._exposures.reel.cuts) if self._exposures.reel else []
+        return sorted(self._steady.exposures.reel.cuts) if self._steady.exposures.reel else []
 
     @property
     def flashes(self) -> list[int]:
         """Numbers of the pictures read so far that begin a flash."""
-        return list(self._exposures.reel.flashes) if self._exposures.reel else []
+        return list(self._steady.exposures.reel.flashes) if self._steady.exposures.reel else []
 
     @property
     def repeated(self) -> list[int]:
         """Numbers of the repeated pictures that were left out (`duplicates` "fill")."""
-        return list(self._exposures.reel.doubles) if self._exposures.reel else []
+        return list(self._steady.exposures.reel.doubles) if self._steady.exposures.reel else []
 
     def _made(self, pictures: Iterable[Any], shutter: Shutter) -> Generator[Any, None, None]:
-        exposed = self._exposures.of(self._pictures(pictures), shutter, self._wanted())
-        for _, exposure in exposed:
+        coded = (self._coded(number, picture) for number, picture in enumerate(pictures))
+        for _, exposure in self._steady.of(coded, shutter):
             yield self._result(exposure)
-
-    def _wanted(self) -> Iterator[OutputFrame]:
-        """The output frames, as many as the pictures turn out to fill."""
-        interval = 1 / self._fps
-        for number in count():
-            reel = self._exposures.reel
-            assert reel is not None
-            reel.read_beyond(float(number * interval))
-            if self._ended and number >= self.count(self.read):
-                return
-            yield OutputFrame(number, number * interval, interval)
-
-    def _pictures(self, pictures: Iterable[Any]) -> Iterator[Picture[Thumbnail]]:
-        for number, picture in enumerate(pictures):
-            coded = self._coded(number, picture)
-            self.read = number + 1
-            yield Picture(float(number / self._rate), Thumbnail(coded), number)
-        self._ended = True
 
     def _coded(self, number: int, picture: Any) -> CodedPicture:
         """A copy of a picture: its owner may fill the same memory again."""
@@ -192,8 +211,8 @@ def blur_pictures(
         known_cuts=cuts.frames(0),
         highlights=request.video.highlights,
     )
-    rates = rate, rate if fps is None else _rate("fps", fps)
-    return PictureBlur(pictures, exposures, run.request.shutter.make(), rates, transfer, run.how)
+    steady = SteadyExposures(exposures, rate, rate if fps is None else _rate("fps", fps))
+    return PictureBlur(pictures, steady, run.request.shutter.make(), transfer, run.how)
 
 
 def _rate(name: str, rate: str | float | Fraction) -> Fraction:

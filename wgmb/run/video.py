@@ -152,11 +152,10 @@ class VideoRun:
         wanted = list(OutputFrames(reader, clock, fps, longest))
         return VideoPlan(reader, output, clock, wanted, said)
 
-    def __call__(self, plan: VideoPlan, progress: Progress | None = None) -> VideoReport:
-        """Blur a video into its output, which is complete, or is not there."""
-        begun, request = time.perf_counter(), self.request
-        cuts, shutter = CutList(request.input.cuts or ""), request.shutter.make()
-        exposures = VideoBlur(
+    def exposures(self, plan: VideoPlan) -> VideoBlur:
+        """The exposures of a video."""
+        request, cuts = self.request, CutList(self.request.input.cuts or "")
+        return VideoBlur(
             plan.reader,
             self.blur,
             self.motion,
@@ -167,6 +166,12 @@ class VideoRun:
             known_cuts=cuts.frames(0),
             highlights=request.video.highlights,
         )
+
+    def __call__(self, plan: VideoPlan, progress: Progress | None = None) -> VideoReport:
+        """Blur a video into its output, which is complete, or is not there."""
+        begun, request = time.perf_counter(), self.request
+        cuts, shutter = CutList(request.input.cuts or ""), request.shutter.make()
+        exposures = self.exposures(plan)
 
         def blur_part(moments: Sequence[OutputFrame], sink: Sink) -> None:
             put_exposures(exposures, shutter, moments, sink, progress)

@@ -53,7 +53,8 @@ class ShotReader(Generic[T]):
     `known_cuts`: numbers of pictures that begin a shot all the same.
     `is_double(before, after)`: whether a picture only repeats the one before; it is left out, and
     its neighbours' cells reach over its time.
-    `flash`: how long a flash of several pictures lasts at most [s].
+    `flash`: how long a flash of several pictures lasts at most [s]. `tolerance`: by how much the
+    file may have rounded a picture's time [s]; so much earlier, it is shown already.
     """
 
     def __init__(
@@ -64,8 +65,9 @@ class ShotReader(Generic[T]):
         known_cuts: Collection[int] = (),
         is_double: Callable[[T, T], bool] | None = None,
         flash: float = FLASH,
+        tolerance: float = 0.0,
     ):
-        self._pictures = pictures
+        self._pictures, self._tolerance = pictures, tolerance
         self._is_cut, self._is_double = is_cut, is_double
         self._known_cuts, self._flash = known_cuts, flash
         self._kept: dict[int, Picture[T]] = {}
@@ -135,7 +137,7 @@ class ShotReader(Generic[T]):
         """The picture that is shown at `time`; before the first one, that."""
         if not self._kept:
             raise NoPicturesError
-        shown = [i for i, picture in self._kept.items() if picture.time <= time]
+        shown = [i for i, picture in self._kept.items() if picture.time <= time + self._tolerance]
         return max(shown, default=min(self._kept))
 
     def read_beyond(self, time: float) -> None:

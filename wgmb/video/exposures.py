@@ -43,8 +43,8 @@ class Exposures:
     `holdout` (height, width): 1 stays sharp. `fill`: repeated pictures are left out, and motion
     goes on over the gap. `cuts`: whether cuts are looked for, beside `known_cuts`, the numbers of
     pictures that begin a shot. `highlights`: times white that white counts as while it is blurred.
-    `flash`: how long a flash of several pictures lasts at most [s]. InputError where the method
-    takes two frames to either side.
+    `flash`: how long a flash of several pictures lasts at most [s]. `tolerance`: by how much their
+    times may be rounded [s]. InputError where the method takes two frames to either side.
     """
 
     def __init__(
@@ -58,10 +58,12 @@ class Exposures:
         known_cuts: Collection[int] = (),
         highlights: float = 1.0,
         flash: float = FLASH,
+        tolerance: float = 0.0,
     ):
         if reach_of(blur.method) > 1:
             raise InputError("a `reach` of 2 is for rendered frames, a video takes 1")
-        self._highlights, self._flash, self._holdout = highlights, flash, holdout
+        self._highlights, self._holdout = highlights, holdout
+        self._flash, self._tolerance = flash, tolerance
         self._blur, self._motion = blur, motion
         self._exposer, self._planes = ExposureSum(blur), Planes(blur.device, highlights)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
@@ -89,6 +91,7 @@ class Exposures:
             known_cuts=self._known_cuts,
             is_double=is_double if self._fill else None,
             flash=self._flash,
+            tolerance=self._tolerance,
         )
         views = VideoFrames(reel, self._blur, self._motion, self._holdout, self._highlights)
         for moment in wanted:
@@ -146,8 +149,9 @@ class VideoBlur(Exposures):
         **more: Any,
     ):
         check_coding(highlights, footage.path, footage.coding)
-        flash = FLASH / float(clock.speed)
-        super().__init__(blur, motion, highlights=highlights, flash=flash, **more)
+        pace = float(clock.speed)
+        more |= {"flash": FLASH / pace, "tolerance": footage.tolerance / pace}
+        super().__init__(blur, motion, highlights=highlights, **more)
         self.footage, self.clock = footage, clock
 
     def exposures(

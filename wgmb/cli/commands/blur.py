@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from ...errors import InputError
 from ...extras import needed_by
 from ...io.frame_numbers import frame_numbers
+from ...io.pipes import is_pipe
 from ...run.job import Job, settle
 from ...run.job_file import read_job
 from ...run.request import BlurRequest
@@ -49,6 +50,7 @@ def blur(
     workers: int | Literal["auto"] | None = None,
     cluster: str | None = None,
     fps_in: str | None = None,
+    color_in: Literal["bt601", "bt709", "bt2020-pq", "bt2020-hlg"] | None = None,
     confidence: bool = False,
     config: Path | None = None,
     adapter: str | None = None,
@@ -66,6 +68,8 @@ def blur(
     Example: wgmb blur night.mp4 -o out.mp4 --highlights 8
 
     Example: wgmb blur 'shot.####.exr' -o 'blurred.####.exr' --fps-in 240 --fps 60
+
+    Example: ffmpeg -i in.mp4 -f yuv4mpegpipe - | wgmb blur - -o - --fps 60 | ffmpeg -i - out.mp4
 
     Example: wgmb blur --job shot.json --frames 17-32
 
@@ -85,6 +89,9 @@ def blur(
     fps_in
         Frames per second of the rendered frames, if --fps is another rate: each is blurred by its
         own vectors over its share of an exposure. Output numbers begin with the first input number.
+        Of a pipe: its rate, if it says none or another.
+    color_in
+        Colours of a pipe, which does not state them; by default as players assume.
     confidence
         Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config
@@ -112,6 +119,16 @@ def blur(
         such = "out.mp4" if is_video(patterns[0]) else "'blurred.####.exr'"
         raise InputError(f"--output is missing, such as -o {such}")
     shutter, pattern = shutter.resolved(), patterns[0]
+    if is_pipe(pattern) or is_pipe(output.output):
+        with needed_by("a pipe", "video"):
+            from ...run.video import VideoRequest
+            from .blur_pipe import blur_pipe
+        if len(patterns) > 1 or confidence or crew:
+            raise InputError("a pipe stands alone: one input, and no --confidence or --workers")
+        wanted = VideoRequest(blur=blur, shutter=shutter, input=input, video=video)
+        return blur_pipe(pattern, output, wanted, adapter, quiet, fps_in, color_in)
+    if color_in:
+        raise InputError("--color-in is for pipes; files state their colours, or are assumed to")
     if is_batch(patterns, output.output) or is_video(pattern):
         with needed_by(pattern, "video"):
             from ...run.video import VideoRequest

@@ -247,6 +247,12 @@ class VideoReader:
         return 1 / self._pixel_aspect if self._turn.swaps else self._pixel_aspect
 
     @property
+    def tolerance(self) -> float:
+        """By how much times of its pictures may be rounded [s]: a tick, if that is short."""
+        tick = self.times.base
+        return float(tick) if 4 * tick * self.rate <= 1 else 0.0
+
+    @property
     def facts(self) -> Facts:
         """Facts about the pictures besides their coding."""
         return Facts(self.pixel_aspect, self.mastering, self.light_level)

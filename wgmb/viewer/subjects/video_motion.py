@@ -141,6 +141,7 @@ class PictureFinder:
             is_cut=self._is_cut if self._cuts.is_search else None,
             known_cuts=self._cuts.frames(0),
             is_double=is_double if self._fill else None,
+            tolerance=self._footage.tolerance,
         )
         return self._reel
 

@@ -1,0 +1,243 @@
+"""`wgmb blur - -o -`: YUV4MPEG2 through pipes, as the file's, and every way in which one ends."""
+
+import contextlib
+import io
+import os
+import subprocess
+import sys
+import threading
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+import make_clips as clips
+from wgmb import InputError
+from wgmb.color.coding import CodedPicture, Coding
+from wgmb.io.pipes import STDIN, STDOUT, named
+from wgmb.run.video import blur_video
+from wgmb.video.read.reader import VideoReader
+from wgmb.video.y4m import Y4mReader, Y4mWriter, planes_of, space_of
+
+SIZE = 64, 48
+ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+
+
+def wgmb(*words, data=b"", **more):
+    line = [sys.executable, "-m", "wgmb", "blur", *map(str, words)]
+    return subprocess.run(line, input=data, capture_output=True, timeout=120, env=ENVIRONMENT,
+                          **more)  # fmt: skip
+
+
+class Bytes(io.BytesIO):
+    """A stream that takes what it is given."""
+
+
+def stream(pictures, coding, rate=Fraction(24), space="", size=SIZE):
+    out = Bytes()
+    writer = Y4mWriter(out, size, rate, coding, space)
+    for picture in pictures:
+        writer.add(picture)
+    return out.getvalue()
+
+
+CODINGS = [
+    Coding(matrix=6, primaries=6),
+    Coding(bits=10, steps=(2, 1), matrix=6, primaries=6),
+    Coding(bits=16, steps=(1, 1), matrix=6, primaries=6),
+    Coding(steps=(4, 1), matrix=6, primaries=6),
+    Coding(steps=(1, 2), matrix=6, primaries=6, full_range=True),
+    Coding(steps=(1, 1), matrix=6, primaries=6, alpha=True),
+    Coding("grey", bits=12, steps=(1, 1), matrix=6, primaries=6),
+]
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("size", [SIZE, (37, 5), (1, 1)])
+@pytest.mark.parametrize("coding", CODINGS, ids=space_of)
+def test_what_is_written_is_read(coding, size):
+    rng, kind = np.random.default_rng(1), np.uint16 if coding.bits > 8 else np.uint8
+    pictures = [
+        CodedPicture(
+            tuple(rng.integers(0, 2**coding.bits, s).astype(kind) for s in planes_of(size, coding)),
+            coding,
+        )
+        for _ in range(3)
+    ]
+    data = stream(pictures, coding, Fraction(30000, 1001), size=size)
+    reader = Y4mReader(io.BytesIO(data), "stdin")
+    assert (reader.size, reader.rate, reader.coding) == (size, Fraction(30000, 1001), coding)
+    for ours, want in zip(reader.pictures(), pictures, strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(ours.planes, want.planes, strict=True))
+    assert reader.loss == ""
+
+
+@pytest.mark.fast
+def test_ffmpeg_reads_what_is_written_and_the_other_way_round(tmp_path):
+    path = clips.write(tmp_path / "c.y4m", codec="rawvideo", kind="yuv4mpegpipe")
+    data = path.read_bytes()
+    reader = Y4mReader(io.BytesIO(data), "stdin")
+    pictures = list(reader.pictures())
+    for number, picture in enumerate(pictures):
+        for ours, want in zip(picture.planes, clips.planes(number), strict=True):
+            np.testing.assert_array_equal(ours, want)
+    (tmp_path / "d.y4m").write_bytes(stream(pictures, reader.coding))
+    with av.open(str(tmp_path / "d.y4m")) as file:
+        assert file.streams.video[0].average_rate == 24
+        for n, frame in enumerate(file.decode(video=0)):
+            np.testing.assert_array_equal(frame.to_ndarray()[:48], clips.planes(n)[0])
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("data, said", [
+    (b"", "stdin: holds no pictures"),
+    (b"\x00\x00\x00\x20ftypisom", "stdin: is not YUV4MPEG2, which `ffmpeg"),
+    (b"YUV4MPEG2 H4 F24:1\n", "stdin: its header lacks a size"),
+    (b"YUV4MPEG2 W4 H0 F24:1\n", "stdin: its header lacks a size"),
+    (b"YUV4MPEG2 W99999 H4 F24:1\n", "stdin: pictures of 99999 x 4"),
+    (b"YUV4MPEG2 W30000 H30000 F24:1\n", "stdin: image of 30000 x 30000 .* `max_mb="),
+    (b"YUV4MPEG2 W4 H4 F24\n", "stdin: its header has the rate '24'"),
+    (b"YUV4MPEG2 W4 H4 F24:1 It\n", "stdin: is interlaced"),
+    (b"YUV4MPEG2 W4 H4 F24:1 C420p11\n", "samples of the kind '420p11' are not read"),
+])  # fmt: skip
+def test_a_header_that_is_none_is_one_line(data, said):
+    with pytest.raises(InputError, match=said) as error:
+        Y4mReader(io.BytesIO(data), "stdin")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.fast
+def test_what_is_cut_off_says_where():
+    pictures = [CodedPicture(clips.planes(n), CODINGS[0]) for n in range(4)]
+    data = stream(pictures, CODINGS[0])
+    length = (len(data) - data.index(b"FRAME")) // 4
+    for cut, whole, said in (
+        (100, 3, "stdin: is cut off in picture 3"),
+        (length - 3, 3, "stdin: is cut off in picture 3"),
+        (length, 3, ""),
+    ):
+        reader = Y4mReader(io.BytesIO(data[:-cut]), "stdin")
+        assert len(list(reader.pictures())) == whole
+        assert reader.loss == said
+    bad = data[:-length] + b"FRUIT" + data[5 - length :]
+    reader = Y4mReader(io.BytesIO(bad), "stdin")
+    assert len(list(reader.pictures())) == 3
+    assert reader.loss == "stdin: is damaged before picture 3"
+
+
+@pytest.mark.fast
+def test_a_dash_is_a_stream():
+    words = ["blur", "-", "-o", "-", "--fps", "60", "--output=-", "-q"]
+    got = ["blur", STDIN, "-o", STDOUT, "--fps", "60", f"--output={STDOUT}", "-q"]
+    assert named(words) == got
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    return clips.write(tmp_path_factory.mktemp("in") / "c.avi", codec="ffv1")
+
+
+@pytest.fixture(scope="module")
+def piped(source):
+    reader = VideoReader(source)
+    return stream([picture for _, picture in reader], reader.coding)
+
+
+@pytest.mark.parametrize("flow", ["none", "dis"])
+def test_a_pipe_gives_the_pictures_of_the_file(source, piped, tmp_path, flow):
+    blur_video(source, tmp_path / "o.mkv", codec="ffv1", fps=60, flow=flow)
+    want = [picture.planes for _, picture in VideoReader(tmp_path / "o.mkv")]
+    done = wgmb("-", "-o", "-", "--fps", 60, "--flow", flow, data=piped)
+    assert done.returncode == 0
+    reader = Y4mReader(io.BytesIO(done.stdout), "stdout")
+    assert reader.rate == 60
+    got = [picture.planes for picture in reader.pictures()]
+    assert len(got) == len(want) == 30
+    for ours, theirs in zip(got, want, strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
+    header = done.stdout.index(b"\n") + 1
+    assert len(done.stdout) == header + 30 * (6 + SIZE[0] * SIZE[1] * 3 // 2)
+    said = done.stderr.decode().splitlines()
+    assert said[-1] == "30 frames -> stdout"
+    (stated,) = [line for line in said if line.startswith("stdin: does not state its colours")]
+    assert "--color-in" in stated
+
+
+def test_one_side_may_be_a_file(source, piped, tmp_path):
+    done = wgmb(source, "-o", "-", "--flow", "none", "-q")
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.split(b"\n", 1)[1] == piped.split(b"\n", 1)[1]
+    out = tmp_path / "o.mkv"
+    done = wgmb("-", "-o", out, "--codec", "ffv1", "--flow", "none", "-q", data=done.stdout)
+    assert (done.returncode, done.stderr) == (0, b"")
+    for (_, ours), (_, want) in zip(VideoReader(out), VideoReader(source), strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(ours.planes, want.planes, strict=True))
+    done = wgmb("-", "-o", out, "--flow", "none", "-q", data=piped)
+    assert done.returncode == 2 and b"--overwrite replaces it" in done.stderr
+
+
+def test_named_pipes_and_two_in_a_row(piped, tmp_path):
+    for name in ("a", "b", "c"):
+        os.mkfifo(tmp_path / name)
+    writer = threading.Thread(target=(tmp_path / "a").write_bytes, args=(piped,))
+    writer.start()
+    line = [sys.executable, "-m", "wgmb", "blur"]
+    words = [["a", "-o", "b"], ["b", "-o", "c"]]
+    running = [
+        subprocess.Popen([*line, *w, "--flow", "none", "-q"], cwd=tmp_path, env=ENVIRONMENT)
+        for w in words
+    ]
+    got = (tmp_path / "c").read_bytes()
+    writer.join()
+    assert [process.wait(60) for process in running] == [0, 0]
+    assert got.split(b"\n", 1)[1] == piped.split(b"\n", 1)[1]
+
+
+@pytest.mark.parametrize("words, data, code, said", [
+    (["-", "-o", "-"], b"", 2, b"wgmb: stdin: holds no pictures\n"),
+    (["-", "-o", "-"], b"garbage" * 90, 2, b"wgmb: stdin: is not YUV4MPEG2"),
+    (["-", "-o", "out.####.png"], None, 2, b"a pipe becomes a pipe (-) or a video"),
+    (["-", "-o", "-", "--resume"], None, 2, b"--resume needs files"),
+    (["-", "-o", "-", "--begin", "1"], None, 2, b"--begin is for files"),
+    (["-", "-o", "-", "--holdout", "static"], None, 2, b"--holdout of a video is for files"),
+    (["-", "x", "-o", "-"], None, 2, b"a pipe stands alone"),
+])  # fmt: skip
+def test_what_a_pipe_cannot_is_one_line(piped, words, data, code, said):
+    done = wgmb(*words, data=piped if data is None else data)
+    assert done.returncode == code and said in done.stderr and done.stdout == b""
+    assert done.stderr.count(b"\n") == 1
+
+
+def test_a_stream_that_ends_early_is_blurred_so_far_and_said(piped):
+    done = wgmb("-", "-o", "-", "--flow", "none", "-q", data=piped[:-50])
+    assert done.returncode == 1
+    assert done.stderr == b"wgmb: stdin: is cut off in picture 11\n"
+    assert len(list(Y4mReader(io.BytesIO(done.stdout), "stdout").pictures())) == 11
+    done = wgmb("-", "-o", "-", "-q", data=piped.replace(b"F24:1", b"F0:0", 1))
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert done.stderr == b"wgmb: stdin: does not say its rate; set --fps-in\n"
+
+
+def test_a_reader_that_goes_away_is_one_line(piped):
+    header, frames = piped.split(b"\n", 1)
+    many = header + b"\n" + frames * 40
+    line = [sys.executable, "-m", "wgmb", "blur", "-", "-o", "-", "--flow", "none", "-q"]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(line, stdin=pipe, stdout=pipe, stderr=pipe, env=ENVIRONMENT)
+
+    def feed():
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.write(many)
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.close()
+
+    writer = threading.Thread(target=feed)
+    writer.start()
+    process.stdout.read(20_000)
+    process.stdout.close()
+    with process.stderr as err:
+        said = err.read().decode()
+    assert process.wait(60) == 1
+    writer.join()
+    assert said.startswith("wgmb: the reader closed the pipe after ") and said.count("\n") == 1

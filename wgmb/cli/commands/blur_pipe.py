@@ -1,0 +1,70 @@
+"""`wgmb blur - -o -`: pictures through pipes."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import BinaryIO
+
+from ...errors import InputError
+from ...io.pipes import STDOUT
+from ...run.pipe import blur_pipe as run
+from ...run.video import VideoRequest
+from ...settings import OutputSettings
+from ..exit_codes import DONE, SOME_FAILED
+from ..spelling import as_options
+from ..terminal import check, note
+
+
+def blur_pipe(
+    source: str,
+    output: OutputSettings,
+    request: VideoRequest,
+    adapter: str | None,
+    quiet: bool,
+    fps_in: str | None,
+    color_in: str | None,
+) -> int:
+    """Blur from or into a pipe; returns the exit code."""
+
+    def tell(text: str) -> None:
+        if not quiet:
+            note(as_options(text))
+
+    def progress(number: int, state: str) -> None:
+        check(number, state)
+
+    with _stdout(output.output) as stdout:
+        report = run(
+            source, output, request, stdout=stdout, device=adapter, fps_in=fps_in,
+            color_in=color_in, tell=tell, progress=progress,
+        )  # fmt: skip
+    if report.cuts:
+        tell(f"camera cut before picture {', '.join(map(str, report.cuts))}")
+    tell(f"{report.frames} frames -> {'stdout' if output.output == STDOUT else output.output}")
+    if report.loss:
+        note(f"wgmb: {report.loss}")
+        return SOME_FAILED
+    return DONE
+
+
+@contextmanager
+def _stdout(name: str) -> Iterator[BinaryIO | None]:
+    """The stream for pictures; whatever else is printed meanwhile goes to standard error."""
+    if name != STDOUT:
+        yield None
+        return
+    if os.isatty(1):
+        raise InputError("standard output is a terminal; pipe the pictures into another program, "
+                         "such as: | ffmpeg -i - out.mp4")  # fmt: skip
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with os.fdopen(os.dup(kept), "wb", 0) as pictures:
+            yield pictures
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)

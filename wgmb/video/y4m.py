@@ -1,0 +1,207 @@
+"""YUV4MPEG2, the form in which video programs hand pictures through pipes: read and written.
+
+A line of text for the stream, such as `YUV4MPEG2 W640 H360 F30:1 Ip A1:1 C420mpeg2`, then for each
+picture the line `FRAME` and its planes. It says nothing of matrix, transfer and primaries.
+"""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+import errno
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import BinaryIO, Literal, cast
+
+import numpy as np
+
+from ..color.coding import BT601, BT709, BT2020, HLG, PQ, UNSPECIFIED, CodedPicture, Coding
+from ..errors import InputError
+from ..io import limits
+from .pixels import PlaneLayout
+from .read.color_tags import assumed
+
+COLORS = {
+    "bt601": (BT601, BT601, BT601),
+    "bt709": (BT709, BT709, BT709),
+    "bt2020-pq": (BT2020, PQ, BT2020),
+    "bt2020-hlg": (BT2020, HLG, BT2020),
+}
+"""Matrix, transfer and primaries by the names that a user chooses from."""
+_LONGEST = 4096  # bytes of a line
+_STEPS = {"420": (2, 2), "422": (2, 1), "444": (1, 1), "440": (1, 2), "411": (4, 1)}
+_NAMES = {steps: name for name, steps in _STEPS.items()}
+_SITED = "jpeg", "mpeg2", "paldv"  # how samples of chroma lie in 4:2:0
+_PLAIN = re.compile(r"(420|422|444|440|411|mono)(jpeg|mpeg2|paldv|alpha|p?(?:9|10|12|14|16))?")
+
+
+class Y4mReader:
+    """Reads pictures from a stream that cannot be sought. `name`: of the stream, for messages.
+
+    `color`: a name in COLORS, or None for what players assume. InputError in one line for a stream
+    that holds none, or something else, and for pictures of more than `max_mb` megabytes.
+    """
+
+    def __init__(
+        self, stream: BinaryIO, name: str, color: str | None = None, max_mb: float = limits.MAX_MB
+    ):
+        self._stream, self.name = stream, name
+        self.loss = ""
+        """The loss at the end, in words."""
+        line = self._line()
+        if not line:
+            raise InputError(f"{name}: holds no pictures")
+        kind, *words = line.split(b" ")
+        if kind != b"YUV4MPEG2":
+            raise InputError(
+                f"{name}: is not YUV4MPEG2, which `ffmpeg -i in.mp4 -f yuv4mpegpipe -` makes, with "
+                "-strict -1 for more than 8 bits"
+            )
+        said = {word[:1].decode("latin-1"): word[1:].decode("latin-1") for word in words if word}
+        full = any(word == b"XCOLORRANGE=FULL" for word in words)
+        self.size = self._whole(said, "W"), self._whole(said, "H")
+        if max(self.size) > limits.MOST_PIXELS_A_SIDE:
+            raise InputError(f"{name}: pictures of {self.size[0]} x {self.size[1]}, expected 1 to "
+                             f"{limits.MOST_PIXELS_A_SIDE} pixels a side")  # fmt: skip
+        promised = limits.unpacked(self.size, 4)
+        limits.check(Path(name), f"{self.size[0]} x {self.size[1]}", promised, promised, max_mb)
+        self.rate = self._ratio(said.get("F", "0:0"))
+        """Pictures a second, exactly; None if the stream does not say."""
+        self.space = said.get("C", "420jpeg")
+        """The samples, as the stream names them."""
+        if said.get("I", "p") not in ("p", "?"):
+            raise InputError(
+                f"{name}: is interlaced, which a pipe cannot be; deinterlace it first: "
+                "`ffmpeg -vf bwdif`"
+            )
+        self.coding, self.notes = self._coding(full, color)
+
+    def pictures(self) -> Iterator[CodedPicture]:
+        """The pictures, in order, up to the end or to what is cut off there (see `loss`)."""
+        kind = np.dtype("<u2" if self.coding.bits > 8 else "u1")
+        shapes = planes_of(self.size, self.coding)
+        length, number = sum(h * w for h, w in shapes) * kind.itemsize, 0
+        while line := self._line():
+            data = b""
+            if line.split(b" ")[0] == b"FRAME":
+                data = self._stream.read(length)
+            if len(data) < length:
+                cut = f"{self.name}: is cut off in picture {number}"
+                self.loss = cut if line.startswith(b"FRAME"[: len(line)]) else (
+                    f"{self.name}: is damaged before picture {number}"
+                )  # fmt: skip
+                return
+            planes, at = [], 0
+            for height, width in shapes:
+                plane = np.frombuffer(data, kind, height * width, at).reshape(height, width)
+                planes.append(plane)
+                at += plane.nbytes
+            yield CodedPicture(tuple(planes), self.coding)
+            number += 1
+
+    def _line(self) -> bytes:
+        return self._stream.readline(_LONGEST).rstrip(b"\n")
+
+    def _whole(self, said: dict[str, str], key: str) -> int:
+        if not re.fullmatch(r"[1-9]\d{0,8}", said.get(key, "")):
+            raise InputError(f"{self.name}: its header lacks a size")
+        return int(said[key])
+
+    def _ratio(self, text: str) -> Fraction | None:
+        if not (found := re.fullmatch(r"(\d{1,9}):(\d{1,9})", text)):
+            raise InputError(f"{self.name}: its header has the rate {text!r}")
+        over, under = map(int, found.groups())
+        return Fraction(over, under) if over and under else None
+
+    def _coding(self, full: bool, color: str | None) -> tuple[Coding, list[str]]:
+        found = _PLAIN.fullmatch(self.space.lower())
+        if not found:
+            raise InputError(f"{self.name}: samples of the kind {self.space!r} are not read")
+        kind, more = found.groups()
+        bits = int((more or "8").lstrip("p")) if (more or "8").lstrip("p").isdigit() else 8
+        model: Literal["grey", "yuv"] = "grey" if kind == "mono" else "yuv"
+        steps = _STEPS.get(kind, (1, 1))
+        of = PlaneLayout("", None, model, bits, steps, more == "alpha", full)
+        tags = 2 if full else 1, *(COLORS[color] if color else (UNSPECIFIED,) * 3)
+        coding, said = assumed(of, self.size, "h264", cast("tuple[int, int, int, int]", tags))
+        return replace(coding, full_range=full), [
+            f"does not state its colours: {', '.join(said)} assumed; `color_in` sets others"
+        ] if said else []
+
+
+class Y4mWriter:
+    """Writes pictures of one size and coding into an unbuffered stream.
+
+    `space`: the name of the samples, if another than this coding's own is wanted. OSError if the
+    stream's reader is gone.
+    """
+
+    def __init__(
+        self,
+        stream: BinaryIO,
+        size: tuple[int, int],
+        rate: Fraction,
+        coding: Coding,
+        space: str = "",
+    ):
+        self._stream, self._coding, self._count = stream, coding, 0
+        width, height = size
+        limit = "FULL" if coding.full_range else "LIMITED"
+        self._put(
+            f"YUV4MPEG2 W{width} H{height} F{rate.numerator}:{rate.denominator} Ip A1:1 "
+            f"C{space or space_of(coding)} XCOLORRANGE={limit}\n".encode()
+        )
+
+    def add(self, picture: CodedPicture) -> None:
+        """Append a picture."""
+        kind = np.dtype("<u2" if self._coding.bits > 8 else "u1")
+        planes = (np.ascontiguousarray(plane, kind).tobytes() for plane in picture.planes)
+        self._put(b"".join([b"FRAME\n", *planes]))
+        self._count += 1
+
+    def _put(self, data: bytes) -> None:
+        rest = memoryview(data)
+        try:
+            while rest:  # a pipe may take a part
+                rest = rest[self._stream.write(rest) :]
+        except BrokenPipeError:
+            text = f"the reader closed the pipe after {self._count} pictures"
+            raise OSError(errno.EPIPE, text) from None
+
+
+def coding_in(coding: Coding) -> Coding:
+    """The coding of pictures in a pipe that were coded so in a file: RGB becomes 4:4:4."""
+    if coding.model == "rgb":
+        return replace(
+            coding, model="yuv", steps=(1, 1), alpha=False, full_range=False, matrix=BT709
+        )
+    return replace(coding, alpha=coding.alpha and (coding.bits, coding.steps) == (8, (1, 1)))
+
+
+def space_of(coding: Coding) -> str:
+    """The name of a coding's samples."""
+    if coding.model == "grey":
+        return "mono" if coding.bits == 8 else f"mono{coding.bits}"
+    if coding.steps not in _NAMES:
+        raise InputError(
+            f"chroma of {coding.steps[0]} x {coding.steps[1]} pixels has no name in a pipe"
+        )
+    name = _NAMES[coding.steps]
+    if coding.alpha:
+        return f"{name}alpha"
+    if coding.bits > 8:
+        return f"{name}p{coding.bits}"
+    return "420mpeg2" if name == "420" else name
+
+
+def planes_of(size: tuple[int, int], coding: Coding) -> list[tuple[int, int]]:
+    """Height and width of each plane."""
+    width, height = size
+    across, down = coding.steps
+    chroma = (-(-height // down), -(-width // across))
+    if coding.model == "grey":
+        return [(height, width)]
+    return [(height, width), chroma, chroma] + [(height, width)] * coding.alpha
