@@ -14,8 +14,9 @@ import pytest
 
 import make_clips as clips
 from wgmb import InputError
+from wgmb.cli.streams import named
 from wgmb.color.coding import CodedPicture, Coding
-from wgmb.io.pipes import STDIN, STDOUT, named
+from wgmb.io.pipes import STDIN, STDOUT
 from wgmb.run.video import blur_video
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.y4m import Y4mReader, Y4mWriter, planes_of, space_of

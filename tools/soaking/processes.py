@@ -6,6 +6,7 @@ has neither a device nor threads, so that it can be forked.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
 import json
@@ -26,6 +27,7 @@ from typing import IO, Any
 from . import PATHS
 
 WGMB = [sys.executable, "-m", "wgmb"]
+_LOOK = 0.02  # s
 _ENDS = "\nsoaking: "  # what a function returned follows, on stdout
 
 
@@ -82,15 +84,43 @@ def run(
     )
     killer = threading.Timer(seconds, process.kill)
     killer.start()
+    peak = _Peak(process.pid)
     streams = [stream for stream in (process.stdout, process.stderr) if stream]
     with ThreadPoolExecutor(2) as readers:
         said, complained = readers.map(_all_of, streams)
-        _, status, used = os.wait4(process.pid, 0)
+        _, status = os.waitpid(process.pid, 0)
     took = time.perf_counter() - started
     killer.cancel()
     process.returncode = os.waitstatus_to_exitcode(status)
     late = process.returncode == -signal.SIGKILL and took >= seconds
-    return Ended(process.returncode, said, complained, took, used.ru_maxrss / 1024, late)
+    return Ended(process.returncode, said, complained, took, peak.end(), late)
+
+
+class _Peak:
+    """The largest memory of a process, followed while it lives.
+
+    What the system says at its end (`ru_maxrss`) is never less than the memory of the
+    process that started it.
+    """
+
+    def __init__(self, pid: int):
+        self._status = Path(f"/proc/{pid}/status")
+        self._largest = 0.0  # MiB
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._follow, daemon=True)
+        self._thread.start()
+
+    def end(self) -> float:
+        self._ended.set()
+        self._thread.join()
+        return self._largest
+
+    def _follow(self) -> None:
+        while not self._ended.wait(_LOOK):
+            with contextlib.suppress(OSError):
+                for line in self._status.read_text().splitlines():
+                    if line.startswith("VmHWM:"):
+                        self._largest = max(self._largest, int(line.split()[1]) / 1024)
 
 
 def _all_of(stream: IO[bytes]) -> str:

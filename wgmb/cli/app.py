@@ -26,7 +26,6 @@ from ..errors import (
     did_you_mean,
 )
 from ..extras import EXTRAS, reason
-from ..io.pipes import named
 from . import terminal
 from .exit_codes import (
     DONE,
@@ -35,6 +34,7 @@ from .exit_codes import (
     SOME_FAILED,
     USAGE,
 )
+from .streams import named
 
 COMMANDS = {
     "blur": "Blur rendered frames or videos.",

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Sequence
 
 STDIN, STDOUT = "/dev/stdin", "/dev/stdout"
-_OUTPUTS = "-o", "--output"
 
 
 def is_pipe(name: str) -> bool:
@@ -16,13 +14,3 @@ def is_pipe(name: str) -> bool:
         return name in (STDIN, STDOUT) or stat.S_ISFIFO(os.stat(name).st_mode)
     except (OSError, ValueError):
         return False
-
-
-def named(words: Sequence[str]) -> list[str]:
-    """The words of a command line with the names of the streams in place of `-`."""
-    found = []
-    for before, word in zip(["", *words], words, strict=False):
-        if word == "-":
-            word = STDOUT if before in _OUTPUTS else STDIN
-        found.append(f"--output={STDOUT}" if word == "--output=-" else word)
-    return found
