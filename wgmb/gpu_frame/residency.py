@@ -83,7 +83,7 @@ class Residency:
         return next((place for place, held in self._resident.items() if held.is_of(frame)), None)
 
     def _upload(self, frame: Frame, place: str) -> FrameViews:
-        color = _padded(frame.color, 4, 1)
+        color = padded(frame.color, 4, 1)
         half = color.dtype == np.float16
         four = "rgba16float" if half else gpu.texel(self._images.device, 4)
         views: dict[str, View] = {}
@@ -92,7 +92,7 @@ class Residency:
             used = not texture["if_used"] or name in self._wanted
             used |= name == "depth" and frame.camera is not None
             if array is not None and used:
-                array = _padded(array, 4, 0) if texture["format"].startswith("rgba") else array
+                array = padded(array, 4, 0) if texture["format"].startswith("rgba") else array
                 views[name] = self._images.upload(name + place, array, texture["format"])
         return FrameViews(
             color=self._images.upload("color" + place, color, four),
@@ -104,7 +104,7 @@ class Residency:
         )
 
 
-def _padded(array: np.ndarray, channels: int, value: float) -> np.ndarray:
+def padded(array: np.ndarray, channels: int, value: float) -> np.ndarray:
     """The array with as many channels, the new ones of one value."""
     if array.shape[2] == channels:
         return array

@@ -11,8 +11,10 @@ import wgpu
 
 from .. import gpu
 from ..exposure import Cell
+from ..frame import Frame
 from ..gpu.textures import TexturePool
-from ..gpu_frame.views import FrameInShot
+from ..gpu_frame.residency import padded
+from ..gpu_frame.views import FrameInShot, FrameViews
 from ..gpu_frame.weighted_sum import WeightedSum
 from .blur import Blur
 
@@ -22,7 +24,8 @@ _AT_ONCE = 2  # pictures that are summed in one pass
 class ExposureSum:
     """Makes one picture of the cells of an exposure (see exposure.py), on the Blur's device.
 
-    A cell whose frame has no motion, or whose shutter is closed, counts as it is.
+    The frame of a cell is given as textures, or as arrays, which are uploaded. One without motion,
+    or whose shutter is closed, counts as it is.
     """
 
     def __init__(self, blur: Blur):
@@ -31,24 +34,33 @@ class ExposureSum:
         self._sum = WeightedSum(blur.device)
 
     def texture(
-        self, size: tuple[int, int], parts: Iterable[tuple[Cell, FrameInShot]]
+        self, size: tuple[int, int], parts: Iterable[tuple[Cell, FrameInShot | Frame]]
     ) -> wgpu.GPUTexture:
         """The exposure of pictures of `size` (width, height): linear light, rgba32float.
 
         The next call overwrites it.
         """
         output = self._images.texture("exposure", size, "rgba32float")
+        self.draw(parts, output)
+        return output
+
+    def draw(
+        self, parts: Iterable[tuple[Cell, FrameInShot | Frame]], output: wgpu.GPUTexture
+    ) -> None:
+        """Submit the exposure into `output`, rgba32float of the pictures' size.
+
+        The Blur keeps the shutter of the last cell.
+        """
         waiting: list[tuple[float, wgpu.GPUTexture]] = []
         begun = False
-        with gpu.reported(size):
-            for cell, shown in parts:
-                waiting.append((cell.share, self._picture(f"part {len(waiting)}", cell, shown)))
+        with gpu.reported((output.size[0], output.size[1])):
+            for cell, frame in parts:
+                waiting.append((cell.share, self._picture(f"part {len(waiting)}", cell, frame)))
                 if len(waiting) == _AT_ONCE:
                     self._add(waiting, output, begun)
                     begun, waiting = True, []
             if waiting:
                 self._add(waiting, output, begun)
-        return output
 
     def _add(
         self, waiting: list[tuple[float, wgpu.GPUTexture]], output: wgpu.GPUTexture, onto: bool
@@ -58,20 +70,30 @@ class ExposureSum:
         self._sum.encode(encoder, [texture for _, texture in waiting], shares, output, onto=onto)
         gpu.submit(self.blur.device, encoder)
 
-    def _picture(self, name: str, cell: Cell, shown: FrameInShot) -> wgpu.GPUTexture:
-        frame = shown.frame
-        if not frame.has_vectors or cell.shutter.degrees <= 0:
-            return frame.color.texture
+    def _picture(self, name: str, cell: Cell, frame: FrameInShot | Frame) -> wgpu.GPUTexture:
+        sharp = frame.frame if isinstance(frame, FrameInShot) else frame
+        if "motion" not in sharp.has or cell.shutter.degrees <= 0:
+            return self._sharp(name, sharp)
         self.blur.shutter = cell.shutter
-        texture = self._images.texture(name, frame.size, self.blur.output)
+        texture = self._images.texture(name, sharp.size, self.blur.output)
+        if isinstance(frame, Frame):
+            self.blur.draw(frame, texture.create_view())
+            return texture
         encoder = self.blur.device.create_command_encoder(label="cell")
         self.blur.encode(
             encoder,
-            frame,
+            frame.frame,
             texture.create_view(),
-            prev=shown.prev,
-            next=shown.next,
-            number=shown.number,
+            prev=frame.prev,
+            next=frame.next,
+            number=frame.number,
         )
         gpu.submit(self.blur.device, encoder)
         return texture
+
+    def _sharp(self, name: str, frame: FrameViews | Frame) -> wgpu.GPUTexture:
+        if isinstance(frame, FrameViews):
+            return frame.color.texture
+        color = padded(frame.color, 4, 1)
+        texel = "rgba16float" if color.dtype == np.float16 else "rgba32float"
+        return self._images.upload(f"{name} sharp", color, texel).texture

@@ -65,7 +65,7 @@ class Exposures:
         self._highlights, self._holdout = highlights, holdout
         self._flash, self._tolerance = flash, tolerance
         self._blur, self._motion = blur, motion
-        self._exposer, self._planes = ExposureSum(blur), Planes(blur.device, highlights)
+        self._sum, self._planes = ExposureSum(blur), Planes(blur.device, highlights)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
         self.reel: ShotReader[Thumbnail] | None = None
@@ -129,7 +129,7 @@ class Exposures:
     ) -> wgpu.GPUTexture:
         """The same with highlights expanded."""
         parts = ((cell, views.shown(cell.index)) for cell in cells)
-        return self._exposer.texture(reel[cells[0].index].content.coded.size, parts)
+        return self._sum.texture(reel[cells[0].index].content.coded.size, parts)
 
 
 class VideoBlur(Exposures):

@@ -16,8 +16,10 @@ from ...color.spaces import ColorConfig, ColorSpace
 from ...frame import Frame
 from ...gpu.textures import TexturePool
 from ...gpu.timing import TimestampClock
+from ...gpu_frame.residency import padded
 from ...methods import METHODS
 from ...pipeline.blur import Blur
+from ...pipeline.exposure_sum import ExposureSum
 from ...shutter import Shutter
 from ...video.holdouts import STATIC, holdout_of
 from ...video.planes import Planes
@@ -30,7 +32,6 @@ from ..state.video_time import (
     output,
     settings_of,
 )
-from .cell_sum import PictureCellSum
 from .motion_thread import MotionThread
 from .video_exposure import Knowledge, VideoExposure, exposed, reach
 from .video_frames import FootageFrames
@@ -60,7 +61,7 @@ class VideoSubject:
         self._moves = settings.flow != "none"
         self.finding = "\n".join([f"motion: {self._maker.how}", *self._footage.notes])
         self._frames = FootageFrames(self._footage, device, self._maker.known, 1.0)
-        self._sums: dict[int, PictureCellSum] = {}
+        self._sums: dict[int, ExposureSum] = {}
         self._state = state
         self._exposed: VideoExposure | None = None
         self._lacking: list[int] = []
@@ -192,10 +193,7 @@ class VideoSubject:
         return found
 
     def _sharp(self, frame: Frame) -> wgpu.GPUTexture:
-        width, height = frame.size
-        rgba = np.ones((height, width, 4), np.float32)
-        rgba[..., : frame.color.shape[2]] = frame.color
-        self._images.upload("color", rgba, "rgba32float")
+        self._images.upload("color", padded(frame.color, 4, 1), "rgba32float")
         color = self._images.texture("color", frame.size, "rgba32float")
         if self._frames.highlights == 1:
             return color
@@ -233,12 +231,12 @@ class VideoSubject:
         planes.compress(encoder, light.create_view(), output.create_view())
         gpu.submit(self._device, encoder)
 
-    def _sum(self, blur: Blur) -> PictureCellSum:
+    def _sum(self, blur: Blur) -> ExposureSum:
         held = self._sums.get(id(blur))
         if held is None or held.blur is not blur:
             while len(self._sums) >= 4:
                 del self._sums[next(iter(self._sums))]
-            held = self._sums[id(blur)] = PictureCellSum(blur)
+            held = self._sums[id(blur)] = ExposureSum(blur)
         return held
 
 
