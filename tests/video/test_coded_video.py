@@ -15,8 +15,7 @@ from wgmb.color.coding import CodedPicture, Coding
 from wgmb.video.clock import Clock, tick
 from wgmb.video.hdr10 import LightLevel, Mastering
 from wgmb.video.read.reader import VideoReader
-from wgmb.video.write import encoders
-from wgmb.video.write.container import VideoFile
+from wgmb.video.write import container, encoders
 from wgmb.video.write.encoders import CODECS, Facts, chosen
 from wgmb.video.write.pictures import CodedVideo
 
@@ -332,14 +331,14 @@ def test_a_clock_goes_there_and_back():
 @pytest.mark.parametrize(("name", "codec"), [("v.mp4", "av1"), ("v.mp4", "h265"), ("v.mp4", None)])
 def test_no_thread_is_made_real_time(tmp_path, monkeypatch, name, codec):
     """SVT-AV1 would where it may, as root: new threads would inherit it and hold others up."""
-    begin, during = VideoFile._begin, []
+    begin, during = container.begin, []
 
     def observed(*given):
         stream = begin(*given)
         during.extend(os.sched_getscheduler(int(n)) for n in os.listdir("/proc/self/task"))
         return stream
 
-    monkeypatch.setattr(VideoFile, "_begin", observed)
+    monkeypatch.setattr(container, "begin", observed)
     write(tmp_path / name, Coding(bits=8), codec)
     assert os.sched_getscheduler(0) == os.SCHED_OTHER
     assert during

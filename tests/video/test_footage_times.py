@@ -141,7 +141,7 @@ def test_dolby_vision_without_a_base_layer_is_said(
     header = struct.pack("=BxHBBBBBBB", 2, 18, profile, 0, 0, 0, 23, 1, full_range)
     data = struct.pack("=3Q", 48, 0, 0).ljust(48, b"\0") + header
     monkeypatch.setattr(
-        "wgmb.video.read.reader._side_data", lambda frame: {Type.DOVI_METADATA: data}
+        "wgmb.video.read.reader.side_data_of", lambda frame: {Type.DOVI_METADATA: data}
     )
     assert any(want in note for note in VideoReader(clips.write(tmp_path / "c.mp4")).notes)
 

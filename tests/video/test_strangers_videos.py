@@ -13,7 +13,7 @@ from file_lists import LISTS
 from wgmb import InputError, blur_video
 from wgmb.video.clock import Clock
 from wgmb.video.output_times import OutputFrames
-from wgmb.video.read.container import _READERS
+from wgmb.video.read.container import READERS
 from wgmb.video.read.reader import VideoReader
 
 
@@ -44,7 +44,7 @@ def test_a_list_of_files_is_no_video(tmp_path, kind, suffix):
 
 def test_readers_are_those_of_the_library_that_read_one_file():
     known = {name for names in av.formats_available for name in names.split(",")}
-    readers = set(_READERS.split(","))
+    readers = set(READERS.split(","))
     assert readers <= known
     # Every reader of FFmpeg that opens what a file names, runs a script or uses a device.
     assert not readers & {

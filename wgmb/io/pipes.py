@@ -1,9 +1,11 @@
-"""Names of pipes: the standard streams, which a command line calls `-`, and named pipes."""
+"""Pipes: the standard streams, which a command line calls `-`, and named pipes."""
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
+from typing import BinaryIO
 
 STDIN, STDOUT = "/dev/stdin", "/dev/stdout"
 
@@ -14,3 +16,24 @@ def is_pipe(name: str) -> bool:
         return name in (STDIN, STDOUT) or stat.S_ISFIFO(os.stat(name).st_mode)
     except (OSError, ValueError):
         return False
+
+
+class PipeWriter:
+    """An unbuffered stream that takes all of what it is given.
+
+    OSError that says how many pictures were written, if the stream's reader is gone.
+    """
+
+    def __init__(self, stream: BinaryIO):
+        self._stream, self.pictures = stream, 0
+
+    def write(self, data: bytes) -> int:
+        """Write all of it."""
+        rest = memoryview(data)
+        try:
+            while rest:  # a pipe may take a part
+                rest = rest[self._stream.write(rest) :]
+        except BrokenPipeError:
+            text = f"the reader closed the pipe after {self.pictures} pictures"
+            raise OSError(errno.EPIPE, text) from None
+        return len(data)

@@ -39,29 +39,32 @@ class SteadyExposures:
     def __init__(self, exposures: Exposures, rate: Fraction, fps: Fraction):
         self.exposures, self._rate, self._fps = exposures, rate, fps
         self.read = 0
-        """Number of pictures read so far."""
+        """Number of the last picture read so far, and 1."""
         self._ended = False
 
     def of(
-        self, pictures: Iterable[CodedPicture], shutter: Shutter
+        self, pictures: Iterable[tuple[int, CodedPicture]], shutter: Shutter, first: int = 0
     ) -> Iterator[tuple[OutputFrame, Exposure]]:
-        """Every output frame and its exposure, which is valid until the next is asked for."""
-        return self.exposures.of(self._timed(pictures), shutter, self._wanted())
+        """Every output frame and its exposure, which is valid until the next is asked for.
+
+        `pictures`: with their numbers, which ascend. `first`: number of the first output frame.
+        """
+        return self.exposures.of(self._timed(pictures), shutter, self._wanted(first))
 
     def count(self, pictures: int) -> int:
         """Number of output frames of so many pictures."""
         return max(1, math.ceil(pictures / self._rate * self._fps - SPARE)) if pictures else 0
 
-    def _timed(self, pictures: Iterable[CodedPicture]) -> Iterator[Picture[Thumbnail]]:
-        for number, picture in enumerate(pictures):
+    def _timed(self, pictures: Iterable[tuple[int, CodedPicture]]) -> Iterator[Picture[Thumbnail]]:
+        for number, picture in pictures:
             self.read = number + 1
             yield Picture(float(number / self._rate), Thumbnail(picture), number)
         self._ended = True
 
-    def _wanted(self) -> Iterator[OutputFrame]:
+    def _wanted(self, first: int) -> Iterator[OutputFrame]:
         """The output frames, as many as the pictures turn out to fill."""
         interval = 1 / self._fps
-        for number in count():
+        for number in count(first):
             reel = self.exposures.reel
             assert reel is not None
             reel.read_beyond(float(number * interval))
@@ -121,7 +124,7 @@ class PictureBlur(Iterator[Any]):
         return list(self._steady.exposures.reel.doubles) if self._steady.exposures.reel else []
 
     def _made(self, pictures: Iterable[Any], shutter: Shutter) -> Generator[Any, None, None]:
-        coded = (self._coded(number, picture) for number, picture in enumerate(pictures))
+        coded = ((number, self._coded(number, picture)) for number, picture in enumerate(pictures))
         for _, exposure in self._steady.of(coded, shutter):
             yield self._result(exposure)
 

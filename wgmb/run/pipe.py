@@ -1,4 +1,4 @@
-"""Videos through pipes: YUV4MPEG2 in, out, or both; nothing is known of the end."""
+"""Videos through pipes, at one end or at both; nothing is known of the end of what comes."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -10,12 +10,12 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
 
 from ..color.coding import Coding
 from ..errors import InputError
 from ..io import atomic
-from ..io.pipes import STDIN, STDOUT, is_pipe
+from ..io.pipes import STDIN, STDOUT, PipeWriter, is_pipe
 from ..settings import OutputSettings
 from ..settings.output import rate_of
 from ..settings.video import VideoSettings
@@ -23,14 +23,17 @@ from ..shots.cut_list import CutList
 from ..video.clock import tick
 from ..video.exposures import Exposure, Exposures
 from ..video.output_times import OutputFrame
-from ..video.write.encoders import FINEST_RATE, SUFFIXES, chosen
+from ..video.read.stream_reader import StreamReader
+from ..video.write.encoders import FINEST_RATE, SUFFIXES, Encoding, Facts, chosen
 from ..video.write.pictures import CodedVideo
+from ..video.write.streamed import MatroskaStream
 from ..video.y4m import Y4mReader, Y4mWriter, coding_in
 from .pictures import SteadyExposures
 from .video import VideoRequest, VideoRun
 
 _BUFFER = 1 << 20  # bytes
 _OF_FILES = "begin", "end", "speed"  # of VideoSettings
+_Y4M = b"YUV4MPEG2"
 
 
 @dataclass
@@ -43,6 +46,11 @@ class PipeReport:
     """The loss at the end of an input that is cut off, in words."""
     cuts: list[int] = field(default_factory=list)
     """Numbers of the input's pictures that begin a shot."""
+    left_out: list[str] = field(default_factory=list)
+    """Contents that the output cannot hold."""
+
+
+Reader = Y4mReader | StreamReader
 
 
 @dataclass(frozen=True)
@@ -51,11 +59,23 @@ class _Source:
 
     size: tuple[int, int]
     coding: Coding
+    facts: Facts
     rate: Fraction
     space: str
+    """The name of the samples in YUV4MPEG2, if they came so."""
     exposures: Exposures
     frames: Iterator[tuple[OutputFrame, Exposure]]
-    reader: Y4mReader | None
+    reader: Reader | None
+
+
+class _Sink(Protocol):
+    """The output."""
+
+    left_out: list[str]
+
+    def put(self, moment: OutputFrame, exposure: Exposure) -> None: ...
+    def close(self) -> None: ...
+    def abandon(self) -> None: ...
 
 
 def blur_pipe(
@@ -73,35 +93,37 @@ def blur_pipe(
     """Blur from a pipe, into a pipe, or both; the other end is a video's file.
 
     `stdout`: the unbuffered stream that STDOUT stands for. `fps_in`: pictures a second of a stream
-    that does not say, or another rate than it says. `color_in`: its colours (y4m.COLORS). `tell` is
+    that does not say, or another rate than it says. `color_in`: its colours (COLORS). `tell` is
     called with lines that a user should know. InputError for settings that a pipe cannot have.
     """
     _check(source, output, request)
+    encoding = _encoding(output, request.video)
     with ExitStack() as stack:
         reader = None
         if is_pipe(source):  # before the GPU: an empty stream is told at once
             stream = stack.enter_context(_input(source))
-            reader = Y4mReader(stream, _plain(source), color_in, request.input.max_mb)
+            reader = reader_of(stream, _plain(source), request, fps_in, color_in)
         run = request.open(device)
         tell(f"motion: {run.how}")
         found = _piped(reader, run, output, fps_in) if reader else _of_file(source, run, output)
         for text in reader.notes if reader else ():
             tell(f"{_plain(source)}: {text}")
         report = PipeReport()
-        put, close, abandon = _output(output, found, request.video, stack, stdout)
+        sink = _sink(output, found, encoding, stack, stdout)
         try:
             for moment, exposure in found.frames:
-                put(moment, exposure)
+                sink.put(moment, exposure)
                 report.frames += 1
                 if progress:
                     progress(moment.number, "done")
-            close()
+            sink.close()
         except BaseException:
-            abandon()
+            sink.abandon()
             raise
         reel = found.exposures.reel
         report.cuts = sorted(reel.cuts) if reel else []
         report.loss = reader.loss if reader else ""
+        report.left_out = sink.left_out
         if reader and not report.frames:
             raise InputError(reader.loss or f"{_plain(source)}: holds no pictures")
         return report
@@ -121,9 +143,42 @@ def _check(source: str, output: OutputSettings, request: VideoRequest) -> None:
             raise InputError("`holdout` of a video is for files; a pipe is read once")
     elif not is_pipe(output.output):
         raise InputError("neither input nor output is a pipe")
-    if not is_pipe(output.output) and Path(output.output).suffix.lower() not in SUFFIXES:
-        known = " ".join(sorted(SUFFIXES))
-        raise InputError(f"a pipe becomes a pipe (-) or a video ({known}), got {output.output}")
+
+
+def _encoding(output: OutputSettings, video: VideoSettings) -> Encoding | None:
+    """The output's encoding; None for YUV4MPEG2. InputError for one that it cannot have."""
+    path = Path(output.output)
+    if not is_pipe(output.output):
+        if path.suffix.lower() not in SUFFIXES:
+            known = " ".join(sorted(SUFFIXES))
+            raise InputError(f"a pipe becomes a pipe (-) or a video ({known}), got {path}")
+        if path.exists() and not output.overwrite:
+            raise InputError(f"{path} exists; `overwrite=True` replaces it")
+        return chosen(path, video.codec, video.quality, video.encoder)
+    if video.codec not in (None, "ffv1"):
+        raise InputError(f"`codec` into a pipe is ffv1 (in Matroska), or none (YUV4MPEG2), got "
+                         f"{video.codec}")  # fmt: skip
+    if video.codec is None and (video.quality is not None or video.encoder is not None):
+        raise InputError("`quality` and `encoder` are for files; YUV4MPEG2 has neither")
+    return chosen("-.mkv", "ffv1", video.quality, video.encoder) if video.codec else None
+
+
+def reader_of(
+    stream: BinaryIO,
+    name: str,
+    request: VideoRequest,
+    fps_in: str | None = None,
+    color_in: str | None = None,
+) -> Reader:
+    """The reader for what comes through a buffered stream; see blur_pipe."""
+    most = request.input.max_mb
+    beginning = stream.peek(len(_Y4M))[: len(_Y4M)]  # pyright: ignore[reportAttributeAccessIssue]
+    if not beginning:
+        raise InputError(f"{name}: holds no pictures")
+    if _Y4M.startswith(beginning):
+        return Y4mReader(stream, name, color_in, most)
+    pause = request.video.longest_pause
+    return StreamReader(stream, name, color_in, most, keeps_time=not fps_in, pause=pause)
 
 
 def _input(source: str) -> BinaryIO:
@@ -140,7 +195,7 @@ def _plain(name: str) -> str:
     return {STDIN: "stdin", STDOUT: "stdout"}.get(name, name)
 
 
-def _piped(reader: Y4mReader, run: VideoRun, output: OutputSettings, fps_in: str | None) -> _Source:
+def _piped(reader: Reader, run: VideoRun, output: OutputSettings, fps_in: str | None) -> _Source:
     rate = rate_of(fps_in, "fps_in") if fps_in else reader.rate
     if rate is None:
         raise InputError(f"{reader.name}: does not say its rate; set `fps_in`")
@@ -156,7 +211,8 @@ def _piped(reader: Y4mReader, run: VideoRun, output: OutputSettings, fps_in: str
     fps = rate if output.fps in (None, "source") else output.rate_or(rate)
     fps = fps.limit_denominator(FINEST_RATE)
     frames = SteadyExposures(exposures, rate, fps).of(reader.pictures(), request.shutter.make())
-    return _Source(reader.size, reader.coding, fps, reader.space, exposures, frames, reader)
+    space = reader.space if isinstance(reader, Y4mReader) else ""
+    return _Source(reader.size, reader.coding, reader.facts, fps, space, exposures, frames, reader)
 
 
 def _of_file(source: str, run: VideoRun, output: OutputSettings) -> _Source:
@@ -166,34 +222,69 @@ def _of_file(source: str, run: VideoRun, output: OutputSettings) -> _Source:
         raise InputError(f"{source}: its rate is variable, that of a pipe cannot be; set `fps`")
     frames = exposures.exposures(run.request.shutter.make(), plan.wanted)
     rate = 1 / plan.wanted[0].interval
-    return _Source(reader.size, coding_in(reader.coding), rate, "", exposures, frames, None)
+    return _Source(reader.size, reader.coding, reader.facts, rate, "", exposures, frames, None)
 
 
-def _output(
+def _sink(
     output: OutputSettings,
     found: _Source,
-    video: VideoSettings,
+    encoding: Encoding | None,
     stack: ExitStack,
     stdout: BinaryIO | None,
-) -> tuple[Callable[[OutputFrame, Exposure], None], Callable[[], None], Callable[[], None]]:
-    """Functions that take an exposure, close the output, and leave nothing of it."""
-    if is_pipe(output.output):
-        stream = stdout if output.output == STDOUT else None
-        stream = stream or stack.enter_context(_named(output.output))
-        writer = Y4mWriter(stream, found.size, found.rate, found.coding, found.space)
-        return (
-            lambda _, exposure: writer.add(exposure.coded(found.coding)),
-            lambda: None,
-            lambda: None,
+) -> _Sink:
+    if not is_pipe(output.output):
+        assert encoding is not None
+        return _ToFile(Path(output.output), found, encoding)
+    stream = stdout if output.output == STDOUT else None
+    stream = stream or stack.enter_context(_named(output.output))
+    if encoding is not None:
+        return _ToMatroska(stream, found, encoding)
+    return _ToY4m(stream, found)
+
+
+class _ToY4m:
+    def __init__(self, stream: BinaryIO, found: _Source):
+        self._coding = coding_in(found.coding)
+        aspect = found.facts.pixel_aspect
+        self._writer = Y4mWriter(stream, found.size, found.rate, self._coding, found.space, aspect)
+        self.left_out = []
+        if found.coding.alpha and not self._coding.alpha:
+            self.left_out.append("YUV4MPEG2 holds no such transparency; `codec='ffv1'` does")
+
+    def put(self, moment: OutputFrame, exposure: Exposure) -> None:
+        self._writer.add(exposure.coded(self._coding))
+
+    def close(self) -> None:
+        pass
+
+    def abandon(self) -> None:
+        pass
+
+
+class _ToMatroska:
+    def __init__(self, stream: BinaryIO, found: _Source, encoding: Encoding):
+        self._coding, lost = encoding.coding(found.coding)
+        self.left_out = [*lost, *encoding.left_out(found.facts)]
+        self._writer = MatroskaStream(
+            PipeWriter(stream), found.size, found.rate, self._coding, encoding, found.facts
         )
-    path = Path(output.output)
-    if (is_there := path.exists()) and not output.overwrite:
-        raise InputError(f"{path} exists; `overwrite=True` replaces it")
-    encoding = chosen(path, video.codec, video.quality, video.encoder)
-    coding, _ = encoding.coding(found.coding)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    made = CodedVideo(
-        path, atomic.temporary_name(path), encoding, coding, found.size, found.rate,
-        tick(1 / found.rate), is_new=not is_there,
-    )  # fmt: skip
-    return (lambda moment, e: made.add(e.coded(coding), moment.time), made.close, made.abandon)
+        self.close, self.abandon = self._writer.close, self._writer.abandon
+
+    def put(self, moment: OutputFrame, exposure: Exposure) -> None:
+        self._writer.add(exposure.coded(self._coding))
+
+
+class _ToFile:
+    def __init__(self, path: Path, found: _Source, encoding: Encoding):
+        self._coding, lost = encoding.coding(found.coding)
+        is_new = not path.exists()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._video = CodedVideo(
+            path, atomic.temporary_name(path), encoding, self._coding, found.size, found.rate,
+            tick(1 / found.rate), found.facts, is_new=is_new,
+        )  # fmt: skip
+        self.left_out = [*lost, *self._video.left_out]
+        self.close, self.abandon = self._video.close, self._video.abandon
+
+    def put(self, moment: OutputFrame, exposure: Exposure) -> None:
+        self._video.add(exposure.coded(self._coding), moment.time)

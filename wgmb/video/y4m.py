@@ -8,7 +8,6 @@ picture the line `FRAME` and its planes. It says nothing of matrix, transfer and
 
 from __future__ import annotations
 
-import errno
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,19 +17,14 @@ from typing import BinaryIO, Literal, cast
 
 import numpy as np
 
-from ..color.coding import BT601, BT709, BT2020, HLG, PQ, UNSPECIFIED, CodedPicture, Coding
+from ..color.coding import BT709, UNSPECIFIED, CodedPicture, Coding
 from ..errors import InputError
 from ..io import limits
+from ..io.pipes import PipeWriter
 from .pixels import PlaneLayout
-from .read.color_tags import assumed
+from .read.color_tags import COLORS, assumed
+from .write.encoders import Facts
 
-COLORS = {
-    "bt601": (BT601, BT601, BT601),
-    "bt709": (BT709, BT709, BT709),
-    "bt2020-pq": (BT2020, PQ, BT2020),
-    "bt2020-hlg": (BT2020, HLG, BT2020),
-}
-"""Matrix, transfer and primaries by the names that a user chooses from."""
 _LONGEST = 4096  # bytes of a line
 _STEPS = {"420": (2, 2), "422": (2, 1), "444": (1, 1), "440": (1, 2), "411": (4, 1)}
 _NAMES = {steps: name for name, steps in _STEPS.items()}
@@ -70,6 +64,7 @@ class Y4mReader:
         limits.check(Path(name), f"{self.size[0]} x {self.size[1]}", promised, promised, max_mb)
         self.rate = self._ratio(said.get("F", "0:0"))
         """Pictures a second, exactly; None if the stream does not say."""
+        self.facts = Facts(self._ratio(said.get("A", "0:0")) or Fraction(1))
         self.space = said.get("C", "420jpeg")
         """The samples, as the stream names them."""
         if said.get("I", "p") not in ("p", "?"):
@@ -79,8 +74,8 @@ class Y4mReader:
             )
         self.coding, self.notes = self._coding(full, color)
 
-    def pictures(self) -> Iterator[CodedPicture]:
-        """The pictures, in order, up to the end or to what is cut off there (see `loss`)."""
+    def pictures(self) -> Iterator[tuple[int, CodedPicture]]:
+        """The pictures and their numbers, up to the end or to what is cut off (see `loss`)."""
         kind = np.dtype("<u2" if self.coding.bits > 8 else "u1")
         shapes = planes_of(self.size, self.coding)
         length, number = sum(h * w for h, w in shapes) * kind.itemsize, 0
@@ -99,7 +94,7 @@ class Y4mReader:
                 plane = np.frombuffer(data, kind, height * width, at).reshape(height, width)
                 planes.append(plane)
                 at += plane.nbytes
-            yield CodedPicture(tuple(planes), self.coding)
+            yield number, CodedPicture(tuple(planes), self.coding)
             number += 1
 
     def _line(self) -> bytes:
@@ -112,7 +107,7 @@ class Y4mReader:
 
     def _ratio(self, text: str) -> Fraction | None:
         if not (found := re.fullmatch(r"(\d{1,9}):(\d{1,9})", text)):
-            raise InputError(f"{self.name}: its header has the rate {text!r}")
+            raise InputError(f"{self.name}: its header has the ratio {text!r}")
         over, under = map(int, found.groups())
         return Fraction(over, under) if over and under else None
 
@@ -135,8 +130,8 @@ class Y4mReader:
 class Y4mWriter:
     """Writes pictures of one size and coding into an unbuffered stream.
 
-    `space`: the name of the samples, if another than this coding's own is wanted. OSError if the
-    stream's reader is gone.
+    `space`: the name of the samples, if another than this coding's own is wanted. `aspect`: width
+    of a pixel to its height. OSError if the stream's reader is gone.
     """
 
     def __init__(
@@ -146,12 +141,14 @@ class Y4mWriter:
         rate: Fraction,
         coding: Coding,
         space: str = "",
+        aspect: Fraction = Fraction(1),
     ):
-        self._stream, self._coding, self._count = stream, coding, 0
+        self._out, self._coding = PipeWriter(stream), coding
         width, height = size
         limit = "FULL" if coding.full_range else "LIMITED"
-        self._put(
-            f"YUV4MPEG2 W{width} H{height} F{rate.numerator}:{rate.denominator} Ip A1:1 "
+        self._out.write(
+            f"YUV4MPEG2 W{width} H{height} F{rate.numerator}:{rate.denominator} Ip "
+            f"A{aspect.numerator}:{aspect.denominator} "
             f"C{space or space_of(coding)} XCOLORRANGE={limit}\n".encode()
         )
 
@@ -159,17 +156,8 @@ class Y4mWriter:
         """Append a picture."""
         kind = np.dtype("<u2" if self._coding.bits > 8 else "u1")
         planes = (np.ascontiguousarray(plane, kind).tobytes() for plane in picture.planes)
-        self._put(b"".join([b"FRAME\n", *planes]))
-        self._count += 1
-
-    def _put(self, data: bytes) -> None:
-        rest = memoryview(data)
-        try:
-            while rest:  # a pipe may take a part
-                rest = rest[self._stream.write(rest) :]
-        except BrokenPipeError:
-            text = f"the reader closed the pipe after {self._count} pictures"
-            raise OSError(errno.EPIPE, text) from None
+        self._out.write(b"".join([b"FRAME\n", *planes]))
+        self._out.pictures += 1
 
 
 def coding_in(coding: Coding) -> Coding:

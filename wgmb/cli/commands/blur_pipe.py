@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import BinaryIO
 
 from ...errors import InputError
-from ...io.pipes import STDOUT
+from ...io.pipes import STDIN, STDOUT
 from ...run.pipe import blur_pipe as run
 from ...run.video import VideoRequest
 from ...settings import OutputSettings
@@ -29,6 +29,10 @@ def blur_pipe(
 ) -> int:
     """Blur from or into a pipe; returns the exit code."""
 
+    if source == STDIN and os.isatty(0):
+        raise InputError("standard input is a terminal; pipe pictures into it, such as: "
+                         "ffmpeg -i in.mp4 -f yuv4mpegpipe - |")  # fmt: skip
+
     def tell(text: str) -> None:
         if not quiet:
             note(as_options(text))
@@ -41,6 +45,8 @@ def blur_pipe(
             source, output, request, stdout=stdout, device=adapter, fps_in=fps_in,
             color_in=color_in, tell=tell, progress=progress,
         )  # fmt: skip
+    for text in report.left_out:
+        tell(text)
     if report.cuts:
         tell(f"camera cut before picture {', '.join(map(str, report.cuts))}")
     tell(f"{report.frames} frames -> {'stdout' if output.output == STDOUT else output.output}")

@@ -11,6 +11,8 @@ from ...color.coding import (
     BT601,
     BT709,
     BT2020,
+    HLG,
+    PQ,
     SRGB,
     UNSPECIFIED,
     Coding,
@@ -21,6 +23,14 @@ _PAL = 5  # primaries of 625 lines
 _LIMITED, _FULL = 1, 2  # ranges, as FFmpeg counts them
 _RESERVED = (0, 3)  # as primaries and transfer; as matrix 3 only
 _VIDEO_CODECS = ("h264", "hevc", "av1", "vp8", "vp9", "mpeg2video", "mpeg4", "vvc")
+
+COLORS = {
+    "bt601": (BT601, BT601, BT601),
+    "bt709": (BT709, BT709, BT709),
+    "bt2020-pq": (BT2020, PQ, BT2020),
+    "bt2020-hlg": (BT2020, HLG, BT2020),
+}
+"""Matrix, transfer and primaries by the names that a user chooses from."""
 
 Tags = tuple[int, int, int, int]
 """Range, matrix, transfer, primaries."""

@@ -20,7 +20,7 @@ _LONGEST = 60.0, 60.0  # seconds that opening, and reading once, may take
 _LISTS = b"ffconcat", b"#EXTM3U", b"v=0", b"<?xml", b"<MPD"  # that name other files
 # FFmpeg's readers of one file that holds moving pictures. No reader of lists (concat, hls, dash,
 # imf, sdp, image2, ...), of scripts or devices, nor one that opens more files by itself (mlv).
-_READERS = (
+READERS = (
     "4xm,anm,apng,asf,asf_o,av1,avi,avs,avs2,avs3,bethsoftvid,bfi,bink,c93,cavsvideo,cdg,cdxl,"
     "cine,dfa,dhav,dirac,dnxhd,dsicin,dv,dxa,ea,evc,film_cpk,filmstrip,flic,flv,frm,gdv,gif,gxf,"
     "h261,h263,h264,hevc,hnm,idcin,iff,ifv,ingenient,ipmovie,ipu,iv8,ivf,ivr,jpegxl_anim,jv,kux,"
@@ -46,7 +46,7 @@ def opened(path: Path) -> InputContainer:
             f"file:{os.fspath(path)}",
             container_options={
                 "protocol_whitelist": "file",
-                "format_whitelist": _READERS,
+                "format_whitelist": READERS,
             },
             timeout=_LONGEST,
             metadata_errors="replace",
@@ -55,7 +55,7 @@ def opened(path: Path) -> InputContainer:
         raise InputError(f"{path}: {_what_is_wrong(path, error)}") from None
 
 
-def picture_stream(container: InputContainer, path: Path) -> VideoStream:
+def picture_stream(container: InputContainer, path: Path | str) -> VideoStream:
     """The stream of moving pictures: the one FFmpeg thinks best, but never a cover, nor the alpha.
 
     Animated AVIF holds alpha as grey pictures in a stream of its own, which may be thought best.

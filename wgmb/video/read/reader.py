@@ -8,9 +8,7 @@ as they are stored (color/coding.py), upright and without interlacing. Colours a
 
 from __future__ import annotations
 
-import contextlib
-import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import islice
@@ -20,7 +18,7 @@ from typing import cast
 import av
 import numpy as np
 from av.audio.stream import AudioStream
-from av.sidedata.sidedata import SideData, Type
+from av.sidedata.sidedata import Type
 from av.stream import Stream
 from av.video.reformatter import VideoReformatter
 from av.video.stream import VideoStream
@@ -28,7 +26,7 @@ from av.video.stream import VideoStream
 from ...color.coding import CodedPicture
 from ...errors import InputError
 from ...io import limits
-from ..hdr10 import LightLevel, Mastering, is_base_layer
+from ..hdr10 import is_base_layer
 from ..pixels import (
     THREADS,
     PlaneLayout,
@@ -42,6 +40,7 @@ from .container import opened, picture_stream
 from .decoder import Decoder, decoded
 from .deinterlace import Deinterlaced
 from .rotation import rotation_of
+from .side_data import SideData, light_level_of, mastering_of, side_data_of
 from .timeline import Times, scanned
 
 _OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
@@ -140,10 +139,9 @@ class VideoReader:
             raise InputError(f"{self.path}: pixels of kind {self.pixels} are not supported")
         self._layout: PlaneLayout = found
         self._frame_size = frame.width, frame.height
-        side = _side_data(frame)
+        side = side_data_of(frame)
         self._turn = rotation_of(side.get(Type.DISPLAYMATRIX), frame.rotation)
-        self.mastering = _read(Mastering, side.get(Type.MASTERING_DISPLAY_METADATA))
-        self.light_level = _read(LightLevel, side.get(Type.CONTENT_LIGHT_LEVEL))
+        self.mastering, self.light_level = mastering_of(side), light_level_of(side)
         tags = either(tags_of(frame), self._tagged)
         coding, self.assumed = assumed(found, self._frame_size, self.codec, tags)
         turned = coding.steps[::-1] if self._turn.swaps else coding.steps
@@ -158,7 +156,7 @@ class VideoReader:
         self._timeline = self._packets.doubled() if self.is_interlaced else self._packets
         self._note(side)
 
-    def _note(self, side: dict[Type, bytes]) -> None:
+    def _note(self, side: SideData) -> None:
         if self.assumed:
             self.notes.append(f"does not state its colours: {', '.join(self.assumed)} assumed")
         if self.is_interlaced:
@@ -338,20 +336,6 @@ class VideoReader:
             if number >= before:
                 yield from fields.of(self._fitted(frame, 2 * number, by), number)
         yield from fields.of(None)
-
-
-def _side_data(frame: av.VideoFrame) -> dict[Type, bytes]:
-    """Side data of a frame; nothing if PyAV does not know all their kinds."""
-    with contextlib.suppress(ValueError):
-        data = cast(Iterable[SideData], frame.side_data)
-        return {one.type: bytes(one) for one in data}  # pyright: ignore[reportArgumentType]
-    return {}
-
-
-def _read(kind: type, data: bytes | None):
-    """The side data as `kind`, if there is any."""
-    with contextlib.suppress(struct.error):
-        return kind.read(data) if data else None
 
 
 def _described(stream: Stream) -> OtherStream:

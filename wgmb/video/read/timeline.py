@@ -216,7 +216,7 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
         timeline,
         lacks=_lacking(container, stream, timeline, found.read),
         is_encrypted=found.is_encrypted,
-        stated=_known(stream.average_rate),
+        stated=known_rate(stream.average_rate),
         lasts=found.lasts * base if container.format.name in _HOLDS else Fraction(0),
     )
     if in_order:
@@ -226,7 +226,7 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
     )
 
 
-def _known(rate: Fraction | None) -> Fraction | None:
+def known_rate(rate: Fraction | None) -> Fraction | None:
     """The known rate that is meant, if any: files round the length of a picture."""
     near = (known for known in KNOWN_RATES if rate and abs(rate / known - 1) < _STATED)
     return next(near, None)

@@ -138,30 +138,10 @@ class VideoFile(NewFile):
         self._base, self._rate, self._given = base, rate, 0
         self._late_times = encoding.encoder.name == "libx265"
         try:
-            self._stream = self._begin(encoding, coding, size, facts)
+            self._stream = begin(self.container, encoding, coding, size, rate, base, facts)
         except (FFmpegError, OSError) as error:
             self.abandon()
             raise _why(path, encoding, error) from None
-
-    def _begin(
-        self, encoding: Encoding, coding: Coding, size: tuple[int, int], facts: Facts
-    ) -> VideoStream:
-        if encoding.codec == "av1":
-            os.environ.setdefault("SVT_LOG", "1")  # it writes pages to the terminal otherwise
-        options, name = encoding.options(coding, facts), encoding.encoder.name
-        stream = self.container.add_stream(name, rate=self._rate, options=options)
-        stream = cast(VideoStream, stream)
-        stream.width, stream.height = size
-        context = stream.codec_context
-        context.pix_fmt, context.time_base = encoding.pixels(coding), self._base
-        if facts.pixel_aspect != 1:
-            context.sample_aspect_ratio = facts.pixel_aspect
-        if encoding.codec != "gif":
-            tag(context, coding)
-        name_codec(stream, encoding)
-        with kept_scheduling():
-            context.open()
-        return stream
 
     def encode(self, frame: av.VideoFrame | None, tick: int = 0) -> None:
         """Write what can be written once `frame`, of the encoder's format, is there."""
@@ -186,6 +166,33 @@ class VideoFile(NewFile):
     def finish(self) -> None:
         """Write what the encoder still holds."""
         self.encode(None)
+
+
+def begin(
+    container: OutputContainer,
+    encoding: Encoding,
+    coding: Coding,
+    size: tuple[int, int],
+    rate: Fraction,
+    base: Fraction,
+    facts: Facts = NO_FACTS,
+) -> VideoStream:
+    """Add a stream of pictures to a container, and start its encoder."""
+    if encoding.codec == "av1":
+        os.environ.setdefault("SVT_LOG", "1")  # it writes pages to the terminal otherwise
+    options, name = encoding.options(coding, facts), encoding.encoder.name
+    stream = cast(VideoStream, container.add_stream(name, rate=rate, options=options))
+    stream.width, stream.height = size
+    context = stream.codec_context
+    context.pix_fmt, context.time_base = encoding.pixels(coding), base
+    if facts.pixel_aspect != 1:
+        context.sample_aspect_ratio = facts.pixel_aspect
+    if encoding.codec != "gif":
+        tag(context, coding)
+    name_codec(stream, encoding)
+    with kept_scheduling():
+        context.open()
+    return stream
 
 
 def name_codec(stream: VideoStream, encoding: Encoding) -> None:
