@@ -44,7 +44,7 @@ def dragged(viewer: Viewer, draw) -> np.ndarray:
 
 def measure(window: bool, scene: str, method: str, look: str = "result") -> float:
     """Prints the figures of one scene and method; the median of frames per second."""
-    state = State(source=scene, method=method, look=look, panel=False)
+    state = State(source=scene, look=look, panel=False).with_settings(method=method)
     if window:
         from rendercanvas.glfw import RenderCanvas
 

@@ -3,7 +3,7 @@
 A test file that names this module in `pytest_plugins` has its fixtures.
 """
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +13,27 @@ from wgmb import Blur, Render, observer
 from wgmb.color.srgb import srgb
 from wgmb.scene import builtin
 from wgmb.viewer import State, offscreen
-from wgmb.viewer.draw.blurs import shutter_of
+from wgmb.viewer.state.groups import GROUP_OF
 from wgmb.viewer.state.state import LOOKS
 from wgmb.viewer.window import frame
 
 SIZE = 512, 1010  # tall enough for the whole panel; the picture is 256 x 144
 BESIDE = 256, 144
 BARE, SMALL = (320, 180), (160, 90)  # of the picture alone, for what needs no panel
-PLAIN = State(method="tap", antialias=1, samples=4)
+
+
+def put(state, **changes):
+    """The state with other fields of its own, or options of its groups, by their names.
+
+    `look` and `speed`, which are both, are its own.
+    """
+    own = {f.name for f in fields(state)} - GROUP_OF.keys() | {"look", "speed"}
+    settings = {name: value for name, value in changes.items() if name not in own}
+    view = {name: value for name, value in changes.items() if name in own}
+    return replace(state.with_settings(**settings), **view)
+
+
+PLAIN = State().with_settings(method="tap", antialias=1, samples=4)
 ALONE = replace(PLAIN, panel=False)
 SAMPLE = str(Path(__file__).parents[2] / "sample" / "crossing.####.exr")
 
@@ -132,9 +145,9 @@ def small(bare):
 def library(state, size=SMALL):
     """A Render of what the state is set to, and when."""
     shows = {} if state.look in LOOKS else {"show": state.look}
-    blur = Blur(state.method, samples=state.samples, shutter=shutter_of(state), **shows)
-    scene = builtin.make(state.source, **dict(state.settings))
-    render = Render(scene, blur, size=size, antialias=state.antialias, fps=state.fps)
+    blur = Blur(state.method, samples=state.blur.samples, shutter=state.shutter.make(), **shows)
+    scene = builtin.make(state.source, **state.scene.parameters())
+    render = Render(scene, blur, size=size, antialias=state.scene.antialias, fps=state.fps)
     return render, (state.frame / state.fps, int(state.frame))
 
 

@@ -125,10 +125,10 @@ def rendering(scene: str, method: str, **options):
     return make
 
 
-def staging(**state):
+def staging(look="result", **settings):
     def make(device):
         stage, numbers = Renderer(device), iter(range(10**6))
-        shown = replace(State(antialias=1, samples=4), **state)
+        shown = State(look=look).with_settings(antialias=1, samples=4, **settings)
 
         def step():
             number = next(numbers)

@@ -94,7 +94,7 @@ def desk(tmp_path, monkeypatch):
     for name in ("truth", "vecblur"):
         make.write_exr(tmp_path / f"{name}.exr", make.frame(2))
     make_clips.write(tmp_path / "in.mp4", tone=0.1)
-    Path("wgmb.toml").write_text(State(samples=2, size=SMALL).toml())
+    Path("wgmb.toml").write_text(State().with_settings(samples=2, size=SMALL).toml())
     return tmp_path
 
 

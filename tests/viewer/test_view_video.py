@@ -2,7 +2,6 @@
 
 import os
 import time
-from dataclasses import replace
 from fractions import Fraction
 from itertools import count
 
@@ -11,6 +10,7 @@ import pytest
 
 import make_clips as clips
 import make_frames as make
+from viewer_hand import put
 from wgmb import (
     Blur,
     InputError,
@@ -34,7 +34,6 @@ from wgmb.video.linear_frames import VideoPictures
 from wgmb.video.output_times import OutputFrames
 from wgmb.video.read.reader import VideoReader
 from wgmb.viewer import State, controls, offscreen
-from wgmb.viewer.draw.blurs import shutter_of
 from wgmb.viewer.state.state import video_time
 from wgmb.viewer.subjects.video import VideoSubject
 from wgmb.viewer.subjects.video_motion import MotionRequest, PictureFinder, PictureFinding
@@ -102,9 +101,10 @@ def held(monkeypatch):
     return source
 
 
-def opened(clip, **changes):
-    state = replace(State().opened(str(clip)), panel=False, method="tap", samples=8)
-    return offscreen(replace(state, **changes).settled(), WINDOW)
+def opened(clip, output_speed="1", **changes):
+    state = put(State().opened(str(clip)), panel=False, method="tap", samples=8)
+    state = put(state.with_settings(speed=output_speed), **changes)
+    return offscreen(state.settled(), WINDOW)
 
 
 def settled(viewer):
@@ -162,23 +162,23 @@ FULL = pytest.mark.full
         pytest.param({"fps": 12.0, "shutter": 360.0, "frame": 2.0},
                      {"fps": 12, "degrees": 360}, marks=FULL),
         ({"fps": 12.0, "flow": "none", "frame": 1.0}, {"fps": 12}),
-        pytest.param({"pace": "0.5", "frame": 8.0},
+        pytest.param({"output_speed": "0.5", "frame": 8.0},
                      {}, marks=FULL),
-        ({"pace": "0.5", "frame": 9.0}, {}),
-        ({"pace": "0.4", "fps": 60.0, "frame": 13.0, "method": "gather"},
+        ({"output_speed": "0.5", "frame": 9.0}, {}),
+        ({"output_speed": "0.4", "fps": 60.0, "frame": 13.0, "method": "gather"},
          {"fps": 60, "method": "gather"}),
-        ({"pace": "0.4", "fps": 60.0, "frame": 34.0, "shutter": 360.0},
+        ({"output_speed": "0.4", "fps": 60.0, "frame": 34.0, "shutter": 360.0},
          {"fps": 60, "degrees": 360}),
-        pytest.param({"pace": "0.5", "frame": 11.0, "flow": "search", "flow_quality": "fast"},
-                     {}, marks=FULL),
-        ({"pace": "4", "frame": 1.0}, {}),
-        ({"video": (("begin", "0.05"), ("end", "0.2")), "frame": 3.0}, {}),
-        ({"frames": "3-9", "pace": "0.3", "frame": 0.0}, {"frames": "3-9"}),
-        pytest.param({"frames": "3-9", "pace": "0.3", "frame": 22.0},
+        pytest.param({"output_speed": "0.5", "frame": 11.0, "flow": "search",
+                      "flow_quality": "fast"}, {}, marks=FULL),
+        ({"output_speed": "4", "frame": 1.0}, {}),
+        ({"begin": "0.05", "end": "0.2", "frame": 3.0}, {}),
+        ({"frames": "3-9", "output_speed": "0.3", "frame": 0.0}, {"frames": "3-9"}),
+        pytest.param({"frames": "3-9", "output_speed": "0.3", "frame": 22.0},
                      {"frames": "3-9"}, marks=FULL),
-        ({"video": (("highlights", 8.0),), "frame": 4.0}, {}),
-        ({"given": (("cuts", "3,5"),), "shutter": 720.0}, {"cuts": "3,5", "degrees": 720}),
-        ({"given": (("cuts", "only:5"),), "frame": 9.0}, {"cuts": "only:5"}),
+        ({"highlights": 8.0, "frame": 4.0}, {}),
+        ({"cuts": "3,5", "shutter": 720.0}, {"cuts": "3,5", "degrees": 720}),
+        ({"cuts": "only:5", "frame": 9.0}, {"cuts": "only:5"}),
     ],
     ids=[
         "own rate",
@@ -204,16 +204,16 @@ FULL = pytest.mark.full
 def test_it_shows_what_the_command_line_makes(clip, changes, made):
     viewer = opened(clip, **{"flow": "dis", "frame": 4.0} | changes)
     state = viewer.state
-    want = command_line(clip, int(state.frame), video=video_time.settings_of(state), **made)
+    want = command_line(clip, int(state.frame), video=state.video, **made)
     np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
     viewer.stage.choices.close()
 
 
 def test_a_finding_that_comes_meanwhile_leaves_nothing_out(clip, monkeypatch):
     """The thread may add findings while the exposure is worked out."""
-    viewer = opened(clip, flow="dis", frame=9.0, pace="0.5", shutter=720.0)
+    viewer = opened(clip, flow="dis", frame=9.0, output_speed="0.5", shutter=720.0)
     settled(viewer)
-    subject, shutter = viewer.stage.choices.subject(viewer.state), shutter_of(viewer.state)
+    subject, shutter = viewer.stage.choices.subject(viewer.state), viewer.state.shutter.make()
     known = subject._maker.known
     whole = subject.stamp([viewer.state], shutter, False)
     assert not subject.busy
@@ -236,18 +236,18 @@ TIMES = [Fraction(n, 48) for n in (0, 1, 2, 4, 5, 7, 8, 9, 12, 13, 14, 16, 17, 1
 def test_variable_rates_and_repeats_are_as_by_the_command_line(tmp_path, speed, own_times, fill):
     clip = passing(tmp_path / "a.mp4", repeats=(4, 5, 8), times=TIMES)
     viewer = opened(
-        clip, flow="dis", pace=speed, own_times=own_times, video=(("duplicates", fill),),
+        clip, flow="dis", output_speed=speed, own_times=own_times, duplicates=fill,
         method="gather", shutter=300.0,
     )  # fmt: skip
     fps = None if own_times else video_time.rate(viewer.state)
-    settings = video_time.settings_of(viewer.state)
+    settings = viewer.state.video
     assert settings.duplicates == fill
     count = len(video_time.output(viewer.state).moments)
     assert own_times == (count == 14)
     for number in (count - 1, 5, 4, 8, 0):
         made = {"fps": fps, "method": "gather", "degrees": 300}
         want = command_line(clip, number, video=settings, **made)
-        viewer.state = replace(viewer.state, frame=float(number))
+        viewer.state = put(viewer.state, frame=float(number))
         np.testing.assert_allclose(settled(viewer), want, atol=2e-5)
     viewer.stage.choices.close()
 
@@ -257,8 +257,7 @@ def test_what_is_held_out_stays_sharp_as_by_the_command_line(clip, tmp_path):
     mask = np.zeros((SIZE[1], SIZE[0], 3), np.float32)
     mask[:, : SIZE[0] // 4] = 1
     matte.write_bytes(stills.encode(mask, ".png", 8, ""))
-    given = (("holdout", (str(matte), "static")),)
-    viewer = opened(clip, flow="dis", frame=4.0, given=given)
+    viewer = opened(clip, flow="dis", frame=4.0, holdout=(str(matte), "static"))
     got = settled(viewer)
     want = command_line(clip, 4, masks=(str(matte), "static"))
     np.testing.assert_allclose(got, want, atol=2e-5)
@@ -276,16 +275,16 @@ def test_a_holdout_that_cannot_be_is_refused(clip, tmp_path, monkeypatch, mask, 
     small = stills.encode(np.ones((8, 8, 3), np.float32), ".png", 8, "")
     (tmp_path / "small.png").write_bytes(small)
     with pytest.raises(InputError, match=said):
-        frame(opened(clip, given=(("holdout", (mask,)),)))
+        frame(opened(clip, holdout=(mask,)))
 
 
 def test_the_speed_of_the_output_is_saved_and_played(clip):
-    state = replace(State().opened(str(clip)), pace="0.5", speed=2.0)
+    state = put(State().opened(str(clip)).with_settings(speed="0.5"), speed=2.0)
     words = state.command("b.mp4")
     assert words[words.index("--speed") + 1] == "0.5"
     assert State.of_toml(state.toml()) == state
-    assert controls.played(replace(state, speed=1.0), 0.125).frame == pytest.approx(6)
-    assert "--speed" not in replace(state, pace="1").command("b.mp4")
+    assert controls.played(put(state, speed=1.0), 0.125).frame == pytest.approx(6)
+    assert "--speed" not in state.with_settings(speed="1").command("b.mp4")
     with pytest.raises(InputError, match=r"`speed` must be 0\.01 to 100"):
         State.of_toml(state.toml().replace('speed = "0.5"', 'speed = "0"'))
 
@@ -339,13 +338,13 @@ def test_motion_is_made_once_whatever_changes(clip, held):
         {"method": "reproject"},
         {"look": "velocity"},
     ):
-        viewer.state = replace(viewer.state, **change)
+        viewer.state = put(viewer.state, **change)
         settled(viewer)
-    viewer.state = replace(viewer.state, frame=2.0)
+    viewer.state = put(viewer.state, frame=2.0)
     settled(viewer)
     assert sorted(held.made) == sorted(set(held.made)) and {2, 5} <= set(held.made)
     before = len(held.made)
-    viewer.state = replace(viewer.state, frame=5.0, shutter=180.0, samples=8, method="tap",
+    viewer.state = put(viewer.state, frame=5.0, shutter=180.0, samples=8, method="tap",
                            look="result")  # fmt: skip
     np.testing.assert_array_equal(settled(viewer), first)
     assert len(held.made) == before
@@ -357,15 +356,15 @@ def test_it_plays_at_its_own_rate_and_steps_from_picture_to_picture(clip):
     assert (state.frames, state.frame, state.fps) == ("0-13", 0.0, 48.0)
     assert controls.stepped(state, 1).frame == 1
     assert controls.played(state, 0.125).frame == pytest.approx(6)
-    assert controls.played(replace(state, fps=12.0), 0.125).frame == pytest.approx(1.5)
+    assert controls.played(put(state, fps=12.0), 0.125).frame == pytest.approx(1.5)
 
 
 def test_what_it_is_set_to_is_what_the_command_line_is_told(clip):
-    state = replace(State().opened(str(clip)), flow="dis", frames="2-5").settled()
+    state = put(State().opened(str(clip)), flow="dis", frames="2-5").settled()
     words = state.command("b.mp4")
     assert words[:4] == ["blur", str(clip), "-o", "b.mp4"] and "--fps" not in words
     assert words[words.index("--flow") + 1] == "dis" and words[words.index("--frames") + 1] == "2-5"
-    assert "--fps" in replace(state, fps=24.0).command("b.mp4")
+    assert "--fps" in put(state, fps=24.0).command("b.mp4")
     assert State.of_toml(state.toml()) == state
     with pytest.raises(InputError, match="flow cannot be 'dise'"):
         State.of_toml(state.toml().replace('"dis"', '"dise"'))
@@ -373,7 +372,7 @@ def test_what_it_is_set_to_is_what_the_command_line_is_told(clip):
 
 def test_options_of_rendered_frames_are_refused(clip):
     with pytest.raises(InputError, match="--layer is for rendered frames"):
-        frame(opened(clip, given=(("layer", "beauty"),)))
+        frame(opened(clip, layer="beauty"))
 
 
 def test_pictures_are_found_in_any_order(clip):
@@ -425,7 +424,7 @@ def test_hdr_is_shown_in_the_colours_of_the_display(tmp_path, transfer):
     [
         ({"shutter": 0.0, "flow": "none", "own_times": True}, 13.0),
         ({"shutter": 0.0, "flow": "none", "own_times": True}, 6.0),
-        ({"flow": "dis", "pace": "0.5", "fps": 24.0}, 11.0),
+        ({"flow": "dis", "output_speed": "0.5", "fps": 24.0}, 11.0),
     ],
     ids=["as wgmb perceive", "near the beginning", "of slow motion"],
 )
@@ -438,8 +437,8 @@ def test_a_video_is_perceived_by_output_frames_held_until_the_next(tmp_path, cha
         fps = video_time.rate(state)
     observer = Observer(100, state.eye, device=viewer.stage.device)
     for number in range(int(frame_shown) + 1):
-        settings = video_time.settings_of(state)
-        made = {"fps": fps, "video": settings, "degrees": state.shutter}
+        settings = state.video
+        made = {"fps": fps, "video": settings, "degrees": state.shutter.shutter}
         observer.present(command_line(clip, number, **made), video_time.held_for(state, number))
     assert len(moments) > frame_shown
     got = settled(viewer)
@@ -471,7 +470,7 @@ def test_a_file_that_vanishes_while_it_plays_is_said_and_the_picture_stays(tmp_p
     assert isinstance(subject, VideoSubject)
     subject._frames._colors.clear()  # as if there had been many more
     for frame_wanted in (12.0, 0.0, 13.0):
-        viewer.state = replace(viewer.state, frame=frame_wanted, playing=True)
+        viewer.state = put(viewer.state, frame=frame_wanted, playing=True)
         for _ in range(3):
             frame(viewer)
     assert str(clip) in viewer.message[0] or "sharp: " in viewer.stage.report.waiting

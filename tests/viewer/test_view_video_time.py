@@ -1,12 +1,12 @@
 """The time of videos in the viewer: from state to state, without a window."""
 
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import make_clips as clips
+from viewer_hand import put
 from wgmb import InputError, Shutter
 from wgmb.cli.app import main
 from wgmb.cone import Cone
@@ -49,7 +49,7 @@ def state(clip):
 
 def test_slow_motion_has_more_output_frames_and_stays_where_it_is(state):
     assert state.span == (0, 23)
-    at = replace(state, frame=10.0)
+    at = put(state, frame=10.0)
     slow = at_pace(at, "0.4")
     assert slow.span == (0, 59) and slow.frame == 25
     assert at_pace(slow, "1") == at
@@ -62,16 +62,16 @@ def test_slow_motion_has_more_output_frames_and_stays_where_it_is(state):
 
 
 def test_a_part_begins_with_its_own_first_output_frame(state):
-    part = in_part(in_part(replace(state, frame=12.0), "begin", "0.25"), "end", "0.75")
+    part = in_part(in_part(put(state, frame=12.0), "begin", "0.25"), "end", "0.75")
     assert part.span == (0, 11) and part.frame == 6
     assert video_time.output(part).clock.back(video_time.moment(part).time) == Fraction(1, 2)
-    assert in_part(in_part(part, "end", ""), "begin", "") == replace(state, frame=12.0)
+    assert in_part(in_part(part, "end", ""), "begin", "") == put(state, frame=12.0)
     words = part.command("b.mp4")
     assert "--frames" not in words and words[words.index("--begin") + 1] == "0.25"
     assert State.of_toml(part.toml()) == part
     with pytest.raises(InputError, match="no pictures in this range"):
         in_part(state, "begin", "7")
-    frames = video_time.in_frames(replace(state, frame=12.0), "6-17")
+    frames = video_time.in_frames(put(state, frame=12.0), "6-17")
     assert frames.span == (0, 11) and frames.frame == 6
     with pytest.raises(InputError, match="0 to 23"):
         video_time.in_frames(state, "6-30")
@@ -84,25 +84,25 @@ def test_at_its_own_times_it_plays_as_unevenly_as_it_is(uneven):
     assert state.own_times and state.span == (0, 9)
     assert State.of_toml(state.toml()) == state and state.arguments()["fps"] == "source"
     for frame, seconds, want in [(0, 1 / 48, 1), (2, 2 / 48, 2.5), (0, 6 / 48, 3), (9, 0, 9)]:
-        assert video_time.passed(replace(state, frame=float(frame)), seconds) == pytest.approx(want)
+        assert video_time.passed(put(state, frame=float(frame)), seconds) == pytest.approx(want)
     moments = video_time.output(state).moments
     found = [moments.nearest(moments[n].time + d) for n in range(10) for d in (0, Fraction(1, 99))]
     assert found[::2] == list(range(10)) and set(found) <= set(range(10))
-    even = video_time.at_rate(replace(state, frame=4.0), "48")
+    even = video_time.at_rate(put(state, frame=4.0), "48")
     assert not even.own_times and even.frame == 7
 
 
 def test_playing_begins_anew_after_the_last_output_frame(state):
-    slow = replace(at_pace(state, "0.5"), frame=47.0)
+    slow = put(at_pace(state, "0.5"), frame=47.0)
     assert controls.played(slow, 1 / 24).frame == pytest.approx(0)
     assert controls.stepped(slow, 1).frame == 0 and controls.stepped(slow, -1).frame == 46
     layout = controls.WindowLayout((0, 0, 9, 9), (0, 0, 9, 9))
     assert controls.key(slow, layout, "Home")[0].frame == 0
-    assert controls.key(replace(slow, frame=3.0), layout, "End")[0].frame == 47
+    assert controls.key(put(slow, frame=3.0), layout, "End")[0].frame == 47
 
 
 def test_the_panel_says_which_output_frame_it_is_and_what_it_is_made_of(state):
-    slow = replace(at_pace(state, "0.5"), frame=9.0)
+    slow = put(at_pace(state, "0.5"), frame=9.0)
     assert made_of(slow, (4, 5)) == "output frame 9, 0.375 s: pictures 4 - 5"
     assert made_of(slow, (4,)) == "output frame 9, 0.375 s: picture 4"
 
@@ -121,10 +121,10 @@ def test_moments_are_all_there_and_ascend(uneven, fps, part):
 
 
 def test_frames_that_are_perceived_begin_with_the_first_one(state):
-    seen = seen_frames(replace(state, look="perceived", frame=20.0))
+    seen = seen_frames(put(state, look="perceived", frame=20.0))
     assert [one.frame for one in seen][:3] == [20, 19, 18]
     assert len(seen) / 24 > Cone().memory
-    assert [one.frame for one in seen_frames(replace(state, look="perceived", frame=2.0))] == [
+    assert [one.frame for one in seen_frames(put(state, look="perceived", frame=2.0))] == [
         2, 1, 0,
     ]  # fmt: skip
 

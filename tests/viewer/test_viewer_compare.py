@@ -1,11 +1,9 @@
 """Two pictures compared in the viewer, and the error to the reference."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from viewer_hand import ALONE, SMALL
+from viewer_hand import ALONE, SMALL, put
 from wgmb import Blur, Render
 from wgmb.color.srgb import srgb
 from wgmb.scene import builtin
@@ -20,25 +18,25 @@ def pictures(bare):
     """The result, and the sharp picture."""
     bare.viewer.state = ALONE
     first = bare.picture()
-    bare.viewer.state = replace(ALONE, look="sharp")
+    bare.viewer.state = put(ALONE, look="sharp")
     return first, bare.picture()
 
 
 def test_wipe_shows_either_side_and_its_line_is_dragged(bare):
     first, second = pictures(bare)
-    bare.viewer.state = replace(ALONE, compare="wipe", against="sharp", wipe=0.5)
+    bare.viewer.state = put(ALONE, compare="wipe", against="sharp", wipe=0.5)
     shown = bare.picture()
     assert np.array_equal(shown[:, :158], first[:, :158])
     assert np.array_equal(shown[:, 162:], second[:, 162:])
     bare.drag((160, 85), (80, 125))
     assert bare.state.wipe == pytest.approx(0.25)
-    assert bare.state.orbit == (0, 0)
+    assert bare.state.scene.orbit == (0, 0)
     shown = bare.picture()
     assert np.array_equal(shown[:, 82:], second[:, 82:])
 
 
 def test_split_shows_both_whole(bare):
-    bare.viewer.state = replace(ALONE, compare="split", against=ALONE.method)
+    bare.viewer.state = put(ALONE, compare="split", against=ALONE.method)
     bare.picture()
     whole = bare.look()
     left, right = whole[45:135, 5:155], whole[45:135, 165:315]
@@ -47,16 +45,16 @@ def test_split_shows_both_whole(bare):
 
 
 def test_difference_of_the_same_is_black_and_of_others_is_not(bare):
-    bare.viewer.state = replace(ALONE, compare="difference", against=ALONE.method)
+    bare.viewer.state = put(ALONE, compare="difference", against=ALONE.method)
     assert bare.picture().max() == 0
-    bare.viewer.state = replace(ALONE, compare="difference", against="sharp", gain=2.0)
+    bare.viewer.state = put(ALONE, compare="difference", against="sharp", gain=2.0)
     got, (first, second) = bare.picture(), pictures(bare)
     assert np.abs(got - np.clip(2 * np.abs(first - second), 0, 1)).max() < 5e-3
 
 
 def test_flicker_changes_with_the_clock(bare):
     first, second = pictures(bare)
-    bare.viewer.state = replace(ALONE, compare="flicker", against="sharp")
+    bare.viewer.state = put(ALONE, compare="flicker", against="sharp")
     bare.picture()
     seen = []
     for _ in range(4):
@@ -69,7 +67,7 @@ def test_flicker_changes_with_the_clock(bare):
 def test_the_error_is_shown_however_others_are_compared(bare):
     shown = []
     for compare in ("off", "wipe", "split", "difference", "flicker"):
-        bare.viewer.state = replace(ALONE, look="error", compare=compare)
+        bare.viewer.state = put(ALONE, look="error", compare=compare)
         bare.look(1.0)
         for _ in range(2):
             bare.look(0.5)
@@ -83,7 +81,7 @@ def test_the_error_is_shown_however_others_are_compared(bare):
 def test_the_reference_converges_and_is_measured(small, monkeypatch):
     monkeypatch.setattr(renderer, "_STEP", 0.0)  # a sample a frame, however fast the machine is
     at = 7 / 24  # a moment that no other test has measured
-    small.viewer.state = replace(ALONE, look="error", gain=1.0, frame=7.0)
+    small.viewer.state = put(ALONE, look="error", gain=1.0, frame=7.0)
     rays = []
     for _ in range(600):
         small.look(0.4)
@@ -100,14 +98,14 @@ def test_the_reference_converges_and_is_measured(small, monkeypatch):
     if found.flip:
         assert 0 < found.flip.result(60) < 1
     small.submit("pointer_move", x=10, y=10, button=0, buttons=())
-    small.viewer.state = replace(small.state, frame=1.0)
+    small.viewer.state = put(small.state, frame=1.0)
     small.look()
     assert small.viewer.stage.report.reference[0] < rays[-1]  # begun anew
 
 
 def test_what_is_shown_never_has_less_in_it_than_before(small, monkeypatch):
     monkeypatch.setattr(renderer, "_STEP", 0.0)  # a few samples at a time
-    small.viewer.state = replace(ALONE, method="accumulate", samples=32)
+    small.viewer.state = put(ALONE, method="accumulate", samples=32)
     want, shown = small.picture(), small.viewer.stage._shown
     small.submit("pointer_down", x=50, y=40, button=1, buttons=(1,))
     for _ in range(3):

@@ -1,17 +1,15 @@
 """The mouse, the keys and the panel of the viewer."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from viewer_hand import ALONE, BESIDE, PLAIN, Hand
+from viewer_hand import ALONE, BESIDE, PLAIN, Hand, put
 from wgmb import Blur, Render
 from wgmb.color.srgb import srgb
 from wgmb.methods import METHODS
 from wgmb.scene import builtin
 from wgmb.viewer import State, actions, controls
-from wgmb.viewer.draw.blurs import shutter_of
+from wgmb.viewer.state.groups import GROUP_OF
 
 pytest_plugins = ["viewer_hand"]
 
@@ -19,60 +17,64 @@ pytest_plugins = ["viewer_hand"]
 def test_left_drag_orbits_and_r_puts_it_back(bare):
     before = bare.picture()
     bare.drag((100, 85), (180, 105))
-    aside, up = bare.state.orbit
+    aside, up = bare.state.scene.orbit
     assert aside == pytest.approx(-80 / 320 * np.degrees(4.0))
     assert up == pytest.approx(20 / 180 * np.degrees(4.0))
     assert np.abs(bare.picture() - before).mean() > 0.02
     bare.press("r")
-    assert bare.state.orbit == (0, 0)
+    assert bare.state.scene.orbit == (0, 0)
     assert np.array_equal(bare.picture(), before)
 
 
 @pytest.mark.parametrize("button, modifiers", [(2, ()), (1, ("Shift",))])
 def test_right_or_shift_drag_moves_the_picture_with_the_hand(bare, button, modifiers):
     bare.drag((100, 85), (132, 85), button, modifiers)
-    assert bare.state.orbit == (0, 0)
-    assert bare.state.pan == pytest.approx((-32 / 180 * 6.25, 0))
+    assert bare.state.scene.orbit == (0, 0)
+    assert bare.state.scene.pan == pytest.approx((-32 / 180 * 6.25, 0))
 
 
 def test_wheel_comes_nearer_and_is_continuous(bare):
     bare.submit("wheel", x=100, y=85, dx=0, dy=-100, buttons=())
     bare.look()
-    whole = bare.state.dolly
+    whole = bare.state.scene.dolly
     bare.viewer.state = ALONE
     for _ in range(10):
         bare.submit("wheel", x=100, y=85, dx=0, dy=-10, buttons=())
         bare.look()
     assert whole < 1
-    assert bare.state.dolly == pytest.approx(whole)
+    assert bare.state.scene.dolly == pytest.approx(whole)
 
 
 def test_elevation_and_distance_are_held(hand):
     layout = controls.WindowLayout((0, 0, 320, 1010), (0, 400, 320, 180))
     up = controls.drag(PLAIN, layout, "orbit", 0, 5000)
     down = controls.drag(PLAIN, layout, "orbit", 0, -5000)
-    assert (down.orbit[1], up.orbit[1]) == controls.ELEVATION
+    assert (down.scene.orbit[1], up.scene.orbit[1]) == controls.ELEVATION
     far = controls.wheel(PLAIN, layout, 5, 5, 0, 1e5)
-    assert far.dolly == 10
+    assert far.scene.dolly == 10
     assert controls.wheel(PLAIN, layout, 500, 5, 0, 100) == PLAIN  # not over the picture
 
 
 def test_the_torusphere_asks_for_its_method_and_shutter_and_is_turned(hand):
-    hand.viewer.state = replace(PLAIN, method=State().method)
+    hand.viewer.state = put(PLAIN, method=State().method)
     hand.choose("scene", "torusphere")
-    assert (hand.state.method, hand.state.curve) == ("volume", "cosine")
+    assert (hand.state.method, hand.state.shutter.curve) == ("volume", "cosine")
     before = hand.picture()
     want = Render(builtin.make("torusphere"), Blur(**blur_of(hand.state)), size=BESIDE)(0.0)
     assert np.abs(before - srgb(want[..., :3])).max() < 2e-3
     hand.drag((80, 500), (144, 500))
-    assert dict(hand.state.settings)["cam_x"] == pytest.approx(-1.0)
+    assert float(hand.state.scene.parameters()["cam_x"]) == pytest.approx(-1.0)
     assert np.abs(hand.picture() - before).mean() > 0.005
     hand.choose("scene", "crossing")
-    assert (hand.state.method, hand.state.shutter, hand.state.curve) == ("gather", 180, "box")
+    assert (hand.state.method, *angle(hand.state)) == ("gather", 180, "box")
+
+
+def angle(state):
+    return state.shutter.shutter, state.shutter.curve
 
 
 def blur_of(state):
-    return {"method": state.method, "shutter": shutter_of(state), "samples": state.samples}
+    return {"method": state.method, "shutter": state.shutter.make(), "samples": state.blur.samples}
 
 
 def test_a_scene_with_a_camera_of_its_own_is_turned_by_it(monkeypatch):
@@ -82,11 +84,11 @@ def test_a_scene_with_a_camera_of_its_own_is_turned_by_it(monkeypatch):
     monkeypatch.setitem(builtin.SCENES, "own", own)
     state, layout = State(source="own"), controls.WindowLayout((0, 0, 400, 200), (0, 0, 400, 200))
     moved = controls.drag(state, layout, "orbit", 100, 20)
-    assert dict(moved.settings) == pytest.approx({"cam_x": -1.0, "cam_y": 0.4})
-    assert moved.orbit == (0, 0)
+    assert moved.scene.set == ("cam_x=-1", "cam_y=0.4")
+    assert moved.scene.orbit == (0, 0)
     held = controls.drag(moved, layout, "orbit", 0, -1000)
-    assert dict(held.settings)["cam_y"] == -1.0
-    assert controls.key(held, layout, "r")[0].settings == ()
+    assert held.scene.parameters()["cam_y"] == "-1"
+    assert controls.key(held, layout, "r")[0].scene.set == ()
 
 
 def test_keys(hand):
@@ -132,7 +134,7 @@ def test_every_key_of_the_help_does_something():
                              ("off", "wipe"), ("left", "pair"))  # fmt: skip
     names = {"space": " ", "left, right": "ArrowLeft", "home, end": "End", "up, down": "ArrowUp",
              "1 - 9": "2", "Esc": "Escape", "r": "R"}  # fmt: skip
-    moved = replace(PLAIN, orbit=(5.0, 5.0))
+    moved = put(PLAIN, orbit=(5.0, 5.0))
     for name in controls.KEYS:
         state, action = controls.key(moved, layout, names.get(name, name))
         assert state != moved or action, name
@@ -146,7 +148,7 @@ def test_escape_closes(hand):
 
 
 def test_playing_goes_on_with_the_clock(hand):
-    hand.viewer.state = replace(PLAIN, playing=True, speed=0.5)
+    hand.viewer.state = put(PLAIN, playing=True, speed=0.5)
     hand.look(0.0)
     hand.look(0.25)
     assert hand.state.frame == pytest.approx(0.25 * 24 * 0.5)
@@ -160,18 +162,23 @@ def test_playing_goes_on_with_the_clock(hand):
 SLIDERS = ("frame", "samples", "jitter", "shutter", "exposure", "fps", "speed")
 
 
+def now(state, name):
+    own = name == "speed" or name not in GROUP_OF  # of the playing, not of the output
+    return getattr(state, name) if own else state.setting(name)
+
+
 @pytest.mark.parametrize("name", SLIDERS)
 def test_a_slider_sets_its_value_and_never_moves_the_camera(hand, name):
-    before = getattr(hand.state, name)
+    before = now(hand.state, name)
     x, y, width, height = hand.viewer.panel.places[name]
     hand.touch(name, 0.15)
-    low = getattr(hand.state, name)
+    low = now(hand.state, name)
     hand.drag((x + 0.15 * width, y + height / 2), (x - 150, y - 80))  # off, over the picture
     hand.touch(name, 0.9)
-    high = getattr(hand.state, name)
+    high = now(hand.state, name)
     assert low < high
     assert before in (low, high) or low != before
-    assert (hand.state.orbit, hand.state.pan, hand.state.dolly) == ((0, 0), (0, 0), 1)
+    assert hand.state.scene == PLAIN.scene
 
 
 def test_shutter_phase_curve_rolling_and_longest(hand):
@@ -179,30 +186,30 @@ def test_shutter_phase_curve_rolling_and_longest(hand):
     hand.choose("curve", "gaussian")
     hand.choose("rolling", "down")
     hand.touch("limited")
-    state = hand.state
-    assert (state.phase, state.curve, state.rolling) == ("end", "gaussian", "down")
-    assert state.max_blur == 40
+    when = hand.state.shutter
+    assert (when.phase, when.curve, when.rolling) == ("end", "gaussian", "down")
+    assert hand.state.blur.max_blur == 40
     hand.touch("max_blur", 0.9)
-    assert hand.state.max_blur > 100
+    assert hand.state.blur.max_blur > 100
     hand.touch("rolling_duration", 0.9)
-    assert hand.state.rolling_duration > 1.5
+    assert hand.state.shutter.rolling_duration > 1.5
     hand.choose("phase", "at")
     hand.touch("phase at", 0.9)
-    assert float(hand.state.phase) > 0.5
+    assert float(hand.state.shutter.phase) > 0.5
 
 
 def test_options_of_the_method(hand):
     hand.choose("path", "straight")
-    assert dict(hand.state.options) == {"path": "straight"}
+    assert hand.state.setting("path") == "straight"
     hand.choose("path", "curved")
-    assert hand.state.options == ()
+    assert hand.state.setting("path") is None
 
 
 def test_a_parameter_of_the_scene(hand):
     before = hand.picture()
     x, y, _, _ = hand.viewer.panel.places["set speed"]
     hand.drag((x + 20, y + 8), (x + 120, y + 8))
-    assert dict(hand.state.settings)["speed"] > 1.2
+    assert float(hand.state.scene.parameters()["speed"]) > 1.2
     assert np.abs(hand.picture() - before).mean() > 1e-3
 
 
@@ -217,19 +224,19 @@ def test_the_panel_changes_nothing_by_itself(hand, name):
     opened = PLAIN.opened(name)
     for method in hand.viewer.stage.choices.methods(opened):
         odd = {"fastest": 0.0431, "max_blur": 33.3, "phase": "0.123", "shutter": 123.4}
-        state = hand.viewer.stage.choices.possible(replace(opened, method=method, **odd))
+        state = hand.viewer.stage.choices.possible(put(opened, method=method, **odd))
         hand.viewer.state = state
         hand.look()
         assert hand.state == state
         if "velocity" in hand.viewer.stage.choices.looks(state):
-            hand.viewer.state = replace(state, look="velocity")
+            hand.viewer.state = put(state, look="velocity")
             hand.look()
-            assert hand.state == replace(state, look="velocity")
+            assert hand.state == put(state, look="velocity")
 
 
 def test_a_value_that_is_refused_is_said_and_undone(hand):
     before = hand.state
-    hand.viewer.state = replace(PLAIN, source="fence", settings=(("posts", 900),))
+    hand.viewer.state = put(PLAIN, source="fence", set=("posts=900",))
     hand.look()
     assert hand.state == before
     assert "posts" in hand.viewer.message[0]

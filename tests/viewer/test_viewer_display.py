@@ -1,22 +1,22 @@
 """The viewer shows what OpenColorIO's processor makes, and keeps it while nothing changes."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import make_frames as make
 from make_config import film_config
-from viewer_hand import ALONE, BARE, PLAIN, SIZE, Hand
+from viewer_hand import ALONE, BARE, PLAIN, SIZE, Hand, put
 from wgmb import DeviceError, InputError
 from wgmb.cli import app
 from wgmb.color.primaries import AP1, REC709
 from wgmb.color.spaces import ColorConfig
 from wgmb.gpu.textures import TexturePool
 from wgmb.io import exr
+from wgmb.settings.color import ColorSettings
 from wgmb.viewer import State
 from wgmb.viewer.draw import display as displayed
 from wgmb.viewer.draw.ocio_shader import OUTPUT, OcioShader
+from wgmb.viewer.state.groups import changed
 
 ACES13 = "ocio://cg-config-v1.0.0_aces-v1.3_ocio-v2.1"
 NEARLY_ALL = 0.9999  # of the pixels are within 1/255
@@ -56,6 +56,11 @@ def shown_by(hand) -> np.ndarray:
     return hand.viewer.screen.picture()
 
 
+def chosen(state) -> dict:
+    """The options of colour that are not as by default."""
+    return changed("color", state.color)
+
+
 def wanted(hand, space=None) -> np.ndarray:
     """The processor's result for the light in the viewer."""
     display = hand.viewer.stage.choices.displayed.display(hand.state)
@@ -72,13 +77,13 @@ def cannot(*_) -> None:
 def test_a_scene_is_shown_as_the_view_shows_it(tmp_path, monkeypatch, gpu_can):
     if not gpu_can:
         monkeypatch.setattr(displayed, "OcioShader", cannot)
-    state = ALONE.with_color(ocio=str(film_config(tmp_path)))
-    hand = Hand(replace(state, exposure=1.0), BARE)
+    state = ALONE.with_settings(ocio=str(film_config(tmp_path)))
+    hand = Hand(put(state, exposure=1.0), BARE)
     hand.look_until(lambda: not hand.viewer.stage.report.busy)
     want = wanted(hand)
     off = np.abs(shown_by(hand) - want).max(axis=2)
     assert (off <= 1 / 255).mean() >= NEARLY_ALL
-    hand.viewer.state = replace(hand.state, color=())
+    hand.viewer.state = put(hand.state, color=ColorSettings())
     hand.look()
     assert np.abs(shown_by(hand) - want).mean() > 0.05
 
@@ -89,41 +94,41 @@ def test_what_does_not_change_is_not_shown_anew(tmp_path, monkeypatch):
     monkeypatch.setattr(
         displayed.DisplayCache, "_draw", lambda *given: (drawn.append(1), draw(*given))
     )
-    hand = Hand(ALONE.with_color(ocio=str(film_config(tmp_path))), BARE)
+    hand = Hand(ALONE.with_settings(ocio=str(film_config(tmp_path))), BARE)
     hand.look_until(lambda: not hand.viewer.stage.report.busy)
     count = len(drawn)
     for _ in range(3):
         hand.look()
     assert len(drawn) == count > 0
-    hand.viewer.state = replace(hand.state, exposure=0.5)
+    hand.viewer.state = put(hand.state, exposure=0.5)
     hand.look()
     assert len(drawn) == count + 1
 
 
 def test_the_panel_chooses_config_display_view_and_look(tmp_path):
     config = film_config(tmp_path)
-    hand = Hand(PLAIN.with_color(ocio=str(config)), SIZE)
+    hand = Hand(PLAIN.with_settings(ocio=str(config)), SIZE)
     before = shown_by(hand)
     hand.choose("view", "Log")
-    assert dict(hand.state.color) == {"ocio": str(config), "view_transform": "Log"}
+    assert chosen(hand.state) == {"ocio": str(config), "view_transform": "Log"}
     assert np.abs(shown_by(hand) - before).mean() > 0.02
     hand.choose("look", "Punchy")
-    assert dict(hand.state.color)["look"] == "Punchy"
+    assert chosen(hand.state)["look"] == "Punchy"
     hand.choose("ocio", "builtin")
-    assert dict(hand.state.color) == {"ocio": "builtin"}
+    assert chosen(hand.state) == {"ocio": "builtin"}
     hand.choose("display", "Display P3 - Display")
-    assert dict(hand.state.color)["display"] == "Display P3 - Display"
+    assert chosen(hand.state)["display"] == "Display P3 - Display"
     hand.choose("ocio", "off")
-    assert dict(hand.state.color) == {"ocio": "off"}
+    assert chosen(hand.state) == {"ocio": "off"}
     assert "tone" in hand.viewer.panel.places
 
 
 def test_a_view_that_is_gone_is_a_message(tmp_path):
-    hand = Hand(ALONE.with_color(ocio=str(film_config(tmp_path))), BARE)
-    hand.viewer.state = hand.state.with_color(view_transform="Agfa")
+    hand = Hand(ALONE.with_settings(ocio=str(film_config(tmp_path))), BARE)
+    hand.viewer.state = hand.state.with_settings(view_transform="Agfa")
     hand.look()
     assert "unknown view 'Agfa'" in hand.viewer.message[0]
-    assert dict(hand.state.color).keys() == {"ocio"}
+    assert chosen(hand.state).keys() == {"ocio"}
 
 
 def shot(folder, attributes=None) -> str:
@@ -138,7 +143,7 @@ def test_frames_are_shown_by_what_they_say_of_their_colours(tmp_path):
     for folder, attributes in (("said", {"chromaticities": AP1}), ("silent", {})):
         (tmp_path / folder).mkdir()
         state = ALONE.opened(shot(tmp_path / folder, attributes))
-        hand = Hand(replace(state, method="tap").with_color(ocio=str(config)), (64, 48))
+        hand = Hand(put(state, method="tap").with_settings(ocio=str(config)), (64, 48))
         hand.look_until(lambda hand=hand: not hand.viewer.stage.report.busy)
         found = hand.viewer.stage.choices.displayed.display(hand.state).config
         space = found.space_of(attributes)
@@ -150,8 +155,8 @@ def test_frames_are_shown_by_what_they_say_of_their_colours(tmp_path):
 
 def test_frames_that_are_not_linear_are_made_so(tmp_path):
     config = film_config(tmp_path)
-    state = replace(ALONE.opened(shot(tmp_path)), method="tap", look="sharp")
-    hand = Hand(state.with_color(ocio=str(config), from_="log"), (64, 48))
+    state = put(ALONE.opened(shot(tmp_path)), method="tap", look="sharp")
+    hand = Hand(state.with_settings(ocio=str(config), from_="log"), (64, 48))
     codes = exr.read(tmp_path / "a.0001.exr").channels()
     want = ColorConfig(config).space("log").linear(np.stack([codes[c] for c in "RGB"], axis=2))
     got = hand.viewer.stage.download()[..., :3]
@@ -161,9 +166,9 @@ def test_frames_that_are_not_linear_are_made_so(tmp_path):
 def test_colours_go_into_settings_files_and_command_lines(tmp_path, capsys):
     config, pattern = film_config(tmp_path), shot(tmp_path)
     color = {"ocio": str(config), "view_transform": "Log", "look": "Punchy", "from_": "log"}
-    state = replace(ALONE.opened(pattern), method="tap").with_color(**color)
+    state = put(ALONE.opened(pattern), method="tap").with_settings(**color)
     again = State.of_toml(state.toml())
-    assert dict(again.color) == color
+    assert chosen(again) == color
     assert again.look == state.look == "result"
     assert 'from = "log"\n' in state.toml()
     words = state.command(str(tmp_path / "o.####.png"))
@@ -186,5 +191,5 @@ def test_a_scene_has_no_colour_space_to_be_given(tmp_path):
 
 
 def test_other_frames_have_colours_of_their_own(tmp_path):
-    state = ALONE.opened(shot(tmp_path)).with_color(ocio="builtin", from_="acescg")
-    assert dict(state.opened("wheel").color) == {"ocio": "builtin"}
+    state = ALONE.opened(shot(tmp_path)).with_settings(ocio="builtin", from_="acescg")
+    assert chosen(state.opened("wheel")) == {"ocio": "builtin"}

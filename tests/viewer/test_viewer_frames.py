@@ -1,17 +1,16 @@
 """Frames on disk in the viewer."""
 
-from dataclasses import replace
-
 import imageio.v3 as iio
 import numpy as np
 import pytest
 
 import make_frames as make
-from viewer_hand import PLAIN, SAMPLE, Hand, seen
+from viewer_hand import PLAIN, SAMPLE, Hand, put, seen
 from wgmb import Blur, Clip, InputError
 from wgmb.cli import app
 from wgmb.color.srgb import srgb
 from wgmb.methods import METHODS, default_method
+from wgmb.settings import BlurSettings
 from wgmb.viewer import State
 from wgmb.viewer.capabilities import Choices
 
@@ -20,12 +19,12 @@ pytest_plugins = ["viewer_hand"]
 
 @pytest.fixture(scope="module")
 def reel():
-    return Hand(replace(PLAIN, antialias=1).opened(SAMPLE))
+    return Hand(put(PLAIN, antialias=1).opened(SAMPLE))
 
 
 def test_frames_on_disk_are_blurred_as_the_library_does(reel):
     want = Blur("tap", samples=4)(next(iter(Clip(SAMPLE))))
-    reel.viewer.state = replace(reel.state, frame=9.0)
+    reel.viewer.state = put(reel.state, frame=9.0)
     reel.picture()
     got = reel.viewer.stage.download()[..., :3]
     assert np.abs(got - want[..., :3]).max() < 1e-5
@@ -33,7 +32,7 @@ def test_frames_on_disk_are_blurred_as_the_library_does(reel):
 
 def test_frames_on_disk_are_perceived_too(reel):
     state = reel.state
-    reel.viewer.state = replace(state, look="perceived", frame=11.0)
+    reel.viewer.state = put(state, look="perceived", frame=11.0)
     reel.picture()
     got = srgb(np.clip(reel.viewer.stage.download()[..., :3], 0, 1))
     blur = Blur("tap", samples=4)
@@ -65,7 +64,7 @@ def test_frames_on_disk_have_no_reference(reel):
     assert set(choices.methods(state)) == {n for n, m in METHODS.items() if "scene" not in m.needs}
     assert "reference" not in choices.rivals(state)
     for look in choices.looks(state):
-        reel.viewer.state = replace(state, look=look)
+        reel.viewer.state = put(state, look=look)
         assert np.isfinite(reel.picture()).all()
 
 
@@ -82,7 +81,7 @@ def test_a_picture_without_passes_is_shown_as_it_is(tmp_path, hand):
 
 
 def test_a_method_that_needs_a_scene_gives_way_to_one_that_does_not(reel):
-    reel.viewer.state = replace(PLAIN.opened(SAMPLE), method="distributed", look="error")
+    reel.viewer.state = put(PLAIN.opened(SAMPLE), method="distributed", look="error")
     reel.look()
     assert (reel.state.method, reel.state.look) == (next(iter(METHODS)), "result")
     assert "distributed" in reel.viewer.message[0]
@@ -98,8 +97,8 @@ def test_options_of_the_command_line_reach_the_state():
     state = State().told(
         {"method": "reproject", "samples": 8, "variant": "published", "shutter": 90.0}
     )
-    assert (state.method, state.samples, state.shutter) == ("reproject", 8, 90)
-    assert dict(state.options) == {"variant": "published"}
+    blur = BlurSettings(method="reproject", samples=8, variant="published")
+    assert (state.blur, state.shutter.shutter) == (blur, 90)
 
 
 def test_a_scene_that_loops_is_there_for_its_whole_loop():
@@ -114,7 +113,7 @@ def test_between_frames_on_disk_no_stale_picture_is_seen(reel, look):
     pictures = []
     for frames in ([first, first + 0.7], [first + 1.0, first + 0.7]):
         for at in frames:
-            reel.viewer.state = replace(reel.state, look=look, frame=at)
+            reel.viewer.state = put(reel.state, look=look, frame=at)
             picture = reel.picture()
         pictures.append(picture)
     assert np.array_equal(*pictures)

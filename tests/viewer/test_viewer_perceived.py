@@ -1,11 +1,9 @@
 """The viewer shows what an observer perceives, and nature as the reference."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from viewer_hand import ALONE, PLAIN, SMALL, seen
+from viewer_hand import ALONE, PLAIN, SMALL, put, seen
 from wgmb import Blur, Render
 from wgmb.cone import Cone
 from wgmb.scene import builtin
@@ -25,20 +23,20 @@ def rendered(numbers, fps=24.0, antialias=1, speed=1.0, **blur):
 
 @pytest.mark.parametrize("frame, newest, after", [(3.0, 3, 0.0), (3.4, 3, 0.4), (2.5, 3, -0.5)])
 def test_what_is_perceived_is_what_the_library_says(small, frame, newest, after):
-    small.viewer.state = replace(ALONE, look="perceived", frame=frame)
+    small.viewer.state = put(ALONE, look="perceived", frame=frame)
     got = small.picture()
     want = seen(rendered(range(newest - 12, newest + 1)), 24.0, after / 24)
     assert np.abs(got - want).max() < 4e-3  # the library keeps pictures as f16
-    small.viewer.state = replace(small.state, look="result")
+    small.viewer.state = put(small.state, look="result")
     assert np.abs(small.picture() - want).mean() > 0.005
 
 
 @pytest.mark.parametrize("method", ["distributed", "gather"])
 def test_what_stands_still_is_perceived_as_it_is(small, method):
-    state = replace(ALONE, settings=(("speed", 0.0),), samples=16, method=method, frame=2.0)
+    state = put(ALONE, set=("speed=0",), samples=16, method=method, frame=2.0)
     small.viewer.state = state
     result = small.picture()
-    small.viewer.state = replace(state, look="perceived")
+    small.viewer.state = put(state, look="perceived")
     got = small.picture()
     apart = np.abs(got - result)  # distributed has other noise in every frame
     assert apart.max() < 2e-3 if method == "gather" else apart.mean() < 0.03
@@ -53,7 +51,7 @@ def test_only_new_frames_are_drawn_while_it_plays(small, monkeypatch):
 
     plain = SceneSubject.draw
     monkeypatch.setattr(SceneSubject, "draw", draw)
-    small.viewer.state = replace(ALONE, look="perceived", frame=4.0)
+    small.viewer.state = put(ALONE, look="perceived", frame=4.0)
     small.picture()
     held = Cone().frames_needed(24)
     assert sorted(drawn) == list(range(5 - held, 5))
@@ -64,16 +62,16 @@ def test_only_new_frames_are_drawn_while_it_plays(small, monkeypatch):
         small.picture()
         assert drawn == number, key
         drawn.clear()
-    small.viewer.state = replace(small.state, cone_peak=0.051, exposure=1.0)
+    small.viewer.state = put(small.state, cone_peak=0.051, exposure=1.0)
     small.picture()
     assert drawn == []
-    small.viewer.state = replace(small.state, shutter=90.0)
+    small.viewer.state = put(small.state, shutter=90.0)
     small.picture()
     assert len(drawn) == held
 
 
 def test_who_perceives_is_set_in_the_panel(hand):
-    hand.viewer.state = replace(PLAIN, look="perceived", frame=4.0)
+    hand.viewer.state = put(PLAIN, look="perceived", frame=4.0)
     before = hand.picture()
     hand.touch("cone_rate", 0.9)
     hand.touch("cone_peak", 0.05)
@@ -86,8 +84,8 @@ def test_who_perceives_is_set_in_the_panel(hand):
 
 def test_the_reference_of_what_is_perceived_is_perceived_nature(small):
     """Nature is a video of very many frames."""
-    state = replace(ALONE, look="perceived", compare="wipe", against="reference", wipe=0.0,
-                    frame=4.0, settings=(("speed", 4.0),))  # fmt: skip
+    state = put(ALONE, look="perceived", compare="wipe", against="reference", wipe=0.0,
+                    frame=4.0, set=("speed=4",))  # fmt: skip
     small.viewer.state = state
     small.look_until(lambda: small.viewer.stage.report.reference[0] >= 200)
     nature = small.viewer.screen.picture()
@@ -101,14 +99,14 @@ def test_the_reference_of_what_is_perceived_is_perceived_nature(small):
 
 
 def test_nature_is_exact_where_volumes_are(small):
-    small.viewer.state = replace(
+    small.viewer.state = put(
         ALONE.opened("disk"), frame=8.0, look="perceived", compare="difference",
         against="reference", gain=1.0,
     )  # fmt: skip
     boxes = small.picture().mean()
     assert small.viewer.stage.report.labels[1] == "nature, perceived"
-    small.viewer.state = replace(small.state, shutter=0.0)
+    small.viewer.state = put(small.state, shutter=0.0)
     assert small.picture().mean() > 1.2 * boxes > 0
     for name, choice in (("crossing", True), ("torusphere", False), ("cone", False)):
-        state = replace(ALONE.opened(name), look="perceived")
+        state = put(ALONE.opened(name), look="perceived")
         assert ("reference" in small.viewer.stage.choices.rivals(state)) is choice

@@ -1,11 +1,9 @@
 """The viewer shows what the library draws: every method, scene and look."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from viewer_hand import ALONE, BARE, PLAIN, library, seen
+from viewer_hand import ALONE, BARE, PLAIN, library, put, seen
 from wgmb.color import srgb as color
 from wgmb.color.srgb import srgb
 from wgmb.methods import METHODS
@@ -17,7 +15,7 @@ pytest_plugins = ["viewer_hand"]
 
 @pytest.mark.parametrize("method", ["tap", "distributed"])
 def test_the_picture_is_what_render_writes(bare, method):
-    state = bare.viewer.state = replace(ALONE, method=method, frame=2.0)
+    state = bare.viewer.state = put(ALONE, method=method, frame=2.0)
     got = bare.picture()
     render, moment = library(state, BARE)
     assert got.shape == (180, 320, 3)
@@ -36,7 +34,7 @@ def test_every_method_and_scene_can_be_chosen(hand):
     assert set(METHODS) - set(methods) == {"volume"}  # there is none in the scene
     for method in methods:
         hand.choose("method", method)
-        assert hand.state == replace(PLAIN, method=method)
+        assert hand.state == put(PLAIN, method=method)
     for name in builtin.SCENES:
         before = hand.state
         if name != before.source:
@@ -47,9 +45,9 @@ def test_every_method_and_scene_can_be_chosen(hand):
 
 @pytest.mark.parametrize("name", builtin.SCENES)
 def test_every_scene_is_what_render_draws(small, name):
-    opened = replace(ALONE, method=State().method).opened(name)
+    opened = put(ALONE, method=State().method).opened(name)
     method = "tap" if opened.method == State().method else opened.method
-    state = small.viewer.state = replace(opened, method=method, frame=3.0)
+    state = small.viewer.state = put(opened, method=method, frame=3.0)
     got = small.picture()
     render, moment = library(state)
     want = srgb(render(*moment)[..., :3])
@@ -59,14 +57,14 @@ def test_every_scene_is_what_render_draws(small, name):
 
 @pytest.mark.parametrize("tone", ["clip", "soft"])
 def test_exposure_and_tone(small, tone):
-    state = small.viewer.state = replace(ALONE, exposure=1.5, tone=tone, look="sharp")
+    state = small.viewer.state = put(ALONE, exposure=1.5, tone=tone, look="sharp")
     want = library(state)[0].frame(0.0).color[..., :3] * 2**1.5
     want = want / (1 + want) if tone == "soft" else want
     assert np.abs(small.picture() - srgb(want)).max() < 2e-3
 
 
 def test_velocity_has_the_colours_of_display(bare):
-    state = bare.viewer.state = replace(ALONE, look="velocity")
+    state = bare.viewer.state = put(ALONE, look="velocity")
     shown = bare.picture()
     render, _ = library(state, BARE)
     motion = render.blur.motion(render.frame(0.0))[..., 2:]
@@ -79,7 +77,7 @@ def test_velocity_has_the_colours_of_display(bare):
 
 
 def test_depth_is_grey_and_nearer_is_brighter(bare):
-    state = bare.viewer.state = replace(ALONE, look="depth")
+    state = bare.viewer.state = put(ALONE, look="depth")
     shown = bare.picture()
     depth = library(state, BARE)[0].frame(0.0).depth
     want = np.where(np.isfinite(depth), 5 / (5 + depth), 0)
@@ -89,7 +87,7 @@ def test_depth_is_grey_and_nearer_is_brighter(bare):
 
 
 def test_what_a_method_shows_of_itself_can_be_looked_at(hand):
-    hand.viewer.state = replace(PLAIN, method="reproject")
+    hand.viewer.state = put(PLAIN, method="reproject")
     result = hand.picture()
     assert "count" in hand.viewer.stage.choices.looks(hand.state)
     hand.choose("look at", "count")
@@ -109,11 +107,11 @@ USUAL = {"tap", "gather", "accumulate"}
 )
 def test_all_that_a_method_draws_is_what_render_draws(small, method):
     """Depth, velocity and error are those of all methods, and have tests of their own."""
-    found = small.viewer.stage.choices.looks(replace(ALONE, method=method))
+    found = small.viewer.stage.choices.looks(put(ALONE, method=method))
     drawn = [look for look in found if look not in ("depth", "velocity", "error")]
     assert drawn[:3] == ["result", "sharp", "perceived"]
     for look in drawn:
-        state = small.viewer.state = replace(ALONE, method=method, look=look)
+        state = small.viewer.state = put(ALONE, method=method, look=look)
         render, moment = library(state)
         if look == "sharp":
             want = srgb(render.frame(*moment).color[..., :3])

@@ -2,14 +2,13 @@
 
 import random
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 
 import imageio.v3 as iio
 import numpy as np
 import pytest
 
-from viewer_hand import BESIDE, PLAIN, SAMPLE
+from viewer_hand import BESIDE, PLAIN, SAMPLE, put
 from wgmb import Blur, InputError, Render
 from wgmb.cli import app
 from wgmb.io import exr
@@ -19,9 +18,10 @@ from wgmb.viewer import State
 pytest_plugins = ["viewer_hand"]
 
 
-MANY = State(
+MANY = put(
+    State(),
     source="fence",
-    settings=(("speed", 4.5), ("posts", 11.0)),
+    set=("speed=4.5", "posts=11"),
     orbit=(10.5, -3.0),
     pan=(0.25, -0.5),
     dolly=0.8,
@@ -33,7 +33,7 @@ MANY = State(
     samples=5,
     jitter=0.5,
     max_blur=33.0,
-    options=(("variant", "slices"),),
+    variant="slices",
     shutter=270.0,
     phase="0.1",
     curve="cosine",
@@ -92,10 +92,59 @@ def test_settings_that_make_no_sense_are_told(text, said):
         State.of_toml(text)
 
 
-ON_DISK = State(
-    source="a.####.exr",
-    given=(("also", ("b.####.exr", "c\x7f.exr")), ("camera", Path("cam.json")), ("far", 50.0)),
-)
+SAVED = """
+[render]
+scene = "fence"
+set = ["speed=4.5", "posts=11"]
+size = "256x144"
+antialias = 1
+orbit = [10.5, -3.0]
+pan = [0.25, -0.5]
+dolly = 0.8
+method = "reproject"
+samples = 5
+jitter = 0.5
+max_blur = 33.0
+variant = "slices"
+shutter = 270.0
+phase = "0.1"
+curve = "cosine"
+rolling_duration = 1.0
+fps = "30"
+time = 0.11666666666666667
+
+[view]
+frames = "0-11"
+frame = 3.5
+look = "result"
+eyes = ""
+compare = "split"
+against = "tap"
+wipe = 0.5
+gain = 4.0
+fastest = 0.05
+middle = 5.0
+exposure = -0.5
+tone = "soft"
+cone_rate = 80.0
+cone_peak = 0.02
+zoom = 1.0
+center = [0.5, 0.5]
+playing = true
+speed = 0.5
+panel = true
+"""
+
+
+def test_saved_settings_have_the_form_that_files_of_users_have():
+    assert tomllib.loads(MANY.toml()) == tomllib.loads(SAVED)
+    assert State.of_toml(SAVED) == MANY
+
+
+ON_DISK = State("a.####.exr").with_settings(
+    also=("b.####.exr", "c\x7f.exr"), camera=Path("cam.json"), far=50.0, holdout=("Matte", "-x"),
+    ocio="off", reach=2, rolling="up",
+)  # fmt: skip
 
 
 def test_what_files_hold_comes_back_as_it_was_saved():
@@ -144,7 +193,7 @@ def test_a_settings_file_that_makes_no_sense_is_named(hand, tmp_path, data, said
 def test_render_takes_the_saved_settings(hand, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     plain = {"compare": "off", "exposure": 0.0, "tone": "clip"}
-    hand.viewer.state = replace(MANY, playing=False, jitter=0.0, **plain)
+    hand.viewer.state = put(MANY, playing=False, jitter=0.0, **plain)
     shown = hand.picture()
     hand.viewer.do("save", "wgmb.toml")
     assert tomllib.loads(Path("wgmb.toml").read_text())["render"]["samples"] == 5
@@ -158,9 +207,9 @@ def test_render_takes_the_saved_settings(hand, tmp_path, monkeypatch):
     assert "nowhere" in hand.viewer.message[0]
 
 
-@pytest.mark.parametrize("state", [MANY, replace(PLAIN.opened(SAMPLE), shutter=90.0)])
+@pytest.mark.parametrize("state", [MANY, put(PLAIN.opened(SAMPLE), shutter=90.0)])
 def test_the_command_line_is_one(state, tmp_path):
-    state = replace(state, frames="9-10") if not state.is_scene else replace(state, frames="0-1")
+    state = put(state, frames="9-10") if not state.is_scene else put(state, frames="0-1")
     out = tmp_path / "out.####.png"
     assert app.main([*state.command(str(out)), "--quiet"]) == 0
     assert len(list(tmp_path.glob("out.*.png"))) == 2
@@ -185,7 +234,7 @@ def test_screenshot_and_recording(hand, tmp_path, monkeypatch):
 
 
 def test_export_runs_the_command_line(hand, tmp_path, monkeypatch):
-    hand.viewer.state = replace(PLAIN, size="64x36", frames="0-1")
+    hand.viewer.state = put(PLAIN, size="64x36", frames="0-1")
     hand.look()
     hand.viewer.do("export", str(tmp_path / "out.####.png"))
     child = hand.viewer.actions.export[0]

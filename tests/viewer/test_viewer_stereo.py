@@ -1,17 +1,15 @@
 """Stereo frames in the viewer: one eye, a pair, red-cyan."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import make_frames as make
 from make_stereo import many_parts, one_view, single_part, with_stereo
-from viewer_hand import PLAIN, SAMPLE, Hand
+from viewer_hand import PLAIN, SAMPLE, Hand, put
 from wgmb import Blur, Clip
 from wgmb.viewer import State, controls
 
-ALONE = replace(PLAIN, panel=False)
+ALONE = put(PLAIN, panel=False)
 
 
 @pytest.fixture(scope="module")
@@ -27,14 +25,14 @@ def shared(frames):
 
 @pytest.fixture
 def bare(shared, frames):
-    shared.viewer.state = replace(ALONE.opened(frames), frame=2.0)
+    shared.viewer.state = put(ALONE.opened(frames), frame=2.0)
     shared.look()
     return shared
 
 
 def eye(bare, view: str, **more) -> np.ndarray:
     """The picture of one view."""
-    bare.viewer.state = replace(bare.state, eyes=view, compare="off", **more)
+    bare.viewer.state = put(bare.state, eyes=view, compare="off", **more)
     return bare.picture()
 
 
@@ -85,7 +83,7 @@ def test_what_is_perceived_may_be_seen_with_both_eyes(bare):
 
 def test_an_eye_is_compared_with_its_own_sharp_picture(bare):
     sharp = eye(bare, "left", look="sharp")
-    bare.viewer.state = replace(bare.state, look="result", compare="wipe", against="sharp", wipe=0)
+    bare.viewer.state = put(bare.state, look="result", compare="wipe", against="sharp", wipe=0)
     assert np.array_equal(bare.picture()[:, 4:], sharp[:, 4:])
 
 
@@ -112,7 +110,7 @@ def test_the_panel_has_a_choice_of_eyes_for_stereo_frames_only(frames):
 
 
 def test_eyes_are_saved_and_are_no_option_of_blur(frames):
-    state = replace(State().opened(frames), eyes="red-cyan")
+    state = put(State().opened(frames), eyes="red-cyan")
     assert State.of_toml(state.toml()) == state
     assert "red-cyan" not in state.command("o.####.exr")
 
@@ -126,7 +124,7 @@ def test_eyes_of_other_data_windows_lie_where_they_are(tmp_path):
                  {n: p[4:41, 8:61] for n, p in one_view(1, (2, 0)).items()}, {"view": "right"},
                  name="r", data=(8, 4, 60, 40), display=(8, 4, 60, 40))]  # fmt: skip
     path = make.write_parts(tmp_path / "a.exr", parts)
-    hand = Hand(replace(ALONE.opened(str(path)), look="sharp", eyes="red-cyan"), (640, 480))
+    hand = Hand(put(ALONE.opened(str(path)), look="sharp", eyes="red-cyan"), (640, 480))
     both = hand.picture()
     assert hand.viewer.stage.report.size == (make.WIDTH, make.HEIGHT)
     left = eye(hand, "left")
@@ -142,6 +140,6 @@ def test_views_of_any_names_are_two_eyes(tmp_path):
         if "view" in part.header:
             part.header["view"] = {"right": "R", "left": "centre"}[part.header["view"]]
     path = make.write_parts(tmp_path / "a.exr", parts)
-    hand = Hand(replace(ALONE.opened(str(path)), eyes="pair"), (160, 120))
+    hand = Hand(put(ALONE.opened(str(path)), eyes="pair"), (160, 120))
     assert hand.viewer.stage.choices.sides(hand.state) == ("centre", "R")
     assert hand.viewer.stage.report.labels == ("tap, centre", "tap, R")

@@ -1,11 +1,9 @@
 """Sizes, pixel ratios and errors of the viewer, and its pace while something moves."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from viewer_hand import BESIDE, PLAIN, SIZE, Hand
+from viewer_hand import BESIDE, PLAIN, SIZE, Hand, put
 from wgmb import DeviceError, gpu
 from wgmb.gpu.timing import TimestampClock
 from wgmb.viewer import offscreen
@@ -17,7 +15,7 @@ pytest_plugins = ["viewer_hand"]
 
 @pytest.mark.parametrize("size, ratio", [((900, 500), 1.0), ((500, 300), 2.0), ((700, 333), 1.25)])
 def test_sizes_and_hidpi(size, ratio):
-    hand = Hand(replace(PLAIN, look="velocity"), size, ratio)
+    hand = Hand(put(PLAIN, look="velocity"), size, ratio)
     shown = hand.picture()
     whole = hand.look()
     assert whole.shape[:2] == (round(size[1] * ratio), round(size[0] * ratio))
@@ -28,7 +26,7 @@ def test_sizes_and_hidpi(size, ratio):
 
 
 def test_twice_the_pixels_show_the_same_twice_as_fine():
-    state = replace(PLAIN, look="velocity", compare="wipe", against="sharp", wipe=0.25)
+    state = put(PLAIN, look="velocity", compare="wipe", against="sharp", wipe=0.25)
     coarse, fine = Hand(state, (640, 400), 1.0), Hand(state, (640, 400), 2.0)
     for hand in (coarse, fine):
         hand.picture()
@@ -44,15 +42,15 @@ def test_twice_the_pixels_show_the_same_twice_as_fine():
 
 
 def test_the_mouse_is_where_it_is_seen_at_any_ratio():
-    state = replace(PLAIN, compare="wipe", against="sharp")
+    state = put(PLAIN, compare="wipe", against="sharp")
     for ratio in (1.0, 1.5, 2.0):
         hand = Hand(state, (640, 400), ratio)
         hand.drag((160, 200), (80, 200))
         assert hand.state.wipe == pytest.approx(0.25, abs=0.01)
         hand.drag((200, 200), (220, 200))
-        assert hand.state.orbit[0] == pytest.approx(-20 / 320 * np.degrees(4.0))
+        assert hand.state.scene.orbit[0] == pytest.approx(-20 / 320 * np.degrees(4.0))
         hand.touch("shutter", 0.5)
-        assert hand.state.shutter == pytest.approx(360, abs=15)
+        assert hand.state.shutter.shutter == pytest.approx(360, abs=15)
 
 
 def test_moving_to_a_screen_of_another_ratio_and_back():
@@ -102,7 +100,7 @@ def test_a_lost_gpu_is_told():
 
 def test_times_of_the_gpu_are_told_by_pass(monkeypatch):
     monkeypatch.setattr(TimestampClock, "usable", staticmethod(lambda device: True))
-    hand = Hand(replace(PLAIN, method="reproject", samples=64))
+    hand = Hand(put(PLAIN, method="reproject", samples=64))
     passes = hand.viewer.stage.report.passes
     assert {"scene/gbuffer.wgsl:main", "methods/reproject.wgsl:resolve"} <= passes.keys()
     hand.look()

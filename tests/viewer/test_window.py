@@ -23,7 +23,7 @@ from wgmb.viewer import State, view
 from wgmb.viewer.draw.screen import Screen
 def compose(*_): raise ZeroDivisionError("broken")
 Screen.compose = compose
-view(State(method="tap"))
+view(State().with_settings(method="tap"))
 """
 CLOSE = """
 import ctypes, sys
@@ -188,7 +188,7 @@ def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     it.do("key", "r")
     assert it.shows_again(first)
 
-    twin = offscreen(State(samples=4, method="tap"), SIZE)
+    twin = offscreen(State().with_settings(samples=4, method="tap"), SIZE)
     frame(twin)
     x, y, width, height = twin.panel.places["shutter"]
     it.drag((x + width * 0.25, y + height / 2), (x + width * 0.8, y + height / 2 + 100))

@@ -212,7 +212,7 @@ def _curve(path: Path) -> None:
 
 
 def _settings(path: Path) -> None:
-    path.write_text(State(playing=True, options=(("path", "straight"),)).toml(), "utf-8")
+    path.write_text(State(playing=True).with_settings(path="straight").toml(), "utf-8")
 
 
 def _edl(path: Path) -> None:

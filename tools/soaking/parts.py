@@ -100,7 +100,8 @@ def _viewer(method: str, **state) -> Callable[[], Step]:
 
     def begin() -> Step:
         now = [0.0]
-        shown = viewer.State(method=method, samples=_MANY, playing=True, antialias=1, **state)
+        settings = {"method": method, "samples": _MANY, "antialias": 1}
+        shown = viewer.State(playing=True, **state).with_settings(**settings)
         window = viewer.offscreen(shown, (480, 270), clock=lambda: now[0])
 
         def step(number: int) -> np.ndarray:

@@ -16,7 +16,6 @@ from .state.state import (
     REFERENCE,
     State,
 )
-from .state.video_time import most_mb, settings_of
 from .subjects.subject import ClipSubject, SceneSubject, Subject
 from .subjects.video import VideoSubject
 
@@ -34,7 +33,8 @@ class Choices:
         if state.is_scene:
             self._scene = self._scene or SceneSubject(self._device)
             return self._scene
-        key = (state.source, state.given, state.read_as, _motion_of(state))
+        masks = state.blur.holdout, state.blur.scale
+        key = (state.source, state.input, masks, state.read_as, _motion_of(state))
         if self._clip is None or self._clip[0] != key:
             self._clip = key, self._opened(state)
         return self._clip[1]
@@ -127,6 +127,6 @@ def _motion_of(state: State) -> tuple:
     """Settings on which a video's motion depends; none for other files."""
     if not state.is_video:
         return ()
-    settings = settings_of(state)
-    file = footage_of(state.source, most_mb(state))  # another object once it has changed
-    return file, settings.flow, settings.flow_quality, settings.duplicates
+    video = state.video
+    file = footage_of(state.source, state.input.max_mb)  # another object once it has changed
+    return file, video.flow, video.flow_quality, video.duplicates

@@ -87,18 +87,18 @@ def drag(state: State, layout: WindowLayout, held: str, dx: float, dy: float) ->
     if held == "orbit" and (own := _own_camera(state)):
         cam_x, cam_y = own
         cam_y = _held(cam_y + 4 * dy / max(layout.area[3], 1), *CAM_Y)
-        turned = state.with_setting("cam_x", cam_x - 4 * dx / max(layout.area[2], 1))
-        return turned.with_setting("cam_y", cam_y)
+        turned = state.with_parameter("cam_x", cam_x - 4 * dx / max(layout.area[2], 1))
+        return turned.with_parameter("cam_y", cam_y)
     if held == "orbit":
-        aside, up = state.orbit
+        aside, up = state.scene.orbit
         aside -= TURN * dx / max(layout.area[2], 1)
         up += TURN * dy / max(layout.area[3], 1)
         turn = (aside + 180) % 360 - 180
-        return replace(state, orbit=(turn, _held(up, *ELEVATION)))
-    right, over = state.pan
-    reach = 6.25 * state.dolly  # the picture's height at the pivot [scene units]
+        return state.with_settings(orbit=(turn, _held(up, *ELEVATION)))
+    right, over = state.scene.pan
+    reach = 6.25 * state.scene.dolly  # the picture's height at the pivot [scene units]
     per_px = reach / max(height, 1)
-    return replace(state, pan=(right - dx * per_px, over + dy * per_px))
+    return state.with_settings(pan=(right - dx * per_px, over + dy * per_px))
 
 
 def wheel(state: State, layout: WindowLayout, x: float, y: float, dx: float, dy: float) -> State:
@@ -107,7 +107,7 @@ def wheel(state: State, layout: WindowLayout, x: float, y: float, dx: float, dy:
         return state
     factor = math.exp(_NOTCH * dy)
     if state.is_scene:
-        return replace(state, dolly=_held(state.dolly * factor, *_DOLLY))
+        return state.with_settings(dolly=_held(state.scene.dolly * factor, *_DOLLY))
     zoom = _held(state.zoom / factor, *_ZOOM)
     left, top, width, height = layout.place
     u, v = (x - left) / max(width, 1), (y - top) / max(height, 1)
@@ -139,8 +139,9 @@ def key(state: State, layout: WindowLayout, name: str) -> tuple[State, str | Non
         return replace(state, panel=not state.panel), None
     if low == "r":
         state = state.unmoved()
-        own = {"cam_x", "cam_y"}
-        return replace(state, settings=tuple(s for s in state.settings if s[0] not in own)), None
+        own = ("cam_x=", "cam_y=")
+        kept = tuple(text for text in state.scene.set if not text.startswith(own))
+        return state.with_settings(set=kept), None
     if low == "c" and layout.compare:
         return replace(state, compare=_next(layout.compare, state.compare)), None
     if low == "e" and layout.eyes:
@@ -171,7 +172,8 @@ def _own_camera(state: State) -> tuple[float, float] | None:
     known = inspect.signature(builtin.SCENES[state.source]).parameters
     if not {"cam_x", "cam_y"} <= known.keys():
         return None
-    values = {name: known[name].default for name in ("cam_x", "cam_y")} | dict(state.settings)
+    values = {name: known[name].default for name in ("cam_x", "cam_y")}
+    values |= state.scene.parameters()
     return float(values["cam_x"]), float(values["cam_y"])
 
 

@@ -203,7 +203,7 @@ class Viewer:
             self.do(action, what)
         self.actions.poll_export()
         seconds = time.perf_counter() - started
-        self.stage.finished(seconds, state.antialias)
+        self.stage.finished(seconds, state.scene.antialias)
         if report.changed or state.playing:
             self._frame_times.append(max(seconds, self._now - before if report.moving else 0))
             self._draw_times.append(report.seconds["draw"])

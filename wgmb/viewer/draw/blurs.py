@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
 
 import wgpu
 
@@ -10,7 +10,7 @@ from ...errors import InputError
 from ...methods import METHODS
 from ...pipeline.arguments import SAMPLES
 from ...pipeline.blur import Blur
-from ...settings import ShutterSettings
+from ...settings import BlurSettings
 from ...shutter import Shutter
 from ..capabilities import Choices
 from ..state.state import REFERENCE, State
@@ -32,52 +32,45 @@ class Blurs:
 
         `quick`: the level of detail while something moves, 0 the finest; None: in full.
         """
-        options: dict[str, Any] = dict(state.options)
-        method, samples, shutter = state.method, state.sampling, shutter_of(state)
+        settings, shutter = state.suited_blur, state.shutter.make()
         if name == REFERENCE:
-            options, method, samples = {}, self._choices.reference(state), REFERENCE_SAMPLES
+            method = self._choices.reference(state)
+            settings = _plain(settings, method, REFERENCE_SAMPLES)
             shutter = state.eye.shutter(state.fps) if state.eye else shutter
         elif name in self._choices.shows(state):
-            options["show"] = name
+            settings = state.with_settings(show=name).suited_blur
         elif name == "sharp":
-            options, method, shutter = {}, "volume", Shutter(0)
+            settings, shutter = _plain(settings, "volume", settings.samples), Shutter(0)
         elif name not in ("result", "perceived", state.method):
-            options, method = {}, name
-            samples = state.with_method(name).sampling
+            settings = state.with_method(name).suited_blur
+        method = settings.method or ""
         if method not in (allowed := self._choices.methods(state)):
             raise InputError(f"method {method!r} is not available here; use {', '.join(allowed)}")
         if quick is not None:
-            count = samples if isinstance(samples, int) else SAMPLES
-            traced = "progress" in METHODS[method].uses
-            fewer = min(count, QUICK) if traced else self._pace.samples(quick, count)
-            samples = fewer if fewer < count else samples
-        if quick:
-            options |= getattr(METHODS[method], "quick", {})
+            settings = self._quick(settings, quick)
         kept = slot, name == "perceived"  # each has the sums of a picture of its own
-        key = (kept, method, samples, state.jitter, state.max_blur, *options.items())
+        key = kept, settings
         if key not in self._made:
             while len(self._made) >= _KEPT:
                 del self._made[next(iter(self._made))]
-            self._made[key] = Blur(
-                method,  # pyright: ignore[reportArgumentType]
-                samples=samples,  # pyright: ignore[reportArgumentType]
-                jitter=state.jitter,
-                max_blur=state.max_blur,
-                device=self._device,
-                **options,
-            )
+            self._made[key] = settings.make(shutter, self._device)
         blur = self._made[key] = self._made.pop(key)
         if blur.shutter != shutter:
             blur.shutter = shutter
         return blur
 
+    def _quick(self, settings: BlurSettings, level: int) -> BlurSettings:
+        """The same with fewer samples, and beyond the finest level with quick options."""
+        method = METHODS[settings.method or ""]
+        count = settings.samples if isinstance(settings.samples, int) else SAMPLES
+        traced = "progress" in method.uses
+        fewer = min(count, QUICK) if traced else self._pace.samples(level, count)
+        if fewer < count:
+            settings = replace(settings, samples=fewer)
+        return replace(settings, **getattr(method, "quick", {})) if level else settings
 
-def shutter_of(state: State) -> Shutter:
-    """The Shutter that the state describes."""
-    return ShutterSettings(
-        shutter=state.shutter,
-        phase=state.phase,
-        curve=state.curve,
-        rolling=state.rolling,  # pyright: ignore[reportArgumentType]
-        rolling_duration=state.rolling_duration,
-    ).make()
+
+def _plain(settings: BlurSettings, method: str | None, samples: int | str | None) -> BlurSettings:
+    """The same with another method, all of whose options are as by default."""
+    some = {"samples": samples, "jitter": settings.jitter, "max_blur": settings.max_blur}
+    return BlurSettings(method=method, **some)  # pyright: ignore[reportArgumentType]

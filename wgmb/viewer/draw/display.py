@@ -8,6 +8,7 @@ import wgpu
 from ...color.spaces import ColorSpace, Display
 from ...errors import DeviceError, InputError
 from ...gpu.textures import TexturePool
+from ...settings.color import ColorSettings
 from ..state.state import State
 from .ocio_shader import OUTPUT, OcioShader
 from .screen import Image
@@ -18,14 +19,14 @@ class DisplayCache:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)
-        self._opened: tuple[tuple | None, Display | None] = None, None
+        self._opened: tuple[ColorSettings | None, Display | None] = None, None
         self._compiled: dict[tuple[Display, ColorSpace], OcioShader | None] = {}
         self._shown: dict[str, tuple[tuple, Image]] = {}
 
     def display(self, state: State) -> Display | None:
         """The display that the state asks for; None: sRGB. InputError if there is none such."""
         if self._opened[0] != state.color:
-            self._opened = state.color, state.colors.open()
+            self._opened = state.color, state.color.open()
             self._compiled.clear()
         return self._opened[1]
 

@@ -23,7 +23,7 @@ from ..state.state import BOTH_EYES, REFERENCE, State
 from ..subjects.subject import SceneSubject, Subject
 from ..subjects.video import VideoSubject
 from .adaptive import Pace
-from .blurs import Blurs, shutter_of
+from .blurs import Blurs
 from .perception import Perceived, seen_frames
 from .quality import Measured, Quality
 from .screen import (
@@ -91,7 +91,7 @@ class Renderer:
         unfinished = not all(self._coming[slot].ready for slot in slots)
         report.busy = moving or unfinished or self._level > 0
         if isinstance(subject, VideoSubject):
-            report.made_of = subject.made_of(state, shutter_of(state))
+            report.made_of = subject.made_of(state, state.shutter.make())
             if any(name != "sharp" for name, _ in names):
                 report.waiting = subject.waiting
                 report.busy |= subject.busy
@@ -165,7 +165,7 @@ class Renderer:
             self._level = 1
         elif self._level == 1 and now - self._still_since > _SETTLE:
             self._level = 0
-        scale, antialias = self.pace.quality(self._level, state.antialias)
+        scale, antialias = self.pace.quality(self._level, state.scene.antialias)
         width, height = whole(place)
         return (max(round(width * scale), 1), max(round(height * scale), 1)), antialias
 
@@ -232,7 +232,7 @@ class Renderer:
             return []
         method = METHODS[name if name in METHODS else state.method]
         states = seen_frames(state) if name == "perceived" else [state]
-        asked = states, shutter_of(state), "neighbours" in method.uses
+        asked = states, state.shutter.make(), "neighbours" in method.uses
         known = subject.stamp(*asked)
         while full and subject.busy:
             time.sleep(_SHORT)

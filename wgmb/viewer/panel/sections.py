@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -14,8 +14,9 @@ from ...color.spaces import Display
 from ...methods import METHODS
 from ...pipeline.arguments import SAMPLES
 from ...scene import builtin
+from ...settings.color import ColorSettings
 from ...shutter import CURVES, PHASES, ROLLING
-from ..draw.blurs import shutter_of
+from ..state.groups import DEFAULTS
 from ..state.state import (
     BOTH_EYES,
     COMPARE,
@@ -54,13 +55,17 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
         return video(ui, state, info) if state.is_video else state
     known = inspect.signature(builtin.SCENES[state.source]).parameters
     defaults = {name: parameter.default for name, parameter in known.items()}
-    for name, value in (defaults | dict(state.settings)).items():
-        new = _parameter(ui, name, value, defaults[name])
+    said = state.scene.parameters()
+    for name, default in defaults.items():
+        value = type(default)(said.get(name, default))
+        new = _parameter(ui, name, value, default)
         if new != value:
-            state = state.with_setting(name, new)
+            state = state.with_parameter(name, new)
     ui.label("camera")
     imgui.align_text_to_frame_padding()
-    imgui.text_disabled("{:.0f}, {:.0f} deg, x {:.2f}".format(*state.orbit, state.dolly))
+    imgui.text_disabled(
+        "{:.0f}, {:.0f} deg, x {:.2f}".format(*state.scene.orbit, state.scene.dolly)
+    )
     if state.unmoved() != state:
         imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - 46)
         if ui.button("reset", 46):
@@ -99,22 +104,22 @@ def blur(ui: Widgets, state: State, info: Info) -> State:
     """The method and its options."""
     state = state.with_method(ui.combo("method", state.method, info.methods))
     state = _samples(ui, state)
-    chosen = dict(state.options)
     for name, option in info.options.items():
         if name == "show":
             continue  # looked at by view
-        value: Any = chosen.get(name, option.default)
+        own = state.setting(name)
+        now = option.default if own == DEFAULTS[name] else own
         if option.choices:
-            word = ui.combo(name, str(value), option.choices)
-            if word != value:
-                state = state.with_option(name, word if word != option.default else None)
-            continue
-        changed, value = ui.number(name, value, option.default)
+            new = ui.combo(name, str(now), option.choices)
+            changed = new != now
+        else:
+            changed, new = ui.number(name, now, option.default)
         if changed:
-            state = state.with_option(name, value if value != option.default else None)
-    state = ui.slide(state, "jitter", 0, 1, "%.2f")
+            new = DEFAULTS[name] if new == option.default else new
+            state = state.with_settings(**{name: new})
+    state = ui.setting(state, "jitter", 0, 1, "%.2f")
     ui.label("max blur")
-    limited, on = state.max_blur is not None, state.max_blur or 40.0
+    limited, on = state.blur.max_blur is not None, state.blur.max_blur or 40.0
     _, limit = imgui.checkbox("##limited", limited)
     ui.keep("limited")
     imgui.same_line()
@@ -123,16 +128,16 @@ def blur(ui: Widgets, state: State, info: Info) -> State:
     changed, most = imgui.slider_float("##max_blur", on, 1, 400, "%.0f px", LOG)
     ui.keep("max_blur")
     imgui.end_disabled()
-    return replace(state, max_blur=(most if changed else on) if limit else None)
+    return state.with_settings(max_blur=(most if changed else on) if limit else None)
 
 
 def _samples(ui: Widgets, state: State) -> State:
-    auto = state.sampling == "auto"
+    samples, auto = state.blur.samples, state.suited_blur.samples == "auto"
     own = getattr(METHODS[state.method], "samples", SAMPLES)
     ui.label("samples")
     imgui.set_next_item_width(-64)
     imgui.begin_disabled(auto)
-    now = state.samples if isinstance(state.samples, int) else own
+    now = samples if isinstance(samples, int) else own
     changed, number = imgui.slider_int("##samples", now, 1, 256, "auto" if auto else "%d", LOG)
     ui.keep("samples")
     imgui.end_disabled()
@@ -140,37 +145,39 @@ def _samples(ui: Widgets, state: State) -> State:
     toggled, auto = imgui.checkbox("auto", auto)
     ui.keep("auto")
     if toggled:
-        return replace(state, samples="auto" if auto else own if state.is_video else None)
-    return replace(state, samples=max(number, 1)) if changed else state
+        return state.with_settings(samples="auto" if auto else own if state.is_video else None)
+    return state.with_settings(samples=max(number, 1)) if changed else state
 
 
 def shutter(ui: Widgets, state: State, info: Info) -> State:
     """Shutter angle, phase and curve."""
     ui.label("angle")
-    changed, angle = imgui.slider_float("##shutter", state.shutter, 0, 720, "%.0f deg")
+    now = state.shutter.shutter or 0.0
+    changed, angle = imgui.slider_float("##shutter", now, 0, 720, "%.0f deg")
     ui.keep("shutter")
     if changed:
-        state = replace(state, shutter=float(round(angle)))
+        state = state.with_settings(shutter=float(round(angle)))
+    when = state.shutter
     names = ["start", "centre", "end"]
-    own = state.phase not in PHASES
-    phase = ui.combo("phase", state.phase if not own else "at", [*names, "at"])
+    own = when.phase not in PHASES
+    phase = ui.combo("phase", when.phase if not own else "at", [*names, "at"])
     if phase == "at" and not own:
-        return replace(state, phase="0")
+        return state.with_settings(phase="0")
     if phase != "at":
-        state = replace(state, phase=phase)
+        state = state.with_settings(phase=phase)
     else:
         ui.label("")
-        now = float(state.phase)
+        now = float(when.phase)
         changed, middle = imgui.slider_float("##phase at", now, -1, 1, "%.2f frames")
         ui.keep("phase at")
-        state = replace(state, phase=f"{middle:.2f}") if changed else state
-    curves = list(CURVES)
-    curves += [] if state.curve in curves else [state.curve]
-    state = replace(state, curve=ui.combo("curve", state.curve, curves))
-    rolling = ui.combo("rolling", state.rolling or "off", ["off", *ROLLING])
-    state = replace(state, rolling=None if rolling == "off" else rolling)
-    if state.rolling:
-        state = ui.slide(state, "rolling_duration", 0, 2, "%.2f frames", label="duration")
+        state = state.with_settings(phase=f"{middle:.2f}") if changed else state
+    curve = when.curve or "box"
+    curves = [*CURVES, *([] if curve in CURVES else [curve])]
+    state = state.with_settings(curve=ui.combo("curve", curve, curves))
+    rolling = ui.combo("rolling", when.rolling or "off", ["off", *ROLLING])
+    state = state.with_settings(rolling=None if rolling == "off" else rolling)
+    if rolling != "off":
+        state = ui.setting(state, "rolling_duration", 0, 2, "%.2f frames", label="duration")
     _curve(ui, state)
     return state
 
@@ -183,7 +190,7 @@ def _curve(ui: Widgets, state: State) -> None:
     x, y, width, height = ui.places["curve drawn"]
     ink = imgui.get_window_draw_list()
     ink.add_rect_filled((x, y), (x + width, y + height), packed(COLORS["frame_bg"]), 4)
-    times, passed = shutter_of(state).integral(96)
+    times, passed = state.shutter.make().integral(96)
     reach = max(1.0, 1.05 * float(np.abs(times).max()))
     for instant in range(-int(reach), int(reach) + 1):
         at = x + width * (0.5 + 0.5 * instant / reach)
@@ -231,27 +238,26 @@ def view(ui: Widgets, state: State, info: Info) -> State:
 def _colors(ui: Widgets, state: State, display: Display | None) -> State:
     """Controls of the display: a config's display, view and look, or a tone and sRGB."""
     if installed():
-        now = state.colors.ocio or ("$OCIO" if display else "off")
+        now = state.color.ocio or ("$OCIO" if display else "off")
         names = dict.fromkeys((now, "off", "builtin", "studio"))
         config = ui.combo("ocio", now, list(names), shown=plain(now))
         if config != now:
-            state = state.with_color(display=None, view_transform=None, look=None, from_=None)
-            return state.with_color(ocio=config)
+            return replace(state, color=ColorSettings(ocio=config))
     if display is None:
         return replace(state, tone=ui.combo("tone", state.tone, TONES))
     config = display.config
     screen = ui.combo("display", display.display, config.displays)
     if screen != display.display:
-        return state.with_color(display=screen, view_transform=None)
+        return state.with_settings(display=screen, view_transform=None)
     view = ui.combo("view", display.view, config.views(screen))
     if view != display.view:
-        state = state.with_color(view_transform=view)
+        state = state.with_settings(view_transform=view)
     looks = config.looks
     if looks:
         own = "of the view"
         look = ui.combo("look", display.look or own, [own, *looks])
         if look != (display.look or own):
-            state = state.with_color(look=None if look == own else look)
+            state = state.with_settings(look=None if look == own else look)
     return state
 
 

@@ -83,6 +83,14 @@ class Widgets:
         changed, value = self.slider(name, now, low, high, form, log=log, label=label)
         return replace(state, **{name: value}) if changed else state
 
+    def setting(
+        self, state: State, name: str, low, high, form: str, *, log=False, label=""
+    ) -> State:
+        """The state with the option `name` of its settings as the slider stands."""
+        now = state.setting(name)
+        changed, value = self.slider(name, now, low, high, form, log=log, label=label)
+        return state.with_settings(**{name: value}) if changed else state
+
     def slider(
         self, name: str, now: float, low, high, form: str, *, log=True, label=""
     ) -> tuple[bool, float]:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from ...errors import InputError
-from ...settings import InputSettings
 from ...settings.color import option_name
-from ...settings.video import VideoSettings
+from .groups import GROUP_OF, MASKS, changed
 
 if TYPE_CHECKING:
     from .state import State
 
-VIDEO = frozenset(f.name for f in fields(VideoSettings))
+VIDEO = frozenset(name for name, group in GROUP_OF.items() if group == "video")
 """Options of videos."""
-INPUTS = frozenset({*(f.name for f in fields(InputSettings)), "holdout", "scale"} - {"frames"})
+INPUTS = frozenset({*(name for name, group in GROUP_OF.items() if group == "input"), *MASKS})
 """Options that say what files hold."""
 OF_VIDEOS = frozenset({"holdout", "max_mb", "cuts"})
 """Those of them that videos have."""
@@ -44,7 +42,7 @@ def check_said(state: State, said: Collection[str]) -> None:
 
 def check_video(state: State) -> None:
     """InputError if the state of a video holds what only rendered frames have."""
-    for name, _ in state.given:
+    for name in (*changed("input", state.input), *changed("blur", state.blur)):
         _check_layers(name)
 
 

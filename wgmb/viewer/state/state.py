@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +16,22 @@ from ...io import frame_numbers, limits
 from ...methods import METHODS
 from ...scene import builtin
 from ...sequence.frame_file import about
-from ...settings import METHOD_OPTIONS, ShutterSettings
+from ...settings import (
+    METHOD_OPTIONS,
+    BlurSettings,
+    InputSettings,
+    SceneSettings,
+    ShutterSettings,
+)
 from ...settings.color import ColorSettings
 from ...settings.toml import text_of
+from ...settings.video import VideoSettings
 from . import toml as saved
 from . import video_time
-from .allowed import INPUTS, VIDEO, check_said
+from .allowed import check_said
 from .files import frames_of, is_video_file
-from .words import (
-    DEFAULTS,
-    no_option,
-    set_words,
-    words_of,
-)
+from .groups import DEFAULTS, GROUP_OF, MASKS, written
+from .words import no_option, words_of
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
 BOTH_EYES = ("pair", "red-cyan")
@@ -36,6 +39,9 @@ LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")
 TONES = ("clip", "soft")
 FLOWS, QUALITIES = ("auto", "search", "dis", "none"), ("best", "fast")
 REFERENCE = "reference"
+_SCENE = SceneSettings(size="1280x720", antialias=2)
+_BLUR = BlurSettings(method="gather")
+_SHUTTER = ShutterSettings().resolved()
 
 
 @dataclass(frozen=True)
@@ -44,45 +50,25 @@ class State:
 
     source: str = "crossing"
     """A scene's name, or a file or pattern."""
-    settings: tuple[tuple[str, float | str], ...] = ()
-    """The scene's parameters that differ from their defaults."""
-    given: tuple[tuple[str, object], ...] = ()
-    """InputSettings, holdout and scale of files that differ from their defaults."""
-    color: tuple[tuple[str, object], ...] = ()
-    """ColorSettings that differ from their defaults."""
-    orbit: tuple[float, float] = (0.0, 0.0)  # degrees to the right, up
-    pan: tuple[float, float] = (0.0, 0.0)  # scene units to the right, up
-    dolly: float = 1.0
+    scene: SceneSettings = _SCENE
+    """Size, parameters and camera of a scene."""
+    input: InputSettings = field(default_factory=InputSettings)
+    """Layers and conventions of files."""
+    blur: BlurSettings = _BLUR
+    """The method, which is always set, and its options."""
+    shutter: ShutterSettings = _SHUTTER
+    """Angle and curve are always set."""
+    color: ColorSettings = field(default_factory=ColorSettings)
+    video: VideoSettings = field(default_factory=VideoSettings)
+    """Motion and time of a video; its encoding, which an export has."""
     frames: str = "0-11"
     """Of a video: its pictures that the output is made from."""
     frame: float = 0.0
     """The moment [frame intervals]; of a video the output frame, from 0 on."""
-    size: str = "1280x720"
-    antialias: int = 2
     fps: float = 24.0
     """Of a video: of the output, whose interval the shutter is in."""
     own_times: bool = False
     """Of a video: `fps` is "source", an output frame for each picture, at its time."""
-    flow: str = "auto"
-    """Of a video: where motion comes from (FlowSettings)."""
-    flow_quality: str = "best"
-    pace: str = "1"
-    """Of a video: the speed of the output, such as "0.5" for slow motion."""
-    video: tuple[tuple[str, object], ...] = ()
-    """The other VideoSettings that differ from their defaults."""
-
-    method: str = "gather"
-    samples: int | str | None = None
-    """A number, "auto", or None for what the method has by default."""
-    jitter: float = 0.0
-    max_blur: float | None = None
-    options: tuple[tuple[str, object], ...] = ()
-    """Of the method: path, variant, show, seed, ..."""
-    shutter: float = 180.0
-    phase: str = "centre"
-    curve: str = "box"
-    rolling: str | None = None
-    rolling_duration: float = 1.0
 
     look: str = "result"
     eyes: str = ""
@@ -115,10 +101,15 @@ class State:
         return not self.is_scene and is_video_file(self.source)
 
     @property
-    def sampling(self) -> int | str | None:
-        """The samples, which for motion from pictures are adaptive unless they are set."""
-        adaptive = getattr(METHODS[self.method], "adaptive", False)
-        return "auto" if self.samples is None and adaptive and self.is_video else self.samples
+    def method(self) -> str:
+        """Name of the blur method."""
+        assert self.blur.method is not None
+        return self.blur.method
+
+    @property
+    def suited_blur(self) -> BlurSettings:
+        """`blur`, the samples adaptive for motion from pictures unless they are set."""
+        return self.blur.for_pictures() if self.is_video else self.blur
 
     @property
     def eye(self) -> Cone | None:
@@ -141,16 +132,10 @@ class State:
         return same if self.is_scene else replace(same, frame=float(math.ceil(self.frame - 0.5)))
 
     @property
-    def colors(self) -> ColorSettings:
-        """Colour space of the input, and display of the pictures."""
-        given: dict[str, Any] = dict(self.color)
-        return ColorSettings(**given)
-
-    @property
-    def read_as(self) -> tuple[tuple[str, object], ...]:
+    def read_as(self) -> ColorSettings:
         """Of `color` what changes how files are read, not only how they are shown."""
-        given = dict(self.color)
-        return tuple((n, given.get(n)) for n in ("from_", "ocio")) if "from_" in given else ()
+        color = self.color
+        return ColorSettings(from_=color.from_, ocio=color.ocio if color.from_ else None)
 
     @property
     def span(self) -> tuple[int, int]:
@@ -170,17 +155,22 @@ class State:
         ):
             known = f"{', '.join(builtin.SCENES)}{did_you_mean(source, builtin.SCENES)}"
             raise InputError(f"no such file or scene: {source!r}; scenes: {known}")
-        color = _changed(self.color, "from_", None)
-        state = replace(self.unmoved(), source=source, settings=(), given=(), color=color)
-        state = replace(state, pace="1", video=(), own_times=False)
-        if max_mb != limits.MAX_MB:
-            state = replace(state, given=(("max_mb", max_mb),))
-        before, after = self.suited(), state.suited()
-        for name, value in after.items():  # what was as the last scene asks for follows the new one
-            if getattr(self, name) == before[name]:
-                state = replace(state, **{name: value})
-        if state.method != self.method:
-            state = replace(state, options=())
+        seen = self.unmoved()
+        state = replace(
+            seen,
+            source=source,
+            scene=replace(seen.scene, set=()),
+            input=InputSettings(max_mb=max_mb),
+            blur=replace(self.blur, **dict.fromkeys(MASKS, ())),
+            color=replace(self.color, from_=None),
+            video=VideoSettings(flow=self.video.flow, flow_quality=self.video.flow_quality),
+            own_times=False,
+        )
+        was, suited = self.suited(), state.suited()
+        if self.tone == self.suited_tone:  # what was as the last source asks for follows this one
+            state = replace(state, tone=state.suited_tone)
+        follows = {n: v for n, v in suited.items() if self.setting(n) == was[n]}
+        state = state.with_method(follows.pop("method", state.method)).with_settings(**follows)
         if state.is_scene:
             plain, loop = State(), builtin.make(source).loop
             if loop:
@@ -193,13 +183,16 @@ class State:
         return replace(state, frames=frames, frame=math.nan, speed=1.0).settled()
 
     def suited(self) -> dict[str, Any]:
-        """Method, shutter, curve and tone that the source asks for; else those that are usual."""
+        """Method, shutter and curve that the source asks for; else those that are usual."""
         scene = builtin.make(self.source) if self.is_scene else None
-        when = ShutterSettings().resolved(scene, self.fps)
-        volumes = scene is not None and scene.has_volumes
-        method = "volume" if volumes else "gather"  # where frames have no depth: tap
-        tone = "soft" if self.is_video and video_time.is_hdr(self) else "clip"
-        return {"method": method, "shutter": when.shutter, "curve": when.curve, "tone": tone}
+        own = ShutterSettings().resolved(scene, self.fps)
+        method = BlurSettings().resolved(scene).method  # where frames have no depth: tap
+        return {"method": method, "shutter": own.shutter, "curve": own.curve}
+
+    @property
+    def suited_tone(self) -> str:
+        """The tone that the source asks for."""
+        return "soft" if self.is_video and video_time.is_hdr(self) else "clip"
 
     def settled(self) -> State:
         """The same, its moment within its frames."""
@@ -207,54 +200,47 @@ class State:
         frame = min(max(self.frame, first), last) if math.isfinite(self.frame) else float(first)
         return replace(self, frame=frame)
 
-    def with_video(self, name: str, value: object) -> State:
-        """The same with another of the VideoSettings, at the same time in the video."""
-        value = None if value == DEFAULTS[name] else value
-        return video_time.retimed(self, video=_changed(self.video, name, value))
-
     def unmoved(self) -> State:
         """The same, seen from where the scene's own camera is."""
-        return replace(self, orbit=(0.0, 0.0), pan=(0.0, 0.0), dolly=1.0, zoom=1.0,
-                       center=(0.5, 0.5))  # fmt: skip
+        own = SceneSettings()
+        scene = replace(self.scene, orbit=own.orbit, pan=own.pan, dolly=own.dolly)
+        return replace(self, scene=scene, zoom=1.0, center=(0.5, 0.5))
 
-    def with_setting(self, name: str, value: float | str) -> State:
-        """The same with another parameter of the scene."""
-        return replace(self, settings=_changed(self.settings, name, value))
+    def setting(self, name: str) -> Any:
+        """An option, whichever group it is in."""
+        return getattr(getattr(self, GROUP_OF[name]), name)
 
-    def with_option(self, name: str, value: object) -> State:
-        """The same with an option of the method changed; None is its default."""
-        return replace(self, options=_changed(self.options, name, value))
-
-    def with_color(self, **changes: object) -> State:
-        """The same with some of the ColorSettings changed; None is the default."""
-        color = self.color
+    def with_settings(self, **changes: Any) -> State:
+        """The same with other values of options, whichever groups they are in."""
+        groups: dict[str, dict[str, Any]] = {}
         for name, value in changes.items():
-            color = _changed(color, name, value)
-        return replace(self, color=color)
+            groups.setdefault(GROUP_OF[name], {})[name] = value
+        new = {group: replace(getattr(self, group), **some) for group, some in groups.items()}
+        return replace(self, **new)
+
+    def with_video(self, **changes: Any) -> State:
+        """The same with others of the VideoSettings, at the same time in the video."""
+        return video_time.retimed(self, video=replace(self.video, **changes))
+
+    def with_parameter(self, name: str, value: float | str) -> State:
+        """The same with another value of a parameter of the scene."""
+        kept = tuple(text for text in self.scene.set if text.partition("=")[0] != name)
+        text = f"{name}={value}" if isinstance(value, str) else f"{name}={value:g}"
+        return self.with_settings(set=(*kept, text))
 
     def with_method(self, method: str) -> State:
         """The same with another method, whose options are its own."""
-        return replace(self, method=method, options=()) if method != self.method else self
+        if method == self.method:
+            return self
+        return self.with_settings(
+            method=method, **{name: DEFAULTS[name] for name in METHOD_OPTIONS}
+        )
 
-    def told(self, given: dict[str, object]) -> State:
+    def told(self, given: dict[str, Any]) -> State:
         """The same with options of the command line, those that are not their defaults."""
         said = {name: value for name, value in given.items() if value != DEFAULTS[name]}
         check_said(self, said)
-        state = replace(self, pace=str(said.pop("speed", self.pace)))
-        own = {f.name for f in fields(self)} - saved.COLORS
-        state = replace(state, **{n: v for n, v in said.items() if n in own})
-        if not self.is_scene:
-            found = {n: v for n, v in said.items() if n in INPUTS}
-            state = replace(state, given=tuple((dict(state.given) | found).items()))
-        for name in VIDEO - own:
-            if name in said:
-                state = replace(state, video=_changed(state.video, name, said[name]))
-        of_files = () if self.is_scene else ("from_",)
-        shown = [name for name in saved.COLORS if not name.endswith("_") or name in of_files]
-        state = state.with_color(**{name: said[name] for name in sorted(shown) if name in said})
-        for name in METHOD_OPTIONS:
-            if name in said:
-                state = state.with_option(name, said[name])
+        state = replace(self, frames=said.pop("frames", self.frames)).with_settings(**said)
         if state.method not in METHODS:
             known = f"available: {', '.join(METHODS)}{did_you_mean(state.method, METHODS)}"
             raise InputError(f"unknown method {state.method!r}; {known}")
@@ -265,37 +251,16 @@ class State:
 
     def arguments(self) -> dict[str, object]:
         """Every option of `wgmb render` or `wgmb blur` that this state sets, by its name."""
-        look: dict[str, object] = {
-            "method": self.method,
-            "samples": self.samples,
-            "jitter": self.jitter,
-            "max_blur": self.max_blur,
-            **dict(self.options),
-            "shutter": self.shutter,
-            "phase": self.phase,
-            "curve": self.curve,
-            "rolling": self.rolling,
-            "rolling_duration": self.rolling_duration,
-            "fps": video_time.SOURCE if self.own_times else str(video_time.rate(self)),
-            **dict(self.color),
-        }
+        given: dict[str, object] = {"scene" if self.is_scene else "pattern": self.source}
+        for group in ("scene" if self.is_scene else "input", "blur", "shutter"):
+            given |= written(group, getattr(self, group))
+        given["fps"] = video_time.SOURCE if self.own_times else str(video_time.rate(self))
+        given |= written("color", self.color)
         if self.is_video:
-            look |= {"flow": self.flow, "flow_quality": self.flow_quality, "speed": self.pace}
-            look |= dict(self.video)
+            given |= written("video", self.video)
             if not self.own_times and video_time.is_own_rate(self):
-                del look["fps"]
-        if not self.is_scene:
-            return {"pattern": self.source, **dict(self.given), **look}
-        return {
-            "scene": self.source,
-            "set": set_words(self.settings),
-            "size": self.size,
-            "antialias": self.antialias,
-            "orbit": list(self.orbit),
-            "pan": list(self.pan),
-            "dolly": self.dolly,
-            **look,
-        }
+                del given["fps"]
+        return given
 
     def command(self, output: str) -> list[str]:
         """The words after `wgmb` that make `output` of all `frames` as they are seen here."""
@@ -303,10 +268,10 @@ class State:
         source = str(given.pop("scene" if self.is_scene else "pattern"))
         words = ["render" if self.is_scene else "blur", no_option(source)]
         words += ["-o", no_option(output)]
-        if self.is_scene or self.frames != frames_of(source, video_time.most_mb(self)):
+        if self.is_scene or self.frames != frames_of(source, self.input.max_mb):
             words += ["--frames", self.frames]
         if self.is_video:  # which keeps its own colours
-            given = {name: value for name, value in given.items() if name not in saved.COLORS}
+            given = {n: v for n, v in given.items() if GROUP_OF.get(n) != "color"}
         return words + words_of(given)
 
     # ---- TOML ----------------------------------------------------------------------------
@@ -337,18 +302,16 @@ class State:
         if on_disk == (source in builtin.SCENES):
             raise InputError(f"settings: {source!r} is {'' if on_disk else 'not '}a built-in scene")
         given.pop("time", None)
-        state = State(source, **saved.values(given, tables.get("view", {}), State, on_disk=on_disk))
+        values = saved.values(given, tables.get("view", {}), State(), on_disk=on_disk)
+        state = State(source, **values)
         if state.is_video:
             state = video_time.completed(state, {*given, *tables.get("view", {})})
         Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
         video_time.check(state)
-        saved.check_words(state, method=METHODS, compare=COMPARE, tone=TONES)
+        saved.check_words("method", state.blur.method, METHODS)
+        saved.check_words("compare", state.compare, COMPARE)
+        saved.check_words("tone", state.tone, TONES)
         return state.settled()
 
 
 _SHOWING = (*(name for name in saved.VIEW if name != "frame"), "help")
-
-
-def _changed(pairs: tuple, name: str, value: object) -> tuple:
-    kept = tuple(pair for pair in pairs if pair[0] != name)
-    return kept if value is None else (*kept, (name, value))

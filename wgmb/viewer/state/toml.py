@@ -5,40 +5,26 @@ from __future__ import annotations
 import json
 import typing
 from collections.abc import Collection
-from dataclasses import fields
+from dataclasses import replace
 from typing import Any
 
 from ...errors import InputError
-from ...settings import (
-    METHOD_OPTIONS,
-    BlurSettings,
-    InputSettings,
-    OutputSettings,
-    SceneSettings,
-    ShutterSettings,
-    rate_of,
-)
-from ...settings.color import ColorSettings
+from ...settings import parameters_of, rate_of
 from ...settings.toml import parse
 from ...settings.typed import typed
-from ...settings.video import VideoSettings
 from .allowed import INPUTS, VIDEO
+from .groups import GROUP_OF, GROUPS
 
-GROUPS = (
-    BlurSettings, ShutterSettings, SceneSettings, OutputSettings, InputSettings, ColorSettings,
-    VideoSettings,
-)  # fmt: skip
-COLORS = frozenset(f.name for f in fields(ColorSettings))
-"""Options of colours; of scenes all but `from_`, as files write `from`."""
 VIEW = (
     "frames", "frame", "look", "eyes", "compare", "against", "wipe", "gain", "fastest", "middle",
     "exposure", "tone", "cone_rate", "cone_peak", "zoom", "center", "playing", "speed", "panel",
 )  # fmt: skip
 """Options of the viewer alone, and the frame shown."""
+_OF_SCENES = frozenset(name for name, group in GROUP_OF.items() if group == "scene")
 
 
 def toml(tables: dict[str, dict[str, object]]) -> str:
-    """The tables as text; what is None or an empty list is left out."""
+    """The tables as text; what is None is left out."""
     return "\n".join(
         f"[{name}]\n" + "".join(_line(k.rstrip("_"), v) for k, v in table.items())
         for name, table in tables.items()
@@ -46,7 +32,7 @@ def toml(tables: dict[str, dict[str, object]]) -> str:
 
 
 def _line(name: str, value: object) -> str:
-    if value is None or value == []:
+    if value is None:
         return ""
     plain = list(value) if isinstance(value, tuple) else value
     text = json.dumps(plain, ensure_ascii=False, default=str)
@@ -65,65 +51,34 @@ def tables(text: str) -> dict[str, dict]:
     return found
 
 
-def values(given: dict[str, Any], view: dict[str, Any], state: type, on_disk: bool) -> dict:
-    """Fields of the dataclass `state` from what the tables [render], or [blur], and [view] hold."""
-    known = _hints(*GROUPS) | {"fps": str | float}
-    own = {f.name for f in fields(state)} & known.keys() - set(VIEW)
-    own -= set() if on_disk else VIDEO
-    allowed = own | {"set", *METHOD_OPTIONS} | (INPUTS | VIDEO if on_disk else set())
-    allowed |= COLORS if on_disk else COLORS - {"from_"}
+def values(given: dict[str, Any], view: dict[str, Any], plain: object, on_disk: bool) -> dict:
+    """Fields of the State `plain`, changed to what [render], or [blur], and [view] hold."""
+    known = {"fps": str | float}
+    for group in GROUPS.values():
+        known |= typing.get_type_hints(group)
+    allowed = {"fps", *GROUP_OF} - (_OF_SCENES if on_disk else INPUTS | VIDEO | {"from_"})
     found: dict[str, Any] = {}
-    pairs: dict[str, list] = {"settings": [], "options": [], "given": [], "color": [], "video": []}
+    groups: dict[str, dict[str, Any]] = {name: {} for name in GROUPS}
     for word, value in given.items():
         name = "from_" if word == "from" else word
         if name not in allowed or word == "from_":
             raise InputError(f"settings: unknown name {word!r}")
         fit = typed(f"settings: {name}", value, known[name])
-        if name == "speed":  # of the output; in [view] it is that of the playing
-            found["pace"] = fit
-        elif name == "set":
-            pairs["settings"] = [_setting(text) for text in fit]
-        elif name == "fps" and fit == "source" and on_disk:
-            found["own_times"] = True
-        elif name in own:
-            found[name] = float(rate_of(str(fit))) if name == "fps" else fit
+        if name == "fps":
+            own_times = fit == "source" and on_disk
+            found |= {"own_times": True} if own_times else {"fps": float(rate_of(str(fit)))}
         else:
-            pairs[_group(name)].append((name, fit))
-    hints = _hints(state)
+            groups[GROUP_OF[name]][name] = fit
+    parameters_of(groups["scene"].get("set", ()))
+    hints = typing.get_type_hints(type(plain))
     for name, value in view.items():
         if name not in VIEW:
             raise InputError(f"settings: [view] has no {name!r}; available: {', '.join(VIEW)}")
         found[name] = typed(f"settings: {name}", value, hints[name])
-    return found | {name: tuple(some) for name, some in pairs.items()}
+    return found | {name: replace(getattr(plain, name), **some) for name, some in groups.items()}
 
 
-def _group(name: str) -> str:
-    """The field of a State that keeps an option."""
-    if name in METHOD_OPTIONS:
-        return "options"
-    return "color" if name in COLORS else "video" if name in VIDEO else "given"
-
-
-def _setting(text: str) -> tuple[str, float | str]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise InputError(f"settings: set takes NAME=VALUE, got {text!r}")
-    try:
-        return name, float(value)
-    except ValueError:
-        return name, value
-
-
-def _hints(*groups: type) -> dict[str, Any]:
-    """The types of all fields of the dataclasses, by name; the first one counts."""
-    found: dict[str, Any] = {}
-    for group in groups:
-        found = typing.get_type_hints(group) | found
-    return found
-
-
-def check_words(state: object, **known: Collection[str]) -> None:
-    """InputError for a field whose value is none of those that are known."""
-    for name, words in known.items():
-        if (value := getattr(state, name)) not in words:
-            raise InputError(f"settings: {name} must be one of {', '.join(words)}, got {value!r}")
+def check_words(name: str, value: str | None, known: Collection[str]) -> None:
+    """InputError for a value that is none of those that are known."""
+    if value not in known:
+        raise InputError(f"settings: {name} must be one of {', '.join(known)}, got {value!r}")

@@ -11,10 +11,8 @@ from typing import TYPE_CHECKING, Any
 from ...color.coding import HLG, PQ
 from ...color.highlights import check as check_highlights
 from ...color.highlights import check_coding
-from ...io import limits
 from ...io.frame_numbers import frame_numbers
 from ...settings import rate_of
-from ...settings.video import VideoSettings
 from ...video.output_times import OutputFrame
 from .files import (
     VideoOutput,
@@ -30,49 +28,36 @@ SOURCE = "source"
 """As a rate: an output frame for each picture of a video, at its time."""
 
 
-def settings_of(state: State) -> VideoSettings:
-    """All options of a video's motion, time and encoding."""
-    found: dict[str, Any] = dict(state.video)
-    found |= {"flow": state.flow, "flow_quality": state.flow_quality}
-    return VideoSettings(speed=state.pace, **found)
-
-
 def check(state: State) -> None:
     """InputError for options that make no sense."""
-    settings = settings_of(state)
-    check_highlights(settings.highlights)
-    if settings.highlights != 1:
-        footage = footage_of(state.source, most_mb(state))
-        check_coding(settings.highlights, footage.path, footage.coding)
-    _ = settings.pace, settings.range
-
-
-def most_mb(state: State) -> float:
-    """The largest picture that is read (see InputSettings)."""
-    found: Any = dict(state.given).get("max_mb", limits.MAX_MB)
-    return found
+    video = state.video
+    check_highlights(video.highlights)
+    if video.highlights != 1:
+        footage = footage_of(state.source, state.input.max_mb)
+        check_coding(video.highlights, footage.path, footage.coding)
+    _ = video.pace, video.range
 
 
 def own_rate(state: State) -> Fraction:
     """Pictures a second of the video."""
-    return footage_of(state.source, most_mb(state)).rate
+    return footage_of(state.source, state.input.max_mb).rate
 
 
 def is_own_rate(state: State) -> bool:
     """Return True if the video keeps a steady rate, and the output has it too."""
-    has_rate = footage_of(state.source, most_mb(state)).has_rate
+    has_rate = footage_of(state.source, state.input.max_mb).has_rate
     return has_rate and rate(state) == own_rate(state)
 
 
 def at_own_rate(state: State) -> State:
     """The same at the rate of the video, or at the times of its pictures if it keeps no rate."""
-    footage = footage_of(state.source, most_mb(state))
+    footage = footage_of(state.source, state.input.max_mb)
     return replace(state, own_times=not footage.has_rate, fps=float(footage.rate))
 
 
 def is_hdr(state: State) -> bool:
     """Return True if the video holds light above white."""
-    return footage_of(state.source, most_mb(state)).coding.transfer in (PQ, HLG)
+    return footage_of(state.source, state.input.max_mb).coding.transfer in (PQ, HLG)
 
 
 def rate(state: State) -> Fraction:
@@ -89,16 +74,16 @@ def completed(state: State, said: Collection[str]) -> State:
     elif state.own_times:
         state = replace(state, fps=float(own_rate(state)))
     if "frames" not in said:
-        state = replace(state, frames=frames_of(state.source, most_mb(state)))
+        state = replace(state, frames=frames_of(state.source, state.input.max_mb))
     return state
 
 
 def output(state: State) -> VideoOutput:
     """The output frames; InputError if the part that is chosen holds none."""
-    most = most_mb(state)
+    most = state.input.max_mb
     frames = None if state.frames == frames_of(state.source, most) else state.frames
     footage, fps = footage_of(state.source, most), None if state.own_times else rate(state)
-    return output_of(footage, frames, settings_of(state), fps)
+    return output_of(footage, frames, state.video, fps)
 
 
 def moment(state: State) -> OutputFrame:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import fields
 
 from ...settings.color import option_name
-from . import toml
+from .groups import DEFAULTS
 
-DEFAULTS = {f.name: f.default for group in toml.GROUPS for f in fields(group)}
-"""Defaults of the command line's options."""
 _REPEATED = ("set", "also", "holdout", "scale")
 
 
@@ -32,14 +29,6 @@ def words_of(options: dict[str, object]) -> list[str]:
         else:
             words += _said(flag, f"{value:g}" if isinstance(value, float) else str(value))
     return words
-
-
-def set_words(settings: tuple[tuple[str, float | str], ...]) -> tuple[str, ...]:
-    """A scene's parameters as --set takes them."""
-    return tuple(
-        f"{name}={value}" if isinstance(value, str) else f"{name}={value:g}"
-        for name, value in settings
-    )
 
 
 def no_option(name: str) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import fields, replace
-from typing import Any
 
 import numpy as np
 import wgpu
@@ -29,9 +28,8 @@ from ...sequence.data_windows import (
 )
 from ...sequence.frame_file import FrameFile
 from ...sequence.input_color import space_of, without_pixels
-from ...settings import InputSettings, SceneSettings, size_of
+from ...settings import size_of
 from ..state.state import BOTH_EYES, State
-from ..state.words import set_words
 from .video import VideoSubject
 
 _MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
@@ -75,7 +73,7 @@ class SceneSubject:
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height that give the picture its shape [px]."""
-        return size_of(state.size)
+        return size_of(state.scene.size)
 
     def space(self, config: ColorConfig) -> ColorSpace:
         """The colour space."""
@@ -90,15 +88,9 @@ class SceneSubject:
         self._time, self._number = state.frame / state.fps, int(state.frame // 1)
 
     def _scene(self, state: State) -> Scene:
-        seen = (state.source, state.settings, state.orbit, state.pan, state.dolly)
+        seen = state.source, state.scene
         if seen != self._seen:
-            given = SceneSettings(
-                set=set_words(state.settings),
-                orbit=state.orbit,
-                pan=state.pan,
-                dolly=state.dolly,
-            )
-            self._made, self._seen = given.make(state.source), seen
+            self._made, self._seen = state.scene.make(state.source), seen
         return self._made
 
     def passes(self) -> dict[str, Texture]:
@@ -123,10 +115,8 @@ class ClipSubject:
 
     def __init__(self, device: wgpu.GPUDevice, state: State, display: Display | None):
         self._device, self._images = device, TexturePool(device)
-        given: dict[str, Any] = dict(state.given)
-        masks = given.pop("holdout", ()), given.pop("scale", ())
-        space = state.colors.space(display)
-        self._clip = InputSettings(**given).open(state.source, *masks, space)
+        blur, space = state.blur, state.color.space(display)
+        self._clip = state.input.open(state.source, blur.holdout, blur.scale, space)
         self._said: dict[tuple, FrameFile] = {}  # what the frames say of their colours
         self._frames: OrderedDict[_Which, Frame] = OrderedDict()
         self._sharp = Blur("tap", device=device)
@@ -183,7 +173,7 @@ class ClipSubject:
         number = min(self._clip.numbers, key=lambda n: abs(n - state.frame))
         default = self.eyes[0] if self.eyes else None
         eye = eye or (state.eyes if state.eyes in self.eyes else default)
-        reach = dict(state.options).get("reach", 1)
+        reach = state.setting("reach")
         is_pair = state.mode in BOTH_EYES and len(self.eyes) > 1
         return number, eye, is_pair, reach if isinstance(reach, int) else 1
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import wgpu
@@ -26,12 +25,7 @@ from ...video.planes import Planes
 from ..state.allowed import check_video
 from ..state.files import footage_of
 from ..state.state import State
-from ..state.video_time import (
-    moment,
-    most_mb,
-    output,
-    settings_of,
-)
+from ..state.video_time import moment, output
 from .motion_thread import MotionThread
 from .video_exposure import Knowledge, VideoExposure, exposed, reach
 from .video_frames import FootageFrames
@@ -50,13 +44,12 @@ class VideoSubject:
 
     def __init__(self, device: wgpu.GPUDevice, state: State):
         check_video(state)
-        given: dict[str, Any] = dict(state.given)
-        max_mb, masks = most_mb(state), given.get("holdout", ())
+        max_mb, masks, settings = state.input.max_mb, state.blur.holdout, state.video
         self._device, self._images = device, TexturePool(device)
         self._footage = footage_of(state.source, max_mb)
-        self._times, settings = self._footage.times, settings_of(state)
+        self._times = self._footage.times
         holdout_of([mask for mask in masks if mask != STATIC], self._footage)  # says what is wrong
-        wish = MotionRequest(masks, settings.duplicates == "fill", given.get("cuts") or "")
+        wish = MotionRequest(masks, settings.duplicates == "fill", state.input.cuts or "")
         self._maker = MotionThread(self._footage.path, max_mb, settings, device, wish)
         self._moves = settings.flow != "none"
         self.finding = "\n".join([f"motion: {self._maker.how}", *self._footage.notes])
@@ -171,7 +164,7 @@ class VideoSubject:
     ) -> None:
         """Set the content of the next draws."""
         self._state = state
-        highlights = settings_of(state).highlights
+        highlights = state.video.highlights
         if highlights != self._frames.highlights:
             check_coding(highlights, self._footage.path, self.coding)
             known = self._maker.known

@@ -1,0 +1,59 @@
+"""The settings' own groups that a State holds, and which of them an option belongs to."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+from ...settings import (
+    METHOD_OPTIONS,
+    BlurSettings,
+    InputSettings,
+    OutputSettings,
+    SceneSettings,
+    ShutterSettings,
+)
+from ...settings.color import ColorSettings
+from ...settings.video import VideoSettings
+
+GROUPS = {
+    "blur": BlurSettings,
+    "shutter": ShutterSettings,
+    "scene": SceneSettings,
+    "input": InputSettings,
+    "color": ColorSettings,
+    "video": VideoSettings,
+}
+"""Settings by the name of a State's field."""
+GROUP_OF = {
+    field.name: name
+    for name, group in GROUPS.items()
+    for field in fields(group)
+    if field.name not in ("frames", "time")  # of all that is shown, a State has its own
+}
+"""The field of a State that holds an option."""
+DEFAULTS = {
+    f.name: f.default for group in (*GROUPS.values(), OutputSettings) for f in fields(group)
+}
+"""Defaults of the command line's options."""
+MASKS = ("holdout", "scale")
+"""Options of the blur that say what files hold."""
+
+_ALWAYS = {
+    *(name for name, home in GROUP_OF.items() if home in ("blur", "shutter", "scene")),
+    *("flow", "flow_quality", "speed"),
+} - {*METHOD_OPTIONS, *MASKS}  # are written even where they are as by default
+
+
+def changed(name: str, group: object) -> dict[str, object]:
+    """The options of a State's group that differ from their defaults."""
+    values = {option: getattr(group, option) for option, of in GROUP_OF.items() if of == name}
+    return {option: value for option, value in values.items() if value != DEFAULTS[option]}
+
+
+def written(name: str, group: object) -> dict[str, object]:
+    """The options of a State's group that a settings file names."""
+    return {
+        option: getattr(group, option)
+        for option, of in GROUP_OF.items()
+        if of == name and (option in _ALWAYS or getattr(group, option) != DEFAULTS[option])
+    }
