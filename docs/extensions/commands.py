@@ -12,12 +12,11 @@ from cyclopts import App
 from sphinx.application import Sphinx
 
 from wgmb.cli.app import COMMANDS, make_app
+from wgmb.cli.help import GROUPS, MAIN, about, place
 from wgmb.scene import builtin
 from wgmb.sequence.layers.vectors import CONVENTIONS
 
 _KINDS = {bool: "", int: "N", float: "X", str: "TEXT", Path: "PATH"}
-_TITLES = {"Parameters": "General"}
-_GROUPS = ("Parameters", "Input", "Compare", "Blur", "Shutter", "Perception", "Colour", "Output")
 
 
 def reference() -> str:
@@ -51,35 +50,30 @@ def _command(name: str, command: App) -> str:
     found = command.assemble_argument_collection(parse_docstring=True)
     shown = [argument for argument in found if argument.show]
     words = [_usage(argument) for argument in shown if argument.required]
-    text, examples = _help(command)
+    paragraphs, examples = about(command)
+    text = "\n\n".join(map(_plain, paragraphs))
     lines = [f"(wgmb-{name})=", f"## wgmb {name}", "", text, ""]
     lines += ["```sh", f"wgmb {' '.join((name, *words))} [OPTIONS]", *examples, "```", ""]
-    groups: dict[str, list[Any]] = {}
+    groups: dict[str, list[Any]] = {group.name: [] for group in GROUPS}
     for argument in shown:
         groups.setdefault(argument.parameter.group[0].name, []).append(argument)
-    for group in sorted(groups, key=lambda g: _GROUPS.index(g) if g in _GROUPS else 99):
-        lines += [f"### {_TITLES.get(group, group)}", ""]
-        for argument in groups[group]:
+    groups[MAIN.name].sort(key=lambda one: (not _is_position(one), place(one.names)))
+    for group, found in groups.items():
+        lines += [f"### {group}", ""] if found else []
+        for argument in found:
             lines += [*_option(name, argument), ""]
     return "\n".join(lines)
 
 
-def _help(command: App) -> tuple[str, list[str]]:
-    """Description of a command, and its examples."""
-    paragraphs = inspect.getdoc(command.default_command).split("\n\n")
-    about = paragraphs[: next(
-        (i for i, p in enumerate(paragraphs) if p.startswith("Parameters\n")), len(paragraphs)
-    )]  # fmt: skip
-    examples = [line.removeprefix("Example: ") for p in about for line in p.splitlines()
-                if line.startswith("Example: ")]  # fmt: skip
-    text = [p for p in about if not p.startswith("Example: ")]
-    return "\n\n".join(map(_plain, text)), examples
+def _is_position(argument) -> bool:
+    """True if an argument needs no name."""
+    return argument.field_info.is_positional and not argument.field_info.is_keyword_only
 
 
 def _names(argument) -> list[str]:
     """Names of an option, the long form first; a position has its name in capitals."""
     names = [n for n in argument.names if not n.startswith(("--no-", "--empty-"))]
-    if argument.field_info.is_positional and not argument.field_info.is_keyword_only:
+    if _is_position(argument):
         return [names[0].lstrip("-").upper()]
     return sorted(names, key=len, reverse=True)
 
@@ -112,7 +106,7 @@ def _option(command: str, argument) -> list[str]:
         shown = f"{shown:g}" if isinstance(shown, float) else shown
         notes.append(f"Default: `{shown}`.")
     written = ", ".join(f"`{name} {kind}`".replace(" `", "`") for name in names)
-    about = _plain(argument.parameter.help or "")
+    about = _plain(" ".join((argument.parameter.help or "").split()))
     anchor = f"wgmb-{command}-{names[0].strip('-').lower()}"
     return [f"({anchor})=", written, f": {' '.join((about, *notes))}"]
 

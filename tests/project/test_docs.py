@@ -40,7 +40,7 @@ def options() -> set[str]:
     commands = [*COMMANDS.values(), app["--install-completion"]]
     found = [command.assemble_argument_collection() for command in commands]
     names = {name for arguments in found for argument in arguments for name in argument.names}
-    return names | {"--help", "--version"}
+    return names | {*app.help_flags, *app.version_flags}
 
 
 WITH_PYTHON = [name for name, text in PAGES.items() if blocks(text, "python")]

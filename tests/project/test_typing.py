@@ -12,7 +12,7 @@ from wgmb.methods import METHODS
 from wgmb.methods.keywords import Curve, MethodKeywords, MethodName
 from wgmb.methods.options import options_of
 from wgmb.pipeline.one_frame import FrameKeywords
-from wgmb.run.video import PictureOptions, VideoOptions
+from wgmb.run.video import PictureKeywords, VideoKeywords
 from wgmb.shutter import CURVES
 
 RIGHT = """
@@ -80,4 +80,4 @@ def test_keywords_are_the_options_of_the_methods():
         assert set(get_args(hint)) == choices, name
         assert choices or {hint} == {option.kind for option in same}, name
     assert set(PASSES) - {"to_next"} <= set(get_type_hints(FrameKeywords))
-    assert set(get_type_hints(PictureOptions)) < set(get_type_hints(VideoOptions))
+    assert set(get_type_hints(PictureKeywords)) < set(get_type_hints(VideoKeywords))

@@ -16,7 +16,7 @@ from wgmb.cli.commands.blur_video import tell_how
 from wgmb.color.srgb import linear, srgb, to_display
 from wgmb.extras import install_command
 from wgmb.run import video_output
-from wgmb.run.video import VideoOptions, VideoRequest, blur_video
+from wgmb.run.video import VideoKeywords, VideoRequest, blur_video
 from wgmb.settings import BlurSettings, OutputSettings, ShutterSettings
 from wgmb.settings.video import FlowSettings, VideoSettings
 from wgmb.video.read.reader import VideoReader
@@ -467,4 +467,8 @@ def test_every_setting_of_a_video_is_a_keyword():
     groups = BlurSettings, ShutterSettings, OutputSettings, VideoSettings
     names = {field.name for group in groups for field in fields(group)}
     only_frames = {"scale", "output", "layers", "window"}
-    assert VideoOptions.__annotations__.keys() == names - only_frames | {"frames", "cuts", "max_mb"}
+    assert VideoKeywords.__annotations__.keys() == names - only_frames | {
+        "frames",
+        "cuts",
+        "max_mb",
+    }

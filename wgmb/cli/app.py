@@ -34,6 +34,7 @@ from .exit_codes import (
     SOME_FAILED,
     USAGE,
 )
+from .help import IN_FULL, MAIN, CommandHelp
 from .streams import named
 
 COMMANDS = {
@@ -54,9 +55,10 @@ COMMANDS = {
 
 
 def make_app(*whole: str) -> cyclopts.App:
-    """Return the program; commands in `whole` have full help, the others their line of COMMANDS.
+    """Return the program; commands in `whole` have a help, the others their line of COMMANDS.
 
-    Full help lies in a command's module, which `wgmb --help` must not load.
+    A help lies in a command's module, which `wgmb --help` must not load; help.py has its two
+    depths, of which "--help-all" in `whole` is the second.
     """
     app = cyclopts.App(
         name="wgmb",
@@ -67,6 +69,9 @@ def make_app(*whole: str) -> cyclopts.App:
         result_action="return_value",
         suppress_keyboard_interrupt=False,
         default_parameter=Parameter(negative=(), show_default=_default),
+        group_arguments=MAIN,
+        group_parameters=MAIN,
+        help_flags=("--help", "-h", IN_FULL),
     )
     app.command(
         "wgmb.cli.commands.completion:install_completion",
@@ -75,7 +80,10 @@ def make_app(*whole: str) -> cyclopts.App:
     )
     for name, line in COMMANDS.items():
         app.command(
-            f"wgmb.cli.commands.{name}:{name}", name=name, help=None if name in whole else line
+            f"wgmb.cli.commands.{name}:{name}",
+            name=name,
+            help=None if name in whole else line,
+            help_formatter=CommandHelp(app, name, IN_FULL in whole),
         )
     return app
 

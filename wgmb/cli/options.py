@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, TypeVar
+from pathlib import Path
+from typing import Annotated, TypeVar, get_type_hints
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from ..io import exr
 from ..io.suffixes import STILLS, VIDEOS
-from ..methods import METHODS
+from ..methods import FRAME_METHODS, METHODS
+from ..methods.options import options_of
 from ..scene import builtin
 from ..sequence.layers.vectors import CONVENTIONS
 from ..settings import (
@@ -23,6 +26,11 @@ from ..settings import (
 from ..settings.color import ColorSettings, DisplaySettings
 from ..settings.video import VideoSettings
 from ..shutter import CURVES, PHASES
+from .help import BLUR, COLOR, INPUT, MAIN, METHOD, OUTPUT, RUN, SHUTTER, VIDEO
+
+_SCENE_METHODS = [name for name in METHODS if name not in FRAME_METHODS]
+_OF_FRAMES = {name for method in FRAME_METHODS for name in options_of(METHODS[method].Options)}
+_OF_SCENES = METHOD_OPTIONS.keys() - _OF_FRAMES  # options that only methods for scenes have
 
 _Settings = TypeVar("_Settings", bound=type)
 
@@ -30,12 +38,39 @@ _Settings = TypeVar("_Settings", bound=type)
 def _with_help(settings: _Settings) -> _Settings:
     """Add the help texts of method-specific options."""
     for name, (kind, default, text) in METHOD_OPTIONS.items():
-        settings.__annotations__[name] = Annotated[kind, Parameter(help=f"{text}.")]
+        about = Parameter(help=f"{text}.", group=METHOD)
+        settings.__annotations__[name] = Annotated[kind, about]
         setattr(settings, name, default)
     return settings
 
 
+def _with(parameter: Parameter, *names: str) -> Callable[[_Settings], _Settings]:
+    """Add a Parameter to fields of settings."""
+
+    def add(settings: _Settings) -> _Settings:
+        # All types as objects: their names mean nothing in this module.
+        hints = get_type_hints(settings, include_extras=True)
+        for name, hint in hints.items():
+            settings.__annotations__[name] = Annotated[hint, parameter] if name in names else hint
+            if hasattr(settings, name):
+                setattr(settings, name, getattr(settings, name))
+        return settings
+
+    return add
+
+
+def _main(*names: str) -> Callable[[_Settings], _Settings]:
+    """Put fields into the panel MAIN."""
+    return _with(Parameter(group=MAIN), *names)
+
+
+def _without(*names: str) -> Callable[[_Settings], _Settings]:
+    """Leave fields out of the help of a command that has no use for them."""
+    return _with(Parameter(show=False), *names)
+
+
 @dataclass(frozen=True, kw_only=True)
+@_main("method", "samples", "holdout")
 @_with_help
 class BlurOptions(BlurSettings):
     """Blur method and options."""
@@ -60,12 +95,35 @@ class BlurOptions(BlurSettings):
     method: Annotated[
         str | None,
         Parameter(
-            help=f"{', '.join(METHODS)}; default: gather with depth or searched motion, else tap."
+            help=f"{', '.join(FRAME_METHODS)}, for scenes also {', '.join(_SCENE_METHODS)}; "
+            "by default the one that suits."
         ),
     ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
+@_without(*_OF_SCENES)
+class FrameBlurOptions(BlurOptions):
+    """Blur method and options, for rendered frames and videos."""
+
+    method: Annotated[
+        str | None,
+        Parameter(
+            help=f"{', '.join(FRAME_METHODS)}; default: gather with depth or searched motion, else "
+            "tap.",
+            group=MAIN,
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+@_without("holdout", "scale")
+class SceneBlurOptions(BlurOptions):
+    """Blur method and options, for built-in scenes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+@_main("shutter")
 class ShutterOptions(ShutterSettings):
     """Shutter angle, phase and curve."""
 
@@ -83,6 +141,7 @@ class ShutterOptions(ShutterSettings):
 
 
 @dataclass(frozen=True, kw_only=True)
+@_main("frames", "vectors")
 class InputOptions(InputSettings):
     """Input frames, layers and conventions."""
 
@@ -96,6 +155,7 @@ class InputOptions(InputSettings):
 
 
 @dataclass(frozen=True, kw_only=True)
+@_main("output", "fps", "resume", "overwrite")
 class OutputOptions(OutputSettings):
     """Output files."""
 
@@ -112,12 +172,38 @@ class OutputOptions(OutputSettings):
     ] = "zip"
 
 
-Inputs = Annotated[InputOptions, Parameter(name="*", group=Group("Input", sort_key=1))]
-SceneTimes = Annotated[SceneSettings, Parameter(name="*", group=Group("Input", sort_key=1))]
-Blurs = Annotated[BlurOptions, Parameter(name="*", group=Group("Blur", sort_key=2))]
-Shutters = Annotated[ShutterOptions, Parameter(name="*", group=Group("Shutter", sort_key=3))]
-Colors = Annotated[ColorSettings, Parameter(name="*", group=Group("Colour", sort_key=4))]
-DisplayOptions = Annotated[DisplaySettings, Parameter(name="*", group=Group("Colour", sort_key=4))]
-Videos = Annotated[VideoSettings, Parameter(name="*", group=Group("Video", sort_key=4))]
-Outputs = Annotated[OutputOptions, Parameter(name="*", group=Group("Output", sort_key=5))]
+@dataclass(frozen=True, kw_only=True)
+@_without("resume")
+class PerceivedOutputOptions(OutputOptions):
+    """Output files whose every frame depends on the previous ones."""
+
+
+@dataclass(frozen=True, kw_only=True)
+@_main("frames")
+class SceneOptions(SceneSettings):
+    """Times, image size, parameters and camera of a scene."""
+
+
+@dataclass(frozen=True, kw_only=True)
+@_main("begin", "end")
+class VideoOptions(VideoSettings):
+    """Motion, time and encoding of videos."""
+
+
+Inputs = Annotated[InputOptions, Parameter(name="*", group=INPUT)]
+SceneTimes = Annotated[SceneOptions, Parameter(name="*", group=INPUT)]
+Blurs = Annotated[BlurOptions, Parameter(name="*", group=BLUR)]
+FrameBlurs = Annotated[FrameBlurOptions, Parameter(name="*", group=BLUR)]
+SceneBlurs = Annotated[SceneBlurOptions, Parameter(name="*", group=BLUR)]
+Shutters = Annotated[ShutterOptions, Parameter(name="*", group=SHUTTER)]
+Colors = Annotated[ColorSettings, Parameter(name="*", group=COLOR)]
+DisplayOptions = Annotated[DisplaySettings, Parameter(name="*", group=COLOR)]
+Videos = Annotated[VideoOptions, Parameter(name="*", group=VIDEO)]
+Outputs = Annotated[OutputOptions, Parameter(name="*", group=OUTPUT)]
+PerceivedOutputs = Annotated[PerceivedOutputOptions, Parameter(name="*", group=OUTPUT)]
+Confidence = Annotated[bool, Parameter(group=OUTPUT)]
+ConfigFile = Annotated[Path | None, Parameter(name="--config", group=RUN)]
+Adapter = Annotated[str | None, Parameter(group=RUN)]
+Verbose = Annotated[bool, Parameter(alias="-v", group=RUN)]
+Quiet = Annotated[bool, Parameter(alias="-q", group=RUN)]
 SceneName = Annotated[str, Parameter(help=f"Scene: {', '.join(builtin.SCENES)}.")]

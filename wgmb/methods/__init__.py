@@ -16,6 +16,8 @@ from .volume import Volume
 
 _ALL = (Tap, Tiles, Gather, Fusion, Reproject, Volume, Accumulate, Distributed)
 METHODS: dict[str, type] = {m.name: m for m in _ALL}
+FRAME_METHODS = tuple(m.name for m in _ALL if "scene" not in m.needs)
+"""Methods that blur frames; the others draw scenes."""
 
 
 def default_method(has: Collection[str]) -> MethodName:

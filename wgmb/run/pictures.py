@@ -25,7 +25,7 @@ from ..video.exposures import Exposure, Exposures
 from ..video.output_times import SPARE, OutputFrame
 from ..video.thumbnail import Thumbnail
 from ..video.write.encoders import FINEST_RATE
-from .video import PictureOptions, request_of
+from .video import PictureKeywords, request_of
 
 TRANSFERS = {"srgb": SRGB, "linear": LINEAR, "pq": PQ, "hlg": HLG, "bt709": BT709}
 _BITS = {"uint8": 8, "uint16": 16, "float16": FLOAT, "float32": FLOAT, "float64": FLOAT}
@@ -175,7 +175,7 @@ def blur_pictures(
     transfer: Literal["srgb", "linear", "pq", "hlg", "bt709"] = "srgb",
     holdout: np.ndarray | None = None,
     device: wgpu.GPUDevice | str | None = None,
-    **settings: Unpack[PictureOptions],
+    **settings: Unpack[PictureKeywords],
 ) -> PictureBlur:
     """Blur pictures without vectors from anywhere: `wgmb blur` of a video, without the video.
 
@@ -198,7 +198,7 @@ def blur_pictures(
         raise InputError("`fps` needs the rate of the pictures; set `fps_in`")
     check_choice("transfer", transfer, TRANSFERS)
     rate = _RATE if fps_in is None else _rate("fps_in", fps_in)
-    request, _ = request_of(dict(settings), PictureOptions)
+    request, _ = request_of(dict(settings), PictureKeywords)
     if holdout is not None and request.video.flow == "none":
         raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
     if request.video.highlights != 1 and transfer in ("linear", "pq", "hlg"):

@@ -232,7 +232,7 @@ def _rate(reader: VideoReader, output: OutputSettings) -> tuple[Fraction | None,
     )
 
 
-class PictureOptions(MethodKeywords, total=False):
+class PictureKeywords(MethodKeywords, total=False):
     """Keywords of `blur_pictures`: options of `wgmb blur`, each with its meaning and default."""
 
     method: Literal["tap", "tiles", "gather", "fusion", "reproject"]
@@ -251,7 +251,7 @@ class PictureOptions(MethodKeywords, total=False):
     highlights: float
 
 
-class VideoOptions(PictureOptions, total=False):
+class VideoKeywords(PictureKeywords, total=False):
     """Keywords of `blur_video`: the options of `wgmb blur`, each with its meaning and default."""
 
     holdout: str | Sequence[str]
@@ -283,7 +283,7 @@ def blur_video(
     *,
     device: wgpu.GPUDevice | str | None = None,
     progress: Callable[[int, str], None] | None = None,
-    **settings: Unpack[VideoOptions],
+    **settings: Unpack[VideoKeywords],
 ) -> VideoReport:
     """Blur a video into a video, or into frames: `wgmb blur` from Python.
 
@@ -296,14 +296,14 @@ def blur_video(
 
     Example: wgmb.blur_video("in.mp4", "out.mp4", fps=60, shutter=180)
     """
-    request, given = request_of(dict(settings), VideoOptions)
+    request, given = request_of(dict(settings), VideoKeywords)
     run = request.open(device)
     kept = {one.name: given[one.name] for one in fields(OutputSettings) if one.name in given}
     return run(run.plan(source, OutputSettings(output=str(output), **kept)), progress)
 
 
 def request_of(
-    given: dict[str, Any], options: type[PictureOptions]
+    given: dict[str, Any], options: type[PictureKeywords]
 ) -> tuple[VideoRequest, dict[str, Any]]:
     """The request of a user's keywords, and the keywords as the settings hold them.
 

@@ -29,8 +29,16 @@ def _merged(options: list[tuple[str, Option]]) -> tuple[object, object, str]:
     if choices := dict.fromkeys(choice for _, option in options for choice in option.choices):
         kind = Literal[tuple(choices)]
     help_ = "; ".join(f"{method}: {option.help}" for method, option in options)
+    help_ = _SHARED_HELP.get(options[0][1].name, help_)
     return (bool, False, help_) if kind is bool else (kind | None, None, help_)  # pyright: ignore
 
+
+_SHARED_HELP = {
+    "variant": "Published form of a method instead of ours; see the method's page",
+    "show": "Show the method's own data instead of the picture: tiles (tiles), confidence (gather) "
+    "or count (reproject)",
+}
+"""Help of options that several methods have, each with its own meaning."""
 
 METHOD_OPTIONS = _method_options()
 """(type, default, help) of the options that only some methods have, by name."""
@@ -55,8 +63,8 @@ class BlurSettings:
     method: str | None = None
     "Blur method; by default gather with depth or searched motion, else tap."
     samples: int | Literal["auto"] | None = None
-    """Taps, images or rays per pixel: 16 (fusion: 8), or auto for motion from pictures;
-    auto: 1 per pixel of blur length, at most 64.
+    """Samples per pixel: 16 by default (fusion: 8). auto, the default for videos: as many as the
+    blur is long, at most 64.
     """
     jitter: float = 0.0
     "Jitter of the sample times, 0 to 1: trades banding for noise."

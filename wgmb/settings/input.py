@@ -48,9 +48,11 @@ class InputSettings:
     also: tuple[str, ...] = ()
     "Pattern of files with additional layers of the same frames; may be repeated."
     outside: Literal["auto", "nothing", "edge"] = "auto"
-    "Picture beyond a data window that ends within the image: nothing, or edge (pixels repeat)."
+    "Surroundings of a cropped frame: nothing, or its edge repeated."
     cuts: str | None = None
-    "Frames that begin a shot: 101,155, cut.edl[@FPS] or cut.otio; only:101,155 detects no others."
+    """Frames that begin a shot: 101,155, cut.edl[@FPS] or cut.otio; only:101,155 switches the
+    detection off.
+    """
     view: str | None = None
     "One view of stereo frames, such as left; by default all are blurred."
     skip_missing: bool = False

@@ -21,7 +21,7 @@ class ShutterSettings:
     """Shutter angle, phase and curve."""
 
     shutter: float | None = None
-    "Shutter angle in degrees; 360 is one frame interval. Default: 180 or the scene's."
+    "Shutter angle in degrees; 360 is one frame interval. Default: 180 (scenes: their own)."
     phase: str = "centre"
     "start (opens at the frame), centre, end (closes at it), or the time of its middle in frames."
     curve: str | None = None

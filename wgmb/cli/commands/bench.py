@@ -16,6 +16,7 @@ from ...pipeline.blur import Blur
 from ...settings import size_of
 from ...shutter import Shutter
 from .. import terminal
+from ..options import Adapter, Quiet
 from ..pages import (
     command_line,
     pages_of,
@@ -36,8 +37,8 @@ def bench(
     save: Path | None = None,
     against: Path | None = None,
     article: bool = False,
-    adapter: str | None = None,
-    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+    adapter: Adapter = None,
+    quiet: Quiet = False,
 ) -> int:
     """Time methods on this machine: median milliseconds per frame, transfers apart.
 

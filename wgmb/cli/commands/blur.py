@@ -19,18 +19,24 @@ from ...run.job_file import read_job
 from ...run.request import BlurRequest
 from ...sequence.frame_file import is_video
 from ...settings.color import ColorSettings, option_name
-from ...settings.video import VideoSettings
 from ..conclusion import conclude
+from ..help import INPUT, RUN, VIDEO
 from ..names import is_batch
 from ..options import (
-    BlurOptions,
-    Blurs,
+    Adapter,
     Colors,
+    Confidence,
+    ConfigFile,
+    FrameBlurOptions,
+    FrameBlurs,
     InputOptions,
     Inputs,
     Outputs,
+    Quiet,
     ShutterOptions,
     Shutters,
+    Verbose,
+    VideoOptions,
     Videos,
 )
 from ..spelling import as_options
@@ -40,22 +46,24 @@ from ..terminal import muted, note, progress
 def blur(
     patterns: Annotated[tuple[str, ...], Parameter(name="pattern")] = (),
     output: Outputs | None = None,
-    blur: Blurs = BlurOptions(),
+    blur: FrameBlurs = FrameBlurOptions(),
     shutter: Shutters = ShutterOptions(),
     input: Inputs = InputOptions(),
     color: Colors = ColorSettings(),
-    video: Videos = VideoSettings(),
+    video: Videos = VideoOptions(),
     *,
-    job: Path | None = None,
-    workers: int | Literal["auto"] | None = None,
-    cluster: str | None = None,
-    fps_in: str | None = None,
-    color_in: Literal["bt601", "bt709", "bt2020-pq", "bt2020-hlg"] | None = None,
-    confidence: bool = False,
-    config: Path | None = None,
-    adapter: str | None = None,
-    verbose: Annotated[bool, Parameter(alias="-v")] = False,
-    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+    job: Annotated[Path | None, Parameter(group=RUN)] = None,
+    workers: Annotated[int | Literal["auto"] | None, Parameter(group=RUN)] = None,
+    cluster: Annotated[str | None, Parameter(group=RUN)] = None,
+    fps_in: Annotated[str | None, Parameter(group=INPUT)] = None,
+    color_in: Annotated[
+        Literal["bt601", "bt709", "bt2020-pq", "bt2020-hlg"] | None, Parameter(group=VIDEO)
+    ] = None,
+    confidence: Confidence = False,
+    config: ConfigFile = None,
+    adapter: Adapter = None,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
 ) -> int:
     """Blur rendered frames or videos.
 
@@ -87,9 +95,8 @@ def blur(
     cluster
         Scheduler of dask.distributed whose workers share the frames, such as tcp://farm:8786.
     fps_in
-        Frames per second of the rendered frames, if --fps is another rate: each is blurred by its
-        own vectors over its share of an exposure. Output numbers begin with the first input number.
-        Of a pipe: its rate, if it says none or another.
+        Rate of the rendered frames, to convert them to --fps; of a pipe, if it states none or
+        another.
     color_in
         Colours of a pipe, which does not state them; by default as players assume.
     confidence
@@ -106,7 +113,13 @@ def blur(
     crew = _crew(workers, cluster)
     if job is not None:
         rest = replace(input, frames=None), blur, shutter, color, video, output
-        plain = InputOptions(), BlurOptions(), ShutterOptions(), ColorSettings(), VideoSettings()
+        plain = (
+            InputOptions(),
+            FrameBlurOptions(),
+            ShutterOptions(),
+            ColorSettings(),
+            VideoOptions(),
+        )
         if patterns or confidence or fps_in or config or rest != (*plain, None):
             raise InputError(
                 "--job holds all settings; only --frames, --workers, --cluster, --adapter, "

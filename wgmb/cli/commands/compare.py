@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from ... import gpu
 from ...errors import InputError, check_choice
@@ -29,12 +29,8 @@ from ...metrics import check_flip
 from ...scene.scene import Scene
 from ...settings import ShutterSettings, size_of
 from ...shutter import Shutter
-from ..options import (
-    InputOptions,
-    Inputs,
-    ShutterOptions,
-    Shutters,
-)
+from ..help import MAIN
+from ..options import Adapter, InputOptions, Inputs, Quiet, ShutterOptions, Shutters
 from ..pages import (
     command_line,
     pages_of,
@@ -89,7 +85,7 @@ class CompareSettings:
         return {f"{d:g}°": replace(settled, shutter=d).make() for d in degrees}
 
 
-Comparison = Annotated[CompareSettings, Parameter(name="*", group=Group("Compare", sort_key=2))]
+Comparison = Annotated[CompareSettings, Parameter(name="*", group=MAIN)]
 
 
 def compare(
@@ -106,9 +102,9 @@ def compare(
     frame: int | None = None,
     peer: tuple[str, ...] = (),
     experiment: str | None = None,
-    adapter: str | None = None,
+    adapter: Adapter = None,
     overwrite: bool = False,
-    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+    quiet: Quiet = False,
 ) -> int:
     """Score and time methods against a ground truth; write an HTML, JSON and CSV report.
 

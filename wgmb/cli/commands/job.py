@@ -17,18 +17,22 @@ from ...run.job_file import is_job, stored, time_there
 from ...run.request import BlurRequest
 from ...sequence.frame_file import is_video
 from ...settings.color import ColorSettings
-from ...settings.video import VideoSettings
 from .. import submit
 from ..exit_codes import DONE
 from ..options import (
-    BlurOptions,
-    Blurs,
+    Adapter,
     Colors,
+    Confidence,
+    ConfigFile,
+    FrameBlurOptions,
+    FrameBlurs,
     InputOptions,
     Inputs,
     Outputs,
+    Quiet,
     ShutterOptions,
     Shutters,
+    VideoOptions,
     Videos,
 )
 from ..spelling import as_options
@@ -39,21 +43,21 @@ from ..terminal import note
 def job(
     pattern: str,
     output: Outputs,
-    blur: Blurs = BlurOptions(),
+    blur: FrameBlurs = FrameBlurOptions(),
     shutter: Shutters = ShutterOptions(),
     input: Inputs = InputOptions(),
     color: Colors = ColorSettings(),
-    video: Videos = VideoSettings(),
+    video: Videos = VideoOptions(),
     *,
     file: Annotated[Path, Parameter(name="--job", alias="-j")],
     chunk: int = 16,
     openjd: Path | None = None,
     slurm: Path | None = None,
     fps_in: Annotated[str | None, Parameter(show=False)] = None,
-    confidence: bool = False,
-    config: Path | None = None,
-    adapter: str | None = None,
-    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+    confidence: Confidence = False,
+    config: ConfigFile = None,
+    adapter: Adapter = None,
+    quiet: Quiet = False,
 ) -> int:
     """Write a job file, from which any machine can blur any part of a sequence.
 

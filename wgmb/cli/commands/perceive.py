@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from ... import charts
 from ..._version import __version__
@@ -34,7 +34,8 @@ from ...settings import (
     plain,
     size_of,
 )
-from ..options import InputOptions, Inputs, Outputs
+from ..help import MAIN
+from ..options import Adapter, InputOptions, Inputs, PerceivedOutputs, Quiet
 from ..terminal import note, out, progress
 
 
@@ -59,20 +60,20 @@ class PerceptionSettings:
         return Cone(self.cone_rate, self.cone_peak)
 
 
-Who = Annotated[PerceptionSettings, Parameter(name="*", group=Group("Perception", sort_key=4))]
+Who = Annotated[PerceptionSettings, Parameter(name="*", group=MAIN)]
 
 
 def perceive(
     pattern: str | None = None,
     /,
     *,
-    output: Outputs,
+    output: PerceivedOutputs,
     input: Inputs = InputOptions(),
     perception: Who = PerceptionSettings(),
     report: bool = False,
     speed: float | None = None,
-    adapter: str | None = None,
-    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+    adapter: Adapter = None,
+    quiet: Quiet = False,
 ) -> int:
     """Simulate a viewer's perception: each frame is held, and earlier ones fade.
 

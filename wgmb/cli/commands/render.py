@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from ..._version import __version__
 from ...errors import InputError
 from ...render import Render
 from ...run.job import check_confidence
 from ...run.scene import render_frames
-from ...settings import SceneSettings, plain, size_of
+from ...settings import plain, size_of
 from ...settings.color import DisplaySettings, color_record
 from ..exit_codes import DONE
 from ..options import (
-    BlurOptions,
-    Blurs,
+    Adapter,
+    Confidence,
+    ConfigFile,
     DisplayOptions,
     Outputs,
+    Quiet,
+    SceneBlurOptions,
+    SceneBlurs,
     SceneName,
+    SceneOptions,
     SceneTimes,
     ShutterOptions,
     Shutters,
+    Verbose,
 )
 from ..terminal import note, progress
 
@@ -32,18 +34,18 @@ from ..terminal import note, progress
 def render(
     scene: SceneName,
     output: Outputs,
-    what: SceneTimes = SceneSettings(),
-    blur: Blurs = BlurOptions(),
+    what: SceneTimes = SceneOptions(),
+    blur: SceneBlurs = SceneBlurOptions(),
     shutter: Shutters = ShutterOptions(),
     color: DisplayOptions = DisplaySettings(),
     *,
     sharp: bool = False,
     passes: bool = False,
-    confidence: bool = False,
-    config: Path | None = None,
-    adapter: str | None = None,
-    verbose: Annotated[bool, Parameter(alias="-v")] = False,
-    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+    confidence: Confidence = False,
+    config: ConfigFile = None,
+    adapter: Adapter = None,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
 ) -> int:
     """Render a built-in scene with motion blur.
 

@@ -15,7 +15,7 @@ from ...run.report import Outcome
 from ...run.sequence import vectors_sequence
 from ...settings import plain
 from ..conclusion import conclude
-from ..options import InputOptions, Inputs
+from ..options import Adapter, InputOptions, Inputs, Quiet, Verbose
 from ..terminal import note, progress
 
 
@@ -31,9 +31,9 @@ def vectors(
     max_displace: float | None = None,
     overwrite: bool = False,
     resume: bool = False,
-    adapter: str | None = None,
-    verbose: Annotated[bool, Parameter(alias="-v")] = False,
-    quiet: Annotated[bool, Parameter(alias="-q")] = False,
+    adapter: Adapter = None,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
 ) -> int:
     """Write the motion of frames in the form of another program.
 

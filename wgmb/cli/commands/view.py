@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from ... import gpu
 from ...errors import DeviceError
 from ...extras import needed_by
 from ...settings import size_of
 from ...settings.color import ColorSettings
-from ...settings.video import VideoSettings
 from ..exit_codes import DONE
 from ..options import (
+    Adapter,
     BlurOptions,
     Blurs,
     Colors,
+    ConfigFile,
     InputOptions,
     Inputs,
     ShutterOptions,
     Shutters,
+    VideoOptions,
     Videos,
 )
 from ..terminal import note
@@ -30,12 +30,12 @@ def view(
     blur: Blurs = BlurOptions(),
     shutter: Shutters = ShutterOptions(),
     color: Colors = ColorSettings(),
-    video: Videos = VideoSettings(),
+    video: Videos = VideoOptions(),
     *,
-    config: Path | None = None,
+    config: ConfigFile = None,
     fps: str | None = None,
     window: str = "1280x720",
-    adapter: str | None = None,
+    adapter: Adapter = None,
 ) -> int:
     """View a scene, frames or a video interactively.
 
