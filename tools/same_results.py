@@ -2,6 +2,7 @@
 
 python tools/same_results.py record FOLDER    run every command; files, messages and exit codes
 python tools/same_results.py compare FOLDER   the same again; exit code 1 and a list if any differ
+python tools/same_results.py compare FOLDER "blur clip8" perceive   only commands with these words
 
 The folder holds the inputs, which are made once, and record.json. Times and speeds in messages, and
 the name of the folder, are left out.
@@ -172,8 +173,11 @@ def _still(text: str, folder: Path) -> str:
     return text
 
 
-def record(folder: Path) -> dict[str, dict]:
-    """Run all commands in copies of the inputs, several in one folder where they follow."""
+def record(folder: Path, words: list[str]) -> dict[str, dict]:
+    """Run all commands in copies of the inputs, several in one folder where they follow.
+
+    `words`: only commands that hold one of them; all if there are none.
+    """
     os.environ["COLUMNS"] = "100"
     if not (folder / "inputs").exists():
         make_inputs(folder / "inputs")
@@ -181,7 +185,8 @@ def record(folder: Path) -> dict[str, dict]:
     shutil.rmtree(work, ignore_errors=True)
     shutil.copytree(folder / "inputs", work)
     results = {}
-    for number, line in enumerate(every := commands()):
+    every = [line for line in commands() if not words or any(word in line for word in words)]
+    for number, line in enumerate(every):
         sys.stderr.write(f"{number + 1}/{len(every)} {line}\n")
         if not line.startswith("blur --job"):
             for path in _made(work, folder / "inputs"):
@@ -203,12 +208,12 @@ def main() -> int:
     """See the top of this file."""
     what, folder = sys.argv[1], Path(sys.argv[2]).resolve()
     kept = folder / "record.json"
-    found = record(folder)
+    found = record(folder, sys.argv[3:])
     if what == "record":
         kept.write_text(json.dumps(found, indent=1), "utf-8")
         return 0
     known, faults = json.loads(kept.read_text("utf-8")), 0
-    for line in known.keys() | found.keys():
+    for line in found.keys() | (set() if sys.argv[3:] else known.keys()):
         for part in ("code", "out", "err", "files"):
             was, now = (one.get(line, {}).get(part) for one in (known, found))
             if was != now:

@@ -39,6 +39,13 @@ class GpuMemoryError(Error):
     """Not enough GPU memory for one frame; smaller or later frames may still fit."""
 
 
+def reason(error: BaseException) -> str:
+    """The error in one line that names the file it is about."""
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.filename}: {error.strerror.lower()}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
 def check_choice(name: str, value: object, known: Iterable[str], more: str = "") -> None:
     """InputError unless `value` is one of the `known` words.
 

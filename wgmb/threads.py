@@ -1,118 +1,132 @@
-"""Work beside the main thread: pictures read ahead, results written behind."""
+"""Work beside the caller's thread: items made ahead of it, results worked on behind it."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
-from collections.abc import Callable, Iterator
-from typing import Generic, TypeVar
+import time
+from collections.abc import Callable, Generator, Iterator
+from typing import Any, Generic, TypeVar
 
 _Item = TypeVar("_Item")
 _POLL = 0.05  # seconds after which a thread looks whether it should stop
 
 
-def ahead(items: Iterator[_Item], count: int) -> Iterator[_Item]:
+def ahead(
+    items: Iterator[_Item], count: int = 1, name: str = "ahead", patience: float = 1.0
+) -> Generator[_Item, None, None]:
     """The items, up to `count` of them made beforehand in a thread of their own.
 
-    What the thread raises is raised here; it ends when nobody reads on.
+    What the thread raises is raised here. When nobody reads on, it ends after the item that it is
+    making, for which one waits at most `patience` [s]. An item that was given is not held here.
     """
-    made: queue.Queue[tuple[bool, _Item | BaseException | None]] = queue.Queue(count)
-    stop = threading.Event()
+    # Each item stands in a list of its own; None stands after the last one.
+    made: queue.SimpleQueue[list[_Item] | BaseException | None] = queue.SimpleQueue()
+    room, stop = threading.Semaphore(count), threading.Event()
 
-    def put(entry: tuple[bool, _Item | BaseException | None]) -> None:
-        while not stop.is_set():
-            try:
-                made.put(entry, timeout=_POLL)
-                return
-            except queue.Full:
-                continue
+    def make_one() -> bool:
+        for item in items:
+            made.put([item])
+            return True
+        made.put(None)
+        return False
 
     def make() -> None:
         try:
-            for item in items:
-                put((True, item))
-                if stop.is_set():
-                    return
-            put((False, None))
+            while _has_room(room, stop.is_set) and make_one():
+                pass
         except BaseException as error:  # raised where the items are read
-            put((False, error))
+            made.put(error)
 
-    thread = threading.Thread(target=make, name="ahead", daemon=True)
+    thread = threading.Thread(target=make, name=name, daemon=True)
     thread.start()
     try:
-        while True:
-            is_item, value = _taken(made)
-            if is_item:
-                yield value  # pyright: ignore[reportReturnType]
-            elif isinstance(value, BaseException):
-                raise value
-            else:
-                return
+        while (entry := _taken(made)) is not None:
+            room.release()
+            if isinstance(entry, BaseException):
+                raise entry
+            yield entry.pop()
     finally:
         stop.set()
-        thread.join(1.0)
+        _join(thread, patience)
 
 
-def _taken(made: queue.Queue) -> tuple:  # pyright: ignore[reportMissingTypeArgument]
+def _taken(entries: queue.SimpleQueue[Any]) -> Any:
+    """The next entry; a wait without limit would hold back Ctrl-C."""
     while True:
         try:
-            return made.get(timeout=_POLL)
+            return entries.get(timeout=_POLL)
         except queue.Empty:
             continue
 
 
-class Behind(Generic[_Item]):
-    """Calls `work` with items in a thread of its own, in their order, at most `count` behind.
+def _join(thread: threading.Thread, patience: float = math.inf) -> None:
+    """Wait for the end of a thread; a join without limit would hold back Ctrl-C."""
+    until = time.monotonic() + patience
+    while thread.is_alive() and time.monotonic() < until:
+        thread.join(_POLL)
 
-    `with Behind(work) as put:`; what it raises is raised by the next `put`, or at the end.
+
+def _has_room(room: threading.Semaphore, is_over: Callable[[], bool]) -> bool:
+    """Wait for room; False if there is none any more."""
+    while not is_over():
+        if room.acquire(timeout=_POLL):
+            return True
+    return False
+
+
+class Behind(Generic[_Item]):
+    """Calls `work` with items in a thread of its own, in their order.
+
+    `with Behind(work) as put:`; what it raises is raised by the next `put`, or at the end. `put`
+    returns when fewer than `count` items wait, so that `count` wait or are being made by the
+    caller, beside the one that is worked on.
     """
 
-    def __init__(self, work: Callable[[_Item], None], count: int = 2):
-        self._work, self._items = work, queue.Queue[_Item | None](count)
+    def __init__(self, work: Callable[[_Item], None], count: int = 1, name: str = "behind"):
+        self._work = work
+        self._items: queue.SimpleQueue[list[_Item] | None] = queue.SimpleQueue()
+        self._room = threading.Semaphore(count - 1)
         self._error: BaseException | None = None
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="behind", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def __enter__(self) -> Callable[[_Item], None]:
         self._thread.start()
         return self._put
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is not None:
+        try:
+            if kind is None:
+                self._items.put(None)
+                _join(self._thread)
+        finally:  # an interruption comes in the middle of it
             self._stop.set()
-            self._thread.join(1.0)
-            return
-        self._enqueue(None)
-        while self._thread.is_alive():  # a join without limit would hold back Ctrl-C
-            self._thread.join(_POLL)
-        if self._error is not None:
+            _join(self._thread, 1.0)
+        if kind is None and self._error is not None:
             raise self._error
 
     def _put(self, item: _Item) -> None:
+        self._items.put([item])
+        del item
+        _has_room(self._room, lambda: self._error is not None)
         if self._error is not None:
             raise self._error
-        self._enqueue(item)
-
-    def _enqueue(self, item: _Item | None) -> None:
-        while self._error is None:
-            try:
-                self._items.put(item, timeout=_POLL)
-                return
-            except queue.Full:
-                continue
 
     def _run(self) -> None:
         while not self._stop.is_set():
             try:
-                item = self._items.get(timeout=_POLL)
+                entry = self._items.get(timeout=_POLL)
             except queue.Empty:
                 continue
-            if item is None:
+            if entry is None:
                 return
+            self._room.release()
             try:
-                self._work(item)
-            except BaseException as error:  # raised in the main thread
+                self._work(entry.pop())
+            except BaseException as error:  # raised in the caller's thread
                 self._error = error
                 return

@@ -17,7 +17,7 @@ from wgmb import (
     vectors_sequence,
 )
 from wgmb.output.vectors import VectorOutput
-from wgmb.run.sequence import ON_REQUEST
+from wgmb.run.engine import ON_REQUEST
 
 COUNT = 8
 

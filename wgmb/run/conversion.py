@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, reason
 from ..exposure import Cell, cells
 from ..io.frame_numbers import frame_list
 from ..output.result import Result
@@ -26,12 +26,7 @@ from ..sequence.clip import Clip
 from ..sequence.data_windows import Placement, laid, union
 from ..sequence.frame_file import FrameFile
 from ..shutter import Shutter
-from .stages import (
-    BlurredFrame,
-    ReadFrame,
-    Stages,
-    reason,
-)
+from .stages import BlurredFrame, ReadFrame, Stages
 
 _SPARE = Fraction(1, 20)  # of an output frame: less at the end of the sequence is none
 
@@ -100,7 +95,7 @@ class RateConversionStages(Stages):
         self._known = frozenset(n for n in clip.on_disk if clip.begins_shot(n))
         self._reading = threading.Lock()
 
-    def made_of(self, number: int) -> dict[str, Any]:
+    def _made_of(self, number: int) -> dict[str, Any]:
         """The files of all frames that may share the exposure, and its time among them."""
         at = self._at(number)
         files: dict[tuple[Any, ...], None] = {}
@@ -112,14 +107,14 @@ class RateConversionStages(Stages):
                 meaning = made_of["vectors_mean"]
         return {"files": [list(file) for file in files], "vectors_mean": meaning, "at": str(at)}
 
-    def read(self, number: int, made_of: dict[str, Any]) -> ReadFrame:
+    def _read(self, number: int, made_of: dict[str, Any]) -> ReadFrame:
         """Nothing yet; see the class."""
         return ReadFrame(number, made_of=made_of)
 
-    def forget(self, number: int) -> None:
+    def _forget(self, number: int) -> None:
         """Nothing: the clip keeps the last frames only."""
 
-    def blur(self, read: ReadFrame) -> BlurredFrame:
+    def _blurred(self, read: ReadFrame) -> BlurredFrame:
         """The exposure, of every view; InputError where one of its frames cannot be."""
         try:
             done, cuts = None, frozenset[int]()
@@ -154,10 +149,10 @@ class RateConversionStages(Stages):
         for cell in found:
             self._blur.shutter = cell.shutter
             with self._reading:
-                one = super().read(cell.index, {})
+                one = super()._read(cell.index, {})
             if "unread" in one.made_of:
                 done.made_of.setdefault("unread", []).extend(one.made_of["unread"])
-            blurred = super().blur(one)
+            blurred = super()._blurred(one)
             for result in blurred.views:
                 of_view = sums.setdefault(result.source.view, _Sum(result.source))
                 of_view.add(result, cell.share, cell.index == nearest)

@@ -1,7 +1,6 @@
 """Whole sequences: rendered frames through a Blur into files.
 
-Three threads read, blur and write concurrently. At most IN_FLIGHT frames are in memory,
-however long the sequence. A failing frame is reported and skipped.
+A failing frame is reported, and the others are made; see engine.py for the threads.
 """
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
@@ -9,9 +8,9 @@ however long the sequence. A failing frame is reported and skipped.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from typing import Any
 
-from ..errors import Error, GpuMemoryError, InputError
+from ..errors import InputError
 from ..io.frame_numbers import has_view
 from ..output.output import Output
 from ..output.vectors import VectorOutput
@@ -19,18 +18,8 @@ from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
 from .batch_report import BatchReport, Progress
 from .conversion import RateConversion, RateConversionStages
-from .stages import (
-    IN_FLIGHT,
-    Handover,
-    MotionStages,
-    ReadFrame,
-    Stages,
-    StopError,
-    reason,
-)
-
-HOPELESS = 3  # frames one after the other that cannot be written for the same reason
-ON_REQUEST = "on request"  # why a run stopped whose `stop` was set
+from .engine import run
+from .stages import BlurredFrame, MotionStages, Stages
 
 
 def blur_sequence(
@@ -59,7 +48,7 @@ def blur_sequence(
     """
     _check_names(clip, output)
     stages = Stages(clip, blur, confidence, output.takes_views)
-    return _Pipeline(stages, output, resume, progress, stop).run()
+    return _run(stages, output, resume, progress, stop)
 
 
 def convert_sequence(
@@ -78,7 +67,7 @@ def convert_sequence(
     """
     _check_names(clip, output)
     stages = RateConversionStages(clip, blur, conversion, output.takes_views)
-    return _Pipeline(stages, output, resume, progress, stop).run()
+    return _run(stages, output, resume, progress, stop)
 
 
 def _check_names(clip: Clip, output: Output) -> None:
@@ -101,154 +90,32 @@ def _check_names_of_views(clip: Clip, output: Output) -> None:
         )
 
 
-class _Pipeline:
-    """Three stages, each in a thread of its own: read, blur (the caller's thread), write."""
+def _run(
+    stages: Stages,
+    output: Output,
+    resume: bool,
+    progress: Progress | None,
+    stop: threading.Event | None,
+) -> BatchReport:
+    """All frames into an output; one that fails is reported, and the others are made."""
+    how: Any = {"resume": resume, "progress": progress, "stop": stop}
+    report = run(stages, FileSink(output), **how, on_error="go on")
+    if len(report.done) == len(stages.numbers):
+        report.absent = stages.clip.absent
+    return report
 
-    def __init__(
-        self,
-        stages: Stages,
-        output: Output,
-        resume: bool,
-        progress: Progress | None,
-        asked: threading.Event | None = None,
-    ):
-        self.stages, self.output, self.resume = stages, output, resume
-        self.clip = stages.clip
-        self.progress = progress or (lambda number, state: None)
-        self.report = BatchReport()
-        self.stop, self.hopeless = threading.Event(), threading.Event()
-        self.asked = asked or threading.Event()
-        self.to_blur, self.to_write = Handover(self.stop), Handover(self.stop)
-        self.places = Handover(self.stop)
-        for _ in range(IN_FLIGHT):
-            self.places.put(None)
-        self.crash: list[BaseException] = []
 
-    def run(self) -> BatchReport:
-        """Do all frames; an interruption or a fault of a thread is raised here."""
-        threads = [
-            threading.Thread(target=self._guarded, args=(stage,), name=stage.__name__, daemon=True)
-            for stage in (self.read, self.write)
-        ]
-        for thread in threads:
-            thread.start()
-        report = self.report
-        try:
-            while (read := self.to_blur.get()) is not None:
-                self.blur_one(read)
-                del read
-            self.to_write.put(None)
-            for thread in threads:
-                while thread.is_alive():  # a join without limit would hold back Ctrl-C
-                    thread.join(0.1)
-            if self.asked.is_set() and not report.stopped and self._rest():
-                report.stopped = ON_REQUEST
-        except StopError:
-            pass
-        finally:
-            broken = any(thread.is_alive() for thread in threads) or self.crash or not report.done
-            broken = broken or (self.output.is_video and report.stopped)
-            self.stop.set()
-            for thread in threads:
-                thread.join(0.5)
-            if broken:
-                self.output.abandon()
-        if self.crash:
-            raise self.crash[0]
-        if not broken:
-            try:
-                self.output.close()
-            except OSError as error:
-                report.stopped = str(error)
-        if self.output.is_video and report.stopped:  # it is not there at all
-            report.done.clear()
-        if len(report.done) == len(self.stages.numbers):
-            report.absent = self.clip.absent
-        return report
+class FileSink:
+    """Frames into an Output."""
 
-    def _rest(self) -> int:
-        """The number of frames of which nothing was heard."""
-        report = self.report
-        known = len(report.done) + len(report.skipped) + len(report.failed)
-        return len(self.stages.numbers) - known
+    def __init__(self, output: Output):
+        self._output, self.is_whole = output, output.is_video
+        self.done, self.why_hopeless = output.done, output.why_hopeless
+        self.close, self.abandon = output.close, output.abandon
 
-    def read(self) -> None:
-        """The first stage: files to frames."""
-        for number in self.stages.numbers:
-            if self.hopeless.is_set():
-                break
-            self.places.get()
-            if self.asked.is_set():
-                break
-            try:
-                self._read_one(number)
-            except (Error, OSError, MemoryError) as error:
-                self._fail(number, error)
-            finally:
-                self.stages.forget(number)
-        self.to_blur.put(None)
-
-    def _read_one(self, number: int) -> None:
-        made_of = self.stages.made_of(number)
-        if self.resume and self.output.done(number, made_of):
-            self.places.put(None)
-            self.report.skipped.append(number)
-            self.progress(number, "skipped")
-            return
-        self.to_blur.put(self.stages.read(number, made_of))
-
-    def blur_one(self, read: ReadFrame) -> None:
-        """The second stage, for one frame."""
-        if self.asked.is_set():
-            self.places.put(None)
-            return
-        try:
-            blurred = self.stages.blur(read)
-        except (InputError, GpuMemoryError) as error:
-            self._fail(read.number, error)
-            return
-        if blurred.bad:
-            self.report.bad[read.number] = blurred.bad
-        self.to_write.put(blurred)
-
-    def write(self) -> None:
-        """The third stage: results to files."""
-        reasons: list[str] = []
-        while (blurred := self.to_write.get()) is not None:
-            number = blurred.number
-            if self.hopeless.is_set():
-                self.places.put(None)
-                continue
-            try:
-                self.output.write_views(blurred.views, blurred.made_of)
-            except (Error, OSError, MemoryError, RuntimeError) as error:
-                self._fail(number, error)
-                reasons.append(self.output.why_hopeless(error))
-                if reasons[-1] and (
-                    self.output.is_video or reasons[-HOPELESS:] == HOPELESS * reasons[-1:]
-                ):
-                    self.report.stopped = reasons[-1]
-                    self.hopeless.set()
-            else:
-                reasons.clear()
-                self.places.put(None)
-                self.report.done.append(number)
-                self.progress(number, "done")
-            del blurred
-
-    def _fail(self, number: int, error: BaseException) -> None:
-        self.places.put(None)
-        self.report.failed[number] = reason(error)
-        self.progress(number, "failed")
-
-    def _guarded(self, stage: Callable[[], None]) -> None:
-        try:
-            stage()
-        except StopError:
-            pass
-        except BaseException as error:  # a fault of ours: the main thread raises it
-            self.crash.append(error)
-            self.stop.set()
+    def put(self, made: BlurredFrame) -> None:
+        """Write a frame."""
+        self._output.write_views(made.views, made.made_of)
 
 
 def vectors_sequence(
@@ -267,4 +134,4 @@ def vectors_sequence(
     `blur_sequence`. `blur`: its device is used, and its `max_blur` limits the motion.
     """
     stages = MotionStages(clip, blur or Blur("tap"), all_views=output.takes_views)
-    return _Pipeline(stages, output, resume, progress, stop).run()
+    return _run(stages, output, resume, progress, stop)

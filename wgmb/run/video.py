@@ -37,7 +37,7 @@ from ..video.output_times import OutputFrame, OutputFrames
 from ..video.read.reader import VideoReader
 from ..video.write.encoders import FINEST_RATE, SUFFIXES
 from .batch_report import Progress
-from .video_output import Sink, put_exposures, write
+from .video_output import PictureSink, put_exposures, write
 
 _TAKEN = "frames", "cuts", "max_mb"  # of InputSettings
 
@@ -173,7 +173,7 @@ class VideoRun:
         cuts, shutter = CutList(request.input.cuts or ""), request.shutter.make()
         exposures = self.exposures(plan)
 
-        def blur_part(moments: Sequence[OutputFrame], sink: Sink) -> None:
+        def blur_part(moments: Sequence[OutputFrame], sink: PictureSink) -> None:
             put_exposures(exposures, shutter, moments, sink, progress)
 
         left_out = write(

@@ -39,7 +39,7 @@ FIRST = 1  # number of the first frame, where they are image files
 _RECORD = "comment", "description", "synopsis"  # texts of a video; the first that is free
 
 
-class Sink(Protocol):
+class PictureSink(Protocol):
     """Destination of exposures: `take` on the main thread, then `put` in a thread of its own."""
 
     def take(self, moment: OutputFrame, exposure: ExposedPicture) -> Any:
@@ -90,7 +90,7 @@ def put_exposures(
     run: VideoBlur,
     shutter: Shutter,
     wanted: Sequence[OutputFrame],
-    sink: Sink,
+    sink: PictureSink,
     progress: Progress | None = None,
 ) -> None:
     """Every exposure of a video into `sink`; the caller closes or abandons what it writes."""
@@ -120,7 +120,7 @@ class PictureMaker(Protocol):
         ...
 
 
-MakePart = Callable[[Sequence[OutputFrame], Sink], None]
+MakePart = Callable[[Sequence[OutputFrame], PictureSink], None]
 """Makes the pictures of some of the moments, and gives them to a sink."""
 
 

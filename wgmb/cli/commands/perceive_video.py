@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...observer import Observer
 from ...run.perceive import PerceivedVideo, densest_rate
 from ...run.video import check_fits
-from ...run.video_output import Sink, write
+from ...run.video_output import PictureSink, write
 from ...settings import BlurSettings, InputSettings, OutputSettings
 from ...settings.video import VideoSettings
 from ...threads import Behind
@@ -50,7 +50,7 @@ def perceive_video(
     started = time.perf_counter()
     with progress(len(wanted), quiet, "perceiving") as tell:
 
-        def make_part(moments: Sequence[OutputFrame], sink: Sink) -> None:
+        def make_part(moments: Sequence[OutputFrame], sink: PictureSink) -> None:
             shown = seen.shown(first, first + len(moments) - 1)
             with Behind(sink.put) as put:
                 for number, color, held in shown:

@@ -21,9 +21,9 @@ from ...errors import DeviceError, Error, InputError
 from ...io.frame_numbers import frame_list
 from ...sequence.findings import ranges
 from ..batch_report import Progress
+from ..engine import ON_REQUEST
 from ..job import Job
 from ..report import Outcome
-from ..sequence import ON_REQUEST
 from .workers import (
     Chunk,
     Worker,
