@@ -94,6 +94,25 @@ def test_every_shader_compiles_with_every_override(device, file):
         gpu.Kernel(device, wgsl.load(file), dict(zip(names, values, strict=True)))
 
 
+MOST_LINES = 60  # of a function, from its name to its last brace
+
+
+def long_functions(text):
+    """(name, lines) of those with more than MOST_LINES lines; one begins and ends a line."""
+    whole = re.findall(
+        r"^fn (\w+)(.*?)^\}", re.sub(r"^(fn .*\})$", "", text, flags=re.M), re.M | re.S
+    )
+    return [(n, lines) for n, body in whole if (lines := body.count("\n") + 1) > MOST_LINES]
+
+
+@pytest.mark.fast
+def test_no_function_of_a_shader_is_long():
+    at_most = "fn f() {\n" + "    a();\n" * (MOST_LINES - 2) + "}\n"
+    assert not long_functions("fn one() { a(); }\n" + at_most)
+    assert long_functions(at_most.replace("}", "    a();\n}")) == [("f", MOST_LINES + 1)]
+    assert not {f: found for f in FILES if (found := long_functions((wgsl.ROOT / f).read_text()))}
+
+
 @pytest.mark.parametrize("file", FILES)
 def test_every_shader_begins_with_what_it_does(file):
     lines = itertools.takewhile(

@@ -101,10 +101,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let x = vec2f(id.xy) + 0.5;
     let noise = pixel_noise(id.xy);
     if TILES {
-        let tile = vec2u((vec2i(id.xy) + frame.origin - begin_of_first()) / i32(tiles.edge));
-        let followed = neighbor_max[tile.y * tiles.count.x + tile.x];
-        let extent = blur_extent(trajectory_from(followed), delay_at(centre_of(tile)));
-        textureStore(output, id.xy, vec4f(wheel_color(extent, f32(tiles.edge)), 1.0));
+        textureStore(output, id.xy, followed_color(id.xy));
         return;
     }
     let all = shutter_times(x, frame.jitter * (noise - 0.5));
@@ -121,7 +118,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let own_extent = clamp(own.z, MIN_EXTENT, limit);
     let trust = clamp((own_extent - MIN_EXTENT) / GAMMA, 0.0, 1.0);
     let odd_direction = own_or_across(own.xy, dominant_extent, trust);
-    let z = own.w;
     // The paper's weight of the pixel itself, or a quarter of it where a tap's weight is 1 instead of 4. All
     // weights are over the number of taps, so that no sum of finite colours overflows.
     let centre_weight = select(0.25, 1.0, PUBLISHED) / (KAPPA * own_extent);
@@ -139,28 +135,44 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let direction = select(even_direction, odd_direction * sign(t), i % 2u == 1u);
         let at = x - far * direction;
         let tap = textureLoad(velocity_depth, vec2u(clamp(floor(at), vec2f(0.0), last)), 0);
-        let tap_extent = clamp(tap.z, MIN_EXTENT, limit);
-        let per_depth = 1.0 / min(z, tap.w);
-        let foreground = clamp(1.0 - (tap.w - z) * per_depth, 0.0, 1.0);
-        let background = clamp(1.0 - (z - tap.w) * per_depth, 0.0, 1.0);
-        let own_along = select(1.0, abs(dot(own.xy, direction)), own_extent > MIN_EXTENT && far > 0.0);
-        let tap_along = select(1.0, abs(dot(tap.xy, direction)), tap_extent > MIN_EXTENT && far > 0.0);
-        var w = foreground * cone(far, tap_extent) * tap_along + background * cone(far, own_extent) * own_along
-            + 2.0 * cylinder(far, min(tap_extent, own_extent)) * max(own_along, tap_along);
+        var w = weight_of(own, tap, far, direction, limit);
         if !PUBLISHED { w /= max(2.0 * cone(far, reach) + 2.0 * cylinder(far, reach), 1e-3); }
         w *= share;
         sum += w * textureSampleLevel(color, linear, at * texel, 0.0);
         if WEIGHTED { total += w * textureSampleLevel(weight, linear, at * texel, 0.0).x; } else { total += w; }
     }
     var result = sum / total;
-    if is_static || total <= 0.0 {      // the pixel itself, to the bit
-        result = textureLoad(color, id.xy, 0);
-        if WEIGHTED {
-            let counts = textureLoad(weight, id.xy, 0).x;
-            result = select(vec4f(0.0), result / counts, counts > 0.0);
-        }
-    }
+    if is_static || total <= 0.0 { result = pixel_itself(id.xy); }
     textureStore(output, id.xy, result);
+}
+
+/// The paper's weight of a tap that is `far` [px] from the pixel, of its velocities and depths `own` and those of the tap.
+fn weight_of(own: vec4f, tap: vec4f, far: f32, direction: vec2f, limit: f32) -> f32 {
+    let own_extent = clamp(own.z, MIN_EXTENT, limit);
+    let tap_extent = clamp(tap.z, MIN_EXTENT, limit);
+    let per_depth = 1.0 / min(own.w, tap.w);
+    let foreground = clamp(1.0 - (tap.w - own.w) * per_depth, 0.0, 1.0);
+    let background = clamp(1.0 - (own.w - tap.w) * per_depth, 0.0, 1.0);
+    let own_along = select(1.0, abs(dot(own.xy, direction)), own_extent > MIN_EXTENT && far > 0.0);
+    let tap_along = select(1.0, abs(dot(tap.xy, direction)), tap_extent > MIN_EXTENT && far > 0.0);
+    return foreground * cone(far, tap_extent) * tap_along + background * cone(far, own_extent) * own_along
+        + 2.0 * cylinder(far, min(tap_extent, own_extent)) * max(own_along, tap_along);
+}
+
+/// The pixel to the bit; without its weight, if pixels have weights.
+fn pixel_itself(px: vec2u) -> vec4f {
+    let own = textureLoad(color, px, 0);
+    if !WEIGHTED { return own; }
+    let counts = textureLoad(weight, px, 0).x;
+    return select(vec4f(0.0), own / counts, counts > 0.0);
+}
+
+/// The motion that the pixel's tile follows, as a colour.
+fn followed_color(px: vec2u) -> vec4f {
+    let tile = vec2u((vec2i(px) + frame.origin - begin_of_first()) / i32(tiles.edge));
+    let followed = neighbor_max[tile.y * tiles.count.x + tile.x];
+    let extent = blur_extent(trajectory_from(followed), delay_at(centre_of(tile)));
+    return vec4f(wheel_color(extent, f32(tiles.edge)), 1.0);
 }
 
 /// Delay of the rolling shutter at `x` [px].

@@ -15,6 +15,15 @@ override WEIGHTED: bool = false;    // pixels have weights, and may show more th
 
 alias Mask = texture_storage_2d_array<r32uint, write>;
 
+struct Block {
+    low: vec2u,         // its first and its last pixel
+    high: vec2u,
+    is_crowded: bool,   // its tile is, in some frame
+    a: Candidates,      // of the frame and its neighbours
+    b: Candidates,
+    c: Candidates,
+}
+
 /// One block, which joins one of the lists. The searches of all its pixels are made from its corners: a time has a single layer if they end on
 /// surfaces that no edge is near, and if all other starts lead to the same. Edges are two pixels wide, so that none
 /// hides between the corners.
@@ -26,60 +35,18 @@ fn main(@builtin(local_invocation_index) local: u32,
     let across = CELL_TILES * down;
     let n = k / (across * down);
     let id = unpack_cell(active_cells.cells[n]) * vec2u(across, down) + vec2u(k % across, k / across % down);
-    let low = id * BLOCK;
-    let tile = low / TILE;
-    if n >= active_cells.count || any(low >= frame.size) { return; }
-    let high = min(low + BLOCK, frame.size) - 1u;
-    let candidates0 = load_candidates(tile, 0u);
-    let candidates1 = load_candidates(tile, 1u);
-    let candidates2 = load_candidates(tile, 2u);
-    let is_crowded = max(candidates0.header.w, max(candidates1.header.w, candidates2.header.w)) > 0.0;
-    let times = sample_times(0.5 * vec2f(low + high) + 0.5, 0.0, candidates0, candidates1, candidates2);
+    if n >= active_cells.count || any(id * BLOCK >= frame.size) { return; }
+    let block = block_at(id);
+    let times = sample_times(0.5 * vec2f(block.low + block.high) + 0.5, 0.0, block.a, block.b, block.c);
     // Jittered pixels have times of their own.
-    let is_static = is_static_tile(candidates0, candidates1, candidates2);
+    let is_static = is_static_tile(block.a, block.b, block.c);
     let count = select(times.count, 0u, frame.jitter > 0.0 || is_static);
     let samples = turns_of(frame.samples, active_cells.count);
     var bits = 0u;
     var all_single = true;
     var i = 0u;
     loop {
-        let t = shutter_time(times, min(i, times.count - 1u));
-        var is_single = i < count;
-        var deepest = 0.0;          // depth that the frame itself shows
-        var f = 0u;
-        loop {          // the frame itself; then, away from its instant, the neighbour on the side of `t`
-            let u = t - offset_of(f);
-            let layer = 2u * f;
-            let handicap = select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u);
-            let candidates = candidates_of(tile, f, candidates0, candidates1, candidates2);
-            let starts = seeds_at(candidates, u, may_be_there(candidates, u));
-            let start = displacement5(unpack_trajectory(surface_of(vec2i(low), layer)), u);
-            let visible_depth = deepest;
-            var n = 0u;
-            loop {      // the corners
-                let x = vec2f(select(low, high, vec2<bool>(n % 2u == 1u, n / 2u == 1u))) + 0.5;
-                let found = iterate_fixed_point(x, start, u, layer);
-                let z = depth_in(found.word) * handicap;
-                deepest = max(deepest, z);
-                let nearer = may_be_nearer(candidates, select(visible_depth, z, f == 0u) / handicap);
-                let is_there = found.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
-                is_single = is_single && (found.word & SMOOTH) != 0u && is_there && z >= visible_depth;
-                var seeds = Seeds(starts.pending & nearer & ~are_solution(starts, found.d), starts.x, starts.y);
-                loop {
-                    let is_pending = seeds.pending != 0u;
-                    let converges = converges_to(x, next_seed(&seeds), found.d, u, layer);
-                    is_single = is_single && (!is_pending || converges);
-                    if !is_single || seeds.pending == 0u { break; }
-                }
-                n++;
-                if !is_single || n >= 4u { break; }
-            }
-            let word = scattered_at(low, t, f, is_single && is_crowded);
-            is_single = is_single && (word == 0u || scattered_depth(word) * handicap * SURFACE_DEPTH_RATIO >= deepest);
-            let again = is_single && f == 0u && sources.count > 1u && abs(t) > TRUSTED_TIME;
-            f = neighbour_of(t, false);
-            if !again { break; }
-        }
+        let is_single = has_single_layer(block, shutter_time(times, min(i, times.count - 1u)), i < count);
         bits |= u32(is_single) << (i % TIMES_PER_WORD);
         all_single = all_single && (is_single || i >= times.count);
         i++;
@@ -90,7 +57,75 @@ fn main(@builtin(local_invocation_index) local: u32,
         if i >= samples { break; }
     }
     textureStore(single_layer_mask, id, (frame.samples - 1u) / TIMES_PER_WORD + 1u, vec4u(u32(all_single)));
-    let is_plain = is_static || (all_single && !WEIGHTED);
+    join_list(id, is_static || (all_single && !WEIGHTED), block.is_crowded);
+}
+
+fn block_at(id: vec2u) -> Block {
+    let low = id * BLOCK;
+    let a = load_candidates(low / TILE, 0u);
+    let b = load_candidates(low / TILE, 1u);
+    let c = load_candidates(low / TILE, 2u);
+    let is_crowded = max(a.header.w, max(b.header.w, c.header.w)) > 0.0;
+    return Block(low, min(low + BLOCK, frame.size) - 1u, is_crowded, a, b, c);
+}
+
+/// True if one smooth surface is all that can be visible at the time `t`: of the frame itself; away from its instant, of the neighbour on
+/// the side of `t` too.
+fn has_single_layer(block: Block, t: f32, wanted: bool) -> bool {
+    var is_single = wanted;
+    var deepest = 0.0;          // depth that the frame itself shows
+    var f = 0u;
+    loop {
+        let candidates = candidates_of(block.low / TILE, f, block.a, block.b, block.c);
+        is_single = corners_agree(block, t, f, candidates, is_single, &deepest);
+        let word = scattered_at(block.low, t, f, is_single && block.is_crowded);
+        let z = scattered_depth(word) * handicap_of(f);
+        is_single = is_single && (word == 0u || z * SURFACE_DEPTH_RATIO >= deepest);
+        let again = is_single && f == 0u && sources.count > 1u && abs(t) > TRUSTED_TIME;
+        f = neighbour_of(t, false);
+        if !again { break; }
+    }
+    return is_single;
+}
+
+/// True if searches in frame `f` from the corners end on smooth surfaces, not nearer than `deepest` if in a neighbour, and all
+/// other starts that may lead nearer lead there too.
+fn corners_agree(block: Block, t: f32, f: u32, candidates: Candidates, wanted: bool, deepest: ptr<function, f32>) -> bool {
+    let u = t - offset_of(f);
+    let layer = 2u * f;
+    let handicap = handicap_of(f);
+    let starts = seeds_at(candidates, u, may_be_there(candidates, u));
+    let start = displacement5(unpack_trajectory(surface_of(vec2i(block.low), layer)), u);
+    let visible_depth = *deepest;
+    var is_single = wanted;
+    var n = 0u;
+    loop {
+        let x = vec2f(select(block.low, block.high, vec2<bool>(n % 2u == 1u, n / 2u == 1u))) + 0.5;
+        let found = iterate_fixed_point(x, start, u, layer);
+        let z = depth_in(found.word) * handicap;
+        *deepest = max(*deepest, z);
+        let nearer = may_be_nearer(candidates, select(visible_depth, z, f == 0u) / handicap);
+        let is_there = found.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
+        is_single = is_single && (found.word & SMOOTH) != 0u && is_there && z >= visible_depth;
+        var seeds = Seeds(starts.pending & nearer & ~are_solution(starts, found.d), starts.x, starts.y);
+        loop {
+            let is_pending = seeds.pending != 0u;
+            let converges = converges_to(x, next_seed(&seeds), found.d, u, layer);
+            is_single = is_single && (!is_pending || converges);
+            if !is_single || seeds.pending == 0u { break; }
+        }
+        n++;
+        if !is_single || n >= 4u { break; }
+    }
+    return is_single;
+}
+
+fn handicap_of(f: u32) -> f32 {
+    return select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u);
+}
+
+/// Add a block to its list: the plain ones, the crowded ones or the others.
+fn join_list(id: vec2u, is_plain: bool, is_crowded: bool) {
     let section = select(select(1u, 2u, is_crowded), 0u, is_plain) * (arrayLength(&lists) / 3u);
     let place = atomicAdd(&lists[section + COUNT_WORD], 1u);
     atomicStore(&lists[section + CELLS_WORD + place], pack_cell(id));

@@ -5,13 +5,11 @@
 //#include methods/gather/worklist.wgsl
 //#include methods/gather/surface.wgsl
 //#include methods/gather/edge_flags.wgsl
+//#include methods/gather/sides.wgsl
 //#include methods/gather/coverage.wgsl
 //#include methods/gather/around.wgsl
 //#include methods/gather/crowd.wgsl
 
-@group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
-@group(1) @binding(3) var weight: texture_2d<f32>;
-@group(1) @binding(4) var edge_flags: texture_2d<u32>;  // stored as r32uint, by edges.wgsl: depth and flags
 @group(1) @binding(6) var colors: Color;                // FRONT, premultiplied by coverage too, and BACK
 @group(1) @binding(7) var surfaces: Packed;             // FRONT and BACK, see pack_surface()
 @group(1) @binding(8) var mattes: Mattes;               // see pack_matte()
@@ -37,23 +35,9 @@ const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and
 const MOST_CONTRAST: f32 = 2.0; // of a front layer to the brightest pixel of it around, which may be half background
 const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
 
-fn color_at(px: vec2i) -> vec4f {
-    return textureLoad(color, clamped(px), 0);
-}
-
-fn flags_at(px: vec2i) -> u32 {
-    let at = clamped(px);
-    return textureLoad(edge_flags, at, 0).x;
-}
-
 /// Those of a pixel and of the ones to its left and right together.
 fn three_flags(px: vec2i) -> u32 {
     return flags_at(px - vec2i(1, 0)) | flags_at(px) | flags_at(px + vec2i(1, 0));
-}
-
-fn weight_at(px: vec2i) -> f32 {
-    if !WEIGHTED { return 1.0; }
-    return textureLoad(weight, clamped(px), 0).x;
 }
 
 /// First pass: every pixel as one layer, which is copied to BACK after it, and the list of edge pixels, which
@@ -104,191 +88,109 @@ fn size_dispatch() {
     edge_groups[2] = 1u;
 }
 
-struct Side {           // weighted sums over the pixels on one side of an edge
-    total: f32,         // of the shares
-    motion: vec4f,
-    depth: f32,
-    color: vec4f,
-    weight: f32,        // of the colour
-}
-
-fn add(side: ptr<function, Side>, share: f32, motion_there: vec4f, z: f32, color_there: vec4f, weight_there: f32) {
-    (*side).total += share;
-    (*side).motion += share * motion_there;
-    (*side).depth += share * z;
-    (*side).color += share * color_there;
-    (*side).weight += share * weight_there;
-}
-
-struct Place {          // the nearest pure pixel of a side
-    at: vec2i,
-    distance2: f32,     // [px^2]
-}
-
-struct Neighbour {      // a pixel of the 5 x 5 around an edge pixel
-    at: vec2i,
-    distance2: f32,     // [px^2]
-    z: f32,
-    counts: bool,
-    is_front: bool,
-    is_pure: bool,      // it shows one surface
-}
-
-fn neighbour(px: vec2i, i: i32, between: f32) -> Neighbour {
-    let off = vec2i(i % 5, i / 5) - 2;
-    let at = px + off;
-    let flags = flags_at(at);
-    let z = flagged_depth(flags);
-    let distance2 = f32(off.x * off.x + off.y * off.y);
-    let is_inside = all(at >= vec2i(0)) && all(at < vec2i(frame.size));
-    // The corners are too far away for a background: they may show another one.
-    let counts = is_inside && (z < between || distance2 < 8.0);
-    return Neighbour(at, distance2, z, counts, z < between, !is_edge(flags));
-}
-
 /// Third pass: the two layers of edge pixels. The pure pixels around are front or back by their depth; the pixel's
 /// coverage is where its own alpha, or its own filtered motion, is between theirs.
 @compute @workgroup_size(WG_X, WG_Y)
 fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let k = (group.y * GROUPS_PER_ROW + group.x) * WG_X * WG_Y + local;
     if k >= atomicLoad(&edges.count) { return; }
-    let px = vec2i(unpack_cell(edges.pixels[k]));
-    let counts = weight_at(px);
-    var nearest = NO_DEPTH;
-    var farthest = 0.0;
-    for (var i = 0; i < 9; i++) {
-        let z = flagged_depth(flags_at(px + vec2i(i % 3, i / 3) - 1));
-        nearest = min(nearest, z);
-        farthest = max(farthest, z);
+    let edge = edge_pixel(vec2i(unpack_cell(edges.pixels[k])));
+    let around = sort_around(edge);
+    let sides = sum_sides(edge, around);
+    var split = one_layer(edge, around);
+    if sides.front.total > 0.0 && sides.back.total > 0.0 && sides.back.weight > 0.0 {
+        let axis = sides.front_motion - sides.back_motion;
+        if dot(axis, axis) >= EDGE_MOTION * EDGE_MOTION && is_mixture(edge.motion - sides.back_motion, axis) {
+            split_layers(&split, edge, around, sides, axis);
+        }
     }
-    let own_color = textureLoad(color, px, 0);
-    let own_motion = textureLoad(motion, px, 0);
-    // One layer, if there are not two after all.
-    var z = flagged_depth(flags_at(px));
-    var front = own_color;
-    var front_motion = own_motion;
-    var back = vec4f(0.0);
-    var back_motion = own_motion;
-    var back_depth = 0.0;
-    var coverage = 1.0;
-    var back_seen = false;      // the back layer is not inferred
-    var seen_around = false;    // its colour is that of neighbouring frames
+    store_layers(edge, split);
+}
 
-    let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= NO_DEPTH);    // depth of neither
-    // The back is as deep as the pixel itself, or as the nearest background beside it, above or below.
-    var behind_z = select(INFINITE, z, z >= between);
-    for (var i = 1; i < select(0, 9, behind_z >= INFINITE); i += 2) {
-        let z_there = flagged_depth(flags_at(px + vec2i(i % 3, i / 3) - 1));
-        behind_z = min(behind_z, select(INFINITE, z_there, z_there >= between));
-    }
-    var front_place = Place(px, INFINITE);
-    var back_place = Place(px, INFINITE);
-    var front_bits = 0u;        // of the 5 x 5, all that are in front
-    var back_bits = 0u;
-    var pure_bits = 0u;         // those that show one surface
-    for (var i = 0; i < 25; i++) {
-        var there = neighbour(px, i, between);
-        let is_another = max(there.z, behind_z) > BACKGROUND_DEPTH_RATIO * min(there.z, behind_z);
-        there.counts = there.counts && (there.is_front || behind_z >= INFINITE || !is_another);
-        front_bits |= select(0u, 1u << u32(i), there.counts && there.is_front);
-        back_bits |= select(0u, 1u << u32(i), there.counts && !there.is_front);
-        pure_bits |= select(0u, 1u << u32(i), there.is_pure);
-        if there.counts && there.is_pure && there.is_front && there.distance2 < front_place.distance2 {
-            front_place = Place(there.at, there.distance2);
-        }
-        if there.counts && there.is_pure && !there.is_front && there.distance2 < back_place.distance2 {
-            back_place = Place(there.at, there.distance2);
-        }
-    }
-    let thin = (front_bits & pure_bits) == 0u;                  // no pure pixel is in front: a wire
-    let no_pure_background = (back_bits & pure_bits) == 0u;
-    var front_side = Side();
-    var back_side = Side();
-    var brightest = own_color / max(counts, 1e-9);
-    var todo = (front_bits & (pure_bits | select(0u, ~0u, thin))) | (back_bits & (pure_bits | select(0u, ~0u, no_pure_background)));
-    loop {
-        let there = neighbour(px, i32(min(firstTrailingBit(todo), 24u)), between);
-        let motion_there = textureLoad(motion, clamped(there.at), 0);
-        let color_there = color_at(there.at);
-        // The farther away, the smaller the share.
-        let share = select(0.0, 1.0 / (1.0 + there.distance2 * there.distance2), todo != 0u);
-        let weight_there = weight_at(there.at);
-        if todo != 0u && there.is_front { brightest = max(brightest, color_there / max(weight_there, 1e-9)); }
-        add(&front_side, select(0.0, share, there.is_front), motion_there, there.z, color_there, weight_there);
-        add(&back_side, select(share, 0.0, there.is_front), motion_there, there.z, color_there, weight_there);
-        todo &= todo - 1u;
-        if todo == 0u { break; }
-    }
-    let background_motion = back_side.motion / back_side.total;
-    var foreground_motion = select(front_side.motion / front_side.total, background_motion, thin);
-    var purest = px;
-    var most = 0.0;
-    for (var i = 0; i < select(0, 9, thin); i++) {      // of a wire, the motion that differs most from the background's
-        let there = neighbour(px, i % 3 + i / 3 * 5 + 6, between);
-        let motion_there = textureLoad(motion, clamped(there.at), 0);
-        let difference2 = dot(motion_there - background_motion, motion_there - background_motion);
-        if there.counts && there.is_front && difference2 > most {
-            most = difference2;
-            purest = there.at;
-            foreground_motion = motion_there;
-        }
-    }
+struct Split {          // the layers of an edge pixel
+    front: vec4f,
+    back: vec4f,
+    front_motion: vec4f,
+    back_motion: vec4f,
+    front_z: f32,
+    back_z: f32,        // 0 if there is no back
+    front_at: vec2i,    // the pixels whose paths bend as theirs
+    back_at: vec2i,
+    coverage: f32,
+    told: u32,          // of the back: SEEN if it is not inferred, AROUND if neighbouring frames gave its colour
+}
 
-    if front_side.total > 0.0 && back_side.total > 0.0 && back_side.weight > 0.0 {
-        let axis = foreground_motion - background_motion;
-        if dot(axis, axis) >= EDGE_MOTION * EDGE_MOTION && is_mixture(own_motion - background_motion, axis) {
-            // Where alphas differ they tell coverage better than vectors, which some renderers do not filter.
-            let front_alpha = select(front_side.color.a / max(front_side.weight, 1e-9), 1.0, thin);
-            let back_alpha = back_side.color.a / back_side.weight;
-            let by_alpha = front_alpha - back_alpha > MATTE_CONTRAST && counts > 0.0;
-            let by_vector = dot(own_motion - background_motion, axis) / dot(axis, axis);
-            back_depth = back_side.depth / back_side.total;
-            let seen = background_around(px, background_motion, back_depth);
-            seen_around = seen.count > 0.0;
-            let background = select(back_side.color / back_side.weight, seen.color / max(seen.count, 1.0), seen_around);
-            var measured = clamp(select(by_vector,
-                (own_color.a / counts - back_alpha) / (front_alpha - back_alpha), by_alpha), 0.0, 1.0);
-            if !by_alpha && !thin && counts > 0.0 && !are_filtered(px, background_motion, axis) {
-                measured = coverage_by_color(own_color / counts, front_side.color / max(front_side.weight, 1e-9), background,
-                                             measured);
-            }
-            measured = round(measured * f32(WHOLE)) / f32(WHOLE);
-            if measured < 1.0 - FULL {      // all background, whatever the one sample of the depth says
-                back_seen = true;
-                coverage = 0.0;
-                back = select(background, own_color / counts, counts > 0.0);
-                front = vec4f(0.0);
-                front_motion = foreground_motion;
-                if thin { front_place.at = purest; }
-                if z >= between { back_depth = z; }
-                z = front_side.depth / front_side.total;
-            } else {
-                coverage = select(measured, 1.0, measured > FULL);
-                // Together they are the pixel's colour: what would be less than black in front, or too bright, is behind.
-                let behind = (1.0 - coverage) * counts;
-                let rest = own_color - behind * background;
-                let most = select(MOST_CONTRAST * coverage * counts * brightest, vec4f(INFINITE), seen_around);
-                front = max(min(rest, most), vec4f(0.0));
-                back = background + select(vec4f(0.0), (rest - front) / max(behind, 1e-6), behind > 0.0);
-                back_motion = background_motion;
-                if measured <= FULL { front_motion = foreground_motion; }
-                if measured <= FULL && thin { front_place.at = purest; }
-                if measured <= FULL || z >= between { z = front_side.depth / front_side.total; }
-            }
-        }
+/// What an edge pixel is if it shows one surface after all.
+fn one_layer(edge: EdgePixel, around: Around) -> Split {
+    return Split(edge.color, vec4f(0.0), edge.motion, edge.motion, edge.z, 0.0,
+                 around.front_place.at, around.back_place.at, 1.0, 0u);
+}
+
+/// The two layers of a pixel whose motion is between those of the two sides, along `axis`.
+fn split_layers(split: ptr<function, Split>, edge: EdgePixel, around: Around, sides: Sides, axis: vec4f) {
+    let back_z = sides.back.depth / sides.back.total;
+    let seen = background_around(edge.px, sides.back_motion, back_z);
+    let seen_around = seen.count > 0.0;
+    let background = select(sides.back.color / sides.back.weight, seen.color / max(seen.count, 1.0), seen_around);
+    let measured = measured_coverage(edge, sides, axis, background);
+    let front_z = sides.front.depth / sides.front.total;
+    (*split).told = select(0u, AROUND, seen_around);
+    (*split).back_z = back_z;
+    if measured < 1.0 - FULL {      // all background, whatever the one sample of the depth says
+        (*split).told = SEEN;
+        (*split).coverage = 0.0;
+        (*split).back = select(background, edge.color / edge.counts, edge.counts > 0.0);
+        (*split).front = vec4f(0.0);
+        (*split).front_motion = sides.front_motion;
+        if sides.thin { (*split).front_at = sides.purest; }
+        if edge.z >= edge.between { (*split).back_z = edge.z; }
+        (*split).front_z = front_z;
+    } else {
+        let coverage = select(measured, 1.0, measured > FULL);
+        // Together they are the pixel's colour: what would be less than black in front, or too bright, is behind.
+        let behind = (1.0 - coverage) * edge.counts;
+        let rest = edge.color - behind * background;
+        let most = select(MOST_CONTRAST * coverage * edge.counts * sides.brightest, vec4f(INFINITE), seen_around);
+        let front = max(min(rest, most), vec4f(0.0));
+        (*split).coverage = coverage;
+        (*split).front = front;
+        (*split).back = background + select(vec4f(0.0), (rest - front) / max(behind, 1e-6), behind > 0.0);
+        (*split).back_motion = sides.back_motion;
+        if measured <= FULL { (*split).front_motion = sides.front_motion; }
+        if measured <= FULL && sides.thin { (*split).front_at = sides.purest; }
+        if measured <= FULL || edge.z >= edge.between { (*split).front_z = front_z; }
     }
-    // The bends of the two paths come from the nearest pure pixels: filtered vectors lead to mixtures.
-    let front_path = with_bend_of(front_place.at, front_motion);
-    let back_path = with_bend_of(back_place.at, back_motion);
-    textureStore(colors, px, FRONT, front);
-    z *= front_path.depth_ratio;
-    back_depth *= back_path.depth_ratio;
-    let has_back = back_depth > 0.0;
-    let told = select(select(0u, AROUND, seen_around), SEEN, back_seen);
-    textureStore(surfaces, px, FRONT, pack_surface(front_path.trajectory, -z, 0u));
-    if has_back { textureStore(colors, px, BACK, back); }     // else nobody reads it
-    textureStore(surfaces, px, BACK, pack_surface(back_path.trajectory, max(back_depth, 0.0), select(SINGLE, told, has_back)));
-    textureStore(mattes, px, pack_matte(Matte(z, has_back, coverage, coverage * counts)));
+}
+
+/// Coverage of the front, in steps of a matte. Where alphas differ they tell it better than vectors, which some renderers do
+/// not filter.
+fn measured_coverage(edge: EdgePixel, sides: Sides, axis: vec4f, background: vec4f) -> f32 {
+    let front_alpha = select(sides.front.color.a / max(sides.front.weight, 1e-9), 1.0, sides.thin);
+    let back_alpha = sides.back.color.a / sides.back.weight;
+    let by_alpha = front_alpha - back_alpha > MATTE_CONTRAST && edge.counts > 0.0;
+    let by_vector = dot(edge.motion - sides.back_motion, axis) / dot(axis, axis);
+    var measured = clamp(select(by_vector,
+        (edge.color.a / edge.counts - back_alpha) / (front_alpha - back_alpha), by_alpha), 0.0, 1.0);
+    if !by_alpha && !sides.thin && edge.counts > 0.0 && !are_filtered(edge.px, sides.back_motion, axis) {
+        let front = sides.front.color / max(sides.front.weight, 1e-9);
+        measured = coverage_by_color(edge.color / edge.counts, front, background, measured);
+    }
+    return round(measured * f32(WHOLE)) / f32(WHOLE);
+}
+
+/// Write both layers. The bends of their paths come from the nearest pure pixels: filtered vectors lead to mixtures.
+fn store_layers(edge: EdgePixel, split: Split) {
+    let front_path = with_bend_of(split.front_at, split.front_motion);
+    let back_path = with_bend_of(split.back_at, split.back_motion);
+    textureStore(colors, edge.px, FRONT, split.front);
+    let z = split.front_z * front_path.depth_ratio;
+    let back_z = split.back_z * back_path.depth_ratio;
+    let has_back = back_z > 0.0;
+    textureStore(surfaces, edge.px, FRONT, pack_surface(front_path.trajectory, -z, 0u));
+    if has_back { textureStore(colors, edge.px, BACK, split.back); }     // else nobody reads it
+    textureStore(surfaces, edge.px, BACK,
+                 pack_surface(back_path.trajectory, max(back_z, 0.0), select(SINGLE, split.told, has_back)));
+    textureStore(mattes, edge.px, pack_matte(Matte(z, has_back, split.coverage, split.coverage * edge.counts)));
 }
 
 /// The trajectory of these vectors, bent as that of the surface at `px` is.

@@ -24,6 +24,30 @@ const MAX_MISS: f32 = 8.0;              // if no search along the pixel's own pa
 
 // Loops are left from their end, and what is rare has a loop of its own over bits of times: see lavapipe.md.
 
+struct Pixel {          // what all times of a pixel have in common
+    x: vec2f,           // its centre [px]
+    block: vec2u,
+    a: Candidates,      // of the frame and its neighbours
+    b: Candidates,
+    c: Candidates,
+    trajectory: Trajectory5,    // its own
+    times: SampleTimes,
+    share: f32,         // of a time, applied before adding, so that no sum of finite colours overflows
+}
+
+struct Times {          // the times of this turn, a bit each
+    first: u32,         // sample of bit 0
+    valid: u32,
+    single: u32,        // those at which one search is enough
+}
+
+struct Exposure {       // what is added up over all times
+    sum: Composite,
+    accepted: f32,      // times at which a sample was found
+    left_image: f32,    // those at which the pixel's path has left the picture
+    hidden: f32,        // those at which another surface must be there that no frame shows
+}
+
 /// For blocks of active cells.
 @compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
 fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
@@ -31,116 +55,153 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let k = worklist_index(group) * BLOCKS_PER_GROUP + local / (BLOCK * BLOCK);
     let id = unpack_cell(worklist.cells[k]) * BLOCK + vec2u(in_block % BLOCK, in_block / BLOCK);
     if k >= worklist.count || any(id >= frame.size) { return; }
-    let x = vec2f(id) + 0.5;
-    let tile = id / TILE;
-    let candidates0 = load_candidates(tile, 0u);
-    let candidates1 = load_candidates(tile, 1u);
-    let candidates2 = load_candidates(tile, 2u);
+    let pixel = pixel_at(id);
     let front = 0u;
-    let trajectory = unpack_trajectory(surface_of(vec2i(id), front));
-    let starts = Starts(trajectory, surface_at(id, 2u), surface_at(id, 3u), surface_at(id, 4u), surface_at(id, 5u));
-    let block_trajectory = unpack_trajectory(surface_of(vec2i(id / BLOCK * BLOCK), front));  // as classified
-    let shift = frame.jitter * (pixel_noise(id) - 0.5);
-    let times = sample_times(x, shift, candidates0, candidates1, candidates2);
-    let share = 1.0 / f32(times.count);     // applied before adding, so that no sum of finite colours overflows
-
-    // Static: nothing moves, nor does anything come here.
-    let longest = max_abs_time(0.0);
-    let v = abs(trajectory.velocity) + abs(trajectory.half_acceleration) * longest;
-    let stays = all(v * longest < vec2f(STATIC_EPSILON));
-    let last_word = (frame.samples - 1u) / TIMES_PER_WORD + 1u;
-    let all_single = textureLoad(single_layer_mask, id / BLOCK, last_word, 0).x == 1u;
-    let is_static = is_static_tile(candidates0, candidates1, candidates2) || (stays && all_single);
-    let samples = select(times.count, 0u, is_static);
-
-    var sum = Composite();
-    var accepted = select(0.0, f32(times.count), is_static);
-    var left_image = 0.0;
-    var hidden = 0.0;       // times at which another surface must be there that no frame shows
-    var first = 0u;         // time of this turn's words of bits
+    let starts = Starts(pixel.trajectory, surface_at(id, 2u), surface_at(id, 3u), surface_at(id, 4u), surface_at(id, 5u));
+    let block_trajectory = unpack_trajectory(surface_of(vec2i(pixel.block * BLOCK), front));  // as classified
+    let is_static = is_static_pixel(pixel);
+    let samples = select(pixel.times.count, 0u, is_static);
+    var exposure = Exposure(Composite(), select(0.0, f32(pixel.times.count), is_static), 0.0, 0.0);
+    var first = 0u;
     loop {
         let valid = select(select(0u, (1u << (samples - first)) - 1u, samples > first), ~0u,
                            samples >= first + TIMES_PER_WORD);
-        var single = textureLoad(single_layer_mask, id / BLOCK, first / TIMES_PER_WORD, 0).x & valid;
-        var todo = single;
-        loop {              // times at which one search is enough
-            let t = time_in(times, first, todo);
-            let found = iterate_fixed_point(x, displacement5(block_trajectory, t), t, front);
-            let px = nearest_pixel(x - found.d);
-            var is_even = true;     // of one weight
-            var counts = 1.0;
-            if WEIGHTED {
-                is_even = is_smooth(surface_of(vec2i(px), front));
-                counts = matte_at(px, front / 2u).weight;
-            }
-            if todo != 0u && is_even {
-                var color = resampled(x - found.d, front, true);
-                if MOVING_LIGHT { color += moving_light(x - found.d, 0u, t, duration_in(times, first, todo)); }
-                let residual = min(sqrt(found.residual2), HALF_MAX);    // a wild motion may end it anywhere
-                var one = Composite(color, counts, 1.0, residual, 0.0, 0.0);
-                if CONFIDENCE && MOVING_LIGHT {
-                    one.unlit = light_unknown(x - found.d, 0u, t, duration_in(times, first, todo));
-                }
-                add(&sum, one, share);
-                accepted += 1.0;
-            }
-            if !is_even { single &= ~(1u << firstTrailingBit(todo)); }
-            todo &= todo - 1u;
-            if todo == 0u { break; }
-        }
-        if !PLAIN {
-            todo = ~single & valid;
-            var unresolved = 0u;
-            var far = 0u;       // of them, those at which no search came near
-            loop {              // all others
-                if todo != 0u {     // where it is 0, the loops within end at once
-                    let t = time_in(times, first, todo);
-                    let visible = resolve_visibility(x, starts, t, candidates0, candidates1, candidates2);
-                    let result = composite_front_to_back(visible, t, duration_in(times, first, todo));
-                    let is_covered = result.coverage > 0.5;
-                    if is_covered {
-                        add(&sum, result, share / result.coverage);
-                        accepted += 1.0;
-                    } else {
-                        let bit = todo & (~todo + 1u);
-                        unresolved |= bit;
-                        far |= select(0u, bit, visible.miss2 > MAX_MISS * MAX_MISS);
-                    }
-                }
-                todo &= todo - 1u;
-                if todo == 0u { break; }
-            }
-            loop {              // of them, those at which no frame shows anything: a tap along the pixel's own trajectory
-                if unresolved != 0u {
-                    let t = time_in(times, first, unresolved);
-                    let p = x - displacement5(trajectory, t);
-                    let is_far = (far & unresolved & (~unresolved + 1u)) != 0u;
-                    if is_far && is_inside(p) {
-                        hidden += 1.0;
-                    } else {
-                        let at = at_border(p, first + firstTrailingBit(unresolved));
-                        var one = tap(at);
-                        if MOVING_LIGHT { one.color += moving_light(at, 0u, t, duration_in(times, first, unresolved)); }
-                        add(&sum, one, share);
-                    }
-                    if !is_inside(p) { left_image += 1.0; }
-                }
-                unresolved &= unresolved - 1u;
-                if unresolved == 0u { break; }
-            }
-        }
+        let single = textureLoad(single_layer_mask, pixel.block, first / TIMES_PER_WORD, 0).x & valid;
+        var times = Times(first, valid, single);
+        add_single(&exposure, &times, pixel, block_trajectory);
+        if !PLAIN { add_layered(&exposure, times, pixel, starts); }
         first += TIMES_PER_WORD;
         if first >= samples { break; }
     }
-    if !PLAIN { add_hidden(&sum, id, hidden * share); }
-    var result = max(sum.color, vec4f(0.0)) / sum.weight;
-    if is_static || sum.weight <= 0.0 { result = static_color(id); }
-    if CONFIDENCE {
-        let share_accepted = max(accepted * share, 1e-9);
-        if is_static { sum.unlit = static_unlit(id); }
-        result = vec4f(max(accepted * share - sum.unlit, 0.0), sum.neighbours, sum.residual / share_accepted, left_image * share);
+    if !PLAIN {
+        var sum = exposure.sum;
+        add_hidden(&sum, id, exposure.hidden * pixel.share);
+        exposure.sum = sum;
     }
-    textureStore(output, id, result);
+    textureStore(output, id, result_of(exposure, pixel, id, is_static));
+}
+
+/// Add what is visible at a time. (A pointer to a part of a variable cannot be handed on everywhere.)
+fn add_time(exposure: ptr<function, Exposure>, one: Composite, share: f32) {
+    var sum = (*exposure).sum;
+    add(&sum, one, share);
+    (*exposure).sum = sum;
+}
+
+fn pixel_at(id: vec2u) -> Pixel {
+    let x = vec2f(id) + 0.5;
+    let tile = id / TILE;
+    let a = load_candidates(tile, 0u);
+    let b = load_candidates(tile, 1u);
+    let c = load_candidates(tile, 2u);
+    let shift = frame.jitter * (pixel_noise(id) - 0.5);
+    let times = sample_times(x, shift, a, b, c);
+    return Pixel(x, id / BLOCK, a, b, c, unpack_trajectory(surface_of(vec2i(id), 0u)), times, 1.0 / f32(times.count));
+}
+
+/// True if nothing moves, nor does anything come here.
+fn is_static_pixel(pixel: Pixel) -> bool {
+    let longest = max_abs_time(0.0);
+    let v = abs(pixel.trajectory.velocity) + abs(pixel.trajectory.half_acceleration) * longest;
+    let stays = all(v * longest < vec2f(STATIC_EPSILON));
+    let last_word = (frame.samples - 1u) / TIMES_PER_WORD + 1u;
+    let all_single = textureLoad(single_layer_mask, pixel.block, last_word, 0).x == 1u;
+    return is_static_tile(pixel.a, pixel.b, pixel.c) || (stays && all_single);
+}
+
+/// Add the times at which one search is enough. Those that show several weights are single no more.
+fn add_single(exposure: ptr<function, Exposure>, times: ptr<function, Times>, pixel: Pixel, block_trajectory: Trajectory5) {
+    let front = 0u;
+    let first = (*times).first;
+    var todo = (*times).single;
+    loop {
+        let t = time_in(pixel.times, first, todo);
+        let found = iterate_fixed_point(pixel.x, displacement5(block_trajectory, t), t, front);
+        let at = pixel.x - found.d;
+        var is_even = true;     // of one weight
+        var counts = 1.0;
+        if WEIGHTED {
+            let px = nearest_pixel(at);
+            is_even = is_smooth(surface_of(vec2i(px), front));
+            counts = matte_at(px, front / 2u).weight;
+        }
+        if todo != 0u && is_even {
+            let duration = duration_in(pixel.times, first, todo);
+            var color = resampled(at, front, true);
+            if MOVING_LIGHT { color += moving_light(at, 0u, t, duration); }
+            let residual = min(sqrt(found.residual2), HALF_MAX);    // a wild motion may end it anywhere
+            var one = Composite(color, counts, 1.0, residual, 0.0, 0.0);
+            if CONFIDENCE && MOVING_LIGHT { one.unlit = light_unknown(at, 0u, t, duration); }
+            add_time(exposure, one, pixel.share);
+            (*exposure).accepted += 1.0;
+        }
+        if !is_even { (*times).single &= ~(1u << firstTrailingBit(todo)); }
+        todo &= todo - 1u;
+        if todo == 0u { break; }
+    }
+}
+
+/// Add all other times: what frames show, composited front to back.
+fn add_layered(exposure: ptr<function, Exposure>, times: Times, pixel: Pixel, starts: Starts) {
+    var todo = ~times.single & times.valid;
+    var unresolved = 0u;
+    var far = 0u;           // of them, those at which no search came near
+    loop {
+        if todo != 0u {     // where it is 0, the loops within end at once
+            let t = time_in(pixel.times, times.first, todo);
+            let visible = resolve_visibility(pixel.x, starts, t, pixel.a, pixel.b, pixel.c);
+            let result = composite_front_to_back(visible, t, duration_in(pixel.times, times.first, todo));
+            let is_covered = result.coverage > 0.5;
+            if is_covered {
+                add_time(exposure, result, pixel.share / result.coverage);
+                (*exposure).accepted += 1.0;
+            } else {
+                let bit = todo & (~todo + 1u);
+                unresolved |= bit;
+                far |= select(0u, bit, visible.miss2 > MAX_MISS * MAX_MISS);
+            }
+        }
+        todo &= todo - 1u;
+        if todo == 0u { break; }
+    }
+    add_unresolved(exposure, times.first, unresolved, far, pixel);
+}
+
+/// Add the times at which no frame shows anything: a tap along the pixel's own trajectory; where no search came near, hidden.
+fn add_unresolved(exposure: ptr<function, Exposure>, first: u32, bits: u32, far: u32, pixel: Pixel) {
+    var todo = bits;
+    loop {
+        if todo != 0u {
+            let t = time_in(pixel.times, first, todo);
+            let p = pixel.x - displacement5(pixel.trajectory, t);
+            let is_far = (far & todo & (~todo + 1u)) != 0u;
+            if is_far && is_inside(p) {
+                (*exposure).hidden += 1.0;
+            } else {
+                let at = at_border(p, first + firstTrailingBit(todo));
+                var one = tap(at);
+                if MOVING_LIGHT { one.color += moving_light(at, 0u, t, duration_in(pixel.times, first, todo)); }
+                add_time(exposure, one, pixel.share);
+            }
+            if !is_inside(p) { (*exposure).left_image += 1.0; }
+        }
+        todo &= todo - 1u;
+        if todo == 0u { break; }
+    }
+}
+
+/// The mean over the exposure, or how sure it is.
+fn result_of(exposure: Exposure, pixel: Pixel, id: vec2u, is_static: bool) -> vec4f {
+    var result = max(exposure.sum.color, vec4f(0.0)) / exposure.sum.weight;
+    if is_static || exposure.sum.weight <= 0.0 { result = static_color(id); }
+    if CONFIDENCE {
+        let accepted = exposure.accepted * pixel.share;
+        var unlit = exposure.sum.unlit;
+        if is_static { unlit = static_unlit(id); }
+        result = vec4f(max(accepted - unlit, 0.0), exposure.sum.neighbours, exposure.sum.residual / max(accepted, 1e-9),
+                       exposure.left_image * pixel.share);
+    }
+    return result;
 }
 
 /// For static cells.

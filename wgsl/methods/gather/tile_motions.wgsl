@@ -146,23 +146,53 @@ fn coarsen(@builtin(global_invocation_id) id: vec3u) {
     textureStore(coarse_boxes_out, id.xy, box);
 }
 
+struct Receiver {       // a tile that gathers, and from where
+    here: vec2i,
+    window: vec2f,      // of the exposure [frame intervals]
+    u: f32,             // the time of it that is farthest from the frame's instant
+    first: vec2i,       // corners of the tiles around from which something may come
+    last: vec2i,
+}
+
+struct Gathered {       // what comes into a tile
+    motions: array<vec4f, 4>,
+    count: u32,         // of the motions
+    min_depth: vec4f,   // of each
+    t_enter: vec4f,     // when the first of it enters the tile and the last leaves it, in shares of the exposure
+    t_exit: vec4f,
+    missed: f32,        // greatest squared distance of a motion from all of them [px^2]
+}
+
 /// The candidates of one tile: clusters of all motions, from wherever they come, whose sweep meets it.
 @compute @workgroup_size(WG_X, WG_Y)
 fn gather_candidates(@builtin(local_invocation_index) local: u32,
         @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let k = work_index(local, group, groups);
-    let tiles = tiles_of(frame.size);
     let id = unpack_cell(active_cells.cells[k / CELL_TILES]) * vec2u(CELL_TILES, 1u) + vec2u(k % CELL_TILES, 0u);
-    if k / CELL_TILES >= active_cells.count || id.x >= tiles.x { return; }
-    let window = exposure_window(source.offset);
-    let u = max_abs_time(source.offset);
+    if k / CELL_TILES >= active_cells.count || id.x >= tiles_of(frame.size).x { return; }
+    let here = vec2i(id);
+    var tile = Receiver(here, exposure_window(source.offset), max_abs_time(source.offset), here, here);
+    find_coarse_range(&tile);
+    let edge_and_longest = narrow_range(&tile);
+    var gathered = Gathered(array<vec4f, 4>(), 0u, vec4f(INFINITE), vec4f(1.0), vec4f(0.0), 0.0);
+    cluster_what_comes(&gathered, tile);
+    measure_what_comes(&gathered, tile);
+    let longest2 = trajectory_distance2(gathered.motions[0], vec4f(0.0), tile.u);
+    let most_missed = max(CROWDED_DISTANCE * CROWDED_DISTANCE, CROWDED_SHARE * CROWDED_SHARE * longest2);
+    let is_crowded = abs(source.offset) <= 1.0 && gathered.missed > most_missed;
+    sort_by_depth(&gathered);
+    scatter_what_is_missed(gathered, tile, is_crowded);
+    let header = vec4f(f32(gathered.count), edge_and_longest, f32(is_crowded));
+    store_candidates(id, header, gathered, tile.window);
+}
+
+/// The range of tiles around a tile from which something may come, by coarse boxes.
+fn find_coarse_range(tile: ptr<function, Receiver>) {
+    let here = (*tile).here;
     let longest_of_all = bitcast<f32>(atomicLoad(&max_displacement));
     let radius = min(i32(ceil(longest_of_all / f32(TILE))) + 1, MAX_TILE_RADIUS);
-    let here = vec2i(id);
     let low = max(here - radius, vec2i(0));
-    let high = min(here + radius, vec2i(tiles) - 1);
-
-    // The range of tiles around of which something may come: first by coarse boxes,
+    let high = min(here + radius, vec2i(tiles_of(frame.size)) - 1);
     let coarse_low = low / COARSE;
     let coarse_high = high / COARSE;
     var first = here;
@@ -176,39 +206,48 @@ fn gather_candidates(@builtin(local_invocation_index) local: u32,
             last = max(last, coarse * COARSE + COARSE - 1);
         }
     }
-    // then by their own boxes and if they move.
-    let least = max(first, low);
-    let most = min(last, high);
-    first = here;
-    last = here;
-    var has_edge = 0.0;
-    var longest = 0.0;
-    for (var tile = least; tile.y <= most.y; tile = after(tile, least, most)) {
-        let other = source_tile(tile, here);
+    (*tile).first = max(first, low);
+    (*tile).last = min(last, high);
+}
+
+/// The same by the tiles' own boxes, and if they move. Of all that may reach the tile: 1 if an edge does, and the greatest
+/// displacement [px].
+fn narrow_range(tile: ptr<function, Receiver>) -> vec2f {
+    let here = (*tile).here;
+    let least = (*tile).first;
+    let most = (*tile).last;
+    var first = here;
+    var last = here;
+    var edge_and_longest = vec2f(0.0);
+    for (var at = least; at.y <= most.y; at = after(at, least, most)) {
+        let other = source_tile(at, here);
         if other.may_reach {
-            let header = textureLoad(tile_motions, other.at, HEADER, 0);
-            has_edge = max(has_edge, header.y);
-            longest = max(longest, header.z);
+            edge_and_longest = max(edge_and_longest, textureLoad(tile_motions, other.at, HEADER, 0).yz);
             if other.count > 0u {
-                first = min(first, tile);
-                last = max(last, tile);
+                first = min(first, at);
+                last = max(last, at);
             }
         }
     }
+    (*tile).first = first;
+    (*tile).last = last;
+    return edge_and_longest;
+}
 
-    // Farthest-point clustering of all the motions that come.
+/// Farthest-point clustering of all the motions that come.
+fn cluster_what_comes(gathered: ptr<function, Gathered>, tile: Receiver) {
     var motions = array<vec4f, 4>();
     var count = 0u;
     var more = true;
     for (var k = 0u; k < MOTIONS && more; k++) {
         var farthest = 0.0;
         var found = vec4f(0.0);
-        for (var tile = first; tile.y <= last.y; tile = after(tile, first, last)) {
-            let other = source_tile(tile, here);
+        for (var at = tile.first; at.y <= tile.last.y; at = after(at, tile.first, tile.last)) {
+            let other = source_tile(at, tile.here);
             for (var n = 0u; n < other.count; n++) {
                 let trajectory = textureLoad(tile_motions, other.at, n, 0);
-                let distance2 = distance2_to_clusters(trajectory, motions, u);
-                let interval = sweep_interval(trajectory, window, other.off);
+                let distance2 = distance2_to_clusters(trajectory, motions, tile.u);
+                let interval = sweep_interval(trajectory, tile.window, other.off);
                 if distance2 > farthest && interval.x <= interval.y {
                     farthest = distance2;
                     found = trajectory;
@@ -221,76 +260,96 @@ fn gather_candidates(@builtin(local_invocation_index) local: u32,
             count = k + 1u;
         }
     }
+    (*gathered).motions = motions;
+    (*gathered).count = count;
+}
 
-    // The least depth of each cluster, and when the first of it enters the tile and the last leaves it.
+/// The depths and times of each cluster, and what is far from all of them.
+fn measure_what_comes(gathered: ptr<function, Gathered>, tile: Receiver) {
+    let motions = (*gathered).motions;
     var min_depth = vec4f(INFINITE);
     var t_enter = vec4f(1.0);
     var t_exit = vec4f(0.0);
-    var missed = 0.0;           // greatest squared distance of a motion from all candidates [px^2]
-    for (var tile = first; tile.y <= last.y; tile = after(tile, first, last)) {
-        let other = source_tile(tile, here);
+    var missed = 0.0;
+    for (var at = tile.first; at.y <= tile.last.y; at = after(at, tile.first, tile.last)) {
+        let other = source_tile(at, tile.here);
         for (var n = 0u; n < other.count; n++) {
             let trajectory = textureLoad(tile_motions, other.at, n, 0);
-            let interval = sweep_interval(trajectory, window, other.off);
+            let interval = sweep_interval(trajectory, tile.window, other.off);
             if interval.x <= interval.y {
-                let nearest = nearest_cluster(trajectory, motions, u);
+                let nearest = nearest_cluster(trajectory, motions, tile.u);
                 let z = textureLoad(tile_motions, other.at, MIN_DEPTH, 0)[n];
                 min_depth = min(min_depth, select(vec4f(INFINITE), vec4f(z), nearest));
                 t_enter = min(t_enter, select(vec4f(1.0), vec4f(interval.x), nearest));
                 t_exit = max(t_exit, select(vec4f(0.0), vec4f(interval.y), nearest));
-                missed = max(missed, missed_distance2(trajectory, motions, u));
+                missed = max(missed, missed_distance2(trajectory, motions, tile.u));
             }
         }
     }
-    let reach2 = CROWDED_SHARE * CROWDED_SHARE * trajectory_distance2(motions[0], vec4f(0.0), u);
+    (*gathered).min_depth = min_depth;
+    (*gathered).t_enter = t_enter;
+    (*gathered).t_exit = t_exit;
+    (*gathered).missed = missed;
+}
 
-    // Sorted by depth, the nearest first.
+/// The nearest first.
+fn sort_by_depth(gathered: ptr<function, Gathered>) {
     for (var i = 0u; i < MOTIONS; i++) {
-        for (var k = 0u; k + 1u < count; k++) {
-            if min_depth[k] > min_depth[k + 1u] {
-                let trajectory = motions[k];
-                motions[k] = motions[k + 1u];
-                motions[k + 1u] = trajectory;
-                let z = min_depth[k];
-                min_depth[k] = min_depth[k + 1u];
-                min_depth[k + 1u] = z;
-                let a = t_enter[k];
-                t_enter[k] = t_enter[k + 1u];
-                t_enter[k + 1u] = a;
-                let b = t_exit[k];
-                t_exit[k] = t_exit[k + 1u];
-                t_exit[k + 1u] = b;
-            }
+        for (var k = 0u; k + 1u < (*gathered).count; k++) {
+            if (*gathered).min_depth[k] > (*gathered).min_depth[k + 1u] { swap_with_next(gathered, k); }
         }
     }
+}
+
+fn swap_with_next(gathered: ptr<function, Gathered>, k: u32) {
+    let trajectory = (*gathered).motions[k];
+    (*gathered).motions[k] = (*gathered).motions[k + 1u];
+    (*gathered).motions[k + 1u] = trajectory;
+    let z = (*gathered).min_depth[k];
+    (*gathered).min_depth[k] = (*gathered).min_depth[k + 1u];
+    (*gathered).min_depth[k + 1u] = z;
+    let a = (*gathered).t_enter[k];
+    (*gathered).t_enter[k] = (*gathered).t_enter[k + 1u];
+    (*gathered).t_enter[k + 1u] = a;
+    let b = (*gathered).t_exit[k];
+    (*gathered).t_exit[k] = (*gathered).t_exit[k + 1u];
+    (*gathered).t_exit[k + 1u] = b;
+}
+
+/// List the tiles from which motions come that are far from all clusters, if the tile is crowded.
+fn scatter_what_is_missed(gathered: Gathered, tile: Receiver, is_crowded: bool) {
+    let end = select(tile.first.y - 1, tile.last.y, is_crowded);
+    for (var at = tile.first; at.y <= end; at = after(at, tile.first, tile.last)) {
+        let other = source_tile(at, tile.here);
+        var is_source = false;
+        for (var n = 0u; n < other.count; n++) {
+            let trajectory = textureLoad(tile_motions, other.at, n, 0);
+            let interval = sweep_interval(trajectory, tile.window, other.off);
+            let distance2 = missed_distance2(trajectory, gathered.motions, tile.u);
+            is_source = is_source || (distance2 > CROWDED_DISTANCE * CROWDED_DISTANCE && interval.x <= interval.y);
+        }
+        if is_source { scatter_from(vec2u(at)); }
+    }
+}
+
+/// Write the candidates of a tile, see CANDIDATE_LAYERS.
+fn store_candidates(tile: vec2u, header: vec4f, gathered: Gathered, window: vec2f) {
     let duration = window.y - window.x;
     var times = vec4u();
     var velocities = vec4u();
     var half_accelerations = vec4u();
     for (var k = 0u; k < MOTIONS; k++) {
-        let interval = vec2f(window.x + duration * t_enter[k] - TIME_SLACK, window.x + duration * t_exit[k] + TIME_SLACK);
-        times[k] = pack_halves(select(interval, vec2f(INFINITE, -INFINITE), min_depth[k] >= INFINITE));
-        velocities[k] = pack_halves(motions[k].xy);
-        half_accelerations[k] = pack_halves(motions[k].zw);
+        let interval = vec2f(window.x + duration * gathered.t_enter[k] - TIME_SLACK,
+                             window.x + duration * gathered.t_exit[k] + TIME_SLACK);
+        times[k] = pack_halves(select(interval, vec2f(INFINITE, -INFINITE), gathered.min_depth[k] >= INFINITE));
+        velocities[k] = pack_halves(gathered.motions[k].xy);
+        half_accelerations[k] = pack_halves(gathered.motions[k].zw);
     }
-    let is_crowded = abs(source.offset) <= 1.0 && missed > max(CROWDED_DISTANCE * CROWDED_DISTANCE, reach2);
-    let sources_end = select(first.y - 1, last.y, is_crowded);
-    for (var tile = first; tile.y <= sources_end; tile = after(tile, first, last)) {
-        let other = source_tile(tile, here);
-        var is_source = false;
-        for (var n = 0u; n < other.count; n++) {
-            let trajectory = textureLoad(tile_motions, other.at, n, 0);
-            let interval = sweep_interval(trajectory, window, other.off);
-            let is_missed = missed_distance2(trajectory, motions, u) > CROWDED_DISTANCE * CROWDED_DISTANCE;
-            is_source = is_source || (is_missed && interval.x <= interval.y);
-        }
-        if is_source { scatter_from(vec2u(tile)); }
-    }
-    textureStore(tile_candidates, id, source.first, bitcast<vec4u>(vec4f(f32(count), has_edge, longest, f32(is_crowded))));
-    textureStore(tile_candidates, id, source.first + 1u, bitcast<vec4u>(min_depth));
-    textureStore(tile_candidates, id, source.first + 2u, times);
-    textureStore(tile_candidates, id, source.first + 3u, velocities);
-    textureStore(tile_candidates, id, source.first + 4u, half_accelerations);
+    textureStore(tile_candidates, tile, source.first, bitcast<vec4u>(header));
+    textureStore(tile_candidates, tile, source.first + 1u, bitcast<vec4u>(gathered.min_depth));
+    textureStore(tile_candidates, tile, source.first + 2u, times);
+    textureStore(tile_candidates, tile, source.first + 3u, velocities);
+    textureStore(tile_candidates, tile, source.first + 4u, half_accelerations);
 }
 
 /// Add a tile to the list of those to scatter, if it is not in it.
