@@ -114,11 +114,11 @@ def codecs_alone(clip: Path, exact: Path, scratch: Path) -> None:
     from wgmb.video.write.encoders import chosen
     from wgmb.video.write.pictures import CodedVideo
 
-    footage = VideoReader(exact)
-    pictures = [picture for _, picture in footage]
+    reader = VideoReader(exact)
+    pictures = [picture for _, picture in reader]
     writer = CodedVideo(
-        scratch, scratch.with_suffix(".part.mp4"), chosen(scratch), footage.coding, footage.size,
-        footage.rate, 1 / footage.rate,
+        scratch, scratch.with_suffix(".part.mp4"), chosen(scratch), reader.coding, reader.size,
+        reader.rate, 1 / reader.rate,
     )  # fmt: skip
     before, began = resource.getrusage(resource.RUSAGE_SELF), time.perf_counter()
     every = 0
@@ -130,7 +130,7 @@ def codecs_alone(clip: Path, exact: Path, scratch: Path) -> None:
         for _ in container.decode(stream):
             every += 1
             while done < min(len(pictures), round(every * share)):
-                writer.add(pictures[done], done / footage.rate)
+                writer.add(pictures[done], done / reader.rate)
                 done += 1
     writer.close()
     after = resource.getrusage(resource.RUSAGE_SELF)
@@ -146,17 +146,17 @@ def kernel_alone(clip: Path, fps: int) -> None:
     from wgmb.video.planes import Average
     from wgmb.video.read.reader import VideoReader
 
-    footage = VideoReader(clip)
-    count = max(1, round(float(footage.rate) / fps))
-    pictures = [picture for _, picture in footage.pictures(0, count - count % 2)]
+    reader = VideoReader(clip)
+    count = max(1, round(float(reader.rate) / fps))
+    pictures = [picture for _, picture in reader.pictures(0, count - count % 2)]
     shares = [1 / count] * len(pictures)
     if count % 2 == 0:
         shares[0] = shares[-1] = 0.5 / count
     average = Average(gpu.open_device(None))
-    average(pictures, shares, footage.coding)
+    average(pictures, shares, reader.coding)
     before, began = resource.getrusage(resource.RUSAGE_SELF), time.perf_counter()
-    for _ in range(round(len(footage) / count)):
-        average(pictures, shares, footage.coding)
+    for _ in range(round(len(reader) / count)):
+        average(pictures, shares, reader.coding)
     after = resource.getrusage(resource.RUSAGE_SELF)
     print(cpu_of(after) - cpu_of(before), time.perf_counter() - began)
 

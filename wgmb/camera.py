@@ -169,13 +169,13 @@ class Reprojections:
             way = (clip[:, :2] / clip[:, 3:] - ndc) * scale
         return np.where(clip[:, 3:] > 0, way, np.nan)
 
-    def _reprojection(self, there: Camera | None, body: int | None) -> np.ndarray:
-        if there is None:
+    def _reprojection(self, other: Camera | None, body: int | None) -> np.ndarray:
+        if other is None:
             return np.diag([0.0, 0.0, 0.0, 0.0])
         moved = np.eye(4)
-        if body is not None and body in there.bodies:
-            moved = np.asarray(there.bodies[body]) @ np.linalg.inv(self.here.bodies[body])
-        return np.asarray(there.clip_from_world) @ moved @ self.world_from_pixel()
+        if body is not None and body in other.bodies:
+            moved = np.asarray(other.bodies[body]) @ np.linalg.inv(self.here.bodies[body])
+        return np.asarray(other.clip_from_world) @ moved @ self.world_from_pixel()
 
     def world_from_pixel(self) -> np.ndarray:
         """World position from (x d, y d, d, 1), or (x, y, d, 1) without perspective."""

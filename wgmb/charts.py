@@ -93,16 +93,16 @@ class Axes:
         low, high = self._y
         return self.bottom - (value - low) / ((high - low) or 1) * (self.bottom - self.top)
 
-    def grid(self, x_ticks, y_ticks, look: str) -> str:
-        """A line and its number at every tick; `look`: attributes of the lines."""
+    def grid(self, x_ticks, y_ticks, attributes: str) -> str:
+        """A line and its number at every tick; `attributes`: of the lines."""
         across = "".join(
-            f'<line {look} x1="{self.left}" x2="{self.right}" y1="{self.y(t):.1f}" '
+            f'<line {attributes} x1="{self.left}" x2="{self.right}" y1="{self.y(t):.1f}" '
             f'y2="{self.y(t):.1f}"/><text x="{self.left - 6}" y="{self.y(t) + 4:.1f}" '
             f'text-anchor="end">{t:g}</text>'
             for t in y_ticks
         )
         down = "".join(
-            f'<line {look} x1="{self.x(t):.1f}" x2="{self.x(t):.1f}" y1="{self.top}" '
+            f'<line {attributes} x1="{self.x(t):.1f}" x2="{self.x(t):.1f}" y1="{self.top}" '
             f'y2="{self.bottom}"/><text x="{self.x(t):.1f}" y="{self.bottom + 15}" '
             f'text-anchor="middle">{t:g}</text>'
             for t in x_ticks

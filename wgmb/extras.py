@@ -66,17 +66,17 @@ def is_available(package: str) -> bool:
 
 
 @contextlib.contextmanager
-def needed_by(what: str, extra: str = "") -> Iterator[None]:
+def needed_by(feature: str, extra: str = "") -> Iterator[None]:
     """Import packages of extras within it; InputError names the command that installs one.
 
-    `what`: who needs them, which begins the message. `extra`: if not the one in EXTRAS.
+    `feature`: who needs them, which begins the message. `extra`: if not the one in EXTRAS.
     """
     try:
         yield
     except ImportError as error:
         if not (why := reason(error, extra)):
             raise
-        raise InputError(f"{what}: {why}") from None
+        raise InputError(f"{feature}: {why}") from None
 
 
 def reason(error: ImportError, extra: str = "") -> str:

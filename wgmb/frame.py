@@ -223,14 +223,14 @@ def _size_of(color: ArrayLike) -> tuple[int, int]:
     return (shape[1], shape[0]) if len(shape) == 3 else (0, 0)
 
 
-def _array(name: str, given: ArrayLike) -> np.ndarray:
-    if isinstance(given, np.ma.MaskedArray):
+def _array(name: str, values: ArrayLike) -> np.ndarray:
+    if isinstance(values, np.ma.MaskedArray):
         raise InputError(f"{name} must not be a masked array: fill it, with NaN for no value")
-    return np.asarray(given)
+    return np.asarray(values)
 
 
-def _float_array(name: str, given: ArrayLike) -> np.ndarray:
-    array = _array(name, given)
+def _float_array(name: str, values: ArrayLike) -> np.ndarray:
+    array = _array(name, values)
     if array.dtype.kind != "f":
         hint = "; divide by its maximum and undo its gamma first" if name == "color" else ""
         raise InputError(f"{name} must be floating point, got {array.dtype}{hint}")

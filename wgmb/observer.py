@@ -37,7 +37,7 @@ class Observer:
         self.held = self.cone.frames_needed(rate)  # pictures in the ring
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         self._images, self._sum = TexturePool(self.device), WeightedSum(self.device)
-        self._size, self._shown = (0, 0), 0
+        self._size, self._count = (0, 0), 0
         self._held_for: deque[float | None] = deque(maxlen=self.held)  # the newest first
         self._lock = threading.RLock()
 
@@ -50,7 +50,7 @@ class Observer:
         if picture.ndim != 3 or picture.shape[2] not in (3, 4):
             raise InputError(f"picture must be (height, width, 3 or 4), got {picture.shape}")
         height, width, channels = picture.shape
-        if self._shown and self._size != (width, height):
+        if self._count and self._size != (width, height):
             raise InputError(
                 f"picture is {width} x {height}, earlier ones {self._size[0]} x {self._size[1]}"
             )
@@ -60,8 +60,8 @@ class Observer:
             picture = np.concatenate([picture, np.ones_like(picture[..., :1])], axis=2)
         with self._lock, gpu.reported((width, height)):
             self._size = width, height
-            self._images.upload(f"ring {self._shown % self.held}", picture, "rgba16float")
-            self._shown += 1
+            self._images.upload(f"ring {self._count % self.held}", picture, "rgba16float")
+            self._count += 1
             self._held_for.appendleft(held)
 
     def perceived(self, after: float = 0.0) -> np.ndarray:
@@ -74,13 +74,13 @@ class Observer:
 
     def texture(self, after: float = 0.0) -> wgpu.GPUTexture:
         """The perceived image as a texture, rgba32float, which the next call overwrites."""
-        if not self._shown:
+        if not self._count:
             raise InputError("no image has been shown yet")
         with self._lock, gpu.reported(self._size):
-            count = min(self._shown, self.held)
+            count = min(self._count, self.held)
             pictures = [
                 self._images.texture(f"ring {number % self.held}", self._size, "rgba16float")
-                for number in range(self._shown - 1, self._shown - 1 - count, -1)
+                for number in range(self._count - 1, self._count - 1 - count, -1)
             ]
             output = self._images.texture("output", self._size, "rgba32float")
             encoder = self.device.create_command_encoder(label="perceive")

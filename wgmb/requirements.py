@@ -80,8 +80,8 @@ def of_extra(extra: str) -> list[Requirement]:
     return list(found.values())
 
 
-def _of_extra(extra: str, lines: list[str], seen: set[str]) -> list[Requirement]:
-    seen.add(extra)
+def _of_extra(extra: str, lines: list[str], visited: set[str]) -> list[Requirement]:
+    visited.add(extra)
     found = []
     for line in lines:
         part = _LINE.fullmatch(line)
@@ -92,8 +92,8 @@ def _of_extra(extra: str, lines: list[str], seen: set[str]) -> list[Requirement]
             found.append(Requirement(part[1], part[3].replace(" ", ""), marker))
             continue
         for inner in re.findall(r"[\w.-]+", part[2] or ""):
-            if inner not in seen:
-                found += _of_extra(inner, lines, seen)
+            if inner not in visited:
+                found += _of_extra(inner, lines, visited)
     return found
 
 

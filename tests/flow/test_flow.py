@@ -521,7 +521,7 @@ def test_a_shot_keeps_no_more_than_it_needs():
     counts = []
     for n in range(12):
         shot(n)
-        counts.append(len(shot._made))
+        counts.append(len(shot._results))
     assert max(counts[6:]) == counts[6] < 25
 
 

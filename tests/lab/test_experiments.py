@@ -14,7 +14,7 @@ from wgmb.lab.cases import Case
 from wgmb.lab.papers import experiments
 from wgmb.lab.papers.chen import ALPHAS
 from wgmb.lab.papers.rosado import TAPS
-from wgmb.lab.papers.taylor import _worth
+from wgmb.lab.papers.taylor import _equal_error
 from wgmb.lab.results import Entry, Report
 from wgmb.methods import METHODS
 from wgmb.metrics import METRICS
@@ -198,6 +198,8 @@ def test_worth_in_rays_is_read_off_the_curve(limit, rays):
                for n in (1, 2, 8, 16)]  # fmt: skip
     entries += [Entry("x", "reproject, variant published", "samples", {"flip": error}, n, 0.001 * n)
                 for n, error in ((1, 2 * limit), (8, 1.01 * limit), (16, limit))]  # fmt: skip
-    ((_, _, best, after, enough, _),) = _worth(Report("", "", {}, 1, entries=entries), case, "flip")
+    ((_, _, best, after, enough, _),) = _equal_error(
+        Report("", "", {}, 1, entries=entries), case, "flip"
+    )
     assert (best, after) == (round(1.01 * limit, 4), 8.0)  # the first that is nearly its best
     assert enough == (pytest.approx(rays, rel=0.03) if rays != "> 16" else rays)

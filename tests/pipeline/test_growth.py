@@ -201,13 +201,13 @@ def test_memory_does_not_grow_with_frames(fresh, name):
 def test_exposures_of_cells_leave_nothing_behind():
     """Also where shutters, shares and numbers of cells change from one to the next."""
     blur = Blur("tap", samples=4)
-    reel = ShotReader(Picture(n / 144, _coded(n), n) for n in range(10_000))
-    views, exposer, number = VideoFrames(reel, blur, _Sideways()), ExposureSum(blur), 0
+    shots = ShotReader(Picture(n / 144, _coded(n), n) for n in range(10_000))
+    views, exposer, number = VideoFrames(shots, blur, _Sideways()), ExposureSum(blur), 0
 
     def step():
         nonlocal number
-        cells = reel.cells(number / 60, 1 / 60, Shutter(180))
-        exposer.texture(SIZE, ((cell, views.shown(cell.index)) for cell in cells))
+        cells = shots.cells(number / 60, 1 / 60, Shutter(180))
+        exposer.texture(SIZE, ((cell, views.in_shot(cell.index)) for cell in cells))
         number += 1
 
     assert growth(step) <= MOST

@@ -104,7 +104,7 @@ def test_a_clip_is_told_without_reading_it(tmp_path):
 def test_long_clips_and_reports_stay_short():
     clip = wgmb.Clip.__new__(wgmb.Clip)
     clip.pattern, clip.numbers = "x" * 4000, list(range(0, 90000, 3))
-    clip.passes, clip._meaning = wgmb.Passes(), SimpleNamespace(known=None)
+    clip.passes, clip._finder = wgmb.Passes(), SimpleNamespace(known=None)
     report = wgmb.BatchReport(list(range(0, 9000, 2)), stopped="y" * 4000)
     report.failed = dict.fromkeys(range(1, 9000, 2), "why" * 99)
     for told in (clip, report):

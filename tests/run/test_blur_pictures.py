@@ -77,8 +77,8 @@ def test_pictures_are_those_of_the_file(video, device, flow, fps):
     assert got.count(14) == len(want)
     for ours, planes in itertools.zip_longest(got, want):
         np.testing.assert_array_equal(ours, np.stack(planes, axis=2))
-    assert got.cuts == blur.reel.cuts == [8]
-    assert got.flashes == blur.reel.flashes == [4]
+    assert got.cuts == blur.shots.cuts == [8]
+    assert got.flashes == blur.shots.flashes == [4]
     assert got.read == 14
 
 

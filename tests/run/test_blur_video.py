@@ -279,7 +279,7 @@ def test_pictures_without_vectors_move_by_flow(tmp_path, capsys):
 def test_the_method_suits_where_motion_comes_from(tmp_path, capsys, flow, asked, method):
     """Pictures without vectors and a video take the same one; auto that of what it becomes."""
     if flow == "auto":
-        method = FlowSettings().settled(gpu.open_device())[0].method
+        method = FlowSettings().chosen(gpu.open_device())[0].method
     for n in (1, 2):
         picture = to_display(make.picture(n)[..., :3], 8)
         Image.fromarray(picture).save(tmp_path / f"a.{n}.png")

@@ -42,12 +42,12 @@ def test_every_picture_counts_for_as_long_as_it_is_shown(tmp_path, capsys, even)
     times = [Fraction(n, 48) for n in range(10)] if even else UNEVEN
     source, out = write(tmp_path / "a.mkv", times), tmp_path / "b.mkv"
     assert app.main(["perceive", str(source), "-o", str(out), "-q"]) == 0, capsys.readouterr().err
-    footage, got = VideoReader(source), VideoReader(out)
-    shown = np.array([float(t) for t in footage.times])
+    reader, got = VideoReader(source), VideoReader(out)
+    shown = np.array([float(t) for t in reader.times])
     assert [round(1000 * float(t - got.times[0])) for t in got.times] == [
         round(1000 * t) for t in shown - shown[0]
     ]
-    ends = np.append(shown[1:], shown[-1] + 1 / float(footage.rate))
+    ends = np.append(shown[1:], shown[-1] + 1 / float(reader.rate))
     light = seen_by_time(shown, (shown + ends) / 2, ends[-1])
     want = 16 + 219 * srgb(light.astype("f4"))
     for value, (_, picture) in zip(want, got, strict=True):

@@ -155,9 +155,9 @@ def test_apples_encoder_counts_its_quality_the_other_way():
 @pytest.mark.parametrize("coding", [c for c in EVERY if c.bits in (8, 10, 12, 16)], ids=str)
 def test_ffv1_keeps_every_sample(tmp_path, coding):
     written = write(tmp_path / "v.mkv", coding, "ffv1")
-    footage = VideoReader(tmp_path / "v.mkv")
-    assert footage.coding == written[0].coding
-    for (_, got), want in zip(footage, written, strict=True):
+    reader = VideoReader(tmp_path / "v.mkv")
+    assert reader.coding == written[0].coding
+    for (_, got), want in zip(reader, written, strict=True):
         for a, b in zip(got.planes, want.planes, strict=True):
             assert np.array_equal(a, b)
 
@@ -178,16 +178,16 @@ def test_pictures_and_their_tags_come_back(tmp_path, name, codec, bits, steps, n
     matrix, transfer, primaries = colours
     coding = Coding("yuv", bits, steps, False, False, matrix, transfer, primaries)
     written = write(tmp_path / name, coding, codec, quality=4 if CODECS[codec].quality else None)
-    footage = VideoReader(tmp_path / name)
-    held = footage.coding
+    reader = VideoReader(tmp_path / name)
+    held = reader.coding
     if codec == "prores" and steps == (1, 1):  # FFmpeg decodes 4444 to 12 bits
         held, near = replace(held, bits=10), near << 2
     assert held == coding
-    assert footage.assumed == ()
-    assert [float(t) for t in footage.times] == pytest.approx([n / 24 for n in range(5)], abs=6e-4)
-    for (_, got), want in zip(footage, written, strict=True):
+    assert reader.assumed == ()
+    assert [float(t) for t in reader.times] == pytest.approx([n / 24 for n in range(5)], abs=6e-4)
+    for (_, got), want in zip(reader, written, strict=True):
         for a, b in zip(got.planes, want.planes, strict=True):
-            more = footage.coding.bits - bits
+            more = reader.coding.bits - bits
             assert np.abs(a.astype(int) - (b.astype(int) << more)).mean() < near
 
 
@@ -202,10 +202,10 @@ def test_the_range_is_kept(tmp_path, name, codec, full):
 def test_alpha_goes_into_prores_4444(tmp_path):
     coding = Coding("yuv", 10, (1, 1), True)
     written = write(tmp_path / "v.mov", coding)
-    footage = VideoReader(tmp_path / "v.mov")
-    assert footage.coding.alpha
-    shift = footage.coding.bits - 10  # FFmpeg decodes it to 12 bits
-    for (_, got), want in zip(footage, written, strict=True):
+    reader = VideoReader(tmp_path / "v.mov")
+    assert reader.coding.alpha
+    shift = reader.coding.bits - 10  # FFmpeg decodes it to 12 bits
+    for (_, got), want in zip(reader, written, strict=True):
         apart = np.abs((got.planes[3] >> shift).astype(int) - want.planes[3])
         assert apart.max() <= 1
 
@@ -216,13 +216,13 @@ def test_alpha_goes_into_prores_4444(tmp_path):
 def test_hdr10_data_is_what_it_was(tmp_path, name, codec):
     facts = Facts(mastering=Mastering(P3, (0.0005, 1000.0)), light_level=LightLevel(993, 412))
     write(tmp_path / name, PQ, codec, facts=facts)
-    footage = VideoReader(tmp_path / name)
-    assert footage.coding == PQ
-    assert footage.light_level == facts.light_level
-    assert footage.mastering is not None
-    assert footage.mastering.luminance == pytest.approx((0.0005, 1000.0), abs=1e-4)
-    assert footage.mastering.primaries is not None
-    assert np.ravel(footage.mastering.primaries) == pytest.approx(np.ravel(P3), abs=2e-5)
+    reader = VideoReader(tmp_path / name)
+    assert reader.coding == PQ
+    assert reader.light_level == facts.light_level
+    assert reader.mastering is not None
+    assert reader.mastering.luminance == pytest.approx((0.0005, 1000.0), abs=1e-4)
+    assert reader.mastering.primaries is not None
+    assert np.ravel(reader.mastering.primaries) == pytest.approx(np.ravel(P3), abs=2e-5)
 
 
 @pytest.mark.parametrize(
@@ -276,9 +276,9 @@ def test_times_are_exact(tmp_path, name, codec):
     encoding = chosen(name, codec)
     made = pictures(encoding.coding(Coding())[0], len(times))
     write(tmp_path / name, Coding(), codec, times, made)
-    footage = VideoReader(tmp_path / name)
-    assert list(footage.times) == times
-    assert footage.is_variable
+    reader = VideoReader(tmp_path / name)
+    assert list(reader.times) == times
+    assert reader.is_variable
 
 
 def test_times_that_do_not_ascend_are_refused(tmp_path):

@@ -337,11 +337,11 @@ def test_deep_views_are_flattened_each(tmp_path):
 
 def test_channels_of_a_layer_go_with_its_own_depth_and_alpha():
     names = dict.fromkeys(["Z", "A", "left.Z", "left.A", "glass.A", "glass.R", "left.R"])
-    assert deep.beside("left.R", "Z", names) == "left.Z"
-    assert deep.beside("spec.left.R", "A", names) == "left.A"
-    assert deep.beside("glass.R", "A", names) == "glass.A"
-    assert deep.beside("glass.R", "Z", names) == "Z"
-    assert deep.beside("R", "Z", {"R": None}) is None
+    assert deep.companion("left.R", "Z", names) == "left.Z"
+    assert deep.companion("spec.left.R", "A", names) == "left.A"
+    assert deep.companion("glass.R", "A", names) == "glass.A"
+    assert deep.companion("glass.R", "Z", names) == "Z"
+    assert deep.companion("R", "Z", {"R": None}) is None
 
 
 def one_pixel(**channels) -> dict:

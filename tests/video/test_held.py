@@ -19,24 +19,24 @@ def animation(path, delays):
 
 @pytest.mark.parametrize("suffix", [".gif", ".apng"])
 def test_a_last_picture_that_is_held_lasts_as_long(tmp_path, suffix):
-    footage = animation(tmp_path / f"a{suffix}", (100, 100, 100, 900))
-    assert footage.duration == Fraction(12, 10)
-    clock = VideoSettings().clock(footage, None)
-    assert len(OutputFrames(footage, clock, Fraction(10))) == 12
-    part = VideoSettings(end="0.5").clock(footage, None)
-    assert len(OutputFrames(footage, part, Fraction(10))) == 5
+    reader = animation(tmp_path / f"a{suffix}", (100, 100, 100, 900))
+    assert reader.duration == Fraction(12, 10)
+    clock = VideoSettings().clock(reader, None)
+    assert len(OutputFrames(reader, clock, Fraction(10))) == 12
+    part = VideoSettings(end="0.5").clock(reader, None)
+    assert len(OutputFrames(reader, part, Fraction(10))) == 5
 
 
 def test_at_its_own_times_it_is_shown_again_where_its_interval_ends(tmp_path):
-    footage = animation(tmp_path / "a.gif", (100, 300, 100, 900))
-    clock = VideoSettings().clock(footage, None)
-    times = [moment.time for moment in OutputFrames(footage, clock, None)]
+    reader = animation(tmp_path / "a.gif", (100, 300, 100, 900))
+    clock = VideoSettings().clock(reader, None)
+    times = [moment.time for moment in OutputFrames(reader, clock, None)]
     assert times[:4] == [0, Fraction(1, 10), Fraction(4, 10), Fraction(5, 10)]
-    assert len(times) == 5 and times[4] + 1 / footage.rate == Fraction(14, 10)
+    assert len(times) == 5 and times[4] + 1 / reader.rate == Fraction(14, 10)
 
 
 def test_delays_that_are_rounded_are_no_hold(tmp_path):
     """GIF has hundredths of a second."""
-    footage = animation(tmp_path / "a.gif", (30, 40, 30, 40))
-    clock = VideoSettings().clock(footage, None)
-    assert len(OutputFrames(footage, clock, None)) == 4
+    reader = animation(tmp_path / "a.gif", (30, 40, 30, 40))
+    clock = VideoSettings().clock(reader, None)
+    assert len(OutputFrames(reader, clock, None)) == 4

@@ -38,15 +38,15 @@ def flashing(path, times=None, late=0.0, rate=48000, codec="aac", count=36, **mo
 def copied(source, path, clock=None, keeps_pitch=True, others=True) -> list[str]:
     """The clip with its pictures encoded anew; what was left out."""
     clock = clock or Clock()
-    footage = VideoReader(source)
+    reader = VideoReader(source)
     encoding = chosen(path, "h264" if path.suffix == ".mov" else None)
-    coding, _ = encoding.coding(footage.coding)
-    beside = OtherStreams(source, footage.index, clock, keeps_pitch) if others else None
-    base = tick(footage.times.base / clock.speed, clock.out(footage.times[0]))
-    video = CodedVideo(path, path.with_name("part"), encoding, coding, footage.size,
-                       footage.rate, base, others=beside)  # fmt: skip
-    for number, picture in footage:
-        time = footage.times[number]
+    coding, _ = encoding.coding(reader.coding)
+    beside = OtherStreams(source, reader.index, clock, keeps_pitch) if others else None
+    base = tick(reader.times.base / clock.speed, clock.out(reader.times[0]))
+    video = CodedVideo(path, path.with_name("part"), encoding, coding, reader.size,
+                       reader.rate, base, others=beside)  # fmt: skip
+    for number, picture in reader:
+        time = reader.times[number]
         if (clock.first or time) <= time < (clock.end or time + 1):
             video.add(picture, clock.out(time))
     video.close()
@@ -150,8 +150,8 @@ def test_a_part_begins_at_its_beginning_with_its_sound(tmp_path):
     shown, heard = flash_and_click(path)
     assert shown == pytest.approx(0.5 - 0.33, abs=0.001)
     assert heard - shown == pytest.approx(0.002, abs=0.0015)
-    footage = VideoReader(path)
-    assert len(footage) == 16
+    reader = VideoReader(path)
+    assert len(reader) == 16
     with av.open(str(path)) as container:
         times = [f.time for f in container.decode(audio=0)]
     assert -0.001 < times[0] < 0.022

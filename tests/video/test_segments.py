@@ -224,9 +224,9 @@ def test_hdr10_data_outlives_the_join(tmp_path):
     parts, coding, times = segmented(tmp_path / "v.mp4", "h265", bits=10, facts=facts)
     fill(parts, coding, times)
     parts.join()
-    footage = VideoReader(tmp_path / "v.mp4")
-    assert footage.light_level == LightLevel(993, 412)
-    assert footage.pixel_aspect == Fraction(4, 3)
+    reader = VideoReader(tmp_path / "v.mp4")
+    assert reader.light_level == LightLevel(993, 412)
+    assert reader.pixel_aspect == Fraction(4, 3)
 
 
 def test_a_gif_has_no_segments(tmp_path):

@@ -62,9 +62,9 @@ def test_sound_is_the_same_and_at_the_same_time(tmp_path, capsys, name, late, ti
 
 def brightest(path):
     """Time of the brightest picture [s]."""
-    footage = VideoReader(path)
-    means = [float(picture.planes[0].mean()) for _, picture in footage]
-    return float(footage.times[int(np.argmax(means))])
+    reader = VideoReader(path)
+    means = [float(picture.planes[0].mean()) for _, picture in reader]
+    return float(reader.times[int(np.argmax(means))])
 
 
 def sounded(path):

@@ -21,7 +21,7 @@ from wgmb.viewer.panel.panel import made_of
 from wgmb.viewer.panel.video_section import at_pace, in_part
 from wgmb.viewer.panel.widgets import shortened
 from wgmb.viewer.state.state import video_time
-from wgmb.viewer.subjects.video_exposure import exposed, picture_at
+from wgmb.viewer.subjects.video_exposure import exposure_of, picture_at
 from wgmb.viewer.subjects.video_motion import PictureFinding
 
 pytestmark = pytest.mark.fast
@@ -155,7 +155,7 @@ def chain(numbers, cuts=(), without=()):
 
 def made(known, frame, fps=48, degrees=180, speed=Fraction(1), count=20):
     moment = OutputFrame(frame, Fraction(frame, fps), Fraction(1, fps))
-    return exposed(shown_at(range(count)), Clock(speed=speed), moment, Shutter(degrees), known)
+    return exposure_of(shown_at(range(count)), Clock(speed=speed), moment, Shutter(degrees), known)
 
 
 def test_an_exposure_is_made_of_the_pictures_whose_cells_it_meets():

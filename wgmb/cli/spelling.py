@@ -52,9 +52,9 @@ def as_options(message: str) -> str:
     return _ARGUMENT.sub(_option, message) if "`" in message else message
 
 
-def _option(found: re.Match[str]) -> str:
-    name, value = found[1], (found[2] or "").strip("'\"")
+def _option(match: re.Match[str]) -> str:
+    name, value = match[1], (match[2] or "").strip("'\"")
     option = options().get(name)
     if option is None:
-        return found[0]
+        return match[0]
     return option if value in ("", "True") else f"{option} {shlex.quote(value)}"

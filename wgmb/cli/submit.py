@@ -90,11 +90,11 @@ steps:
 """
 
 
-def openjd_ranges(found: Sequence[Range]) -> str:
+def openjd_ranges(ranges: Sequence[Range]) -> str:
     """Ranges as OpenJD has them: 1-100, 1-99:2, or a number."""
     return ",".join(
         f"{first}" if first == last else f"{first}-{last}" + (f":{step}" if step != 1 else "")
-        for first, last, step in found
+        for first, last, step in ranges
     )
 
 
@@ -131,8 +131,8 @@ def is_ours(path: Path) -> bool:
         return MARK.encode() in file.read(64)
 
 
-def _of_wgmb(found: Range) -> str:
-    first, last, step = found
+def _of_wgmb(numbers: Range) -> str:
+    first, last, step = numbers
     if first == last:
         return f"{first}"
     return f"{first}-{last}" + (f"x{abs(step)}" if abs(step) != 1 else "")

@@ -164,9 +164,9 @@ def progress(frames: int, quiet: bool, doing: str = "blurring"):
         task = bar.add_task(doing, total=frames, speed="")
         started, made = time.perf_counter(), [0]
 
-        def tick(number: int, what: str, name: str = "frame") -> None:
+        def tick(number: int, status: str, name: str = "frame") -> None:
             check()
-            made[0] += what == "done"
+            made[0] += status == "done"
             speed = made[0] / (time.perf_counter() - started)
             bar.update(
                 task, advance=1, description=f"{name} {number}", speed=f"{speed:.1f} frames/s"

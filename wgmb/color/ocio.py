@@ -35,7 +35,7 @@ def load() -> Any:
 
 
 @contextlib.contextmanager
-def told(about: str) -> Iterator[None]:
+def reported(about: str) -> Iterator[None]:
     """OpenColorIO's errors as one line that names what they are about; it prints nothing."""
     ocio = load()
     level = ocio.GetLoggingLevel()

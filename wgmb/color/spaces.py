@@ -88,7 +88,7 @@ class ColorConfig:
     def __init__(self, config: str | Path):
         self._ocio, place = ocio.load(), ocio.config_file(str(config))
         _check_text(str(config), Path(place))
-        with ocio.told(str(config)):
+        with ocio.reported(str(config)):
             self._config: Any = self._ocio.Config.CreateFromFile(place)
         self.name: str = self._config.getName() or Path(place).name
         """For messages and records."""
@@ -155,7 +155,7 @@ class ColorConfig:
         if space.matrix is not None:
             return of_matrix(conversion(primaries, AP0) @ np.reshape(space.matrix, (3, 3)))
         columns = np.eye(3, dtype=np.float32)[None]
-        with ocio.told(f"{space.name} in {self.name}"):
+        with ocio.reported(f"{space.name} in {self.name}"):
             moved = self._lossless(self._config.getProcessor(space.name, onto))
             moved.applyRGB(columns)
         matrix = conversion(primaries, AP0) @ columns[0].T.astype(np.float64)
@@ -164,13 +164,13 @@ class ColorConfig:
     def is_linear(self, name: str) -> bool:
         """True if the space of that name holds scene-linear light or data."""
         scene = self._ocio.REFERENCE_SPACE_SCENE
-        with ocio.told(f"{name} in {self.name}"):
+        with ocio.reported(f"{name} in {self.name}"):
             data = self._config.getColorSpace(name).isData()
             return data or self._config.isColorSpaceLinear(name, scene)
 
     def linearised(self, rgb: np.ndarray, name: str) -> np.ndarray:
         """Convert (height, width, 3) RGB of the named space to `scene_linear`; new float32."""
-        with ocio.told(f"{name} in {self.name}"):
+        with ocio.reported(f"{name} in {self.name}"):
             processor = self._config.getProcessor(name, self.scene_linear.name)
             return ocio.applied(self._lossless(processor), np.array(rgb, np.float32, order="C"))
 
@@ -228,7 +228,7 @@ class ColorConfig:
         if look is not None:
             pipeline.setLooksOverrideEnabled(True)
             pipeline.setLooksOverride(look)
-        with ocio.told(f"{display}, {view} in {self.name}"):
+        with ocio.reported(f"{display}, {view} in {self.name}"):
             shown = pipeline.getProcessor(self._config)
             if space.matrix is None:
                 return shown
@@ -323,7 +323,7 @@ class Display:
 
     def shader(self, space: ColorSpace, first_binding: int) -> ocio.Shader:
         """OpenColorIO's shader for pictures in `space` (unassociated, linear)."""
-        with ocio.told(f"{self.display}, {self.view} in {self.config.name}"):
+        with ocio.reported(f"{self.display}, {self.view} in {self.config.name}"):
             return ocio.shader(self._processor(space), first_binding)
 
     def _processor(self, space: ColorSpace) -> Any:

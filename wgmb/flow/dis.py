@@ -66,14 +66,14 @@ class Dis:
                 grey[number] = None if color is None else self._grey(color)
             return grey[number]
 
-        def found(number: int) -> Found | None:
+        def motion_of(number: int) -> Found | None:
             here = picture(number)
             near = [picture(number + side) for side in (-1, 1)]
             if here is None or all(one is None for one in near):
                 return None
             return self._between(near[0], here, near[1], depth)
 
-        return found
+        return motion_of
 
     def _grey(self, color: np.ndarray) -> np.ndarray:
         if color.ndim == 2:

@@ -57,26 +57,26 @@ def enlarged(homography: np.ndarray, factor: float) -> np.ndarray:
     return scale @ homography @ np.linalg.inv(scale)
 
 
-def _equations(here: np.ndarray, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _equations(here: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rows and right sides for the 8 unknowns of homographies whose last entry is 1."""
-    x, y, u, v = here[..., 0], here[..., 1], there[..., 0], there[..., 1]
+    x, y, u, v = here[..., 0], here[..., 1], other[..., 0], other[..., 1]
     one, zero = np.ones_like(x), np.zeros_like(x)
     across = np.stack([x, y, one, zero, zero, zero, -u * x, -u * y], axis=-1)
     down = np.stack([zero, zero, zero, x, y, one, -v * x, -v * y], axis=-1)
     return np.concatenate([across, down], axis=-2), np.concatenate([u, v], axis=-1)
 
 
-def _fits(here: np.ndarray, there: np.ndarray) -> np.ndarray:
+def _fits(here: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Homographies of samples (count, 4, 2), without those of points on a line."""
-    rows, sides = _equations(here, there)
+    rows, sides = _equations(here, other)
     good = np.abs(np.linalg.det(rows)) > 1e-9
     solved = np.linalg.solve(rows[good], sides[good][..., None])[..., 0]
     last = np.ones((len(solved), 1))
     return np.concatenate([solved, last], axis=1).reshape(-1, 3, 3)
 
 
-def _least_squares(here: np.ndarray, there: np.ndarray) -> np.ndarray:
-    rows, sides = _equations(here, there)
+def _least_squares(here: np.ndarray, other: np.ndarray) -> np.ndarray:
+    rows, sides = _equations(here, other)
     solved = np.linalg.lstsq(rows.T @ rows, rows.T @ sides, rcond=None)[0]
     return np.append(solved, 1.0).reshape(3, 3)
 
@@ -87,10 +87,10 @@ class _Ends:
     `tolerance`: how far from its end a homography may move a point.
     """
 
-    def __init__(self, here: np.ndarray, there: np.ndarray, tolerance: float):
+    def __init__(self, here: np.ndarray, other: np.ndarray, tolerance: float):
         place = np.concatenate([here, np.ones((len(here), 1))], axis=1).T
-        self._across = np.concatenate([place, -there[:, 0] * place])
-        self._down = np.concatenate([place, -there[:, 1] * place])
+        self._across = np.concatenate([place, -other[:, 0] * place])
+        self._down = np.concatenate([place, -other[:, 1] * place])
         self._tolerance = tolerance
 
     def best(self, homographies: np.ndarray) -> np.ndarray:

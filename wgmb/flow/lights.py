@@ -19,12 +19,12 @@ UNLIKE = 0.25  # difference of sizes, as a share, besides 1 px
 Ways = list[tuple[int, np.ndarray]]
 
 
-def find_lights(shown: np.ndarray, largest: int) -> np.ndarray:
+def find_lights(values: np.ndarray, largest: int) -> np.ndarray:
     """(count, 4) centre x, y [px], width and height of the white spots up to `largest` pixels.
 
-    `shown`: (height, width, 3 or more) bytes. Empty if there are too many.
+    `values`: (height, width, 3 or more) bytes. Empty if there are too many.
     """
-    white = shown[..., :3].min(axis=2) >= WHITE
+    white = values[..., :3].min(axis=2) >= WHITE
     columns: dict[int, list[tuple[float, int]]] = {}
     for x, y, high in _runs(white.T, largest):
         columns.setdefault(int(x), []).append((y, high))

@@ -23,8 +23,8 @@ def mend(
     near_views, near = neighbours[views.near]
     sides = {"near": near_views.leads_by(views.here)}
     far = near
-    if len(views.beside) == 2:
-        far_views, far = neighbours[views.beside[1]]
+    if len(views.neighbours) == 2:
+        far_views, far = neighbours[views.neighbours[1]]
         sides["far"] = far_views.leads_by(views.here)
     lost = passes.scratch(size, "r32uint", "lost")
     none = passes.scratch((1, 1), "r32uint", "none lost")

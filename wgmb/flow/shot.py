@@ -101,7 +101,7 @@ class Shot:
         self._passes, self._load, self._effort = passes, load, effort
         self._full_search = FullSearch(passes, effort.block)
         self._size: tuple[int, int] | None = None
-        self._made: dict[tuple[str, int, int], Any] = {}
+        self._results: dict[tuple[str, int, int], Any] = {}
 
     def textures(self, number: int) -> Motion | None:
         """Motion and depth of a frame on the GPU, valid until others are asked for.
@@ -126,9 +126,9 @@ class Shot:
 
     def _once(self, stage: str, number: int, level: int, make: Callable[[int, int], Any]) -> Any:
         key = stage, number, level
-        if key not in self._made:
-            self._made[key] = make(number, level)
-        return self._made[key]
+        if key not in self._results:
+            self._results[key] = make(number, level)
+        return self._results[key]
 
     def _features(self, number: int) -> list[wgpu.GPUTexture] | None:
         return self._once("pictures", number, 0, self._measured)
@@ -177,15 +177,17 @@ class Shot:
             states, *some = self._full_search(size, bound)
             states, both = follow_most(passes, size, bound, views, states, *some)
             states = sweep(passes, size, swept, states, [], level, count, both[0])
-            self._made["most", number, level] = both
+            self._results["most", number, level] = both
             states = self._led(views, level, states)
             return self._polished(states, size, bound) if level else states
         states = self._grown(self._once("mended", number, level + 1, self._mended), level)
-        if level > coarsest - self._effort.led and len(views.beside) == 2:
+        if level > coarsest - self._effort.led and len(views.neighbours) == 2:
             states = self._led(views, level, states)
-        guesses = [self._carried(other, views, level) for other in views.beside] if count else []
-        most = enlarged(self._made["most", number, coarsest][0], 2.0 ** (coarsest - level))
-        leads = (self._made.get(("lead", number, k)) for k in range(level, coarsest + 1))
+        guesses = (
+            [self._carried(other, views, level) for other in views.neighbours] if count else []
+        )
+        most = enlarged(self._results["most", number, coarsest][0], 2.0 ** (coarsest - level))
+        leads = (self._results.get(("lead", number, k)) for k in range(level, coarsest + 1))
         lead = next(one for one in leads if one is not None)
         states = sweep(passes, size, swept, states, guesses, level, count, most, lead)
         passes.give(*guesses)
@@ -195,24 +197,24 @@ class Shot:
         """The states, those of the guide where it leads."""
         number, size, bound = views.here, self._sizes[level], self._matched(views, level)
         guides = self._guides(number, level)
-        coarser = self._made.get(("lead", number, level + 1))
+        coarser = self._results.get(("lead", number, level + 1))
         led = follow_guide(self._passes, size, bound, states, guides[0], guides[1:], coarser)
-        states, self._made["lead", number, level] = led
+        states, self._results["lead", number, level] = led
         if level > len(self._sizes) - self._effort.led:
-            self._made["guides", number, level] = guides
+            self._results["guides", number, level] = guides
         else:
             self._passes.give(*guides)
         return states
 
     def _guides(self, number: int, level: int) -> list[wgpu.GPUTexture]:
         """The guide of a frame, and if it has two neighbours, theirs back to it."""
-        own, most = self._views(number), self._made["most", number, len(self._sizes) - 1]
+        own, most = self._views(number), self._results["most", number, len(self._sizes) - 1]
         assert own is not None
         views, mosts = [own], [most]
-        if len(own.beside) == 2:
-            views += [Views(other, number, None, BESIDE) for other in own.beside]
+        if len(own.neighbours) == 2:
+            views += [Views(other, number, None, BESIDE) for other in own.neighbours]
             mosts += [2 * (np.linalg.pinv(matrix),) for matrix in most]
-        coarser = self._made.get(("guides", number, level + 1))
+        coarser = self._results.get(("guides", number, level + 1))
         sizes = all_sizes(self._sizes[0])[level:]
         guides = []
         for k, (view, matrices) in enumerate(zip(views, mosts, strict=True)):
@@ -244,7 +246,7 @@ class Shot:
         views = self._views(number)
         assert views is not None
         neighbours = {}
-        for other in views.beside:
+        for other in views.neighbours:
             theirs = self._views(other)
             assert theirs is not None
             neighbours[other] = theirs, self._once("searched", other, level, self._searched)
@@ -300,10 +302,10 @@ class Shot:
 
     def _forget(self, number: int) -> None:
         """Let go of what the frames after and before this one will not need."""
-        for key in list(self._made):
+        for key in list(self._results):
             stage, other, level = key
             if abs(other - number) > KEPT[stage] + level:
-                made = self._made.pop(key)
+                made = self._results.pop(key)
                 textures = made if isinstance(made, list | tuple) else [made]
                 if isinstance(made, Motion):
                     textures = [made.motion, made.depth]

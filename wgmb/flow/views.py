@@ -25,7 +25,7 @@ class Views:
         return "AROUND" if self.factor == AROUND else "BESIDE"
 
     @property
-    def beside(self) -> tuple[int, ...]:
+    def neighbours(self) -> tuple[int, ...]:
         """The frames of these that are direct neighbours."""
         return (self.near,) if self.far is None or self.factor == BESIDE else (self.near, self.far)
 

@@ -19,12 +19,12 @@ class BindGroups:
     """
 
     def __init__(self) -> None:
-        self._made: dict[tuple, tuple[wgpu.GPUBindGroup, set[int]]] = {}  # and uids of its things
+        self._groups: dict[tuple, tuple[wgpu.GPUBindGroup, set[int]]] = {}  # and uids of its things
         self._keys: dict[int, set[tuple]] = {}  # of the groups that bind a thing, by its uid
         self._watched: dict[int, weakref.ref] = {}
 
     def __len__(self) -> int:
-        return len(self._made)
+        return len(self._groups)
 
     def group(
         self,
@@ -34,12 +34,12 @@ class BindGroups:
     ) -> wgpu.GPUBindGroup:
         """The group of `layout` that binds these resources by their indices."""
         key = layout.uid, *map(_identity, resources.values())
-        found = self._made.get(key)
+        found = self._groups.get(key)
         if found is not None:
             return found[0]
         made = made_group(device, layout, resources)
         things = {thing.uid: thing for thing in map(_thing, resources.values())}
-        self._made[key] = made, set(things)
+        self._groups[key] = made, set(things)
         for thing in things.values():
             self._watch(thing, key)
         return made
@@ -61,7 +61,7 @@ class BindGroups:
     def _forget(self, uid: int) -> None:
         self._watched.pop(uid, None)
         for key in self._keys.pop(uid, ()):
-            _, others = self._made.pop(key, (None, ()))
+            _, others = self._groups.pop(key, (None, ()))
             for other in others:
                 keys = self._keys.get(other)
                 if keys is None:

@@ -52,13 +52,13 @@ class Preparation:
         self,
         encoder: wgpu.GPUCommandEncoder,
         bindings: gpu.FrameBindings,
-        around: Sequence[tuple[int, FrameViews]],
+        views: Sequence[tuple[int, FrameViews]],
     ) -> tuple[PreparedFrame, ...]:
-        """Record what frames are to methods: `around` are the frame that is blurred and its
+        """Record what frames are to methods: `views` are the frame that is blurred and its
         neighbours, each after its offset. If one of them is masked, all have weights."""
-        masked = any(frame.holdout is not None or frame.check for _, frame in around)
+        masked = any(frame.holdout is not None or frame.check for _, frame in views)
         return tuple(
-            self._frame(encoder, bindings, frame, offset, masked) for offset, frame in around
+            self._frame(encoder, bindings, frame, offset, masked) for offset, frame in views
         )
 
     def _frame(

@@ -48,9 +48,9 @@ class Explorer(ipywidgets.VBox):
         self.samples = ipywidgets.IntSlider(16, min=1, max=MOST_SAMPLES, description="samples")
         self.compare = ipywidgets.ToggleButton(False, description="as rendered")
         self.picture = ipywidgets.Image(format="png")
-        self.told = ipywidgets.Label()
+        self.status = ipywidgets.Label()
         rows = [self.method, self.shutter, self.samples, self.compare]
-        super().__init__([ipywidgets.HBox(rows), self.picture, self.told])
+        super().__init__([ipywidgets.HBox(rows), self.picture, self.status])
         self._turn = threading.Condition()
         self._wanted = self._drawn = 0
         self._busy = False
@@ -84,9 +84,9 @@ class Explorer(ipywidgets.VBox):
                 image = self._frame.color if compare else self._blurred(*values)
                 took = f"{1e3 * (time.perf_counter() - began):.0f} ms"
                 self.picture.value = show(image, self._exposure).png
-                self.told.value = "as rendered" if compare else took
+                self.status.value = "as rendered" if compare else took
             except Error as error:
-                self.told.value = str(error)
+                self.status.value = str(error)
             except BaseException:
                 with self._turn:
                     self._busy, self._drawn = False, self._wanted

@@ -77,17 +77,17 @@ def _between(plane: np.ndarray, axis: int) -> np.ndarray:
     return np.moveaxis(made, 0, axis)
 
 
-def _held_back(made: np.ndarray, shares: np.ndarray) -> np.ndarray:
+def _held_back(rgb: np.ndarray, shares: np.ndarray) -> np.ndarray:
     """Saturation held to 1 - (1 - mean) / 4, the mean over the diagonal neighbours; Y is kept."""
-    most = made.max(axis=2)
-    saturation = np.where(most > 0, 1 - made.min(axis=2) / most, 0)
+    most = rgb.max(axis=2)
+    saturation = np.where(most > 0, 1 - rgb.min(axis=2) / most, 0)
     around = np.pad(saturation, 1, mode="edge")
     mean = (around[:-2, :-2] + around[:-2, 2:] + around[2:, :-2] + around[2:, 2:]) / 4
     limit = 1 - (1 - np.minimum(mean, 1)) / 4
     y, x = np.nonzero((saturation > mean) & (saturation > limit))
     if len(y):
-        one, top = made[y, x], most[y, x, None]
+        one, top = rgb[y, x], most[y, x, None]
         held = np.maximum(top - (top - one) * (limit[y, x] / saturation[y, x])[:, None], 0)
         before, after = one @ shares, held @ shares
-        made[y, x] = held * np.where(after > 0, before / after, 1)[:, None]
-    return made
+        rgb[y, x] = held * np.where(after > 0, before / after, 1)[:, None]
+    return rgb

@@ -53,7 +53,7 @@ def flatten(
     planes: dict[str, np.ndarray] = {}
     seen: dict[tuple[str | None, str | None], np.ndarray] = {}
     for name, samples in values.items():
-        depth, alpha = beside(name, "Z", channels), beside(name, "A", channels)
+        depth, alpha = companion(name, "Z", channels), companion(name, "A", channels)
         if depth not in orders:
             orders[depth] = _order(values[depth] if depth else None, counts)
         ordered = samples[orders[depth]]
@@ -61,7 +61,7 @@ def flatten(
             key = depth, alpha
             if key not in seen:
                 clear = values[alpha][orders[depth]] if alpha else np.ones(len(ordered))
-                seen[key] = _seen(clear, starts, counts)
+                seen[key] = _transmittance(clear, starts, counts)
             flat = _summed(ordered, seen[key], counts)
             if samples.dtype == np.float16:
                 flat = np.clip(flat, -_MOST_HALF, _MOST_HALF)
@@ -87,7 +87,7 @@ def _is_color(name: str, data_layers: Collection[str]) -> bool:
     return component != "y" and (component != "Y" or not layer)
 
 
-def beside(name: str, wanted: str, names: Mapping[str, object]) -> str | None:
+def companion(name: str, wanted: str, names: Mapping[str, object]) -> str | None:
     """The channel `wanted` (Z or A) that goes with a channel: of its layer, its view, or at all."""
     *layer, _ = name.split(".")
     leads = [".".join(layer), *layer, ""]
@@ -114,7 +114,7 @@ def _order(depth: np.ndarray | None, counts: np.ndarray) -> np.ndarray:
     return np.lexsort((depth, of))
 
 
-def _seen(alpha: np.ndarray, starts: np.ndarray, counts: np.ndarray) -> np.ndarray:
+def _transmittance(alpha: np.ndarray, starts: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Transmittance of the samples in front of each sample, 0 to 1."""
     clear = np.clip(1 - alpha.astype(np.float64), 0, None)
     seen = np.ones(len(alpha))
@@ -127,11 +127,13 @@ def _seen(alpha: np.ndarray, starts: np.ndarray, counts: np.ndarray) -> np.ndarr
     return seen
 
 
-def _summed(samples: np.ndarray, seen: np.ndarray, counts: np.ndarray) -> np.ndarray:
+def _summed(samples: np.ndarray, transmittance: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """The sum of what is seen of every pixel's samples."""
     of = np.repeat(np.arange(len(counts)), counts)
     shares = np.zeros(len(samples))
-    np.multiply(samples, seen, out=shares, where=seen != 0)  # infinite light may be hidden
+    np.multiply(
+        samples, transmittance, out=shares, where=transmittance != 0
+    )  # infinite light may be hidden
     return np.bincount(of, shares, len(counts))
 
 

@@ -121,12 +121,12 @@ def numbers_on_disk(pattern: str | Path) -> list[int]:
     return found
 
 
-def frame_numbers(text: str, what: str = "frames") -> list[int]:
+def frame_numbers(text: str, name: str = "frames") -> list[int]:
     """The numbers that `1-100x2`, `1-100:2` or `1,3,5-8` stands for, in that order.
 
-    At most MOST_FRAMES. A colon is the step of OpenJD's ranges. `what`: for messages.
+    At most MOST_FRAMES. A colon is the step of OpenJD's ranges. `name`: for messages.
     """
-    asked = f"{what} {text if len(text) < 60 else f'{text[:60]}...'!r}"
+    asked = f"{name} {text if len(text) < 60 else f'{text[:60]}...'!r}"
     text = _COLON.sub(r"\1-\2x\3", text)
     try:
         ranges = [(int(a), int(b), int(step or 1)) for a, b, step in _RANGE.findall(text)]

@@ -20,10 +20,10 @@ def unpacked(size: tuple[int, int], channels: int) -> int:
     return 4 * size[0] * size[1] * channels
 
 
-def check(path: Path, what: str, promised: int, stored: int, max_mb: float) -> None:
+def check(path: Path, name: str, promised: int, stored: int, max_mb: float) -> None:
     """Raise InputError where `promised` bytes are more than a file of `stored` bytes may ask for.
 
-    `what`: how large the picture is, for the message. A file that unpacks to over 500 times its
+    `name`: how large the picture is, for the message. A file that unpacks to over 500 times its
     size may take a quarter of `max_mb`: a black frame does so, and so does a bomb. InputError for a
     limit that is none.
     """
@@ -36,6 +36,6 @@ def check(path: Path, what: str, promised: int, stored: int, max_mb: float) -> N
     needed = -(-promised * (_SHARE if thin else 1) // 2**20)
     because = f" (over {_TIMES} times its own size)" if thin else ""
     raise InputError(
-        f"{path}: image of {what} would decode to {-(-promised // 2**20)} MB{because}, "
+        f"{path}: image of {name} would decode to {-(-promised // 2**20)} MB{because}, "
         f"the limit is {most:g} MB; `max_mb={needed}` allows it"
     )

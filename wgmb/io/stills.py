@@ -169,12 +169,12 @@ def _to_linear(samples: np.ndarray, space: ColorSpace | None) -> np.ndarray:
 
 
 def encode(
-    rgba: np.ndarray, suffix: str, bits: int, text: str, shown: ToDisplay = to_display
+    rgba: np.ndarray, suffix: str, bits: int, text: str, convert: ToDisplay = to_display
 ) -> bytes:
     """The bytes of a still of (height, width, 3 or 4) linear light, with the record's text."""
     suffix = suffix.lower()
     if suffix in (".jpg", ".jpeg"):
-        samples = shown(rgba, 8, over_black=True)
+        samples = convert(rgba, 8, over_black=True)
         imageio, _ = _jpeg()
         return imageio.imwrite(
             "<bytes>",
@@ -184,7 +184,7 @@ def encode(
             subsampling=0,
             comment=text.encode(),
         )
-    samples = shown(rgba, bits)
+    samples = convert(rgba, bits)
     if suffix == ".png":
         return _with_text(_png(samples), text)
     stream = io.BytesIO()

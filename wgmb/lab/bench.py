@@ -74,7 +74,7 @@ def bench(
         for i, (size, count) in enumerate(groups):
             left = [pace * matrix.seconds(*group) for group in groups[i:]]
             about = f": about {_about(left[0])}, to the end {_about(sum(left))}" if i else ""
-            tell(f"{_what(size, count)} ({i + 1} of {len(groups)}){about}")
+            tell(f"{_described(size, count)} ({i + 1} of {len(groups)}){about}")
             started = time.perf_counter()
             matrix.measure(size, count)
             if left[0]:
@@ -90,7 +90,7 @@ def bench(
     return Bench(machine(device), copy, matrix.figures, name, empty, matrix.notes)
 
 
-def _what(size: tuple[int, int], samples: int) -> str:
+def _described(size: tuple[int, int], samples: int) -> str:
     return f"{size[0]} x {size[1]}, {samples} samples"
 
 
@@ -124,7 +124,7 @@ class _Matrix:
         try:
             gpu.check_size(self.device, *size)
         except InputError as error:
-            self.note(f"{_what(size, samples)} skipped: {error}")
+            self.note(f"{_described(size, samples)} skipped: {error}")
             return
         frame, jobs, timed = synthetic_frame(*size), {}, {}
         for c in self.candidates:
@@ -137,7 +137,7 @@ class _Matrix:
                     else TimedFrame(blur, self.clock, frame)
                 )
             except (InputError, wgpu.GPUError) as error:
-                self.note(f"{_what(size, samples)}: {name} skipped: {error}")
+                self.note(f"{_described(size, samples)}: {name} skipped: {error}")
                 continue
             for part in one.parts:
                 jobs[f"{name} {part}"] = getattr(one, part)

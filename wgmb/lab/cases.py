@@ -34,14 +34,14 @@ class Candidate:
     """A method with options as the command line writes it: `tap`, `reproject:variant=published`.
 
     `samples`: its own number at equal samples, `tap:32`; None takes everyone's. `name`: what
-    tables call it, if not by method and options. `given`: what it is given of a case's frame.
+    tables call it, if not by method and options. `select`: the part of a case's frame that it gets.
     """
 
     method: str
     options: tuple[tuple[str, Any], ...] = ()
     samples: int | None = None
     name: str = ""
-    given: Callable[[Frame], Frame] = lambda frame: frame
+    select: Callable[[Frame], Frame] = lambda frame: frame
 
     @classmethod
     def parse(cls, text: str) -> Candidate:

@@ -58,7 +58,7 @@ class Laboratory:
             for label, picture in pictures.items():
                 found = measure(picture, case.truth)
                 report.entries.append(
-                    Entry(case.name, label, kind, found, shown=True, picture=picture)
+                    Entry(case.name, label, kind, found, on_page=True, picture=picture)
                 )
         if case.floor is not None:
             found = ", ".join(f"{METRICS[m].title} {case.floor[m]:.{METRICS[m].digits}f}"
@@ -71,14 +71,14 @@ class Laboratory:
         for samples in sorted({*ladder, report.samples}):
             equal = samples == report.samples
             jobs = {c: c.samples or samples if equal else samples for c in able}
-            found = self._judge(case, jobs, "samples", frame_seconds, shown=equal)
+            found = self._judge(case, jobs, "samples", frame_seconds, on_page=equal)
             report.entries += found
             for c, entry in zip(able, found, strict=True):
                 known[c].append((jobs[c], entry.seconds or 0.0))
         for budget in (budgets or _slowest_of_pictures)(report, case):
             jobs = {c: self._fitting(case, c, known[c], budget, frame_seconds) for c in able}
             report.entries += self._judge(
-                case, jobs, "time", frame_seconds, shown=True, budget=budget
+                case, jobs, "time", frame_seconds, on_page=True, budget=budget
             )
 
     def _able(self, report: Report, case: Case, candidates) -> list[Candidate]:
@@ -104,7 +104,7 @@ class Laboratory:
         kind: str,
         frame_seconds: float,
         *,
-        shown: bool,
+        on_page: bool,
         budget: float | None = None,
     ) -> list[Entry]:
         """Every candidate's picture with its number of samples, judged, and timed in turns."""
@@ -115,8 +115,8 @@ class Laboratory:
             picture = self.picture(case, blur, c)
             judged = measure(picture, case.truth)
             found.append(
-                Entry(case.name, c.label, kind, judged, samples, budget=budget, shown=shown,
-                      traced=c.needs_scene, picture=picture if shown else None)
+                Entry(case.name, c.label, kind, judged, samples, budget=budget, on_page=on_page,
+                      traced=c.needs_scene, picture=picture if on_page else None)
             )  # fmt: skip
             timed.append(self.timer(case, blur, c))
         seconds = self.least(timed)
@@ -144,7 +144,7 @@ class Laboratory:
         if "scene" in blur.method.needs:
             assert case.scene_frame is not None
             return case.scene_frame.render(blur)(case.scene_frame.time)
-        return blur(candidate.given(case.frame))
+        return blur(candidate.select(case.frame))
 
     def timer(self, case: Case, blur: Blur, candidate: Candidate) -> Callable[[], float]:
         """A function that does the case's work once and returns its seconds."""
@@ -163,7 +163,7 @@ class Laboratory:
 
     def _recorder(self, case: Case, blur: Blur, candidate: Candidate) -> Callable[..., None]:
         """A function that records the blur of the case's frame, which is uploaded now."""
-        views = blur.upload(candidate.given(case.frame))
+        views = blur.upload(candidate.select(case.frame))
         output = self._images.view("timed", case.frame.size, blur.output)
         return partial(blur.encode, output=output, **views)
 

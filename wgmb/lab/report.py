@@ -135,7 +135,7 @@ def _means(report: Report, colors) -> str:
     """Every method's mean over the cases, at equal samples."""
     by_label: dict[str, list[Entry]] = {}
     for e in report.entries:
-        if e.shown and e.kind != "time":
+        if e.on_page and e.kind != "time":
             by_label.setdefault(e.label, []).append(e)
     everywhere = {k: v for k, v in by_label.items() if len(v) == len(report.cases)}
     columns = ["method", *(m.title for m in METRICS.values())]
@@ -222,10 +222,10 @@ def _card(index: int, case: Case, e: Entry) -> str:
     )
 
 
-def _uri(shown: np.ndarray) -> str:
+def _uri(values: np.ndarray) -> str:
     """A picture of display values 0..1 within the page."""
     data = io.BytesIO()
-    levels = (255 * np.clip(shown, 0, 1) + 0.5).astype(np.uint8)
+    levels = (255 * np.clip(values, 0, 1) + 0.5).astype(np.uint8)
     Image.fromarray(levels).save(data, "WEBP", quality=90, method=4)
     return "data:image/webp;base64," + base64.b64encode(data.getvalue()).decode()
 

@@ -34,7 +34,7 @@ class Entry:
     """Seconds it was to fit, of kind "time"."""
     traced: bool = False
     """True if the method renders a scene instead of blurring rendered frames."""
-    shown: bool = False
+    on_page: bool = False
     """True if `picture` is shown on the page."""
     picture: np.ndarray | None = None
 

@@ -78,9 +78,9 @@ def best_shutter(speed: float, fps: float, cone: Cone | None = None) -> tuple[st
     return name, found[name][0]
 
 
-def perception_charts(found, speeds: np.ndarray, fps: float) -> tuple[Chart, Chart]:
+def perception_charts(differences, speeds: np.ndarray, fps: float) -> tuple[Chart, Chart]:
     """Differences by shutter (`perceive.compare`) against speed [rad/s], and the small ones."""
-    lines = {name: (speeds, np.asarray(values)) for name, values in found.items()}
+    lines = {name: (speeds, np.asarray(values)) for name, values in differences.items()}
     title = f"perceived video and perceived nature, {fps:g} frames per second"
     axes = "speed [rad/s]", "difference"
     blurred = {name: line for name, line in lines.items() if name != "none"}

@@ -50,24 +50,24 @@ class Volume:
     def encode(self, encoder, inputs, output):
         """Record a pass for every kind of tile."""
         on_gpu, shutter = inputs.scene, inputs.shutter
-        shown = on_gpu.shown
-        if not shown.has_volumes:
-            raise InputError(f"method 'volume' needs volumes, scene {shown.name!r} has none")
-        if shown.bodies:
+        scene = on_gpu.original
+        if not scene.has_volumes:
+            raise InputError(f"method 'volume' needs volumes, scene {scene.name!r} has none")
+        if scene.bodies:
             raise InputError("method 'volume' cannot draw the rigid bodies of this scene")
-        if shown.figure is not None:
+        if scene.figure is not None:
             if shutter.rolling:
                 raise InputError("a figure is exposed at once: it cannot roll the shutter")
-            self._figure(encoder, inputs, shown.figure, output)
+            self._figure(encoder, inputs, scene.figure, output)
         else:
             self._volumes(encoder, inputs, output)
 
     def _volumes(self, encoder, inputs, output):
         on_gpu, shutter = inputs.scene, inputs.shutter
-        volumes, backdrop = on_gpu.shown.instant(on_gpu.time)
+        volumes, backdrop = on_gpu.original.instant(on_gpu.time)
         volumes = [v for v in volumes if v.opacity or v.facing]
         volumes.sort(key=lambda v: isinstance(v, Torus))
-        exact = on_gpu.shown.density == "exact"
+        exact = on_gpu.original.density == "exact"
         rotations = [rotation_of(v, shutter, on_gpu.fps, exact) for v in volumes]
         constants = {
             **overrides(shutter, rotations),
@@ -208,8 +208,8 @@ def _uniforms(
     source = wgsl.load("methods/volume.wgsl")
     data = np.zeros((), source.dtype("Volumes"))
     width, height = on_gpu.size
-    camera = on_gpu.shown.camera.world_from_camera(on_gpu.time)[0]
-    zoom = float(np.ravel(on_gpu.shown.camera.zoom(np.array([on_gpu.time])))[0])
+    camera = on_gpu.original.camera.world_from_camera(on_gpu.time)[0]
+    zoom = float(np.ravel(on_gpu.original.camera.zoom(np.array([on_gpu.time])))[0])
     bound = backdrop.bound or max(math.dist((0, 0, 0), v.centre) + v.reach for v in volumes)
     data["eye"] = (*camera[:3, 3], bound)
     data["right"][:3] = camera[:3, 0] * width / height / zoom

@@ -31,7 +31,7 @@ def with_results(
     source = results[0].source
     if source.file is None:
         made = exr.new(results[0].picture, chromaticities(source.space) | {record.KEY: text})
-        made.parts[0].channels |= _told(results[0], made.parts[0])
+        made.parts[0].channels |= _confidence(results[0], made.parts[0])
         return made
     parts = [_twin(part, results if grows else ()) for part in source.file.parts]
     twins = dict(zip(map(id, source.file.parts), parts, strict=True))
@@ -62,7 +62,7 @@ def with_results(
         _keep(parts, {(id(twins[id(part)]), name) for part, name in source.origin.values()} | new)
     for result in results:
         home = twins[id(result.source.part)]
-        home.channels |= _told(result, home)
+        home.channels |= _confidence(result, home)
     if view is not None:
         for part in parts:
             stereo.leave_only(part, view)
@@ -89,7 +89,7 @@ def _twin(part: exr.Part, results: Sequence[Result]) -> exr.Part:
     return replace(part, channels=channels, attributes=dict(part.attributes), data_window=onto)
 
 
-def _told(result: Result, part: exr.Part) -> dict[str, np.ndarray]:
+def _confidence(result: Result, part: exr.Part) -> dict[str, np.ndarray]:
     """Confidence as channels of `part`."""
     view = result.source.view or ""
     return {

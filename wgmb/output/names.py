@@ -12,16 +12,16 @@ from ..errors import InputError
 
 
 def refuse_inputs(
-    folder: Path, names: Iterable[str], there: Iterable[Path], inputs: Iterable[Path]
+    folder: Path, names: Iterable[str], existing: Iterable[Path], inputs: Iterable[Path]
 ) -> None:
     """InputError where an output, NAME in `folder`, is one of `inputs`.
 
-    By the folder itself, however it is reached; and, for `there`, the outputs that exist, by the
+    By the folder itself, however it is reached; and, for `existing`, the outputs that exist, by the
     file itself, whatever links lead to it.
     """
     real = Path(os.path.realpath(folder))  # also through folders that are to be made
     place, wanted, folders = _identity(real), set(names), {}
-    outputs = {_identity(path): path for path in there}
+    outputs = {_identity(path): path for path in existing}
     for path in inputs:
         if path.parent not in folders:
             folders[path.parent] = _identity(path.parent)

@@ -238,7 +238,7 @@ class Output:
         """Write the file of `view`, or of all."""
         first = results[0]
         if self._videos:
-            self._videos[view].add(first.displayed, self._shown(first))
+            self._videos[view].add(first.displayed, self._to_display(first))
             return
         path = self.path(first.source.number, view)
         text = record.blank(self._expected(made_of))
@@ -256,10 +256,10 @@ class Output:
             only_picture = self._layers == "picture"
             content = with_results(results, view, text, only_picture, self._grows)
             return exr.encode(content, self._compression)
-        shown = self._shown(results[0])
+        shown = self._to_display(results[0])
         return stills.encode(results[0].displayed, path.suffix, self.bits, text, shown)
 
-    def _shown(self, result: Result) -> ToDisplay:
+    def _to_display(self, result: Result) -> ToDisplay:
         """Conversion of the picture to display values."""
         if self._display is None:
             return to_display

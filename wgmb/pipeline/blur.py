@@ -354,8 +354,8 @@ class Blur:
         views = self._residency.views_of(frames_around(frame, self.method))
         return {"number": frame.number} | {names[offset]: one for offset, one in views.items()}
 
-    def _require(self, there: Collection[str], whose: str = "") -> None:
-        if missing := self.method.needs - set(there):
+    def _require(self, available: Collection[str], whose: str = "") -> None:
+        if missing := self.method.needs - set(available):
             what = ", ".join(whose + name for name in sorted(missing))
             raise InputError(f"method {self.method.name!r} needs {what}")
 

@@ -277,7 +277,7 @@ def _motion(clip: Clip, request: BlurRequest, adapter: str | None) -> tuple[Vide
     """Source of the motion for frames without vectors, decided, and in words."""
     if not _lacks_motion(clip):
         return request.video, ""
-    return request.video.settled(gpu.open_device(adapter))
+    return request.video.chosen(gpu.open_device(adapter))
 
 
 def _lacks_motion(clip: Clip) -> bool:

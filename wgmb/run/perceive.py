@@ -22,7 +22,7 @@ from ..video.read.reader import VideoReader
 class PerceivedVideo:
     """A video that is looked at; after each picture, what is seen of it."""
 
-    footage: VideoReader
+    reader: VideoReader
     clock: Clock
     pictures: VideoPictures
     observer: Observer
@@ -44,7 +44,7 @@ class PerceivedVideo:
 
     def shown(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray, float]]:
         """Pictures with their numbers, and how long each is held [s]: until the next one."""
-        times, before = self.footage.times, None
+        times, before = self.reader.times, None
         for number, color in self.pictures.read(first, last):
             if before is not None:
                 yield *before, float(times[number] - times[before[0]])
@@ -54,13 +54,13 @@ class PerceivedVideo:
             ends = (
                 times[number + 1]
                 if number + 1 < len(times)
-                else times[number] + 1 / self.footage.rate
+                else times[number] + 1 / self.reader.rate
             )
             yield *before, float(ends - times[number])
 
 
-def densest_rate(footage: VideoReader, cone: Cone) -> float:
+def densest_rate(reader: VideoReader, cone: Cone) -> float:
     """Images per second where they are densest, over as long as a cone cell remembers."""
-    times = footage.times.seconds
+    times = reader.times.seconds
     ends = np.searchsorted(times, times + cone.memory, side="right")
     return float((ends - np.arange(len(times))).max()) / cone.memory

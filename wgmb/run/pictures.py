@@ -65,9 +65,9 @@ class SteadyExposures:
         """The output frames, as many as the pictures turn out to fill."""
         interval = 1 / self._fps
         for number in count(first):
-            reel = self.exposures.reel
-            assert reel is not None
-            reel.read_beyond(float(number * interval))
+            shots = self.exposures.shots
+            assert shots is not None
+            shots.read_beyond(float(number * interval))
             if self._ended and number >= self.count(self.read):
                 return
             yield OutputFrame(number, number * interval, interval)
@@ -111,17 +111,17 @@ class PictureBlur(Iterator[Any]):
     @property
     def cuts(self) -> list[int]:
         """Numbers of the pictures read so far that begin a shot."""
-        return sorted(self._steady.exposures.reel.cuts) if self._steady.exposures.reel else []
+        return sorted(self._steady.exposures.shots.cuts) if self._steady.exposures.shots else []
 
     @property
     def flashes(self) -> list[int]:
         """Numbers of the pictures read so far that begin a flash."""
-        return list(self._steady.exposures.reel.flashes) if self._steady.exposures.reel else []
+        return list(self._steady.exposures.shots.flashes) if self._steady.exposures.shots else []
 
     @property
     def repeated(self) -> list[int]:
         """Numbers of the repeated pictures that were left out (`duplicates` "fill")."""
-        return list(self._steady.exposures.reel.doubles) if self._steady.exposures.reel else []
+        return list(self._steady.exposures.shots.doubles) if self._steady.exposures.shots else []
 
     def _made(self, pictures: Iterable[Any], shutter: Shutter) -> Generator[Any, None, None]:
         coded = ((number, self._coded(number, picture)) for number, picture in enumerate(pictures))

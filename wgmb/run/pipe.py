@@ -120,8 +120,8 @@ def blur_pipe(
         except BaseException:
             sink.abandon()
             raise
-        reel = found.exposures.reel
-        report.cuts = sorted(reel.cuts) if reel else []
+        shots = found.exposures.shots
+        report.cuts = sorted(shots.cuts) if shots else []
         report.loss = reader.loss if reader else ""
         report.left_out = sink.left_out
         if reader and not report.frames:

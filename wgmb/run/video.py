@@ -110,7 +110,7 @@ class VideoRequest:
         if self.blur.holdout and self.video.flow == "none":
             raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
         opened = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
-        chosen, how = self.video.settled(opened)
+        chosen, how = self.video.chosen(opened)
         shutter = self.shutter.resolved()
         look = replace(self.blur, method=self.blur.method or chosen.method).for_pictures()
         blur = look.make(shutter.make(), device)
@@ -185,7 +185,7 @@ class VideoRun:
             blur_part,
             files_of(request.blur.holdout),
         )
-        found = exposures.reel
+        found = exposures.shots
         return VideoReport(
             plan.reader.path,
             plan.name,

@@ -105,7 +105,7 @@ class PictureMaker(Protocol):
     """Maker of the pictures of a video, such as VideoBlur."""
 
     @property
-    def footage(self) -> VideoReader:
+    def reader(self) -> VideoReader:
         """The input."""
         ...
 
@@ -139,7 +139,7 @@ def write(
     """
     is_video = Path(output.output).suffix.lower() in SUFFIXES
     to = _write_video if is_video else _write_frames
-    inputs, made_of = [run.footage.path, *masks], settings | _made_of(run, masks)
+    inputs, made_of = [run.reader.path, *masks], settings | _made_of(run, masks)
     return to(run, output, video, wanted, made_of, make_part, inputs)
 
 
@@ -153,12 +153,12 @@ def _write_video(
     inputs: Sequence[Path],
 ) -> list[str]:
     """Write a video, with `resume` in segments; returns what it cannot hold, in lines."""
-    path, footage = Path(output.output), run.footage
+    path, reader = Path(output.output), run.reader
     encoding = chosen(path, video.codec, video.quality, video.encoder)
-    coding, lost = encoding.coding(footage.coding)
-    facts = footage.facts
+    coding, lost = encoding.coding(reader.coding)
+    facts = reader.facts
     made_of = settings | {"times": _crc(str([(m.time, m.interval) for m in wanted]).encode())}
-    texts = _texts(footage, made_of)
+    texts = _texts(reader, made_of)
     there = [path] if os.path.exists(os.path.realpath(path)) else []
     refuse_inputs(path.parent, [path.name], there, inputs)
     is_ours = is_whole = False
@@ -175,11 +175,11 @@ def _write_video(
     atomic.sweep(path.parent, [path.name])
     times, rate = [moment.time for moment in wanted], 1 / wanted[0].interval
     base = tick(*times, wanted[0].interval)
-    shape = encoding, coding, footage.size, rate, base
+    shape = encoding, coding, reader.size, rate, base
     others = None
     if video.streams == "all":
         keeps_pitch = video.pitch == "keep"
-        others = OtherStreams(footage.path, footage.index, run.clock, keeps_pitch)
+        others = OtherStreams(reader.path, reader.index, run.clock, keeps_pitch)
     if output.resume and encoding.codec != "gif":  # which has one palette after another
         segments = Segments(path, *shape, times, made_of, facts)
         try:
@@ -213,9 +213,9 @@ def _fill(
         raise
 
 
-def _texts(footage: VideoReader, made_of: dict[str, Any]) -> dict[str, str]:
+def _texts(reader: VideoReader, made_of: dict[str, Any]) -> dict[str, str]:
     """The record of a video, under the first text that its input leaves free."""
-    free = next((name for name in _RECORD if name not in footage.metadata), _RECORD[0])
+    free = next((name for name in _RECORD if name not in reader.metadata), _RECORD[0])
     return {free: record.blank(made_of)}
 
 
@@ -229,9 +229,9 @@ def _record_of(path: Path) -> tuple[dict[str, Any] | None, bool]:
 
 def _made_of(run: PictureMaker, masks: Sequence[Path]) -> dict[str, Any]:
     """The files that every picture depends on, and the part of the input that is let through."""
-    found, clock = os.stat(run.footage.path), run.clock
+    found, clock = os.stat(run.reader.path), run.clock
     return {
-        "input": [run.footage.path.name, found.st_size, found.st_mtime_ns],
+        "input": [run.reader.path.name, found.st_size, found.st_mtime_ns],
         "masks": [_crc(path.read_bytes()) for path in masks],
         "part": [str(clock.first), str(clock.end)],
     }
@@ -253,7 +253,7 @@ def _write_frames(
     """Write image files."""
     numbers = [FIRST + moment.number for moment in wanted]
     files = replace(output, fps=None).make(settings, numbers, inputs)
-    channels = 4 if run.footage.coding.alpha else 3
+    channels = 4 if run.reader.coding.alpha else 3
     left = wanted
     if output.resume:
         left = [m for m in wanted if not files.done(FIRST + m.number, _moment(m))]

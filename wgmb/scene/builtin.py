@@ -195,7 +195,7 @@ def wheel(speed: float = 24.0, roll: float = 0.0) -> Scene:
                 Body(
                     "box",
                     (radius * 0.5, 0.05, 0.04),
-                    _around(hub, roll, turn, TURN * k / spokes, radius * 0.5),
+                    _on_wheel(hub, roll, turn, TURN * k / spokes, radius * 0.5),
                     CREAM,
                 )
             )
@@ -204,7 +204,7 @@ def wheel(speed: float = 24.0, roll: float = 0.0) -> Scene:
                 Body(
                     "box",
                     (radius * 0.27, 0.07, 0.09),
-                    _around(hub, roll, turn, TURN * (k + 0.5) / 12, radius, 0.5 * TURN / 2),
+                    _on_wheel(hub, roll, turn, TURN * (k + 0.5) / 12, radius, 0.5 * TURN / 2),
                     color if k % 2 else INK,
                 )
             )
@@ -212,7 +212,7 @@ def wheel(speed: float = 24.0, roll: float = 0.0) -> Scene:
             Body(
                 "cylinder",
                 (0.16, 0.16, 0.1),
-                _around(hub, roll, turn, 0.0, 0.0),
+                _on_wheel(hub, roll, turn, 0.0, 0.0),
                 YELLOW,
                 specular=0.5,
             )
@@ -220,7 +220,7 @@ def wheel(speed: float = 24.0, roll: float = 0.0) -> Scene:
     return Scene("wheel", tuple(bodies), _still_camera())
 
 
-def _around(hub, travel: float, turn: float, angle: float, radius: float, twist: float = 0.0):
+def _on_wheel(hub, travel: float, turn: float, angle: float, radius: float, twist: float = 0.0):
     """A place on a turning wheel: at `angle` and `radius`, turned by `twist` there."""
     x, y, z = hub
     return lambda t: (
@@ -272,7 +272,7 @@ def hdr(light: float = 60.0, speed: float = 1.0) -> Scene:
     for k, color in enumerate((RED, YELLOW, TEAL, CREAM, ORANGE, BLUE)):
         hub = (-1.9 + 0.75 * k, 1.5 + 0.35 * (k % 2), -2.2 - 0.4 * (k % 3))
         turn = (14.0 - 3 * k) * speed
-        path = _around(hub, 0.0, turn, 1.1 * k, 0.55)
+        path = _on_wheel(hub, 0.0, turn, 1.1 * k, 0.55)
         size = 0.035 + 0.01 * (k % 3)
         lamps.append(Body("sphere", (size, size, size), path, color, emission=light))
     return Scene(

@@ -39,7 +39,7 @@ class SceneOnGpu:
     ):
         """`time` of the frame [s]; `span` of interest around it [frame intervals]."""
         self.device, self.size, self.time, self.fps = device, size, time, fps
-        self.shown = scene
+        self.original = scene
         self.scene = scene = scene.solid(time)
         n = len(scene.bodies)
         source = wgsl.load("scene/trace.wgsl")

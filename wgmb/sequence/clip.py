@@ -101,12 +101,12 @@ class Clip:
         self._masks = Masks(
             passes.holdout, passes.scale, patterns, self.numbers, self._max_mb, files.of_views
         )
-        self._meaning = ConventionFinder(stored, settled.finding if settled else None)
-        self._ingredients = Dependencies(files, self._masks, (passes.camera, self._cut_list.path))
-        self._maker = FrameBuilder(stored, self._meaning, self._masks, self._cameras)
-        self._around = Neighbours(stored, self._maker, self._cut_list.is_search)
+        self._finder = ConventionFinder(stored, settled.finding if settled else None)
+        self._dependencies = Dependencies(files, self._masks, (passes.camera, self._cut_list.path))
+        self._builder = FrameBuilder(stored, self._finder, self._masks, self._cameras)
+        self._neighbours = Neighbours(stored, self._builder, self._cut_list.is_search)
         if settled is not None:
-            self._around.settle(settled.beyond)
+            self._neighbours.settle(settled.beyond)
             self._masks.take_names_as_found()
             self.notes |= {text: list(self.numbers) for text in settled.notes}
 
@@ -118,12 +118,12 @@ class Clip:
         """
         if self._settled is None:
             self.check_names()
-            beyond = self._around.beyond
+            beyond = self._neighbours.beyond
             notes = tuple(text for text, at in self.notes.items() if len(at) == len(self.numbers))
             self._settled = SequenceFindings(
                 tuple(self.on_disk),
                 self.views,
-                self._meaning.found,
+                self._finder.finding,
                 tuple(sorted(self._known_cuts)),
                 beyond,
                 notes,
@@ -140,7 +140,7 @@ class Clip:
         return made
 
     def __repr__(self) -> str:
-        known = self._meaning.known or self.passes
+        known = self._finder.known or self.passes
         name = (known.vectors or self.passes.vectors).convention
         vectors = {"auto": "", "none": ", no vectors"}.get(name, f", {name} vectors")
         pattern = self.pattern if len(self.pattern) <= 200 else f"...{self.pattern[-200:]}"
@@ -149,9 +149,9 @@ class Clip:
 
     def move_by(self, motion: MotionSource | None) -> None:
         """Find motion in the pictures (see wgmb/flow) if the files hold none; None: all stand."""
-        self._maker.picture_motion = PictureMotion(self._stored, motion) if motion else standing
-        self._stored.around = FAR if motion else 0
-        self._around.forget_all()
+        self._builder.picture_motion = PictureMotion(self._stored, motion) if motion else standing
+        self._stored.margin = FAR if motion else 0
+        self._neighbours.forget_all()
 
     def expand_highlights(self, highlights: float) -> None:
         """Brighten white by this factor in frames, for the blur alone (color/highlights.py).
@@ -160,13 +160,13 @@ class Clip:
         Frames that hold light above white can then not be read.
         """
         check_highlights(highlights)
-        self._maker.highlights = highlights
-        self._around.forget_all()
+        self._builder.highlights = highlights
+        self._neighbours.forget_all()
 
     @property
     def highlights(self) -> float:
         """Times white that white is in frames."""
-        return self._maker.highlights
+        return self._builder.highlights
 
     def is_there(self, number: int) -> bool:
         """Return True if frame `number` is on disk."""
@@ -194,7 +194,7 @@ class Clip:
         """
         if number not in self.numbers:
             raise InputError(f"frame {number} is not in {self}")
-        return self._around.opened(self.source(number), extras(normal=True, light=True))
+        return self._neighbours.opened(self.source(number), extras(normal=True, light=True))
 
     @property
     def views(self) -> tuple[str, ...]:
@@ -221,7 +221,7 @@ class Clip:
 
     def files(self, number: int) -> list[Path]:
         """Every file that the result of frame `number` depends on."""
-        return self._ingredients.of(number)
+        return self._dependencies.of(number)
 
     @property
     def inputs(self) -> Iterator[Path]:
@@ -235,10 +235,10 @@ class Clip:
         Name, size [bytes] and time of change [ns] of every file, those of up to `reach` frames
         before and after too; and the detected vector convention.
         """
-        meaning = self._meaning.found.vectors
+        convention = self._finder.finding.vectors
         return {
-            "files": self._ingredients.states(number, reach),
-            "vectors_mean": str(meaning) if meaning else None,
+            "files": self._dependencies.states(number, reach),
+            "vectors_mean": str(convention) if convention else None,
         }
 
     def source(self, number: int, view: str | None = None) -> FrameFile:
@@ -259,21 +259,21 @@ class Clip:
     def forget(self, number: int) -> None:
         """Drop a frame from the cache."""
         self._stored.forget(number)
-        self._around.forget(number)
+        self._neighbours.forget(number)
 
     @property
     def finding(self) -> str:
         """Readable description of the detected vector convention."""
-        return self._meaning.found.text
+        return self._finder.finding.text
 
     @property
     def is_finding_notable(self) -> bool:
         """True if the vectors do not follow the convention of their names, or should be checked."""
-        return self._meaning.found.notable
+        return self._finder.finding.notable
 
     def vector_mask(self, source: FrameFile) -> str | None:
         """The channel of a frame that is 1 where its vectors are valid, if there is one."""
-        return self._meaning.mask_of(source)
+        return self._finder.mask_of(source)
 
     def neighbour(self, source: FrameFile, side: int) -> FrameFile | None:
         """The same view of the frame before (`side` -1) or after (1).
@@ -298,7 +298,7 @@ class Clip:
         arrays are read-only (Frame.locked): a frame is made, and uploaded by a Blur, only once,
         although three or five outputs use it.
         """
-        return self._around.between(source, extras(normal, light), extent, reach)[0]
+        return self._neighbours.between(source, extras(normal, light), extent, reach)[0]
 
     def placed(
         self,
@@ -311,8 +311,8 @@ class Clip:
         """Input of a Blur of this `extent`: with_neighbours, or `frame` for a `reach` of 0; and its
         placement."""
         if not reach:
-            return self._around.alone(source, extras(normal, light), extent)
-        return self._around.between(source, extras(normal, light), extent, reach)
+            return self._neighbours.alone(source, extras(normal, light), extent)
+        return self._neighbours.between(source, extras(normal, light), extent, reach)
 
     def frame(
         self,
@@ -326,20 +326,20 @@ class Clip:
 
         Motion across a camera cut is omitted (see cuts.jumps).
         """
-        return self._around.frame(source, picture, extras(normal, light))
+        return self._neighbours.frame(source, picture, extras(normal, light))
 
     @property
     def cuts(self) -> set[int]:
         """Frames after a camera cut, of those read so far."""
-        return self._around.cuts
+        return self._neighbours.cuts
 
     def light_passes(self, source: FrameFile) -> LightPasses:
         """The passes of light of a frame's picture."""
-        return self._maker.light_passes(source)
+        return self._builder.light_passes(source)
 
     def passes_of(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
         """The Frame of `source` as its layers have it; see `frame`. `also`: "normal", "light"."""
-        return self._maker.made(source, picture, also)
+        return self._builder.build(source, picture, also)
 
     @property
     def unseen(self) -> list[str]:
@@ -363,4 +363,4 @@ class Clip:
 
         The first frame is examined, and the middle and the last one only if it lacks a layer.
         """
-        self._maker.check_layers()
+        self._builder.check_layers()

@@ -38,7 +38,7 @@ class SequenceFiles:
         self.view_names = self._view_names()
         self._leading = str(in_view(pattern, self.view_names[0] if self.view_names else None))
         self.on_disk = self._on_disk()
-        self._there = frozenset(self.on_disk)
+        self._existing = frozenset(self.on_disk)
 
     def settle(self, settled: SequenceFindings) -> None:
         """Keep to what was found, whatever lies on disk from now on."""
@@ -73,7 +73,7 @@ class SequenceFiles:
     def is_there(self, number: int) -> bool:
         """Return True if frame `number` is on disk."""
         if self._settled is not None or not self.is_sequence:
-            return number in self._there
+            return number in self._existing
         return self.path(number).is_file()
 
     @cached_property
@@ -146,12 +146,12 @@ class SequenceFiles:
                 "`skip_missing=True` accepts gaps, `frames` selects"
             )
         wanted = frame_numbers(frames) if frames else list(range(there[0], there[-1] + 1))
-        missing = sorted(set(wanted) - self._there)
+        missing = sorted(set(wanted) - self._existing)
         if missing and not skip_missing:
             raise InputError(
                 f"{self.pattern}: missing frames {frame_list(missing)}; "
                 "`skip_missing=True` leaves them out"
             )
-        if not self._there & set(wanted):
+        if not self._existing & set(wanted):
             raise InputError(f"{self.pattern}: none of the frames {frames} exist")
-        return [n for n in wanted if n in self._there]
+        return [n for n in wanted if n in self._existing]

@@ -81,6 +81,6 @@ class PictureMotion:
             return None
         try:
             found = self._stored.source(number, view)
-            return found if found.beside is not None else None
+            return found if found.reference_channel is not None else None
         except (InputError, OSError):  # its turn to fail comes
             return None

@@ -35,28 +35,28 @@ class FrameBuilder:
     def __init__(
         self,
         stored: FrameCache,
-        meaning: ConventionFinder,
+        finder: ConventionFinder,
         masks: Masks,
         cameras: Mapping[str | None, CameraFile],
     ):
-        self._stored, self._meaning, self._masks = stored, meaning, masks
+        self._stored, self._finder, self._masks = stored, finder, masks
         self._cameras = cameras
         self.picture_motion: Callable[[FrameFile], Found | None] | None = None
         self.highlights = 1.0
 
-    def made(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
+    def build(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
         """The Frame of `source` as its layers have it; without `picture`, its colour is 0.
         `also`: "normal", "light".
         """
         passes, own = self._stored.passes, self._stored.own(source)
-        meaning = self._meaning.found.vectors
+        convention = self._finder.finding.vectors
         with about(source.name):
-            if meaning is None:  # where a layer was asked for, this says why there is none
-                meaning = vectors.named(own, passes.vectors, source.beside)
+            if convention is None:  # where a layer was asked for, this says why there is none
+                convention = vectors.named(own, passes.vectors, source.reference_channel)
             motion = reprojections = ids = None
             depth = self._depth(source)
-            if meaning is not None:
-                motion = vectors.read(own, meaning, source.beside)
+            if convention is not None:
+                motion = vectors.read(own, convention, source.reference_channel)
             camera = self._cameras.get(source.view)
             if motion is None and camera is None and self.picture_motion is not None:
                 motion, guessed = self.picture_motion(source) or (None, None)
@@ -101,7 +101,7 @@ class FrameBuilder:
         for number in dict.fromkeys(numbers[i] for i in (0, len(numbers) // 2, -1)):
             try:
                 for source in stored.sources(number):
-                    self.made(source, True, frozenset({"normal", "light"}))
+                    self.build(source, True, frozenset({"normal", "light"}))
                 return
             except layers.MissingLayerError as error:
                 first = first or error
@@ -112,14 +112,14 @@ class FrameBuilder:
 
     def light_passes(self, source: FrameFile) -> light.LightPasses:
         """The passes of light of a frame's picture."""
-        return light.find(self._stored.own(source), source.beside)
+        return light.find(self._stored.own(source), source.reference_channel)
 
     def _bright(self, rgba: np.ndarray) -> np.ndarray:
         return rgba if self.highlights == 1 else expanded(rgba, self.highlights)
 
     def _depth(self, source: FrameFile) -> np.ndarray | None:
         passes = self._stored.passes
-        name = layers.find_depth(self._stored.own(source), passes.depth, source.beside)
+        name = layers.find_depth(self._stored.own(source), passes.depth, source.reference_channel)
         if name is None:
             return None
         depth = source.channels[name].astype(np.float32, copy=False)
@@ -129,7 +129,7 @@ class FrameBuilder:
         return depth
 
     def _normal(self, source: FrameFile) -> np.ndarray | None:
-        names = layers.find_normal(self._stored.own(source), source.beside)
+        names = layers.find_normal(self._stored.own(source), source.reference_channel)
         if not names:
             return None
         return np.stack([source.channels[name] for name in names], 2, dtype=np.float32)
@@ -142,7 +142,7 @@ class FrameBuilder:
         return light.read(source.channels, found)
 
     def _object_ids(self, source: FrameFile) -> np.ndarray | None:
-        by_layer = layers.layers(source.channels, near=source.beside)
+        by_layer = layers.layers(source.channels, near=source.reference_channel)
         name = self._stored.passes.object_layer
         if name is None:
             named = [k for k in by_layer if layers.stem(k) in _OBJECT_STEMS]

@@ -23,7 +23,7 @@ class FrameCache:
     `numbers`: the requested ones. `known_cuts`: frames that begin a new shot. `view`: the only one
     asked for. Of the frames read so far, `sizes` has the sizes, `notes` lines that a user should
     know, each with its frames, and `unread` the neighbours that could not be read. Kept are as many
-    as a blur takes, `reach` to either side of its own, and those `around` each that it is made of.
+    as a blur takes, `reach` to either side of its own, and the `margin` that each is made of.
     """
 
     def __init__(
@@ -44,13 +44,13 @@ class FrameCache:
         self.notes: dict[str, list[int]] = {}
         self.unread: set[int] = set()
         self.reach = 1
-        self.around = 0
+        self.margin = 0
         self._kept: OrderedDict[int, tuple[FrameFile, ...]] = OrderedDict()
 
     @property
     def most_kept(self) -> int:
         """Frames that are kept at once."""
-        return 2 * (self.reach + self.around) + 1
+        return 2 * (self.reach + self.margin) + 1
 
     @property
     def views(self) -> tuple[str, ...]:
@@ -96,7 +96,7 @@ class FrameCache:
     def leader(self, number: int) -> FrameFile:
         """The view on which is settled what all views of a frame share: the default one."""
         found = self.all(number)
-        return next((s for s in found if s.beside is not None), found[0])
+        return next((s for s in found if s.reference_channel is not None), found[0])
 
     def source(self, number: int, view: str | None = None) -> FrameFile:
         """Frame `number` as stored: `view`, or by default the one chosen, or the default one."""
@@ -114,7 +114,7 @@ class FrameCache:
         if self._view is not None:
             return [self.source(number)]
         found = self.all(number)
-        return [s for s in found if s.beside is not None] or [found[0]]
+        return [s for s in found if s.reference_channel is not None] or [found[0]]
 
     def own(self, source: FrameFile) -> dict[str, np.ndarray]:
         """The channels of a view. What is in no view belongs to the default one."""

@@ -59,7 +59,7 @@ class FrameFile:
             return names.find_color(own, self.wanted)
 
     @property
-    def beside(self) -> str | None:
+    def reference_channel(self) -> str | None:
         """A channel whose neighbours are preferred: the picture's first, if there is one."""
         with contextlib.suppress(InputError):
             return next(name for name in self.color if name)
@@ -144,18 +144,18 @@ def read(
     max_mb: float = limits.MAX_MB,
     named: Sequence[str] = (),
     space: ColorSpace | None = None,
-    asked: Sequence[str] = (),
+    layers: Sequence[str] = (),
 ) -> tuple[FrameFile, ...]:
     """Every view of a frame, the default one first; the channels of its files together.
 
     `wanted`: the picture's layer. `max_mb`: megabytes that each file may unpack to. `named`: the
     views, if %V stands for them in the first path; else that file tells them. In the other paths
     %V stands for them too; of a file without %V and without views, they are the default view's.
-    `space`: of the samples of a still (stills.read) that is the first path. `asked`: names of
+    `space`: of the samples of a still (stills.read) that is the first path. `layers`: names of
     layers that may begin with a part's (see views.by_view).
     `InputError` names the file that is missing, damaged, too large, or of another size.
     """
-    files = _Files(max_mb, (*asked, *((wanted,) if wanted else ())))
+    files = _Files(max_mb, (*layers, *((wanted,) if wanted else ())))
     first = files.content(in_view(paths[0], named[0] if named else None), space)
     full = tuple(view for view in first.named if first.views[view])
     there = tuple(named) or full or (None,)
@@ -204,8 +204,8 @@ class _Content:
 class _Files:
     """The files of one frame, each read once."""
 
-    def __init__(self, max_mb: float, asked: Sequence[str]):
-        self._max_mb, self._asked = max_mb, asked
+    def __init__(self, max_mb: float, layers: Sequence[str]):
+        self._max_mb, self._layers = max_mb, layers
         self._read: dict[Path, _Content] = {}
 
     def content(self, path: Path, space: ColorSpace | None) -> _Content:
@@ -217,7 +217,7 @@ class _Files:
     def _content(self, path: Path, space: ColorSpace | None) -> _Content:
         if path.suffix.lower() == ".exr":
             file = exr.read(path, max_mb=self._max_mb, data_layers=vectors.STEMS)
-            return _Content(path, file, {}, stereo.by_view(file, self._asked))
+            return _Content(path, file, {}, stereo.by_view(file, self._layers))
         if path.suffix.lower() in stills.SUFFIXES:
             rgba = stills.read(path, max_mb=self._max_mb, space=space)
             planes = {c: rgba[..., i] for i, c in enumerate("RGBA"[: rgba.shape[2]])}
@@ -284,18 +284,18 @@ def _together(
     )
 
 
-def _noted(found: tuple[FrameFile, ...], empty: Sequence[str]) -> tuple[FrameFile, ...]:
+def _noted(views: tuple[FrameFile, ...], empty: Sequence[str]) -> tuple[FrameFile, ...]:
     """The views of a frame with notes on those whose picture is not whole, if any has one."""
-    if all(f.beside is None for f in found):
-        return found
-    more = {f.view: _remarks(f) for f in found}
-    more[found[0].view] += [_NO_PICTURE.format(view) for view in empty]
-    return tuple(replace(f, notes=(*f.notes, *more[f.view])) if more[f.view] else f for f in found)
+    if all(f.reference_channel is None for f in views):
+        return views
+    more = {f.view: _remarks(f) for f in views}
+    more[views[0].view] += [_NO_PICTURE.format(view) for view in empty]
+    return tuple(replace(f, notes=(*f.notes, *more[f.view])) if more[f.view] else f for f in views)
 
 
 def _remarks(frame: FrameFile) -> list[str]:
     """Remarks on channels that a view's picture lacks."""
-    if frame.beside is None:
+    if frame.reference_channel is None:
         return [_NO_PICTURE.format(frame.view)]
     lacks = ", ".join(c for c, name in zip("RGB", frame.color, strict=False) if not name)
     of = f" of view {frame.view}" if frame.view else ""

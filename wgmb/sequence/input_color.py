@@ -25,7 +25,7 @@ def in_space(frame: FrameFile, space: ColorSpace) -> FrameFile:
     if frame.file is not None and space.is_linear:
         return replace(frame, space=space)
     working = space.config.scene_linear
-    if frame.file is None or frame.beside is None:
+    if frame.file is None or frame.reference_channel is None:
         return replace(frame, space=working)
     with about(frame.name):
         light = space.linear(frame.rgba).transpose(2, 0, 1)

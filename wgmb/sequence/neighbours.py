@@ -47,15 +47,15 @@ def extras(normal: bool, light: bool) -> frozenset[str]:
 
 
 class Neighbours:
-    """The frames in `stored` as a blur takes them, made by `maker`.
+    """The frames in `stored` as a blur takes them, built by `builder`.
 
     `is_search`: cuts that nobody told of are looked for. `cuts`: those found so far, and those
     known.
     """
 
-    def __init__(self, stored: FrameCache, maker: FrameBuilder, is_search: bool):
+    def __init__(self, stored: FrameCache, builder: FrameBuilder, is_search: bool):
         check_choice("outside", stored.passes.outside, OUTSIDE)
-        self._stored, self._maker, self._is_search = stored, maker, is_search
+        self._stored, self._builder, self._is_search = stored, builder, is_search
         self._outside = stored.passes.outside
         self.cuts: set[int] = set()
         self._alone: OrderedDict[
@@ -91,7 +91,7 @@ class Neighbours:
 
     def frame(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
         """The Frame of `source` in its own window, without motion that leads across a cut."""
-        frame = self._maker.made(source, picture, also)
+        frame = self._builder.build(source, picture, also)
         if all(self._stored.is_known_cut(source.number, side) for side in (-1, 1)):
             self.cuts |= {source.number, source.number + 1}
             return still(frame)
@@ -121,7 +121,7 @@ class Neighbours:
         frames = {0: (source, self._locked(source, also))}
         for side in (-1, 1):
             for offset in range(side, side * (reach + 1), side):
-                found = self._beside(*frames[offset - side], side, also)
+                found = self._neighbour(*frames[offset - side], side, also)
                 if found is None:
                     break
                 frames[offset] = found
@@ -142,12 +142,12 @@ class Neighbours:
         frame, canvas = self._locked(source, also), onto or source.data_window
 
         def load(side: int) -> Frame | None:
-            found = self._beside(source, frame, side, also)
+            found = self._neighbour(source, frame, side, also)
             return self.opened(found[0], also, canvas) if found else None
 
         return ClipFrame.of(self._on(canvas, source, frame), load)
 
-    def _beside(
+    def _neighbour(
         self, source: FrameFile, frame: Frame, side: int, also: frozenset[str]
     ) -> tuple[FrameFile, Frame] | None:
         """The frame before or after, and its file; None where there is none of the same shot."""

@@ -31,11 +31,11 @@ class DisplaySettings:
         """
         given = [name for name, value in vars(self).items() if value is not None and name != "ocio"]
         if self.ocio is not None and self.ocio != "off":
-            return self._shown(self.ocio)
+            return self._display_of(self.ocio)
         config = os.environ.get("OCIO") if self.ocio is None else None
         if config and (given or (needed and installed())):
             try:
-                return self._shown(config)
+                return self._display_of(config)
             except InputError as error:
                 raise InputError(f"$OCIO: {error}; `ocio='off'` shows sRGB") from None
         if given:
@@ -43,7 +43,7 @@ class DisplaySettings:
             raise InputError(f"`{given[0]}` needs an OpenColorIO config: {known}")
         return None
 
-    def _shown(self, config: str) -> Display:
+    def _display_of(self, config: str) -> Display:
         return ColorConfig(config).display(self.display, self.view_transform, self.look)
 
     @property

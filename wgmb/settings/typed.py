@@ -36,7 +36,7 @@ def typed(name: str, value: object, hint: Any) -> Any:
             return _as(value, one)
         except (TypeError, ValueError, OverflowError):
             continue
-    raise InputError(f"{name} cannot be {_shown(value)}")
+    raise InputError(f"{name} cannot be {_described(value)}")
 
 
 def _as(value: Any, hint: Any) -> Any:
@@ -66,7 +66,7 @@ def _as(value: Any, hint: Any) -> Any:
     raise TypeError
 
 
-def _shown(value: object) -> str:
+def _described(value: object) -> str:
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # a number of thousands of digits, or lists as deep

@@ -35,24 +35,24 @@ class FlowSettings:
     def method(self) -> str:
         """The blur method that suits this motion: dense inverse search is to be quick.
 
-        Of settings that are `settled`, as "auto" may become either.
+        Of settings that are `chosen`, as "auto" may become either.
         """
         return "gather" if self.flow in ("auto", "search") else "tap"
 
     def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
         """The source of the motion, and its description in words."""
-        settled, how = self.settled(device)
-        if settled.flow == "none":
+        chosen, how = self.chosen(device)
+        if chosen.flow == "none":
             return None, how
-        if settled.flow == "dis":
+        if chosen.flow == "dis":
             from ..flow.dis import Dis  # only where it is needed
 
-            return Dis(settled.flow_quality), how
+            return Dis(chosen.flow_quality), how
         from ..flow import Flow
 
-        return Flow(quality=settled.flow_quality, device=device), how
+        return Flow(quality=chosen.flow_quality, device=device), how
 
-    def settled(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
+    def chosen(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
         """A copy in which `flow` is chosen as it suits the device, and the choice in words."""
         if self.flow == "none":
             return self, "none: pictures are averaged"
@@ -111,24 +111,24 @@ class VideoSettings(FlowSettings):
             raise InputError(f"`end` must be after `begin`, got {self.begin} to {self.end}")
         return begin, end
 
-    def clock(self, footage: VideoReader, frames: str | None) -> Clock:
+    def clock(self, reader: VideoReader, frames: str | None) -> Clock:
         """The clock of the part that is asked for; InputError if there is no such part.
 
         `frames`: numbers of the video's pictures, such as 120-480.
         """
-        start, (first, end) = footage.times[0], self.range
+        start, (first, end) = reader.times[0], self.range
         first, end = (None if t is None else start + t for t in (first, end))
         if frames is not None:
             if self.begin or self.end:
                 raise InputError("choose either `frames`, or `begin` and `end`")
             numbers = frame_numbers(frames)
-            there = f"{footage.path} has pictures 0 to {len(footage) - 1}"
-            if not 0 <= numbers[0] <= numbers[-1] < len(footage):
+            there = f"{reader.path} has pictures 0 to {len(reader) - 1}"
+            if not 0 <= numbers[0] <= numbers[-1] < len(reader):
                 raise InputError(f"frames {frames}: {there}")
             if numbers != list(range(numbers[0], numbers[-1] + 1)):
                 raise InputError(f"frames of a video must be one range, got {frames}")
-            first = footage.times[numbers[0]]
-            end = None if numbers[-1] + 1 == len(footage) else footage.times[numbers[-1] + 1]
+            first = reader.times[numbers[0]]
+            end = None if numbers[-1] + 1 == len(reader) else reader.times[numbers[-1] + 1]
         origin = start if first is None else Fraction(0)
         return Clock(first or start, self.pace, origin, first, end)
 

@@ -1,7 +1,6 @@
 """Pictures in time, read once from first to last; cut into shots.
 
-A video is a reel, and so is a sequence of pictures whose rate is to change. Only the pictures
-around the present one are kept, however long it is.
+Only the pictures around the present one are kept, however many there are.
 
 A flash is no shot: a picture, or some for up to a 24th of a second, that differ from those around
 them, which agree with each other. They are exposed with those around, but no motion leads to them.
@@ -29,12 +28,12 @@ T = TypeVar("T")
 
 @dataclass
 class Picture(Generic[T]):
-    """One picture of a reel."""
+    """One picture in time."""
 
     time: float
     """Time at which it is first shown [s]."""
     content: T
-    """The picture itself: whatever the reel's tests for cuts and repeats take."""
+    """The picture itself: whatever the reader's tests for cuts and repeats take."""
     number: int = 0
     """Of the frame in its file."""
     begins_shot: bool = False
@@ -100,7 +99,7 @@ class ShotReader(Generic[T]):
         return here
 
     def cells(self, at: float, interval: float, shutter: Shutter) -> list[Cell]:
-        """The cells of an output frame (see exposure.cells); their indices are the reel's.
+        """The cells of an output frame (see exposure.cells); their indices are the reader's.
 
         Asked for in the order of time, as what lies before is forgotten.
         """

@@ -68,7 +68,7 @@ class Exposures:
         self._sum, self._planes = ExposureSum(blur), Planes(blur.device, highlights)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
-        self.reel: ShotReader[Thumbnail] | None = None
+        self.shots: ShotReader[Thumbnail] | None = None
 
     @property
     def device(self) -> wgpu.GPUDevice:
@@ -81,11 +81,11 @@ class Exposures:
         shutter: Shutter,
         wanted: Iterable[OutputFrame],
     ) -> Iterator[tuple[OutputFrame, Exposure]]:
-        """Every moment and its exposure, which is valid until the next is asked for.
+        """Every output frame and its exposure, which is valid until the next is asked for.
 
         `pictures` and `wanted`, in the order of their times, are read as far as is needed.
         """
-        self.reel = reel = ShotReader(
+        self.shots = shots = ShotReader(
             pictures,
             is_cut=is_cut if self._cuts else None,
             known_cuts=self._known_cuts,
@@ -93,16 +93,16 @@ class Exposures:
             flash=self._flash,
             tolerance=self._tolerance,
         )
-        views = VideoFrames(reel, self._blur, self._motion, self._holdout, self._highlights)
-        for moment in wanted:
-            cells = reel.cells(float(moment.time), float(moment.interval), shutter)
-            yield moment, Exposure(self, reel, views, cells)
+        views = VideoFrames(shots, self._blur, self._motion, self._holdout, self._highlights)
+        for frame in wanted:
+            cells = shots.cells(float(frame.time), float(frame.interval), shutter)
+            yield frame, Exposure(self, shots, views, cells)
 
     def light(
-        self, reel: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell]
+        self, shots: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell]
     ) -> wgpu.GPUTexture:
         """The exposure of these cells as linear light (rgba32float)."""
-        light = self._light(reel, views, cells)
+        light = self._light(shots, views, cells)
         if self._highlights == 1:
             return light
         encoder = self.device.create_command_encoder(label="compress")
@@ -113,23 +113,27 @@ class Exposures:
         return output
 
     def coded(
-        self, reel: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell], coding: Coding
+        self,
+        shots: ShotReader[Thumbnail],
+        views: VideoFrames,
+        cells: Sequence[Cell],
+        coding: Coding,
     ) -> CodedPicture:
         """The exposure of these cells in planes."""
         plain = self._motion is None and self._highlights == 1
-        if plain and averages(reel[cells[0].index].content.coded.coding, coding):
-            pictures = [reel[cell.index].content.coded for cell in cells]
+        if plain and averages(shots[cells[0].index].content.coded.coding, coding):
+            pictures = [shots[cell.index].content.coded for cell in cells]
             return self._average(pictures, [cell.share for cell in cells], coding)
-        light = self._light(reel, views, cells)
+        light = self._light(shots, views, cells)
         encoder = self.device.create_command_encoder(label="encode")
         return self._planes.encode(encoder, light.create_view(), coding)
 
     def _light(
-        self, reel: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell]
+        self, shots: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell]
     ) -> wgpu.GPUTexture:
         """The same with highlights expanded."""
-        parts = ((cell, views.shown(cell.index)) for cell in cells)
-        return self._sum.texture(reel[cells[0].index].content.coded.size, parts)
+        parts = ((cell, views.in_shot(cell.index)) for cell in cells)
+        return self._sum.texture(shots[cells[0].index].content.coded.size, parts)
 
 
 class VideoBlur(Exposures):
@@ -140,7 +144,7 @@ class VideoBlur(Exposures):
 
     def __init__(
         self,
-        footage: VideoReader,
+        reader: VideoReader,
         blur: Blur,
         motion: MotionSource | None,
         *,
@@ -148,36 +152,36 @@ class VideoBlur(Exposures):
         highlights: float = 1.0,
         **more: Any,
     ):
-        check_coding(highlights, footage.path, footage.coding)
+        check_coding(highlights, reader.path, reader.coding)
         pace = float(clock.speed)
-        more |= {"flash": FLASH / pace, "tolerance": footage.tolerance / pace}
+        more |= {"flash": FLASH / pace, "tolerance": reader.tolerance / pace}
         super().__init__(blur, motion, highlights=highlights, **more)
-        self.footage, self.clock = footage, clock
+        self.reader, self.clock = reader, clock
 
     def exposures(
         self, shutter: Shutter, wanted: Sequence[OutputFrame]
     ) -> Iterator[tuple[OutputFrame, Exposure]]:
-        """Every moment and its exposure, which is valid until the next is asked for."""
+        """Every output frame and its exposure, which is valid until the next is asked for."""
         return self.of(self._pictures(shutter, wanted), shutter, wanted)
 
     def _pictures(
         self, shutter: Shutter, wanted: Sequence[OutputFrame]
     ) -> Iterator[Picture[Thumbnail]]:
         """The video's pictures from before the first exposure to the end, on the output's clock."""
-        times = self.footage.times
+        times = self.reader.times
         opens = (
             self.clock.back(wanted[0].time)
             + Fraction(shutter.span[0]) * wanted[0].interval * self.clock.speed
         )
         first = int(np.searchsorted(times.seconds, float(opens)))
         first, none = max(first - _BEFORE, 0), True
-        for number, picture in ahead(self.footage.pictures(first), _READ_AHEAD):
+        for number, picture in ahead(self.reader.pictures(first), _READ_AHEAD):
             none = False
             yield Picture(float(self.clock.out(times[number])), Thumbnail(picture), number)
         if none:
             at = float(times[min(first, len(times) - 1)])
             raise InputError(
-                f"{self.footage.path}: none of its pictures from {at:.2f} s on can be decoded"
+                f"{self.reader.path}: none of its pictures from {at:.2f} s on can be decoded"
             )
 
 
@@ -186,17 +190,17 @@ class Exposure:
     """An output frame, made when it is asked for as what is wanted."""
 
     _run: Exposures
-    _reel: ShotReader[Thumbnail]
+    _shots: ShotReader[Thumbnail]
     _views: VideoFrames
     _cells: Sequence[Cell]
 
     def light(self) -> wgpu.GPUTexture:
         """As linear light (rgba32float)."""
-        return self._run.light(self._reel, self._views, self._cells)
+        return self._run.light(self._shots, self._views, self._cells)
 
     def coded(self, coding: Coding) -> CodedPicture:
         """In the planes of a video."""
-        return self._run.coded(self._reel, self._views, self._cells, coding)
+        return self._run.coded(self._shots, self._views, self._cells, coding)
 
 
 class ExposedPicture(Protocol):

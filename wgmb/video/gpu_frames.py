@@ -1,4 +1,4 @@
-"""The pictures of a reel on the GPU, with the motion between them: nothing comes down."""
+"""The pictures of a video's shots on the GPU, with the motion between them: nothing comes down."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -27,7 +27,7 @@ _FRAMES = 3  # with motion: a frame and its neighbours
 
 
 class VideoFrames:
-    """Textures of a reel's pictures, on the device of the Blur that takes them.
+    """Textures of the pictures of `shots`, on the device of the Blur that takes them.
 
     `motion`: where motion comes from, or None. `holdout` (height, width): 1 stays sharp.
     `highlights`: times white that white becomes; motion is searched without.
@@ -35,13 +35,13 @@ class VideoFrames:
 
     def __init__(
         self,
-        reel: ShotReader[Thumbnail],
+        shots: ShotReader[Thumbnail],
         blur: Blur,
         motion: MotionSource | None = None,
         holdout: np.ndarray | None = None,
         highlights: float = 1.0,
     ):
-        self._reel, self._source = reel, motion
+        self._shots, self._source = shots, motion
         self._device = blur.device
         self._planes, self._plain = Planes(blur.device, highlights), Planes(blur.device)
         self._images = TexturePool(blur.device)
@@ -56,18 +56,18 @@ class VideoFrames:
         self._shot: Callable[[int], Any] | None = None
         self._first = 0  # a picture of the present shot
 
-    def shown(self, index: int) -> FrameInShot:
+    def in_shot(self, index: int) -> FrameInShot:
         """A picture, between its neighbours if the method takes them.
 
         What it refers to may be overwritten once two others have been asked for.
         """
         wanted = [index]
         if self._source is not None and self._neighbours:
-            wanted = [i for i in (index - 1, index, index + 1) if self._reel.moves_on(index, i)]
+            wanted = [i for i in (index - 1, index, index + 1) if self._shots.moves_on(index, i)]
         found = {i: self._frame(i) for i in wanted}
         near = (found.get(i) for i in (index - 1, index + 1))
         before, after = (one if one is not None and one.has_vectors else None for one in near)
-        return FrameInShot(found[index], before, after, self._reel[index].number)
+        return FrameInShot(found[index], before, after, self._shots[index].number)
 
     def _frame(self, index: int) -> FrameViews:
         """The views of one picture."""
@@ -86,7 +86,7 @@ class VideoFrames:
 
     def _light(self, index: int) -> wgpu.GPUTexture:
         """The texture of one picture, kept until others need its place."""
-        content = self._reel[index].content
+        content = self._shots[index].content
         if index in self._lights:
             self._lights[index] = self._lights.pop(index)
         else:
@@ -112,7 +112,7 @@ class VideoFrames:
         """Motion of a picture within its own interval of time, and depth if the method reads it."""
         if self._source is None:
             return None
-        if self._shot is None or not self._reel.moves_on(self._first, index):
+        if self._shot is None or not self._shots.moves_on(self._first, index):
             # The first of a shot that is kept is the same, whatever was asked for before.
             self._shot = self._source.shot(self._load, self._wants_depth)
         self._first = index
@@ -139,18 +139,18 @@ class VideoFrames:
 
     def _load(self, index: int) -> Any:
         """The picture of an index of the present shot, None outside it."""
-        if not self._reel.moves_on(self._first, index):
+        if not self._shots.moves_on(self._first, index):
             return None
-        content = self._reel[index].content
+        content = self._shots[index].content
         if isinstance(self._shot, Shot):
             return self._decode(self._plain, content, "searched")
         return content.grey
 
     def _factors(self, index: int) -> tuple[float, float]:
         """See exposure.evened."""
-        near = [i for i in (index - 1, index, index + 1) if self._reel.same_shot(index, i)]
-        times = np.array([self._reel[i].time for i in near])
-        back, ahead = (self._reel.moves_on(index, i) for i in (index - 1, index + 1))
+        near = [i for i in (index - 1, index, index + 1) if self._shots.same_shot(index, i)]
+        times = np.array([self._shots[i].time for i in near])
+        back, ahead = (self._shots.moves_on(index, i) for i in (index - 1, index + 1))
         return evened(times, near.index(index), (back, ahead))
 
     def _paced(

@@ -18,7 +18,7 @@ from .static_areas import overlay_of
 STATIC = "static"  # as a holdout: what never changes while all around it does
 
 
-def holdout_of(masks: Iterable[str], footage: VideoReader) -> np.ndarray | None:
+def holdout_of(masks: Iterable[str], reader: VideoReader) -> np.ndarray | None:
     """(height, width) float32, 1 stays sharp: all masks together; None without any.
 
     A mask is STATIC or an image file of the video's size, of whose first channel the display values
@@ -26,9 +26,9 @@ def holdout_of(masks: Iterable[str], footage: VideoReader) -> np.ndarray | None:
     """
     whole: np.ndarray | None = None
     for mask in masks:
-        plane = overlay_of(footage) if mask == STATIC else _matte(mask)
-        if plane.shape[::-1] != footage.size:
-            expected = "{} x {}".format(*footage.size)
+        plane = overlay_of(reader) if mask == STATIC else _matte(mask)
+        if plane.shape[::-1] != reader.size:
+            expected = "{} x {}".format(*reader.size)
             raise InputError(f"{mask} must be {expected} like the video, got {size_text(plane)}")
         whole = plane if whole is None else np.maximum(whole, plane)
     return whole

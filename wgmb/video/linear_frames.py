@@ -25,11 +25,11 @@ class VideoPictures:
     `highlights`: times white that white becomes (see color/highlights.py); 1 is off.
     """
 
-    def __init__(self, footage: VideoReader, device: wgpu.GPUDevice, highlights: float = 1.0):
-        self.footage, self.planes = footage, Planes(device, highlights)
+    def __init__(self, reader: VideoReader, device: wgpu.GPUDevice, highlights: float = 1.0):
+        self.reader, self.planes = reader, Planes(device, highlights)
         self._device, self._images = device, TexturePool(device)
         self._going: Iterator[tuple[int, CodedPicture]] = iter(())
-        self._reached = len(footage)  # number of the picture that `_going` gave last
+        self._reached = len(reader)  # number of the picture that `_going` gave last
         self._pending: tuple[int, CodedPicture] | None = None
 
     def light(self, picture: CodedPicture) -> np.ndarray:
@@ -45,7 +45,7 @@ class VideoPictures:
 
         They are decoded in a thread of its own. Those that cannot be decoded are left out.
         """
-        for number, picture in ahead(self.footage.pictures(first, last), _READ_AHEAD):
+        for number, picture in ahead(self.reader.pictures(first, last), _READ_AHEAD):
             yield number, self.light(picture)
 
     def at(self, number: int) -> np.ndarray | None:
@@ -56,12 +56,12 @@ class VideoPictures:
     def coded(self, number: int) -> CodedPicture | None:
         """The same as it is stored."""
         if not self._reached < number <= self._reached + _NEAR:
-            self._going, self._pending = self.footage.pictures(number), None
+            self._going, self._pending = self.reader.pictures(number), None
         while True:
             found = self._pending or next(self._going, None)
             self._pending = None
             if found is None:
-                self._reached = len(self.footage)
+                self._reached = len(self.reader)
                 return None
             if found[0] > number:
                 self._pending, self._reached = found, number

@@ -41,28 +41,28 @@ class OutputFrames(Sequence[OutputFrame]):
 
     def __init__(
         self,
-        footage: VideoReader,
+        reader: VideoReader,
         clock: Clock,
         fps: Fraction | None,
         longest_pause: float = math.inf,
     ):
-        times = footage.times
+        times = reader.times
         first = 0 if clock.first is None else _count_before(times, clock.first)
         last = len(times) if clock.end is None else _count_before(times, clock.end)
         if first >= last:
-            raise InputError(f"{footage.path}: has no pictures in this range")
+            raise InputError(f"{reader.path}: has no pictures in this range")
         self._clock = clock
         self._own: list[Fraction] | None = None
         self._begin = clock.out(times[first])
-        self._step = 1 / (fps or footage.rate * clock.speed)
-        end = footage.until if clock.end is None else min(footage.until, clock.end)
+        self._step = 1 / (fps or reader.rate * clock.speed)
+        end = reader.until if clock.end is None else min(reader.until, clock.end)
         if fps is not None:
-            _check_pauses(footage, clock, times[first:last], longest_pause)
+            _check_pauses(reader, clock, times[first:last], longest_pause)
             self._count = max(1, math.ceil((clock.out(end) - self._begin) * fps - SPARE))
             return
         self._own, self._count = list(times[first:last]), last - first
-        again = footage.until - 1 / footage.rate
-        if times[-1] + _HELD / footage.rate < again < end:
+        again = reader.until - 1 / reader.rate
+        if times[-1] + _HELD / reader.rate < again < end:
             self._own.append(again)
             self._count += 1
 
@@ -76,9 +76,9 @@ class OutputFrames(Sequence[OutputFrame]):
     def __getitem__(self, index: int | slice) -> OutputFrame | list[OutputFrame]:
         numbers = range(self._count)[index]
         return (
-            [self._moment(k) for k in numbers]
+            [self._frame(k) for k in numbers]
             if isinstance(numbers, range)
-            else self._moment(numbers)
+            else self._frame(numbers)
         )
 
     def nearest(self, time: Fraction) -> int:
@@ -89,7 +89,7 @@ class OutputFrames(Sequence[OutputFrame]):
         near = {min(max(n, 0), self._count - 1) for n in (after - 1, after)}
         return min(near, key=lambda n: (abs(self[n].time - time), n))
 
-    def _moment(self, number: int) -> OutputFrame:
+    def _frame(self, number: int) -> OutputFrame:
         if self._own is None:
             return OutputFrame(number, self._begin + number * self._step, self._step)
         return OutputFrame(number, self._clock.out(self._own[number]), self._step)
@@ -104,15 +104,15 @@ def _count_before(times: Sequence[Fraction], time: Fraction) -> int:
     return low
 
 
-def _check_pauses(footage: VideoReader, clock: Clock, shown: Times, longest: float) -> None:
+def _check_pauses(reader: VideoReader, clock: Clock, times: Times, longest: float) -> None:
     """InputError where a picture is held for longer, up to the next one or to the end."""
-    end = footage.until if clock.end is None else min(footage.until, clock.end)
-    begins = np.append(shown.ticks, int(end / shown.base))
+    end = reader.until if clock.end is None else min(reader.until, clock.end)
+    begins = np.append(times.ticks, int(end / times.base))
     number = int(np.argmax(np.diff(begins)))
-    held = int(begins[number + 1] - begins[number]) * shown.base
+    held = int(begins[number + 1] - begins[number]) * times.base
     if held > longest:
         raise InputError(
-            f"{footage.path}: a pause of {math.ceil(held):,} s after "
-            f"{float(shown[number] - footage.times[0]):.2f} s, which frames of a steady rate would "
+            f"{reader.path}: a pause of {math.ceil(held):,} s after "
+            f"{float(times[number] - reader.times[0]):.2f} s, which frames of a steady rate would "
             f"fill; `longest_pause={math.ceil(held)}` allows it, `begin` and `end` choose a part"
         )

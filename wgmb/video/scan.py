@@ -13,36 +13,34 @@ from .thumbnail import Thumbnail, is_cut, is_double
 _READ_AHEAD = 2  # coded pictures
 
 
-def scan_video(
-    footage: VideoReader, tell: Callable[[int, str, str], None]
-) -> list[tuple[str, str]]:
+def scan_video(reader: VideoReader, tell: Callable[[int, str, str], None]) -> list[tuple[str, str]]:
     """(name, text) lines about all pictures of a video, which are decoded for them.
 
     `tell`: called after every picture, see `terminal.progress`.
     """
-    times = footage.times
+    times = reader.times
 
     def pictures() -> Iterator[Picture[Thumbnail]]:
-        for number, coded in ahead(footage.pictures(), _READ_AHEAD):
+        for number, coded in ahead(reader.pictures(), _READ_AHEAD):
             yield Picture(float(times[number]), Thumbnail(coded), number)
             tell(number, "done", "picture")
 
-    reel = ShotReader(pictures(), is_cut=is_cut, is_double=is_double)
+    shots = ShotReader(pictures(), is_cut=is_cut, is_double=is_double)
     for time in times:
-        reel.at(float(time))
-    lines = [("cuts", _cuts(footage, sorted(reel.cuts)))]
-    if reel.flashes:
-        lines.append(("flashes", f"at {_pictures(reel.flashes)}"))
-    if reel.doubles:
-        lines.append(("repeated", f"{len(reel.doubles)}: {_pictures(reel.doubles)}"))
+        shots.at(float(time))
+    lines = [("cuts", _cuts(reader, sorted(shots.cuts)))]
+    if shots.flashes:
+        lines.append(("flashes", f"at {_pictures(shots.flashes)}"))
+    if shots.doubles:
+        lines.append(("repeated", f"{len(shots.doubles)}: {_pictures(shots.doubles)}"))
     return lines
 
 
-def _cuts(footage: VideoReader, numbers: Sequence[int]) -> str:
+def _cuts(reader: VideoReader, numbers: Sequence[int]) -> str:
     """Every cut with its time."""
     if not numbers:
         return "none found"
-    parts = (f"{number} ({float(footage.times[number]):.2f} s)" for number in numbers)
+    parts = (f"{number} ({float(reader.times[number]):.2f} s)" for number in numbers)
     return f"before picture {', '.join(parts)}"
 
 

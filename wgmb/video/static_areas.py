@@ -15,20 +15,20 @@ _AROUND = 16  # pixels to each side
 _CHANGES = 0.25  # share of changes around a pixel from which it stands out by not changing
 
 
-def overlay_of(footage: VideoReader) -> np.ndarray:
+def overlay_of(reader: VideoReader) -> np.ndarray:
     """(height, width) float32: 1 where nothing changes although what is around it does.
 
     Looked for in pictures from all over the video.
     """
-    width, height = footage.size
-    numbers = np.unique(np.linspace(0, len(footage) - 1, _SAMPLES).astype(int))
+    width, height = reader.size
+    numbers = np.unique(np.linspace(0, len(reader) - 1, _SAMPLES).astype(int))
     still = np.ones((height, width), bool)
     changes = np.zeros((height, width), np.float32)
     before: list[np.ndarray] | None = None
     first: list[np.ndarray] | None = None
     count = 0
     for number in numbers:
-        for _, picture in footage.pictures(int(number), int(number)):
+        for _, picture in reader.pictures(int(number), int(number)):
             planes = _planes(picture)
             if first is None or before is None:
                 first = before = planes

@@ -38,7 +38,7 @@ class Thumbnail:
         self.coded = coded
 
     @cached_property
-    def _seen(self) -> CodedPicture:
+    def _integers(self) -> CodedPicture:
         """The picture as integers."""
         coding = self.coded.coding
         if coding.bits != FLOAT:
@@ -77,7 +77,7 @@ class Thumbnail:
     @property
     def grey(self) -> np.ndarray:
         """(height, width) uint8: display values without colour."""
-        coding, planes = self._seen.coding, self._colors
+        coding, planes = self._integers.coding, self._colors
         most, unit = 2**coding.bits - 1, 2 ** (coding.bits - 8)
         if coding.model == "rgb" and coding.bits == 8:
             total = planes[1].astype(np.uint16)
@@ -96,17 +96,17 @@ class Thumbnail:
     @property
     def _colors(self) -> tuple[np.ndarray, ...]:
         """The planes without alpha."""
-        planes = self._seen.planes
-        return planes[:-1] if self._seen.coding.alpha else planes
+        planes = self._integers.planes
+        return planes[:-1] if self._integers.coding.alpha else planes
 
     def _steps(self, plane: np.ndarray) -> tuple[int, int]:
         """Columns and rows of pixels to one sample of a plane."""
-        whole = plane.shape == self._seen.planes[0].shape
-        return (1, 1) if whole else self._seen.coding.steps
+        whole = plane.shape == self._integers.planes[0].shape
+        return (1, 1) if whole else self._integers.coding.steps
 
     def _display(self, planes: list[np.ndarray]) -> np.ndarray:
         """Display values of samples, those of HDR up to the white of text."""
-        coding = self._seen.coding
+        coding = self._integers.coding
         samples = np.array(planes if len(planes) == 3 else [planes[0]] * 3, np.float32)
         rows = _rows(coding)
         signal = np.einsum("cp,pyx->yxc", rows[:, :3], samples) + rows[:, 3]

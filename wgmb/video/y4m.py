@@ -100,10 +100,10 @@ class Y4mReader:
     def _line(self) -> bytes:
         return self._stream.readline(_LONGEST).rstrip(b"\n")
 
-    def _whole(self, said: dict[str, str], key: str) -> int:
-        if not re.fullmatch(r"[1-9]\d{0,8}", said.get(key, "")):
+    def _whole(self, parameters: dict[str, str], key: str) -> int:
+        if not re.fullmatch(r"[1-9]\d{0,8}", parameters.get(key, "")):
             raise InputError(f"{self.name}: its header lacks a size")
-        return int(said[key])
+        return int(parameters[key])
 
     def _ratio(self, text: str) -> Fraction | None:
         if not (found := re.fullmatch(r"(\d{1,9}):(\d{1,9})", text)):

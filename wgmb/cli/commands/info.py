@@ -102,13 +102,17 @@ def describe(
         kinds = [f"{names.component(m).upper()} {source.channels[m].dtype}" for m in members]
         lines.append(("layer", f"{layer or '(picture)'}: {', '.join(kinds)}"))
     lines += [("note", text) for text, on in clip.notes.items() if source.number in on]
-    color = ", ".join(dict.fromkeys(filter(None, source.color))) if source.beside else "none found"
+    color = (
+        ", ".join(dict.fromkeys(filter(None, source.color)))
+        if source.reference_channel
+        else "none found"
+    )
     lines.append(("picture", color))
     if shown is not None:
         space = space_of(source, shown.config)
         text = space.text + ("" if space.is_linear else ", not linear: --from makes it so")
         lines.append(("colour", f"{text}; shown on {shown.display}, {shown.view}"))
-    depth = names.find_depth(source.channels, clip.passes.depth, source.beside)
+    depth = names.find_depth(source.channels, clip.passes.depth, source.reference_channel)
     lines.append(("depth", depth or "none"))
     lines.append(("vectors", clip.finding))
     lines.append(("light", clip.light_passes(source).text))
@@ -128,7 +132,7 @@ def _views_text(clip: Clip, source: FrameFile) -> str:
 
 def _about_motion(clip: Clip, source: FrameFile, output: Path | None) -> list[tuple[str, str]]:
     """Return lines about the frame's motion, and draw it into `output`."""
-    frame = clip.frame(source, picture=source.beside is not None)
+    frame = clip.frame(source, picture=source.reference_channel is not None)
     lines = []
     if frame.bad:
         found = [f"{n} pixels of {name}" for name, n in frame.bad.items()]

@@ -34,17 +34,17 @@ def _colors(coding: Coding) -> str:
 
 def tell_about(path: str, max_mb: float, scan: bool) -> int:
     """Print the lines about a video; returns the exit code. `scan`: those of all its pictures."""
-    footage = VideoReader(path, max_mb=max_mb)
-    _print(describe_video(footage))
+    reader = VideoReader(path, max_mb=max_mb)
+    _print(describe_video(reader))
     if not scan:
         _print([("cuts", "not looked for; --scan decodes the video and lists them")])
         return DONE
-    with progress(len(footage), quiet=False, doing="reading") as tell:
-        found = scan_video(footage, tell)
+    with progress(len(reader), quiet=False, doing="reading") as tell:
+        found = scan_video(reader, tell)
     _print(found)
-    if scaling := footage.scaling():
+    if scaling := reader.scaling():
         _print([("scaled", scaling)])
-    if loss := footage.loss():
+    if loss := reader.loss():
         note(f"wgmb: {loss}")
         return SOME_FAILED
     return DONE
@@ -55,46 +55,46 @@ def _print(lines: list[tuple[str, str]]) -> None:
         out(f"{name:10}{text}")
 
 
-def describe_video(footage: VideoReader) -> list[tuple[str, str]]:
+def describe_video(reader: VideoReader) -> list[tuple[str, str]]:
     """(name, text) lines about a video."""
-    coding = footage.coding
+    coding = reader.coding
     kind = _KINDS[coding.model] + (_STEPS.get(coding.steps, "") if coding.model == "yuv" else "")
     extent = "full" if coding.full_range else "limited"
     lines = [
-        ("file", str(footage.path)),
-        ("video", f"{footage.codec} in {footage.container}"),
-        ("size", "{} x {}".format(*footage.size)),
-        ("pictures", f"{len(footage)} in {float(footage.duration):.2f} s"),
-        ("rate", _rate(footage)),
+        ("file", str(reader.path)),
+        ("video", f"{reader.codec} in {reader.container}"),
+        ("size", "{} x {}".format(*reader.size)),
+        ("pictures", f"{len(reader)} in {float(reader.duration):.2f} s"),
+        ("rate", _rate(reader)),
         ("colour", f"{_colors(coding)}; {kind}, {coding.bits} bits, {extent} range"),
     ]
-    if footage.mastering is not None and (display := str(footage.mastering)):
+    if reader.mastering is not None and (display := str(reader.mastering)):
         lines.append(("mastered", f"on a display of {display}"))
-    if footage.light_level is not None:
-        level = footage.light_level
+    if reader.light_level is not None:
+        level = reader.light_level
         text = f"brightest pixel {level.max_cll}, brightest mean of a picture {level.max_fall}"
         lines.append(("light", f"{text} cd/m2 (MaxCLL, MaxFALL)"))
     if coding.alpha:
         lines.append(("alpha", "straight"))
-    if footage.pixel_aspect != 1:
-        lines.append(("pixels", f"{footage.pixel_aspect} times as wide as high"))
-    if footage.rotation:
-        lines.append(("rotation", f"turned by {footage.rotation} degrees to be upright"))
-    if footage.times[0]:
-        lines.append(("begins", f"at {float(footage.times[0]):.3f} s"))
-    for stream in footage.streams:
+    if reader.pixel_aspect != 1:
+        lines.append(("pixels", f"{reader.pixel_aspect} times as wide as high"))
+    if reader.rotation:
+        lines.append(("rotation", f"turned by {reader.rotation} degrees to be upright"))
+    if reader.times[0]:
+        lines.append(("begins", f"at {float(reader.times[0]):.3f} s"))
+    for stream in reader.streams:
         language = stream.language if stream.language != "und" else ""  # undetermined
         words = [stream.text, language, stream.title]
         lines.append(("stream", f"{stream.kind}: {', '.join(filter(None, words))}"))
-    if footage.chapters:
-        lines.append(("chapters", str(footage.chapters)))
-    return lines + [("note", note) for note in footage.notes]
+    if reader.chapters:
+        lines.append(("chapters", str(reader.chapters)))
+    return lines + [("note", note) for note in reader.notes]
 
 
-def _rate(footage: VideoReader) -> str:
+def _rate(reader: VideoReader) -> str:
     """The rate, and how steady it is."""
-    text = f"{float(footage.rate):g} pictures a second"
-    if not footage.is_variable:
+    text = f"{float(reader.rate):g} pictures a second"
+    if not reader.is_variable:
         return text
-    least, most = footage.steps
+    least, most = reader.steps
     return f"{text}, variable: {1000 * least:.1f} to {1000 * most:.1f} ms apart"

@@ -37,15 +37,15 @@ def perceive_video(
     check_fits(input, BlurSettings())
     if output.fps is not None:
         raise InputError("`fps` is for frames, the pictures of a video have their own times")
-    footage = VideoReader(path, max_mb=input.max_mb)
-    clock = VideoSettings().clock(footage, input.frames)
-    wanted = list(OutputFrames(footage, clock, None))
+    reader = VideoReader(path, max_mb=input.max_mb)
+    clock = VideoSettings().clock(reader, input.frames)
+    wanted = list(OutputFrames(reader, clock, None))
     device = gpu.open_device(adapter)
-    observer = Observer(densest_rate(footage, cone), cone, device=device)
-    seen = PerceivedVideo(footage, clock, VideoPictures(footage, device), observer)
-    first = next(n for n, t in enumerate(footage.times) if clock.out(t) == wanted[0].time)
+    observer = Observer(densest_rate(reader, cone), cone, device=device)
+    seen = PerceivedVideo(reader, clock, VideoPictures(reader, device), observer)
+    first = next(n for n, t in enumerate(reader.times) if clock.out(t) == wanted[0].time)
     if not quiet:
-        for text in footage.notes:
+        for text in reader.notes:
             note(f"{path}: {text}")
     started = time.perf_counter()
     with progress(len(wanted), quiet, "perceiving") as tell:
@@ -65,7 +65,7 @@ def perceive_video(
             note(f"{output.output}: {text}")
         seconds = time.perf_counter() - started
         note(f"{len(wanted)} frames in {seconds:.1f} s -> {output.output}")
-    if loss := footage.loss():
+    if loss := reader.loss():
         note(f"wgmb: {loss}")
         return SOME_FAILED
     return DONE

@@ -76,7 +76,7 @@ def view(
         state = state.opened(what, input.max_mb)
     state = state.told(vars(input) | vars(blur) | vars(shutter) | vars(color) | vars(video))
     if state.is_video and config is None and blur.method is None:
-        settled, _ = video.settled(gpu.open_device(adapter))
+        settled, _ = video.chosen(gpu.open_device(adapter))
         state = state.with_method(settled.method)
     if fps is not None:
         state = viewer.at_rate(state, fps)

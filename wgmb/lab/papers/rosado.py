@@ -30,10 +30,10 @@ def rosado(lab: Laboratory, report: Report, size: tuple[int, int]) -> None:
     reference = Candidate("distributed", (("seed", 1),), 256)
     case = scene_case("chase", Shutter(180), reference, scene_frame, lab.device, lab.tell)
     candidates = [
-        Candidate("tap", name="camera only", given=_camera_only),
-        Candidate("tap", name="camera only, mask", given=lambda f: _camera_only(_masked(f))),
+        Candidate("tap", name="camera only", select=_camera_only),
+        Candidate("tap", name="camera only, mask", select=lambda f: _camera_only(_masked(f))),
         Candidate("tap", name="velocity buffer"),
-        Candidate("tap", name="velocity buffer, mask", given=_masked),
+        Candidate("tap", name="velocity buffer, mask", select=_masked),
     ]
     lab.compare(report, case, candidates, TAPS)
     rows, curves = [], {}

@@ -51,7 +51,7 @@ def taylor(
             said, rows = _claims(report, case, metric, [c.label for c in candidates])
             claims.append([name, METRICS[metric].title, *said])
             fixed += rows
-            worth += _worth(report, case, metric)
+            worth += _equal_error(report, case, metric)
     labels = [c.label for c in candidates]
     report.tables += [
         Table(
@@ -108,7 +108,7 @@ def _error(metric: str, value: float) -> float:
     return 10 ** (-value / 20) if metric.startswith("psnr") else value
 
 
-def _worth(report: Report, case: Case, metric: str) -> list[list]:
+def _equal_error(report: Report, case: Case, metric: str) -> list[list]:
     traced = report.of(case.name, kind="samples", label="distributed")
     rays, times, errors = np.array(
         [(e.samples or 0, e.seconds or 0.0, _error(metric, e.measures[metric])) for e in traced]

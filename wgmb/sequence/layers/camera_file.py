@@ -49,9 +49,9 @@ class CameraFile:
         except InputError as error:
             raise InputError(f"{self.path}: frame {number:g}: {error}") from None
 
-    def _check_shared(self, here: float, there: float) -> None:
+    def _check_shared(self, number: float, near: float) -> None:
         """Objects that share an index can only be told apart if they move as one."""
-        objects, then = (self._frames[k].get("objects", {}) for k in (here, there))
+        objects, then = (self._frames[k].get("objects", {}) for k in (number, near))
         by_index: dict[int, list[str]] = {}
         for name in objects.keys() & then.keys():
             by_index.setdefault(objects[name]["index"], []).append(name)
@@ -68,7 +68,7 @@ class CameraFile:
                 first, other = sorted(names)[0], sorted(names)[apart.index(True)]
                 raise InputError(
                     f"objects {first} and {other} share index {index} but move apart "
-                    f"between frames {here:g} and {there:g}"
+                    f"between frames {number:g} and {near:g}"
                 )
 
     def _camera(self, number: float) -> Camera:

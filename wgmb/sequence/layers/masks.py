@@ -39,7 +39,7 @@ class Masks:
     max_mb: float
     of_views: Callable[[str], list[Path]]  # a pattern, for each of the views that %V stands for
     _met: dict[str, bool] = field(default_factory=dict)  # masks by number: if a frame has them
-    _seen: dict[str, bool] = field(default_factory=dict)  # masks by name: if a pixel has them
+    _in_pixels: dict[str, bool] = field(default_factory=dict)  # masks by name: if a pixel has them
     _missing: dict[str, InputError | None] = field(default_factory=dict)  # why, by mask
 
     @property
@@ -55,7 +55,7 @@ class Masks:
     @property
     def unseen(self) -> list[str]:
         """Masks by name that manifests list, and no pixel of the frames read so far has."""
-        return [mask for mask in self.every if self._seen.get(mask) is False]
+        return [mask for mask in self.every if self._in_pixels.get(mask) is False]
 
     def holdout(self, source: FrameFile) -> np.ndarray | None:
         """(height, width) float32 0..1 of one frame; None without masks."""
@@ -145,7 +145,7 @@ class Masks:
                 raise
             return np.zeros(source.size[::-1], np.float32)  # some manifests list what is seen
         by_number = asks_by_number(source.attributes, mask)
-        met = self._met if by_number else self._seen
+        met = self._met if by_number else self._in_pixels
         if "=" in mask and not met.get(mask):
             met[mask] = bool(plane.any())
         return plane

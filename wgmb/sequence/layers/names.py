@@ -129,7 +129,7 @@ def find_normal(names: Iterable[str], near: str | None = None) -> list[str]:
     return []
 
 
-def pick(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:
+def pick(by_layer: Mapping[str, list[str]], wanted: str, kind: str) -> str:
     """The layer called `wanted`: its full name, or its last part if that is unambiguous."""
     if wanted in by_layer:
         return wanted
@@ -137,13 +137,13 @@ def pick(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:
     if len(alike) == 1:
         return alike[0]
     there = ", ".join(map(repr, by_layer))
-    raise MissingLayerError(f"no {what} {wanted!r}; available: {there}")
+    raise MissingLayerError(f"no {kind} {wanted!r}; available: {there}")
 
 
-def one_channel(by_layer: Mapping[str, list[str]], wanted: str, what: str) -> str:
+def one_channel(by_layer: Mapping[str, list[str]], wanted: str, kind: str) -> str:
     """The channel called `wanted`, or the first of the layer of that name."""
     everything = [name for members in by_layer.values() for name in members]
-    return wanted if wanted in everything else by_layer[pick(by_layer, wanted, what)][0]
+    return wanted if wanted in everything else by_layer[pick(by_layer, wanted, kind)][0]
 
 
 def grey(channels: Channels) -> np.ndarray:

@@ -95,30 +95,32 @@ def names_of(file: Exr) -> tuple[str, ...]:
     return tuple(found)
 
 
-def by_view(file: Exr, asked: Iterable[str] = ()) -> dict[str | None, Places]:
+def by_view(file: Exr, layers: Iterable[str] = ()) -> dict[str | None, Places]:
     """Every channel of a file by view, the default one first, and name; None: in no view.
 
     The name of a part leads where two parts hold the same channel of a view, where channels
     without a layer are not the picture's (`u` in the part `forward` is `forward.u`), and where
-    it begins a layer that is `asked` for. InputError where two channels are the same one.
+    it begins one of the `layers`. InputError where two channels are the same one.
     """
-    asked = [name.lower() for name in asked]
+    layers = [name.lower() for name in layers]
     found: dict[str | None, list[tuple[str, str, Place]]] = {v: [] for v in names_of(file)}
     for part in file.parts:
         view, multi = _view(part), _multi(part)
         for name in part.channels:
             layer, of, component = split(name, view, multi, part.channels)
             found.setdefault(of, []).append((layer, component, (part, name)))
-    return {of: _named(file, of, channels, asked) for of, channels in found.items()}
+    return {of: _named(file, of, channels, layers) for of, channels in found.items()}
 
 
 def _named(
-    file: Exr, view: str | None, channels: list[tuple[str, str, Place]], asked: list[str]
+    file: Exr, view: str | None, channels: list[tuple[str, str, Place]], layers: list[str]
 ) -> Places:
     """The places of a view's channels by their names."""
     count = Counter((layer, component) for layer, component, _ in channels)
     several = len(file.parts) > 1
-    wanted = {part.name for part in file.parts if _is_asked(_without_view(part.name, view), asked)}
+    wanted = {
+        part.name for part in file.parts if _is_wanted(_without_view(part.name, view), layers)
+    }
     leads = {
         (id(part), layer)
         for layer, component, (part, _) in channels
@@ -144,9 +146,9 @@ def _named(
     return places
 
 
-def _is_asked(part: str, asked: list[str]) -> bool:
+def _is_wanted(part: str, layers: list[str]) -> bool:
     """Return True if a layer is asked for by the name of a part."""
-    return any(f"{name}.".startswith(f"{part.lower()}.") for name in asked)
+    return any(f"{name}.".startswith(f"{part.lower()}.") for name in layers)
 
 
 def _without_view(part: str, view: str | None) -> str:

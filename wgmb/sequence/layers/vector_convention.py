@@ -30,7 +30,7 @@ class ConventionFinder:
         self._wanted = stored.passes.vectors
 
     @property
-    def found(self) -> vector_test.ConventionFinding:
+    def finding(self) -> vector_test.ConventionFinding:
         """The vector convention, determined once for all frames.
 
         By name, then tested on the first frame on disk; unless that shows what the name says, on
@@ -43,9 +43,13 @@ class ConventionFinder:
 
     def mask_of(self, source: FrameFile) -> str | None:
         """The channel of a frame that is 1 where its vectors are valid, if there is one."""
-        meaning = self.found.vectors
+        convention = self.finding.vectors
         with contextlib.suppress(InputError):  # its turn to fail comes
-            return vectors.mask_of(source.channels, meaning, source.beside) if meaning else None
+            return (
+                vectors.mask_of(source.channels, convention, source.reference_channel)
+                if convention
+                else None
+            )
         return None
 
     def _find_out(self) -> vector_test.ConventionFinding:
@@ -71,14 +75,16 @@ class ConventionFinder:
         """The vectors that the layers' names speak for, in the first view that has any."""
         first = self._stored.leader(number)
         for source in dict.fromkeys((first, *self._stored.all(number))):
-            if named := vectors.named(self._stored.own(source), self._wanted, source.beside):
+            if named := vectors.named(
+                self._stored.own(source), self._wanted, source.reference_channel
+            ):
                 return source, named
         return first, None
 
     def _evidence(self, source: FrameFile, named: vectors.Vectors) -> vector_test.Evidence:
-        if source.beside is None:
+        if source.reference_channel is None:
             return vector_test.Evidence(doubt="no picture to test it on")
-        motion = vectors.read(self._stored.own(source), named, source.beside)
+        motion = vectors.read(self._stored.own(source), named, source.reference_channel)
         near = [self._probe(source, side) for side in (-1, 1)]
         near = [one if one and near_enough(source.data_window, one[1]) else None for one in near]
         onto = union([source.data_window, *(window for _, window in filter(None, near))])

@@ -17,7 +17,7 @@ class Deinterlaced:
     """Makes two pictures of an interlaced frame (bwdif)."""
 
     def __init__(self, size: tuple[int, int], pixels: str, base: Fraction):
-        self._base, self._given = base, 0
+        self._base, self._count = base, 0
         self._waiting: deque[int] = deque()
         graph = Graph()
         form = av.VideoFormat(pixels, *size)
@@ -33,8 +33,8 @@ class Deinterlaced:
     ) -> Iterator[tuple[int, av.VideoFrame]]:
         """The pictures that are ready once `frame`, of that number, is there; None: the rest."""
         if frame is not None:
-            frame.pts, frame.time_base = self._given, self._base
-            self._given += 1
+            frame.pts, frame.time_base = self._count, self._base
+            self._count += 1
             self._waiting += (2 * number, 2 * number + 1)
         self._graph.push(frame)
         with contextlib.suppress(BlockingIOError, EOFError):

@@ -102,7 +102,7 @@ class VideoReader:
             self._packets = scanned(container, stream)
         if not len(self._packets.times):
             raise InputError(f"{self.path}: {self._packets.problem or 'holds no pictures'}")
-        self._look()
+        self._probe()
 
     def _check_size(self, stream: VideoStream, max_mb: float) -> None:
         width, height = stream.codec_context.width, stream.codec_context.height
@@ -119,7 +119,7 @@ class VideoReader:
         stored = self.path.stat().st_size
         limits.check(self.path, f"{width} x {height}", promised, stored, max_mb)
 
-    def _look(self) -> None:
+    def _probe(self) -> None:
         """Decode one picture: what it says of itself counts more than what the header says."""
         if self._packets.is_encrypted:  # some of its noise may be taken for pictures
             raise InputError(f"{self.path}: is encrypted")

@@ -201,7 +201,7 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
         problem = str(error.strerror or error)
     end = max((n * (container.streams[i].time_base or base) for i, n in ends.items()), default=base)
     in_order, is_assumed = False, False
-    shown = found.shown
+    shown = found.presented
     if len(shown) < found.count:
         in_order, shown = True, found.decoded
     elif container.format.name == "avi" and stream.codec_context.has_b_frames:
@@ -232,24 +232,24 @@ def known_rate(rate: Fraction | None) -> Fraction | None:
     return next(near, None)
 
 
-def _counted(timeline: Timeline, found: _Packets, reorders: bool) -> Timeline | None:
+def _counted(timeline: Timeline, packets: _Packets, reorders: bool) -> Timeline | None:
     """See Timeline.counted."""
     times = timeline.times
-    if len(times) < found.count:  # times that repeat: some pictures have that of decoding instead
-        decoded = _sorted(found.decoded)
-        if len(decoded) < found.count:
+    if len(times) < packets.count:  # times that repeat: some pictures have that of decoding instead
+        decoded = _sorted(packets.decoded)
+        if len(decoded) < packets.count:
             return None
         return replace(
             timeline, in_order=True, times=Times(decoded - decoded[0] + times.ticks[0], times.base)
         )
-    return replace(timeline, in_order=True) if found.ascends and reorders else None
+    return replace(timeline, in_order=True) if packets.ascends and reorders else None
 
 
 class _Packets:
     """Facts in the packets of a stream of pictures."""
 
     def __init__(self, codec: str):
-        self.shown, self.decoded, self.keys = array("q"), array("q"), array("q")
+        self.presented, self.decoded, self.keys = array("q"), array("q"), array("q")
         self.lasts = 0  # ticks for which the last one is shown
         self.count = self.read = 0  # of pictures that are shown, of packets
         self.ascends = True  # the time at which each is shown
@@ -265,8 +265,8 @@ class _Packets:
             return
         self.count += 1
         if packet.pts is not None:
-            self.ascends = self.ascends and (not self.shown or packet.pts >= self.shown[-1])
-            self.shown.append(packet.pts)
+            self.ascends = self.ascends and (not self.presented or packet.pts >= self.presented[-1])
+            self.presented.append(packet.pts)
             self.lasts = packet.duration or 0
             if packet.is_keyframe:
                 self.keys.append(packet.pts)

@@ -46,7 +46,7 @@ class SoundAtSpeed:
         else:
             self._changed = Resampled(self._rate, source.layout, clock.speed)
         self._begin: Fraction | None = None  # input time of the first sample that is taken
-        self._given = self._made = 0
+        self._received = self._written = 0
 
     def take(self, packet: Packet[AudioStream] | None) -> Iterator[Packet[AudioStream]]:
         """The packets that are ready once `packet` is there; None: the rest."""
@@ -82,8 +82,8 @@ class SoundAtSpeed:
             audible = self._clock.back(Fraction(0)) if first is None else first
             self._begin = max(time or Fraction(0), audible)
         if time is not None:
-            ahead = round((time - self._begin) * self._rate) - self._given
-            if ahead < 0 and (self._given == 0 or ahead < -_GAP * self._rate):
+            ahead = round((time - self._begin) * self._rate) - self._received
+            if ahead < 0 and (self._received == 0 or ahead < -_GAP * self._rate):
                 samples = samples[:, -ahead:]
             elif ahead > _GAP * self._rate:
                 yield from self._within(np.zeros((len(samples), ahead), np.float32))
@@ -93,9 +93,9 @@ class SoundAtSpeed:
         """Without what is after the clock's end."""
         count = samples.shape[1]
         if self._clock.end is not None and self._begin is not None:
-            left = round((self._clock.end - self._begin) * self._rate) - self._given
+            left = round((self._clock.end - self._begin) * self._rate) - self._received
             count = max(min(count, left), 0)
-        self._given += count
+        self._received += count
         for at in range(0, count, self._rate):  # a long gap a second at a time
             yield samples[:, at : min(at + self._rate, count)]
 
@@ -106,8 +106,8 @@ class SoundAtSpeed:
             np.ascontiguousarray(samples, np.float32), "fltp", self._source.layout.name
         )
         frame.sample_rate, frame.time_base = self._rate, Fraction(1, self._rate)
-        frame.pts = round(self._clock.out(self._begin) * self._rate) + self._made
-        self._made += samples.shape[1]
+        frame.pts = round(self._clock.out(self._begin) * self._rate) + self._written
+        self._written += samples.shape[1]
         yield from self._into.encode(frame)
 
 
@@ -126,21 +126,21 @@ class Resampled:
         source.link_to(resample)
         resample.link_to(graph.add("abuffersink"))
         graph.configure()
-        self._graph, self._rate, self._layout, self._given = graph, slow, layout.name, 0
+        self._graph, self._rate, self._layout, self._received = graph, slow, layout.name, 0
 
     def add(self, samples: np.ndarray) -> np.ndarray:
         """Take in samples; return those that are ready."""
         data = np.ascontiguousarray(samples, np.float32)
         frame = av.AudioFrame.from_ndarray(data, "fltp", self._layout)
         frame.sample_rate, frame.time_base = self._rate, Fraction(1, self._rate)
-        frame.pts = self._given
-        self._given += samples.shape[1]
+        frame.pts = self._received
+        self._received += samples.shape[1]
         self._graph.push(frame)
         return self._pulled(len(samples))
 
     def rest(self) -> np.ndarray:
         """Return what is left; nothing can be added then."""
-        if not self._given:
+        if not self._received:
             return np.zeros((1, 0), np.float32)
         self._graph.push(None)
         return self._pulled(1)

@@ -135,7 +135,7 @@ class VideoFile(NewFile):
         metadata: dict[str, str] | None = None,
     ):
         super().__init__(path, temporary, encoding.suffix, metadata or {})
-        self._base, self._rate, self._given = base, rate, 0
+        self._base, self._rate, self._packets = base, rate, 0
         self._late_times = encoding.encoder.name == "libx265"
         try:
             self._stream = begin(self.container, encoding, coding, size, rate, base, facts)
@@ -147,7 +147,7 @@ class VideoFile(NewFile):
         """Write what can be written once `frame`, of the encoder's format, is there."""
         if frame is not None:
             frame.pts, frame.time_base = tick, self._base
-            self._given += 1
+            self._packets += 1
         try:
             packets = self._stream.encode(frame)
         except (FFmpegError, OSError) as error:
@@ -156,7 +156,7 @@ class VideoFile(NewFile):
 
     def _timed(self, packets: list[Packet[VideoStream]]) -> list[Packet[VideoStream]]:
         """The packets, with decoding times also where x265 leaves them to chance."""
-        if self._late_times and self._given <= _FEW:
+        if self._late_times and self._packets <= _FEW:
             delay = round(_FEW / (self._rate * self._base))
             for packet in packets:
                 assert packet.pts is not None

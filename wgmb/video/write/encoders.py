@@ -227,15 +227,15 @@ class Encoding:
         )
         return found, self._lost(wanted, found)
 
-    def _lost(self, wanted: Coding, found: Coding) -> list[str]:
+    def _lost(self, wanted: Coding, stored: Coding) -> list[str]:
         said = []
-        if wanted.alpha and not found.alpha:
+        if wanted.alpha and not stored.alpha:
             said.append(f"{self.codec} holds no transparency: it is left out; prores and ffv1 do")
-        if wanted.bits > found.bits:
-            said.append(f"{self.codec} holds {found.bits} bits of {wanted.bits}")
-        coarser = any(a > b for a, b in zip(found.steps, wanted.steps, strict=True))
+        if wanted.bits > stored.bits:
+            said.append(f"{self.codec} holds {stored.bits} bits of {wanted.bits}")
+        coarser = any(a > b for a, b in zip(stored.steps, wanted.steps, strict=True))
         if coarser and wanted.model != "grey":
-            across, down = found.steps
+            across, down = stored.steps
             said.append(f"{self.codec} holds one colour for {across} x {down} pixels")
         return said
 

@@ -153,7 +153,7 @@ class OtherStreams:
     def _following(self) -> Packet[Any] | None:
         try:
             return next(self._packets, None)
-        except FFmpegError:  # said by the Footage of the same file
+        except FFmpegError:  # said by the VideoReader of the same file
             return None
 
     def close(self) -> None:
@@ -238,14 +238,14 @@ def _from_template(stream: Stream, to: OutputContainer) -> Stream:
     return to.add_stream_from_template(stream, opaque=True)
 
 
-def _describe(made: Stream, like: Stream) -> None:
+def _describe(stream: Stream, like: Stream) -> None:
     """Language, title, name, default and forced."""
     for key, text in like.metadata.items():
         if not key.upper().startswith(_OF_THE_FILE):
-            made.metadata[key] = text
+            stream.metadata[key] = text
     if "name" in like.metadata:  # what MP4 calls a title
-        made.metadata.setdefault("title", like.metadata["name"])
-    made.disposition = like.disposition
+        stream.metadata.setdefault("title", like.metadata["name"])
+    stream.disposition = like.disposition
 
 
 def _refusal(stream: Stream, container: str, again: bool) -> str:

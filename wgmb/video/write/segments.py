@@ -122,7 +122,7 @@ class Segments:
 
     def _written(self, file: NewFile, others: OtherStreams | None) -> list[str]:
         left_out = self._encoding.left_out(self._facts)
-        orders = [self._shown(self._file(n), r) for n, r in enumerate(self._ranges)]
+        orders = [self._display_order(self._file(n), r) for n, r in enumerate(self._ranges)]
         delay = max(min(o) + at - number for o in orders for at, number in enumerate(o))
         into: VideoStream | None = None
         for index, order in enumerate(orders):
@@ -154,7 +154,7 @@ class Segments:
             packet.duration = self._tick(number + 1) - packet.pts
             yield packet, number
 
-    def _shown(self, path: Path, numbers: range) -> list[int]:
+    def _display_order(self, path: Path, numbers: range) -> list[int]:
         """The numbers of the pictures in a segment, in the order of its packets.
 
         The container may have rounded their times. InputError unless each is there once.

@@ -44,14 +44,14 @@ class TimeStretch:
         self._input = np.zeros((channels, lead), np.float32)
         self._start = -lead  # index of the first sample of _input
         self._tail = np.zeros((channels, self._hop), np.float32)
-        self._pieces, self._given, self._taken = 0, 0, 0
+        self._pieces, self._received, self._taken = 0, 0, 0
         self._before: int | None = None  # where the piece before began
         self._ahead = round(max(2.0, 1 + _NEAR * self._speed) * self._hop) + self._reach
         self._onsets = Onsets(rate)
 
     def add(self, samples: np.ndarray) -> np.ndarray:
         """Take in samples; return those that are ready."""
-        self._given += samples.shape[1]
+        self._received += samples.shape[1]
         return self._go_on(samples, final=False)
 
     def rest(self) -> np.ndarray:
@@ -85,7 +85,7 @@ class TimeStretch:
         out = self._pieces * self._hop
         centre = round(out * self._speed)
         least, most = centre - self._reach, centre + self._reach
-        for onset in self._onsets.found:
+        for onset in self._onsets.samples:
             away = out - onset / self._speed
             if abs(away) <= _NEAR * self._hop:
                 return max(round(onset + away) - self._hop, self._start)
@@ -124,22 +124,22 @@ class TimeStretch:
         self._input, self._start = self._input[:, drop:], self._start + drop
         self._onsets.forget(first - self._hop)
 
-    def _cut(self, found: np.ndarray, final: bool) -> np.ndarray:
+    def _cut(self, samples: np.ndarray, final: bool) -> np.ndarray:
         """Without the half piece before the beginning, and what is after the end."""
-        begin = min(max(self._hop - self._taken, 0), found.shape[1])
-        end = found.shape[1]
+        begin = min(max(self._hop - self._taken, 0), samples.shape[1])
+        end = samples.shape[1]
         if final:
-            end = min(end, self._hop + round(self._given / self._speed) - self._taken)
-        self._taken += found.shape[1]
-        return found[:, begin : max(end, begin)]
+            end = min(end, self._hop + round(self._received / self._speed) - self._taken)
+        self._taken += samples.shape[1]
+        return samples[:, begin : max(end, begin)]
 
 
 class Onsets:
     """Finds where sounds begin: a few milliseconds louder than what was before."""
 
     def __init__(self, rate: int):
-        self.found: list[int] = []
-        """Indices of samples."""
+        self.samples: list[int] = []
+        """Indices of the samples at which they begin."""
         self._block = round(_BLOCK * rate)
         self._apart = round(_APART * rate)
         self._left = np.zeros(0, np.float32)
@@ -160,12 +160,12 @@ class Onsets:
         for n in np.flatnonzero(power[_BEFORE:] > _LOUDER * before + _QUIET):
             index = self._at + int(n) * self._block
             loud = float(power[_BEFORE + n])
-            near = bool(self.found) and index - self.found[-1] < self._apart
+            near = bool(self.samples) and index - self.samples[-1] < self._apart
             if near and loud <= _LOUDER * self._loud:
                 continue
             if near:  # that was nothing beside this one
-                self.found.pop()
-            self.found.append(index)
+                self.samples.pop()
+            self.samples.append(index)
             self._loud = loud
         self._power = power[-_BEFORE:]
         self._left = self._left[count * self._block :]
@@ -173,8 +173,8 @@ class Onsets:
 
     def forget(self, before: int) -> None:
         """Drop onsets before a sample, except the last."""
-        while len(self.found) > 1 and self.found[0] < before:
-            self.found.pop(0)
+        while len(self.samples) > 1 and self.samples[0] < before:
+            self.samples.pop(0)
 
 
 def _best(area: np.ndarray, want: np.ndarray) -> int:

@@ -39,9 +39,9 @@ class MotionThread:
         max_mb: float,
         settings: FlowSettings,
         device: wgpu.GPUDevice,
-        wish: MotionRequest,
+        request: MotionRequest,
     ):
-        self._path, self._max_mb, self._wish = path, max_mb, wish
+        self._path, self._max_mb, self._request = path, max_mb, request
         beside = gpu.second_device(device)
         motion, self.how = settings.source(beside)
         self.problem = ""
@@ -82,8 +82,8 @@ class MotionThread:
 
     def _work(self, device: wgpu.GPUDevice, motion: MotionSource | None) -> None:
         try:
-            footage = VideoReader(self._path, max_mb=self._max_mb)
-            find = PictureFinder(footage, device, motion, self._wish)
+            reader = VideoReader(self._path, max_mb=self._max_mb)
+            find = PictureFinder(reader, device, motion, self._request)
             for number in self._to_do():
                 known = find(number)
                 with self._lock:

@@ -27,8 +27,8 @@ from ..state.files import footage_of
 from ..state.state import State
 from ..state.video_time import moment, output
 from .motion_thread import MotionThread
-from .video_exposure import Knowledge, VideoExposure, exposed, reach
-from .video_frames import FootageFrames
+from .video_exposure import Knowledge, VideoExposure, exposure_of, reach
+from .video_frames import PictureFrames
 from .video_motion import MotionRequest
 
 _PASSES = frozenset({"color", "motion", "depth"})
@@ -46,14 +46,14 @@ class VideoSubject:
         check_video(state)
         max_mb, masks, settings = state.input.max_mb, state.blur.holdout, state.video
         self._device, self._images = device, TexturePool(device)
-        self._footage = footage_of(state.source, max_mb)
-        self._times = self._footage.times
-        holdout_of([mask for mask in masks if mask != STATIC], self._footage)  # says what is wrong
-        wish = MotionRequest(masks, settings.duplicates == "fill", state.input.cuts or "")
-        self._maker = MotionThread(self._footage.path, max_mb, settings, device, wish)
+        self._reader = footage_of(state.source, max_mb)
+        self._times = self._reader.times
+        holdout_of([mask for mask in masks if mask != STATIC], self._reader)  # says what is wrong
+        request = MotionRequest(masks, settings.duplicates == "fill", state.input.cuts or "")
+        self._maker = MotionThread(self._reader.path, max_mb, settings, device, request)
         self._moves = settings.flow != "none"
-        self.finding = "\n".join([f"motion: {self._maker.how}", *self._footage.notes])
-        self._frames = FootageFrames(self._footage, device, self._maker.known, 1.0)
+        self.finding = "\n".join([f"motion: {self._maker.how}", *self._reader.notes])
+        self._frames = PictureFrames(self._reader, device, self._maker.known, 1.0)
         self._sums: dict[int, ExposureSum] = {}
         self._state = state
         self._exposed: VideoExposure | None = None
@@ -75,18 +75,18 @@ class VideoSubject:
 
     def size(self, state: State) -> tuple[int, int]:
         """Width and height of the pictures [px]."""
-        return self._footage.size
+        return self._reader.size
 
     @property
     def shape(self) -> tuple[float, float]:
         """Width and height in square pixels, as a picture is shown."""
-        width, height = self._footage.size
-        return width * float(self._footage.pixel_aspect), height
+        width, height = self._reader.size
+        return width * float(self._reader.pixel_aspect), height
 
     @property
     def coding(self) -> Coding:
         """The coding of its colours; its light is linear in these primaries."""
-        return self._footage.coding
+        return self._reader.coding
 
     def space(self, config: ColorConfig) -> ColorSpace:
         """The colour space of the pictures that VideoLight makes: linear Rec. 709."""
@@ -155,7 +155,7 @@ class VideoSubject:
         self, state: State, shutter: Shutter, known: Knowledge | None = None
     ) -> VideoExposure:
         clock = output(state).clock
-        return exposed(self._times, clock, moment(state), shutter, known or self._maker.known)
+        return exposure_of(self._times, clock, moment(state), shutter, known or self._maker.known)
 
     # ---- drawing --------------------------------------------------------------------------
 
@@ -166,9 +166,9 @@ class VideoSubject:
         self._state = state
         highlights = state.video.highlights
         if highlights != self._frames.highlights:
-            check_coding(highlights, self._footage.path, self.coding)
+            check_coding(highlights, self._reader.path, self.coding)
             known = self._maker.known
-            self._frames = FootageFrames(self._footage, self._device, known, highlights)
+            self._frames = PictureFrames(self._reader, self._device, known, highlights)
         self._exposed = self._exposure(state, Shutter(0))
 
     def passes(self) -> dict[str, wgpu.GPUTexture]:
@@ -233,10 +233,10 @@ class VideoSubject:
         return held
 
 
-def _near(number: int, beside: int, known: Knowledge) -> list[int]:
-    """A picture, and with `beside` those that its motion leads to."""
+def _near(number: int, reach: int, known: Knowledge) -> list[int]:
+    """A picture, and with `reach` 1 those that its motion leads to."""
     found = known(number)
-    if found is None or not beside:
+    if found is None or not reach:
         return [number]
     before = None if found.begins else found.before
     after = None if found.ends else found.after

@@ -33,13 +33,13 @@ class VideoExposure:
     """Pictures nothing is known of, on which the exposure depends."""
 
 
-def exposed(
-    times: Times, clock: Clock, moment: OutputFrame, shutter: Shutter, known: Knowledge
+def exposure_of(
+    times: Times, clock: Clock, frame: OutputFrame, shutter: Shutter, known: Knowledge
 ) -> VideoExposure:
     """The exposure of an output frame; where too little is known, of what is known."""
-    shown = picture_at(times, clock, moment)
+    shown = picture_at(times, clock, frame)
     here, lacking = _kept(shown, known)
-    at, interval = float(moment.time), float(moment.interval)
+    at, interval = float(frame.time), float(frame.interval)
     opens, closes = (at + interval * t for t in shutter.span)
 
     def time(number: int) -> float:
@@ -47,11 +47,11 @@ def exposed(
 
     numbers = [here]
     while (numbers[0] == here or time(numbers[0]) + time(numbers[1]) > 2 * opens) and (
-        before := _beside(numbers[0], -1, known, lacking)
+        before := _neighbour(numbers[0], -1, known, lacking)
     ) is not None:
         numbers.insert(0, before)
     while (numbers[-1] == here or time(numbers[-1]) + time(numbers[-2]) < 2 * closes) and (
-        after := _beside(numbers[-1], 1, known, lacking)
+        after := _neighbour(numbers[-1], 1, known, lacking)
     ) is not None:
         numbers.append(after)
     found = cells([time(n) for n in numbers], at, interval, shutter)
@@ -59,20 +59,20 @@ def exposed(
     return VideoExposure(here, tuple(numbers), parts, tuple(dict.fromkeys(lacking)))
 
 
-def picture_at(times: Times, clock: Clock, moment: OutputFrame) -> int:
+def picture_at(times: Times, clock: Clock, frame: OutputFrame) -> int:
     """The picture that is shown at an output frame's time; before the first one, that."""
-    tick = clock.back(moment.time) / times.base
+    tick = clock.back(frame.time) / times.base
     after = int(np.searchsorted(times.ticks, tick.numerator // tick.denominator, side="right"))
     return max(after - 1, 0)
 
 
-def reach(times: Times, clock: Clock, moment: OutputFrame, shutter: Shutter) -> tuple[int, int]:
+def reach(times: Times, clock: Clock, frame: OutputFrame, shutter: Shutter) -> tuple[int, int]:
     """First and last picture of an exposure, if there is no cut and no repeat among them."""
-    at = clock.back(moment.time)
+    at = clock.back(frame.time)
     opens, closes = (
-        float((at + Fraction(t) * moment.interval * clock.speed) / times.base) for t in shutter.span
+        float((at + Fraction(t) * frame.interval * clock.speed) / times.base) for t in shutter.span
     )
-    first = last = picture_at(times, clock, moment)
+    first = last = picture_at(times, clock, frame)
     while first > 0 and _middle(times, first) > opens:
         first -= 1
     while last + 1 < len(times) and _middle(times, last + 1) < closes:
@@ -85,20 +85,20 @@ def _middle(times: Times, number: int) -> float:
     return (int(times.ticks[number]) + int(times.ticks[number - 1])) / 2
 
 
-def _kept(shown: int, known: Knowledge) -> tuple[int, list[int]]:
+def _kept(number: int, known: Knowledge) -> tuple[int, list[int]]:
     """The picture that stands for one: itself, or where it is left out the one before."""
-    found = known(shown)
+    found = known(number)
     if found is None:
-        return shown, [shown]
+        return number, [number]
     if not found.is_left_out:
-        return shown, []
+        return number, []
     before = found.after if found.before is None else found.before
     if before is None:
-        return shown, []
+        return number, []
     return before, [] if known(before) is not None else [before]
 
 
-def _beside(number: int, side: int, known: Knowledge, lacking: list[int]) -> int | None:
+def _neighbour(number: int, side: int, known: Knowledge, lacking: list[int]) -> int | None:
     """The picture before (-1) or after (1) one in its shot; None if there is none, or unknown."""
     here = known(number)
     if here is None:

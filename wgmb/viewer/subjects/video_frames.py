@@ -19,18 +19,18 @@ _MEMORY = 1 << 29  # bytes of pictures kept
 _FEWEST = 12  # pictures kept at least
 
 
-class FootageFrames:
+class PictureFrames:
     """Pictures of a video as Frames; `known` tells of their motion.
 
     `highlights`: times white that white becomes (see color/highlights.py).
     """
 
     def __init__(
-        self, footage: VideoReader, device: wgpu.GPUDevice, known: Knowledge, highlights: float
+        self, reader: VideoReader, device: wgpu.GPUDevice, known: Knowledge, highlights: float
     ):
-        self._footage, self._known, self.highlights = footage, known, highlights
-        self._pictures = VideoPictures(footage, device, highlights)
-        self._times = footage.times.seconds
+        self._reader, self._known, self.highlights = reader, known, highlights
+        self._pictures = VideoPictures(reader, device, highlights)
+        self._times = reader.times.seconds
         self._colors: OrderedDict[int, np.ndarray] = OrderedDict()
         self._frames: OrderedDict[int, tuple[PictureFinding | None, Frame]] = OrderedDict()
 
@@ -49,14 +49,14 @@ class FootageFrames:
         known = self._known(number)
         held = self._frames.get(number)
         if held is None or held[0] is not known:
-            held = self._frames[number] = known, self._made(number, known)
+            held = self._frames[number] = known, self._build(number, known)
             most = max(_MEMORY // (3 * held[1].color.nbytes), _FEWEST)
             while len(self._frames) > most:
                 self._frames.popitem(last=False)
         self._frames.move_to_end(number)
         return held[1]
 
-    def _made(self, number: int, known: PictureFinding | None) -> Frame:
+    def _build(self, number: int, known: PictureFinding | None) -> Frame:
         color = self._color(number)
         if known is None or known.motion is None:
             return Frame(color, number=number).locked()
@@ -76,14 +76,14 @@ class FootageFrames:
         """A picture; the nearest one before, or after, if it cannot be decoded."""
         if number not in self._colors:
             color = self._pictures.at(number)
-            near = range(number - 1, -1, -1), range(number + 1, len(self._footage))
+            near = range(number - 1, -1, -1), range(number + 1, len(self._reader))
             for other in (n for some in near for n in some):
                 if color is not None:
                     break
                 color = self._colors.get(other)
                 color = self._pictures.at(other) if color is None else color
             if color is None:
-                raise InputError(f"{self._footage.path}: its pictures cannot be decoded any more")
+                raise InputError(f"{self._reader.path}: its pictures cannot be decoded any more")
             self._colors[number] = color
             while len(self._colors) > max(_MEMORY // color.nbytes, _FEWEST):
                 self._colors.popitem(last=False)

@@ -1,6 +1,6 @@
 """Finding of a video's picture: its motion, and the end of its shot, as in `wgmb blur`.
 
-The pictures around it go through the same Reel, so that cuts, flashes, repeated pictures and
+The pictures around it go through the same ShotReader, so that cuts, flashes, repeated pictures and
 those that cannot be decoded mean the same. Any picture may be asked for; neighbours are quick.
 """
 
@@ -70,100 +70,100 @@ class PictureFinder:
 
     def __init__(
         self,
-        footage: VideoReader,
+        reader: VideoReader,
         device: wgpu.GPUDevice,
         motion: MotionSource | None,
-        wish: MotionRequest,
+        request: MotionRequest,
     ):
-        self._footage, self._device, self._motion = footage, device, motion
-        self._times = footage.times.seconds
-        self._fill, self._cuts = wish.fill, CutList(wish.cuts)
-        self._holdout = holdout_of(wish.masks, footage) if motion is not None else None
+        self._reader, self._device, self._motion = reader, device, motion
+        self._times = reader.times.seconds
+        self._fill, self._cuts = request.fill, CutList(request.cuts)
+        self._holdout = holdout_of(request.masks, reader) if motion is not None else None
         self._planes, self._images = Planes(device), TexturePool(device)
-        self._reel: ShotReader[Thumbnail] | None = None
+        self._shots: ShotReader[Thumbnail] | None = None
         self._numbers: WeakKeyDictionary[Thumbnail, int] = WeakKeyDictionary()
-        self._told: dict[tuple[int, int], bool] = {}
+        self._compared: dict[tuple[int, int], bool] = {}
         self._shot: Callable[[int], Any] | None = None
         self._first = 0  # index of a picture of the present shot
 
     def __call__(self, number: int) -> PictureFinding:
         """The finding about a picture, as far as possible."""
-        reel = self._reel_around(number)
+        shots = self._shots_around(number)
         try:
-            here = reel.at(self._times[number], _BEHIND)
+            here = shots.at(self._times[number], _BEHIND)
         except NoPicturesError:  # from some pictures before it on, none can be decoded
             return PictureFinding(None, None, None, None, is_left_out=True)
-        near = {i: reel[i].number for i in (here - 1, here, here + 1) if i in reel.kept}
+        near = {i: shots[i].number for i in (here - 1, here, here + 1) if i in shots.kept}
         if near.get(here) != number:
             beside = sorted(near.values())
             before = max((n for n in beside if n < number), default=None)
             after = min((n for n in beside if n > number), default=None)
             return PictureFinding(None, None, before, after, is_left_out=True)
-        found = self._found(reel, here)
+        found = self._motion_of(shots, here)
         motion, depth = found or (None, None)
         return PictureFinding(
             motion,
             depth,
             near.get(here - 1),
             near.get(here + 1),
-            begins=not reel.moves_on(here, here - 1),
-            ends=not reel.moves_on(here, here + 1),
-            begins_shot=not reel.same_shot(here, here - 1),
-            ends_shot=not reel.same_shot(here, here + 1),
+            begins=not shots.moves_on(here, here - 1),
+            ends=not shots.moves_on(here, here + 1),
+            begins_shot=not shots.same_shot(here, here - 1),
+            ends_shot=not shots.same_shot(here, here + 1),
             holdout=None if found is None else self._holdout,
         )
 
-    def _found(
-        self, reel: ShotReader[Thumbnail], index: int
+    def _motion_of(
+        self, shots: ShotReader[Thumbnail], index: int
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Motion and depth."""
         if self._motion is None:
             return None
-        if self._shot is None or not reel.moves_on(self._first, index):
+        if self._shot is None or not shots.moves_on(self._first, index):
             self._shot = self._motion.shot(self._load)
         self._first = index
         return self._shot(index)
 
-    def _reel_around(self, number: int) -> ShotReader[Thumbnail]:
-        """A reel that can tell all of a picture: another one where the last is far from it."""
-        reel = self._reel
-        if reel is not None and len(reel.kept):
-            kept = reel.kept
-            first, last = reel[kept[0]].number, reel[kept[-1]].number
+    def _shots_around(self, number: int) -> ShotReader[Thumbnail]:
+        """A ShotReader that knows all around a picture: another one where the last is far away."""
+        shots = self._shots
+        if shots is not None and len(shots.kept):
+            kept = shots.kept
+            first, last = shots[kept[0]].number, shots[kept[-1]].number
             at_start = first == 0 or (kept[0] == 0 and first > number)
-            behind = sum(reel[i].number < number for i in kept)
+            behind = sum(shots[i].number < number for i in kept)
             if number <= last + _NEAR and (at_start or behind >= _BEFORE):
-                return reel
+                return shots
         first = max(number - _BEFORE - _EARLIER, 0)
         self._shot = None
-        self._reel = ShotReader(
+        self._shots = ShotReader(
             self._pictures(first),
             is_cut=self._is_cut if self._cuts.is_search else None,
             known_cuts=self._cuts.frames(0),
             is_double=is_double if self._fill else None,
-            tolerance=self._footage.tolerance,
+            tolerance=self._reader.tolerance,
         )
-        return self._reel
+        return self._shots
 
     def _pictures(self, first: int) -> Iterator[Picture[Thumbnail]]:
-        for number, coded in self._footage.pictures(first):
-            glance = Thumbnail(coded)
-            self._numbers[glance] = number
-            yield Picture(float(self._times[number]), glance, number)
+        for number, coded in self._reader.pictures(first):
+            thumbnail = Thumbnail(coded)
+            self._numbers[thumbnail] = number
+            yield Picture(float(self._times[number]), thumbnail, number)
 
     def _is_cut(self, before: Thumbnail, after: Thumbnail) -> bool:
         """The same as is_cut, told once for two pictures: to tell costs more than to decode."""
         key = self._numbers[before], self._numbers[after]
-        if key not in self._told:
-            self._told[key] = is_cut(before, after)
-        return self._told[key]
+        if key not in self._compared:
+            self._compared[key] = is_cut(before, after)
+        return self._compared[key]
 
     def _load(self, index: int) -> Any:
         """The picture of an index of the present shot, None outside it."""
-        assert self._reel is not None
-        if not self._reel.moves_on(self._first, index):
+        assert self._shots is not None
+        if not self._shots.moves_on(self._first, index):
             return None
-        content = self._reel[index].content
+        content = self._shots[index].content
         if not isinstance(self._shot, Shot):
             return content.grey
         texture = self._images.texture("searched", content.coded.size, "rgba16float")

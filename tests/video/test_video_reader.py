@@ -44,11 +44,11 @@ def test_every_sample_is_the_one_that_was_stored(tmp_path, codec, pixels, want):
     tags = (2 if want.full_range else 1, 1, 1, 1)
     path = clips.write(tmp_path / "c.mkv", [clips.frame(d, pixels) for d in data], codec=codec,
                        pixels=pixels, tags=tags)  # fmt: skip
-    footage = VideoReader(path)
-    assert footage.coding == want
-    assert footage.assumed == ()
-    for (number, picture), stored in zip(list(footage), data, strict=True):
-        assert picture.size == (clips.WIDTH, clips.HEIGHT) == footage.size
+    reader = VideoReader(path)
+    assert reader.coding == want
+    assert reader.assumed == ()
+    for (number, picture), stored in zip(list(reader), data, strict=True):
+        assert picture.size == (clips.WIDTH, clips.HEIGHT) == reader.size
         for plane, samples in zip(picture.planes, stored, strict=True):
             assert not plane.flags.writeable
             assert plane.dtype == samples.dtype
@@ -75,9 +75,9 @@ def test_pixels_that_are_not_planes_are_sorted_into_them(tmp_path, pixels, codec
     path = clips.write(
         tmp_path / ("c.mov" if codec == "png" else "c.mkv"), [made], codec=codec, pixels=pixels
     )
-    footage = VideoReader(path)
-    ((_, picture),) = footage
-    coding = footage.coding
+    reader = VideoReader(path)
+    ((_, picture),) = reader
+    coding = reader.coding
     assert (coding.model, coding.alpha, coding.full_range) == (model, alpha, True)
     kind = np.uint8 if coding.bits == 8 else np.dtype("<u2")
     per = 1 if model == "grey" else 4
@@ -147,12 +147,12 @@ def test_planes_become_a_frame_and_come_back(coding):
      ((720, 576), (6, 1, 5))],
 )  # fmt: skip
 def test_untagged_colours_go_by_the_size(tmp_path, size, want):
-    footage = VideoReader(clips.write(tmp_path / "c.mp4", [clips.grey(size)]))
-    coding = footage.coding
+    reader = VideoReader(clips.write(tmp_path / "c.mp4", [clips.grey(size)]))
+    coding = reader.coding
     assert (coding.matrix, coding.transfer, coding.primaries) == want
     name = "BT.709" if want[0] == 1 else "BT.601"
-    assert footage.assumed == (f"matrix {name}", "transfer BT.709", f"primaries {name}")
-    assert any("does not state its colours: matrix BT" in note for note in footage.notes)
+    assert reader.assumed == (f"matrix {name}", "transfer BT.709", f"primaries {name}")
+    assert any("does not state its colours: matrix BT" in note for note in reader.notes)
 
 
 @pytest.mark.parametrize("kind", ["mp4", "mkv"])
@@ -161,8 +161,8 @@ def test_colours_that_are_tagged_are_taken_as_tagged(tmp_path, kind, tags):
     frames = [clips.frame(clips.planes(n, bits=10), "yuv420p10le") for n in range(3)]
     path = clips.write(tmp_path / f"c.{kind}", frames, codec="libx265", pixels="yuv420p10le",
                        tags=tags)  # fmt: skip
-    footage, coding = VideoReader(path), VideoReader(path).coding
-    assert footage.assumed == ()
+    reader, coding = VideoReader(path), VideoReader(path).coding
+    assert reader.assumed == ()
     assert coding.full_range == (tags[0] == 2)
     assert (coding.matrix, coding.transfer, coding.primaries) == tags[1:]
 
@@ -171,13 +171,13 @@ def test_the_display_that_an_hdr10_video_was_graded_on_is_read(tmp_path):
     options = {"x265-params": "log-level=none:max-cll=1000,400:master-display="
                "G(13250,34500)B(7500,3000)R(34000,16000)WP(15635,16450)L(10000000,1)"}  # fmt: skip
     frames = [clips.frame(clips.planes(n, bits=10), "yuv420p10le") for n in range(3)]
-    footage = VideoReader(clips.write(tmp_path / "c.mp4", frames, codec="libx265",
+    reader = VideoReader(clips.write(tmp_path / "c.mp4", frames, codec="libx265",
                                   pixels="yuv420p10le", options=options))  # fmt: skip
-    assert footage.mastering is not None and footage.light_level is not None
-    assert footage.mastering.for_x265() in options["x265-params"]
-    assert str(footage.light_level) == "1000,400"
-    assert footage.mastering.luminance == (0.0001, 1000.0)
-    said = dict(describe_video(footage))
+    assert reader.mastering is not None and reader.light_level is not None
+    assert reader.mastering.for_x265() in options["x265-params"]
+    assert str(reader.light_level) == "1000,400"
+    assert reader.mastering.luminance == (0.0001, 1000.0)
+    said = dict(describe_video(reader))
     assert said["mastered"] == (
         "on a display of 0.0001 to 1000 cd/m2; "
         "red 0.680 0.320, green 0.265 0.690, blue 0.150 0.060, white 0.313 0.329"
@@ -204,16 +204,16 @@ def test_pictures_are_upright(tmp_path, degrees, mirror):
         tmp_path / "c.mov", [clips.frame(clips.planes(1, steps=(2, 1)), "yuv422p")],
         pixels="yuv422p", setup=lambda s: s.set_display_rotation(degrees, hflip=mirror),
     )  # fmt: skip
-    footage = VideoReader(path)
-    ((_, picture),) = footage
+    reader = VideoReader(path)
+    ((_, picture),) = reader
     stored = clips.planes(1, steps=(2, 1))[0]
     want = np.rot90(stored, degrees // 90)
     if mirror:
         want = want[:, ::-1]
     assert np.array_equal(picture.planes[0], want)
-    assert footage.size == picture.size == want.shape[::-1]
+    assert reader.size == picture.size == want.shape[::-1]
     assert picture.coding.steps == ((1, 2) if degrees % 180 else (2, 1))
-    assert footage.coding == picture.coding
+    assert reader.coding == picture.coding
 
 
 def test_an_interlaced_frame_is_two_pictures(tmp_path):
@@ -229,18 +229,18 @@ def test_an_interlaced_frame_is_two_pictures(tmp_path):
     path = clips.write(tmp_path / "c.ts", frames, codec="mpeg2video", tick=Fraction(1, 25),
                        times=[Fraction(n, 25) for n in range(8)],
                        options={"flags": "+ilme+ildct", "qmin": "1", "qmax": "2"})  # fmt: skip
-    footage = VideoReader(path)
-    assert footage.is_interlaced
-    assert footage.rate == 50
-    assert len(footage) == 16
-    assert any("two pictures (50 a second)" in note for note in footage.notes)
+    reader = VideoReader(path)
+    assert reader.is_interlaced
+    assert reader.rate == 50
+    assert len(reader) == 16
+    assert any("two pictures (50 a second)" in note for note in reader.notes)
     places = {}
-    for number, picture in footage:
+    for number, picture in reader:
         row = picture.planes[0][10:38].astype(float).mean(0) - 50
         places[number] = float((row * np.arange(64)).sum() / row.sum())
     assert list(places) == list(range(16))
     assert np.diff(list(places.values())) == pytest.approx(2, abs=0.6)
-    later = dict(footage.pictures(9, 12))
+    later = dict(reader.pictures(9, 12))
     assert list(later) == [9, 10, 11, 12]
     for number, picture in later.items():
         row = picture.planes[0][10:38].astype(float).mean(0) - 50

@@ -1,4 +1,4 @@
-"""Reels: shots, repeated pictures, what is kept; and exposures summed from cells."""
+"""Pictures in time: shots, repeated pictures, what is kept; and exposures summed from cells."""
 
 import numpy as np
 import pytest
@@ -54,20 +54,20 @@ def pictures(count, fps=240.0, times=None):
 
 
 class VideoExposure:
-    """Exposures of a reel as arrays."""
+    """Exposures of a shots as arrays."""
 
-    def __init__(self, reel, blur, motion=None):
-        self.reel, self.views, self._exposer = (
-            reel,
-            VideoFrames(reel, blur, motion),
+    def __init__(self, shots, blur, motion=None):
+        self.shots, self.views, self._exposer = (
+            shots,
+            VideoFrames(shots, blur, motion),
             ExposureSum(blur),
         )
         self._images = TexturePool(blur.device)
 
     def __call__(self, at, interval, shutter):
-        cells = self.reel.cells(at, interval, shutter)
-        size = self.reel[cells[0].index].content.coded.size
-        parts = ((cell, self.views.shown(cell.index)) for cell in cells)
+        cells = self.shots.cells(at, interval, shutter)
+        size = self.shots[cells[0].index].content.coded.size
+        parts = ((cell, self.views.in_shot(cell.index)) for cell in cells)
         texture = self._exposer.texture(size, parts)
         return self.array(texture)[..., :3]
 
@@ -76,7 +76,7 @@ class VideoExposure:
         return self._images.download(encoder, texture)
 
     def motion(self, index):
-        return self.array(self.views.shown(index).frame.motion.texture)
+        return self.array(self.views.in_shot(index).frame.motion.texture)
 
 
 def linear_average(at, interval, degrees, fps=240.0, count=40):
@@ -136,7 +136,7 @@ def test_motion_that_stays_on_the_gpu_is_that_of_arrays():
     flow = Flow(quality="fast", device=blur.device)
     times = [0.0, 0.1, 0.2, 0.5, 0.6, 0.7, 0.8, 0.9]
     exposed = VideoExposure(ShotReader(pictures(8, times=times)), blur, flow)
-    exposed.reel.cells(0.2, 0.1, Shutter(180))
+    exposed.shots.cells(0.2, 0.1, Shutter(180))
     light = [np.clip(make.picture(n)[..., :3], 0, 1).astype("f2").astype("f4") for n in range(8)]
     want, _ = flow.shot(lambda n: light[n] if 0 <= n < 8 else None)(2)
     even = np.array([2, 2, 2 / 3, 2 / 3], "f4")  # its own interval is 0.2 s, those around 0.1, 0.3
@@ -151,10 +151,10 @@ def test_a_cut_ends_exposures_and_motion():
     def is_cut(before, after):
         return before.sampled.tobytes() in first and after.sampled.tobytes() not in first
 
-    reel = ShotReader(pictures(12), is_cut=is_cut)  # later ones would be the first again
-    exposed = VideoExposure(reel, Blur("gather"), motion)
-    cells = exposed.reel.cells(9 / 240, 1 / 60, Shutter(360))
-    assert max(cell.index for cell in cells) <= 9 and exposed.reel.cuts == [10]
+    shots = ShotReader(pictures(12), is_cut=is_cut)  # later ones would be the first again
+    exposed = VideoExposure(shots, Blur("gather"), motion)
+    cells = exposed.shots.cells(9 / 240, 1 / 60, Shutter(360))
+    assert max(cell.index for cell in cells) <= 9 and exposed.shots.cuts == [10]
     exposed(9 / 240, 1 / 60, Shutter(360))
     exposed(11 / 240, 1 / 60, Shutter(360))
     assert motion.shots == 2
@@ -186,17 +186,17 @@ def brightens(before, after):
          "up to the end"],
 )  # fmt: skip
 def test_a_flash_is_no_shot(fps, flashes, cuts):
-    reel = ShotReader(with_flash(40, flashes, fps), is_cut=brightens)
+    shots = ShotReader(with_flash(40, flashes, fps), is_cut=brightens)
     for k in range(30):
-        reel.cells(k / fps, 1 / fps, Shutter(180))
-    assert reel.cuts == cuts
-    assert bool(reel.flashes) == (not cuts)
+        shots.cells(k / fps, 1 / fps, Shutter(180))
+    assert shots.cuts == cuts
+    assert bool(shots.flashes) == (not cuts)
 
 
 def test_a_flash_is_exposed_by_its_share_and_has_no_part_in_motion():
     motion, shutter = PictureFinding(), Shutter(360)
-    reel = ShotReader(with_flash(24, [8], 240), is_cut=brightens)
-    exposed = VideoExposure(reel, Blur("gather", samples=8), motion)
+    shots = ShotReader(with_flash(24, [8], 240), is_cut=brightens)
+    exposed = VideoExposure(shots, Blur("gather", samples=8), motion)
     without = VideoExposure(ShotReader(pictures(24)), Blur("gather", samples=8), PictureFinding())
     found = [(exposed(k / 60, 1 / 60, shutter), without(k / 60, 1 / 60, shutter)) for k in range(5)]
     sharp = np.clip(make.picture(8)[..., :3], 0, 1)
@@ -215,7 +215,7 @@ def test_motion_beside_a_flash_goes_on_as_on_the_other_side():
         Picture(t, p.content, p.number) for t, p in zip(times, with_flash(10, [3], 1), strict=True)
     ]
     exposed = VideoExposure(ShotReader(iter(many), is_cut=brightens), Blur("tap"), PictureFinding())
-    exposed.reel.cells(0.2, 0.1, Shutter(180))
+    exposed.shots.cells(0.2, 0.1, Shutter(180))
     to_prev, to_next = make.motion(0)
     motion = exposed.motion(2)  # its own interval is 0.2 s, and it moved for 0.1 s
     np.testing.assert_allclose(motion[..., :2], 2 * to_prev)
@@ -227,16 +227,16 @@ def test_a_repeated_picture_is_left_out_and_its_neighbours_reach_over_it():
         for n in range(12):
             yield Picture(n / 60, coded(make.picture(n // 2)), n)
 
-    reel = ShotReader(doubled(), is_double=is_double)
-    cell, *_ = reel.cells(2 / 60, 1 / 60, Shutter(180))
-    assert reel[cell.index].number == 2 and reel.doubles[:3] == [1, 3, 5]
+    shots = ShotReader(doubled(), is_double=is_double)
+    cell, *_ = shots.cells(2 / 60, 1 / 60, Shutter(180))
+    assert shots[cell.index].number == 2 and shots.doubles[:3] == [1, 3, 5]
     assert cell.shutter.span == pytest.approx((-0.125, 0.125))  # its own interval is twice as long
 
 
 def test_uneven_times_stretch_the_motion():
     times = [0.0, 0.1, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1]
     exposed = VideoExposure(ShotReader(pictures(10, times=times)), Blur("tap"), PictureFinding())
-    (cell,) = exposed.reel.cells(0.1, 0.05, Shutter(180))
+    (cell,) = exposed.shots.cells(0.1, 0.05, Shutter(180))
     motion = exposed.motion(cell.index)
     to_prev, to_next = make.motion(0)
     np.testing.assert_allclose(motion[..., :2], 2 * to_prev)
@@ -245,11 +245,11 @@ def test_uneven_times_stretch_the_motion():
 
 def test_however_long_the_reel_only_what_is_around_is_kept():
     content = coded(make.picture(0))
-    reel = ShotReader(Picture(n / 240, content, n) for n in range(400))
+    shots = ShotReader(Picture(n / 240, content, n) for n in range(400))
     most = 0
     for k in range(90):
-        reel.cells(k / 60, 1 / 60, Shutter(360))
-        most = max(most, len(reel._kept))
+        shots.cells(k / 60, 1 / 60, Shutter(360))
+        most = max(most, len(shots._kept))
     assert most <= 26
 
 

@@ -16,10 +16,10 @@ from wgmb.video.read.timeline import Timeline, Times
 pytestmark = pytest.mark.fast
 
 
-def shown(footage: VideoReader, *which) -> list[int]:
+def shown(reader: VideoReader, *which) -> list[int]:
     """The numbers of the pictures, told by their levels, which repeat after 6."""
     found = []
-    for number, picture in footage.pictures(*which):
+    for number, picture in reader.pictures(*which):
         level = float(np.median(picture.planes[0])) - 5  # in the middle of the ramp
         assert abs(level - clips.level(number)) < 12
         found.append(number)
@@ -32,31 +32,31 @@ def test_times_are_those_in_the_file(tmp_path, kind, late):
     late = 0 if kind == "avi" else late  # which has no times
     tick = Fraction(1, clips.RATE) if kind == "avi" else clips.TICK
     path = clips.write(tmp_path / f"c.{kind}", tone=0.5, late=late, tick=tick)
-    footage = VideoReader(path)
+    reader = VideoReader(path)
     with av.open(str(path)) as container:
         first = next(container.decode(audio=0))
         sound = first.pts * first.time_base
-    assert len(footage) == 12
-    assert footage.rate == 24
-    assert not footage.is_variable
-    steady = [float(t - footage.times[0]) for t in footage.times]
+    assert len(reader) == 12
+    assert reader.rate == 24
+    assert not reader.is_variable
+    steady = [float(t - reader.times[0]) for t in reader.times]
     assert steady == pytest.approx([n / 24 for n in range(12)], abs=0.0011)
     if kind != "avi":
-        assert float(footage.times[0] - sound) == pytest.approx(
+        assert float(reader.times[0] - sound) == pytest.approx(
             late + (1024 / 48000 if kind == "ts" else 0), abs=0.0015
         )
-    assert shown(footage) == list(range(12))
+    assert shown(reader) == list(range(12))
 
 
 @pytest.mark.parametrize("kind", ["mp4", "mkv"])
 def test_a_variable_rate_is_seen_in_the_times_alone(tmp_path, kind):
     times = [Fraction(n, 60) for n in (0, 1, 3, 4, 7, 8, 9, 10, 13, 14, 15, 16)]
-    footage = VideoReader(clips.write(tmp_path / f"c.{kind}", times=times))
-    assert footage.is_variable
-    assert footage.rate == 60
-    assert [float(t) for t in footage.times] == pytest.approx([float(t) for t in times], abs=6e-4)
-    assert footage.steps == pytest.approx((1 / 60, 3 / 60), abs=0.001)
-    assert shown(footage) == list(range(12))
+    reader = VideoReader(clips.write(tmp_path / f"c.{kind}", times=times))
+    assert reader.is_variable
+    assert reader.rate == 60
+    assert [float(t) for t in reader.times] == pytest.approx([float(t) for t in times], abs=6e-4)
+    assert reader.steps == pytest.approx((1 / 60, 3 / 60), abs=0.001)
+    assert shown(reader) == list(range(12))
 
 
 @pytest.mark.parametrize(
@@ -67,10 +67,10 @@ def test_a_variable_rate_is_seen_in_the_times_alone(tmp_path, kind):
 def test_a_rate_that_is_rounded_to_milliseconds_is_known_again(tmp_path, rate, want):
     times = [n / Fraction(rate) for n in range(40)]
     frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(40)]
-    footage = VideoReader(clips.write(tmp_path / "c.mkv", frames, times))
-    assert float(footage.rate) == pytest.approx(float(Fraction(want)), rel=2e-4)
-    assert want == "37" or footage.rate == Fraction(want)
-    assert not footage.is_variable
+    reader = VideoReader(clips.write(tmp_path / "c.mkv", frames, times))
+    assert float(reader.rate) == pytest.approx(float(Fraction(want)), rel=2e-4)
+    assert want == "37" or reader.rate == Fraction(want)
+    assert not reader.is_variable
 
 
 @pytest.mark.parametrize("rate", ["30", "30000/1001", "60000/1001", "120000/1001"])
@@ -81,8 +81,8 @@ def test_a_few_times_of_milliseconds_have_the_rate_that_the_file_states(tmp_path
     path = clips.write(tmp_path / "c.mkv", frames, rate=Fraction(rate))
     with av.open(str(path)) as container:
         assert container.streams.video[0].time_base == Fraction(1, 1000)
-    footage = VideoReader(path)
-    assert footage.rate == Fraction(rate) and not footage.is_variable
+    reader = VideoReader(path)
+    assert reader.rate == Fraction(rate) and not reader.is_variable
 
 
 def test_a_rate_that_the_times_do_not_keep_is_not_believed(tmp_path):
@@ -123,10 +123,10 @@ def test_pictures_whose_times_are_those_of_decoding_are_counted(tmp_path, suffix
     with av.open(str(path)) as container:
         raw = [frame.pts for frame in container.decode(video=0)]
     assert raw != sorted(raw)
-    footage, wanted = VideoReader(path), VideoReader(plain)
-    assert shown(footage) == shown(wanted)
-    assert footage.loss() == ""
-    assert footage.rate == 24
+    reader, wanted = VideoReader(path), VideoReader(plain)
+    assert shown(reader) == shown(wanted)
+    assert reader.loss() == ""
+    assert reader.rate == 24
 
 
 @pytest.mark.parametrize(
@@ -171,10 +171,10 @@ def test_what_an_edit_list_leaves_out_is_left_out(tmp_path):
                        muxing={"use_editlist": "1", "avoid_negative_ts": "disabled"})  # fmt: skip
     with av.open(str(path)) as container:
         assert container.streams.video[0].frames == 12
-    footage = VideoReader(path)
-    assert len(footage) == 9
-    assert footage.times[0] == 0
-    levels = [float(np.median(p.planes[0])) for _, p in footage.pictures()]
+    reader = VideoReader(path)
+    assert len(reader) == 9
+    assert reader.times[0] == 0
+    levels = [float(np.median(p.planes[0])) for _, p in reader.pictures()]
     assert [round(level - 5) for level in levels] == pytest.approx(
         [clips.level(n) for n in range(3, 12)], abs=8
     )
@@ -186,12 +186,12 @@ def test_pictures_from_the_middle_are_those_of_a_whole_pass(tmp_path, kind, g):
     """With B-frames and open groups, whose first pictures build on the group before."""
     frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(30)]
     options = {"g": g, "bf": "3", "x264-params": "open-gop=1:keyint-min=1:scenecut=0", "qp": "8"}
-    footage = VideoReader(clips.write(tmp_path / f"c.{kind}", frames, options=options))
-    whole = dict(footage)
+    reader = VideoReader(clips.write(tmp_path / f"c.{kind}", frames, options=options))
+    whole = dict(reader)
     for first in (0, 3, 4, 11, 17, 29):
-        part = dict(footage.pictures(first, first + 2))
+        part = dict(reader.pictures(first, first + 2))
         assert list(part) == [n for n in range(first, first + 3) if n < 30]
         for number, picture in part.items():
             for a, b in zip(picture.planes, whole[number].planes, strict=True):
                 assert np.array_equal(a, b), number
-    assert footage.loss() == ""
+    assert reader.loss() == ""

@@ -44,10 +44,10 @@ def test_a_file_that_was_cut_off_says_where(tmp_path, kind, muxing):
     whole = path.read_bytes()
     assert not any("cut off" in note for note in VideoReader(path).notes)
     path.write_bytes(whole[: len(whole) // 2])
-    footage = VideoReader(path)
-    got = [n for n, _ in footage]
+    reader = VideoReader(path)
+    got = [n for n, _ in reader]
     assert 10 < len(got) < 40
-    (note,) = [note for note in footage.notes if "is cut off: it ends at" in note]
+    (note,) = [note for note in reader.notes if "is cut off: it ends at" in note]
     assert note.endswith(("of 2.00 s", "of 2.02 s", "of 2.05 s"))
 
 
@@ -58,10 +58,10 @@ def test_damaged_bytes_are_counted_in_pictures(tmp_path, kind):
     at = len(data) // 3  # of several pictures: what threads see of one may be hidden by luck
     data[at : at + 4000] = np.random.default_rng(4).bytes(4000)
     path.write_bytes(data)
-    footage = VideoReader(path)
-    got = [n for n, _ in footage]
-    assert len(got) + len(footage.missing) == len(footage)
-    said = " ".join((footage.loss(), *footage.notes))
+    reader = VideoReader(path)
+    got = [n for n, _ in reader]
+    assert len(got) + len(reader.missing) == len(reader)
+    said = " ".join((reader.loss(), *reader.notes))
     assert any(word in said for word in ("could not be decoded", "are damaged", "pause once"))
 
 
@@ -118,11 +118,11 @@ def test_pictures_of_another_size_are_scaled_to_that_of_the_first(tmp_path):
         frames = [clips.frame(clips.planes(n, size), "yuv420p") for n in range(4)]
         parts.append(clips.write(tmp_path / f"{size[0]}.h264", frames, kind="h264").read_bytes())
     (tmp_path / "both.h264").write_bytes(b"".join(parts))
-    footage = VideoReader(tmp_path / "both.h264")
-    assert not footage.scaling()
-    pictures = dict(footage)
-    assert footage.scaled == {4, 5, 6, 7} and len(pictures) == 8 and not footage.loss()
-    assert "4 pictures of another size were scaled to 64 x 48, from 0." in footage.scaling()
+    reader = VideoReader(tmp_path / "both.h264")
+    assert not reader.scaling()
+    pictures = dict(reader)
+    assert reader.scaled == {4, 5, 6, 7} and len(pictures) == 8 and not reader.loss()
+    assert "4 pictures of another size were scaled to 64 x 48, from 0." in reader.scaling()
     for n, picture in pictures.items():
         assert picture.size == (64, 48)
         luma, want = picture.planes[0].astype(int), clips.planes(n % 4)[0]

@@ -1,0 +1,69 @@
+"""Names are the field's words: parameters, functions, classes and fields say what they hold."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.fast
+
+PACKAGE = Path(__file__).parents[2] / "wgmb"
+FORBIDDEN = {
+    **dict.fromkeys(("asked", "wish"), "a request, or layers, columns, numbers ..."),
+    **dict.fromkeys(("told", "said"), "messages, notes, or what was read"),
+    **dict.fromkeys(("made", "found", "worth"), "the result, by its own name"),
+    **dict.fromkeys(("shown", "seen", "glance"), "display values, a display, a thumbnail ..."),
+    **dict.fromkeys(("given", "what", "who", "when"), "the settings' own names"),
+    **dict.fromkeys(("there", "beside", "around"), "neighbours, existing, other ..."),
+    **dict.fromkeys(("spare",), "margin, unused"),
+    **dict.fromkeys(("footage", "reel"), "a reader, shots"),
+    **dict.fromkeys(("ingredients", "meaning"), "dependencies, convention"),
+}
+"""Words that say nothing of what is held, and what says it instead."""
+
+ALLOWED = {
+    ("color/spaces.py", "shown"): "public: Display.shown",
+    ("sequence/layers/camera_file.py", "around"): "public: CameraFile.around",
+}
+LATER = ("run/", "cli/commands/", "viewer/", "methods/gather/", "threads.py")
+
+
+def names(file: Path) -> Iterator[tuple[int, str]]:
+    """Lines and names of a file's parameters, functions, classes and fields."""
+    for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.lineno, node.name
+        if isinstance(node, ast.arg):
+            yield node.lineno, node.arg
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            yield node.lineno, node.attr
+        if isinstance(node, ast.ClassDef):
+            for field in node.body:
+                if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+                    yield field.lineno, field.target.id
+
+
+def faults(file: Path, name: str) -> list[str]:
+    """A line for each forbidden name of a file, which is called `name`."""
+    return [
+        f"{name}:{line}: {word}, rather: {FORBIDDEN[plain]}"
+        for line, word in names(file)
+        if (plain := word.strip("_").lower()) in FORBIDDEN and (name, word) not in ALLOWED
+    ]
+
+
+def test_names_say_what_they_hold():
+    found = []
+    for file in sorted(PACKAGE.rglob("*.py")):
+        name = file.relative_to(PACKAGE).as_posix()
+        if not name.startswith(LATER):
+            found += faults(file, name)
+    assert not found, "\n".join(found)
+
+
+def test_every_kind_of_name_is_looked_at(tmp_path):
+    code = "class Wish:\n    told: int\n    def _made(self, given):\n        self.seen = given\n"
+    (file := tmp_path / "one.py").write_text(code)
+    words = sorted(fault.split(":")[2].split(",")[0].strip() for fault in faults(file, "one.py"))
+    assert words == ["Wish", "_made", "given", "seen", "told"]
