@@ -111,7 +111,7 @@ class Stages:
         kinds = [Kind(pulled, seen, albedo)]
         done = light.encode(encoder, bindings, kinds, self.times, None)
         gpu.submit(device, encoder)
-        self.found = np.frombuffer(device.queue.read_buffer(done.found), np.uint32)
+        self.found = np.frombuffer(device.queue.read_buffer(done.change_flags), np.uint32)
         self._device, self._pool, self._light, self._layers = device, pool, light, done.layers
         self._kind = "glossy" if pulled else "diffuse"
 

@@ -427,7 +427,7 @@ def test_a_manifest_that_changed_makes_the_frame_anew(tmp_path, capsys):
 
 def test_the_viewer_hands_several_masks_on(shot):
     given = {"holdout": ("CryptoObject=tree", "IndexOB=2"), "scale": ("IndexOB=3:0.5",)}
-    state = State().opened(str(shot)).told(given)
+    state = State().opened(str(shot)).with_options(given)
     words = state.command("o.####.png")
     assert [words[i + 1] for i, w in enumerate(words) if w == "--holdout"] == list(given["holdout"])
     assert dict(State.of_toml(state.toml()).given) == given

@@ -148,7 +148,7 @@ def test_the_viewers_command_line_takes_names_that_begin_with_a_hyphen(tmp_path,
     for n in (1, 2):
         (tmp_path / f"shot.{n:04d}.exr").rename(tmp_path / name.replace("####", f"{n:04d}"))
     monkeypatch.chdir(tmp_path)
-    state = State().opened(name).told({"holdout": ("-layer",), "method": "tap"})
+    state = State().opened(name).with_options({"holdout": ("-layer",), "method": "tap"})
     assert "--holdout=-layer" in state.command("x.png")
     words = State().opened(name).command("-x.####.png")
     assert app.main([*words, "--quiet"]) == 0

@@ -242,7 +242,7 @@ def test_variable_rates_and_repeats_are_as_by_the_command_line(tmp_path, speed, 
     fps = None if own_times else video_time.rate(viewer.state)
     settings = viewer.state.video
     assert settings.duplicates == fill
-    count = len(video_time.output(viewer.state).moments)
+    count = len(video_time.output(viewer.state).frames)
     assert own_times == (count == 14)
     for number in (count - 1, 5, 4, 8, 0):
         made = {"fps": fps, "method": "gather", "degrees": 300}
@@ -432,7 +432,7 @@ def test_a_video_is_perceived_by_output_frames_held_until_the_next(tmp_path, cha
     clip = passing(tmp_path / "a.mp4", times=TIMES)
     viewer = opened(clip, look="perceived", frame=frame_shown, **changes)
     state = viewer.state
-    moments, fps = video_time.output(state).moments, None
+    moments, fps = video_time.output(state).frames, None
     if not state.own_times:
         fps = video_time.rate(state)
     observer = Observer(100, state.eye, device=viewer.stage.device)

@@ -64,7 +64,7 @@ def test_slow_motion_has_more_output_frames_and_stays_where_it_is(state):
 def test_a_part_begins_with_its_own_first_output_frame(state):
     part = in_part(in_part(put(state, frame=12.0), "begin", "0.25"), "end", "0.75")
     assert part.span == (0, 11) and part.frame == 6
-    assert video_time.output(part).clock.back(video_time.moment(part).time) == Fraction(1, 2)
+    assert video_time.output(part).clock.back(video_time.output_frame(part).time) == Fraction(1, 2)
     assert in_part(in_part(part, "end", ""), "begin", "") == put(state, frame=12.0)
     words = part.command("b.mp4")
     assert "--frames" not in words and words[words.index("--begin") + 1] == "0.25"
@@ -85,7 +85,7 @@ def test_at_its_own_times_it_plays_as_unevenly_as_it_is(uneven):
     assert State.of_toml(state.toml()) == state and state.arguments()["fps"] == "source"
     for frame, seconds, want in [(0, 1 / 48, 1), (2, 2 / 48, 2.5), (0, 6 / 48, 3), (9, 0, 9)]:
         assert video_time.passed(put(state, frame=float(frame)), seconds) == pytest.approx(want)
-    moments = video_time.output(state).moments
+    moments = video_time.output(state).frames
     found = [moments.nearest(moments[n].time + d) for n in range(10) for d in (0, Fraction(1, 99))]
     assert found[::2] == list(range(10)) and set(found) <= set(range(10))
     even = video_time.at_rate(put(state, frame=4.0), "48")

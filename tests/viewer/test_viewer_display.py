@@ -183,7 +183,7 @@ def test_colours_go_into_settings_files_and_command_lines(tmp_path, capsys):
 
 def test_a_scene_has_no_colour_space_to_be_given(tmp_path):
     with pytest.raises(InputError, match="--from is for frames, crossing is a scene"):
-        ALONE.told({"ocio": "builtin", "from_": "acescg", "look": None})
+        ALONE.with_options({"ocio": "builtin", "from_": "acescg", "look": None})
     with pytest.raises(InputError, match="unknown name 'from'"):
         State.of_toml('[render]\nscene = "wheel"\nfrom = "acescg"\n')
     with pytest.raises(InputError, match="unknown name 'from_'"):

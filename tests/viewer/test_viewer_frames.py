@@ -94,7 +94,7 @@ def test_what_cannot_be_opened_is_told(tmp_path):
 
 
 def test_options_of_the_command_line_reach_the_state():
-    state = State().told(
+    state = State().with_options(
         {"method": "reproject", "samples": 8, "variant": "published", "shutter": 90.0}
     )
     blur = BlurSettings(method="reproject", samples=8, variant="published")

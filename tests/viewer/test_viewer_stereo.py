@@ -47,7 +47,7 @@ def test_each_eye_is_what_the_library_blurs(bare, frames):
 
 def test_the_default_view_is_seen_first_or_the_one_that_was_chosen(frames):
     assert Hand(ALONE.opened(frames), (160, 120)).state.eyes == "right"
-    chosen = ALONE.opened(frames).told({"view": "left"})
+    chosen = ALONE.opened(frames).with_options({"view": "left"})
     hand = Hand(chosen, (160, 120))
     assert hand.state.eyes == "left"
     assert "--view left" in " ".join(hand.state.command("o.####.exr"))

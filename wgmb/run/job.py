@@ -89,9 +89,9 @@ class Job:
         """The findings about the whole sequence."""
         return self.findings or self.clip.settle()
 
-    def _check_machine(self, shown: Display | None) -> None:
+    def _check_machine(self, display: Display | None) -> None:
         """InputError if colours or the shutter's curve are others here than they were."""
-        for name, value in self.request.color_record(shown).items():
+        for name, value in self.request.color_record(display).items():
             if self.settings.get(name) != value:
                 was = self.settings.get(name)
                 raise InputError(f"{name.replace('_', ' ')} is {value} here, but {was} in the job")
@@ -257,20 +257,20 @@ def _of_conversion(conversion: RateConversion, clip: Clip, output: OutputSetting
     return "; ".join(said)
 
 
-def _check_space(clip: Clip, shown: Display | None) -> str:
+def _check_space(clip: Clip, display: Display | None) -> str:
     """InputError where frames say that they are not linear; a remark on a space of no config."""
-    if shown is None:
+    if display is None:
         return ""
     source = clip.source(clip.numbers[0])
     if source.part is None:
         return ""
-    said = shown.config.unknown(source.part.attributes)
-    found: ColorSpace = space_of(source, shown.config)
+    said = display.config.unknown(source.part.attributes)
+    found: ColorSpace = space_of(source, display.config)
     with about(source.name):
         found.check_linear()
     if not said:
         return ""
-    return f"{source.path}: {said} is not in {shown.config.name}, so it is taken as {found.text}"
+    return f"{source.path}: {said} is not in {display.config.name}, so it is taken as {found.text}"
 
 
 def _motion(clip: Clip, request: BlurRequest, adapter: str | None) -> tuple[VideoSettings, str]:

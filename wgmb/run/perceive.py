@@ -42,7 +42,7 @@ class PerceivedVideo:
         encoder = self.device.create_command_encoder(label="encode")
         return self.pictures.planes.encode(encoder, self.light().create_view(), coding)
 
-    def shown(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray, float]]:
+    def perceived(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray, float]]:
         """Pictures with their numbers, and how long each is held [s]: until the next one."""
         times, before = self.reader.times, None
         for number, color in self.pictures.read(first, last):

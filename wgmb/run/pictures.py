@@ -89,7 +89,7 @@ class PictureBlur(Iterator[Any]):
         self._steady, self._transfer = steady, transfer
         self._like: type = type(None)
         self._shape, self._dtype, self._coding = (0, 0, 0), np.dtype(np.uint8), Coding()
-        self._results = self._made(pictures, shutter)
+        self._results = self._generate(pictures, shutter)
 
     def __next__(self) -> Any:
         """The next picture, as an array or a tensor like those that were given."""
@@ -123,7 +123,7 @@ class PictureBlur(Iterator[Any]):
         """Numbers of the repeated pictures that were left out (`duplicates` "fill")."""
         return list(self._steady.exposures.shots.doubles) if self._steady.exposures.shots else []
 
-    def _made(self, pictures: Iterable[Any], shutter: Shutter) -> Generator[Any, None, None]:
+    def _generate(self, pictures: Iterable[Any], shutter: Shutter) -> Generator[Any, None, None]:
         coded = ((number, self._coded(number, picture)) for number, picture in enumerate(pictures))
         for _, exposure in self._steady.of(coded, shutter):
             yield self._result(exposure)

@@ -227,28 +227,30 @@ def _of_file(source: str, run: VideoRun, output: OutputSettings) -> _Source:
 
 def _sink(
     output: OutputSettings,
-    found: _Source,
+    source: _Source,
     encoding: Encoding | None,
     stack: ExitStack,
     stdout: BinaryIO | None,
 ) -> _Sink:
     if not is_pipe(output.output):
         assert encoding is not None
-        return _ToFile(Path(output.output), found, encoding)
+        return _ToFile(Path(output.output), source, encoding)
     stream = stdout if output.output == STDOUT else None
     stream = stream or stack.enter_context(_named(output.output))
     if encoding is not None:
-        return _ToMatroska(stream, found, encoding)
-    return _ToY4m(stream, found)
+        return _ToMatroska(stream, source, encoding)
+    return _ToY4m(stream, source)
 
 
 class _ToY4m:
-    def __init__(self, stream: BinaryIO, found: _Source):
-        self._coding = coding_in(found.coding)
-        aspect = found.facts.pixel_aspect
-        self._writer = Y4mWriter(stream, found.size, found.rate, self._coding, found.space, aspect)
+    def __init__(self, stream: BinaryIO, source: _Source):
+        self._coding = coding_in(source.coding)
+        aspect = source.facts.pixel_aspect
+        self._writer = Y4mWriter(
+            stream, source.size, source.rate, self._coding, source.space, aspect
+        )
         self.left_out = []
-        if found.coding.alpha and not self._coding.alpha:
+        if source.coding.alpha and not self._coding.alpha:
             self.left_out.append("YUV4MPEG2 holds no such transparency; `codec='ffv1'` does")
 
     def put(self, moment: OutputFrame, exposure: Exposure) -> None:
@@ -262,11 +264,11 @@ class _ToY4m:
 
 
 class _ToMatroska:
-    def __init__(self, stream: BinaryIO, found: _Source, encoding: Encoding):
-        self._coding, lost = encoding.coding(found.coding)
-        self.left_out = [*lost, *encoding.left_out(found.facts)]
+    def __init__(self, stream: BinaryIO, source: _Source, encoding: Encoding):
+        self._coding, lost = encoding.coding(source.coding)
+        self.left_out = [*lost, *encoding.left_out(source.facts)]
         self._writer = MatroskaStream(
-            PipeWriter(stream), found.size, found.rate, self._coding, encoding, found.facts
+            PipeWriter(stream), source.size, source.rate, self._coding, encoding, source.facts
         )
         self.close, self.abandon = self._writer.close, self._writer.abandon
 
@@ -275,13 +277,13 @@ class _ToMatroska:
 
 
 class _ToFile:
-    def __init__(self, path: Path, found: _Source, encoding: Encoding):
-        self._coding, lost = encoding.coding(found.coding)
+    def __init__(self, path: Path, source: _Source, encoding: Encoding):
+        self._coding, lost = encoding.coding(source.coding)
         is_new = not path.exists()
         path.parent.mkdir(parents=True, exist_ok=True)
         self._video = CodedVideo(
-            path, atomic.temporary_name(path), encoding, self._coding, found.size, found.rate,
-            tick(1 / found.rate), found.facts, is_new=is_new,
+            path, atomic.temporary_name(path), encoding, self._coding, source.size, source.rate,
+            tick(1 / source.rate), source.facts, is_new=is_new,
         )  # fmt: skip
         self.left_out = [*lost, *self._video.left_out]
         self.close, self.abandon = self._video.close, self._video.abandon

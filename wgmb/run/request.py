@@ -71,7 +71,7 @@ class BlurRequest:
         masks = self.blur.holdout, self.blur.scale
         return input.open(self.pattern, *masks, space, settled), shown
 
-    def color_record(self, shown: Display | None) -> dict[str, str | None]:
+    def color_record(self, display: Display | None) -> dict[str, str | None]:
         """Colour settings that change the contents of the files."""
-        space = self.color.space(shown)
-        return color_record(shown, self.output.output, space, self.pattern)
+        space = self.color.space(display)
+        return color_record(display, self.output.output, space, self.pattern)

@@ -41,16 +41,16 @@ class FlowSettings:
 
     def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
         """The source of the motion, and its description in words."""
-        chosen, how = self.chosen(device)
-        if chosen.flow == "none":
+        settings, how = self.chosen(device)
+        if settings.flow == "none":
             return None, how
-        if chosen.flow == "dis":
+        if settings.flow == "dis":
             from ..flow.dis import Dis  # only where it is needed
 
-            return Dis(chosen.flow_quality), how
+            return Dis(settings.flow_quality), how
         from ..flow import Flow
 
-        return Flow(quality=chosen.flow_quality, device=device), how
+        return Flow(quality=settings.flow_quality, device=device), how
 
     def chosen(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
         """A copy in which `flow` is chosen as it suits the device, and the choice in words."""

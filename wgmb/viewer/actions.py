@@ -32,24 +32,24 @@ class Actions:
         self._video: Video | None = None
         self._windowed: tuple[int, int, int, int] | None = None
         self.export: tuple[subprocess.Popen, str] | None = None
-        self.export_said = ""
+        self.export_message = ""
 
     @property
     def recording(self) -> bool:
         """True while a video is being recorded."""
         return self._video is not None
 
-    def do(self, action: str, what: str, state: State) -> State:
+    def do(self, action: str, argument: str, state: State) -> State:
         """Do it; the state afterwards, which only "load" changes."""
         actions = {
             "quit": lambda: self._canvas.close(),
-            "save": lambda: self._save(Path(what), state),
-            "load": lambda: self._load(Path(what)),
+            "save": lambda: self._save(Path(argument), state),
+            "load": lambda: self._load(Path(argument)),
             "screenshot": lambda: self._screenshot(state),
             "record": lambda: self._record(state),
-            "say": lambda: self._say(what),
-            "copy": lambda: self._copy(what),
-            "export": lambda: self._start_export(what, state),
+            "say": lambda: self._say(argument),
+            "copy": lambda: self._copy(argument),
+            "export": lambda: self._start_export(argument, state),
             "fullscreen": self._fullscreen,
         }
         try:
@@ -67,13 +67,13 @@ class Actions:
         self._say(f"loaded {path}")
         return state
 
-    def _shown(self) -> np.ndarray:
+    def _displayed(self) -> np.ndarray:
         """The picture as it is on the screen, but in linear light, as files are written."""
         return linear(np.clip(self._screen.picture(), 0, 1))
 
     def _screenshot(self, state: State) -> None:
         path, settings = _free(".png", ".exr"), state.toml()
-        write_file(path, stills.encode(self._shown(), ".png", 8, settings))
+        write_file(path, stills.encode(self._displayed(), ".png", 8, settings))
         linear = self._stage.download()
         rgba = np.ones((*linear.shape[:2], 4), np.float32)
         rgba[..., : linear.shape[2]] = linear
@@ -91,7 +91,7 @@ class Actions:
     def add_frame(self) -> None:
         """Add the displayed image to the video, if one is being recorded."""
         if self._video is not None:
-            self._video.add(self._shown())
+            self._video.add(self._displayed())
 
     def close(self) -> None:
         """Let go of what is under way: a video is finished, an export goes on by itself."""
@@ -115,7 +115,7 @@ class Actions:
             stderr=subprocess.PIPE,
             text=True,
         )
-        self.export, self.export_said = (child, output), f"exporting {output} ..."
+        self.export, self.export_message = (child, output), f"exporting {output} ..."
 
     def poll_export(self) -> None:
         """Notice that an export has ended, and how."""
@@ -123,7 +123,7 @@ class Actions:
             return
         (child, output), self.export = self.export, None
         said = (child.communicate()[1] or "").strip().splitlines()
-        self.export_said = f"exported {output}" if child.returncode == 0 else " ".join(said[-1:])
+        self.export_message = f"exported {output}" if child.returncode == 0 else " ".join(said[-1:])
 
     def _fullscreen(self) -> None:
         window = self._window

@@ -9,7 +9,7 @@ import wgpu
 from ..methods import METHODS
 from ..methods.options import Option, options_of
 from .draw.display import DisplayCache
-from .state.files import footage_of
+from .state.files import reader_of
 from .state.state import (
     BOTH_EYES,
     LOOKS,
@@ -128,5 +128,5 @@ def _motion_of(state: State) -> tuple:
     if not state.is_video:
         return ()
     video = state.video
-    file = footage_of(state.source, state.input.max_mb)  # another object once it has changed
+    file = reader_of(state.source, state.input.max_mb)  # another object once it has changed
     return file, video.flow, video.flow_quality, video.duplicates

@@ -91,13 +91,13 @@ class Viewer:
     def _guarded(self, function):
         """Errors end the viewer; left alone, rendercanvas logs them and goes on."""
 
-        def guarded(*given):
+        def guarded(*arguments):
             if self.failed is not None:
                 return
             try:
-                function(*given)
+                function(*arguments)
             except Exception as error:
-                self.failed = _told(error)
+                self.failed = _translated(error)
                 self.canvas.close()
 
         return guarded
@@ -243,7 +243,7 @@ class Viewer:
             draw_times=np.array(self._draw_times),
             passes={k: v for k, v in self._passes.items() if k != "draw"},
             recording="recording" if full else "",
-            export=self.actions.export_said,
+            export=self.actions.export_message,
             message=self.message[0] if self._now < self.message[1] else report.waiting,
             finding=getattr(choices.subject(state), "finding", ""),
             flicked=self._flicked(),
@@ -286,17 +286,17 @@ class Viewer:
         """Show a message for a while."""
         self.message = text, self.clock() + _MESSAGE
 
-    def do(self, action: str, what: str = "") -> None:
+    def do(self, action: str, argument: str = "") -> None:
         """Run the action of a key or a button."""
-        self.state = self.actions.do(action, what, self.state)
+        self.state = self.actions.do(action, argument, self.state)
 
 
 def offscreen(
-    state: State, size: tuple[int, int] = (1280, 720), ratio: float = 1.0, **given
+    state: State, size: tuple[int, int] = (1280, 720), ratio: float = 1.0, **options
 ) -> Viewer:
     """A Viewer without a window: `canvas.submit_event` in, `frame` out."""
     canvas = OffscreenRenderCanvas(size=size, pixel_ratio=ratio)
-    return Viewer(canvas, state, **given)
+    return Viewer(canvas, state, **options)
 
 
 def frame(viewer: Viewer) -> np.ndarray:
@@ -329,7 +329,7 @@ def view(state: State, *, adapter: str | None = None, size: tuple[int, int] = (1
         raise viewer.failed
 
 
-def _told(error: Exception) -> Exception:
+def _translated(error: Exception) -> Exception:
     """The same error, or one of ours for a GPU that is gone."""
     if isinstance(error, wgpu.GPUError) and "lost" in str(error).lower():
         return DeviceError(f"the GPU was lost: {error}")

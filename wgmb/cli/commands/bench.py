@@ -120,11 +120,11 @@ def bench(
     return 0
 
 
-def _tell_article(found: dict, width: int, height: int) -> None:
+def _tell_article(results: dict, width: int, height: int) -> None:
     from ...lab.baselines import ARTICLE
 
     out(f"{width} x {height}, torusphere, published density")
-    for time_, (frame, recording, work) in found.items():
+    for time_, (frame, recording, work) in results.items():
         line = f"  iTime {time_:<6g}{frame:9.2f} ms per frame, {recording:.2f} of it recording, "
         line += f"{work:.2f} ms of CPU time on all cores"
         if (width, height) == (640, 360):

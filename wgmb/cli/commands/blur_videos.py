@@ -68,9 +68,9 @@ def _one_of_many(plan: VideoPlan, run: VideoRun, tell: Tell, quiet: bool) -> boo
     """Blur a video and say so in a line; returns whether all of it is done."""
     path, told = plan.reader.path, [0]
 
-    def tell_name(number: int, what: str) -> None:
+    def tell_name(number: int, status: str) -> None:
         told[0] += 1
-        tell(number, what, f"{path.name}, frame")
+        tell(number, status, f"{path.name}, frame")
 
     try:
         report = run(plan, tell_name)

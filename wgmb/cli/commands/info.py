@@ -78,11 +78,11 @@ def info(
 
 
 def describe(
-    clip: Clip, output: Path | None = None, shown: Display | None = None
+    clip: Clip, output: Path | None = None, display: Display | None = None
 ) -> list[tuple[str, str]]:
     """Return (name, text) lines about the clip's first frame; `output`: draw its motion.
 
-    `shown`: say what its colours are in that config, and how they would be shown.
+    `display`: say what its colours are in that config, and how they would be shown.
     """
     if output is not None and output.suffix.lower() not in stills.SUFFIXES:
         raise InputError(f"output {output}: must be an image, {', '.join(stills.SUFFIXES)}")
@@ -108,10 +108,10 @@ def describe(
         else "none found"
     )
     lines.append(("picture", color))
-    if shown is not None:
-        space = space_of(source, shown.config)
+    if display is not None:
+        space = space_of(source, display.config)
         text = space.text + ("" if space.is_linear else ", not linear: --from makes it so")
-        lines.append(("colour", f"{text}; shown on {shown.display}, {shown.view}"))
+        lines.append(("colour", f"{text}; shown on {display.display}, {display.view}"))
     depth = names.find_depth(source.channels, clip.passes.depth, source.reference_channel)
     lines.append(("depth", depth or "none"))
     lines.append(("vectors", clip.finding))

@@ -123,7 +123,7 @@ def perceive(
     else:
         clip = input.open(pattern)
         numbers, rate = clip.numbers, float(output.rate)
-        pictures = _shown(clip)
+        pictures = _on_display_window(clip)
         inputs = clip.inputs
     observer = Observer(rate, perception.cone, device=adapter)
     settings = (
@@ -150,7 +150,7 @@ def perceive(
     return 0
 
 
-def _shown(clip: Clip):
+def _on_display_window(clip: Clip):
     """Every frame on one canvas: the display window, and the overscan of the first one."""
     first = clip.source(clip.numbers[0])
     canvas = union([first.display_window, first.data_window])

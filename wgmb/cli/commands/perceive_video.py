@@ -51,7 +51,7 @@ def perceive_video(
     with progress(len(wanted), quiet, "perceiving") as tell:
 
         def make_part(moments: Sequence[OutputFrame], sink: PictureSink) -> None:
-            shown = seen.shown(first, first + len(moments) - 1)
+            shown = seen.perceived(first, first + len(moments) - 1)
             with Behind(sink.put) as put:
                 for number, color, held in shown:
                     observer.present(color, held)

@@ -34,7 +34,7 @@ from ..terminal import note, progress
 def render(
     scene: SceneName,
     output: Outputs,
-    what: SceneTimes = SceneOptions(),
+    options: SceneTimes = SceneOptions(),
     blur: SceneBlurs = SceneBlurOptions(),
     shutter: Shutters = ShutterOptions(),
     color: DisplayOptions = DisplaySettings(),
@@ -69,7 +69,7 @@ def render(
         Print errors only.
     """
     fps = float(output.rate)
-    picture = what.make(scene)
+    picture = options.make(scene)
     blur, shutter = blur.resolved(picture), shutter.resolved(picture, fps)
     if blur.holdout or blur.scale:
         raise InputError("--holdout and --scale need input files; use them with wgmb blur")
@@ -77,13 +77,15 @@ def render(
         raise InputError(f"--passes needs an .exr output, got {output.output}")
     if passes and output.layers == "picture":
         raise InputError("--passes cannot be combined with --layers picture")
-    moments = what.moments(fps)
+    moments = options.moments(fps)
     if confidence and sharp:
         raise InputError("--confidence cannot be combined with --sharp")
     made = blur.make(shutter.make(), adapter)
-    renderer = Render(picture, made, size=size_of(what.size), fps=fps, antialias=what.antialias)
+    renderer = Render(
+        picture, made, size=size_of(options.size), fps=fps, antialias=options.antialias
+    )
     settings = {"scene": scene, "sharp": sharp, "passes": passes} | output.looks
-    settings |= plain(blur) | plain(shutter) | plain(what) | {"wgmb": __version__, "fps": fps}
+    settings |= plain(blur) | plain(shutter) | plain(options) | {"wgmb": __version__, "fps": fps}
     settings["samples"], settings["curve"] = blur.settled_samples(), shutter.curve_read()
     if confidence:
         check_confidence(made.method.name, output)

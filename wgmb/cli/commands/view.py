@@ -74,7 +74,7 @@ def view(
         state = viewer.State.read(config)
     if what is not None:
         state = state.opened(what, input.max_mb)
-    state = state.told(vars(input) | vars(blur) | vars(shutter) | vars(color) | vars(video))
+    state = state.with_options(vars(input) | vars(blur) | vars(shutter) | vars(color) | vars(video))
     if state.is_video and config is None and blur.method is None:
         settled, _ = video.chosen(gpu.open_device(adapter))
         state = state.with_method(settled.method)

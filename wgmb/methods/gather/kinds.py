@@ -32,7 +32,7 @@ def kinds_of(inputs: Inputs, shading: Shading) -> list[Kind]:
 
 
 def _kind(inputs: Inputs, light: str, color: str | None, pulled: bool) -> list[Kind]:
-    seen = {f.offset: _seen(f, light) for f in inputs.frames if abs(f.offset) <= 1}
+    seen = {f.offset: _surface_light(f, light) for f in inputs.frames if abs(f.offset) <= 1}
     there = {offset: one for offset, one in seen.items() if one is not None}
     albedo = None if color is None else getattr(inputs.frame, color)
     if 0 not in there or len(there) < 2 or (color is not None and albedo is None):
@@ -44,7 +44,7 @@ def _has(frame: PreparedFrame, *names: str) -> bool:
     return all(getattr(frame, name) is not None for name in names)
 
 
-def _seen(frame: PreparedFrame, light: str) -> SurfaceLight | None:
+def _surface_light(frame: PreparedFrame, light: str) -> SurfaceLight | None:
     view = getattr(frame, light)
     if view is None or frame.motion is None or frame.depth is None:
         return None

@@ -25,7 +25,7 @@ class Layers:
     def __init__(self, device: wgpu.GPUDevice, images: TexturePool):
         self._device, self._images = device, images
         self._edges, self._edge_pixels = Edges(device, images), ScratchBuffer(device)
-        self._edge_groups, self._spare = ScratchBuffer(device), ScratchBuffer(device)
+        self._edge_groups, self._unused = ScratchBuffer(device), ScratchBuffer(device)
         self.textures: dict[str, wgpu.GPUTexture] = {}
 
     def front_surface(self, slot: int) -> wgpu.GPUTextureView:
@@ -82,8 +82,8 @@ class Layers:
             }
             self._separate(encoder, inputs, slot, frame, around, worklists)
 
-    def _separate(self, encoder, inputs, slot: int, frame, around, worklists):
-        """Record the layers of a frame, `around` which others may show what it does not."""
+    def _separate(self, encoder, inputs, slot: int, frame, neighbours, worklists):
+        """Record the layers of a frame, of which `neighbours` may show what it does not."""
         size, colors = inputs.bindings.size, self.textures["layer_colors"]
         if copied := _is_like(frame.color.texture, colors):
             _copy(encoder, (frame.color.texture, 0), (colors, 2 * slot))
@@ -102,8 +102,8 @@ class Layers:
             {"Color": colors.format, "Mattes": self.textures["mattes"].format},
             WEIGHTED=frame.weight is not None,
             COPIED=copied,
-            HAS_PREV=around["prev"] is not None,
-            HAS_NEXT=around["next"] is not None,
+            HAS_PREV=neighbours["prev"] is not None,
+            HAS_NEXT=neighbours["next"] is not None,
             OWN_IS_PREV=frame.offset == 1,
             OWN_IS_NEXT=frame.offset == -1,
             HAS_FAR_PREV=not frame.offset and any(f.offset == -2 for f in inputs.frames),
@@ -113,7 +113,7 @@ class Layers:
         encoder.clear_buffer(pixels, 0, 4)
         others = {
             f"{side}_{name}": getattr(other, name, None) or inputs.unbound
-            for side, other in around.items()
+            for side, other in neighbours.items()
             for name in ("color", "motion", "depth", "weight")
         }
         for entry, (indirect, worklist) in passes.items():
@@ -129,7 +129,7 @@ class Layers:
                 depth=frame.depth,
                 weight=frame.weight or inputs.unbound,
                 edges=pixels,
-                edge_groups=groups if sizing else self._spare.at_least(16),
+                edge_groups=groups if sizing else self._unused.at_least(16),
                 **found,
                 **self._views(slot),
                 **self._far(inputs, frame.offset),

@@ -121,7 +121,7 @@ class Search:
         usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDIRECT
         groups = self._device.create_buffer(label="groups", size=32, usage=usage)
         alone = replace(inputs.bindings, size=(1, 1))
-        kernel.run(encoder, "main", alone, found=added.found, worklist=cells, groups=groups)
+        kernel.run(encoder, "main", alone, found=added.change_flags, worklist=cells, groups=groups)
         return [
             (one, {"buffer": groups, "offset": offset, "size": 12})
             for one, offset in ((added, 0), (None, 12))

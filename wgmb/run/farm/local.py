@@ -96,10 +96,10 @@ def _load_once() -> None:
 
 
 @contextmanager
-def closing(what: Any) -> Iterator[Any]:
+def closing(resource: Any) -> Iterator[Any]:
     """Close a client or a cluster, whose connection may be gone."""
     try:
-        yield what
+        yield resource
     finally:
         with suppress(Exception):
-            what.close(timeout=_CLOSING)
+            resource.close(timeout=_CLOSING)

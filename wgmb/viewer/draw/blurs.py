@@ -25,7 +25,7 @@ class Blurs:
 
     def __init__(self, device: wgpu.GPUDevice, choices: Choices, pace: Pace):
         self._device, self._choices, self._pace = device, choices, pace
-        self._made: dict[tuple, Blur] = {}
+        self._blurs: dict[tuple, Blur] = {}
 
     def __call__(self, slot: str, name: str, state: State, quick: int | None) -> Blur:
         """The Blur for `name` (a look, a method or the reference) in a slot.
@@ -50,11 +50,11 @@ class Blurs:
             settings = self._quick(settings, quick)
         kept = slot, name == "perceived"  # each has the sums of a picture of its own
         key = kept, settings
-        if key not in self._made:
-            while len(self._made) >= _KEPT:
-                del self._made[next(iter(self._made))]
-            self._made[key] = settings.make(shutter, self._device)
-        blur = self._made[key] = self._made.pop(key)
+        if key not in self._blurs:
+            while len(self._blurs) >= _KEPT:
+                del self._blurs[next(iter(self._blurs))]
+            self._blurs[key] = settings.make(shutter, self._device)
+        blur = self._blurs[key] = self._blurs.pop(key)
         if blur.shutter != shutter:
             blur.shutter = shutter
         return blur

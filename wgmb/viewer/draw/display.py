@@ -21,7 +21,7 @@ class DisplayCache:
         self._device, self._images = device, TexturePool(device)
         self._opened: tuple[ColorSettings | None, Display | None] = None, None
         self._compiled: dict[tuple[Display, ColorSpace], OcioShader | None] = {}
-        self._shown: dict[str, tuple[tuple, Image]] = {}
+        self._converted: dict[str, tuple[tuple, Image]] = {}
 
     def display(self, state: State) -> Display | None:
         """The display that the state asks for; None: sRGB. InputError if there is none such."""
@@ -38,12 +38,12 @@ class DisplayCache:
         `slot`: on which side it is; `exposure`: a factor of the light.
         """
         key = image.stamp, display, space, exposure
-        if self._shown.get(slot, (None,))[0] != key:
+        if self._converted.get(slot, (None,))[0] != key:
             assert image.texture is not None
             texture = self._images.texture(slot, image.texture.size[:2], OUTPUT)
             self._draw(image.texture, texture, display, space, exposure)
-            self._shown[slot] = key, Image(texture, "DISPLAY", key)
-        return self._shown[slot][1]
+            self._converted[slot] = key, Image(texture, "DISPLAY", key)
+        return self._converted[slot][1]
 
     def _draw(
         self,

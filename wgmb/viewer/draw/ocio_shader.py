@@ -136,18 +136,18 @@ class OcioShader:
         gpu.submit(self._device, encoder)
 
 
-def _with_textures(made: Shader) -> str:
+def _with_textures(shader: Shader) -> str:
     """OpenColorIO's GLSL with textures and samplers apart, as WebGPU has them."""
 
-    def apart(found: re.Match) -> str:
-        start, kind, name = found.groups()
-        sampler = "linear" if name in made.interpolated else "nearest"
+    def apart(match: re.Match) -> str:
+        start, kind, name = match.groups()
+        sampler = "linear" if name in shader.interpolated else "nearest"
         return (
             f"{start} uniform texture{kind} {name}_table;\n"
             f"#define {name} sampler{kind}({name}_table, {sampler})"
         )
 
-    text = re.sub(r"(layout\([^)]*\)) uniform sampler(\dD) (\w+);", apart, made.text)
+    text = re.sub(r"(layout\([^)]*\)) uniform sampler(\dD) (\w+);", apart, shader.text)
     return re.sub(r"\.rgb\.([rgb])\b", r".\1", text)  # which naga cannot assign to
 
 

@@ -30,7 +30,7 @@ class Quality:
         self._worker = ThreadPoolExecutor(1, "flip")
         self._last: tuple[tuple, Measured] | None = None
 
-    def found(self, key: tuple) -> Measured | None:
+    def latest(self, key: tuple) -> Measured | None:
         """Return the latest measurement of the images identified by `key`."""
         return self._last[1] if self._last and self._last[0] == key else None
 
@@ -41,7 +41,7 @@ class Quality:
 
         `pictures` gives both, linear, (height, width, 3 or more).
         """
-        have = self.found(key)
+        have = self.latest(key)
         least = min(2 * have.samples, total) if have else self.ENOUGH
         if done < least or (have and have.samples == done):
             return

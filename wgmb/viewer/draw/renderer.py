@@ -55,9 +55,9 @@ class Renderer:
         self._perceived = {slot: Perceived(device) for slot in ("first", "second")}
         self._past: SceneSubject | None = None
         self._blurs = Blurs(device, self.choices, self.pace)
-        self._shown = {"first": Slot(), "second": Slot()}
-        self._coming = dict(self._shown)  # takes the place of what is shown
-        self._seen: dict[str, Image] = {}
+        self._slots = {"first": Slot(), "second": Slot()}
+        self._coming = dict(self._slots)  # takes the place of what is shown
+        self._on_screen: dict[str, Image] = {}
         self.chromaticities: dict[str, Any] = {}  # of what is shown, as an attribute of an EXR
         self._level, self._still_since, self._still = 0, 0.0, ()
         self._moved = False
@@ -83,11 +83,11 @@ class Renderer:
             if name != "perceived":
                 self._perceived[slot].forget()
             self._advance(slot, name, eye, state, subject, size, antialias, quick, full, report)
-        first, last = self._shown["first"], self._shown[slots[-1]]
+        first, last = self._slots["first"], self._slots[slots[-1]]
         assert first.texture is not None
         report.size, report.kind = first.texture.size[:2], first.kind
         report.labels = (first.label, last.label)
-        self._seen = self._displayed(slots, state, subject)
+        self._on_screen = self._displayed(slots, state, subject)
         unfinished = not all(self._coming[slot].ready for slot in slots)
         report.busy = moving or unfinished or self._level > 0
         if isinstance(subject, VideoSubject):
@@ -106,19 +106,22 @@ class Renderer:
 
     def images(self, flicked: bool) -> tuple[Image, Image]:
         """Return the images of both sides; `flicked`: the second one for both."""
-        first, second = self._seen["first"], self._seen.get("second", Image(None, "COLOR", ()))
+        first, second = (
+            self._on_screen["first"],
+            self._on_screen.get("second", Image(None, "COLOR", ())),
+        )
         return (second if flicked else first), second
 
     def _displayed(
         self, slots: tuple[str, ...], state: State, subject: Subject
     ) -> dict[str, Image]:
         """The images by slot, colours as the display of an OpenColorIO config shows them."""
-        images = {slot: self._shown[slot].image for slot in slots}
+        images = {slot: self._slots[slot].image for slot in slots}
         displayed, self.chromaticities = self.choices.displayed, {}
         if isinstance(subject, VideoSubject):
             self.chromaticities = {"chromaticities": primaries_of(subject.coding)}
             for slot, image in images.items():
-                if image.kind == "COLOR" and not self._is_data(self._shown[slot], state):
+                if image.kind == "COLOR" and not self._is_data(self._slots[slot], state):
                     images[slot] = self._video_light.image(slot, image, subject.coding)
         if (display := displayed.display(state)) is None:
             return images
@@ -129,16 +132,16 @@ class Renderer:
                 images[slot] = displayed.image(slot, image, display, space, exposure)
         return images
 
-    def _is_data(self, shown: Slot, state: State) -> bool:
+    def _is_data(self, slot: Slot, state: State) -> bool:
         """Return True for an image of a method's own data, whose colours are no light."""
-        return shown.key[0] in self.choices.shows(state)
+        return slot.key[0] in self.choices.shows(state)
 
-    def download(self, shown: Slot | None = None) -> np.ndarray:
+    def download(self, slot: Slot | None = None) -> np.ndarray:
         """(height, width, channels) float32 of the first image, or of another."""
-        shown = shown or self._shown["first"]
-        assert shown.texture is not None
+        slot = slot or self._slots["first"]
+        assert slot.texture is not None
         encoder = self.device.create_command_encoder(label="download")
-        return self._images.download(encoder, shown.texture)
+        return self._images.download(encoder, slot.texture)
 
     def finished(self, seconds: float, antialias: int) -> None:
         """The window's frame took so long; moving frames set the pace."""
@@ -196,7 +199,7 @@ class Renderer:
         report: FrameStatus,
     ) -> None:
         """Draw some of `name`; it is shown once it is no coarser than what it replaces."""
-        shown, coming = self._shown[slot], self._coming[slot]
+        shown, coming = self._slots[slot], self._coming[slot]
         eye = state.eye if name in ("perceived", REFERENCE) else None
         known = self._known(name, state, subject, full)
         frame = state.frame if name == "perceived" else None
@@ -219,7 +222,7 @@ class Renderer:
             report.passes |= self._timing.read()
         self.device.queue.read_buffer(self._token)  # waits
         if shown.key != key or coming.done >= min(shown.done, coming.total):
-            self._shown[slot] = coming
+            self._slots[slot] = coming
         report.changed = True
         report.seconds[coming.label] = time.perf_counter() - started
 
@@ -291,7 +294,7 @@ class Renderer:
             self.quality.measure(
                 key, last.done, last.total, lambda: [self.download(s) for s in (first, last)]
             )
-        return self.quality.found(key)
+        return self.quality.latest(key)
 
 
 def _coarser(a: tuple, b: tuple) -> bool:

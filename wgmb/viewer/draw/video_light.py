@@ -24,7 +24,7 @@ class VideoLight:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)
-        self._shown: dict[str, tuple[tuple, Image]] = {}
+        self._converted: dict[str, tuple[tuple, Image]] = {}
 
     def image(self, slot: str, image: Image, coding: Coding) -> Image:
         """`image` as linear Rec. 709 light of a display; `slot`: on which side it is.
@@ -36,12 +36,12 @@ class VideoLight:
         if primaries == REC709 and coding.transfer != HLG:
             return image
         key = image.stamp, coding
-        if self._shown.get(slot, (None,))[0] != key:
+        if self._converted.get(slot, (None,))[0] != key:
             assert image.texture is not None
             texture = self._images.texture(slot, image.texture.size[:2], _TEXEL)
             self._convert(image.texture, texture, primaries, coding.transfer == HLG)
-            self._shown[slot] = key, Image(texture, "COLOR", key)
-        return self._shown[slot][1]
+            self._converted[slot] = key, Image(texture, "COLOR", key)
+        return self._converted[slot][1]
 
     def _convert(
         self,

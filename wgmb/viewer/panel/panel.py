@@ -12,7 +12,7 @@ from ...methods.options import Option
 from ..controls import Box
 from ..draw.slot import FrameStatus
 from ..state.state import State
-from ..state.video_time import moment, output
+from ..state.video_time import output, output_frame
 from ..state.words import for_shell
 from . import overlay, sections
 from .widgets import Widgets
@@ -178,8 +178,8 @@ def _subject(state: State) -> str:
 
 def made_of(state: State, pictures: tuple[int, ...]) -> str:
     """The output frame of a video on display, and the pictures that contribute to it."""
-    now = moment(state)
-    since = float(now.time - output(state).moments[0].time)
+    now = output_frame(state)
+    since = float(now.time - output(state).frames[0].time)
     numbers = " - ".join(str(n) for n in dict.fromkeys((min(pictures), max(pictures))))
     word = "pictures" if len(pictures) > 1 else "picture"
     return f"output frame {now.number}, {since:.3f} s: {word} {numbers}"

@@ -46,7 +46,7 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
     """
     names = list(builtin.SCENES) if state.is_scene else [state.source, *builtin.SCENES]
     label = "scene" if state.is_scene else "shown"
-    chosen = ui.combo(label, state.source, names, shown=plain(state.source))
+    chosen = ui.combo(label, state.source, names, text=plain(state.source))
     if chosen != state.source:
         return state.opened(chosen)
     if not state.is_scene:
@@ -240,7 +240,7 @@ def _colors(ui: Widgets, state: State, display: Display | None) -> State:
     if installed():
         now = state.color.ocio or ("$OCIO" if display else "off")
         names = dict.fromkeys((now, "off", "builtin", "studio"))
-        config = ui.combo("ocio", now, list(names), shown=plain(now))
+        config = ui.combo("ocio", now, list(names), text=plain(now))
         if config != now:
             return replace(state, color=ColorSettings(ocio=config))
     if display is None:

@@ -59,14 +59,14 @@ class Widgets:
         self.keep(name or text)
         return pressed
 
-    def combo(self, name: str, now: str, names: Sequence[str], shown: str = "") -> str:
+    def combo(self, name: str, now: str, names: Sequence[str], text: str = "") -> str:
         """The one of `names` that is chosen."""
         self.label(name)
         start, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
         self.places[name] = (start.x, start.y, wide, imgui.get_frame_height())
         whole = imgui.ComboFlags_.height_largest
         room = wide - imgui.get_frame_height() - 2 * imgui.get_style().frame_padding.x
-        text = shortened(shown or now, lambda text: imgui.calc_text_size(text).x <= room)
+        text = shortened(text or now, lambda part: imgui.calc_text_size(part).x <= room)
         opened = imgui.begin_combo(f"##{name}", text, whole)
         if opened:
             for item in names:

@@ -21,9 +21,9 @@ OF_VIDEOS = frozenset({"holdout", "max_mb", "cuts"})
 _BLURRED = frozenset({"flow", "flow_quality", "highlights"})  # that `wgmb blur` has for frames, too
 
 
-def check_said(state: State, said: Collection[str]) -> None:
+def check_options(state: State, named: Collection[str]) -> None:
     """InputError for an option of the command line that the state's source has no use for."""
-    for name in said:
+    for name in named:
         option = option_name(name)
         if name in VIDEO and not state.is_video:
             if name in _BLURRED and not state.is_scene:

@@ -30,7 +30,7 @@ def is_video_file(source: str) -> bool:
     return is_video(source)
 
 
-def footage_of(source: str, max_mb: float) -> VideoReader:
+def reader_of(source: str, max_mb: float) -> VideoReader:
     """The video in a file; the same object as long as the file does not change."""
     key, held = (source, max_mb), _known.get((source, max_mb))
     try:
@@ -51,22 +51,22 @@ class VideoOutput:
     """The output frames of a video, and the clock that they are on."""
 
     clock: Clock
-    moments: OutputFrames
+    frames: OutputFrames
 
 
 @lru_cache(maxsize=32)
 def output_of(
-    footage: VideoReader, frames: str | None, settings: VideoSettings, fps: Fraction | None
+    reader: VideoReader, frames: str | None, settings: VideoSettings, fps: Fraction | None
 ) -> VideoOutput:
     """The output of a video at a rate, or, where it is None, at the times of its own pictures."""
-    clock = settings.clock(footage, frames)
-    return VideoOutput(clock, OutputFrames(footage, clock, fps))
+    clock = settings.clock(reader, frames)
+    return VideoOutput(clock, OutputFrames(reader, clock, fps))
 
 
 def frames_of(source: str, max_mb: float) -> str:
     """All frames, or pictures, as numbers."""
     if is_video_file(source):
-        return f"0-{len(footage_of(source, max_mb)) - 1}"
+        return f"0-{len(reader_of(source, max_mb)) - 1}"
     if not frame_numbers.is_pattern(source):
         return str(frame_numbers.number_in(Path(source)))
     return frame_numbers.frame_range(frame_numbers.numbers_on_disk(source))

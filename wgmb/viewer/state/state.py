@@ -28,7 +28,7 @@ from ...settings.toml import text_of
 from ...settings.video import VideoSettings
 from . import toml as saved
 from . import video_time
-from .allowed import check_said
+from .allowed import check_options
 from .files import frames_of, is_video_file
 from .groups import DEFAULTS, GROUP_OF, MASKS, written
 from .words import no_option, words_of
@@ -141,7 +141,7 @@ class State:
     def span(self) -> tuple[int, int]:
         """First and last frame of `frames`; of a video, of the output."""
         if self.is_video:
-            return 0, len(video_time.output(self).moments) - 1
+            return 0, len(video_time.output(self).frames) - 1
         numbers = frame_numbers.frame_numbers(self.frames)
         return min(numbers), max(numbers)
 
@@ -236,11 +236,11 @@ class State:
             method=method, **{name: DEFAULTS[name] for name in METHOD_OPTIONS}
         )
 
-    def told(self, given: dict[str, Any]) -> State:
+    def with_options(self, options: dict[str, Any]) -> State:
         """The same with options of the command line, those that are not their defaults."""
-        said = {name: value for name, value in given.items() if value != DEFAULTS[name]}
-        check_said(self, said)
-        state = replace(self, frames=said.pop("frames", self.frames)).with_settings(**said)
+        changed = {name: value for name, value in options.items() if value != DEFAULTS[name]}
+        check_options(self, changed)
+        state = replace(self, frames=changed.pop("frames", self.frames)).with_settings(**changed)
         if state.method not in METHODS:
             known = f"available: {', '.join(METHODS)}{did_you_mean(state.method, METHODS)}"
             raise InputError(f"unknown method {state.method!r}; {known}")

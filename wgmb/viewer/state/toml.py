@@ -51,7 +51,7 @@ def tables(text: str) -> dict[str, dict]:
     return found
 
 
-def values(given: dict[str, Any], view: dict[str, Any], plain: object, on_disk: bool) -> dict:
+def values(table: dict[str, Any], view: dict[str, Any], plain: object, on_disk: bool) -> dict:
     """Fields of the State `plain`, changed to what [render], or [blur], and [view] hold."""
     known = {"fps": str | float}
     for group in GROUPS.values():
@@ -59,7 +59,7 @@ def values(given: dict[str, Any], view: dict[str, Any], plain: object, on_disk: 
     allowed = {"fps", *GROUP_OF} - (_OF_SCENES if on_disk else INPUTS | VIDEO | {"from_"})
     found: dict[str, Any] = {}
     groups: dict[str, dict[str, Any]] = {name: {} for name in GROUPS}
-    for word, value in given.items():
+    for word, value in table.items():
         name = "from_" if word == "from" else word
         if name not in allowed or word == "from_":
             raise InputError(f"settings: unknown name {word!r}")

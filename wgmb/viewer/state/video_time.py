@@ -16,9 +16,9 @@ from ...settings import rate_of
 from ...video.output_times import OutputFrame
 from .files import (
     VideoOutput,
-    footage_of,
     frames_of,
     output_of,
+    reader_of,
 )
 
 if TYPE_CHECKING:
@@ -33,31 +33,31 @@ def check(state: State) -> None:
     video = state.video
     check_highlights(video.highlights)
     if video.highlights != 1:
-        footage = footage_of(state.source, state.input.max_mb)
+        footage = reader_of(state.source, state.input.max_mb)
         check_coding(video.highlights, footage.path, footage.coding)
     _ = video.pace, video.range
 
 
 def own_rate(state: State) -> Fraction:
     """Pictures a second of the video."""
-    return footage_of(state.source, state.input.max_mb).rate
+    return reader_of(state.source, state.input.max_mb).rate
 
 
 def is_own_rate(state: State) -> bool:
     """Return True if the video keeps a steady rate, and the output has it too."""
-    has_rate = footage_of(state.source, state.input.max_mb).has_rate
+    has_rate = reader_of(state.source, state.input.max_mb).has_rate
     return has_rate and rate(state) == own_rate(state)
 
 
 def at_own_rate(state: State) -> State:
     """The same at the rate of the video, or at the times of its pictures if it keeps no rate."""
-    footage = footage_of(state.source, state.input.max_mb)
+    footage = reader_of(state.source, state.input.max_mb)
     return replace(state, own_times=not footage.has_rate, fps=float(footage.rate))
 
 
 def is_hdr(state: State) -> bool:
     """Return True if the video holds light above white."""
-    return footage_of(state.source, state.input.max_mb).coding.transfer in (PQ, HLG)
+    return reader_of(state.source, state.input.max_mb).coding.transfer in (PQ, HLG)
 
 
 def rate(state: State) -> Fraction:
@@ -67,13 +67,13 @@ def rate(state: State) -> Fraction:
     return Fraction(state.fps).limit_denominator(1001)
 
 
-def completed(state: State, said: Collection[str]) -> State:
+def completed(state: State, named: Collection[str]) -> State:
     """The same with the video's own rate and all of its pictures, unless others were said."""
-    if "fps" not in said:
+    if "fps" not in named:
         state = at_own_rate(state)
     elif state.own_times:
         state = replace(state, fps=float(own_rate(state)))
-    if "frames" not in said:
+    if "frames" not in named:
         state = replace(state, frames=frames_of(state.source, state.input.max_mb))
     return state
 
@@ -82,19 +82,19 @@ def output(state: State) -> VideoOutput:
     """The output frames; InputError if the part that is chosen holds none."""
     most = state.input.max_mb
     frames = None if state.frames == frames_of(state.source, most) else state.frames
-    footage, fps = footage_of(state.source, most), None if state.own_times else rate(state)
+    footage, fps = reader_of(state.source, most), None if state.own_times else rate(state)
     return output_of(footage, frames, state.video, fps)
 
 
-def moment(state: State) -> OutputFrame:
+def output_frame(state: State) -> OutputFrame:
     """The output frame that is shown."""
-    moments = output(state).moments
+    moments = output(state).frames
     return moments[min(max(math.ceil(state.frame - 0.5), 0), len(moments) - 1)]
 
 
 def held_for(state: State, number: int) -> float:
     """Duration of an output frame [s]: until the next one."""
-    moments = output(state).moments
+    moments = output(state).frames
     if number + 1 < len(moments):
         return float(moments[number + 1].time - moments[number].time)
     return float(moments[number].interval)
@@ -102,10 +102,10 @@ def held_for(state: State, number: int) -> float:
 
 def retimed(state: State, **changes: Any) -> State:
     """The same with other options, at the same time in the video."""
-    at = output(state).clock.back(moment(state).time)
+    at = output(state).clock.back(output_frame(state).time)
     state = replace(state, **changes)
     now = output(state)
-    return replace(state, frame=float(now.moments.nearest(now.clock.out(at))))
+    return replace(state, frame=float(now.frames.nearest(now.clock.out(at))))
 
 
 def in_frames(state: State, text: str) -> State:
@@ -129,7 +129,7 @@ def passed(state: State, seconds: float) -> float:
     frames = float(rate(state))
     if not (state.is_video and state.own_times):
         return state.frame + seconds * frames
-    moments, frame = output(state).moments, state.frame
+    moments, frame = output(state).frames, state.frame
     for number in range(max(math.floor(frame), 0), len(moments) - 1):
         step = float(moments[number + 1].time - moments[number].time)
         left = (number + 1 - frame) * step

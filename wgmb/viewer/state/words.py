@@ -21,13 +21,13 @@ def words_of(options: dict[str, object]) -> list[str]:
         flag = option_name(name)
         if name in _REPEATED:
             for item in value:  # pyright: ignore[reportGeneralTypeIssues]
-                words += _said(flag, str(item))
+                words += _words(flag, str(item))
         elif value is True:
             words += [flag]
         elif isinstance(plain, list):
             words += [flag, *(f"{x:g}" for x in plain)]
         else:
-            words += _said(flag, f"{value:g}" if isinstance(value, float) else str(value))
+            words += _words(flag, f"{value:g}" if isinstance(value, float) else str(value))
     return words
 
 
@@ -36,7 +36,7 @@ def no_option(name: str) -> str:
     return f"./{name}" if name.startswith("-") else name
 
 
-def _said(flag: str, text: str) -> list[str]:
+def _words(flag: str, text: str) -> list[str]:
     return [f"{flag}={text}"] if text.startswith("-") else [flag, text]
 
 

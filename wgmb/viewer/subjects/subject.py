@@ -46,8 +46,8 @@ class SceneSubject:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._render = Render(builtin.make(next(iter(builtin.SCENES))), Blur("tap", device=device))
-        self._seen: tuple = ()
-        self._made = self._render.scene
+        self._scene_key: tuple = ()
+        self._held = self._render.scene
 
     def has(self, state: State) -> frozenset[str]:
         """Inputs that a method may ask for; figures are flat: they have no pictures of instants."""
@@ -89,9 +89,9 @@ class SceneSubject:
 
     def _scene(self, state: State) -> Scene:
         seen = state.source, state.scene
-        if seen != self._seen:
-            self._made, self._seen = state.scene.make(state.source), seen
-        return self._made
+        if seen != self._scene_key:
+            self._held, self._scene_key = state.scene.make(state.source), seen
+        return self._held
 
     def passes(self) -> dict[str, Texture]:
         """The sharp picture and what lies under it, by name."""
@@ -117,7 +117,7 @@ class ClipSubject:
         self._device, self._images = device, TexturePool(device)
         blur, space = state.blur, state.color.space(display)
         self._clip = state.input.open(state.source, blur.holdout, blur.scale, space)
-        self._said: dict[tuple, FrameFile] = {}  # what the frames say of their colours
+        self._headers: dict[tuple, FrameFile] = {}  # what the frames say of their colours
         self._frames: OrderedDict[_Which, Frame] = OrderedDict()
         self._sharp = Blur("tap", device=device)
         self._uploaders: dict[tuple, Blur] = {}
@@ -146,7 +146,7 @@ class ClipSubject:
     def space(self, config: ColorConfig) -> ColorSpace:
         """The colour space of the frame; InputError if it is unknown."""
         self._frame(self._now)
-        return space_of(self._said[self._now[:2]], config)
+        return space_of(self._headers[self._now[:2]], config)
 
     @property
     def eyes(self) -> list[str]:
@@ -191,7 +191,7 @@ class ClipSubject:
         if key not in self._frames:
             source = self._clip.source(*key[:2])
             frame = self._clip.with_neighbours(source, extent=EVERYWHERE, reach=key[3])
-            self._said[key[:2]] = without_pixels(source)
+            self._headers[key[:2]] = without_pixels(source)
             least, most = _FRAMES_KEPT
             around = 2 * key[3] + 1
             kept = min(max(_MEMORY // (around * _bytes(frame)), least), most)

@@ -23,9 +23,9 @@ from ...shutter import Shutter
 from ...video.holdouts import STATIC, holdout_of
 from ...video.planes import Planes
 from ..state.allowed import check_video
-from ..state.files import footage_of
+from ..state.files import reader_of
 from ..state.state import State
-from ..state.video_time import moment, output
+from ..state.video_time import output, output_frame
 from .motion_thread import MotionThread
 from .video_exposure import Knowledge, VideoExposure, exposure_of, reach
 from .video_frames import PictureFrames
@@ -46,7 +46,7 @@ class VideoSubject:
         check_video(state)
         max_mb, masks, settings = state.input.max_mb, state.blur.holdout, state.video
         self._device, self._images = device, TexturePool(device)
-        self._reader = footage_of(state.source, max_mb)
+        self._reader = reader_of(state.source, max_mb)
         self._times = self._reader.times
         holdout_of([mask for mask in masks if mask != STATIC], self._reader)  # says what is wrong
         request = MotionRequest(masks, settings.duplicates == "fill", state.input.cuts or "")
@@ -108,7 +108,7 @@ class VideoSubject:
             found = self._exposure(state, shutter, known)
             of_motion = [n for cell in found.cells for n in _near(cell.index, beside, known)]
             needed = [*found.lacking, *of_motion]
-            first, last = reach(self._times, output(state).clock, moment(state), shutter)
+            first, last = reach(self._times, output(state).clock, output_frame(state), shutter)
             soon = range(max(first - beside, 0), min(last + beside + 1, len(self._times)))
             asked |= dict.fromkeys([*needed, *sorted(soon, key=lambda n: abs(n - found.here))])
             lacking += [n for n in needed if known(n) is None]
@@ -155,7 +155,9 @@ class VideoSubject:
         self, state: State, shutter: Shutter, known: Knowledge | None = None
     ) -> VideoExposure:
         clock = output(state).clock
-        return exposure_of(self._times, clock, moment(state), shutter, known or self._maker.known)
+        return exposure_of(
+            self._times, clock, output_frame(state), shutter, known or self._maker.known
+        )
 
     # ---- drawing --------------------------------------------------------------------------
 

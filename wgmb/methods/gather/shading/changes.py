@@ -26,12 +26,12 @@ def changes(
     frames: Mapping[int, SurfaceLight],
     albedo: View | None,
     by_color: bool,
-    found: wgpu.GPUBuffer,
+    change_flags: wgpu.GPUBuffer,
 ) -> dict[int, View]:
     """Changes of the logarithm of light to each neighbour, by its offset; black where unknown.
 
     `frames`: by their offsets, 0 the frame itself. `by_color`: the light is the picture itself.
-    `found`: gets 1 if there are any.
+    `change_flags`: its first word gets 1 if there are any.
     """
     here = frames[0]
     plain = {}
@@ -63,8 +63,8 @@ def changes(
             stage.texture(name, "r32float") for name in ("peaks", "gain", "coherence")
         )
         four, one, none = (
-            stage.spare("rgba16float"),
-            stage.spare("r32float"),
+            stage.unused("rgba16float"),
+            stage.unused("r32float"),
             stage.none("r32float"),
         )
         for entry, ratio, scalar, ratio_out, scalar_out in (
@@ -87,7 +87,7 @@ def changes(
                 coherence=coherence if entry == "find_gain" else none,
                 ratio_out=ratio_out,
                 scalar_out=scalar_out,
-                found=found,
+                found=change_flags,
             )
         result[offset] = limited
     return result

@@ -58,20 +58,20 @@ def pyramid(stage: Stage, name: str, source: View) -> list[View]:
 
 
 def flow(
-    stage: Stage, side: int, here: tuple[View, list[View]], there: tuple[View, list[View]],
+    stage: Stage, side: int, here: tuple[View, list[View]], neighbour: tuple[View, list[View]],
     depth: View, linear: wgpu.GPUSampler,
 ) -> LightFlow:  # fmt: skip
-    """Flow to the neighbour at the offset `side`; `here`, `there`: values and their pyramid.
+    """Flow to the neighbour at the offset `side`; `here`, `neighbour`: values and their pyramid.
 
     `depth`: of the frame itself, over whose surfaces both move.
     """
     raw = {
-        True: _search(stage, "ahead", here[1], there[1], linear),
-        False: _search(stage, "back", there[1], here[1], linear),
+        True: _search(stage, "ahead", here[1], neighbour[1], linear),
+        False: _search(stage, "back", neighbour[1], here[1], linear),
     }
     given = {
         ahead: {"values": own[0], "values_there": other[0], "depth": depth, "linear": linear}
-        for ahead, own, other in ((True, here, there), (False, there, here))
+        for ahead, own, other in ((True, here, neighbour), (False, neighbour, here))
     }
     names = {True: f"ahead {side}", False: f"back {side}"}
     filled = {
@@ -91,7 +91,7 @@ def flow(
         differences = stage.texture("weighted", "rgba32float")
         stage.run(
             "explain", flow=trusted[True], flow_back=trusted[False], values=here[0],
-            values_there=there[0], linear=linear, differences=differences,
+            values_there=neighbour[0], linear=linear, differences=differences,
         )  # fmt: skip
         blurred(stage, differences, GUARD, explained)
     return LightFlow(trusted[True], trusted[False], explained)
@@ -104,20 +104,20 @@ def blurred(stage: Stage, source: View, sigma: float, output: View) -> None:
     stage.run("blur", "down", constants={"SIGMA": sigma}, source=half, output=output)
 
 
-def _filled(stage: Stage, name: str, flow: View, back: View, given: dict[str, Any]) -> View:
-    """Flow in which that around it stands for what is not trusted; `given`: what else is bound."""
+def _filled(stage: Stage, name: str, flow: View, back: View, bindings: dict[str, Any]) -> View:
+    """Flow in which that around it stands for what is not trusted; `bindings`: all others."""
     known, result = (stage.texture(n, "rgba16float") for n in ("known", f"filled {name}"))
     weighted, around = (stage.texture(n, "rgba32float") for n in ("weighted", "around"))
-    given = given | {"flow_back": back}
+    bindings = bindings | {"flow_back": back}
     stage.run("accept", "trust", flow=flow, around=stage.none("rgba32float"), flow_out=known,
-              weighted=weighted, **given)  # fmt: skip
+              weighted=weighted, **bindings)  # fmt: skip
     blurred(stage, weighted, SPREAD, around)
     stage.run("accept", "fill", flow=known, around=around, flow_out=result, weighted=weighted,
-              **given)  # fmt: skip
+              **bindings)  # fmt: skip
     return result
 
 
-def _search(stage: Stage, name: str, here: list[View], there: list[View], linear) -> View:
+def _search(stage: Stage, name: str, here: list[View], other: list[View], linear) -> View:
     """Flow by itself, from the coarsest level to the finest."""
     coarse = stage.none("rgba16float")
     sizes = level_sizes(stage.size)
@@ -125,7 +125,7 @@ def _search(stage: Stage, name: str, here: list[View], there: list[View], linear
         grid = patch_grid(sizes[i])
         first, second = (stage.texture(f"patches {i} {k}", "rgba32float", grid) for k in "ab")
         found = stage.texture(f"level flow {i} {name}", "rgba16float", sizes[i])
-        no_patches, no_flow = stage.spare("rgba32float"), stage.spare("rgba16float")
+        no_patches, no_flow = stage.unused("rgba32float"), stage.unused("rgba16float")
         for entry, size, patches, patches_out, flow_out in (
             ("search", grid, stage.none("rgba32float"), first, no_flow),
             ("propagate", grid, first, second, no_flow),
@@ -133,7 +133,7 @@ def _search(stage: Stage, name: str, here: list[View], there: list[View], linear
             ("write_flow", sizes[i], first, no_patches, found),
         ):
             stage.run(
-                "flow", entry, size=size, here=here[i], there=there[i], coarse=coarse,
+                "flow", entry, size=size, here=here[i], there=other[i], coarse=coarse,
                 patches=patches, linear=linear, patches_out=patches_out, flow_out=flow_out,
             )  # fmt: skip
         coarse = found

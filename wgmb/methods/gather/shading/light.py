@@ -65,13 +65,13 @@ class Added:
     The alpha of a node says how sure its light is, from 0 to 1; that of a neighbour, whether the
     surface is seen there.
 
-    `found`: a buffer whose first word is 1 if light changes anywhere; if not, the layers are
+    `change_flags`: a buffer whose first word is 1 if light changes anywhere; if not, the layers are
     undefined. The others are of tiles, see active.wgsl.
     """
 
     layers: wgpu.GPUTexture
     times: LightTimes
-    found: wgpu.GPUBuffer
+    change_flags: wgpu.GPUBuffer
 
 
 class MovingLight:
@@ -87,7 +87,7 @@ class MovingLight:
     ) -> Added:
         """Record all passes. `weight`: of every pixel (see PreparedFrame)."""
         usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
-        found = self._device.create_buffer_with_data(
+        change_flags = self._device.create_buffer_with_data(
             label="found", data=np.zeros(1 + _tiles(bindings.size), np.uint32), usage=usage
         )
         stage = Stage(self._device, self._images, encoder, bindings, "", False, {})
@@ -96,16 +96,16 @@ class MovingLight:
             for kind in kinds
         ]
         changed = [
-            changes(stage, kind.frames, kind.albedo, kind.by_color, found)
+            changes(stage, kind.frames, kind.albedo, kind.by_color, change_flags)
             for stage, kind in zip(stages, kinds, strict=True)
         ]
-        gated = stage.gated(found, grids(stage.size)).gates
+        gated = stage.gated(change_flags, grids(stage.size)).gates
         earlier = None
         for stage, kind, by_side in zip(stages, kinds, changed, strict=True):
             stage = replace(stage, gates=gated)
-            earlier = self._layers(stage, kind, by_side, times, weight, earlier, found)
+            earlier = self._layers(stage, kind, by_side, times, weight, earlier, change_flags)
         assert earlier is not None, "no kind of light"
-        return Added(earlier, times, found)
+        return Added(earlier, times, change_flags)
 
     def _layers(
         self,
@@ -115,7 +115,7 @@ class MovingLight:
         times: LightTimes,
         weight: View | None,
         earlier: wgpu.GPUTexture | None,
-        found: wgpu.GPUBuffer,
+        change_flags: wgpu.GPUBuffer,
     ) -> wgpu.GPUTexture:
         """Record the layers of one kind, added to the `earlier` ones."""
         present = values(stage, kind.frames[0], changed, kind.by_color)
@@ -153,7 +153,7 @@ class MovingLight:
                     ("from_there", 1 - share, there, way.back),
                 ):
                     push = stage.uniform("push", "Push", along=along)
-                    stage.run("push", push=push, values=value, flow=by, found=found,
+                    stage.run("push", push=push, values=value, flow=by, found=change_flags,
                               pushed=buffers[name])  # fmt: skip
             before, after = (changed.get(one, none) for one in (-1, 1))
             stage.run(
@@ -173,7 +173,7 @@ class MovingLight:
                 explained=way.explained,
                 earlier=none if earlier is None else layer_of(earlier, i),
                 linear=self._linear,
-                found=found,
+                found=change_flags,
                 added=layer_of(result, i),
                 **buffers,
             )

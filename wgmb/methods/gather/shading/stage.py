@@ -43,7 +43,7 @@ class Stage:
         """Bound where a pass reads nothing; black."""
         return self.images.view(f"none {format}", (1, 1), format)
 
-    def spare(self, format: str) -> wgpu.GPUTextureView:
+    def unused(self, format: str) -> wgpu.GPUTextureView:
         """Bound where a pass writes nothing."""
         return self.images.view(f"spare {format}", (1, 1), format)
 
@@ -78,8 +78,8 @@ class Stage:
         usage = wgpu.BufferUsage.UNIFORM
         return self.device.create_buffer_with_data(label=struct, data=data, usage=usage)
 
-    def gated(self, found: wgpu.GPUBuffer, sizes: list[tuple[int, int]]) -> Stage:
-        """The same, whose passes of these sizes run only if `found` says so."""
+    def gated(self, change_flags: wgpu.GPUBuffer, sizes: list[tuple[int, int]]) -> Stage:
+        """The same, whose passes of these sizes run only if `change_flags` says so."""
         assert len(sizes) <= _GATES
         counts = np.zeros((_GATES, 4), np.uint32)
         counts[: len(sizes), :2] = sizes
@@ -89,7 +89,7 @@ class Stage:
             label="gates", size=length, usage=usage.STORAGE | usage.INDIRECT
         )
         self.run("gate", size=(1, 1), sizes=self.uniform("gate", "Sizes", counts=counts),
-                 found=found, gates=gates)  # fmt: skip
+                 found=change_flags, gates=gates)  # fmt: skip
         each = {
             size: {"buffer": gates, "offset": 12 * i, "size": 12} for i, size in enumerate(sizes)
         }
