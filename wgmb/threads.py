@@ -105,7 +105,7 @@ class Behind(Generic[_Item]):
                 _join(self._thread)
         finally:  # an interruption comes in the middle of it
             self._stop.set()
-            _join(self._thread, 1.0)
+            _join(self._thread)  # before the caller closes what is written to
         if kind is None and self._error is not None:
             raise self._error
 

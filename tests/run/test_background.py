@@ -87,3 +87,19 @@ def test_an_error_of_the_caller_leaves_the_rest_undone(left):
         put(1)
         raise KeyboardInterrupt
     assert len(done) <= 1 and not left()
+
+
+def test_work_that_is_begun_is_done_before_the_caller_goes_on_after_an_error(left):
+    """A caller closes the file that is written to, which an encoder may still be at."""
+    begun, done = threading.Event(), []
+
+    def work(n):
+        begun.set()
+        time.sleep(1.2)
+        done.append(n)
+
+    with pytest.raises(KeyboardInterrupt), Behind(work) as put:
+        put(1)
+        begun.wait()
+        raise KeyboardInterrupt
+    assert done == [1] and not left()

@@ -245,3 +245,13 @@ def test_an_interlaced_frame_is_two_pictures(tmp_path):
     for number, picture in later.items():
         row = picture.planes[0][10:38].astype(float).mean(0) - 50
         assert (row * np.arange(64)).sum() / row.sum() == pytest.approx(places[number], abs=0.01)
+
+
+def test_two_threads_may_read_one_video_at_the_same_time(tmp_path):
+    """On a busy machine the thread that read ahead for one segment may outlive it."""
+    footage = VideoReader(clips.write(tmp_path / "c.mp4", options={"g": "4"}))
+    old, new, count = footage.pictures(), footage.pictures(), len(footage)
+    numbers = [next(new)[0] for _ in range(2)]
+    assert [next(old)[0] for _ in range(count - 2)] == list(range(count - 2))
+    assert numbers + [number for number, _ in new] == list(range(count))
+    assert not footage.missing

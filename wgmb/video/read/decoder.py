@@ -24,19 +24,22 @@ class Decoder:
 
     def __init__(self, path: Path, index: int, timeline: Timeline):
         self._path, self._index, self._timeline = path, index, timeline
-        self._last = -1  # number of the frame that was yielded last
 
     def frames(self, first: int) -> Iterator[tuple[int, av.VideoFrame]]:
         """Frames and their numbers, which ascend, from one at or before `first` on.
 
         Frames that cannot be decoded are left out. Several threads decode until there is an error,
-        because they lose more than what is damaged; then one does.
+        because they lose more than what is damaged; then one does. Others may be asked for
+        meanwhile, in other threads.
         """
-        self._last = -1
+        last = -1
         try:
-            yield from self._begun(first, careful=False)
+            for last, frame in self._begun(first, careful=False):
+                yield last, frame
         except _DamagedError:
-            yield from self._begun(max(self._last + 1, first), careful=True)
+            for number, frame in self._begun(max(last + 1, first), careful=True):
+                if number > last:
+                    yield number, frame
 
     def _begun(self, first: int, careful: bool) -> Iterator[tuple[int, av.VideoFrame]]:
         """Frames from the last key frame on that leads to `first`."""
@@ -76,9 +79,7 @@ class Decoder:
                     continue  # what edits leave out
             if before < number < len(ticks):
                 before = number
-                if number > self._last:
-                    self._last = number
-                    yield number, frame
+                yield number, frame
 
 
 def decoded(
