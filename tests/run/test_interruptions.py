@@ -2,7 +2,10 @@
 
 import contextlib
 import itertools
+import os
 import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -122,6 +125,23 @@ def test_a_library_that_breaks_by_itself_is_not(monkeypatch):
     monkeypatch.setattr(app, "make_app", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         app.main(["devices"])
+
+
+@pytest.mark.parametrize(("words", "code"), [("--version", 0), ("nonsense", 2)])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_after_the_end_changes_no_exit_code(words, code, number):
+    script = (
+        "import atexit, os, time\n"
+        "from wgmb.cli.app import run\n"
+        "atexit.register(lambda: (os.write(1, b'over'), time.sleep(60)))\n"
+        f"run([{words!r}])\n"
+    )
+    line = [sys.executable, "-c", script]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        while b"over" not in os.read(process.stdout.fileno(), 100):
+            pass
+        process.send_signal(number)
+        assert process.wait(timeout=20) == code
 
 
 def test_what_a_half_made_object_raises_after_an_interruption_is_not_printed(capsys, monkeypatch):

@@ -284,6 +284,8 @@ def test_a_curve_that_changes_is_told(desk, capsys, shot):
         ("--job shot.json --frames 8-12", "9-12 are not in the job, which has 1-8"),
         ("--job shot.json --shutter 90", "--job holds all settings"),
         ("--job shot.json -o x.####.exr", "--job holds all settings"),
+        ("--job shot.json --frames 11 --resume", "--job holds all settings, and frames that are"),
+        ("--job=shot.json --overwrite", "--job holds all settings"),
         ("in/shot.####.exr --job shot.json", "--job holds all settings"),
         ("in/shot.####.exr", "--output is missing"),
         ("-o x.####.exr", "no input"),

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tracemalloc
 from fractions import Fraction
 
 import av
@@ -11,10 +12,16 @@ import pytest
 from file_lists import LISTS
 
 from wgmb import InputError, blur_video
-from wgmb.video.clock import Clock
+from wgmb.color.coding import Coding
+from wgmb.run.video import VideoRequest
+from wgmb.settings import OutputSettings
+from wgmb.settings.video import VideoSettings
+from wgmb.video.clock import Clock, tick
 from wgmb.video.output_times import OutputFrames
 from wgmb.video.read.container import READERS
 from wgmb.video.read.reader import VideoReader
+from wgmb.video.write.encoders import chosen
+from wgmb.video.write.segments import Segments
 
 
 def write(path, times, size=(32, 32), pixels="yuv420p", codec="ffv1"):
@@ -93,6 +100,38 @@ def test_frames_at_the_times_of_the_pictures_do_not_fill_a_pause(tmp_path):
     reader = VideoReader(path)
     clock = Clock(reader.times[0], Fraction(1), Fraction(0), None, None)
     assert len(OutputFrames(reader, clock, None, 600)) <= 6
+
+
+def test_output_frames_of_short_pauses_are_not_listed(tmp_path):
+    """Each pause is allowed; together they are 100 million frames."""
+    path = write(tmp_path / "lots.mkv", [590_000 * n for n in range(200)])
+    run = VideoRequest(video=VideoSettings(flow="none")).open()
+    tracemalloc.start()
+    plan = run.plan(path, OutputSettings(output=str(tmp_path / "o.mp4"), fps="1000"))
+    assert len(plan.wanted) > 100_000_000
+    assert plan.wanted.times[-1] - plan.wanted.times[0] > 117_000
+    assert plan.wanted.tick == Fraction(1, 1000)
+    segments = Segments(
+        tmp_path / "o.mp4", chosen(tmp_path / "o.mp4"), Coding(), (32, 32), Fraction(1000),
+        plan.wanted.tick, plan.wanted.times, {},
+    )  # fmt: skip
+    assert len(segments.to_do()) > 10_000
+    segments.release()
+    assert tracemalloc.get_traced_memory()[1] < 20 << 20
+    tracemalloc.stop()
+
+
+@pytest.mark.parametrize("fps", [None, Fraction(30)])
+def test_output_frames_have_a_key_of_their_own(tmp_path, fps):
+    reader = VideoReader(write(tmp_path / "in.mkv", [0, 42, 84, 126, 170, 201]))
+    clocks = [Clock(), Clock(speed=Fraction(2)), Clock(end=Fraction(1, 10)), Clock(Fraction(1, 9))]
+    keys = {OutputFrames(reader, clock, fps).key for clock in clocks}
+    assert len(keys) == len(clocks)
+    assert OutputFrames(reader, clocks[0], fps).key in keys
+    frames = OutputFrames(reader, clocks[1], fps)
+    assert list(frames.times) == [frame.time for frame in frames]
+    assert frames.tick == tick(*frames.times, frames[0].interval)
+    assert frames.times[1:3] == [frame.time for frame in frames[1:3]]
 
 
 def test_pictures_a_million_seconds_apart_have_a_rate(tmp_path):

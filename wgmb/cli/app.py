@@ -116,7 +116,7 @@ def main(arguments: list[str] | None = None) -> int:
     except cyclopts.UnknownOptionError as error:
         return _say_why(f"{_elsewhere(words, error) or error}{_hint(words)}", USAGE)
     except cyclopts.CycloptsError as error:
-        return _say_why(f"{_plainly(str(error))}{_hint(words)}", USAGE)
+        return _say_why(f"{_plainly(str(error), words)}{_hint(words)}", USAGE)
     except DeviceError as error:
         return _say_why(str(error), NO_DEVICE)
     except Error as error:
@@ -152,10 +152,15 @@ def _check_text(words: list[str]) -> None:
             raise InputError(f"{shown}: not UTF-8; please rename the file or folder") from None
 
 
-def _plainly(text: str) -> str:
+def _plainly(text: str, words: list[str]) -> str:
     """The message about a value of another type, in words: a number, not int|None; about a
     missing option, how to give it.
     """
+    if words[:1] == ["blur"] and any(w.partition("=")[0] == "--job" for w in words):
+        from .commands.blur import NOT_WITH_JOB
+
+        if "--output" in text:  # which is missing where another option of the output is given
+            return NOT_WITH_JOB
     if missing := re.fullmatch(r'Command "(.*)" parameter (--?\S+) requires an argument\.', text):
         option = "--output (-o)" if missing[2] in ("--output", "-o") else missing[2]
         return f"{missing[1]} needs {option} and its value; `wgmb {missing[1]} --help` tells more"
@@ -222,8 +227,8 @@ def run(arguments: list[str] | None = None) -> None:
     codes: list[int] = []
     atexit.register(_insist, codes)  # before all others, so it is called after them
     code = main(arguments)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    for number in (signal.SIGTERM, signal.SIGINT):  # nothing is left to be interrupted
+        signal.signal(number, lambda *_: os._exit(code))
     terminal.drop_streams()
     codes.append(code)
     sys.exit(code)

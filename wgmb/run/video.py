@@ -78,7 +78,7 @@ class VideoPlan:
     reader: VideoReader
     output: OutputSettings
     clock: Clock
-    wanted: list[OutputFrame]
+    wanted: OutputFrames
     rate: str
     """A line about the output's rate where it was chosen for the user, or ''."""
 
@@ -149,7 +149,7 @@ class VideoRun:
         clock = self.request.video.clock(reader, self.request.input.frames)
         fps, said = _rate(reader, output)
         longest = self.request.video.longest_pause
-        wanted = list(OutputFrames(reader, clock, fps, longest))
+        wanted = OutputFrames(reader, clock, fps, longest)
         return VideoPlan(reader, output, clock, wanted, said)
 
     def exposures(self, plan: VideoPlan) -> VideoBlur:

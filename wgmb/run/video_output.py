@@ -25,9 +25,9 @@ from ..settings import OutputSettings
 from ..settings.video import VideoSettings
 from ..shutter import Shutter
 from ..threads import Behind
-from ..video.clock import Clock, tick
+from ..video.clock import Clock
 from ..video.exposures import ExposedPicture, VideoBlur
-from ..video.output_times import OutputFrame
+from ..video.output_times import OutputFrame, OutputFrames
 from ..video.read.reader import VideoReader
 from ..video.write.encoders import SUFFIXES, chosen
 from ..video.write.other_streams import OtherStreams
@@ -128,7 +128,7 @@ def write(
     run: PictureMaker,
     output: OutputSettings,
     video: VideoSettings,
-    wanted: list[OutputFrame],
+    wanted: OutputFrames,
     settings: dict[str, Any],
     make_part: MakePart,
     masks: Sequence[Path] = (),
@@ -147,7 +147,7 @@ def _write_video(
     run: PictureMaker,
     output: OutputSettings,
     video: VideoSettings,
-    wanted: list[OutputFrame],
+    wanted: OutputFrames,
     settings: dict[str, Any],
     make_part: MakePart,
     inputs: Sequence[Path],
@@ -157,7 +157,7 @@ def _write_video(
     encoding = chosen(path, video.codec, video.quality, video.encoder)
     coding, lost = encoding.coding(reader.coding)
     facts = reader.facts
-    made_of = settings | {"times": _crc(str([(m.time, m.interval) for m in wanted]).encode())}
+    made_of = settings | {"times": wanted.key}
     texts = _texts(reader, made_of)
     there = [path] if os.path.exists(os.path.realpath(path)) else []
     refuse_inputs(path.parent, [path.name], there, inputs)
@@ -173,15 +173,13 @@ def _write_video(
         raise InputError(f"{path} exists{more}; `overwrite=True` replaces it")
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic.sweep(path.parent, [path.name])
-    times, rate = [moment.time for moment in wanted], 1 / wanted[0].interval
-    base = tick(*times, wanted[0].interval)
-    shape = encoding, coding, reader.size, rate, base
+    shape = encoding, coding, reader.size, 1 / wanted[0].interval, wanted.tick
     others = None
     if video.streams == "all":
         keeps_pitch = video.pitch == "keep"
         others = OtherStreams(reader.path, reader.index, run.clock, keeps_pitch)
     if output.resume and encoding.codec != "gif":  # which has one palette after another
-        segments = Segments(path, *shape, times, made_of, facts)
+        segments = Segments(path, *shape, wanted.times, made_of, facts)
         try:
             for numbers in segments.to_do():
                 part = wanted[numbers.start : numbers.stop]
@@ -245,16 +243,16 @@ def _write_frames(
     run: PictureMaker,
     output: OutputSettings,
     video: VideoSettings,
-    wanted: list[OutputFrame],
+    wanted: OutputFrames,
     settings: dict[str, Any],
     make_part: MakePart,
     inputs: Sequence[Path],
 ) -> list[str]:
     """Write image files."""
-    numbers = [FIRST + moment.number for moment in wanted]
+    numbers = list(range(FIRST, FIRST + len(wanted)))
     files = replace(output, fps=None).make(settings, numbers, inputs)
     channels = 4 if run.reader.coding.alpha else 3
-    left = wanted
+    left: Sequence[OutputFrame] = wanted
     if output.resume:
         left = [m for m in wanted if not files.done(FIRST + m.number, _moment(m))]
     try:

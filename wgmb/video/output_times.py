@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -13,7 +14,7 @@ from typing import overload
 import numpy as np
 
 from ..errors import InputError
-from .clock import Clock
+from .clock import Clock, tick
 from .read.reader import VideoReader
 from .read.timeline import Times
 
@@ -81,6 +82,26 @@ class OutputFrames(Sequence[OutputFrame]):
             else self._frame(numbers)
         )
 
+    @property
+    def times(self) -> Sequence[Fraction]:
+        """Their times [s]; nothing is listed."""
+        return _Times(self)
+
+    @property
+    def tick(self) -> Fraction:
+        """The tick of a clock that all their times are multiples of, and their interval too [s]."""
+        if self._own is None:
+            return tick(self._begin, self._step)
+        return tick(*self.times, self._step)
+
+    @property
+    def key(self) -> str:
+        """Their number and times, in a text that no other frames have."""
+        if self._own is None:
+            return f"{self._count} from {self._begin} by {self._step}"
+        own = ",".join(map(str, self.times))
+        return f"{self._count} by {self._step}, {zlib.crc32(own.encode()):08x}"
+
     def nearest(self, time: Fraction) -> int:
         """The number of the output frame whose time is nearest to `time` [s], on its clock."""
         if self._own is None:
@@ -93,6 +114,25 @@ class OutputFrames(Sequence[OutputFrame]):
         if self._own is None:
             return OutputFrame(number, self._begin + number * self._step, self._step)
         return OutputFrame(number, self._clock.out(self._own[number]), self._step)
+
+
+class _Times(Sequence[Fraction]):
+    """The times of output frames, each made when it is asked for."""
+
+    def __init__(self, frames: OutputFrames):
+        self._frames = frames
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    @overload
+    def __getitem__(self, index: int) -> Fraction: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Fraction]: ...
+    def __getitem__(self, index: int | slice) -> Fraction | list[Fraction]:
+        if isinstance(index, slice):
+            return [frame.time for frame in self._frames[index]]
+        return self._frames[index].time
 
 
 def _count_before(times: Sequence[Fraction], time: Fraction) -> int:

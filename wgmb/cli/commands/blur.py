@@ -42,6 +42,11 @@ from ..options import (
 from ..spelling import as_options
 from ..terminal import muted, note, progress
 
+NOT_WITH_JOB = (
+    "--job holds all settings, and frames that are done are kept; only --frames, --workers, "
+    "--cluster, --adapter, --verbose and --quiet can be combined with it"
+)
+
 
 def blur(
     patterns: Annotated[tuple[str, ...], Parameter(name="pattern")] = (),
@@ -121,10 +126,7 @@ def blur(
             VideoOptions(),
         )
         if patterns or confidence or fps_in or config or rest != (*plain, None):
-            raise InputError(
-                "--job holds all settings; only --frames, --workers, --cluster, --adapter, "
-                "--verbose and --quiet can be combined with it"
-            )
+            raise InputError(NOT_WITH_JOB)
         return blur_job(job, input.frames, crew, adapter, verbose, quiet)
     if not patterns:
         raise InputError("no input: name frames such as 'shot.####.exr', or a video")

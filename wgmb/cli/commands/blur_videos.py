@@ -78,8 +78,8 @@ def _one_of_many(plan: VideoPlan, run: VideoRun, tell: Tell, quiet: bool) -> boo
         complain(_reason(error, path))
         return False
     finally:
-        for moment in plan.wanted[told[0] :]:
-            tell_name(moment.number, "skipped")
+        for number in range(told[0], len(plan.wanted)):
+            tell_name(number, "skipped")
     if not quiet:
         took = f"{report.frames} frames in {report.seconds:.1f} s"
         words = [took if report.is_new else "", *report.left_out, *report.notes]

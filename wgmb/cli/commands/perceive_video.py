@@ -39,7 +39,7 @@ def perceive_video(
         raise InputError("`fps` is for frames, the pictures of a video have their own times")
     reader = VideoReader(path, max_mb=input.max_mb)
     clock = VideoSettings().clock(reader, input.frames)
-    wanted = list(OutputFrames(reader, clock, None))
+    wanted = OutputFrames(reader, clock, None)
     device = gpu.open_device(adapter)
     observer = Observer(densest_rate(reader, cone), cone, device=device)
     seen = PerceivedVideo(reader, clock, VideoPictures(reader, device), observer)
