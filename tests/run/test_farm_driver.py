@@ -152,6 +152,20 @@ def test_a_cluster_without_workers_is_an_error_after_a_while(drive):
         drive({}, None)
 
 
+def test_an_interruption_that_python_lost_ends_a_run_whose_workers_are_gone(shot, tmp_path):
+    """Ctrl-C reaches workers too, which end; no frame is told of any more."""
+    looks = []
+
+    def check():
+        looks.append(1)
+        if len(looks) == 3:
+            raise KeyboardInterrupt
+
+    place = Farm("tcp://x", check=check)
+    with pytest.raises(KeyboardInterrupt):
+        Driver(place, Client({}, None), job_of(shot, tmp_path), "", lambda n, state: None).run()
+
+
 def test_a_frame_that_kills_its_worker_twice_is_named_and_the_others_are_done(drive):
     deaths = collections.Counter()
 

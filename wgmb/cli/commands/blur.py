@@ -40,7 +40,7 @@ from ..options import (
     Videos,
 )
 from ..spelling import as_options
-from ..terminal import muted, note, progress
+from ..terminal import check, muted, note, progress
 
 NOT_WITH_JOB = (
     "--job holds all settings, and frames that are done are kept; only --frames, --workers, "
@@ -243,7 +243,7 @@ def blur_on_farm(
     def say(text: str) -> None:
         note(as_options(text))
 
-    farm = Farm(cluster, workers, adapter, say, say if verbose else lambda text: None)
+    farm = Farm(cluster, workers, adapter, say, say if verbose else lambda text: None, check)
     started = time.perf_counter()
     with progress(len(job.numbers), quiet) as tick, muted():
         outcome = farm.blur(job, tick)

@@ -82,6 +82,7 @@ class Driver:
 
     def _go_on(self) -> None:
         while True:
+            self._farm.check()
             self._look()
             self._give()
             busy = any(worker.part for worker in self._workers.values())

@@ -20,7 +20,7 @@ class WorkerPool:
 
     `cluster`: address of a scheduler; without, `workers` processes are started here, by default
     one for each GPU. `note`: called with a line that a user should read, `details` with those
-    that tell which worker did what.
+    that tell which worker did what; `check` all the time, and may raise to end the run.
     """
 
     cluster: str | None = None
@@ -28,6 +28,7 @@ class WorkerPool:
     adapter: str | None = None
     note: Callable[[str], None] = lambda text: None
     details: Callable[[str], None] = lambda text: None
+    check: Callable[[], None] = lambda: None
     plugin: Callable[..., Any] | None = None
     patience: float = PATIENCE
 
