@@ -65,6 +65,11 @@ def did_you_mean(word: object, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
+def counted(number: int, what: str) -> str:
+    """A number of things, for messages: 1 frame, 3 frames."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def size_text(of: NDArray | tuple[int, int]) -> str:
     """Width x height of a plane, or of a pair, for messages."""
     width, height = of if isinstance(of, tuple) else of.shape[::-1]

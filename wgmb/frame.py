@@ -104,8 +104,10 @@ class Frame:
             raise InputError(f"color must be at most {MOST_SIDE} pixels a side, got "
                              f"{width} x {height}")  # fmt: skip
         color = _float_array("color", self.color)
-        if color.ndim != 3 or color.shape[2] not in (3, 4) or 0 in color.shape:
+        if color.ndim != 3 or color.shape[2] not in (3, 4):
             raise InputError(f"color must be (height, width, 3 or 4), got {color.shape}")
+        if 0 in color.shape:
+            raise InputError(f"color must have at least one pixel, got {width} x {height}")
         object.__setattr__(self, "color", color)
         for name, channels in _CHANNELS.items():
             given = getattr(self, name)

@@ -82,8 +82,9 @@ class Shutter:
     rolling_duration: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.degrees) and 0 <= self.degrees <= 36000):
-            raise InputError(f"shutter must be 0 to 36000 degrees, got {self.degrees}")
+        text = isinstance(self.degrees, str)
+        if text or not (math.isfinite(self.degrees) and 0 <= self.degrees <= 36000):
+            raise InputError(f"shutter must be 0 to 36000 degrees, got {self.degrees!r}")
         if isinstance(self.phase, str) and self.phase not in PHASES:
             check_choice("phase", self.phase, ("start", "centre", "end"), " or a number")
         if not isinstance(self.phase, str) and not abs(self.phase) <= 100:

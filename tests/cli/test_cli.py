@@ -195,7 +195,7 @@ def test_info_says_windows_and_bad_pixels(tmp_path, capsys):
     code, out, _ = make.inside(capsys, "info", path)
     assert code == 0
     assert "(-3, 2, 60, 49)" in out
-    assert "1 pixels of color" in out
+    assert "1 pixel of color" in out
     assert "3 pixels of motion" in out or "3 pixels of to_next" in out
     assert "nan" not in out
 

@@ -279,7 +279,7 @@ def test_runs_are_resumed_and_files_replaced_only_when_asked(shot, tmp_path, cap
     before = (tmp_path / "o.0001.exr").read_bytes()
     (tmp_path / "o.0002.exr").unlink()
     _, _, err = make.inside(capsys, *line, "--resume")
-    assert "1 frames" in err
+    assert "1 frame in" in err
     assert "2 already done" in err
     assert (tmp_path / "o.0001.exr").read_bytes() == before
     other = (*line[:-1], "plain")

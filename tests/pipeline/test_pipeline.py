@@ -42,7 +42,7 @@ def motion(x=6.0, y=2.0, size=(48, 64)):
             "object_id must not be a masked array",
         ),
         ({"color": np.zeros((48, 64), "f4")}, r"color must be \(height, width, 3 or 4\)"),
-        ({"color": np.zeros((0, 64, 3), "f4")}, "color must be"),
+        ({"color": np.zeros((0, 64, 3), "f4")}, "color must have at least one pixel, got 64 x 0"),
         (
             {"color": np.broadcast_to(np.float32(1), (200_000, 200_000, 3))},
             "color must be at most 32768 pixels a side, got 200000 x 200000",
@@ -61,12 +61,16 @@ def motion(x=6.0, y=2.0, size=(48, 64)):
         ({"jitter": float("nan")}, "jitter"),
         ({"max_blur": -1.0}, "max_blur"),
         ({"method": "magic"}, "unknown method 'magic'; available: tap"),
-        ({"magic": 1}, "method 'tap' has no option magic; it has path, variant"),
+        ({"magic": 1}, "method 'tap' has no option magic; it has path, variant, shutter, curve"),
+        ({"shuter": 90}, "no option shuter; it has .*; did you mean 'shutter'?"),
+        ({"seed": 1}, "method 'tap' has no option seed, but distributed; it has path, variant"),
+        ({"shutter": "180"}, "shutter must be 0 to 36000 degrees, got '180'"),
+        ({"to_next": None}, "method 'tap' needs motion: to_next, or depth and a camera"),
         ({"path": "bent"}, "path must be one of curved, straight"),
         ({"variant": "old"}, "variant must be one of"),
         ({"output": "rgba8unorm"}, "output must be one of"),
         ({"shutter": -1}, "shutter must be 0 to"),
-        ({"method": "distributed"}, "method 'distributed' needs scene"),
+        ({"method": "distributed"}, "method 'distributed' draws built-in scenes; for frames: tap"),
     ],
 )
 def test_what_does_not_fit_is_named(noise, change, words):

@@ -327,7 +327,7 @@ def test_a_job_is_written_without_a_gpu(desk, capsys, shot):
     line = ("job", shot, "-o", "o.####.exr", "-j", "shot.json")
     done = make.command(*line, env=env)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
-    assert done.stderr == "shot.json: 10 frames 1-10 with gather, not blurred yet\n"
+    assert done.stderr == "shot.json: 10 frames (1-10) with gather, not blurred yet\n"
 
 
 # ---- what is there --------------------------------------------------------------------------
@@ -354,7 +354,7 @@ def test_overwrite_means_what_was_there_before_the_job_and_not_what_it_made(own,
 def test_a_job_that_resumes_keeps_what_was_there_before(own, capsys):
     in_parts(capsys, ["1-3"])
     make_job(capsys, "in/shot.####.exr", "--resume")
-    assert "1 frames in" in (err := in_parts(capsys, ["2-4"]))
+    assert "1 frame in" in (err := in_parts(capsys, ["2-4"]))
     assert "2 already done" in err
 
 

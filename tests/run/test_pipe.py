@@ -322,7 +322,7 @@ def test_matroska_that_is_cut_off_or_damaged_is_said(tmp_path):
     bad = data[:middle] + bytes(40) + data[middle + 40 :]
     reader = StreamReader(Unseekable(bad), "stdin")
     assert len(list(reader.pictures())) == 12
-    assert reader.loss == "stdin: 1 pictures are damaged"
+    assert reader.loss == "stdin: 1 damaged picture"
 
 
 def test_exceptions_of_the_stream_arrive_unchanged(tmp_path):

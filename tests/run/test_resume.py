@@ -255,7 +255,7 @@ def test_resume_redoes_frames_whose_input_is_newer(tmp_path, capsys):
     run(capsys, pattern, tmp_path / "out", "--method", "tap")
     newer(tmp_path / "shot.0002.exr")
     _, _, err = run(capsys, pattern, tmp_path / "out", "--resume", "--method", "tap")
-    assert "1 frames" in err
+    assert "1 frame in" in err
 
 
 @pytest.mark.parametrize("option", ["--also", "--camera", "--holdout", "--scale"])
@@ -387,7 +387,7 @@ def test_a_run_whose_folder_is_gone_stops(tmp_path, capsys, monkeypatch):
     assert code == 1
     said, why = err.splitlines(), "No such file or directory"
     assert [s.split(" failed")[0] for s in said[:3]] == [f"wgmb: frame {n}" for n in (4, 5, 6)]
-    assert said[3] == f"wgmb: stopped: {out}: {why}; 14 other frames were not written"
+    assert said[3] == f"wgmb: stopped: {out}: {why}; 14 other frames not written"
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "gif"])

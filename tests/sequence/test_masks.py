@@ -416,7 +416,7 @@ def test_a_manifest_that_changed_makes_the_frame_anew(tmp_path, capsys):
     path = with_sidecar(tmp_path, text=b'{"tree": "%08x"}' % TREE)
     line = ("blur", path, "-o", tmp_path / "o.exr", "--method", "tap", "--holdout",
             "CryptoObject=tree", "--resume")  # fmt: skip
-    assert "1 frames" in make.inside(capsys, *line)[2]
+    assert "1 frame in" in make.inside(capsys, *line)[2]
     assert "1 already done" in make.inside(capsys, *line)[2]
     (tmp_path / "m.json").write_bytes(b'{"tree": "%08x", "house": "00000001"}' % TREE)
     assert "already done" not in make.inside(capsys, *line)[2]

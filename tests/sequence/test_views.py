@@ -287,7 +287,7 @@ def test_a_picture_or_video_has_the_default_view_and_percent_v_makes_one_of_each
     assert again[2].startswith("0 frames")
     (out / "right.0002.exr").unlink()
     again = make.inside(capsys, "blur", pattern, "-o", out / "%V.####.exr", "--resume")
-    assert again[2].startswith("1 frames")
+    assert again[2].startswith("1 frame in")
 
 
 def test_percent_v_reads_a_file_of_each_view(tmp_path, capsys):
@@ -473,7 +473,7 @@ def test_a_frame_that_lacks_a_view_is_told(tmp_path, capsys):
 
     pattern = with_stereo(tmp_path, half, (1, 2, 3))
     code, _, err = make.inside(capsys, "blur", pattern, "-o", tmp_path / "o.####.exr")
-    assert code == 0 and "frames 2: " in err and "left" in err
+    assert code == 0 and "frame 2: " in err and "left" in err
 
 
 def test_resume_redoes_what_another_view_was_chosen_for(tmp_path, capsys):

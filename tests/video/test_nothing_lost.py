@@ -31,7 +31,7 @@ def test_a_cut_off_video_says_how_many_pictures_are_lost(tmp_path, capsys, cut):
     made = len(VideoReader(tmp_path / "b.mkv"))
     (count,) = [int(w) for w in text.split() if w.isdigit()]
     assert 10 < made < 40 and abs(made + count - 48) <= 2, text
-    assert "pictures after" in text and text.count("\n") == 1
+    assert "cut off after" in text and text.count("\n") == 1
 
 
 def test_a_part_before_the_cut_off_end_has_lost_nothing(tmp_path, capsys, cut):

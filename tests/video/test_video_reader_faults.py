@@ -122,7 +122,7 @@ def test_pictures_of_another_size_are_scaled_to_that_of_the_first(tmp_path):
     assert not reader.scaling()
     pictures = dict(reader)
     assert reader.scaled == {4, 5, 6, 7} and len(pictures) == 8 and not reader.loss()
-    assert "4 pictures of another size were scaled to 64 x 48, from 0." in reader.scaling()
+    assert "4 pictures of another size scaled to 64 x 48, from 0." in reader.scaling()
     for n, picture in pictures.items():
         assert picture.size == (64, 48)
         luma, want = picture.planes[0].astype(int), clips.planes(n % 4)[0]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..io.frame_numbers import frame_list
+from ..errors import counted
+from ..io.frame_numbers import frame_list, numbered
 from ..run.report import Outcome
 from ..sequence.frame_file import odd_sizes
 from .exit_codes import DONE, SOME_FAILED
@@ -18,7 +19,7 @@ def conclude(outcome: Outcome, target: Path, took: str, quiet: bool, verbose: bo
     for number, why in sorted(report.failed.items()):
         complain(f"frame {number} failed: {why}")
     if report.stopped:
-        complain(f"stopped: {report.stopped}; {outcome.rest} other frames were not written")
+        complain(f"stopped: {report.stopped}; {counted(outcome.rest, 'other frame')} not written")
     for mask in report.absent:
         complain(f"{mask} is in no frame, so it changed nothing")
     if not quiet:
@@ -30,7 +31,7 @@ def conclude(outcome: Outcome, target: Path, took: str, quiet: bool, verbose: bo
         for text, told in outcome.notes.items():
             if told:
                 text = as_options(text)
-                some = "" if len(told) == len(report.done) else f"frames {frame_list(told)}: "
+                some = "" if len(told) == len(report.done) else f"{numbered(told)}: "
                 note(f"{some}{text}")
         for mask in outcome.unseen:
             note(f"{mask} is in no pixel of these frames, so it changed nothing")
@@ -41,8 +42,8 @@ def conclude(outcome: Outcome, target: Path, took: str, quiet: bool, verbose: bo
             note(f"camera cut before frame {', '.join(map(str, sorted(outcome.cuts)))}")
         if odd := odd_sizes({n: size for size, at in outcome.sizes.items() for n in at}):
             note(odd)
-        done = f"{len(report.done)} frames in {took} -> {target}"
+        done = f"{counted(len(report.done), 'frame')} in {took} -> {target}"
         note(done + (f", {len(report.skipped)} already done" if report.skipped else ""))
     if report.failed:
-        complain(f"{len(report.failed)} of {outcome.total} frames failed")
+        complain(f"{len(report.failed)} of {counted(outcome.total, 'frame')} failed")
     return SOME_FAILED if report.failed or report.stopped or report.absent else DONE

@@ -7,6 +7,8 @@ import os
 import stat
 from typing import BinaryIO
 
+from ..errors import counted
+
 STDIN, STDOUT = "/dev/stdin", "/dev/stdout"
 
 
@@ -34,6 +36,6 @@ class PipeWriter:
             while rest:  # a pipe may take a part
                 rest = rest[self._stream.write(rest) :]
         except BrokenPipeError:
-            text = f"the reader closed the pipe after {self.pictures} pictures"
+            text = f"the reader closed the pipe after {counted(self.pictures, 'picture')}"
             raise OSError(errno.EPIPE, text) from None
         return len(data)

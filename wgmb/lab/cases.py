@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError
 from ..extent import EVERYWHERE
 from ..frame import Frame
 from ..io.frame_numbers import frame_list
-from ..methods import METHODS
+from ..methods import METHODS, check_method
 from ..methods.options import options_of
 from ..metrics import measure
 from ..pipeline.blur import Blur
@@ -47,9 +47,7 @@ class Candidate:
     def parse(cls, text: str) -> Candidate:
         """NAME[:SAMPLES][:OPTION=VALUE]...; the error says which method is unknown."""
         name, *more = text.split(":")
-        if name not in METHODS:
-            known = f"available: {', '.join(METHODS)}{did_you_mean(name, METHODS)}"
-            raise InputError(f"unknown method {name!r}; {known}")
+        check_method(name)
         samples, options = None, []
         for part in more:
             key, equals, value = part.partition("=")

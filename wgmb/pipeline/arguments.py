@@ -12,7 +12,7 @@ import wgpu
 
 from .. import gpu
 from ..errors import InputError, check_choice, did_you_mean
-from ..methods import METHODS
+from ..methods import METHODS, check_method
 from ..methods.options import options_of
 from ..shutter import Shutter, Weight
 
@@ -34,9 +34,7 @@ def checked(
 
     InputError where one of them makes no sense; no device is opened.
     """
-    if not isinstance(method, str) or method not in METHODS:
-        known = f"available: {', '.join(METHODS)}{did_you_mean(str(method), METHODS)}"
-        raise InputError(f"unknown method {method!r}; {known}")
+    check_method(method)
     auto = samples == "auto" and getattr(METHODS[method], "adaptive", False)
     if samples is None:
         samples = getattr(METHODS[method], "samples", SAMPLES)
@@ -50,11 +48,22 @@ def checked(
     check_choice("output", output, OUTPUTS)
     known = options_of(METHODS[method].Options)
     if unknown := (options or {}).keys() - known.keys():
-        raise InputError(
-            f"method {method!r} has no option {', '.join(sorted(unknown))}; "
-            f"it has {', '.join(known) or 'none'}"
-        )
+        raise InputError(_no_option(method, sorted(unknown), list(known)))
     return int(samples), auto
+
+
+def _no_option(method: str, unknown: list[str], own: list[str]) -> str:
+    """The message about options that a method does not have."""
+    others = [n for n, m in METHODS.items() if not set(unknown) - options_of(m.Options).keys()]
+    text = f"method {method!r} has no option {', '.join(unknown)}"
+    if others:
+        return f"{text}, but {' and '.join(others)}; it has {', '.join(own) or 'none'}"
+    hint = did_you_mean(unknown[0], [*own, *_OF_ALL])
+    return f"{text}; it has {', '.join(own + _OF_ALL)}{hint}"
+
+
+_OF_ALL = ["shutter", "curve", "samples", "jitter", "max_blur", "device", "output"]
+"""Arguments of every Blur."""
 
 
 def most_samples(method: str, device: wgpu.GPUDevice) -> int:
@@ -73,7 +82,7 @@ def shutter_of(shutter: Shutter | float, curve: str | Weight | None = None) -> S
             )
         return shutter
     try:
-        degrees = float(shutter)
+        degrees = shutter if isinstance(shutter, str) else float(shutter)  # Shutter refuses text
     except (TypeError, ValueError):
         raise InputError(f"shutter must be degrees or a Shutter, got {shutter!r}") from None
     return Shutter(degrees) if curve is None else Shutter(degrees, curve=curve)

@@ -32,7 +32,7 @@ from ..gpu_frame.views import (
     check_output,
     check_view,
 )
-from ..methods import METHODS
+from ..methods import FRAME_METHODS, METHODS, check_method
 from ..methods.contract import (
     Inputs,
     PreparedFrame,
@@ -356,8 +356,11 @@ class Blur:
 
     def _require(self, available: Collection[str], whose: str = "") -> None:
         if missing := self.method.needs - set(available):
-            what = ", ".join(whose + name for name in sorted(missing))
-            raise InputError(f"method {self.method.name!r} needs {what}")
+            if "scene" in missing:
+                check_method(self.method.name, FRAME_METHODS)
+            what = " and ".join(whose + name for name in sorted(missing))
+            how = ": to_next, or depth and a camera" if {"motion"} == missing else ""
+            raise InputError(f"method {self.method.name!r} needs {what}{how}")
 
     def frame_bindings(
         self, size: tuple[int, int], number: int = 0, window: Window | None = None

@@ -24,9 +24,10 @@ from ..io.frame_numbers import (
     frame_path,
     has_view,
     in_view,
+    numbered,
 )
 from ..io.suffixes import STILLS
-from ..methods import METHODS
+from ..methods import FRAME_METHODS, METHODS, check_method
 from ..output.output import Output
 from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
@@ -38,6 +39,7 @@ from ..settings import OutputSettings, plain
 from ..settings.video import VideoSettings
 from .batch_report import Progress
 from .conversion import RateConversion
+from .needs import check_needs
 from .report import Outcome
 from .request import BlurRequest
 from .sequence import blur_sequence, convert_sequence
@@ -189,6 +191,8 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     settings make no sense together.
     """
     request = replace(request, shutter=request.shutter.resolved())
+    if request.blur.method is not None:
+        check_method(request.blur.method, FRAME_METHODS)
     clip, shown = request.opened()
     clip.check_layers()
     remarks = list(map(_of_scale, request.blur.scale))
@@ -204,6 +208,7 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
         blur = replace(request.blur, method=request.blur.method or video.method).for_pictures()
     else:
         blur = request.blur.resolved(clip=clip)
+        check_needs(clip, blur.method or "")
     request = replace(request, blur=blur, video=video)
     blur, output = request.blur, request.output
     request.shutter.make()  # says what is wrong with it
@@ -247,8 +252,8 @@ def _of_conversion(conversion: RateConversion, clip: Clip, output: OutputSetting
     said = []
     if conversion.step != 1:
         said.append(
-            f"frames {frame_list(clip.numbers)} at {conversion.fps_in} frames per second become "
-            f"frames {frame_list(conversion.numbers(clip))} at {conversion.fps}"
+            f"{numbered(clip.numbers)} at {conversion.fps_in} frames per second become "
+            f"{numbered(conversion.numbers(clip))} at {conversion.fps}"
         )
     if output.is_exr and output.layers == "all":
         said.append(

@@ -173,7 +173,7 @@ def blurred(
 
     InputError, before any frame is read, where a mask names an object that no Cryptomatte has.
     """
-    clip.check_names()
+    clip.check_masks()
     return frames(Stages(clip, blur, confidence), stop)
 
 

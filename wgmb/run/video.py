@@ -18,6 +18,7 @@ from .._version import __version__
 from ..color.highlights import check as check_highlights
 from ..errors import InputError, did_you_mean
 from ..extras import install_command, is_installed
+from ..methods import FRAME_METHODS, check_method
 from ..methods.keywords import MethodKeywords
 from ..pipeline.blur import Blur
 from ..settings import (
@@ -104,6 +105,8 @@ class VideoRequest:
 
     def open(self, device: wgpu.GPUDevice | str | None = None) -> VideoRun:
         """Open the GPU and what all videos share; InputError for settings that do not fit."""
+        if self.blur.method is not None:
+            check_method(self.blur.method, FRAME_METHODS)
         check_fits(self.input, self.blur)
         check_highlights(self.video.highlights)
         check_pause(self.video.longest_pause)

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..extent import Extent
 from ..frame import Frame
 from ..io import limits
-from ..io.frame_numbers import frame_list
+from ..io.frame_numbers import numbered
 from ..shots.cut_list import CutList
 from ..shots.motion_source import MotionSource
 from .data_windows import Placement
@@ -117,7 +117,7 @@ class Clip:
         even if the files on disk have changed.
         """
         if self._settled is None:
-            self.check_names()
+            self.check_masks()
             beyond = self._neighbours.beyond
             notes = tuple(text for text, at in self.notes.items() if len(at) == len(self.numbers))
             self._settled = SequenceFindings(
@@ -144,8 +144,7 @@ class Clip:
         name = (known.vectors or self.passes.vectors).convention
         vectors = {"auto": "", "none": ", no vectors"}.get(name, f", {name} vectors")
         pattern = self.pattern if len(self.pattern) <= 200 else f"...{self.pattern[-200:]}"
-        frames = f"frame{'s' if len(self.numbers) > 1 else ''} {frame_list(self.numbers)}"
-        return f'Clip("{pattern}", {frames}{vectors})'
+        return f'Clip("{pattern}", {numbered(list(self.numbers))}{vectors})'
 
     def move_by(self, motion: MotionSource | None) -> None:
         """Find motion in the pictures (see wgmb/flow) if the files hold none; None: all stand."""
@@ -351,12 +350,12 @@ class Clip:
         """Masks by index or id that no frame read so far has."""
         return self._masks.absent
 
-    def check_names(self) -> None:
-        """InputError if a mask names an object that no frame's Cryptomatte has.
+    def check_masks(self) -> None:
+        """InputError if there is no file of a mask, or no Cryptomatte has the object it names.
 
         The headers of the frames are searched once, up to the first with the name.
         """
-        self._masks.check_names()
+        self._masks.check()
 
     def check_layers(self) -> None:
         """InputError if a layer that is given by its name is in none of the frames.

@@ -10,13 +10,13 @@ from ..errors import InputError, did_you_mean
 from ..io import exr
 from ..io.frame_numbers import (
     MOST_FRAMES,
-    frame_list,
     frame_numbers,
     frame_path,
     has_view,
     in_view,
     is_pattern,
     number_in,
+    numbered,
     numbers_on_disk,
     readable,
     views_on_disk,
@@ -149,8 +149,7 @@ class SequenceFiles:
         missing = sorted(set(wanted) - self._existing)
         if missing and not skip_missing:
             raise InputError(
-                f"{self.pattern}: missing frames {frame_list(missing)}; "
-                "`skip_missing=True` leaves them out"
+                f"{self.pattern}: missing {numbered(missing)}; `skip_missing=True` leaves them out"
             )
         if not self._existing & set(wanted):
             raise InputError(f"{self.pattern}: none of the frames {frames} exist")

@@ -10,7 +10,6 @@ from ..io.frame_numbers import is_pattern, readable
 from ..sequence.clip import Clip, Passes
 from ..sequence.findings import SequenceFindings
 from ..sequence.layers import vectors
-from ..sequence.layers.masks import is_file, with_amount
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,8 +72,7 @@ class InputSettings:
         `settled`: what was found out about the sequence before (Clip.settle). InputError if a file
         is not readable, or a mask names what no Cryptomatte has.
         """
-        files = [name for name in (*holdout, *(with_amount(s)[0] for s in scale)) if is_file(name)]
-        for name in (*files, *self.also):
+        for name in self.also:
             if Path(name).suffix and not is_pattern(name):
                 readable(Path(name))
         passes = Passes(
@@ -109,5 +107,5 @@ class InputSettings:
             max_mb=self.max_mb,
             settled=settled,
         )
-        clip.check_names()
+        clip.check_masks()
         return clip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from ..io.frame_numbers import frame_list
+from ..io.frame_numbers import numbered
 from ..shots.reader import Picture, ShotReader
 from ..threads import ahead
 from .read.reader import VideoReader
@@ -46,4 +46,4 @@ def _cuts(reader: VideoReader, numbers: Sequence[int]) -> str:
 
 def _pictures(numbers: Sequence[int]) -> str:
     found = sorted(numbers)
-    return f"picture{'s' if len(found) > 1 else ''} {frame_list(found)}"
+    return numbered(found, "picture")

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import BinaryIO
 
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...io.pipes import STDIN, STDOUT
 from ...run.pipe import blur_pipe as run
 from ...run.video import VideoRequest
@@ -49,7 +49,8 @@ def blur_pipe(
         tell(text)
     if report.cuts:
         tell(f"camera cut before picture {', '.join(map(str, report.cuts))}")
-    tell(f"{report.frames} frames -> {'stdout' if output.output == STDOUT else output.output}")
+    where = "stdout" if output.output == STDOUT else output.output
+    tell(f"{counted(report.frames, 'frame')} -> {where}")
     if report.loss:
         note(f"wgmb: {report.loss}")
         return SOME_FAILED

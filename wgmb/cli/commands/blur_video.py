@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from ...errors import counted
 from ...run.video import VideoRequest, VideoRun
 from ...settings import OutputSettings
 from ..exit_codes import DONE, SOME_FAILED
@@ -41,7 +42,7 @@ def blur_video(
             note(f"{report.repeated} repeated pictures left out")
         if report.scaling:
             note(report.scaling)
-        note(f"{report.frames} frames in {took} -> {report.output}")
+        note(f"{counted(report.frames, 'frame')} in {took} -> {report.output}")
     if report.loss:
         note(f"wgmb: {report.loss}")
         return SOME_FAILED

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ...errors import GpuMemoryError, InputError
+from ...errors import GpuMemoryError, InputError, counted
 from ...io import stills
 from ...io.frame_numbers import is_pattern
 from ...run.video import VideoPlan, VideoRequest, VideoRun
@@ -60,7 +60,7 @@ def blur_videos(
             else:
                 failed += not _one_of_many(plan, run, tell, quiet)
     if not quiet:
-        note(f"{len(plans) - failed} of {len(plans)} videos done")
+        note(f"{len(plans) - failed} of {counted(len(plans), 'video')} done")
     return SOME_FAILED if failed else DONE
 
 
@@ -81,7 +81,7 @@ def _one_of_many(plan: VideoPlan, run: VideoRun, tell: Tell, quiet: bool) -> boo
         for number in range(told[0], len(plan.wanted)):
             tell_name(number, "skipped")
     if not quiet:
-        took = f"{report.frames} frames in {report.seconds:.1f} s"
+        took = f"{counted(report.frames, 'frame')} in {report.seconds:.1f} s"
         words = [took if report.is_new else "", *report.left_out, *report.notes]
         if report.repeated:
             words.append(f"{report.repeated} repeated pictures left out")

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from ...color.spaces import Display
 from ...color.srgb import motion_picture
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...extras import needed_by
 from ...io import stills
 from ...io.atomic import write_file
@@ -135,7 +135,7 @@ def _about_motion(clip: Clip, source: FrameFile, output: Path | None) -> list[tu
     frame = clip.frame(source, picture=source.reference_channel is not None)
     lines = []
     if frame.bad:
-        found = [f"{n} pixels of {name}" for name, n in frame.bad.items()]
+        found = [f"{counted(n, 'pixel')} of {name}" for name, n in frame.bad.items()]
         lines.append(("bad", f"not finite or not in front of the camera: {', '.join(found)}"))
     if "motion" not in frame.has:
         if output:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...io.atomic import write_file
 from ...io.frame_numbers import frame_list
 from ...run.job import settle
@@ -130,7 +130,7 @@ def job(
     if not quiet:
         if made.clip.is_finding_notable:
             note(f"vectors: {made.clip.finding}")
-        frames = f"{len(made.numbers)} frames {frame_list(made.numbers)}"
+        frames = f"{counted(len(made.numbers), 'frame')} ({frame_list(made.numbers)})"
         note(f"{file}: {frames} with {made.request.blur.method}, not blurred yet")
     return DONE
 

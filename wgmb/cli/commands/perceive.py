@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from ... import charts
 from ..._version import __version__
 from ...cone import VIDEOS, Cone
-from ...errors import InputError, size_text
+from ...errors import InputError, counted, size_text
 from ...extras import needed_by
 from ...io.atomic import write_file
 from ...io.frame_numbers import frame_numbers
@@ -145,7 +145,7 @@ def perceive(
             raise
     if not quiet:
         seconds = time.perf_counter() - started
-        done = f"{len(numbers)} frames in {seconds:.1f} s -> {files.pattern}"
+        done = f"{counted(len(numbers), 'frame')} in {seconds:.1f} s -> {files.pattern}"
         note(done)
     return 0
 

@@ -9,7 +9,7 @@ from typing import Any
 from ... import gpu
 from ..._version import __version__
 from ...cone import Cone
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...observer import Observer
 from ...run.perceive import PerceivedVideo, densest_rate
 from ...run.video import check_fits
@@ -64,7 +64,7 @@ def perceive_video(
         for text in left_out:
             note(f"{output.output}: {text}")
         seconds = time.perf_counter() - started
-        note(f"{len(wanted)} frames in {seconds:.1f} s -> {output.output}")
+        note(f"{counted(len(wanted), 'frame')} in {seconds:.1f} s -> {output.output}")
     if loss := reader.loss():
         note(f"wgmb: {loss}")
         return SOME_FAILED

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from ..._version import __version__
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...render import Render
 from ...run.job import check_confidence
 from ...run.scene import render_frames
@@ -109,6 +109,6 @@ def render(
             raise
     if not quiet:
         seconds, made = time.perf_counter() - started, len(moments) - skipped
-        done = f"{made} frames in {seconds:.1f} s -> {files.pattern}"
+        done = f"{counted(made, 'frame')} in {seconds:.1f} s -> {files.pattern}"
         note(done + (f", {skipped} already done" if skipped else ""))
     return DONE

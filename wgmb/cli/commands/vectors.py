@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..._version import __version__
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...output.vectors import PROGRAMS, VectorOutput
 from ...pipeline.blur import Blur
 from ...run.report import Outcome
@@ -85,7 +85,7 @@ def vectors(
         report = vectors_sequence(clip, files, blur=blur, resume=resume, progress=tick)
     if not quiet:
         for number, count in sorted(files.clipped.items()):
-            note(f"frame {number}: clipped {count} pixels that move over --max-displace")
+            note(f"frame {number}: clipped {counted(count, 'pixel')} beyond --max-displace")
         if len(clip.chosen) > 1 and not files.takes_views:
             note(f"wrote only view {clip.chosen[0]}; %V in the output's name makes a file for each")
     took = f"{time.perf_counter() - started:.1f} s"

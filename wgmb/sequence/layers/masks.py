@@ -14,7 +14,7 @@ import numpy as np
 from ...color.srgb import srgb
 from ...errors import InputError, size_text
 from ...io import exr, stills
-from ...io.frame_numbers import frame_path, in_view
+from ...io.frame_numbers import frame_path, in_view, is_pattern, numbers_on_disk, readable
 from ..data_windows import laid
 from ..frame_file import FrameFile, read
 from . import cryptomatte
@@ -81,8 +81,15 @@ class Masks:
                 found += [path] if path else []
         return found
 
-    def check_names(self) -> None:
-        """InputError where a mask names an object that no frame's Cryptomatte has."""
+    def check(self) -> None:
+        """InputError where a mask has no file, or names what no Cryptomatte has."""
+        for mask in self.every:
+            if is_file(mask):
+                for path in self.of_views(mask):
+                    if is_pattern(path):
+                        numbers_on_disk(path)
+                    elif not readable(path):
+                        raise InputError(f"{path}: no such file")
         for mask in self._by_name:
             if error := self._why_missing(mask):
                 raise error

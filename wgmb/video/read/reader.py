@@ -24,7 +24,7 @@ from av.video.reformatter import VideoReformatter
 from av.video.stream import VideoStream
 
 from ...color.coding import CodedPicture
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...io import limits
 from ..hdr10 import is_base_layer
 from ..pixels import (
@@ -127,10 +127,10 @@ class VideoReader:
             stream = cast(VideoStream, container.streams[self.index])
             frames = decoded(container, stream)
             frame = next(frames, None)
-            if (counted := self._packets.counted) is not None:
+            if (whole := self._packets.counted) is not None:
                 shown = [one.pts for one in islice(frames, _REORDERED) if one.pts is not None]
                 if shown != sorted(shown):  # as in VC-1 and RealVideo: times of decoding
-                    self._packets = counted
+                    self._packets = whole
         if frame is None:
             raise InputError(f"{self.path}: none of its pictures can be decoded ({self.codec})")
         self.pixels = frame.format.name
@@ -151,7 +151,8 @@ class VideoReader:
             first = int(np.searchsorted(self._packets.times.ticks, frame.pts))
             if 0 < first < len(self._packets.times):
                 self._packets = self._packets.from_picture(first)
-                self.notes.append(f"its first {first} pictures lack the one they build on")
+                lost = counted(first, "picture")
+                self.notes.append(f"left out at its beginning: {lost}, not decodable alone")
         self._decoder = Decoder(self.path, self.index, self._packets)
         self._timeline = self._packets.doubled() if self.is_interlaced else self._packets
         self._note(side)
@@ -269,10 +270,11 @@ class VideoReader:
             said.append(f"{text}, the first at {at:.2f} s")
         if self.damaged:
             at = float(self.times[min(self.damaged)])
-            said.append(f"{len(self.damaged)} pictures are damaged, the first at {at:.2f} s")
+            said.append(f"{counted(len(self.damaged), 'damaged picture')}, the first at {at:.2f} s")
         if self._packets.lacks and self._is_at_end:
             count, at = round(self._packets.lacks * self.rate), float(self._packets.end)
-            said.append(f"about {count} pictures after {at:.2f} s are lost, as it is cut off")
+            lost = counted(count, "picture")
+            said.append(f"cut off after {at:.2f} s, about {lost} before its end")
         return f"{self.path}: {'; '.join(said)}" if said else ""
 
     def scaling(self) -> str:
@@ -280,7 +282,8 @@ class VideoReader:
         if not self.scaled:
             return ""
         at, size = float(self.times[min(self.scaled)]), "{} x {}".format(*self.size)
-        return f"{len(self.scaled)} pictures of another size were scaled to {size}, from {at:.2f} s"
+        what = counted(len(self.scaled), "picture")
+        return f"{what} of another size scaled to {size}, from {at:.2f} s"
 
     def __len__(self) -> int:
         return len(self.times)

@@ -17,7 +17,7 @@ from av.sidedata.sidedata import Type
 from av.video.reformatter import VideoReformatter
 
 from ...color.coding import CodedPicture
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...io import limits
 from ..pixels import is_transparent, layout, planes_of
 from ..write.encoders import Facts
@@ -130,8 +130,8 @@ class StreamReader:
             following = next(self._frames, None)
             number += self._steps(frame, following, number)
             frame = following
-        lost = [f"{self._failed} pictures could not be decoded"] if self._failed else []
-        lost += [f"{damaged} pictures are damaged"] if damaged else []
+        lost = [f"{counted(self._failed, 'picture')} not decoded"] if self._failed else []
+        lost += [counted(damaged, "damaged picture")] if damaged else []
         lost += [self.loss] if self.loss else []
         self.loss = f"{self.name}: {', '.join(lost)}" if lost else ""
 
