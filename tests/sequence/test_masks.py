@@ -430,14 +430,15 @@ def test_the_viewer_hands_several_masks_on(shot):
     state = State().opened(str(shot)).with_options(given)
     words = state.command("o.####.png")
     assert [words[i + 1] for i, w in enumerate(words) if w == "--holdout"] == list(given["holdout"])
-    assert dict(State.of_toml(state.toml()).given) == given
+    again = State.of_toml(state.toml()).blur
+    assert {name: getattr(again, name) for name in given} == given
 
 
 def test_a_settings_file_has_a_list_of_masks(shot, tmp_path, capsys):
     saved = tmp_path / "s.toml"
     masks = '["IndexOB=2", "CryptoObject=tree"]'
     saved.write_text(f"[blur]\npattern = '{shot}'\nholdout = {masks}\nmethod = 'tap'\n")
-    assert dict(State.read(saved).given)["holdout"] == ("IndexOB=2", "CryptoObject=tree")
+    assert State.read(saved).blur.holdout == ("IndexOB=2", "CryptoObject=tree")
     out = tmp_path / "o.####.exr"
     assert make.inside(capsys, "blur", "-o", out, "--config", saved)[0] == 0
     assert masks in make.plain_header(tmp_path / "o.0002.exr")["wgmb"]

@@ -1,4 +1,4 @@
-"""What the chosen method needs, compared with what the frames have, before any is blurred."""
+"""Needs of the chosen method, compared with the frames before any is blurred."""
 
 from __future__ import annotations
 
