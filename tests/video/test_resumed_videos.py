@@ -44,6 +44,15 @@ def test_a_whole_video_is_done_in_every_container(clip, tmp_path, suffix):
 
 
 @pytest.mark.parametrize("resume", [False, True])
+@pytest.mark.parametrize("suffix", VIDEOS)
+def test_two_runs_make_the_same_bytes(clip, tmp_path, suffix, resume):
+    made = [tmp_path / f"{n}{suffix}" for n in range(2)]
+    for to in made:
+        blur_video(clip, to, flow="none", resume=resume, fps=20)
+    assert made[0].read_bytes() == made[1].read_bytes()
+
+
+@pytest.mark.parametrize("resume", [False, True])
 def test_every_container_tells_a_changed_bit(clip, tmp_path, resume):
     for suffix in VIDEOS:
         to = tmp_path / f"o{suffix}"

@@ -213,7 +213,8 @@ def _muxing(container: str, metadata: dict[str, str]) -> dict[str, str]:
     if container in ("mp4", "mov") and any(key.startswith(_APPLE) for key in metadata):
         return {"movflags": "use_metadata_tags"}  # which hold the dates of Apple's cameras
     if container in ("matroska", "webm"):
-        return {"write_crc32": "0"}  # of the texts, which the seal changes
+        # No checksum of the texts, which the seal changes; no random number as the file's name.
+        return {"write_crc32": "0", "fflags": "+bitexact"}
     return {}
 
 
