@@ -1,4 +1,9 @@
-"""Texts that name other files, as FFmpeg's readers of lists know them: {name} or {path} is one."""
+"""Texts that name other files, as FFmpeg's readers of lists know them: {name} or {path} is one.
+
+And a film that does.
+"""
+
+import struct
 
 LISTS = {
     "ffconcat": "ffconcat version 1.0\nfile {name}\n",
@@ -19,3 +24,25 @@ LISTS = {
     "webm manifest": "{name}\n",
     "metadata": ";FFMETADATA1\ntitle={name}\n",
 }
+
+_PARENTS = (b"moov", b"trak", b"mdia", b"minf", b"dinf", b"dref")
+
+
+def refer(movie: bytes, name: str) -> bytes:
+    """A MOV whose pictures lie in another file, as QuickTime's references know it.
+
+    The index of `movie` must come last, so that nothing else moves.
+    """
+    at = movie.index(b"url \0\0\0\1") - 4
+    alias = bytearray(150)
+    alias[130:134] = struct.pack(">HH", 1, 1)  # up to the folder of both, down to the file
+    path = f"/{name}".encode()
+    path += bytes(len(path) % 2)
+    alias += struct.pack(">HH", 2, len(path)) + path + struct.pack(">HH", 0xFFFF, 0)
+    box = struct.pack(">I4sI", 12 + len(alias), b"alis", 0) + alias
+    made = bytearray(movie[:at] + box + movie[at + 12 :])
+    for kind in _PARENTS:
+        begin = made.rindex(kind, 0, at) - 4
+        size = int.from_bytes(made[begin : begin + 4], "big") + len(box) - 12
+        made[begin : begin + 4] = size.to_bytes(4, "big")
+    return bytes(made)

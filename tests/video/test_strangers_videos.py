@@ -1,5 +1,7 @@
 """What may come under a video's name: lists of other files, views, pauses of years, links."""
 
+import contextlib
+import itertools
 import os
 import subprocess
 import sys
@@ -9,7 +11,8 @@ from fractions import Fraction
 import av
 import numpy as np
 import pytest
-from file_lists import LISTS
+from file_lists import LISTS, refer
+from watched import Watched
 
 from wgmb import InputError, blur_video
 from wgmb.color.coding import Coding
@@ -59,6 +62,50 @@ def test_readers_are_those_of_the_library_that_read_one_file():
         "imf", "kmsgrab", "lavfi", "mlv", "rtp", "rtsp", "sdp", "tedcaptions", "vapoursynth",
         "video4linux2", "v4l2", "vobsub", "webm_dash_manifest", "x11grab",
     }  # fmt: skip
+
+
+@pytest.fixture
+def other(tmp_path):
+    """A video, and whether anybody opens it."""
+    path = write(tmp_path / "other.mov", [0, 42, 84], codec="mjpeg", pixels="yuvj420p")
+    watched = Watched(path)
+    yield path, watched.was_opened
+    watched.close()
+
+
+READABLE = sorted({name for names in av.formats_available for name in names.split(",")})
+
+
+@pytest.mark.parametrize("kind", [pytest.param(k, marks=pytest.mark.full) for k in LISTS] + [None])
+def test_no_reader_of_the_library_opens_what_a_text_names(tmp_path, other, kind):
+    """FFmpeg chooses by what a file is called, too. None: each reader takes another list."""
+    path, was_opened = other
+    lists, tried = itertools.cycle([kind] if kind else LISTS), 0
+    for reader in READABLE:
+        with contextlib.suppress(ValueError):  # only written
+            known = av.ContainerFormat(reader, "r").extensions
+            listed = tmp_path / f"list.{next(iter(sorted(known)), reader)}"
+            listed.write_text(LISTS[next(lists)].format(name=path.name, path=path))
+            with pytest.raises(InputError) as refused:
+                VideoReader(listed)
+            assert str(refused.value).startswith(f"{listed}: ")
+            assert "\n" not in str(refused.value)
+            assert not was_opened(), (reader, listed)
+            tried += 1
+    assert tried > 300
+
+
+def test_a_film_opens_no_other_that_it_refers_to(tmp_path, other):
+    path, was_opened = other
+    film = tmp_path / "film.mov"
+    film.write_bytes(refer(path.read_bytes(), path.name))
+    assert was_opened()
+    with av.open(str(film), container_options={"enable_drefs": "1"}) as file:
+        assert was_opened()  # where it is allowed to
+        assert len(list(file.decode(video=0))) == 3
+    with pytest.raises(InputError, match=r"film\.mov: "):
+        VideoReader(film)
+    assert not was_opened()
 
 
 def test_a_picture_named_as_one_of_many_opens_no_other(tmp_path):
