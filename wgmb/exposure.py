@@ -10,8 +10,8 @@ so covers 240 frames a second made 60, 144 made 60, 24 as 24, and variable rates
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,6 +65,36 @@ def cells(times: Sequence[float], at: float, interval: float, shutter: Shutter) 
         return [Cell(nearest, 1.0, Shutter(0))]
     total = sum(cell.share for cell in found)
     return [Cell(cell.index, cell.share / total, cell.shutter) for cell in found]
+
+
+def cells_in_shot(
+    here: int,
+    neighbour: Callable[[int, int], int | None],
+    time: Callable[[int], float],
+    at: float,
+    interval: float,
+    shutter: Shutter,
+) -> list[Cell]:
+    """The cells of an exposure of one shot; their indices are the numbers of its frames.
+
+    `here`: the frame that is shown at `at`. `neighbour`: the frame before (-1) or after (1) another
+    one in the shot, None if there is none; asked for as far as the exposure reaches, and once more
+    on either side. `time`: when a frame is shown [s]. All else as for `cells`.
+    """
+    opens, closes = (at + interval * t for t in shutter.span)
+    numbers, times = [here], [time(here)]
+    while len(numbers) == 1 or times[0] + times[1] > 2 * opens:
+        if (before := neighbour(numbers[0], -1)) is None:
+            break
+        numbers.insert(0, before)
+        times.insert(0, time(before))
+    while numbers[-1] == here or times[-1] + times[-2] <= 2 * closes:
+        if (after := neighbour(numbers[-1], 1)) is None:
+            break
+        numbers.append(after)
+        times.append(time(after))
+    found = cells(times, at, interval, shutter)
+    return [replace(cell, index=numbers[cell.index]) for cell in found]
 
 
 def own_interval(times: np.ndarray, index: int) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wgmb import InputError, Shutter
-from wgmb.exposure import cells, evened, own_interval
+from wgmb.exposure import cells, cells_in_shot, evened, own_interval
 from wgmb.shutter import CURVES
 
 pytestmark = pytest.mark.fast
@@ -87,6 +87,35 @@ def test_a_closed_shutter_takes_the_frame_of_that_moment():
     found = cells(np.arange(9) / 24, 4.2 / 24, 1 / 24, Shutter(0))
     assert [(c.index, c.share) for c in found] == [(4, 1)]
     assert found[0].shutter.span == pytest.approx((0.2, 0.2))
+
+
+@pytest.mark.parametrize("shutter", [*SHUTTERS, Shutter(0), Shutter(90, 3.0), Shutter(90, -3.0)],
+                         ids=range(len(SHUTTERS) + 3))  # fmt: skip
+def test_the_cells_of_a_shot_are_those_among_all_of_its_frames(shutter):
+    """To the last bit, though none are asked for but those it meets and one or two beyond."""
+    rng = np.random.default_rng(2)
+    for steady in (True, False):
+        times = np.cumsum(np.full(30, 1 / 48) if steady else rng.choice([1 / 60, 1 / 30, 0.2], 30))
+        for at in (*times[[0, 14, 29]], times[14] + 0.5 / 48, times[0] + 1.5 / 48):
+            here, asked = int(np.searchsorted(times, at, "right")) - 1, set()
+
+            def time(number, times=times, asked=asked):
+                asked.add(number)
+                return float(times[number - 100])
+
+            def neighbour(number, side):
+                return number + side if 100 <= number + side < 130 else None
+
+            found = cells_in_shot(100 + here, neighbour, time, at, 1 / 24, shutter)
+            want = cells(times, at, 1 / 24, shutter)
+            assert [(c.index - 100, c.share) for c in found] == [(c.index, c.share) for c in want]
+            for ours, theirs in zip(found, want, strict=True):
+                assert ours.shutter.span == theirs.shutter.span
+                weights = (c.shutter.time(np.linspace(0, 1, 9)) for c in (ours, theirs))
+                np.testing.assert_array_equal(*weights)
+            met = {*range(found[0].index, found[-1].index + 1), 100 + here}
+            between = range(min(met) - 1, max(met) + 3)
+            assert asked <= set(between)
 
 
 def test_ways_to_neighbours_are_told_in_the_frame_s_own_interval():

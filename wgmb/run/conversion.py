@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, reason
-from ..exposure import Cell, cells
+from ..exposure import Cell, cells_in_shot
 from ..io.frame_numbers import frame_list
 from ..output.result import Result
 from ..pipeline.blur import Blur
@@ -61,22 +61,20 @@ class RateConversion:
         return first + (number - first) * self.step
 
     def cells(
-        self, at: Fraction, shutter: Shutter, there: Collection[int], cuts: Collection[int]
+        self, at: Fraction, shutter: Shutter, existing: Collection[int], cuts: Collection[int]
     ) -> list[Cell]:
         """The cells of the output frame at `at`; their indices are numbers of input frames.
 
-        `there`: the frames that exist; `cuts`: those that begin a shot. Only frames of the shot
+        `existing`: the frames on disk; `cuts`: those that begin a shot. Only frames of the shot
         that is shown at `at` are taken, up to the next gap.
         """
-        here, begin, end = math.floor(at), *(float(at + self.step * t) for t in shutter.span)
-        first = last = here
-        while first - 1 in there and first not in cuts and first > begin - 2:
-            first -= 1
-        while last + 1 in there and last + 1 not in cuts and last < end + 2:
-            last += 1
-        times = [float(n) for n in range(first, last + 1)]
-        found = cells(times, float(at), float(self.step), shutter)
-        return [replace(cell, index=first + cell.index) for cell in found]
+
+        def neighbour(number: int, side: int) -> int | None:
+            near = number + side
+            return near if near in existing and max(number, near) not in cuts else None
+
+        interval = float(self.step)
+        return cells_in_shot(math.floor(at), neighbour, float, float(at), interval, shutter)
 
 
 class RateConversionStages(Stages):
@@ -91,7 +89,7 @@ class RateConversionStages(Stages):
         self.numbers = conversion.numbers(clip)
         self.reach = max(self.reach, 1)
         self._conversion, self._shutter = conversion, blur.shutter
-        self._there = frozenset(clip.on_disk)
+        self._existing = frozenset(clip.on_disk)
         self._known = frozenset(n for n in clip.on_disk if clip.begins_shot(n))
         self._reading = threading.Lock()
 
@@ -139,7 +137,7 @@ class RateConversionStages(Stages):
         return self._known | (self.clip.cuts & set(near))
 
     def _cells(self, number: int, cuts: Collection[int]) -> list[Cell]:
-        return self._conversion.cells(self._at(number), self._shutter, self._there, cuts)
+        return self._conversion.cells(self._at(number), self._shutter, self._existing, cuts)
 
     def _exposed(self, read: ReadFrame, found: list[Cell]) -> BlurredFrame:
         done = BlurredFrame(read.number, made_of=dict(read.made_of))

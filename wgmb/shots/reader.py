@@ -12,10 +12,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from ..exposure import Cell, cells
+from ..exposure import Cell, cells_in_shot
 from ..shutter import Shutter
 
 _BEYOND = 6  # pictures read beyond an exposure: as far as flow looks
@@ -99,21 +99,22 @@ class ShotReader(Generic[T]):
         return here
 
     def cells(self, at: float, interval: float, shutter: Shutter) -> list[Cell]:
-        """The cells of an output frame (see exposure.cells); their indices are the reader's.
+        """The cells of an output frame (see exposure.py); their indices are the reader's.
 
         Asked for in the order of time, as what lies before is forgotten.
         """
         self.read_beyond(at + interval * max(shutter.span[1], 0.0))
         here = self._index_at(at)
-        first, last = here, here
-        while first > min(self._kept) and self.same_shot(first, first - 1):
-            first -= 1
-        while self.same_shot(last, last + 1):
-            last += 1
-        times = [self._kept[i].time for i in range(first, last + 1)]
-        found = cells(times, at, interval, shutter)
-        self._forget_before(min(first + found[0].index, here) - _TO_KEEP)
-        return [replace(cell, index=first + cell.index) for cell in found]
+
+        def neighbour(index: int, side: int) -> int | None:
+            return index + side if self.same_shot(index, index + side) else None
+
+        def time(index: int) -> float:
+            return self._kept[index].time
+
+        found = cells_in_shot(here, neighbour, time, at, interval, shutter)
+        self._forget_before(min(found[0].index, here) - _TO_KEEP)
+        return found
 
     def same_shot(self, index: int, other: int) -> bool:
         """True if two pictures are kept, and no cut lies between them."""

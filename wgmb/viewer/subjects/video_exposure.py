@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from ...exposure import Cell, cells
+from ...exposure import Cell, cells_in_shot
 from ...shutter import Shutter
 from ...video.clock import Clock
 from ...video.output_times import OutputFrame
@@ -25,8 +25,6 @@ class VideoExposure:
 
     here: int
     """The picture that is shown at its time."""
-    numbers: tuple[int, ...]
-    """`here` and those around it, ascending: all that share the exposure, and one on each side."""
     cells: tuple[Cell, ...]
     """Their parts of the exposure; the indices are pictures' numbers."""
     lacking: tuple[int, ...]
@@ -39,24 +37,16 @@ def exposure_of(
     """The exposure of an output frame; where too little is known, of what is known."""
     shown = picture_at(times, clock, frame)
     here, lacking = _kept(shown, known)
-    at, interval = float(frame.time), float(frame.interval)
-    opens, closes = (at + interval * t for t in shutter.span)
 
     def time(number: int) -> float:
         return float(clock.out(times[number]))
 
-    numbers = [here]
-    while (numbers[0] == here or time(numbers[0]) + time(numbers[1]) > 2 * opens) and (
-        before := _neighbour(numbers[0], -1, known, lacking)
-    ) is not None:
-        numbers.insert(0, before)
-    while (numbers[-1] == here or time(numbers[-1]) + time(numbers[-2]) < 2 * closes) and (
-        after := _neighbour(numbers[-1], 1, known, lacking)
-    ) is not None:
-        numbers.append(after)
-    found = cells([time(n) for n in numbers], at, interval, shutter)
-    parts = tuple(Cell(numbers[cell.index], cell.share, cell.shutter) for cell in found)
-    return VideoExposure(here, tuple(numbers), parts, tuple(dict.fromkeys(lacking)))
+    def neighbour(number: int, side: int) -> int | None:
+        return _neighbour(number, side, known, lacking)
+
+    at, interval = float(frame.time), float(frame.interval)
+    cells = cells_in_shot(here, neighbour, time, at, interval, shutter)
+    return VideoExposure(here, tuple(cells), tuple(dict.fromkeys(lacking)))
 
 
 def picture_at(times: Times, clock: Clock, frame: OutputFrame) -> int:
