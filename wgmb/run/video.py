@@ -30,7 +30,7 @@ from ..settings import (
 )
 from ..settings.video import VideoSettings, check_pause
 from ..shots.cut_list import CutList
-from ..shots.motion_source import MotionSource
+from ..shots.motion import MotionSource
 from ..video.clock import Clock
 from ..video.exposures import VideoBlur
 from ..video.holdouts import files_of, holdout_of

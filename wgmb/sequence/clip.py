@@ -18,7 +18,7 @@ from ..frame import Frame
 from ..io import limits
 from ..io.frame_numbers import numbered
 from ..shots.cut_list import CutList
-from ..shots.motion_source import MotionSource
+from ..shots.motion import MotionSource
 from .data_windows import Placement
 from .dependencies import Dependencies
 from .files import SequenceFiles

@@ -4,13 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ..errors import InputError
 from ..shots.cuts import pictures_differ
-from ..shots.motion_source import Found, MotionSource
+from ..shots.motion import Found, MotionSource, ShotMotion
 from .frame_cache import FrameCache
 from .frame_file import FrameFile
 
@@ -26,38 +24,28 @@ def standing(source: FrameFile) -> Found:
 class PictureMotion:
     """Motion (height, width, 4) [px] and depth order of frames by a source of motion.
 
-    A frame's motion depends on pictures of its own shot alone, and of its own size and window.
+    A frame's motion depends on pictures of its own shot alone, and of its own data window.
     """
 
     def __init__(self, stored: FrameCache, motion: MotionSource):
         self._stored, self._motion = stored, motion
         self._cuts: dict[tuple[int, str | None], bool] = {}
-        self._shots: dict[str | None, tuple[int, Callable[[int], Found | None]]] = {}
+        self._views: dict[str | None, ShotMotion] = {}
 
     def __call__(self, source: FrameFile) -> Found | None:
         """None where a frame is alone in its shot."""
         number, view = source.number, source.view
-        began = self._shots.get(view)
-        if began is None or not self._same_shot(began[0], number, view):
-            self._shots[view] = number, self._motion.shot(self._loader(source))
-        self._shots[view] = number, self._shots[view][1]
-        return self._shots[view][1](number)
+        if view not in self._views:
+            self._views[view] = ShotMotion(
+                self._motion,
+                lambda number: self._picture(number, view),
+                lambda a, b: self._same_shot(a, b, view),
+            )
+        return self._views[view](number)
 
-    def _loader(self, first: FrameFile) -> Callable[[int], np.ndarray | None]:
-        """Loads the pictures of the shot that the frame is in."""
-        anchor, view = first.number, first.view
-
-        def load(number: int) -> np.ndarray | None:
-            nonlocal anchor
-            if not self._same_shot(anchor, number, view):
-                return None
-            other = self._source(number, view)
-            if other is None or other.data_window != first.data_window:
-                return None
-            anchor = number
-            return other.rgba
-
-        return load
+    def _picture(self, number: int, view: str | None) -> np.ndarray | None:
+        source = self._source(number, view)
+        return None if source is None else source.rgba
 
     def _same_shot(self, a: int, b: int, view: str | None) -> bool:
         """True if no cut lies between two frames; frames far apart count as different shots."""
@@ -66,14 +54,19 @@ class PictureMotion:
         return not any(self._is_cut(n, view) for n in range(min(a, b) + 1, max(a, b) + 1))
 
     def _is_cut(self, number: int, view: str | None) -> bool:
-        """True if a cut, or a gap, lies before a frame."""
+        """True if a cut, a gap, or another data window lies before a frame."""
         key = number, view
         if key not in self._cuts:
             while len(self._cuts) > 8 * FAR:
                 self._cuts.pop(next(iter(self._cuts)))
             before, after = (self._source(n, view) for n in (number - 1, number))
-            lacking = before is None or after is None or self._stored.is_known_cut(number, -1)
-            self._cuts[key] = lacking or pictures_differ(before.rgba, after.rgba)  # pyright: ignore
+            self._cuts[key] = (
+                before is None
+                or after is None
+                or self._stored.is_known_cut(number, -1)
+                or before.data_window != after.data_window
+                or pictures_differ(before.rgba, after.rgba)
+            )
         return self._cuts[key]
 
     def _source(self, number: int, view: str | None) -> FrameFile | None:

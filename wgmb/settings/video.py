@@ -15,7 +15,7 @@ from .. import gpu
 from ..errors import InputError
 from ..extras import is_installed
 from ..io.frame_numbers import frame_numbers
-from ..shots.motion_source import MotionSource
+from ..shots.motion import MotionSource
 from ..video.clock import Clock
 
 if TYPE_CHECKING:

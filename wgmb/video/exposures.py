@@ -21,7 +21,7 @@ from ..gpu.textures import TexturePool
 from ..methods.contract import reach_of
 from ..pipeline.blur import Blur
 from ..pipeline.exposure_sum import ExposureSum
-from ..shots.motion_source import MotionSource
+from ..shots.motion import MotionSource
 from ..shots.reader import FLASH, Picture, ShotReader
 from ..shutter import Shutter
 from ..threads import ahead
@@ -93,7 +93,7 @@ class Exposures:
             flash=self._flash,
             tolerance=self._tolerance,
         )
-        views = VideoFrames(shots, self._blur, self._motion, self._holdout, self._highlights)
+        views = VideoFrames(shots, self._blur, self._motion, self._holdout, self._planes)
         for frame in wanted:
             cells = shots.cells(float(frame.time), float(frame.interval), shutter)
             yield frame, Exposure(self, shots, views, cells)

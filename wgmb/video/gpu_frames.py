@@ -4,9 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import wgpu
 
@@ -16,13 +13,13 @@ from ..flow import Shot
 from ..gpu.textures import TexturePool
 from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
-from ..shots.motion_source import MotionSource
+from ..shots.motion import MotionSource
 from ..shots.reader import ShotReader
+from .motion import VideoMotion
 from .planes import Planes
 from .thumbnail import Thumbnail
 
 LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two that are summed
-_HALF_BITS = 12  # of samples that come back exactly from light as half floats
 _FRAMES = 3  # with motion: a frame and its neighbours
 
 
@@ -30,7 +27,7 @@ class VideoFrames:
     """Textures of the pictures of `shots`, on the device of the Blur that takes them.
 
     `motion`: where motion comes from, or None. `holdout` (height, width): 1 stays sharp.
-    `highlights`: times white that white becomes; motion is searched without.
+    `planes`: make their light; motion is searched in light that is not expanded.
     """
 
     def __init__(
@@ -39,22 +36,19 @@ class VideoFrames:
         blur: Blur,
         motion: MotionSource | None = None,
         holdout: np.ndarray | None = None,
-        highlights: float = 1.0,
+        planes: Planes | None = None,
     ):
-        self._shots, self._source = shots, motion
-        self._device = blur.device
-        self._planes, self._plain = Planes(blur.device, highlights), Planes(blur.device)
-        self._images = TexturePool(blur.device)
+        self._shots, self._device = shots, blur.device
+        self._planes, self._images = planes or Planes(blur.device), TexturePool(blur.device)
         self._neighbours = "neighbours" in blur.method.uses
-        self._wants_depth = "depth" in blur.method.needs | blur.method.uses
+        wants_depth = "depth" in blur.method.needs | blur.method.uses
+        self._source = VideoMotion(motion, shots, blur.device, wants_depth) if motion else None
         self._holdout: View | None = None
         if holdout is not None and motion is not None:
             texel = TEXTURES["holdout"]["format"]
             self._holdout = self._images.upload("holdout", holdout, texel)
         self._lights: dict[int, str] = {}  # names of textures by index, the latest last
         self._frames: dict[int, FrameViews] = {}
-        self._shot: Callable[[int], Any] | None = None
-        self._first = 0  # a picture of the present shot
 
     def in_shot(self, index: int) -> FrameInShot:
         """A picture, between its neighbours if the method takes them.
@@ -86,46 +80,33 @@ class VideoFrames:
 
     def _light(self, index: int) -> wgpu.GPUTexture:
         """The texture of one picture, kept until others need its place."""
-        content = self._shots[index].content
-        if index in self._lights:
+        coded = self._shots[index].content.coded
+        if known := index in self._lights:
             self._lights[index] = self._lights.pop(index)
         else:
             free = {f"light {n}" for n in range(LIGHTS)} - set(self._lights.values())
             oldest = next(iter(self._lights), None)
             self._lights[index] = min(free) if free else self._lights.pop(oldest or 0)
-            self._decode(self._planes, content, self._lights[index])
-        return self._images.texture(self._lights[index], content.coded.size, self._texel(content))
-
-    def _decode(self, planes: Planes, content: Thumbnail, name: str) -> wgpu.GPUTexture:
-        texture = self._images.texture(name, content.coded.size, self._texel(content))
-        encoder = self._device.create_command_encoder(label="decode")
-        planes.decode(encoder, content.coded, texture.create_view())
-        gpu.submit(self._device, encoder)
+        texel = self._planes.texel(coded.coding)
+        texture = self._images.texture(self._lights[index], coded.size, texel)
+        if not known:
+            self._planes.draw(coded, texture)
         return texture
-
-    def _texel(self, content: Thumbnail) -> str:
-        """Of a picture's light: 16 bits and floats need more than half floats hold."""
-        is_fine = content.coded.coding.bits > _HALF_BITS
-        return gpu.texel(self._device, 4) if is_fine else "rgba16float"
 
     def _motion(self, index: int) -> tuple[View, View | None] | None:
         """Motion of a picture within its own interval of time, and depth if the method reads it."""
         if self._source is None:
             return None
-        if self._shot is None or not self._shots.moves_on(self._first, index):
-            # The first of a shot that is kept is the same, whatever was asked for before.
-            self._shot = self._source.shot(self._load, self._wants_depth)
-        self._first = index
-        factors = self._factors(index)
-        if isinstance(self._shot, Shot):
-            textures = self._shot.textures(index)
+        factors, shot = self._factors(index), self._source.shot(index)
+        if isinstance(shot, Shot):
+            textures = shot.textures(index)
             if textures is None:
                 return None
             motion = textures.motion
             if factors != (1.0, 1.0):
                 motion = self._paced(motion, index, factors)
             return motion.create_view(), textures.depth.create_view()
-        arrays = self._shot(index)
+        arrays = shot(index)
         if arrays is None:
             return None
         motion, depth = arrays
@@ -136,15 +117,6 @@ class VideoFrames:
             self._images.upload(f"motion {place}", motion, "rgba32float"),
             None if depth is None else self._images.upload(f"depth {place}", depth, "r32float"),
         )
-
-    def _load(self, index: int) -> Any:
-        """The picture of an index of the present shot, None outside it."""
-        if not self._shots.moves_on(self._first, index):
-            return None
-        content = self._shots[index].content
-        if isinstance(self._shot, Shot):
-            return self._decode(self._plain, content, "searched")
-        return content.grey
 
     def _factors(self, index: int) -> tuple[float, float]:
         """See exposure.evened."""

@@ -15,6 +15,8 @@ from .matrices import from_samples
 from .packed import Packed, PlaneSlot, places_of
 from .uniforms import curve_of, reading, writing
 
+_HALF_BITS = 12  # of samples that come back exactly from light as half floats
+
 __all__ = ["Average", "Planes", "averages", "check"]
 
 
@@ -33,6 +35,16 @@ class Planes:
     def __init__(self, device: wgpu.GPUDevice, highlights: float = 1.0):
         self._highlights = highlights
         self._device, self._images, self._packed = device, TexturePool(device), Packed(device)
+
+    def texel(self, coding: Coding) -> str:
+        """Of a picture's light: 16 bits and floats need more than half floats hold."""
+        return gpu.texel(self._device, 4) if coding.bits > _HALF_BITS else "rgba16float"
+
+    def draw(self, picture: CodedPicture, output: wgpu.GPUTexture) -> None:
+        """Submit a picture's way into `output`, of its size and a format as for `decode`."""
+        encoder = self._device.create_command_encoder(label="decode")
+        self.decode(encoder, picture, output.create_view())
+        gpu.submit(self._device, encoder)
 
     def decode(
         self, encoder: wgpu.GPUCommandEncoder, picture: CodedPicture, output: wgpu.GPUTextureView

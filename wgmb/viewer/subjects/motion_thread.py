@@ -17,7 +17,7 @@ import wgpu
 from ... import gpu
 from ...errors import Error
 from ...settings.video import FlowSettings
-from ...shots.motion_source import MotionSource
+from ...shots.motion import MotionSource
 from ...video.read.reader import VideoReader
 from .video_motion import MotionRequest, PictureFinder, PictureFinding
 

@@ -6,22 +6,18 @@ those that cannot be decoded mean the same. Any picture may be asked for; neighb
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import wgpu
 
-from ... import gpu
-from ...flow import Shot
-from ...gpu.textures import TexturePool
 from ...shots.cut_list import CutList
-from ...shots.motion_source import MotionSource
+from ...shots.motion import MotionSource
 from ...shots.reader import NoPicturesError, Picture, ShotReader
 from ...video.holdouts import holdout_of
-from ...video.planes import Planes
+from ...video.motion import VideoMotion
 from ...video.read.reader import VideoReader
 from ...video.thumbnail import Thumbnail, is_cut, is_double
 
@@ -75,16 +71,14 @@ class PictureFinder:
         motion: MotionSource | None,
         request: MotionRequest,
     ):
-        self._reader, self._device, self._motion = reader, device, motion
+        self._reader, self._device, self._source = reader, device, motion
         self._times = reader.times.seconds
         self._fill, self._cuts = request.fill, CutList(request.cuts)
         self._holdout = holdout_of(request.masks, reader) if motion is not None else None
-        self._planes, self._images = Planes(device), TexturePool(device)
         self._shots: ShotReader[Thumbnail] | None = None
+        self._motion: VideoMotion | None = None
         self._numbers: WeakKeyDictionary[Thumbnail, int] = WeakKeyDictionary()
         self._compared: dict[tuple[int, int], bool] = {}
-        self._shot: Callable[[int], Any] | None = None
-        self._first = 0  # index of a picture of the present shot
 
     def __call__(self, number: int) -> PictureFinding:
         """The finding about a picture, as far as possible."""
@@ -99,7 +93,7 @@ class PictureFinder:
             before = max((n for n in beside if n < number), default=None)
             after = min((n for n in beside if n > number), default=None)
             return PictureFinding(None, None, before, after, is_left_out=True)
-        found = self._motion_of(shots, here)
+        found = self._motion(here) if self._motion else None
         motion, depth = found or (None, None)
         return PictureFinding(
             motion,
@@ -113,17 +107,6 @@ class PictureFinder:
             holdout=None if found is None else self._holdout,
         )
 
-    def _motion_of(
-        self, shots: ShotReader[Thumbnail], index: int
-    ) -> tuple[np.ndarray, np.ndarray] | None:
-        """Motion and depth."""
-        if self._motion is None:
-            return None
-        if self._shot is None or not shots.moves_on(self._first, index):
-            self._shot = self._motion.shot(self._load)
-        self._first = index
-        return self._shot(index)
-
     def _shots_around(self, number: int) -> ShotReader[Thumbnail]:
         """A ShotReader that knows all around a picture: another one where the last is far away."""
         shots = self._shots
@@ -135,15 +118,16 @@ class PictureFinder:
             if number <= last + _NEAR and (at_start or behind >= _BEFORE):
                 return shots
         first = max(number - _BEFORE - _EARLIER, 0)
-        self._shot = None
-        self._shots = ShotReader(
+        self._shots = shots = ShotReader(
             self._pictures(first),
             is_cut=self._is_cut if self._cuts.is_search else None,
             known_cuts=self._cuts.frames(0),
             is_double=is_double if self._fill else None,
             tolerance=self._reader.tolerance,
         )
-        return self._shots
+        source = self._source
+        self._motion = VideoMotion(source, shots, self._device) if source else None
+        return shots
 
     def _pictures(self, first: int) -> Iterator[Picture[Thumbnail]]:
         for number, coded in self._reader.pictures(first):
@@ -157,17 +141,3 @@ class PictureFinder:
         if key not in self._compared:
             self._compared[key] = is_cut(before, after)
         return self._compared[key]
-
-    def _load(self, index: int) -> Any:
-        """The picture of an index of the present shot, None outside it."""
-        assert self._shots is not None
-        if not self._shots.moves_on(self._first, index):
-            return None
-        content = self._shots[index].content
-        if not isinstance(self._shot, Shot):
-            return content.grey
-        texture = self._images.texture("searched", content.coded.size, "rgba16float")
-        encoder = self._device.create_command_encoder(label="decode")
-        self._planes.decode(encoder, content.coded, texture.create_view())
-        gpu.submit(self._device, encoder)
-        return texture

@@ -1,0 +1,45 @@
+"""Motion of a video's pictures, by a source that takes textures or display values."""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from typing import Any
+
+import wgpu
+
+from ..flow import Flow
+from ..gpu.textures import TexturePool
+from ..shots.motion import MotionSource, ShotMotion
+from ..shots.reader import ShotReader
+from .planes import Planes
+from .thumbnail import Thumbnail
+
+
+class VideoMotion(ShotMotion):
+    """The motion of the pictures that a ShotReader keeps, by their indices there.
+
+    Flow takes them as textures of `device`, without expanded highlights; others as grey.
+    """
+
+    def __init__(
+        self,
+        source: MotionSource,
+        shots: ShotReader[Thumbnail],
+        device: wgpu.GPUDevice,
+        depth: bool = True,
+    ):
+        self._shots, self._planes = shots, Planes(device)
+        self._images = TexturePool(device)
+        on_gpu = isinstance(source, Flow)
+        super().__init__(source, self._texture if on_gpu else self._grey, shots.moves_on, depth)
+
+    def _texture(self, index: int) -> wgpu.GPUTexture:
+        coded = self._shots[index].content.coded
+        texel = self._planes.texel(coded.coding)
+        texture = self._images.texture("searched", coded.size, texel)
+        self._planes.draw(coded, texture)
+        return texture
+
+    def _grey(self, index: int) -> Any:
+        return self._shots[index].content.grey
