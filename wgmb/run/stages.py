@@ -126,9 +126,7 @@ class Stages:
         return done
 
     def _prepared(self, source: FrameFile) -> tuple[Frame, Placement | None]:
-        uses = self._blur.method.uses
-        normal, light = "normal" in uses, "diffuse_light" in uses
-        return self.clip.placed(source, self._blur.extent, self.reach, normal, light)
+        return self.clip.placed(source, self._blur.extent, self.reach, self._blur.method.uses)
 
     def _view(self, source: FrameFile, frame: Frame, placement: Placement | None) -> Result:
         confidence: dict[str, np.ndarray] = {}

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +24,14 @@ from .dependencies import Dependencies
 from .files import SequenceFiles
 from .findings import SequenceFindings
 from .flow_motion import FAR, PictureMotion, standing
-from .frame_builder import FrameBuilder
+from .frame_builder import OPTIONAL, FrameBuilder
 from .frame_cache import FrameCache
 from .frame_file import FrameFile
 from .layers.light import LightPasses
 from .layers.masks import Masks
 from .layers.passes import Passes
 from .layers.vector_convention import ConventionFinder
-from .neighbours import Neighbours, extras
+from .neighbours import Neighbours
 
 
 class Clip:
@@ -167,10 +167,6 @@ class Clip:
         """Times white that white is in frames."""
         return self._builder.highlights
 
-    def is_there(self, number: int) -> bool:
-        """Return True if frame `number` is on disk."""
-        return self._files.is_there(number)
-
     def begins_shot(self, number: int) -> bool:
         """Return True if the user said that a new shot begins with the frame."""
         return self._stored.is_known_cut(number, -1)
@@ -193,7 +189,7 @@ class Clip:
         """
         if number not in self.numbers:
             raise InputError(f"frame {number} is not in {self}")
-        return self._neighbours.opened(self.source(number), extras(normal=True, light=True))
+        return self._neighbours.opened(self.source(number), OPTIONAL)
 
     @property
     def views(self) -> tuple[str, ...]:
@@ -215,7 +211,7 @@ class Clip:
         """
         for number in self.on_disk:
             with contextlib.suppress(InputError, OSError):  # its turn to fail comes
-                return self.frame(self.source(number), picture=False, normal=False, light=False).has
+                return self._neighbours.frame(self.source(number), frozenset()).has
         return frozenset()
 
     def files(self, number: int) -> list[Path]:
@@ -251,10 +247,6 @@ class Clip:
         """
         return self._stored.sources(number)
 
-    def leader(self, number: int) -> FrameFile:
-        """The default view, from which the findings for all views of a frame are determined."""
-        return self._stored.leader(number)
-
     def forget(self, number: int) -> None:
         """Drop a frame from the cache."""
         self._stored.forget(number)
@@ -274,13 +266,6 @@ class Clip:
         """The channel of a frame that is 1 where its vectors are valid, if there is one."""
         return self._finder.mask_of(source)
 
-    def neighbour(self, source: FrameFile, side: int) -> FrameFile | None:
-        """The same view of the frame before (`side` -1) or after (1).
-
-        None beyond a known cut, and if the file does not exist or cannot be read.
-        """
-        return self._stored.neighbour(source, side)
-
     def with_neighbours(
         self,
         source: FrameFile,
@@ -297,21 +282,23 @@ class Clip:
         arrays are read-only (Frame.locked): a frame is made, and uploaded by a Blur, only once,
         although three or five outputs use it.
         """
-        return self._neighbours.between(source, extras(normal, light), extent, reach)[0]
+        wanted = _wanted(True, normal, light)
+        return self._neighbours.between(source, wanted, extent, reach)[0]
 
     def placed(
         self,
         source: FrameFile,
         extent: Extent,
         reach: int,
-        normal: bool = True,
-        light: bool = True,
+        uses: Collection[str] = ("normal", "diffuse_light"),
     ) -> tuple[Frame, Placement]:
         """Input of a Blur of this `extent`: with_neighbours, or `frame` for a `reach` of 0; and its
-        placement."""
+        placement. `uses`: inputs that its method uses (Method.uses).
+        """
+        wanted = OPTIONAL & {"color", *uses}
         if not reach:
-            return self._neighbours.alone(source, extras(normal, light), extent)
-        return self._neighbours.between(source, extras(normal, light), extent, reach)
+            return self._neighbours.alone(source, wanted, extent)
+        return self._neighbours.between(source, wanted, extent, reach)
 
     def frame(
         self,
@@ -325,7 +312,7 @@ class Clip:
 
         Motion across a camera cut is omitted (see cuts.jumps).
         """
-        return self._neighbours.frame(source, picture, extras(normal, light))
+        return self._neighbours.frame(source, _wanted(picture, normal, light))
 
     @property
     def cuts(self) -> set[int]:
@@ -335,10 +322,6 @@ class Clip:
     def light_passes(self, source: FrameFile) -> LightPasses:
         """The passes of light of a frame's picture."""
         return self._builder.light_passes(source)
-
-    def passes_of(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
-        """The Frame of `source` as its layers have it; see `frame`. `also`: "normal", "light"."""
-        return self._builder.build(source, picture, also)
 
     @property
     def unseen(self) -> list[str]:
@@ -363,3 +346,9 @@ class Clip:
         The first frame is examined, and the middle and the last one only if it lacks a layer.
         """
         self._builder.check_layers()
+
+
+def _wanted(picture: bool, normal: bool, light: bool) -> frozenset[str]:
+    """Those of OPTIONAL that three options stand for."""
+    named = ("color", picture), ("normal", normal), ("diffuse_light", light)
+    return frozenset(name for name, is_wanted in named if is_wanted)

@@ -24,6 +24,9 @@ from .layers.vector_convention import ConventionFinder
 
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
 
+OPTIONAL = frozenset({"color", "normal", "diffuse_light"})
+"""Inputs that are read only if they are wanted; "diffuse_light" stands for all passes of light."""
+
 
 class FrameBuilder:
     """Makes Frames of the files in `stored`, as its Passes ask for.
@@ -44,9 +47,10 @@ class FrameBuilder:
         self.picture_motion: Callable[[FrameFile], Found | None] | None = None
         self.highlights = 1.0
 
-    def build(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
-        """The Frame of `source` as its layers have it; without `picture`, its colour is 0.
-        `also`: "normal", "light".
+    def build(self, source: FrameFile, wanted: frozenset[str]) -> Frame:
+        """The Frame of `source` as its layers have it; of OPTIONAL, only what is `wanted`.
+
+        Without "color", its colour is 0.
         """
         passes, own = self._stored.passes, self._stored.own(source)
         convention = self._finder.finding.vectors
@@ -72,12 +76,12 @@ class FrameBuilder:
                 ids = self._object_ids(source) if reprojections.here.bodies else None
             return Frame(
                 self._bright(source.rgba)
-                if picture
+                if "color" in wanted
                 else np.zeros((*source.size[::-1], 3), np.float16),
                 motion=motion,
                 depth=depth,
-                normal=self._normal(source) if "normal" in also else None,
-                **(self._light(source) if "light" in also else {}),
+                normal=self._normal(source) if "normal" in wanted else None,
+                **(self._light(source) if "diffuse_light" in wanted else {}),
                 window=source.window,
                 camera=reprojections,
                 object_id=ids,
@@ -101,7 +105,7 @@ class FrameBuilder:
         for number in dict.fromkeys(numbers[i] for i in (0, len(numbers) // 2, -1)):
             try:
                 for source in stored.sources(number):
-                    self.build(source, True, frozenset({"normal", "light"}))
+                    self.build(source, OPTIONAL)
                 return
             except layers.MissingLayerError as error:
                 first = first or error

@@ -41,11 +41,6 @@ from .frame_file import FrameFile
 _SIDES = "left", "top", "right", "bottom"
 
 
-def extras(normal: bool, light: bool) -> frozenset[str]:
-    """Names of the inputs that only some methods take."""
-    return frozenset(n for n, wanted in (("normal", normal), ("light", light)) if wanted)
-
-
 class Neighbours:
     """The frames in `stored` as a blur takes them, built by `builder`.
 
@@ -89,9 +84,9 @@ class Neighbours:
 
     # ---- frames ----------------------------------------------------------------------------
 
-    def frame(self, source: FrameFile, picture: bool, also: frozenset[str]) -> Frame:
+    def frame(self, source: FrameFile, wanted: frozenset[str]) -> Frame:
         """The Frame of `source` in its own window, without motion that leads across a cut."""
-        frame = self._builder.build(source, picture, also)
+        frame = self._builder.build(source, wanted)
         if all(self._stored.is_known_cut(source.number, side) for side in (-1, 1)):
             self.cuts |= {source.number, source.number + 1}
             return still(frame)
@@ -101,16 +96,16 @@ class Neighbours:
         return frame
 
     def alone(
-        self, source: FrameFile, also: frozenset[str], extent: Extent | None
+        self, source: FrameFile, wanted: frozenset[str], extent: Extent | None
     ) -> tuple[Frame, Placement]:
         """The frame by itself, on a canvas with room for `extent`."""
-        frame = self.frame(source, True, also)
+        frame = self.frame(source, wanted)
         onto = self._canvas({0: (source, frame)}, extent)
         frame = placed(frame, source.data_window, onto, self._edges(source, onto))
         return frame, Placement(onto, self._bounds(source))
 
     def between(
-        self, source: FrameFile, also: frozenset[str], extent: Extent | None, reach: int
+        self, source: FrameFile, wanted: frozenset[str], extent: Extent | None, reach: int
     ) -> tuple[Frame, Placement]:
         """The frame with `reach` before and after it, on a canvas with room for `extent`.
 
@@ -118,10 +113,10 @@ class Neighbours:
         Blur, once, though it is shown in three, or five.
         """
         self._stored.reach = max(self._stored.reach, reach)
-        frames = {0: (source, self._locked(source, also))}
+        frames = {0: (source, self._locked(source, wanted))}
         for side in (-1, 1):
             for offset in range(side, side * (reach + 1), side):
-                found = self._neighbour(*frames[offset - side], side, also)
+                found = self._neighbour(*frames[offset - side], side, wanted)
                 if found is None:
                     break
                 frames[offset] = found
@@ -136,43 +131,43 @@ class Neighbours:
         return made[0].between(*beside), Placement(onto, self._bounds(source))
 
     def opened(
-        self, source: FrameFile, also: frozenset[str], onto: Window | None = None
+        self, source: FrameFile, wanted: frozenset[str], onto: Window | None = None
     ) -> ClipFrame:
         """The frame on a canvas, by default its own window; its neighbours are read when needed."""
-        frame, canvas = self._locked(source, also), onto or source.data_window
+        frame, canvas = self._locked(source, wanted), onto or source.data_window
 
         def load(side: int) -> Frame | None:
-            found = self._neighbour(source, frame, side, also)
-            return self.opened(found[0], also, canvas) if found else None
+            found = self._neighbour(source, frame, side, wanted)
+            return self.opened(found[0], wanted, canvas) if found else None
 
         return ClipFrame.of(self._on(canvas, source, frame), load)
 
     def _neighbour(
-        self, source: FrameFile, frame: Frame, side: int, also: frozenset[str]
+        self, source: FrameFile, frame: Frame, side: int, wanted: frozenset[str]
     ) -> tuple[FrameFile, Frame] | None:
         """The frame before or after, and its file; None where there is none of the same shot."""
         other = self._stored.neighbour(source, side)
         if other is None or other.display_window != source.display_window:
             return None
         try:
-            near = self._locked(other, also)
+            near = self._locked(other, wanted)
         except InputError:  # its turn to fail comes
             self._stored.unread.add(other.number)
             return None
-        if self._is_cut(source, frame, near, side, also):
+        if self._is_cut(source, frame, near, side, wanted):
             self.cuts.add(source.number + (side > 0))
             return None
         return other, near
 
-    def _locked(self, source: FrameFile, also: frozenset[str]) -> Frame:
+    def _locked(self, source: FrameFile, wanted: frozenset[str]) -> Frame:
         """`frame`, made once for the three frames, or five, that it is shown in."""
         key = source.number, source.view
-        made, with_also, frame = self._alone.get(key, (None, None, None))
-        if frame is None or made is not source or with_also != also:
+        made, with_inputs, frame = self._alone.get(key, (None, None, None))
+        if frame is None or made is not source or with_inputs != wanted:
             self._alone.pop(key, None)
             self._make_room(self._alone)
-            frame = self.frame(source, True, also).locked()
-            self._alone[key] = source, also, frame
+            frame = self.frame(source, wanted).locked()
+            self._alone[key] = source, wanted, frame
         return frame
 
     def _on(self, onto: Window, source: FrameFile, frame: Frame) -> Frame:
@@ -201,7 +196,7 @@ class Neighbours:
         if source.view is not None and source.view != self._stored.leader(number).view:
             with contextlib.suppress(InputError):  # then this view decides
                 if number not in self._jumps:
-                    self.frame(self._stored.leader(number), False, frozenset())
+                    self.frame(self._stored.leader(number), frozenset())
                 return self._jumps[number]
         sides: list[int] = []
         for side in (-1, 1):
@@ -213,7 +208,7 @@ class Neighbours:
         return sides
 
     def _is_cut(
-        self, source: FrameFile, frame: Frame, near: Frame, side: int, also: frozenset[str]
+        self, source: FrameFile, frame: Frame, near: Frame, side: int, wanted: frozenset[str]
     ) -> bool:
         """True if a cut lies between `frame` and `near`, as decided on the default view."""
         if not self._is_search:  # known ones are not asked
@@ -227,7 +222,7 @@ class Neighbours:
                 with contextlib.suppress(InputError, OSError):  # then this view decides
                     other = self._stored.neighbour(leader, side)
                     if other is not None and other.display_window == leader.display_window:
-                        frame, near = self._locked(leader, also), self._locked(other, also)
+                        frame, near = self._locked(leader, wanted), self._locked(other, wanted)
             self._cuts_to[key] = is_cut(frame, near, side)
         return self._cuts_to[key]
 
