@@ -9,13 +9,14 @@ import make_frames as make
 from wgmb import Clip, InputError, gpu
 from wgmb.cli import app
 from wgmb.color.coding import CodedPicture, Coding
-from wgmb.color.highlights import compressed, expanded
+from wgmb.color.highlights import Expansion
 from wgmb.color.srgb import linear, to_display
 from wgmb.gpu.textures import TexturePool
 from wgmb.video.planes import Planes
 from wgmb.video.read.reader import VideoReader
 
 KNEE = 0.92
+LAMPS = Expansion(8.0)
 
 
 def slowly(rgb, times):
@@ -45,20 +46,20 @@ def colors(count=400, channels=3, seed=3):
 @pytest.mark.parametrize("times", [1.0, 2.0, 8.0, 32.0])
 def test_the_curve_is_its_twin_and_has_its_inverse(times, channels):
     light = colors(channels=channels)
-    got = expanded(light, times)
+    got = Expansion(times).expanded(light)
     for pixel, found in zip(light.reshape(-1, channels), got.reshape(-1, channels), strict=True):
         alpha = pixel[3] if channels == 4 else 1.0
         straight = pixel[:3] / alpha if alpha else pixel[:3]
         np.testing.assert_allclose(found[:3], alpha * np.array(slowly(straight, times)), 1e-4)
         assert channels == 3 or found[3] == alpha
-    np.testing.assert_allclose(compressed(got, times), light, atol=2e-6)
+    np.testing.assert_allclose(Expansion(times).compressed(got), light, atol=2e-6)
     assert got[0, 1, 0] == pytest.approx(times)
 
 
 def test_the_curve_ascends_and_has_no_corner():
     grey = np.linspace(0, 1, 10_001, dtype="f8")
-    assert compressed(expanded(np.ones((1, 1, 3), "f4"), 8.0), 8.0)[0, 0, 0] == 1
-    light = expanded(np.repeat(grey[None, :, None], 3, 2), 8.0)[0, :, 0].astype("f8")
+    assert LAMPS.compressed(LAMPS.expanded(np.ones((1, 1, 3), "f4")))[0, 0, 0] == 1
+    light = LAMPS.expanded(np.repeat(grey[None, :, None], 3, 2))[0, :, 0].astype("f8")
     slope = np.diff(light) / np.diff(grey)
     assert slope.min() > 0.99 and np.abs(np.diff(slope)).max() < 0.5  # up to 176; f32 rounds
     np.testing.assert_array_equal(light[grey <= KNEE], grey[grey <= KNEE].astype("f4"))
@@ -67,8 +68,8 @@ def test_the_curve_ascends_and_has_no_corner():
 def test_paint_is_no_light():
     """A colour that is cut off in one or two of its channels only."""
     paint = np.array([[[1, 0.9, 0.1], [1, 0.1, 0.1], [0.1, 1, 1]]], "f4")
-    np.testing.assert_array_equal(expanded(paint, 8.0), paint)
-    np.testing.assert_array_equal(compressed(paint, 8.0), paint)
+    np.testing.assert_array_equal(LAMPS.expanded(paint), paint)
+    np.testing.assert_array_equal(LAMPS.compressed(paint), paint)
 
 
 def picture(channels):
@@ -84,7 +85,7 @@ def picture(channels):
 @pytest.mark.parametrize("times", [2.0, 8.0, 32.0])
 def test_shaders_are_their_twin(times, channels):
     device, coded = gpu.open_device(None), picture(channels)
-    planes, images = Planes(device, times), TexturePool(device)
+    planes, images = Planes(device, Expansion(times)), TexturePool(device)
     encoder = device.create_command_encoder()
     light = images.texture("light", coded.size, "rgba32float")
     planes.decode(encoder, coded, light.create_view())
@@ -94,7 +95,9 @@ def test_shaders_are_their_twin(times, channels):
         alpha = coded.planes[3][..., None] / np.float32(255)
         want = np.concatenate([want * alpha, alpha], 2)
     want = np.minimum(want, 1)
-    np.testing.assert_allclose(got[..., :channels], expanded(want, times), rtol=2e-3, atol=2e-5)
+    np.testing.assert_allclose(
+        got[..., :channels], Expansion(times).expanded(want), rtol=2e-3, atol=2e-5
+    )
     encoder = device.create_command_encoder()
     compressed = images.texture("compressed", coded.size, "rgba32float")
     planes.compress(encoder, light.create_view(), compressed.create_view())
@@ -112,7 +115,7 @@ def test_samples_above_white_come_back(times):
     device, coding = gpu.open_device(None), Coding(bits=10, steps=(1, 1))
     luma, blue, red = np.meshgrid([700, 940, 1019], [400, 512, 1019], [400, 512, 1019])
     coded = CodedPicture(tuple(p.reshape(3, 9).astype("u2") for p in (luma, blue, red)), coding)
-    planes, images = Planes(device, times), TexturePool(device)
+    planes, images = Planes(device, Expansion(times)), TexturePool(device)
     encoder, light = device.create_command_encoder(), images.texture("light", (9, 3), "rgba32float")
     planes.decode(encoder, coded, light.create_view())
     plain = images.texture("plain", (9, 3), "rgba32float")
@@ -174,8 +177,8 @@ def test_lamps_of_a_video_streak_brighter_by_the_exact_average(tmp_path, capsys)
             *more)  # fmt: skip
         run(capsys, "blur", source, "-o", tmp_path / f"{times}.#.png", *words, *more)
     light = linear((np.stack(lumas(source)[2:5]) - 16) / np.float32(219))
-    light = [expanded(np.repeat(one[..., None], 3, 2), 8.0) for one in light]
-    want = to_display(compressed(np.mean(light, 0), 8.0), 8)[..., 0].astype(int)
+    light = [LAMPS.expanded(np.repeat(one[..., None], 3, 2)) for one in light]
+    want = to_display(LAMPS.compressed(np.mean(light, 0)), 8)[..., 0].astype(int)
     with Image.open(tmp_path / "8.2.png") as image:
         assert np.abs(np.asarray(image)[..., 0] - want).max() <= 1
     planes = lumas(tmp_path / "8.mkv")[1]
@@ -227,6 +230,6 @@ def test_light_above_white_is_refused(tmp_path, capsys):
     assert "--highlights is for videos clipped at white, not for HDR" in text
     assert make.names_in(tmp_path) == ["a.1.exr", "a.mp4"]
     with pytest.raises(InputError, match=r"up to 1\.5 times white"):
-        expanded(np.full((2, 2, 3), 1.5, "f4"), 8.0)
+        LAMPS.expanded(np.full((2, 2, 3), 1.5, "f4"))
     with pytest.raises(InputError, match="1 to 32"):
         Clip(tmp_path / "a.1.exr").expand_highlights(0.1)

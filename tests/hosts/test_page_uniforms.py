@@ -218,7 +218,7 @@ def test_command_lines_make_the_same_bytes(answers, monkeypatch):
     step = 8 if parts.TIER != "all" else 1
     for state, answer in answers[::step]:
         render, blur = (understood(program, line) for line in answer["lines"])
-        what, output = render["what"], render["output"]
+        what, output = render["options"], render["output"]
         fps = float(output.rate)
         shown = what.make("torusphere")
         ((_, time),) = what.moments(fps).items()

@@ -1,6 +1,7 @@
 """Names are the field's words: parameters, functions, classes and fields say what they hold."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -68,3 +69,9 @@ def test_every_kind_of_name_is_looked_at(tmp_path):
     (file := tmp_path / "one.py").write_text(code)
     words = sorted(fault.split(":")[2].split(",")[0].strip() for fault in faults(file, "one.py"))
     assert words == ["Wish", "_made", "given", "seen", "told"]
+
+
+def test_light_before_and_after_a_blur_is_named_in_few_modules():
+    """A change of it is made in color/highlights.py, video/planes/ and their shader."""
+    named = [f for f in PACKAGE.rglob("*.py") if re.search(r"\bhighlights\b", f.read_text("utf-8"))]
+    assert len(named) <= 8, named

@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 import make_frames as make
-from wgmb.color.highlights import compressed, expanded
+from wgmb.color.highlights import Expansion
 from wgmb.color.srgb import linear, to_display
 
 
@@ -26,9 +26,9 @@ def test_frames_without_vectors_are_averaged_by_their_shares(tmp_path, capsys, h
     code, _, err = make.inside(capsys, *words, "--cuts", "only:1")
     assert code == 0 and "none: pictures are averaged" in err, err
     assert make.names_in(tmp_path)[9:] == ["b.1.png", "b.2.png", "b.3.png"]
-    around = [expanded(one, highlights) for one in light[2:7]] if highlights > 1 else light[2:7]
+    around = [Expansion(highlights).expanded(one) for one in light[2:7]]
     mean = np.average(around, 0, weights=[1, 2, 2, 2, 1])
-    want = to_display(compressed(mean, highlights) if highlights > 1 else mean, 8)
+    want = to_display(Expansion(highlights).compressed(mean), 8)
     with Image.open(tmp_path / "b.2.png") as image:
         assert np.abs(np.asarray(image).astype(int) - want).max() <= 1
 

@@ -32,6 +32,7 @@ from wgmb.video.exposures import VideoBlur
 from wgmb.video.holdouts import holdout_of
 from wgmb.video.linear_frames import VideoPictures
 from wgmb.video.output_times import OutputFrames
+from wgmb.video.planes import Planes
 from wgmb.video.read.reader import VideoReader
 from wgmb.viewer import State, controls, offscreen
 from wgmb.viewer.state.state import video_time
@@ -139,7 +140,7 @@ def command_line(
         fill=video.duplicates == "fill",
         cuts=cut_list.is_search,
         known_cuts=cut_list.frames(0),
-        highlights=video.highlights,
+        planes=Planes(blur.device, video.expansion),
     )
     wanted = list(OutputFrames(footage, clock, None if fps is None else Fraction(fps)))
     for moment, exposure in run.exposures(Shutter(**shutter), wanted):
@@ -261,7 +262,7 @@ def test_what_is_held_out_stays_sharp_as_by_the_command_line(clip, tmp_path):
     got = settled(viewer)
     want = command_line(clip, 4, masks=(str(matte), "static"))
     np.testing.assert_allclose(got, want, atol=2e-5)
-    sharp = VideoPictures(VideoReader(clip), gpu.open_device()).at(4)
+    sharp = VideoPictures(VideoReader(clip), Planes(gpu.open_device())).at(4)
     kept = np.abs(got - sharp)[:, : SIZE[0] // 4 - 2]
     assert kept.max() < 1e-3 < 0.02 < np.abs(got - command_line(clip, 4)).max()
     viewer.stage.choices.close()
@@ -320,7 +321,7 @@ def test_the_sharp_picture_comes_first_and_says_so(clip, held):
         frame(viewer)
     report = viewer.stage.report
     assert report.waiting.startswith("sharp: finding the motion of picture 5")
-    sharp = VideoPictures(VideoReader(clip), gpu.open_device()).at(5)
+    sharp = VideoPictures(VideoReader(clip), Planes(gpu.open_device())).at(5)
     np.testing.assert_allclose(viewer.stage.download()[..., :3], sharp, atol=1e-6)
     held.free = True
     assert np.abs(settled(viewer) - sharp).max() > 0.05
@@ -376,8 +377,8 @@ def test_options_of_rendered_frames_are_refused(clip):
 
 
 def test_pictures_are_found_in_any_order(clip):
-    pictures, want = VideoPictures(VideoReader(clip), gpu.open_device()), {}
-    for number, light in VideoPictures(VideoReader(clip), gpu.open_device()).read():
+    pictures, want = VideoPictures(VideoReader(clip), Planes(gpu.open_device())), {}
+    for number, light in VideoPictures(VideoReader(clip), Planes(gpu.open_device())).read():
         want[number] = light
     for number in (3, 4, 5, 9, 2, 2, 13, 0, 12):
         np.testing.assert_array_equal(pictures.at(number), want[number])
@@ -407,7 +408,7 @@ def test_hdr_is_shown_in_the_colours_of_the_display(tmp_path, transfer):
     viewer = opened(path, look="sharp", flow="none", tone="clip")
     for _ in range(3):
         frame(viewer)
-    light = VideoPictures(VideoReader(path), gpu.open_device()).at(0).astype(np.float64)
+    light = VideoPictures(VideoReader(path), Planes(gpu.open_device())).at(0).astype(np.float64)
     if transfer == HLG:
         light *= (light @ [0.2627, 0.678, 0.0593])[..., None] ** 0.2  # BT.2100, table 5
     want = srgb(light @ conversion(REC2020, REC709).T)

@@ -162,7 +162,7 @@ class RateConversionStages(Stages):
         return done
 
     def _finished(self, light: np.ndarray) -> np.ndarray:
-        """As it is: highlights are compressed in the sum."""
+        """As it is: the sum is compressed."""
         return light
 
 

@@ -15,7 +15,6 @@ from typing import Any
 
 from .. import gpu
 from .._version import __version__
-from ..color.highlights import check as check_highlights
 from ..color.spaces import ColorSpace, Display
 from ..errors import InputError
 from ..io import atomic
@@ -125,8 +124,8 @@ class Job:
             clip = clip.part(self.chosen(numbers))
         if self.flow:
             clip.move_by(self.request.video.source(blur.device)[0])
-        if self.request.video.highlights != 1:
-            clip.expand_highlights(self.request.video.highlights)
+        if expansion := self.request.video.expansion:
+            clip.expand_highlights(expansion.white)
         files = self.make_output(None if numbers is None else clip)
         request = self.request
         return Run(clip, blur, files, self._resumes, request.confidence, request.conversion)
@@ -225,16 +224,10 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
         settings |= {"fps_in": str(conversion.fps_in), "fps": str(conversion.fps)}
     if request.color.remark and not output.is_exr:
         remarks.append(request.color.remark)
-    if video.highlights != 1:
-        check_highlights(video.highlights)
-        if Path(request.pattern).suffix.lower() not in STILLS:
-            raise InputError(
-                f"{request.pattern}: `highlights` is for pictures clipped at white, such as PNG; "
-                "EXR holds light above it"
-            )
-        if request.color.space(shown) is not None:
-            raise InputError("`highlights`, for sRGB pictures, cannot be combined with `from_`")
-        settings["highlights"] = video.highlights
+    is_converted = request.color.space(shown) is not None
+    is_clipped = Path(request.pattern).suffix.lower() in STILLS
+    video.expansion.check_frames(request.pattern, is_clipped, is_converted)
+    settings |= video.expansion.record
     if how:
         settings["flow"] = how
         remarks.append(f"the frames have no vectors; motion: {how}")

@@ -23,6 +23,7 @@ from ..shots.reader import Picture
 from ..shutter import Shutter
 from ..video.exposures import Exposure, Exposures
 from ..video.output_times import SPARE, OutputFrame
+from ..video.planes import Planes
 from ..video.thumbnail import Thumbnail
 from ..video.write.encoders import FINEST_RATE
 from .video import PictureKeywords, request_of
@@ -201,8 +202,7 @@ def blur_pictures(
     request, _ = request_of(dict(settings), PictureKeywords)
     if holdout is not None and request.video.flow == "none":
         raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
-    if request.video.highlights != 1 and transfer in ("linear", "pq", "hlg"):
-        raise InputError("`highlights` is for pictures clipped at white, not for HDR")
+    request.video.expansion.check_pictures(transfer not in ("linear", "pq", "hlg"))
     run = request.open(device)
     cuts = CutList(run.request.input.cuts or "")
     exposures = Exposures(
@@ -212,7 +212,7 @@ def blur_pictures(
         fill=request.video.duplicates == "fill",
         cuts=cuts.is_search,
         known_cuts=cuts.frames(0),
-        highlights=request.video.highlights,
+        planes=Planes(run.blur.device, request.video.expansion),
     )
     steady = SteadyExposures(exposures, rate, rate if fps is None else _rate("fps", fps))
     return PictureBlur(pictures, steady, run.request.shutter.make(), transfer, run.how)

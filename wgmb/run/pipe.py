@@ -23,6 +23,7 @@ from ..shots.cut_list import CutList
 from ..video.clock import tick
 from ..video.exposures import Exposure, Exposures
 from ..video.output_times import OutputFrame
+from ..video.planes import Planes
 from ..video.read.stream_reader import StreamReader
 from ..video.write.encoders import FINEST_RATE, SUFFIXES, Encoding, Facts, chosen
 from ..video.write.pictures import CodedVideo
@@ -206,7 +207,7 @@ def _piped(reader: Reader, run: VideoRun, output: OutputSettings, fps_in: str | 
         fill=request.video.duplicates == "fill",
         cuts=cuts.is_search,
         known_cuts=cuts.frames(0),
-        highlights=request.video.highlights,
+        planes=Planes(run.blur.device, request.video.expansion),
     )
     fps = rate if output.fps in (None, "source") else output.rate_or(rate)
     fps = fps.limit_denominator(FINEST_RATE)

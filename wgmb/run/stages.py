@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ..color.highlights import compressed
 from ..errors import Error, GpuMemoryError, InputError, reason
 from ..frame import Frame
 from ..methods.contract import reach_of
@@ -137,9 +136,8 @@ class Stages:
         return Result(source, self._finished(picture), confidence, placement)
 
     def _finished(self, light: np.ndarray) -> np.ndarray:
-        """The light of a frame as it is written: highlights that were expanded are compressed."""
-        highlights = self.clip.highlights
-        return light if highlights == 1 else compressed(light, highlights)
+        """The light of a frame as it is written: what was expanded is compressed."""
+        return self.clip.expansion.compressed(light)
 
 
 class MotionStages(Stages):

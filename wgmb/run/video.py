@@ -15,7 +15,6 @@ import wgpu
 
 from .. import gpu
 from .._version import __version__
-from ..color.highlights import check as check_highlights
 from ..errors import InputError, did_you_mean
 from ..extras import install_command, is_installed
 from ..methods import FRAME_METHODS, check_method
@@ -28,13 +27,14 @@ from ..settings import (
     ShutterSettings,
     plain,
 )
-from ..settings.video import VideoSettings, check_pause
+from ..settings.video import VideoSettings
 from ..shots.cut_list import CutList
 from ..shots.motion import MotionSource
 from ..video.clock import Clock
 from ..video.exposures import VideoBlur
 from ..video.holdouts import files_of, holdout_of
 from ..video.output_times import OutputFrame, OutputFrames
+from ..video.planes import Planes
 from ..video.read.reader import VideoReader
 from ..video.write.encoders import FINEST_RATE, SUFFIXES
 from .batch_report import Progress
@@ -108,8 +108,7 @@ class VideoRequest:
         if self.blur.method is not None:
             check_method(self.blur.method, FRAME_METHODS)
         check_fits(self.input, self.blur)
-        check_highlights(self.video.highlights)
-        check_pause(self.video.longest_pause)
+        self.video.check()
         if self.blur.holdout and self.video.flow == "none":
             raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
         opened = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
@@ -167,7 +166,7 @@ class VideoRun:
             fill=request.video.duplicates == "fill",
             cuts=cuts.is_search,
             known_cuts=cuts.frames(0),
-            highlights=request.video.highlights,
+            planes=Planes(self.blur.device, request.video.expansion),
         )
 
     def __call__(self, plan: VideoPlan, progress: Progress | None = None) -> VideoReport:

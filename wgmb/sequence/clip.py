@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..color.highlights import check as check_highlights
+from ..color.highlights import Expansion
 from ..color.spaces import ColorSpace
 from ..errors import InputError
 from ..extent import Extent
@@ -86,6 +86,7 @@ class Clip:
 
     def _begin(self) -> None:
         """Nothing has been read yet."""
+        self.expansion = Expansion()
         settled, files, passes = self._settled, self._files, self.passes
         self._stored = stored = FrameCache(
             files,
@@ -158,14 +159,14 @@ class Clip:
         `blurred` and `blur_sequence` compress it again. InputError unless it is 1 (off) to 32.
         Frames that hold light above white can then not be read.
         """
-        check_highlights(highlights)
-        self._builder.highlights = highlights
+        self.expansion = Expansion(highlights)
+        self._builder.brighten = self.expansion.expanded
         self._neighbours.forget_all()
 
     @property
     def highlights(self) -> float:
         """Times white that white is in frames."""
-        return self._builder.highlights
+        return self.expansion.white
 
     def begins_shot(self, number: int) -> bool:
         """Return True if the user said that a new shot begins with the frame."""

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..camera import MAX_INDEX
-from ..color.highlights import expanded
 from ..errors import InputError
 from ..frame import Frame
 from .flow_motion import Found
@@ -32,7 +31,7 @@ class FrameBuilder:
     """Makes Frames of the files in `stored`, as its Passes ask for.
 
     `cameras`: those of every view to blur. `picture_motion`: motion where the files hold none.
-    `highlights`: times white that white is in frames (see wgmb/color/highlights.py).
+    `brighten`: changes the light of pictures for the blur.
     """
 
     def __init__(
@@ -45,7 +44,7 @@ class FrameBuilder:
         self._stored, self._finder, self._masks = stored, finder, masks
         self._cameras = cameras
         self.picture_motion: Callable[[FrameFile], Found | None] | None = None
-        self.highlights = 1.0
+        self.brighten: Callable[[np.ndarray], np.ndarray] = lambda rgba: rgba
 
     def build(self, source: FrameFile, wanted: frozenset[str]) -> Frame:
         """The Frame of `source` as its layers have it; of OPTIONAL, only what is `wanted`.
@@ -75,7 +74,7 @@ class FrameBuilder:
                 )
                 ids = self._object_ids(source) if reprojections.here.bodies else None
             return Frame(
-                self._bright(source.rgba)
+                self.brighten(source.rgba)
                 if "color" in wanted
                 else np.zeros((*source.size[::-1], 3), np.float16),
                 motion=motion,
@@ -117,9 +116,6 @@ class FrameBuilder:
     def light_passes(self, source: FrameFile) -> light.LightPasses:
         """The passes of light of a frame's picture."""
         return light.find(self._stored.own(source), source.reference_channel)
-
-    def _bright(self, rgba: np.ndarray) -> np.ndarray:
-        return rgba if self.highlights == 1 else expanded(rgba, self.highlights)
 
     def _depth(self, source: FrameFile) -> np.ndarray | None:
         passes = self._stored.passes

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, Self
 import wgpu
 
 from .. import gpu
+from ..color.highlights import Expansion
 from ..errors import InputError
 from ..extras import is_installed
 from ..io.frame_numbers import frame_numbers
@@ -93,6 +94,17 @@ class VideoSettings(FlowSettings):
     "Hardware encoder; by default the encoding is done in software."
 
     @property
+    def expansion(self) -> Expansion:
+        """What happens to light before the blur, and back after it."""
+        return Expansion(self.highlights)
+
+    def check(self) -> None:
+        """InputError for light and a pause that make no sense."""
+        _ = self.expansion
+        if not self.longest_pause > 0:
+            raise InputError(f"`longest_pause` must be above 0 seconds, got {self.longest_pause:g}")
+
+    @property
     def pace(self) -> Fraction:
         """The speed, exactly."""
         try:
@@ -131,12 +143,6 @@ class VideoSettings(FlowSettings):
             end = None if numbers[-1] + 1 == len(reader) else reader.times[numbers[-1] + 1]
         origin = start if first is None else Fraction(0)
         return Clock(first or start, self.pace, origin, first, end)
-
-
-def check_pause(longest: float) -> None:
-    """InputError for a `longest_pause` that is no duration."""
-    if not longest > 0:
-        raise InputError(f"`longest_pause` must be above 0 seconds, got {longest:g}")
 
 
 def time_of(name: str, text: str | None) -> Fraction | None:

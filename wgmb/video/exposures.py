@@ -14,7 +14,6 @@ import wgpu
 
 from .. import gpu
 from ..color.coding import CodedPicture, Coding
-from ..color.highlights import check_coding
 from ..errors import InputError
 from ..exposure import Cell
 from ..gpu.textures import TexturePool
@@ -42,7 +41,7 @@ class Exposures:
     `motion`: where motion comes from (wgmb/flow); None: pictures are averaged as they are.
     `holdout` (height, width): 1 stays sharp. `fill`: repeated pictures are left out, and motion
     goes on over the gap. `cuts`: whether cuts are looked for, beside `known_cuts`, the numbers of
-    pictures that begin a shot. `highlights`: times white that white counts as while it is blurred.
+    pictures that begin a shot. `planes`: make their light, which may be expanded for the blur.
     `flash`: how long a flash of several pictures lasts at most [s]. `tolerance`: by how much their
     times may be rounded [s]. InputError where the method takes two frames to either side.
     """
@@ -56,16 +55,15 @@ class Exposures:
         fill: bool = False,
         cuts: bool = True,
         known_cuts: Collection[int] = (),
-        highlights: float = 1.0,
+        planes: Planes | None = None,
         flash: float = FLASH,
         tolerance: float = 0.0,
     ):
         if reach_of(blur.method) > 1:
             raise InputError("a `reach` of 2 is for rendered frames, a video takes 1")
-        self._highlights, self._holdout = highlights, holdout
-        self._flash, self._tolerance = flash, tolerance
+        self._holdout, self._flash, self._tolerance = holdout, flash, tolerance
         self._blur, self._motion = blur, motion
-        self._sum, self._planes = ExposureSum(blur), Planes(blur.device, highlights)
+        self._sum, self._planes = ExposureSum(blur), planes or Planes(blur.device)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
         self.shots: ShotReader[Thumbnail] | None = None
@@ -103,7 +101,7 @@ class Exposures:
     ) -> wgpu.GPUTexture:
         """The exposure of these cells as linear light (rgba32float)."""
         light = self._light(shots, views, cells)
-        if self._highlights == 1:
+        if not self._planes.expansion:
             return light
         encoder = self.device.create_command_encoder(label="compress")
         size = light.size[0], light.size[1]
@@ -120,7 +118,7 @@ class Exposures:
         coding: Coding,
     ) -> CodedPicture:
         """The exposure of these cells in planes."""
-        plain = self._motion is None and self._highlights == 1
+        plain = self._motion is None and not self._planes.expansion
         if plain and averages(shots[cells[0].index].content.coded.coding, coding):
             pictures = [shots[cell.index].content.coded for cell in cells]
             return self._average(pictures, [cell.share for cell in cells], coding)
@@ -131,7 +129,7 @@ class Exposures:
     def _light(
         self, shots: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell]
     ) -> wgpu.GPUTexture:
-        """The same with highlights expanded."""
+        """The same as it is blurred: expanded."""
         parts = ((cell, views.in_shot(cell.index)) for cell in cells)
         return self._sum.texture(shots[cells[0].index].content.coded.size, parts)
 
@@ -139,7 +137,7 @@ class Exposures:
 class VideoBlur(Exposures):
     """The exposures of a video. `clock`: the time of its pictures in the output.
 
-    All else: see Exposures. InputError for `highlights` where the video holds light above white.
+    All else: see Exposures. InputError for expanded light where the video holds light above white.
     """
 
     def __init__(
@@ -149,13 +147,12 @@ class VideoBlur(Exposures):
         motion: MotionSource | None,
         *,
         clock: Clock = Clock(),  # noqa: B008  it is frozen
-        highlights: float = 1.0,
         **more: Any,
     ):
-        check_coding(highlights, reader.path, reader.coding)
         pace = float(clock.speed)
         more |= {"flash": FLASH / pace, "tolerance": reader.tolerance / pace}
-        super().__init__(blur, motion, highlights=highlights, **more)
+        super().__init__(blur, motion, **more)
+        self._planes.expansion.check_video(reader.path, reader.coding)
         self.reader, self.clock = reader, clock
 
     def exposures(

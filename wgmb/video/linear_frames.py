@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import wgpu
 
 from ..color.coding import CodedPicture
 from ..gpu.textures import TexturePool
@@ -20,21 +19,18 @@ _NEAR = 48  # pictures that are decoded rather than sought
 
 
 class VideoPictures:
-    """Decodes a video's pictures, and makes them linear on the GPU.
+    """Decodes a video's pictures, and makes them linear on the GPU, by `planes`."""
 
-    `highlights`: times white that white becomes (see color/highlights.py); 1 is off.
-    """
-
-    def __init__(self, reader: VideoReader, device: wgpu.GPUDevice, highlights: float = 1.0):
-        self.reader, self.planes = reader, Planes(device, highlights)
-        self._device, self._images = device, TexturePool(device)
+    def __init__(self, reader: VideoReader, planes: Planes):
+        self.reader, self.planes = reader, planes
+        self._images = TexturePool(planes.device)
         self._going: Iterator[tuple[int, CodedPicture]] = iter(())
         self._reached = len(reader)  # number of the picture that `_going` gave last
         self._pending: tuple[int, CodedPicture] | None = None
 
     def light(self, picture: CodedPicture) -> np.ndarray:
         """(height, width, 3, or 4 with alpha) float16, linear, premultiplied."""
-        encoder = self._device.create_command_encoder(label="decode")
+        encoder = self.planes.device.create_command_encoder(label="decode")
         light = self._images.texture("light", picture.size, "rgba16float")
         self.planes.decode(encoder, picture, light.create_view())
         color = self._images.download(encoder, light)

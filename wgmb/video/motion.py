@@ -19,7 +19,7 @@ from .thumbnail import Thumbnail
 class VideoMotion(ShotMotion):
     """The motion of the pictures that a ShotReader keeps, by their indices there.
 
-    Flow takes them as textures of `device`, without expanded highlights; others as grey.
+    Flow takes them as textures of `device`, in light that is not expanded; others as grey.
     """
 
     def __init__(

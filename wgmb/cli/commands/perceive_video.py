@@ -19,6 +19,7 @@ from ...settings.video import VideoSettings
 from ...threads import Behind
 from ...video.linear_frames import VideoPictures
 from ...video.output_times import OutputFrame, OutputFrames
+from ...video.planes import Planes
 from ...video.read.reader import VideoReader
 from ..exit_codes import DONE, SOME_FAILED
 from ..terminal import note, progress
@@ -42,7 +43,7 @@ def perceive_video(
     wanted = OutputFrames(reader, clock, None)
     device = gpu.open_device(adapter)
     observer = Observer(densest_rate(reader, cone), cone, device=device)
-    seen = PerceivedVideo(reader, clock, VideoPictures(reader, device), observer)
+    seen = PerceivedVideo(reader, clock, VideoPictures(reader, Planes(device)), observer)
     first = next(n for n, t in enumerate(reader.times) if clock.out(t) == wanted[0].time)
     if not quiet:
         for text in reader.notes:

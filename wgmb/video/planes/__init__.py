@@ -9,6 +9,7 @@ import wgpu
 
 from ... import gpu
 from ...color.coding import FLOAT, CodedPicture, Coding
+from ...color.highlights import Expansion
 from ...gpu.textures import TexturePool
 from .average import Average, averages
 from .matrices import from_samples
@@ -29,22 +30,22 @@ def check(coding: Coding) -> None:
 class Planes:
     """Converts pictures on one device; keeps its textures from picture to picture.
 
-    `highlights`: times white that white becomes in light (see color/highlights.py); 1 is off.
+    `expansion`: what happens to light that is decoded, and back when it is encoded.
     """
 
-    def __init__(self, device: wgpu.GPUDevice, highlights: float = 1.0):
-        self._highlights = highlights
-        self._device, self._images, self._packed = device, TexturePool(device), Packed(device)
+    def __init__(self, device: wgpu.GPUDevice, expansion: Expansion = Expansion()):  # noqa: B008
+        self.expansion = expansion
+        self.device, self._images, self._packed = device, TexturePool(device), Packed(device)
 
     def texel(self, coding: Coding) -> str:
         """Of a picture's light: 16 bits and floats need more than half floats hold."""
-        return gpu.texel(self._device, 4) if coding.bits > _HALF_BITS else "rgba16float"
+        return gpu.texel(self.device, 4) if coding.bits > _HALF_BITS else "rgba16float"
 
     def draw(self, picture: CodedPicture, output: wgpu.GPUTexture) -> None:
         """Submit a picture's way into `output`, of its size and a format as for `decode`."""
-        encoder = self._device.create_command_encoder(label="decode")
+        encoder = self.device.create_command_encoder(label="decode")
         self.decode(encoder, picture, output.create_view())
-        gpu.submit(self._device, encoder)
+        gpu.submit(self.device, encoder)
 
     def decode(
         self, encoder: wgpu.GPUCommandEncoder, picture: CodedPicture, output: wgpu.GPUTextureView
@@ -60,19 +61,19 @@ class Planes:
         ]
         alpha = views.pop() if coding.alpha else None
         kernel = gpu.kernel(
-            self._device,
+            self.device,
             "video/planes/decode.wgsl",
             {"Output": output.texture.format},
             CURVE=curve_of(coding),
-            HIGHLIGHTS=self._highlights,
+            HIGHLIGHTS=self.expansion.white,
             GREY=coding.model == "grey",
             ALPHA=coding.alpha,
         )
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self._device, picture.size),
-            code=reading(self._device, coding),
+            gpu.FrameBindings.of_size(self.device, picture.size),
+            code=reading(self.device, coding),
             plane0=views[0],
             plane1=views[1 % len(views)],
             plane2=views[2 % len(views)],
@@ -84,15 +85,15 @@ class Planes:
         self, encoder: wgpu.GPUCommandEncoder, picture: CodedPicture, output: wgpu.GPUTextureView
     ) -> None:
         kernel = gpu.kernel(
-            self._device,
+            self.device,
             "video/planes/decode_floats.wgsl",
             {"Output": output.texture.format},
             CURVE=curve_of(picture.coding),
-            HIGHLIGHTS=self._highlights,
+            HIGHLIGHTS=self.expansion.white,
             ALPHA=picture.coding.alpha,
         )
         signals = self._images.upload("signals", picture.planes[0], "rgba32float")
-        frame = gpu.FrameBindings.of_size(self._device, picture.size)
+        frame = gpu.FrameBindings.of_size(self.device, picture.size)
         kernel.run(encoder, "main", frame, signals=signals, output=output)
 
     def encode(
@@ -103,18 +104,18 @@ class Planes:
         size = light.size[0], light.size[1]
         samples = self._images.texture("samples", size, "rgba32float")
         kernel = gpu.kernel(
-            self._device,
+            self.device,
             "video/planes/encode.wgsl",
             {"Output": "rgba32float"},
             CURVE=curve_of(coding),
-            HIGHLIGHTS=self._highlights,
+            HIGHLIGHTS=self.expansion.white,
             ALPHA=coding.alpha,
         )
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self._device, size),
-            code=writing(self._device, coding),
+            gpu.FrameBindings.of_size(self.device, size),
+            code=writing(self.device, coding),
             light=light,
             output=samples.create_view(),
         )
@@ -131,15 +132,15 @@ class Planes:
         light: wgpu.GPUTextureView,
         output: wgpu.GPUTextureView,
     ) -> None:
-        """Record the way of light with `highlights` into `output` without them, rgba32float."""
+        """Record the way of expanded light into `output`, rgba32float, as it was."""
         size = light.size[0], light.size[1]
         kernel = gpu.kernel(
-            self._device,
+            self.device,
             "video/planes/compress.wgsl",
             {"Output": "rgba32float"},
-            HIGHLIGHTS=self._highlights,
+            HIGHLIGHTS=self.expansion.white,
         )
-        frame = gpu.FrameBindings.of_size(self._device, size)
+        frame = gpu.FrameBindings.of_size(self.device, size)
         kernel.run(encoder, "main", frame, light=light, output=output)
 
     def _pack(
@@ -152,7 +153,7 @@ class Planes:
     ) -> None:
         """Record a plane's bytes."""
         kernel = gpu.kernel(
-            self._device,
+            self.device,
             "video/planes/pack.wgsl",
             COMPONENT=place.component,
             BITS=16 if coding.bits > 8 else 8,
@@ -164,8 +165,8 @@ class Planes:
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self._device, (place.words, place.size[1])),
-            plane=self._device.create_buffer_with_data(data=data, usage=uniform),
+            gpu.FrameBindings.of_size(self.device, (place.words, place.size[1])),
+            plane=self.device.create_buffer_with_data(data=data, usage=uniform),
             samples=samples.create_view(),
             packed=self._packed.buffer(places),
         )

@@ -9,8 +9,6 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from ...color.coding import HLG, PQ
-from ...color.highlights import check as check_highlights
-from ...color.highlights import check_coding
 from ...io.frame_numbers import frame_numbers
 from ...settings import rate_of
 from ...video.output_times import OutputFrame
@@ -31,10 +29,9 @@ SOURCE = "source"
 def check(state: State) -> None:
     """InputError for options that make no sense."""
     video = state.video
-    check_highlights(video.highlights)
-    if video.highlights != 1:
-        footage = reader_of(state.source, state.input.max_mb)
-        check_coding(video.highlights, footage.path, footage.coding)
+    if video.expansion:
+        reader = reader_of(state.source, state.input.max_mb)
+        video.expansion.check_video(reader.path, reader.coding)
     _ = video.pace, video.range
 
 
@@ -51,8 +48,8 @@ def is_own_rate(state: State) -> bool:
 
 def at_own_rate(state: State) -> State:
     """The same at the rate of the video, or at the times of its pictures if it keeps no rate."""
-    footage = reader_of(state.source, state.input.max_mb)
-    return replace(state, own_times=not footage.has_rate, fps=float(footage.rate))
+    reader = reader_of(state.source, state.input.max_mb)
+    return replace(state, own_times=not reader.has_rate, fps=float(reader.rate))
 
 
 def is_hdr(state: State) -> bool:
@@ -82,8 +79,8 @@ def output(state: State) -> VideoOutput:
     """The output frames; InputError if the part that is chosen holds none."""
     most = state.input.max_mb
     frames = None if state.frames == frames_of(state.source, most) else state.frames
-    footage, fps = reader_of(state.source, most), None if state.own_times else rate(state)
-    return output_of(footage, frames, state.video, fps)
+    reader, fps = reader_of(state.source, most), None if state.own_times else rate(state)
+    return output_of(reader, frames, state.video, fps)
 
 
 def output_frame(state: State) -> OutputFrame:

@@ -10,7 +10,6 @@ import wgpu
 
 from ... import gpu
 from ...color.coding import Coding
-from ...color.highlights import check_coding
 from ...color.spaces import ColorConfig, ColorSpace
 from ...frame import Frame
 from ...gpu.textures import TexturePool
@@ -53,7 +52,8 @@ class VideoSubject:
         self._maker = MotionThread(self._reader.path, max_mb, settings, device, request)
         self._moves = settings.flow != "none"
         self.finding = "\n".join([f"motion: {self._maker.how}", *self._reader.notes])
-        self._frames = PictureFrames(self._reader, device, self._maker.known, 1.0)
+        self._planes = Planes(device)
+        self._frames = PictureFrames(self._reader, self._planes, self._maker.known)
         self._sums: dict[int, ExposureSum] = {}
         self._state = state
         self._exposed: VideoExposure | None = None
@@ -166,11 +166,11 @@ class VideoSubject:
     ) -> None:
         """Set the content of the next draws."""
         self._state = state
-        highlights = state.video.highlights
-        if highlights != self._frames.highlights:
-            check_coding(highlights, self._reader.path, self.coding)
-            known = self._maker.known
-            self._frames = PictureFrames(self._reader, self._device, known, highlights)
+        expansion = state.video.expansion
+        if expansion != self._planes.expansion:
+            expansion.check_video(self._reader.path, self.coding)
+            self._planes = Planes(self._device, expansion)
+            self._frames = PictureFrames(self._reader, self._planes, self._maker.known)
         self._exposed = self._exposure(state, Shutter(0))
 
     def passes(self) -> dict[str, wgpu.GPUTexture]:
@@ -190,7 +190,7 @@ class VideoSubject:
     def _sharp(self, frame: Frame) -> wgpu.GPUTexture:
         self._images.upload("color", padded(frame.color, 4, 1), "rgba32float")
         color = self._images.texture("color", frame.size, "rgba32float")
-        if self._frames.highlights == 1:
+        if not self._planes.expansion:
             return color
         shown = self._images.texture("shown", frame.size, "rgba32float")
         self._compress(color, shown)
@@ -205,7 +205,7 @@ class VideoSubject:
     ) -> int:
         """Draw the exposure of the present output frame with `blur`, all its samples."""
         shutter, light = blur.shutter, target
-        if self._frames.highlights != 1:
+        if self._planes.expansion:
             size = target.size[0], target.size[1]
             light = self._images.texture("light", size, "rgba32float")
         neighbours = "neighbours" in blur.method.uses
@@ -220,10 +220,9 @@ class VideoSubject:
         return blur.samples
 
     def _compress(self, light: wgpu.GPUTexture, output: wgpu.GPUTexture) -> None:
-        """Take expanded highlights back."""
+        """Make expanded light as it was."""
         encoder = self._device.create_command_encoder(label="compress")
-        planes = Planes(self._device, self._frames.highlights)
-        planes.compress(encoder, light.create_view(), output.create_view())
+        self._planes.compress(encoder, light.create_view(), output.create_view())
         gpu.submit(self._device, encoder)
 
     def _sum(self, blur: Blur) -> ExposureSum:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import OrderedDict
 
 import numpy as np
-import wgpu
 
 from ...errors import InputError
 from ...exposure import evened
 from ...frame import Frame
 from ...video.linear_frames import VideoPictures
+from ...video.planes import Planes
 from ...video.read.reader import VideoReader
 from .video_exposure import Knowledge
 from .video_motion import PictureFinding
@@ -22,14 +22,12 @@ _FEWEST = 12  # pictures kept at least
 class PictureFrames:
     """Pictures of a video as Frames; `known` tells of their motion.
 
-    `highlights`: times white that white becomes (see color/highlights.py).
+    `planes`: make their light.
     """
 
-    def __init__(
-        self, reader: VideoReader, device: wgpu.GPUDevice, known: Knowledge, highlights: float
-    ):
-        self._reader, self._known, self.highlights = reader, known, highlights
-        self._pictures = VideoPictures(reader, device, highlights)
+    def __init__(self, reader: VideoReader, planes: Planes, known: Knowledge):
+        self._reader, self._known = reader, known
+        self._pictures = VideoPictures(reader, planes)
         self._times = reader.times.seconds
         self._colors: OrderedDict[int, np.ndarray] = OrderedDict()
         self._frames: OrderedDict[int, tuple[PictureFinding | None, Frame]] = OrderedDict()
