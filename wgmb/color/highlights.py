@@ -28,7 +28,7 @@ _WHITE = 1.001  # the most that counts as white
 
 @dataclass(frozen=True)
 class Expansion:
-    """What happens to light before a blur, and its inverse after it; false if nothing does.
+    """A change of light before a blur, and its inverse after it; false if there is none.
 
     `white`: times white that white counts as. InputError unless it is 1 (off) to MOST.
     """

@@ -154,9 +154,9 @@ def _frame_set(of: str | list[int]) -> FrameSet:
     return FrameSet(of)
 
 
-def numbered(numbers: list[int], what: str = "frame") -> str:
+def numbered(numbers: list[int], noun: str = "frame") -> str:
     """Numbers for people, with what has them: frame 9, frames 9-11."""
-    return f"{what}{'' if len(numbers) == 1 else 's'} {frame_list(numbers)}"
+    return f"{noun}{'' if len(numbers) == 1 else 's'} {frame_list(numbers)}"
 
 
 def frame_list(numbers: list[int], longest: int = 120) -> str:

@@ -95,7 +95,7 @@ class VideoSettings(FlowSettings):
 
     @property
     def expansion(self) -> Expansion:
-        """What happens to light before the blur, and back after it."""
+        """The change of light before the blur, which is taken back after it."""
         return Expansion(self.highlights)
 
     def check(self) -> None:

@@ -30,7 +30,7 @@ def check(coding: Coding) -> None:
 class Planes:
     """Converts pictures on one device; keeps its textures from picture to picture.
 
-    `expansion`: what happens to light that is decoded, and back when it is encoded.
+    `expansion`: of light that is decoded, taken back where it is encoded.
     """
 
     def __init__(self, device: wgpu.GPUDevice, expansion: Expansion = Expansion()):  # noqa: B008
