@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -14,6 +15,11 @@ from ...gpu.textures import TexturePool
 from ..state.state import BOTH_EYES, State
 
 _WHEEL, _KEY_HEIGHT, _KEY_WIDTH, _MARGIN = 96, 8, 180, 16  # logical pixels
+_COMPOSE, _BLIT = "viewer/draw/compose.wgsl", "viewer/draw/blit.wgsl"
+_COMPOSED: list[dict] = [{"buffer": {"type": "uniform"}}] + 2 * [
+    {"texture": {"sample_type": "unfilterable-float"}}
+]
+_PICTURE = "rgba16float"
 _MOST_TAPS = 4  # texels a side that are averaged for one pixel
 
 Box = tuple[float, float, float, float]  # x, y, width, height [px]
@@ -34,10 +40,12 @@ class Screen:
     def __init__(self, device: wgpu.GPUDevice, format: str):
         self.device, self._images = device, TexturePool(device)
         self._none = self._images.view("none", (1, 1), "rgba32float")
-        self._blit = self._blitter(format)
+        self._blit = self._pipeline(_BLIT, format, "auto", {})
+        self._composers: dict[tuple, Any] = {}
+        self._composition: wgpu.GPUTexture | None = None
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._composed: tuple = ()
-        self._size = (1, 1)
+        self._size: tuple[int, int] = (1, 1)
         self._visible: Box = (0, 0, 1, 1)
         self.seconds = 0.0  # that the last composing took
 
@@ -63,16 +71,14 @@ class Screen:
         self._composed, self._size, self._visible = shown, size, overlap(place, area)
         started = time.perf_counter()
         first, second = images
-        source = wgsl.load("viewer/draw/compose.wgsl")
-        kernel = gpu.kernel(
-            self.device,
-            "viewer/draw/compose.wgsl",
-            FIRST=source.constant(first.kind),
-            SECOND=source.constant(second.kind),
-            COMPARE=source.constant(mode),
-            TONE=source.constant(state.tone.upper()),
-            TAPS=_taps(images, whole(place), mode),
-        )
+        source = wgsl.load(_COMPOSE)
+        constants = {
+            "FIRST": source.constant(first.kind),
+            "SECOND": source.constant(second.kind),
+            "COMPARE": source.constant(mode),
+            "TONE": source.constant(state.tone.upper()),
+            "TAPS": _taps(images, whole(place), mode),
+        }
         data = np.zeros((), source.dtype("View"))
         data["area"], data["place"] = area, place
         data["line"], data["thick"] = place[0] + state.wipe * place[2], ratio
@@ -80,33 +86,31 @@ class Screen:
         data["middle"], data["fastest"] = state.middle, state.fastest
         if (key := key_box(state, first.kind, place, area, ratio)) is not None:
             data["wheel" if first.kind == "MOTION" else "key"] = key
-        buffer = self.device.create_buffer_with_data
         uniform = wgpu.BufferUsage.UNIFORM
-        encoder = self.device.create_command_encoder(label="view")
-        kernel.run(
-            encoder,
-            "main",
-            gpu.FrameBindings.of_size(self.device, size),
-            view=buffer(label="view", data=data, usage=uniform),
-            first=first.texture.create_view() if first.texture else self._none,
-            second=second.texture.create_view() if second.texture else self._none,
-            picture=self._picture().create_view(),
-        )
-        gpu.submit(self.device, encoder)
+        view = self.device.create_buffer_with_data(label="view", data=data, usage=uniform)
+        textures = [
+            image.texture.create_view() if image.texture else self._none for image in images
+        ]
+        pipeline = self._composer(tuple(constants.items()))
+        self._draw(pipeline, 1, [{"buffer": view}, *textures], self._picture())
         self.device.queue.read_buffer(self._token)  # waits
         self.seconds = time.perf_counter() - started
 
     def paint(self, target: wgpu.GPUTexture) -> None:
         """Put what was composed on the canvas's texture."""
-        encoder = self.device.create_command_encoder(label="blit")
+        self._draw(self._blit, 0, [self._picture().create_view()], target)
+
+    def _draw(self, pipeline, group: int, resources: list, target: wgpu.GPUTexture) -> None:
+        """One pass of a rasterizer over all of `target`; what it binds, in order."""
+        encoder = self.device.create_command_encoder(label="view")
         attachment = {"view": target.create_view(), "load_op": "clear", "store_op": "store"}
         pass_ = encoder.begin_render_pass(color_attachments=[attachment])
-        pass_.set_pipeline(self._blit)
+        pass_.set_pipeline(pipeline)
         bound = self.device.create_bind_group(
-            layout=self._blit.get_bind_group_layout(0),
-            entries=[{"binding": 0, "resource": self._picture().create_view()}],
+            layout=pipeline.get_bind_group_layout(group),
+            entries=[{"binding": i, "resource": r} for i, r in enumerate(resources)],
         )
-        pass_.set_bind_group(0, bound)
+        pass_.set_bind_group(group, bound)
         pass_.draw(3)
         pass_.end()
         gpu.submit(self.device, encoder)
@@ -119,16 +123,45 @@ class Screen:
         return canvas[y : y + h, x : x + w]
 
     def _picture(self) -> wgpu.GPUTexture:
-        return self._images.texture("picture", self._size, "rgba16float")
+        """What is composed; wgpu's pools hold what compute shaders write, not what is drawn."""
+        if self._composition is None or self._composition.size[:2] != self._size:
+            usage = wgpu.TextureUsage
+            self._composition = self.device.create_texture(
+                label="picture",
+                size=(self._size[0], self._size[1], 1),
+                format=_PICTURE,
+                usage=usage.RENDER_ATTACHMENT | usage.TEXTURE_BINDING | usage.COPY_SRC,
+            )
+        return self._composition
 
-    def _blitter(self, format: str):
-        module = self.device.create_shader_module(code=wgsl.load("viewer/draw/blit.wgsl").text)
+    def _composer(self, constants: tuple[tuple[str, float], ...]):
+        if constants not in self._composers:
+            layouts = [self._layout([]), self._layout(_COMPOSED)]
+            layout = self.device.create_pipeline_layout(bind_group_layouts=layouts)
+            self._composers[constants] = self._pipeline(_COMPOSE, _PICTURE, layout, dict(constants))
+        return self._composers[constants]
+
+    def _layout(self, entries: list[dict]):
+        stage = wgpu.ShaderStage.FRAGMENT
+        numbered = [{"binding": i, "visibility": stage} | e for i, e in enumerate(entries)]
+        return self.device.create_bind_group_layout(entries=numbered)
+
+    def _pipeline(self, file: str, format: str, layout: Any, constants: dict[str, float]):
+        """A pass over all pixels: the fragment shader of a file."""
+        modules = [
+            self.device.create_shader_module(code=wgsl.load(name).text) for name in (_BLIT, file)
+        ]
         return self.device.create_render_pipeline(
-            label="viewer/draw/blit.wgsl",
-            layout="auto",
-            vertex={"module": module, "entry_point": "corner"},
+            label=file,
+            layout=layout,
+            vertex={"module": modules[0], "entry_point": "corner"},
             primitive={"topology": "triangle-list"},
-            fragment={"module": module, "entry_point": "texel", "targets": [{"format": format}]},
+            fragment={
+                "module": modules[1],
+                "entry_point": "texel",
+                "targets": [{"format": format}],
+                "constants": constants,
+            },
         )
 
 

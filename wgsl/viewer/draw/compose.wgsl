@@ -47,14 +47,21 @@ const BACKGROUND: vec3f = vec3f(0.075, 0.078, 0.086);
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
-    let at = vec2f(id.xy) + 0.5;
-    var color = BACKGROUND;
-    if inside(at, view.area) {
-        color = comparison(at);
-        if inside(at, view.key) { color = color_bar(at); }
-        if inside(at, view.wheel) { color = wheel(at, color); }
-    }
-    textureStore(picture, id.xy, vec4f(color, 1.0));
+    textureStore(picture, id.xy, vec4f(shown(vec2f(id.xy) + 0.5), 1.0));
+}
+
+/// The same by a rasterizer: where compute shaders run one after the other, it need not wait for them.
+@fragment
+fn texel(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    return vec4f(shown(at.xy), 1.0);
+}
+
+/// Display values of the pixel whose centre is `at`.
+fn shown(at: vec2f) -> vec3f {
+    if !inside(at, view.area) { return BACKGROUND; }
+    if inside(at, view.key) { return color_bar(at); }
+    let color = comparison(at);
+    return select(color, wheel(at, color), inside(at, view.wheel));
 }
 
 fn inside(at: vec2f, box: vec4f) -> bool {
