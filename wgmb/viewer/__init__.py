@@ -2,7 +2,8 @@
 
 state/     what the viewer is set to: one frozen State; as TOML and as words of a command line
 subjects/  a scene, frames or a video, drawn into textures; motion and cuts of a video
-draw/      a State becomes one or two images, in small steps, and these go on the screen
+draw/      a State becomes one or two images, in small steps or in a thread, and these go on the
+           screen
 panel/     the controls beside the image, and text over it
 window     events in, images out, on a desktop or offscreen; controls: an event and a State make
            a State; actions: files, videos, exports; capabilities: what can be chosen

@@ -17,6 +17,7 @@ from ..io import exr, stills
 from ..io.atomic import temporary_name, write_file
 from ..io.record import KEY
 from ..video.write.frames import Video
+from .draw.draw_thread import DrawThread
 from .draw.renderer import Renderer
 from .draw.screen import Screen
 from .state.state import State
@@ -26,7 +27,9 @@ from .state.video_time import rate
 class Actions:
     """Runs actions and tracks those in progress; failures are shown as messages."""
 
-    def __init__(self, canvas, stage: Renderer, screen: Screen, say: Callable[[str], None]):
+    def __init__(
+        self, canvas, stage: Renderer | DrawThread, screen: Screen, say: Callable[[str], None]
+    ):
         self._window = getattr(canvas, "_window", None)  # of glfw, where there is one
         self._canvas, self._stage, self._screen, self._say = canvas, stage, screen, say
         self._video: Video | None = None

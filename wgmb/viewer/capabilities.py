@@ -19,6 +19,9 @@ from .state.state import (
 from .subjects.subject import ClipSubject, SceneSubject, Subject
 from .subjects.video import VideoSubject
 
+QUICKEST = "tap"
+"""The method that stands for slower ones where drawing is slow."""
+
 
 class Choices:
     """Choices available with the device and the scene or frames."""
@@ -102,6 +105,13 @@ class Choices:
         if state.eye:
             return self.subject(state).nature(state)
         return "distributed" if "distributed" in self.methods(state) else None
+
+    def has_preview(self, state: State, name: str) -> bool:
+        """True if the quickest method may stand for `name`, a look or method, until it is drawn."""
+        method = state.method if name in ("result", "perceived") else name
+        if method not in METHODS or method == QUICKEST or QUICKEST not in self.methods(state):
+            return False
+        return METHODS[QUICKEST].needs <= METHODS[method].needs  # others add samples meanwhile
 
     def rivals(self, state: State) -> list[str]:
         """Return the images that the result can be compared with."""

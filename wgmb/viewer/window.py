@@ -19,8 +19,12 @@ from .. import gpu
 from ..errors import DeviceError, InputError
 from . import controls
 from .actions import Actions
+from .draw.draw_thread import DrawThread
 from .draw.renderer import Renderer
-from .draw.screen import Screen, key_box
+from .draw.request import Drawn, Request
+from .draw.screen import NOTHING, Screen, fit, key_box
+from .draw.slot import FrameStatus
+from .panel import overlay
 from .panel.panel import Info, Panel
 from .panel.theme import style
 from .state.state import COMPARE, State
@@ -40,7 +44,9 @@ _SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "char", "resize")
 class Viewer:
     """The viewer on a canvas: state, event handling and drawing.
 
-    `failed` holds the exception that ended it, if one did.
+    `beside`: pictures are drawn in a thread of their own, and the window never waits for them;
+    the thread has the window drawn by `call_soon`, of the canvas's loop. `failed` holds the
+    exception that ended it, if one did.
     """
 
     def __init__(
@@ -49,6 +55,8 @@ class Viewer:
         state: State,
         *,
         device: wgpu.GPUDevice | None = None,
+        beside: bool = False,
+        call_soon: Callable[[Callable[[], None]], object] | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ):
         self.canvas, self.state, self.clock = canvas, state, clock
@@ -57,15 +65,15 @@ class Viewer:
         # Plain formats: the picture and ImGui's colours are display values already.
         format = self._context.get_preferred_format(self.device.adapter).removesuffix("-srgb")
         self._context.configure(device=self.device, format=format)
-        self.stage, self.screen, self.panel = (
-            Renderer(self.device),
-            Screen(self.device, format),
-            Panel(),
-        )
+        self.stage = DrawThread(self.device, self._on_news) if beside else Renderer(self.device)
+        self.screen, self.panel = Screen(self.device, format), Panel()
         self.actions = Actions(canvas, self.stage, self.screen, self.say)
         self.failed: BaseException | None = None
         self.message = ("", 0.0)  # and until when it is shown
-        self._good = state
+        self._good = self._asked = state  # drawn without an error, and requested last
+        self._call_soon = call_soon
+        self._drawn: Drawn | None = None
+        self._is_answered = False  # the last request, which is what is on the screen
         self._imgui = ImguiRenderer(self.device, canvas)
         style()
         self._imgui.set_gui(self._gui)
@@ -101,6 +109,11 @@ class Viewer:
                 self.canvas.close()
 
         return guarded
+
+    @property
+    def is_beside(self) -> bool:
+        """True if pictures are drawn in a thread of their own."""
+        return isinstance(self.stage, DrawThread)
 
     def _on_any(self, event: dict) -> None:
         self._due = _AFTER_EVENT
@@ -158,14 +171,30 @@ class Viewer:
 
     def _layout(self) -> controls.WindowLayout:
         ratio, info = self.canvas.get_pixel_ratio(), self._info
-        x, y, width, height = (v / ratio for v in self.stage.report.place)
-        methods, looks, eyes = (info.methods, info.looks, info.eyes) if info else ((), (), ())
+        x, y, width, height = (v / ratio for v in self._place())
         place = x, y, width, height
-        return controls.WindowLayout(
-            self._area(), place, tuple(methods), tuple(looks), COMPARE, tuple(eyes)
-        )
+        if info is None:
+            return controls.WindowLayout(self._area(), place)
+        can = info.available
+        words = tuple(can.methods), tuple(can.looks), COMPARE, tuple(can.eyes)
+        return controls.WindowLayout(self._area(), place, *words)
+
+    def _place(self) -> controls.Box:
+        """Where the whole image is on the canvas [px]."""
+        shape = self._drawn.report.shape if self._drawn else (1, 1)
+        return fit(shape, self._area_px(), self.state)
+
+    def _area_px(self) -> controls.Box:
+        ratio = self.canvas.get_pixel_ratio()
+        x, y, width, height = (round(v * ratio) for v in self._area())
+        return x, y, width, height
 
     # ---- drawing -------------------------------------------------------------------------
+
+    def _on_news(self) -> None:
+        """The thread has drawn something; called there."""
+        if self._call_soon is not None:
+            self._call_soon(self.canvas.request_draw)
 
     def _draw(self) -> None:
         started = time.perf_counter()
@@ -173,9 +202,10 @@ class Viewer:
         self._last, recording = self._now, self.actions.recording
         self._repeat_key()
         state = self.state
-        if state.playing or recording:
-            step = 1 / state.fps if recording else min(self._now - before, 0.5)
-            state = controls.played(state, step)
+        if recording and self._is_answered:
+            state = controls.played(state, 1 / state.fps)
+        elif state.playing and not recording:
+            state = controls.played(state, min(self._now - before, 0.5))
         try:
             self._prepare(state)
         except (InputError, OSError) as error:
@@ -183,41 +213,45 @@ class Viewer:
             if self.state == self._good:
                 raise
             self._prepare(replace(self._good, playing=False))
-        report, state, ratio = self.stage.report, self.state, self.canvas.get_pixel_ratio()
+        drawn, state, ratio = self._drawn, self.state, self.canvas.get_pixel_ratio()
         width, height = self.canvas.get_physical_size()
-        self.screen.compose(
-            state,
-            self.stage.images(self._flicked()),
-            report.place,
-            report.area,
-            (max(width, 1), max(height, 1)),
-            ratio,
-        )
+        images = drawn.sides(self._flicked()) if drawn else (NOTHING, NOTHING)
+        area = self._area_px() if drawn else (0, 0, 0, 0)
+        size = max(width, 1), max(height, 1)
+        self.screen.compose(state, images, self._place(), area, size, ratio)
         self.screen.paint(self._context.get_current_texture())
-        if report.labels != self._timed:  # what is not drawn any more is forgotten
-            self._timed, self._passes = report.labels, {}
-        self._passes |= report.seconds | report.passes | {"view": self.screen.seconds}
+        if drawn:
+            self._note_times(drawn.report)
         self._imgui.render()
-        self.actions.add_frame()
+        if self._is_answered:
+            self.actions.add_frame()
         for action, what in self.panel.actions:
             self.do(action, what)
         self.actions.poll_export()
         seconds = time.perf_counter() - started
         self.stage.finished(seconds, state.scene.antialias)
+        if drawn is None:
+            return
+        report = drawn.report
         if report.changed or state.playing:
-            self._frame_times.append(max(seconds, self._now - before if report.moving else 0))
+            took = self._now - before if report.moving else 0
+            self._frame_times.append(max(seconds, took))
             self._draw_times.append(report.seconds["draw"])
+        if isinstance(self.stage, DrawThread):
+            self._ask_for_more(False)  # news come by themselves
+            return
         if report.waiting and not (report.changed or report.moving):
             time.sleep(_WAIT)  # the work is not here
         self._ask_for_more(report.busy)
 
+    def _note_times(self, report: FrameStatus) -> None:
+        if report.labels != self._timed:  # what is not drawn any more is forgotten
+            self._timed, self._passes = report.labels, {}
+        self._passes |= report.seconds | report.passes | {"view": self.screen.seconds}
+
     def _prepare(self, state: State) -> None:
         """Draw what goes on the screen; the state, as far as it is possible, is what is there."""
-        choices, full = self.stage.choices, self.actions.recording
-        possible = choices.possible(state)
-        if possible.method != state.method:
-            self.say(f"method {state.method!r} is not available here")
-        self.state = state = possible
+        full = self.actions.recording
         changes = state.picture != self._good.picture
         self._sliding = self.panel.active and (self._sliding or changes)
         moving = (
@@ -227,41 +261,40 @@ class Viewer:
             or self._now < self._wheel_until
             or self._sliding
         )
-        ratio = self.canvas.get_pixel_ratio()
-        x, y, width, height = (round(v * ratio) for v in self._area())
-        area = x, y, width, height
-        report = self.stage.update(state, area, self._now, moving and not full, full)
+        request = Request(state, self._area_px(), moving and not full, full)
+        self.state = state
+        self._drawn = drawn = self.stage.draw(request, self._now)
+        self._is_answered = drawn is not None and drawn.request == request
+        if drawn is None:
+            self._asked = state
+            return
+        self.state = possible = drawn.corrected(state)
+        if possible.method != state.method:
+            self.say(f"method {state.method!r} is not available here")
+        report = drawn.report
         self._info = Info(
             report=report,
             adapter=self.device.adapter.summary,
-            methods=choices.methods(state),
-            looks=choices.looks(state),
-            eyes=choices.eyes(state),
-            rivals=choices.rivals(state),
-            options=choices.options(state.method),
+            available=drawn.available,
             frame_times=np.array(self._frame_times),
             draw_times=np.array(self._draw_times),
             passes={k: v for k, v in self._passes.items() if k != "draw"},
             recording="recording" if full else "",
             export=self.actions.export_message,
             message=self.message[0] if self._now < self.message[1] else report.waiting,
-            finding=getattr(choices.subject(state), "finding", ""),
             flicked=self._flicked(),
-            display=choices.displayed.display(state),
         )
-        self._good = state
+        self._good, self._asked = drawn.state, self.state
 
     def _flicked(self) -> bool:
         return self.state.mode == "flicker" and int(self._now / _FLICKER) % 2 == 1
 
     def _gui(self) -> None:
-        assert self._info is not None
-        size, ratio, report = (
-            self.canvas.get_logical_size(),
-            self.canvas.get_pixel_ratio(),
-            self.stage.report,
-        )
-        key = key_box(self.state, report.kind, report.place, report.area, ratio)
+        if self._info is None or self._drawn is None:
+            overlay.tag(f"opening {self.state.source} ...", 16, 16)
+            return
+        size, ratio = self.canvas.get_logical_size(), self.canvas.get_pixel_ratio()
+        key = key_box(self.state, self._drawn.report.kind, self._place(), self._area_px(), ratio)
         logical = None if key is None else tuple(v / ratio for v in key)
         self.state = self.panel.draw(self.state, self._info, size, self._area(), logical)
 
@@ -272,7 +305,7 @@ class Viewer:
             busy
             or waiting
             or self._due > 0
-            or self.state != self._good
+            or self.state != self._asked
             or self.state.playing
             or self.actions.recording
             or self.panel.active
@@ -321,10 +354,12 @@ def view(state: State, *, adapter: str | None = None, size: tuple[int, int] = (1
     from rendercanvas.glfw import RenderCanvas, loop  # only now: without a display it aborts
 
     canvas = RenderCanvas(title=TITLE, size=size, update_mode="ondemand", max_fps=60)
-    viewer = Viewer(canvas, state, device=device)
+    is_slow = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+    soon = loop.call_soon_threadsafe
+    viewer = Viewer(canvas, state, device=device, beside=is_slow, call_soon=soon)
     loop.run()
     viewer.actions.close()
-    viewer.stage.choices.close()
+    viewer.stage.close()
     if viewer.failed is not None:
         raise viewer.failed
 

@@ -8,14 +8,14 @@ QUICK = 4  # the fewest samples while something moves
 
 
 class Pace:
-    """Level of detail during motion: the finest one that meets TARGET."""
+    """Level of detail during motion: the finest one whose frames take `target` seconds at most."""
 
     TARGET = 0.08  # seconds from one frame of the window to the next
     SCALES = (1.0, 1.0, 0.85, 0.72, 0.6, 0.5, 0.42, 0.36, 0.3, 0.25, 0.2)
     FEWER = (1, 1, 1, 1, 1, 2, 2, 3, 4, 4, 4)  # the samples' divisor, for methods of many passes
 
-    def __init__(self, level: int = 0):
-        self.level = level
+    def __init__(self, level: int = 0, target: float = TARGET):
+        self.level, self._target = level, target
         self._took: deque[tuple[float, float]] = deque(maxlen=3)
         self._patience = 0
 
@@ -39,10 +39,10 @@ class Pace:
             return rest + drew * self._cost(level, antialias) / self._cost(self.level, antialias)
 
         last = len(self.SCALES) - 1
-        if middle[0] > 1.1 * self.TARGET and self.level < last:
-            fits = [k for k in range(self.level + 1, last) if predicted(k) <= self.TARGET]
+        if middle[0] > 1.1 * self._target and self.level < last:
+            fits = [k for k in range(self.level + 1, last) if predicted(k) <= self._target]
             self._set(min(fits, default=last))
-        elif self.level and predicted(self.level - 1) < 0.85 * self.TARGET:
+        elif self.level and predicted(self.level - 1) < 0.85 * self._target:
             self._patience += 1
             if self._patience >= 5:
                 self._set(self.level - 1)

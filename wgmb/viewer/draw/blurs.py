@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import replace
 
 import wgpu
@@ -15,6 +16,7 @@ from ...shutter import Shutter
 from ..capabilities import Choices
 from ..state.state import REFERENCE, State
 from .adaptive import QUICK, Pace
+from .portions import DroppedError
 
 REFERENCE_SAMPLES = 1024
 _KEPT = 12
@@ -27,10 +29,13 @@ class Blurs:
         self._device, self._choices, self._pace = device, choices, pace
         self._blurs: dict[tuple, Blur] = {}
 
-    def __call__(self, slot: str, name: str, state: State, quick: int | None) -> Blur:
+    def __call__(
+        self, slot: str, name: str, state: State, quick: int | None, stand_in: str | None = None
+    ) -> Blur:
         """The Blur for `name` (a look, a method or the reference) in a slot.
 
         `quick`: the level of detail while something moves, 0 the finest; None: in full.
+        `stand_in`: the method that is used instead.
         """
         settings, shutter = state.suited_blur, state.shutter.make()
         if name == REFERENCE:
@@ -43,6 +48,8 @@ class Blurs:
             settings, shutter = _plain(settings, "volume", settings.samples), Shutter(0)
         elif name not in ("result", "perceived", state.method):
             settings = state.with_method(name).suited_blur
+        if stand_in is not None:
+            settings = state.with_method(stand_in).suited_blur
         method = settings.method or ""
         if method not in (allowed := self._choices.methods(state)):
             raise InputError(f"method {method!r} is not available here; use {', '.join(allowed)}")
@@ -58,6 +65,15 @@ class Blurs:
         if blur.shutter != shutter:
             blur.shutter = shutter
         return blur
+
+    @contextmanager
+    def kept_if_done(self, blur: Blur):
+        """Forget the Blur if what it draws is dropped: what it keeps of a frame is not whole."""
+        try:
+            yield
+        except DroppedError:
+            self._blurs = {key: one for key, one in self._blurs.items() if one is not blur}
+            raise
 
     def _quick(self, settings: BlurSettings, level: int) -> BlurSettings:
         """The same with fewer samples, and beyond the finest level with quick options."""

@@ -16,7 +16,7 @@ import wgpu
 
 from ... import gpu
 from ...cone import MOST_HELD, Cone
-from ...gpu.timing import TimestampClock
+from ...gpu.timing import Clock
 from ...gpu_frame.weighted_sum import WeightedSum
 from ...pipeline.blur import Blur
 from ..state.state import State
@@ -69,7 +69,7 @@ class Perceived:
         blur: Blur,
         antialias: int,
         seconds: float,
-        timing: TimestampClock | None,
+        timing: Clock | None,
         known: list[tuple],
     ) -> int:
         """Draw frames that are missing, the newest first, for about `seconds`; how many are done.

@@ -15,17 +15,19 @@ import wgpu
 from ... import gpu
 from ...errors import InputError
 from ...gpu.textures import TexturePool
-from ...gpu.timing import TimestampClock
+from ...gpu.timing import Clock, TimestampClock
 from ...methods import METHODS
 from ...sequence.input_color import chromaticities
-from ..capabilities import Choices
+from ..capabilities import QUICKEST, Choices
 from ..state.state import BOTH_EYES, REFERENCE, State
 from ..subjects.subject import SceneSubject, Subject
 from ..subjects.video import VideoSubject
 from .adaptive import Pace
 from .blurs import Blurs
 from .perception import Perceived, seen_frames
+from .portions import DroppedError
 from .quality import Measured, Quality
+from .request import Available, Drawn, Request
 from .screen import (
     Box,
     Image,
@@ -39,17 +41,24 @@ _STEP = 0.07  # seconds of work on what converges, between two frames of the win
 _QUICK_STEP = 0.03  # while something moves
 _SETTLE = 0.35  # seconds of stillness before antialiasing
 _SHORT = 0.02  # seconds
+_HALF = 5  # the level of detail with half the width
 _PASSES = {"sharp": "color", "depth": "depth", "velocity": "motion"}
 
 
 class Renderer:
-    """The textures of what is shown, and the passes that draw them."""
+    """The textures of what is shown, and the passes that draw them.
 
-    def __init__(self, device: wgpu.GPUDevice):
+    `timing`: a clock of the passes, by default that of the device, if it has one. `target`:
+    seconds that a frame may take while something moves.
+    """
+
+    def __init__(
+        self, device: wgpu.GPUDevice, timing: Clock | None = None, target: float = Pace.TARGET
+    ):
         self.device = device
         self.choices, self.quality = Choices(device), Quality()
-        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        self.pace = Pace(5 if software else 0)
+        self._is_slow = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        self.pace = Pace(5 if self._is_slow else 0, target)
         self.report = FrameStatus()
         self._images, self._video_light = TexturePool(device), VideoLight(device)
         self._perceived = {slot: Perceived(device) for slot in ("first", "second")}
@@ -60,9 +69,28 @@ class Renderer:
         self._on_screen: dict[str, Image] = {}
         self.chromaticities: dict[str, Any] = {}  # of what is shown, as an attribute of an EXR
         self._level, self._still_since, self._still = 0, 0.0, ()
+        self._preview, self._ready = False, False
         self._moved = False
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
-        self._timing = TimestampClock(device) if TimestampClock.usable(device) else None
+        self._timing = timing
+        if timing is None and TimestampClock.usable(device):
+            self._timing = TimestampClock(device)
+
+    def draw(self, request: Request, now: float) -> Drawn:
+        """Go on with what is requested, `now` [s]; InputError if it cannot be shown."""
+        choices = self.choices
+        state = choices.possible(request.state)
+        report = self.update(state, request.area, now, request.moving, request.full)
+        available = Available(
+            methods=choices.methods(state),
+            looks=choices.looks(state),
+            eyes=choices.eyes(state),
+            rivals=choices.rivals(state),
+            options=choices.options(state.method),
+            finding=getattr(choices.subject(state), "finding", ""),
+            display=choices.displayed.display(state),
+        )
+        return Drawn(request, state, report, available, self._on_screen, self.chromaticities)
 
     def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> FrameStatus:
         """Go on with what `state` shows in `area` [px] of the canvas, `now` [s].
@@ -71,13 +99,19 @@ class Renderer:
         """
         started = time.perf_counter()
         subject = self.choices.subject(state)
-        shape = subject.size(state)
-        is_video = isinstance(subject, VideoSubject)
-        place = fit(subject.shape if is_video else shape, area, state)
-        size, antialias = self._quality(state, shape, place, now, moving, full)
-        report = FrameStatus(shape if not state.is_scene else whole(place), place, area, moving)
-        quick = moving and not full
+        size = subject.size(state)
+        shape = subject.shape if isinstance(subject, VideoSubject) else size
+        place = fit(shape, area, state)
+        full_size = whole(place) if state.is_scene else size
         names = self._wanted(state)
+        slow = self._is_slow and not full and self.choices.has_preview(state, names[0][0])
+        if slow:
+            self._slow_quality(state, place, moving)
+        else:
+            self._quick_quality(state, place, now, moving, full)
+        size, antialias = self._size(state, size, place)
+        report = FrameStatus(full_size, shape, place, area, moving)
+        quick = (moving or self._preview) and not full
         slots = ("first", "second")[: len(names)]
         for slot, (name, eye) in zip(slots, names, strict=True):
             if name != "perceived":
@@ -87,10 +121,15 @@ class Renderer:
         assert first.texture is not None
         report.size, report.kind = first.texture.size[:2], first.kind
         report.labels = (first.label, last.label)
+        if any(self._slots[slot].is_preview for slot in slots):
+            share = report.size[0] / max(full_size[0], 1)
+            of_size = f" at {share:.0%}" if share < 0.995 else ""
+            report.preview = f"preview by {QUICKEST}{of_size}"
         self._on_screen = self._displayed(slots, state, subject)
-        unfinished = not all(self._coming[slot].ready for slot in slots)
-        report.busy = moving or unfinished or self._level > 0
+        self._ready = all(self._coming[slot].ready for slot in slots)
+        report.busy = moving or not self._ready or self._level > 0 or self._preview
         if isinstance(subject, VideoSubject):
+            report.draft = subject.draft if state.look == "result" else ""
             report.made_of = subject.made_of(state, state.shutter.make())
             if any(name != "sharp" for name, _ in names):
                 report.waiting = subject.waiting
@@ -104,13 +143,14 @@ class Renderer:
         self.report = report
         return report
 
-    def images(self, flicked: bool) -> tuple[Image, Image]:
-        """Return the images of both sides; `flicked`: the second one for both."""
-        first, second = (
-            self._on_screen["first"],
-            self._on_screen.get("second", Image(None, "COLOR", ())),
-        )
-        return (second if flicked else first), second
+    @property
+    def first(self) -> Image:
+        """The first image as it was drawn."""
+        return self._slots["first"].image
+
+    def close(self) -> None:
+        """End what goes on beside the window."""
+        self.choices.close()
 
     def _displayed(
         self, slots: tuple[str, ...], state: State, subject: Subject
@@ -152,11 +192,18 @@ class Renderer:
                 self.pace.observe(seconds, self.report.seconds["draw"], antialias)
             self._moved = True
 
-    def _quality(self, state, shape, place, now, moving, full) -> tuple[tuple[int, int], int]:
-        """Size to draw [px] and rays: coarse while moving, then in full, then antialiased."""
+    def _size(self, state, size, place) -> tuple[tuple[int, int], int]:
+        """Size to draw [px] and rays per pixel side, at the level of detail."""
         if not state.is_scene:
             self._level = 0
-            return shape, 1
+            return size, 1
+        scale, antialias = self.pace.quality(self._level, state.scene.antialias)
+        width, height = whole(place)
+        return (max(round(width * scale), 1), max(round(height * scale), 1)), antialias
+
+    def _quick_quality(self, state, place, now, moving, full) -> None:
+        """Coarse while moving, then in full, then antialiased."""
+        self._preview = False
         if full:
             self._level = 0
         elif moving:
@@ -168,9 +215,18 @@ class Renderer:
             self._level = 1
         elif self._level == 1 and now - self._still_since > _SETTLE:
             self._level = 0
-        scale, antialias = self.pace.quality(self._level, state.scene.antialias)
-        width, height = whole(place)
-        return (max(round(width * scale), 1), max(round(height * scale), 1)), antialias
+
+    def _slow_quality(self, state, place, moving) -> None:
+        """By the quickest method while moving and at first, then at half the size, then in full."""
+        key = state.picture, place
+        if moving or key != self._still:
+            self._still, self._preview = key, True
+            self._level = max(self.pace.level, 1)
+        elif self._ready and self._preview:
+            self._preview = False
+            self._level = _HALF if self._level >= _HALF else 0
+        elif self._ready:
+            self._level = 0
 
     def _wanted(self, state: State) -> list[tuple[str, str | None]]:
         """One or two names, of a look, a method or the reference, each with the view it is of."""
@@ -204,20 +260,26 @@ class Renderer:
         known = self._known(name, state, subject, full)
         frame = state.frame if name == "perceived" else None
         key = (name, view, state.picture, eye, frame, tuple(known))
-        fine = (size, antialias, self._level if quick else None)
+        is_preview = self._preview and self.choices.has_preview(state, name)
+        fine = (size, antialias, self._level if quick else None, is_preview)
         if (coming.key, coming.fine) != (key, fine):
-            if self._level and shown.key == key and not _coarser(shown.fine, fine):
+            coarse = self._level or is_preview
+            if coarse and shown.key == key and not _coarser(shown.fine, fine):
                 return
             texture = f"{slot} {1 + shown.name.endswith('1')}"
             label = self._label(name, state) + (f", {view}" if view else "")
-            coming = Slot(label, key, fine, texture)
+            coming = Slot(label, key, fine, texture, is_preview=is_preview)
             self._coming[slot] = coming
         if coming.ready:
             return
         started = time.perf_counter()
         seconds = float("inf") if full else _QUICK_STEP if quick else _STEP
         subject.look_at(state, size, antialias, view)
-        self._draw(coming, slot, name, view, state, subject, seconds, quick, known)
+        try:
+            self._draw(coming, slot, name, view, state, subject, seconds, quick, known)
+        except DroppedError:
+            self._coming[slot] = shown
+            raise
         if self._timing:
             report.passes |= self._timing.read()
         self.device.queue.read_buffer(self._token)  # waits
@@ -254,7 +316,7 @@ class Renderer:
         quick: bool,
         known: list[tuple],
     ) -> None:
-        size, antialias, _ = coming.fine
+        size, antialias = coming.fine[:2]
         volumes = state.is_scene and "volume" in self.choices.methods(state)
         if name in _PASSES and not (name == "sharp" and volumes):
             passes = subject.passes()
@@ -263,20 +325,23 @@ class Renderer:
             coming.texture, coming.done = passes[_PASSES[name]], 1
             coming.kind = {"depth": "DEPTH", "velocity": "MOTION"}.get(name, "COLOR")
             return
-        blur = self._blurs(slot, name, state, self._level if quick else None)
+        stand_in = QUICKEST if coming.is_preview else None
+        blur = self._blurs(slot, name, state, self._level if quick else None, stand_in)
         coming.texture = self._images.texture(coming.name, size, blur.output)
         if name == "perceived" and (eye := state.eye):
             if state.is_scene:  # of its own, so that what else is drawn keeps its moment
                 subject = self._past = self._past or SceneSubject(self.device)
             coming.total = len(seen_frames(state))
             by = view, blur, antialias
-            coming.done = self._perceived[slot].draw(
-                coming.texture, state, eye, subject, *by, seconds, self._timing, known
-            )
+            with self._blurs.kept_if_done(blur):
+                coming.done = self._perceived[slot].draw(
+                    coming.texture, state, eye, subject, *by, seconds, self._timing, known
+                )
             return
         budget = coming.done, float("inf") if quick else seconds
         coming.total = blur.samples
-        coming.done = subject.draw(blur, coming.texture, budget, self._timing)
+        with self._blurs.kept_if_done(blur):
+            coming.done = subject.draw(blur, coming.texture, budget, self._timing)
 
     def _label(self, name: str, state: State) -> str:
         if name == "result":
@@ -299,4 +364,6 @@ class Renderer:
 
 def _coarser(a: tuple, b: tuple) -> bool:
     """Return True if an image of quality `a` is coarser than one of quality `b`."""
+    if a[3] != b[3]:
+        return a[3]
     return a[0][0] < b[0][0] or a[1] < b[1]

@@ -34,6 +34,10 @@ class Image:
     stamp: tuple  # changes with what is in the texture
 
 
+NOTHING = Image(None, "COLOR", ())
+"""An image that is black."""
+
+
 class Screen:
     """Composes images into `picture`, in display values, and paints that on a canvas."""
 

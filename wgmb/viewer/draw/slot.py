@@ -22,6 +22,7 @@ class Slot:
     texture: wgpu.GPUTexture | None = None
     done: int = 0
     total: int = 1
+    is_preview: bool = False  # drawn by the quickest method, which stands for another one
 
     @property
     def ready(self) -> bool:
@@ -39,10 +40,13 @@ class FrameStatus:
     """Result of one update, for the panel."""
 
     full: tuple[int, int] = (0, 0)
+    shape: tuple[float, float] = (1, 1)  # width and height of the whole picture, in square pixels
     place: Box = (0, 0, 0, 0)
     area: Box = (0, 0, 0, 0)
     moving: bool = False
     size: tuple[int, int] = (0, 0)
+    preview: str = ""  # of what, where a quick method stands for the one that is set
+    draft: str = ""  # in what way a video's motion is no more than a draft
     seconds: dict[str, float] = field(default_factory=dict)  # on the clock
     passes: dict[str, float] = field(default_factory=dict)  # on the GPU, where it tells
     labels: tuple[str, str] = ("", "")

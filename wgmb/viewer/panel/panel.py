@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from imgui_bundle import imgui
 
-from ...color.spaces import Display
-from ...methods.options import Option
 from ..controls import Box
+from ..draw.request import Available
 from ..draw.slot import FrameStatus
 from ..state.state import State
 from ..state.video_time import output, output_frame
@@ -27,20 +26,14 @@ class Info:
 
     report: FrameStatus
     adapter: str
-    methods: list[str]
-    looks: list[str]
-    eyes: list[str]
-    rivals: list[str]
-    options: dict[str, Option]
+    available: Available
     frame_times: np.ndarray  # seconds, the last one last
     draw_times: np.ndarray
     passes: dict[str, float] = field(default_factory=dict)
     recording: str = ""
     export: str = ""
     message: str = ""
-    finding: str = ""
     flicked: bool = False
-    display: Display | None = None
 
 
 class Panel:
@@ -73,6 +66,8 @@ class Panel:
         overlay.name_images(state, report.labels, info.flicked, x, y + 12, wide)
         if key is not None:
             overlay.explain(state, key, report.full[1])
+        for n, remark in enumerate(filter(None, (report.preview, report.draft))):
+            overlay.tag(remark, x + 12, y + 40 + 28 * n)
         overlay.tell(info.recording, info.message, area)
         if state.help:
             overlay.give_help(area)
@@ -128,7 +123,7 @@ class Panel:
             state = replace(state, playing=not state.playing)
         imgui.same_line()
         imgui.set_next_item_width(-1)
-        form = "frame %.1f" if state.is_scene else "frame %.0f"
+        form = "frame %.1f" if state.is_scene else f"frame {state.number}"
         changed, frame = imgui.slider_float("##frame", state.frame, first, max(last, first), form)
         self._ui.keep("frame")
         state = replace(state, frame=frame, playing=False) if changed else state

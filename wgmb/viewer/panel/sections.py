@@ -50,8 +50,8 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
     if chosen != state.source:
         return state.opened(chosen)
     if not state.is_scene:
-        if info.finding:
-            ui.dim(info.finding)
+        if info.available.finding:
+            ui.dim(info.available.finding)
         return video(ui, state, info) if state.is_video else state
     known = inspect.signature(builtin.SCENES[state.source]).parameters
     defaults = {name: parameter.default for name, parameter in known.items()}
@@ -102,9 +102,9 @@ def animation(ui: Widgets, state: State, info: Info) -> State:
 
 def blur(ui: Widgets, state: State, info: Info) -> State:
     """The method and its options."""
-    state = state.with_method(ui.combo("method", state.method, info.methods))
+    state = state.with_method(ui.combo("method", state.method, info.available.methods))
     state = _samples(ui, state)
-    for name, option in info.options.items():
+    for name, option in info.available.options.items():
         if name == "show":
             continue  # looked at by view
         own = state.setting(name)
@@ -216,9 +216,9 @@ def _curve(ui: Widgets, state: State) -> None:
 
 def view(ui: Widgets, state: State, info: Info) -> State:
     """View, comparison and exposure."""
-    state = replace(state, look=ui.combo("look at", state.look, info.looks))
-    if info.eyes:
-        state = replace(state, eyes=ui.combo("eyes", state.eyes, info.eyes))
+    state = replace(state, look=ui.combo("look at", state.look, info.available.looks))
+    if info.available.eyes:
+        state = replace(state, eyes=ui.combo("eyes", state.eyes, info.available.eyes))
     if state.look == "depth":
         state = ui.slide(state, "middle", 0.1, 100, "%.1f", log=True, label="middle grey")
     elif state.look == "velocity":
@@ -231,7 +231,7 @@ def view(ui: Widgets, state: State, info: Info) -> State:
     else:
         state = _eye(ui, state) if state.eye else state
         state = ui.slide(state, "exposure", -8, 8, "%+.1f stops")
-        state = _colors(ui, state, info.display)
+        state = _colors(ui, state, info.available.display)
     return _compare(ui, state, info)
 
 
@@ -280,7 +280,7 @@ def _compare(ui: Widgets, state: State, info: Info) -> State:
     state = replace(state, compare=ui.combo("compare", state.compare, COMPARE))
     if state.compare == "off":
         return state
-    state = replace(state, against=ui.combo("with", state.against, info.rivals))
+    state = replace(state, against=ui.combo("with", state.against, info.available.rivals))
     if state.compare == "difference":
         state = _gain(ui, state)
     if state.against == REFERENCE:

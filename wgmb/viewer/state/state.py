@@ -132,6 +132,11 @@ class State:
         return same if self.is_scene else replace(same, frame=float(math.ceil(self.frame - 0.5)))
 
     @property
+    def number(self) -> int:
+        """Number of the frame on disk, or of the video's output frame, that is shown."""
+        return min(math.ceil(self.frame - 0.5), self.span[1])
+
+    @property
     def read_as(self) -> ColorSettings:
         """Of `color` what changes how files are read, not only how they are shown."""
         color = self.color

@@ -13,7 +13,7 @@ from ...color.spaces import ColorConfig, ColorSpace, Display
 from ...extent import EVERYWHERE
 from ...frame import Frame
 from ...gpu.textures import TexturePool
-from ...gpu.timing import TimestampClock
+from ...gpu.timing import Clock
 from ...methods import METHODS
 from ...methods.contract import reach_of
 from ...pipeline.blur import Blur
@@ -97,9 +97,7 @@ class SceneSubject:
         """The sharp picture and what lies under it, by name."""
         return self._render.passes(self._time, self._number)
 
-    def draw(
-        self, blur: Blur, output: Texture, budget: Budget, timing: TimestampClock | None
-    ) -> int:
+    def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Clock | None) -> int:
         """Draw with `blur`; samples done, which may be less than it has where it is slow."""
         view, (done, seconds) = output.create_view(), budget
         if "progress" in blur.method.uses:
@@ -233,9 +231,7 @@ class ClipSubject:
         rgba[..., : frame.color.shape[2]] = frame.color
         return rgba
 
-    def draw(
-        self, blur: Blur, output: Texture, budget: Budget, timing: TimestampClock | None
-    ) -> int:
+    def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Clock | None) -> int:
         """Draw with `blur`, all its samples."""
         encoder = self._device.create_command_encoder(label="blur")
         view = output.create_view()

@@ -13,7 +13,7 @@ from ...color.coding import Coding
 from ...color.spaces import ColorConfig, ColorSpace
 from ...frame import Frame
 from ...gpu.textures import TexturePool
-from ...gpu.timing import TimestampClock
+from ...gpu.timing import Clock
 from ...gpu_frame.residency import padded
 from ...methods import METHODS
 from ...pipeline.blur import Blur
@@ -147,6 +147,12 @@ class VideoSubject:
         """Numbers of the pictures that share the exposure of the present output frame."""
         return tuple(cell.index for cell in self._exposure(state, shutter).cells)
 
+    @property
+    def draft(self) -> str:
+        """Source of motion that is quick rather than right; '' for the best."""
+        how = self._maker.how
+        return f"draft motion: {how}" if how.startswith("dense inverse search") else ""
+
     def close(self) -> None:
         """Let the search for motion end."""
         self._maker.close()
@@ -201,7 +207,7 @@ class VideoSubject:
         blur: Blur,
         target: wgpu.GPUTexture,
         budget: tuple[int, float],
-        timing: TimestampClock | None,
+        timing: Clock | None,
     ) -> int:
         """Draw the exposure of the present output frame with `blur`, all its samples."""
         shutter, light = blur.shutter, target

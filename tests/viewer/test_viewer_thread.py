@@ -1,0 +1,175 @@
+"""Drawing beside the window: the same bits, and a window that goes on meanwhile."""
+
+import threading
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from viewer_hand import ALONE, SMALL, put
+from wgmb import InputError, gpu
+from wgmb.viewer import offscreen
+from wgmb.viewer.draw.portions import DroppedError, Portions
+from wgmb.viewer.draw.renderer import Renderer
+from wgmb.viewer.draw.request import Request
+from wgmb.viewer.window import frame
+
+STATE = put(ALONE, method="gather", samples=4, shading="off")
+AREA = (0, 0, *SMALL)
+
+
+@pytest.fixture
+def viewer():
+    made = offscreen(STATE, SMALL, beside=True)
+    yield made
+    made.actions.close()
+    made.stage.close()
+
+
+def seen_until(viewer, done):
+    """Frames of the window until `done`; it is never asked to wait."""
+    for _ in range(3000):
+        frame(viewer)
+        if done():
+            return
+        time.sleep(0.01)
+    raise AssertionError("never done")
+
+
+def is_final(viewer):
+    return viewer._is_answered and not viewer.stage.report.busy
+
+
+class Gate:
+    """Lets the thread draw once it is open."""
+
+    def __init__(self, monkeypatch):
+        self.opened, self.entered = threading.Event(), threading.Event()
+        draw = Renderer.draw
+
+        def held(renderer, request, now):
+            self.entered.set()
+            self.opened.wait(60)
+            return draw(renderer, request, now)
+
+        monkeypatch.setattr(Renderer, "draw", held)
+
+
+def whole(state):
+    """The final picture, drawn in one go."""
+    renderer = Renderer(gpu.open_device())
+    renderer.draw(Request(state, AREA, full=True), 0.0)
+    return renderer.download()
+
+
+def test_parts_give_the_same_bits_as_the_whole(viewer):
+    seen_until(viewer, lambda: is_final(viewer))
+    np.testing.assert_array_equal(viewer.stage.download(), whole(STATE))
+    assert viewer.stage.report.preview == ""
+
+
+def test_the_window_goes_on_while_something_is_drawn(monkeypatch):
+    gate = Gate(monkeypatch)
+    viewer = offscreen(STATE, SMALL, beside=True)
+    try:
+        frame(viewer)
+        assert gate.entered.wait(60)
+        for _ in range(3):  # each of them returns
+            frame(viewer)
+        assert viewer._drawn is None
+        gate.opened.set()
+        seen_until(viewer, lambda: is_final(viewer))
+        gate.opened.clear()
+        gate.entered.clear()
+        viewer.state = put(STATE, shutter=90.0)
+        frame(viewer)
+        assert gate.entered.wait(60)
+        before = viewer.screen.picture()
+        viewer.state = put(viewer.state, exposure=1.0)  # needs nothing of the thread
+        frame(viewer)
+        assert viewer.screen.picture().mean() > before.mean() + 0.02
+        gate.opened.set()
+    finally:
+        gate.opened.set()
+        viewer.stage.close()
+
+
+def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
+    renderer = Renderer(gpu.open_device())
+    seen = []
+    for now in range(4):
+        report = renderer.draw(Request(STATE, AREA), float(now)).report
+        seen.append((report.preview, report.size, report.busy))
+    assert seen[0][0] == "preview by tap at 50%" and seen[0][2]
+    assert seen[-1] == ("", SMALL, False)
+    widths = [size[0] for _, size, _ in seen]
+    assert widths == sorted(widths)  # it never jumps back
+
+
+def test_work_that_nobody_wants_is_dropped_between_two_passes_and_leaves_nothing_behind():
+    device = gpu.open_device()
+    left = [10**9]
+
+    def wanted():
+        left[0] -= 1
+        return left[0] > 0
+
+    renderer = Renderer(device, Portions(device, wanted))
+    full = Request(STATE, AREA, full=True)
+    for passes in (1, 5, 12):
+        left[0] = passes
+        with pytest.raises(DroppedError):
+            renderer.draw(full, 0.0)
+        assert left[0] == 0
+    left[0] = 10**9
+    renderer.draw(full, 0.0)
+    np.testing.assert_array_equal(renderer.download(), whole(STATE))
+
+
+def test_another_setting_drops_what_is_drawn_but_playing_does_not(viewer):
+    stage = viewer.stage
+    still, moving = Request(STATE, AREA), Request(STATE, AREA, moving=True)
+    other = Request(put(STATE, shutter=90.0), AREA)
+    seen_until(viewer, lambda: is_final(viewer))
+    for drawing, now, want in ((still, other, False), (moving, other, True), (still, still, True)):
+        stage._drawing, stage._wanted = drawing, now
+        assert stage._is_wanted() == want
+    shown = Request(put(STATE, exposure=2.0, wipe=0.1), AREA)
+    stage._drawing, stage._wanted = still, shown
+    assert stage._is_wanted()
+
+
+def test_what_cannot_be_drawn_is_a_message_and_the_last_state_stays(viewer):
+    seen_until(viewer, lambda: is_final(viewer))
+    viewer.state = put(STATE, source="fence", set=("posts=900",))
+    seen_until(viewer, lambda: "posts" in viewer.message[0])
+    assert viewer.state == STATE
+
+
+def test_a_state_that_cannot_be_drawn_at_first_ends_the_viewer():
+    viewer = offscreen(put(STATE, set=("posts=1",)), SMALL, beside=True)
+    with pytest.raises(InputError, match="posts"):
+        seen_until(viewer, lambda: False)
+    viewer.stage.close()
+
+
+def test_a_recording_has_every_frame_in_full(viewer, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    added = []
+    seen_until(viewer, lambda: is_final(viewer))
+    viewer.state = put(STATE, method="tap", frame=0.0)
+    viewer.do("record")
+    monkeypatch.setattr(viewer.actions._video, "add", lambda picture: added.append(picture))
+    monkeypatch.setattr(viewer.actions._video, "close", lambda: None)
+    seen_until(viewer, lambda: len(added) >= 3)
+    steps = viewer.state.frame / viewer.state.speed  # one between two, perhaps one before them
+    assert steps == pytest.approx(round(steps)) and len(added) - round(steps) in (0, 1)
+    assert all(np.abs(a - b).mean() > 1e-3 for a, b in pairwise(added))
+
+
+def test_the_thread_ends_with_the_window():
+    viewer = offscreen(STATE, SMALL, beside=True)
+    frame(viewer)
+    viewer.stage.close()
+    assert not viewer.stage._thread.is_alive()

@@ -1,0 +1,216 @@
+"""Drawing beside the window, in a thread with a device of its own: the window never waits for it.
+
+Without a GPU, passes of seconds run on the same processor as the panel. Here they run in the
+driver's threads while the window goes on, each pass by itself, so that all is dropped at once when
+something else is wanted. Images come as arrays; the window's own device gets them as textures.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from ... import gpu
+from ...gpu.textures import TexturePool
+from .portions import DroppedError, Portions
+from .renderer import Renderer
+from .request import Drawn, Request
+from .screen import Image
+from .slot import FrameStatus
+
+_PLAYED = 1 / 24  # seconds that a frame may take while it plays
+_POLL = 0.2  # seconds after which the thread looks whether it should end
+_PAUSE = 0.03  # seconds between two looks at whether there is something to do
+_HALF_MAX = 65504.0
+_CHANNELS = {1: "r", 2: "rg", 4: "rgba"}
+
+
+@dataclass
+class _Answer:
+    """What the thread has made of a request."""
+
+    drawn: Drawn
+    arrays: dict[str, np.ndarray]
+    """The images by slot; (height, width, channels), float16 where they are colours."""
+    light: np.ndarray
+    """The first image as it was drawn."""
+
+
+class DrawThread:
+    """Draws what is requested; `draw` returns the last answer at once.
+
+    `news` is called in the thread when there is an answer.
+    """
+
+    def __init__(self, device: wgpu.GPUDevice, news: Callable[[], None] = lambda: None):
+        self.device, self._news = device, news
+        self._images = TexturePool(device)
+        self._uploaded: dict[str, Image] = {}
+        self._changed = threading.Condition()
+        self._wanted: Request | None = None
+        self._drawing: Request | None = None
+        self._answer: _Answer | None = None
+        self._failed: tuple[Request, Exception] | None = None
+        self._taken: _Answer | None = None
+        self._ended = False
+        beside = gpu.second_device(device)
+        self._thread = threading.Thread(
+            target=self._work, args=(beside,), name="drawing", daemon=True
+        )
+        self._thread.start()
+
+    # ---- of the window -------------------------------------------------------------------
+
+    def draw(self, request: Request, now: float) -> Drawn | None:
+        """The last answer, None before the first; `request` is worked on from now on.
+
+        What went wrong with a request for the same picture is raised.
+        """
+        with self._changed:
+            if request != self._wanted:
+                self._wanted = request
+                self._changed.notify()
+            failed, answer = self._failed, self._answer
+            self._failed = None
+        if failed is not None and _alike(failed[0], request):
+            raise failed[1]
+        if answer is None:
+            return None
+        report = replace(answer.drawn.report, changed=answer is not self._taken)
+        if answer is not self._taken:
+            self._taken = answer
+            self._upload(answer)
+        return replace(answer.drawn, report=report, images=dict(self._uploaded))
+
+    def _upload(self, answer: _Answer) -> None:
+        for slot, image in answer.drawn.images.items():
+            held, array = self._uploaded.get(slot), answer.arrays[slot]
+            if held is None or held.stamp != image.stamp:
+                texel = f"{_CHANNELS[array.shape[2]]}{8 * array.itemsize}float"
+                self._images.upload(slot, array, texel)
+                texture = self._images.texture(slot, (array.shape[1], array.shape[0]), texel)
+                self._uploaded[slot] = Image(texture, image.kind, image.stamp)
+
+    @property
+    def report(self) -> FrameStatus:
+        """The last one."""
+        return self._taken.drawn.report if self._taken else FrameStatus()
+
+    @property
+    def chromaticities(self) -> dict[str, Any]:
+        """Of what is shown, as an attribute of an EXR."""
+        return self._taken.drawn.chromaticities if self._taken else {}
+
+    def download(self) -> np.ndarray:
+        """(height, width, channels) float32 of the first image."""
+        return self._taken.light if self._taken else np.zeros((1, 1, 4), np.float32)
+
+    def finished(self, seconds: float, antialias: int) -> None:
+        """The window's frames say nothing about how long drawing takes."""
+
+    def close(self) -> None:
+        """Let the thread end after the pass that it is at."""
+        with self._changed:
+            self._ended = True
+            self._changed.notify()
+        self._thread.join()
+
+    # ---- of the thread -------------------------------------------------------------------
+
+    def _is_wanted(self) -> bool:
+        """Return False once the window is closed, or wants another picture than a still one."""
+        now, drawing = self._wanted, self._drawing
+        if self._ended or now is None or drawing is None:
+            return not self._ended
+        return drawing.moving or drawing.full or now.picture == drawing.picture
+
+    def _work(self, device: wgpu.GPUDevice) -> None:
+        renderer = Renderer(device, Portions(device, self._is_wanted), _PLAYED)
+        images = _Downloads(TexturePool(device))
+        busy, last = False, ()
+        while (request := self._next(busy)) is not None:
+            started = time.perf_counter()
+            try:
+                drawn = renderer.draw(request, started)
+            except DroppedError:
+                busy = True
+                continue
+            except Exception as error:  # which the window raises
+                busy = False
+                with self._changed:
+                    self._failed = request, error
+                self._news()
+                continue
+            renderer.finished(time.perf_counter() - started, drawn.state.scene.antialias)
+            report, busy = drawn.report, drawn.report.busy
+            told = request, busy, report.waiting, report.reference, report.measured
+            if report.changed or told != last:
+                last = told
+                self._publish(images.answer(renderer, drawn))
+            else:
+                time.sleep(_PAUSE)  # until the mouse is still, or motion is found
+        renderer.choices.close()
+
+    def _publish(self, answer: _Answer) -> None:
+        with self._changed:
+            self._answer = answer
+        self._news()
+
+    def _next(self, busy: bool) -> Request | None:
+        """The request that is to be worked on; None: no more."""
+        with self._changed:
+            while not self._ended and (self._wanted is None or self._wanted == self._drawing):
+                if busy:
+                    break
+                self._changed.wait(_POLL)
+            self._drawing = self._wanted
+            return None if self._ended else self._drawing
+
+
+class _Downloads:
+    """Images as arrays; one that has not changed is the same array."""
+
+    def __init__(self, images: TexturePool):
+        self._images = images
+        self._kept: dict[str, tuple[tuple, np.ndarray]] = {}
+
+    def answer(self, renderer: Renderer, drawn: Drawn) -> _Answer:
+        """The drawing with its images as arrays."""
+        first = renderer.first
+        light = self._array("light", first)
+        arrays = {}
+        for slot, image in drawn.images.items():
+            whole = light if image.stamp == first.stamp else self._array(slot, image)
+            arrays[slot] = self._colors(slot, image, whole)
+        return _Answer(drawn, arrays, light)
+
+    def _array(self, name: str, image: Image) -> np.ndarray:
+        if name not in self._kept or self._kept[name][0] != image.stamp:
+            assert image.texture is not None
+            encoder = self._images.device.create_command_encoder(label="download")
+            array = self._images.download(encoder, image.texture)
+            self._kept[name] = image.stamp, array.astype(np.float32, copy=False)
+        return self._kept[name][1]
+
+    def _colors(self, slot: str, image: Image, array: np.ndarray) -> np.ndarray:
+        """Colours as half floats, which are half as much to copy in the window's thread."""
+        if image.kind not in ("COLOR", "DISPLAY"):
+            return array
+        name = f"{slot} as halves"
+        if name not in self._kept or self._kept[name][0] != image.stamp:
+            with np.errstate(over="ignore"):
+                halves = np.clip(array, -_HALF_MAX, _HALF_MAX).astype(np.float16)
+            self._kept[name] = image.stamp, halves
+        return self._kept[name][1]
+
+
+def _alike(failed: Request, request: Request) -> bool:
+    """Return True if the request that failed is still wanted, perhaps at another moment."""
+    a, b = (replace(r.state, frame=0.0, playing=False) for r in (failed, request))
+    return a == b

@@ -1,0 +1,73 @@
+"""A request of the window, and the answer: images, and all that can be chosen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from ...color.spaces import Display
+from ...methods.options import Option
+from ..state.state import State
+from .screen import NOTHING, Box, Image
+from .slot import FrameStatus
+
+
+@dataclass(frozen=True)
+class Request:
+    """A state that is to be shown in an area [px] of the canvas."""
+
+    state: State
+    area: Box
+    moving: bool = False
+    """Quick is better than fine."""
+    full: bool = False
+    """Everything at once, however long it takes."""
+
+    @property
+    def picture(self) -> tuple:
+        """All that the images depend on."""
+        state = self.state
+        return state.picture, self.area, state.look, state.mode, state.against, state.eyes
+
+
+@dataclass(frozen=True)
+class Available:
+    """Choices that there are for a state, by name."""
+
+    methods: list[str]
+    looks: list[str]
+    eyes: list[str]
+    rivals: list[str]
+    options: dict[str, Option]
+    finding: str = ""
+    display: Display | None = None
+
+
+@dataclass
+class Drawn:
+    """The answer to a request."""
+
+    request: Request
+    state: State
+    """That of the request, as far as it is possible here."""
+    report: FrameStatus
+    available: Available
+    images: dict[str, Image]
+    """By slot; colours as their display shows them, or linear light."""
+    chromaticities: dict[str, Any] = field(default_factory=dict)
+    """Of what is shown, as an attribute of an EXR."""
+
+    def sides(self, flicked: bool) -> tuple[Image, Image]:
+        """The images of both sides; `flicked`: the second one for both."""
+        first, second = self.images["first"], self.images.get("second", NOTHING)
+        return (second if flicked else first), second
+
+    def corrected(self, state: State) -> State:
+        """A state, with what is not possible here replaced as in `self.state`."""
+        asked, found = self.request.state, self.state
+        if asked.method == state.method != found.method:
+            state = state.with_method(found.method)
+        for name in ("look", "eyes", "against"):
+            if getattr(asked, name) == getattr(state, name):
+                state = replace(state, **{name: getattr(found, name)})
+        return state
