@@ -36,7 +36,7 @@ def main() -> int:
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         for name in given.subjects:
-            measure(name, source_of(name, Path(folder)), beside=not given.inline)
+            measure(name, source_of(name, Path(folder)), threaded=not given.inline)
     return 0
 
 
@@ -81,11 +81,11 @@ def video(folder: Path) -> str:
     return str(path)
 
 
-def measure(name: str, source: str, beside: bool) -> None:
+def measure(name: str, source: str, threaded: bool) -> None:
     """Open a source, then change the shutter, then another method."""
     canvas = RenderCanvas(title="wgmb", size=SIZE, update_mode="manual", vsync=False)
     state, news = State().opened(source), []
-    viewer = Viewer(canvas, state, beside=beside, call_soon=news.append)
+    viewer = Viewer(canvas, state, threaded=threaded, call_soon=news.append)
     steps = (
         ("opened", lambda: state, False),
         ("shutter", lambda: viewer.state.with_settings(shutter=90.0), False),
@@ -129,7 +129,7 @@ def watched(viewer: Viewer, news: list, moves: bool) -> tuple[float, float, list
                 return first, now - started, took
         due = max(due + _EVERY, now)
         time.sleep(due - now)
-        while viewer.is_beside and not (moves or news):
+        while viewer.is_threaded and not (moves or news):
             time.sleep(0.005)
         due = time.perf_counter() if not moves else due
 

@@ -106,7 +106,7 @@ def test_the_reference_converges_and_is_measured(small, monkeypatch):
 def test_what_is_shown_never_has_less_in_it_than_before(small, monkeypatch):
     monkeypatch.setattr(renderer, "_STEP", 0.0)  # a few samples at a time
     small.viewer.state = put(ALONE, method="accumulate", samples=32)
-    want, shown = small.picture(), small.viewer.stage._shown
+    want, shown = small.picture(), small.viewer.stage._slots
     small.submit("pointer_down", x=50, y=40, button=1, buttons=(1,))
     for _ in range(3):
         small.look()

@@ -240,5 +240,5 @@ def test_export_runs_the_command_line(hand, tmp_path, monkeypatch):
     child = hand.viewer.actions.export[0]
     assert child.wait(60) == 0
     hand.look()
-    assert "exported" in hand.viewer.actions.export_said
+    assert "exported" in hand.viewer.actions.export_message
     assert len(list(tmp_path.glob("*.png"))) == 2

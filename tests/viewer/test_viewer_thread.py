@@ -21,7 +21,7 @@ AREA = (0, 0, *SMALL)
 
 @pytest.fixture
 def viewer():
-    made = offscreen(STATE, SMALL, beside=True)
+    made = offscreen(STATE, SMALL, threaded=True)
     yield made
     made.actions.close()
     made.stage.close()
@@ -71,7 +71,7 @@ def test_parts_give_the_same_bits_as_the_whole(viewer):
 
 def test_the_window_goes_on_while_something_is_drawn(monkeypatch):
     gate = Gate(monkeypatch)
-    viewer = offscreen(STATE, SMALL, beside=True)
+    viewer = offscreen(STATE, SMALL, threaded=True)
     try:
         frame(viewer)
         assert gate.entered.wait(60)
@@ -148,7 +148,7 @@ def test_what_cannot_be_drawn_is_a_message_and_the_last_state_stays(viewer):
 
 
 def test_a_state_that_cannot_be_drawn_at_first_ends_the_viewer():
-    viewer = offscreen(put(STATE, set=("posts=1",)), SMALL, beside=True)
+    viewer = offscreen(put(STATE, set=("posts=1",)), SMALL, threaded=True)
     with pytest.raises(InputError, match="posts"):
         seen_until(viewer, lambda: False)
     viewer.stage.close()
@@ -169,7 +169,7 @@ def test_a_recording_has_every_frame_in_full(viewer, tmp_path, monkeypatch):
 
 
 def test_the_thread_ends_with_the_window():
-    viewer = offscreen(STATE, SMALL, beside=True)
+    viewer = offscreen(STATE, SMALL, threaded=True)
     frame(viewer)
     viewer.stage.close()
     assert not viewer.stage._thread.is_alive()

@@ -44,7 +44,7 @@ _SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "char", "resize")
 class Viewer:
     """The viewer on a canvas: state, event handling and drawing.
 
-    `beside`: pictures are drawn in a thread of their own, and the window never waits for them;
+    `threaded`: pictures are drawn in a thread of their own, and the window never waits for them;
     the thread has the window drawn by `call_soon`, of the canvas's loop. `failed` holds the
     exception that ended it, if one did.
     """
@@ -55,7 +55,7 @@ class Viewer:
         state: State,
         *,
         device: wgpu.GPUDevice | None = None,
-        beside: bool = False,
+        threaded: bool = False,
         call_soon: Callable[[Callable[[], None]], object] | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ):
@@ -65,12 +65,12 @@ class Viewer:
         # Plain formats: the picture and ImGui's colours are display values already.
         format = self._context.get_preferred_format(self.device.adapter).removesuffix("-srgb")
         self._context.configure(device=self.device, format=format)
-        self.stage = DrawThread(self.device, self._on_news) if beside else Renderer(self.device)
+        self.stage = DrawThread(self.device, self._on_news) if threaded else Renderer(self.device)
         self.screen, self.panel = Screen(self.device, format), Panel()
         self.actions = Actions(canvas, self.stage, self.screen, self.say)
         self.failed: BaseException | None = None
         self.message = ("", 0.0)  # and until when it is shown
-        self._good = self._asked = state  # drawn without an error, and requested last
+        self._good = self._requested = state  # drawn without an error, and requested last
         self._call_soon = call_soon
         self._drawn: Drawn | None = None
         self._is_answered = False  # the last request, which is what is on the screen
@@ -111,7 +111,7 @@ class Viewer:
         return guarded
 
     @property
-    def is_beside(self) -> bool:
+    def is_threaded(self) -> bool:
         """True if pictures are drawn in a thread of their own."""
         return isinstance(self.stage, DrawThread)
 
@@ -266,7 +266,7 @@ class Viewer:
         self._drawn = drawn = self.stage.draw(request, self._now)
         self._is_answered = drawn is not None and drawn.request == request
         if drawn is None:
-            self._asked = state
+            self._requested = state
             return
         self.state = possible = drawn.corrected(state)
         if possible.method != state.method:
@@ -284,7 +284,7 @@ class Viewer:
             message=self.message[0] if self._now < self.message[1] else report.waiting,
             flicked=self._flicked(),
         )
-        self._good, self._asked = drawn.state, self.state
+        self._good, self._requested = drawn.state, self.state
 
     def _flicked(self) -> bool:
         return self.state.mode == "flicker" and int(self._now / _FLICKER) % 2 == 1
@@ -305,7 +305,7 @@ class Viewer:
             busy
             or waiting
             or self._due > 0
-            or self.state != self._asked
+            or self.state != self._requested
             or self.state.playing
             or self.actions.recording
             or self.panel.active
@@ -356,7 +356,7 @@ def view(state: State, *, adapter: str | None = None, size: tuple[int, int] = (1
     canvas = RenderCanvas(title=TITLE, size=size, update_mode="ondemand", max_fps=60)
     is_slow = device.adapter_info["adapter_type"] == gpu.SOFTWARE
     soon = loop.call_soon_threadsafe
-    viewer = Viewer(canvas, state, device=device, beside=is_slow, call_soon=soon)
+    viewer = Viewer(canvas, state, device=device, threaded=is_slow, call_soon=soon)
     loop.run()
     viewer.actions.close()
     viewer.stage.close()

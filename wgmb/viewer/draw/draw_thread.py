@@ -33,7 +33,7 @@ _CHANNELS = {1: "r", 2: "rg", 4: "rgba"}
 
 @dataclass
 class _Answer:
-    """What the thread has made of a request."""
+    """An answer of the thread to a request."""
 
     drawn: Drawn
     arrays: dict[str, np.ndarray]

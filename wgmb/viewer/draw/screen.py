@@ -127,7 +127,7 @@ class Screen:
         return canvas[y : y + h, x : x + w]
 
     def _picture(self) -> wgpu.GPUTexture:
-        """What is composed; wgpu's pools hold what compute shaders write, not what is drawn."""
+        """The composition; pools of textures have those that compute shaders write."""
         if self._composition is None or self._composition.size[:2] != self._size:
             usage = wgpu.TextureUsage
             self._composition = self.device.create_texture(
