@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import command, operators, panel, process, settings
+from . import command, operators, panel, preview, process, settings
 
-_PARTS = (settings, operators, panel, command)
+_PARTS = (settings, operators, panel, preview, command)
 
 
 def register() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from .process import Process
-from .sharp import PASSES
+from .sharp import LIGHT_PASSES, PASSES
 from .wgmb_worker.problem import ProblemError
 from .wgmb_worker.recipe import COMPOSITE, MATTE, Recipe, Setup, View, told
 
@@ -53,7 +53,7 @@ def save_layers(
     left_out = [
         (layer.name, name)
         for layer in scene.view_layers
-        for switch, name in (*PASSES.items(), MATTE)
+        for switch, name in (*PASSES.items(), *LIGHT_PASSES.items(), MATTE)
         if not getattr(layer, switch)
     ]
     for i, (file, target) in enumerate(zip(files, targets, strict=True)):

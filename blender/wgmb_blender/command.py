@@ -11,7 +11,7 @@ import bpy
 
 from . import job
 from .process import lent
-from .settings import METHODS, wanted_of
+from .settings import LIGHT, METHODS, wanted_of
 from .wanted import ERRORS, Report, Wanted
 from .wgmb_worker.problem import NoAdapterError, ProblemError, plain
 
@@ -30,6 +30,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--method", choices=[name for name, *_ in METHODS])
     parser.add_argument("--samples", metavar="N", help="a number, or auto")
+    parser.add_argument(
+        "--light", choices=[name.lower() for name, *_ in LIGHT], help="follow moving shadows"
+    )
     parser.add_argument("--device", metavar="NAME", help="part of the name of a GPU")
     parser.add_argument("--scene", metavar="NAME", help="by default the active scene")
     parser.add_argument(
@@ -99,6 +102,7 @@ def _wanted(scene: bpy.types.Scene, given: argparse.Namespace) -> Wanted:
         wanted,
         method=given.method or wanted.method,
         samples=samples,
+        light=(given.light or wanted.light).upper(),
         frames=_frames(given.frames),
         device=given.device or wanted.device,
         sharp=given.sharp or wanted.sharp,

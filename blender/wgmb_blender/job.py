@@ -66,6 +66,16 @@ def compare(
         shutil.rmtree(folder, ignore_errors=True)
 
 
+def described(
+    scene: bpy.types.Scene, wanted: Wanted, number: int, folder: Path
+) -> tuple[Setup, Recipe]:
+    """The blur of the picture of one frame by the sharp files that are there."""
+    wanted = replace(wanted, frames=(number,), is_rendering=False)
+    work = _Work(scene, wanted, Report(), at_once, is_shown=True)
+    recipe = work.recipe(folder)
+    return work.setup, replace(recipe, layers=recipe.layers[:1], is_whole=False)
+
+
 class _Work:
     """One run."""
 
@@ -92,11 +102,25 @@ class _Work:
         self.shown = frames_of(scene, wanted)
         if not self.shown:
             raise ProblemError("There are no frames: the end is before the start")
-        self.setup = Setup(wanted.method, exposure_of(scene), wanted.samples, wanted.device)
+        self.setup = Setup(
+            wanted.method,
+            exposure_of(scene),
+            wanted.samples,
+            wanted.device,
+            "off" if wanted.light == "OFF" else "auto",
+        )
+        self.has_light = self._can_follow_light()
         self.cuts = cuts_of(scene)
         self.rendered: set[int] = set()
         self._done = 0
         self._all = 1
+
+    def _can_follow_light(self) -> bool:
+        """Return True if passes of light are to be rendered; without a GPU only if asked for."""
+        wanted = self.wanted
+        if wanted.method != "gather" or wanted.light == "OFF" or self.is_composited:
+            return False
+        return wanted.light == "ON" or self.scene.render.engine == "CYCLES"
 
     # ---- all of it -----------------------------------------------------------------------------
 
@@ -125,6 +149,7 @@ class _Work:
         yield from self._until(opening, "Opening the GPU")
         if opening.result()["is_cpu"]:
             self.report.notes.append("No GPU found: blurred on the CPU")
+            self.has_light &= self.wanted.light == "ON"
 
     def _around(self) -> list[int]:
         near = (-1, 0, 1) if self.wanted.handles else (0,)
@@ -181,6 +206,7 @@ class _Work:
                         self.files,
                         self.picture,
                         bool(self.kept),
+                        self.has_light,
                         self.is_composited,
                         self.render,
                     )
@@ -197,7 +223,7 @@ class _Work:
         saving.numbers = self.shown
         is_film = saving.is_film and not self.is_shown
         folder = self._folder(is_film)
-        blurring = Blurring(process, self.setup, self._recipe(folder))
+        blurring = Blurring(process, self.setup, self.recipe(folder))
         compositing = None
         if self.has_compositor and not self.is_composited:
             compositing = Compositing(self.scene, self.picture, self.views)
@@ -289,7 +315,8 @@ class _Work:
         folder.mkdir(parents=True, exist_ok=True)
         return folder
 
-    def _recipe(self, folder: Path) -> Recipe:
+    def recipe(self, folder: Path) -> Recipe:
+        """The subject of the blur, whose files go into `folder`."""
         layers = [layer.name for layer in sharp.layers_of(self.scene)]
         is_whole = self.is_multilayer or (self.has_compositor and not self.is_composited)
         if self.is_composited:

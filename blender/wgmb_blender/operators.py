@@ -8,8 +8,8 @@ from dataclasses import replace
 import bpy
 from bpy.props import IntProperty
 
-from . import job, running
-from .comparison import COMPARISON
+from . import job, preview, running
+from .comparison import COMPARISON, PREVIEW, open_in_editor
 from .rendering import Render, at_once, beside
 from .settings import wanted_of
 from .wanted import ERRORS, Report, Step, Wanted
@@ -35,7 +35,8 @@ class Running:
         return context.scene is not None and not bpy.app.is_job_running("RENDER")
 
     def begin(self, context: bpy.types.Context, render: Render) -> Iterator[Step]:
-        """Make the steps and the report."""
+        """Make the steps and the report; a preview ends, as its files may change."""
+        preview.end()
         self._report = Report()
         return self.steps(context.scene, self._report, render)
 
@@ -157,13 +158,32 @@ class WGMB_OT_compare(Running, bpy.types.Operator):
 
     def _told(self, context: bpy.types.Context) -> set[str]:
         image = bpy.data.images.get(COMPARISON)
-        for area in getattr(context.screen, "areas", ()):
-            if area.type == "IMAGE_EDITOR" and image is not None:
-                area.spaces.active.image = image
-                break
-        else:
+        if image is None or not open_in_editor(context.screen, image):
             self.report({"INFO"}, f"Open the image {COMPARISON!r} in an Image Editor")
         return super()._told(context)
+
+
+class WGMB_OT_preview(bpy.types.Operator):
+    """Show the current frame, blurred from its sharp file, in the Image Editor, and again whenever
+    the frame or a setting changes; press again to end it"""
+
+    bl_idname = "wgmb.preview"
+    bl_label = "Live Preview"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return False while frames are blurred or rendered."""
+        return Running.poll.__func__(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Begin or end it."""
+        if preview.is_on():
+            preview.end()
+            return {"FINISHED"}
+        image = preview.begin(context.scene)
+        if not open_in_editor(context.screen, image):
+            self.report({"INFO"}, f"Open the image {PREVIEW!r} in an Image Editor")
+        return {"FINISHED"}
 
 
 class WGMB_OT_stop(bpy.types.Operator):
@@ -213,6 +233,7 @@ CLASSES = (
     WGMB_OT_render_and_blur,
     WGMB_OT_blur_rendered,
     WGMB_OT_compare,
+    WGMB_OT_preview,
     WGMB_OT_stop,
     WGMB_OT_keep,
     WGMB_OT_keep_no_more,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import running, sharp
+from . import preview, running, sharp
 
 
 class WGMB_PT_motion_blur(bpy.types.Panel):
@@ -30,6 +30,9 @@ class WGMB_PT_motion_blur(bpy.types.Panel):
         row = column.row()
         row.active = not own.is_auto
         row.prop(own, "samples")
+        row = column.row()
+        row.active = own.method == "gather"
+        row.prop(own, "light")
         column = layout.column()
         column.prop(own, "sharp")
         column.prop(own, "handles")
@@ -47,6 +50,9 @@ def draw_buttons(column: bpy.types.UILayout) -> None:
         column.operator("wgmb.render_and_blur", icon="RENDER_ANIMATION")
         column.operator("wgmb.blur_rendered", icon="FILE_REFRESH")
         column.operator("wgmb.compare", icon="IMAGE_DATA")
+        column.operator("wgmb.preview", icon="HIDE_OFF", depress=preview.is_on())
+        if preview.text():
+            column.label(text=preview.text())
     else:
         row = column.row()
         row.progress(factor=now.share, text=now.text)

@@ -35,9 +35,9 @@ def now() -> Run | None:
     return _now[0] if _now else None
 
 
-def redraw(manager: bpy.types.WindowManager) -> None:
-    """Have the panels drawn again."""
+def redraw(manager: bpy.types.WindowManager, kind: str = "PROPERTIES") -> None:
+    """Have editors of a kind drawn again, by default the panels."""
     for window in manager.windows:
         for area in window.screen.areas:
-            if area.type == "PROPERTIES":
+            if area.type == kind:
                 area.tag_redraw()

@@ -43,6 +43,13 @@ COMPOSITING = (
 )
 
 
+LIGHT = (
+    ("AUTO", "Automatic", "With Cycles and Gather on a GPU, where it costs almost nothing"),
+    ("ON", "On", "Render the passes of light, by which Gather follows shadows and reflections"),
+    ("OFF", "Off", "Shadows and reflections are blurred with the surface on which they appear"),
+)
+
+
 class WgmbKeptCollection(bpy.types.PropertyGroup):
     """A collection whose objects stay sharp."""
 
@@ -58,6 +65,12 @@ class WgmbSettings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Samples", min=1, max=512, default=16, description="Times within the exposure"
+    )
+    light: EnumProperty(
+        name="Moving Shadows",
+        items=LIGHT,
+        description="Follow shadows and reflections that move over surfaces. The sharp frames have "
+        "the passes Diffuse and Glossy: Direct, Indirect and Color for it",
     )
     handles: BoolProperty(
         name="Handles",
@@ -140,6 +153,7 @@ def wanted_of(scene: bpy.types.Scene) -> Wanted:
     return Wanted(
         method=own.method,
         samples="auto" if own.is_auto else own.samples,
+        light=own.light,
         handles=own.handles,
         overscan=own.overscan,
         composited=own.compositing == "AFTER",

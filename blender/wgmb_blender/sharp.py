@@ -16,6 +16,14 @@ from .wgmb_worker.recipe import MATTE, Picture, SharpFrames, View
 FIVE = bpy.app.version >= (5, 0, 0)
 _ENGINES = {"CYCLES": "Cycles", "BLENDER_EEVEE_NEXT": "EEVEE", "BLENDER_EEVEE": "EEVEE"}
 PASSES = {"use_pass_z": "Depth", "use_pass_vector": "Vector"}
+LIGHT_PASSES = {
+    "use_pass_diffuse_direct": "Diffuse Direct" if FIVE else "DiffDir",
+    "use_pass_diffuse_indirect": "Diffuse Indirect" if FIVE else "DiffInd",
+    "use_pass_diffuse_color": "Diffuse Color" if FIVE else "DiffCol",
+    "use_pass_glossy_direct": "Glossy Direct" if FIVE else "GlossDir",
+    "use_pass_glossy_indirect": "Glossy Indirect" if FIVE else "GlossInd",
+    "use_pass_glossy_color": "Glossy Color" if FIVE else "GlossCol",
+}
 
 
 def sharp_frames(text: str) -> SharpFrames:
@@ -79,6 +87,7 @@ def render_frame(
     files: SharpFrames,
     seen: Picture,
     matte: bool,
+    light: bool,
     composited: bool,
     render: Render,
 ) -> Iterator[None]:
@@ -86,17 +95,21 @@ def render_frame(
     views = views_of(scene)
     paths = [files.path(number, view) for view in views]
     stem = str(files.path(number).with_suffix(""))
-    with changed([*_settings(scene, stem, matte, composited), *picture.changes(scene, seen)]):
+    with changed(
+        [*_settings(scene, stem, matte, light, composited), *picture.changes(scene, seen)]
+    ):
         yield from render(scene, number, paths)
 
 
-def _settings(scene: bpy.types.Scene, path: str, matte: bool, composited: bool) -> Iterator[Change]:
+def _settings(
+    scene: bpy.types.Scene, path: str, matte: bool, light: bool, composited: bool
+) -> Iterator[Change]:
     render = scene.render
     image = render.image_settings
     yield render, "use_motion_blur", False  # Cycles has no vectors with it
     for layer in layers_of(scene):
         yield layer, "use_pass_combined", True
-        for name in PASSES:
+        for name in (*PASSES, *(LIGHT_PASSES if light else ())):
             yield layer, name, True
         if matte:
             yield layer, MATTE[0], True

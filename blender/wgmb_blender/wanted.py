@@ -21,14 +21,16 @@ ERRORS = ProblemError, OSError, MemoryError
 class Wanted:
     """The wishes of the user. `frames`: by default the scene's. `samples`: a number or "auto".
 
-    `handles`: render the frames around those too. `overscan`: pixels. `composited`: blur what the
-    compositor makes, not what it is given. `kept`: collections that stay sharp. `sharp`: where the
-    sharp frames lie, as in the panel. `device`: a part of an adapter's name.
+    `light`: "ON", "OFF" or "AUTO", follow light that moves over surfaces. `handles`: render the
+    frames around those too. `overscan`: pixels. `composited`: blur what the compositor makes, not
+    what it is given. `kept`: collections that stay sharp. `sharp`: where the sharp frames lie, as
+    in the panel. `device`: a part of an adapter's name.
     """
 
     method: str = "gather"
     samples: int | str = 16
     frames: tuple[int, ...] | None = None
+    light: str = "AUTO"
     handles: bool = True
     overscan: int = 0
     composited: bool = False

@@ -28,6 +28,8 @@ def fields(found):
     [
         (("DiffDir", "DiffInd", "DiffCol"), "diffuse_light", False),
         (("GlossDir", "GlossInd", "GlossCol"), "glossy_light", False),
+        (("Diffuse Direct", "Diffuse Indirect", "Diffuse Color"), "diffuse_light", False),
+        (("Glossy Direct", "Glossy Indirect", "Glossy Color"), "glossy_light", False),
         (("diffuse_direct", "diffuse_indirect", "diffuse_albedo"), "diffuse_light", True),
         (("specular_direct", "specular_indirect", "specular_albedo"), "glossy_light", True),
         (

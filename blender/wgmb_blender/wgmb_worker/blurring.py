@@ -35,12 +35,14 @@ def shutter_of(exposure: Exposure) -> wgmb.Shutter:
 
 def open_blur(setup: Setup) -> wgmb.Blur:
     """The blur; NoAdapterError where there is nothing to run it on."""
+    options = {"shading": setup.shading} if setup.method == "gather" else {}
     try:
         return wgmb.Blur(
             setup.method,
             shutter=shutter_of(setup.exposure),
             samples=setup.samples,
             device=setup.device,
+            **options,
         )
     except wgmb.DeviceError as error:
         raise NoAdapterError(
@@ -60,16 +62,9 @@ class Blurring:
         """Blur a frame: the file of each view, remarks, and whether anything moves in it."""
         recipe, notes, moves, files = self.recipe, [], False, []
         for view in recipe.views:
-            path = recipe.sharp.path(number, view)
-            if not path.is_file():
-                raise ProblemError(f"Frame {number}: there is no {path}")
             results = {}
             for layer in recipe.layers:
-                clip = self._clip(view, layer)
-                source = clip.source(number)
-                if not any(name.endswith("Vector.X") for name in source.channels):
-                    raise ProblemError(f"Frame {number}: {path.name} has no Vector pass")
-                frame = self._frame(clip, source, number)
+                clip, source, frame = self._read(number, view, layer)
                 moves |= bool(np.any(frame.motion))
                 results[layer] = source, self._blur(frame)
                 clip.forget(number - 1)
@@ -78,6 +73,27 @@ class Blurring:
                 notes += [f"Frame {n}: {text}" for text, on in clip.notes.items() for n in on]
             files.append(str(self._write(number, view, results)))
         return {"files": files, "notes": notes, "moves": moves}
+
+    def preview(self, number: int, path: Path) -> None:
+        """Blur the first picture of a frame into a numpy file: (height, width, 4) float32, linear
+        light, the first row on top.
+        """
+        _, _, frame = self._read(number, self.recipe.views[0], self.recipe.layers[0])
+        rgba = self._blur(frame)
+        four = np.ones((*rgba.shape[:2], 4), np.float32)
+        four[..., : rgba.shape[2]] = rgba
+        np.save(path, self.recipe.picture.laid(four))
+
+    def _read(self, number: int, view: View, layer: str) -> tuple[Any, Any, Any]:
+        """The clip, the file and the frame of a picture."""
+        path = self.recipe.sharp.path(number, view)
+        if not path.is_file():
+            raise ProblemError(f"Frame {number}: there is no {path}")
+        clip = self._clip(view, layer)
+        source = clip.source(number)
+        if not any(name.endswith("Vector.X") for name in source.channels):
+            raise ProblemError(f"Frame {number}: {path.name} has no Vector pass")
+        return clip, source, self._frame(clip, source, number)
 
     def _frame(self, clip: Any, source: Any, number: int) -> Any:
         """The frame and those of its neighbours that were rendered with it."""

@@ -97,12 +97,16 @@ class Exposure:
 
 @dataclass(frozen=True)
 class Setup:
-    """The blur: `samples` is a number or "auto", `device` a part of an adapter's name."""
+    """The blur: `samples` is a number or "auto", `device` a part of an adapter's name.
+
+    `shading`: "auto" follows light by the passes that the frames have, "off" does not.
+    """
 
     method: str
     exposure: Exposure
     samples: int | str
     device: str | None
+    shading: str = "auto"
 
 
 @dataclass(frozen=True)

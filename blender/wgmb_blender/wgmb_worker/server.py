@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import traceback
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from .problem import NoAdapterError, ProblemError, plain
@@ -58,6 +59,14 @@ class Desk:
             self.rest()
             raise
 
+    def preview(
+        self, number: int, setup: dict[str, Any], recipe: dict[str, Any], path: str
+    ) -> None:
+        """Blur the picture of a frame into a numpy file."""
+        from pathlib import Path
+
+        self._of(recipe_of(recipe), setup_of(setup)).preview(number, Path(path))
+
     def layers(self, **words: Any) -> None:
         """Write a multilayer file."""
         from .layers import write_layers
@@ -76,9 +85,14 @@ class Desk:
         self._setup = self._blur = self._blurring = None
 
     def _opened(self, setup: Setup) -> Blur:
-        from .blurring import open_blur
+        from .blurring import open_blur, shutter_of
 
-        if self._blur is None or self._setup != setup:
+        if self._blur is None or self._setup is None:
+            self._blur, self._setup = open_blur(setup), setup
+        elif replace(self._setup, exposure=setup.exposure) == setup:  # all is compiled
+            if self._setup != setup:
+                self._blur.shutter, self._setup = shutter_of(setup.exposure), setup
+        else:
             self.rest()
             self._blur, self._setup = open_blur(setup), setup
         return self._blur

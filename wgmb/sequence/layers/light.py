@@ -1,7 +1,7 @@
 """Passes of light by the names that renderers give them: what falls on surfaces, and their colour.
 
 Blender writes light before it is multiplied by the surface's colour, Arnold after it, V-Ray both
-("raw" is before it).
+("raw" is before it). Blender 5.0 spells its names out.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ _FAMILIES = (
         _VRAY_DIFFUSE,
     ),
     _Family("diffuse_light", ("diffusedirect",), ("diffuseindirect",), ("diffusealbedo",), True),
+    _Family("diffuse_light", ("diffusedirect",), ("diffuseindirect",), ("diffusecolor",)),
     _Family(
         "diffuse_light",
         ("vraylighting", "lighting"),
@@ -48,6 +49,7 @@ _FAMILIES = (
         True,
     ),
     _Family("glossy_light", ("glossdir",), ("glossind",), ("glosscol",)),
+    _Family("glossy_light", ("glossydirect",), ("glossyindirect",), ("glossycolor",)),
     _Family("glossy_light", ("vrayrawreflection", "rawreflection"), (), _VRAY_REFLECTION),
     _Family("glossy_light", ("speculardirect",), ("specularindirect",), ("specularalbedo",), True),
     _Family(
@@ -58,8 +60,19 @@ _FAMILIES = (
         True,
     ),
 )
-_UNUSED = ("transdir", "transind", "volumedir", "volumeind", "transmissiondirect",
-           "transmissionindirect", "vrayrefraction", "refraction", "rawrefraction")  # fmt: skip
+_UNUSED = (
+    "transdir",
+    "transind",
+    "volumedir",
+    "volumeind",
+    "volumedirect",
+    "volumeindirect",
+    "transmissiondirect",
+    "transmissionindirect",
+    "vrayrefraction",
+    "refraction",
+    "rawrefraction",
+)
 _EFFECT = {"diffuse_light": "shadows", "glossy_light": "reflections"}
 
 
@@ -124,9 +137,10 @@ def find(names: Iterable[str], picture: str | None) -> LightPasses:
         if direct is None or family.light in found:
             continue
         if color is None:
-            lacking[family.light] = (
+            lacking.setdefault(
+                family.light,
                 f"{_layer(direct)} without the surface's colour ({_written(family.color)}): "
-                f"{_EFFECT[family.light]} are not followed"
+                f"{_EFFECT[family.light]} are not followed",
             )
             continue
         lights = tuple(one for one in (direct, indirect) if one is not None)
@@ -168,9 +182,16 @@ def _layer(channels: tuple[str, ...]) -> str:
     return channels[0].rpartition(".")[0].rpartition(".")[2] or channels[0]
 
 
-_SPELLED = {"diffcol": "DiffCol", "glosscol": "GlossCol", "diffusealbedo": "diffuse_albedo",
-            "specularalbedo": "specular_albedo", "vraydiffusefilter": "VRayDiffuseFilter",
-            "vrayreflectionfilter": "VRayReflectionFilter"}  # fmt: skip
+_SPELLED = {
+    "diffcol": "DiffCol",
+    "glosscol": "GlossCol",
+    "diffusealbedo": "diffuse_albedo",
+    "specularalbedo": "specular_albedo",
+    "diffusecolor": "Diffuse Color",
+    "glossycolor": "Glossy Color",
+    "vraydiffusefilter": "VRayDiffuseFilter",
+    "vrayreflectionfilter": "VRayReflectionFilter",
+}
 
 
 def _written(color: tuple[str, ...]) -> str:
