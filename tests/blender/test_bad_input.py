@@ -185,7 +185,7 @@ def blurred_on(scene, number, folder):
     path = files.path(number)
     changes = [
         change
-        for change in sharp._settings(scene, str(path.with_suffix("")), False, False)
+        for change in sharp._settings(scene, str(path.with_suffix("")), False, False, False)
         if change[1] != "use_motion_blur"
     ]
     changes += picture.changes(scene, picture.picture_of(scene))
@@ -202,7 +202,7 @@ def test_frames_without_vectors(tmp_path):
     path = sharp.sharp_frames(scene.wgmb.sharp).path(4)
     changes = [
         change
-        for change in sharp._settings(scene, str(path.with_suffix("")), False, False)
+        for change in sharp._settings(scene, str(path.with_suffix("")), False, False, False)
         if change[1] != "use_pass_vector"
     ]
     changes += picture.changes(scene, picture.picture_of(scene, scene.wgmb.overscan))

@@ -79,3 +79,19 @@ def test_a_help_offers_only_methods_that_can_work(said, command):
     assert set(re.findall(r"[a-z]+", listed[1])) >= set(wanted)
     for name in METHODS.keys() - set(wanted):
         assert name not in text
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [("[blur]\nmax_blurr = 3", "unknown option max_blurr; did you mean 'max_blur'?"),
+     ("[blur]\nshutter = 'much'", "shutter: 'much' is not a number"),
+     ("[blur\n", "not TOML: Expected ']' at the end of a table declaration (at line 1, column 6)"),
+     ("[blurr]\nshutter = 90", "unknown table [blurr]; did you mean 'blur'?"),
+     ("shutter = 90", "shutter is in no table; write it below [blur]"),
+     ("[render]\nshutter = 90", "no table [blur], which wgmb blur reads")],
+)  # fmt: skip
+def test_a_settings_file_is_corrected_in_its_own_words(tmp_path, capsys, monkeypatch, text, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.toml").write_text(text)
+    line = ("blur", "shot.####.exr", "-o", "o.####.exr", "--config", "s.toml")
+    assert make.inside(capsys, *line) == (2, "", f"wgmb: s.toml: {said}\n")

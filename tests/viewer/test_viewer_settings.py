@@ -56,7 +56,7 @@ def test_settings_come_back_as_they_were_saved(state):
 @pytest.mark.parametrize(
     "text, said",
     [
-        ("[render", "settings"),
+        ("[render", "not TOML"),
         ("", r"\[render\]"),
         ("[render]\nscene = 3", "scene"),
         ('[render]\nscene = "nowhere"', "nowhere"),
@@ -177,7 +177,7 @@ def test_changed_settings_are_read_or_refused_and_nothing_else():
 
 @pytest.mark.parametrize(
     "data, said",
-    [(b"\xff[render]", "UTF-8"), (b"[render", "settings"), (b"[render]\nscene = 3", "scene")],
+    [(b"\xff[render]", "UTF-8"), (b"[render", "not TOML"), (b"[render]\nscene = 3", "scene")],
 )
 def test_a_settings_file_that_makes_no_sense_is_named(hand, tmp_path, data, said):
     (tmp_path / "bad.toml").write_bytes(data)

@@ -114,7 +114,9 @@ def main(arguments: list[str] | None = None) -> int:
         terminal.flush()
         return result if isinstance(result, int) else DONE
     except cyclopts.UnknownOptionError as error:
-        return _say_why(f"{_elsewhere(words, error) or error}{_hint(words)}", USAGE)
+        return _say_why(
+            f"{_elsewhere(words, error) or _of_file(error) or error}{_hint(words)}", USAGE
+        )
     except cyclopts.CycloptsError as error:
         return _say_why(f"{_plainly(str(error), words)}{_hint(words)}", USAGE)
     except DeviceError as error:
@@ -152,6 +154,16 @@ def _check_text(words: list[str]) -> None:
             raise InputError(f"{shown}: not UTF-8; please rename the file or folder") from None
 
 
+def _of_file(error: cyclopts.UnknownOptionError) -> str:
+    """The message about a name in a --config file that is no option; '' for others."""
+    if error.token is None or error.token.source == "cli":
+        return ""
+    name = (error.token.keyword or "").strip("[]")
+    close = re.search(r"Did you mean --([a-z-]+)", str(error))
+    hint = f"; did you mean {close[1].replace('-', '_')!r}?" if close else ""
+    return f"{error.token.source}: unknown option {name}{hint}"
+
+
 def _plainly(text: str, words: list[str]) -> str:
     """The message about a value of another type, in words: a number, not int|None; about a
     missing option, how to give it.
@@ -164,6 +176,7 @@ def _plainly(text: str, words: list[str]) -> str:
     if missing := re.fullmatch(r'Command "(.*)" parameter (--?\S+) requires an argument\.', text):
         option = "--output (-o)" if missing[2] in ("--output", "-o") else missing[2]
         return f"{missing[1]} needs {option} and its value; `wgmb {missing[1]} --help` tells more"
+    text = re.sub(r"^Invalid value for \[(\w+)\] from (.+?): ", r"\2: \1: ", text)
     m = re.fullmatch(r'(.*): unable to convert "(.*)" into (.*)\.', text, re.DOTALL)
     if m is None:
         return text
@@ -210,10 +223,24 @@ def _config(words: list[str]) -> tuple[Dict, ...]:
             path = Path(given or "".join(words[i + 1 : i + 2]))
             with about(path):
                 tables = parse(text_of(path))
+                _check_tables(tables, words[0])
                 if words[0] == "job" and "blur" in tables:
                     tables["job"] = tables["blur"]
                 return (Dict(tables, source=str(path)),)
     return ()
+
+
+def _check_tables(tables: dict[str, object], command: str) -> None:
+    """InputError for what no command would read in a --config file."""
+    for name, table in tables.items():
+        if not isinstance(table, dict):
+            raise InputError(f"{name} is in no table; write it below [{command}]")
+        if name not in COMMANDS:
+            known = [*COMMANDS, "view"]
+            raise InputError(f"unknown table [{name}]{did_you_mean(name, known)}")
+    own = ("job", "blur") if command == "job" else (command,)
+    if tables and not tables.keys() & set(own):
+        raise InputError(f"no table [{own[-1]}], which wgmb {command} reads")
 
 
 def _say_why(text: str, code: int) -> int:

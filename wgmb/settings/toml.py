@@ -29,8 +29,8 @@ def parse(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise InputError("settings: lists or tables are nested too deeply") from None
+        raise InputError("not TOML: lists or tables are nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"settings: {error}") from None
+        raise InputError(f"not TOML: {error}") from None
     except ValueError:
-        raise InputError("settings: a number has thousands of digits") from None
+        raise InputError("not TOML: a number has thousands of digits") from None
