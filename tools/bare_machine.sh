@@ -11,21 +11,23 @@
 #   --user            as a user without root; --sudo: as a user who may call sudo
 #   --folder NAME     clone into this folder, such as 'with spaces'; default: wgmb
 #   --offline         then all commands once more, without a network
+#   --interrupted     first break each command off after 1, 2, 4, ... s as Ctrl-C does, each time
+#                     followed by a try without a network; the commands must work all the same
 #   --keep            keep the roots in build/bare, where --again uses them as they are
 #
 # Needs root, debootstrap, and for Ubuntu its keys (the package ubuntu-keyring).
 set -eu
 cd "$(dirname "$0")/.."
 here=$PWD
-who=root folder=wgmb offline= keep= again= systems=()
+who=root folder=wgmb offline= keep= again= interrupted= systems=()
 while [ $# -gt 0 ]; do
     case $1 in
         --user | --sudo) who=${1#--} ;;
         --folder) folder=$2; shift ;;
-        --offline | --keep | --again) declare "${1#--}=yes" ;;
+        --offline | --keep | --again | --interrupted) declare "${1#--}=yes" ;;
         --) shift; break ;;
         debian:* | ubuntu:*) systems+=("$1") ;;
-        *) sed -n '2,17s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
+        *) sed -n '2,19s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
     esac
     shift
 done
@@ -105,6 +107,18 @@ try() {  # try SYSTEM ROOT COMMAND [--offline]: run it and add a row to the tabl
            now - begun, $1 + $2, size, installed }' <<<"$took")")
 }
 
+# interrupt SYSTEM ROOT COMMAND: break it off ever later, until it ends by itself.
+interrupt() {
+    local seconds=1 broken="env --default-signal=INT timeout --signal=INT --kill-after=60"
+    while echo "bare_machine: $1: $3, broken off after $seconds s" >&2
+        ! inside "$2" "$broken $seconds $3" >"$2.interrupted.log" 2>&1; do
+        echo "bare_machine: $1: $3, without a network" >&2
+        ! inside "$2" --offline "$broken 60 $3" >>"$2.interrupted.log" 2>&1 || return 0
+        seconds=$((seconds * 2))
+        [ $seconds -le 128 ] || return 0
+    done
+}
+
 for system in "${systems[@]}"; do
     root=$here/build/bare/${system/:/-}-$who
     mkdir -p "$(dirname "$root")"
@@ -116,7 +130,10 @@ for system in "${systems[@]}"; do
     [ "$who" = root ] || home=$root/home/somebody owner=1000:1000
     [ -d "$home/$folder" ] || git clone --quiet --no-hardlinks "$here" "$home/$folder"
     chown -R $owner "$home/$folder"
-    for command in "$@"; do try "$system" "$root" "$command" ""; done
+    for command in "$@"; do
+        [ -z "$interrupted" ] || interrupt "$system" "$root" "$command"
+        try "$system" "$root" "$command" ""
+    done
     [ -z "$offline" ] || for command in "$@"; do try "$system" "$root" "$command" --offline; done
     [ -n "$keep$again" ] || rm -rf --one-file-system "$root"
 done

@@ -10,7 +10,7 @@ apt_install() {
         root=sudo
     fi
     say "installing $*"
-    $root dpkg --configure -a >&2  # after an installation that was interrupted
+    $root dpkg --configure -a >&2 || :  # after an installation that was interrupted; apt waits for others
     { $root apt-get -o DPkg::Lock::Timeout=120 update -qq >&2 &&
         $root env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=120 \
             install -y -qq --no-install-recommends "$@" >&2; } ||
