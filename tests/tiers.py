@@ -27,7 +27,7 @@ def pytest_collection_modifyitems(items):
     """The cases of a test marked covers(n) that add nothing to the others are full."""
     products = defaultdict(list)
     for item in items:
-        if item.get_closest_marker("covers"):
+        if item.get_closest_marker("covers") and not item.get_closest_marker("full"):
             products[item.nodeid.partition("[")[0]].append(item)
     for cases in products.values():
         (n,) = cases[0].get_closest_marker("covers").args
@@ -42,7 +42,7 @@ def covering(cases: list[dict[str, int]], n: int) -> set[int]:
     """Indices of a few of the cases that meet every combination of n values of all cases.
 
     A case is the value of each parameter, as a number. Greedy: the next one is that which meets
-    most combinations not met yet.
+    most combinations not met yet. With n = 0, it is the first case.
     """
     met = [set(combinations(sorted(case.items()), min(n, len(case)))) for case in cases]
     open_ = set().union(*met)

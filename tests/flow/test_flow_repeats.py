@@ -48,6 +48,7 @@ def test_the_guide_descends_from_the_motion_of_most():
     assert (got == want).all(axis=2).mean() > 0.97
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("reach", [1, 2])
 def test_the_guide_descends_from_the_coarser_level(reach):
     coarser = random_ways((5, 7))
@@ -82,6 +83,7 @@ def striped(views):
     return match, matched(kit(), views, on_gpu, 1)
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(("views", "is_finer"), [(MIDDLE, False), (MIDDLE, True), (FIRST, False)])
 @pytest.mark.parametrize("places", [slice(0, 20), slice(20, 64)])
 def test_the_guide_leads_where_states_lead_to_repeats_or_turn_back(views, is_finer, places):

@@ -27,6 +27,7 @@ def run(device):
     return bench.bench(device, [Candidate(m) for m in METHODS], SIZES, (2, 4), rounds=1)
 
 
+@pytest.mark.full
 def test_every_method_has_a_figure_for_every_size_and_number(run):
     keys = {f.key for f in run.figures}
     assert keys == {(m, *size, n) for m in METHODS for size in SIZES for n in (2, 4)}

@@ -139,6 +139,7 @@ def test_a_parabola_stays_one(method, least):
     assert decibel(frame_of(sources), falls, method) > least
 
 
+@pytest.mark.full
 @pytest.mark.covers(1)
 @pytest.mark.parametrize("path", [swings, circles, starts, bounces])
 @pytest.mark.parametrize("frames", [2, 3])

@@ -168,6 +168,7 @@ def test_the_short_cut_of_plain_times_shows_the_same(degrees, alone):
     assert apart.max() < 0.05
 
 
+@pytest.mark.full
 def test_textures_that_are_read_as_storage_show_the_same(sources, monkeypatch):
     """As lavapipe reads them, and as all other drivers do."""
     shown = []

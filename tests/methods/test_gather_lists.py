@@ -70,6 +70,7 @@ def far_from(box, picture):
     return picture[outside]
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(
     ("speed", "bend", "shutter"),
     [(30, 0, 180), (-45, 20, 360), (24, -8, Shutter(200, "start")), (60, 0, Shutter(40, "end"))],
@@ -113,6 +114,7 @@ def test_masks_hold_where_nothing_moves():
     np.testing.assert_allclose(out[:, 200:], frame.color[:, 200:], atol=1e-6)
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("kept", [True, False])
 def test_lists_may_be_longer_than_a_row_of_workgroups(with_shader, kept):
     frame = shot(30, 10)

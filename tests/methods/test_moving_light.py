@@ -261,7 +261,7 @@ def test_what_is_added_is_its_twin(stages, close):
         close(stages.layer(stages.times.count + i)[..., :3], want, 4e-3)
 
 
-@pytest.mark.covers(1)
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("glossy", [False, True], ids=["shadow", "reflection"])
 @pytest.mark.parametrize("pan", [(0.0, 0.0), PAN], ids=["still", "pan"])
 def test_light_that_moves_is_nearer_the_truth(pan, glossy):
@@ -274,6 +274,7 @@ def test_light_that_moves_is_nearer_the_truth(pan, glossy):
     assert followed < (0.55 if glossy else 0.3) * plain
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("shutter", [Shutter(270, curve="triangle"), Shutter(200, "start"),
                                      Shutter(250, rolling="down", rolling_duration=0.3)],
                          ids=["curve", "after", "rolling"])  # fmt: skip
@@ -293,6 +294,7 @@ def test_every_shutter_sees_the_light_move(shutter):
     assert followed < (0.4 if shutter.curve == "box" else 0.7) * plain
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("samples", [3, 40, "auto"])
 def test_every_number_of_samples_sees_it_move(samples):
     shutter = Shutter(360)
@@ -371,6 +373,7 @@ def flash(pan=(0.0, 0.0), glossy=False):
     return dark.between(lit.prev, lit.next), spot[..., 0] < 0.6
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("pulled", [False, True], ids=["shadows", "reflections"])
 def test_what_is_not_followed_is_as_sure_as_its_twin(device, close, pulled):
     stages = Stages(device, pulled, flash(glossy=pulled)[0])
@@ -380,6 +383,7 @@ def test_what_is_not_followed_is_as_sure_as_its_twin(device, close, pulled):
         assert sure.min() < 0.1 < 0.8 < np.mean(sure > 0.95)
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("glossy", [False, True], ids=["shadow", "reflection"])
 @pytest.mark.parametrize("pan", [(0.0, 0.0), PAN], ids=["still", "pan"])
 def test_confidence_tells_where_light_could_not_be_followed(pan, glossy):

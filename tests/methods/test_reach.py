@@ -99,6 +99,7 @@ def test_without_frames_beyond_it_is_a_reach_of_one(offsets):
     assert np.array_equal(blurred(frame, 2), blurred(frame, 1))
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(
     "offsets", [pytest.param((0, -1, 1, -2), marks=pytest.mark.full), (0, -1, 1, -2, 2), (0, 1, 2)]
 )
@@ -112,6 +113,7 @@ def test_bars_are_their_twin(offsets):
     assert (np.abs(got - want).max(axis=2) > 1e-3).mean() < 0.01
 
 
+@pytest.mark.full
 def test_what_is_held_out_in_the_frames_beyond_leaves_no_trace():
     plain, masked = frame_at(bars), frame_at(bars, holdout=np.zeros(SIZE, "f4"))
     np.testing.assert_allclose(blurred(masked, 2), blurred(plain, 2), atol=1e-5)

@@ -127,6 +127,7 @@ def test_a_shutters_tails_are_as_long_as_they_are():
     assert np.abs((got - want)[:, tails].mean(axis=0)).max() < 4e-4
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("way", ["down", "up", "left", "right"])
 def test_a_rolling_shutter_delays_every_ray_by_its_place(way):
     shutter = Shutter(90, "centre", CURVES["early"], rolling=way, rolling_duration=0.6)

@@ -113,7 +113,7 @@ def test_nor_in_the_published_form():
     np.testing.assert_allclose(render(0.2), render.frame(0.2).color, atol=1e-4)
 
 
-@pytest.mark.covers(1)
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("method", ["tap", "reproject", "gather"])
 @pytest.mark.parametrize("name", ["crossing", "fence"])
 def test_rendering_passes_and_blurring_them_is_rendering_with_blur(tmp_path, capsys, name, method):

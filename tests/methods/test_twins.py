@@ -204,7 +204,7 @@ def test_reproject_is_its_twin(size, neighbours):
     assert wrong.mean() < 0.01
 
 
-@pytest.mark.covers(2)
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("frames", [1, 2, 3, 5])
 @pytest.mark.parametrize("size", [(36, 52), (1, 1)])
 @pytest.mark.parametrize("degrees", [180, 400])
@@ -223,6 +223,7 @@ def test_gather_is_its_twin_in_a_crowd():
     assert differing_from_gather(sources, 180) < 0.01
 
 
+@pytest.mark.full
 def test_gather_is_its_twin_of_what_comes_nearer():
     """At the same depth in the neighbours, whose samples would be seen instead, 19 % differ."""
     sources = []
@@ -244,6 +245,7 @@ def differing_from_gather(sources, degrees):
     return (np.abs(got - want) > 1e-3).any(axis=2).mean()
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(
     "variant, depths, speed",
     [("even", True, 6.0), ("even", False, 60.0), ("published", True, 60.0)],

@@ -283,7 +283,7 @@ def several():
     )
 
 
-@pytest.mark.parametrize("curve", ["box", "triangle"])
+@pytest.mark.parametrize("curve", [pytest.param("box", marks=pytest.mark.full), "triangle"])
 def test_several_volumes_are_their_twin(curve):
     shutter = Shutter(360, curve=curve)
     got = wgmb.Render(several(), wgmb.Blur("volume", shutter=shutter), fps=24, size=(96, 54))(0.3)

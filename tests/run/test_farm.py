@@ -216,6 +216,7 @@ def scheduler_and_worker(folder):
             process.wait()
 
 
+@pytest.mark.full
 def test_a_scheduler_that_is_lost_is_one_line_and_resume_goes_on(long_shot, tmp_path):
     out = tmp_path / "out"
     with scheduler_and_worker(tmp_path / "first") as (scheduler, address):

@@ -98,7 +98,7 @@ def test_parts_of_a_shot_that_moves_only_at_times_read_its_vectors_alike(desk, c
     assert told.count("flip y") == 3
 
 
-@pytest.mark.covers(1)
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("reach", [1, 2])
 @pytest.mark.parametrize("cut", [5, 6, 7])
 @pytest.mark.parametrize("known", [True, False], ids=["named", "found"])

@@ -51,6 +51,7 @@ def test_damaged_files_are_read_or_refused_by_name_and_nothing_else(tmp_path):
     check(damage.mutations, 40, tmp_path)
 
 
+@pytest.mark.full
 def test_files_that_were_cut_off_are_refused(tmp_path):
     check(damage.truncations, 15, tmp_path)
 
@@ -128,6 +129,7 @@ def leaking(kib: int) -> float:
     return growth(step, 10, 60)
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(("kib", "least", "most"), [(0, -5, 12), (100, 90, 112)])
 def test_growth_is_what_a_step_leaves_behind(kib, least, most):
     assert least <= apart(leaking, kib).value <= most

@@ -162,6 +162,7 @@ def test_half_floats_differ_in_the_last_bits_of_few_pixels(tmp_path):
         assert ulps.max() <= 4 and (ulps > 0).any(axis=2).mean() < 0.01
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", IMAGE_METHODS)
 def test_a_picture_that_leaves_the_display_goes_on_in_the_overscan(tmp_path, method):
     """A ball that crosses the right border; windows reach beyond it."""

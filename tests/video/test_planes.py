@@ -181,6 +181,7 @@ def averaged(pictures, weights, wanted):
     return planes
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("name", YUV)
 def test_one_picture_averaged_is_itself(device, name):
     picture = mild(stored(CODINGS[name]), 0)
@@ -204,7 +205,7 @@ def test_every_colour_of_8_bits_averaged_with_itself_is_itself(device, matrix, f
         np.testing.assert_array_equal(plane, want)
 
 
-@pytest.mark.covers(1)
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("count", [3, 19])
 @pytest.mark.parametrize("name", YUV)
 def test_an_average_of_planes_is_that_of_their_light(device, name, count):

@@ -153,6 +153,7 @@ def command_line(
 FULL = pytest.mark.full
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(
     ("changes", "made"),
     [

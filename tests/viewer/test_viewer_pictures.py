@@ -29,6 +29,7 @@ def test_the_window_shows_the_picture_in_its_place(hand):
     assert np.abs(shown / 255 - want).max() < 0.01
 
 
+@pytest.mark.full
 def test_every_method_and_scene_can_be_chosen(hand):
     methods = hand.viewer.stage.choices.methods(PLAIN)
     assert set(METHODS) - set(methods) == {"volume"}  # there is none in the scene
@@ -97,6 +98,7 @@ def test_what_a_method_shows_of_itself_can_be_looked_at(hand):
 USUAL = {"tap", "gather", "accumulate"}
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(
     "method",
     [

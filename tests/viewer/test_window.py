@@ -240,6 +240,7 @@ def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     assert (code, said) == (0, "")
 
 
+@pytest.mark.full
 def test_a_video_plays_and_is_scrubbed_to_its_ends(desk, tmp_path):
     clip = tmp_path / "a.mp4"
     x = np.mgrid[:96, :160][1]
