@@ -107,7 +107,7 @@ def test_figures_are_those_of_the_picture(found, case):
 
 
 def test_blur_is_nearer_to_the_truth_than_none(found):
-    error = {e.label: e.measures["flip"] for e in found.of("bar", shown=True)}
+    error = {e.label: e.measures["flip"] for e in found.of("bar", on_page=True)}
     assert error["tap"] < error["sharp"]
     assert error["sharp"] == error["still"]
 
@@ -167,7 +167,7 @@ def test_a_scene_is_compared_with_every_method(device, scene_frame, methods):
     labels = {e.label for e in got.of("x", kind="samples")}
     assert labels == {*methods} - left_out
     assert labels >= {*FEW}
-    errors = {e.label: e.measures["psnr"] for e in got.of("x", shown=True, kind="samples")}
+    errors = {e.label: e.measures["psnr"] for e in got.of("x", on_page=True, kind="samples")}
     assert min(errors.values()) > 20  # the same picture, from the same place, at the same time
     table = compare.crossings(got, made)
     assert table is not None
@@ -299,9 +299,9 @@ def test_the_page_tells_command_machine_and_figures(found):
     assert "a &lt; b" in text
     for part in ("wgmb compare bar", *found.machine.values(), "still", "closed form"):
         assert part in text
-    tap = found.of("bar", label="tap", shown=True)[0]
+    tap = found.of("bar", label="tap", on_page=True)[0]
     assert f"{tap.measures['flip']:.4f}" in text
-    assert text.count('class="card"') == len(found.of("bar", shown=True)) + 1  # and the truth
+    assert text.count('class="card"') == len(found.of("bar", on_page=True)) + 1  # and the truth
 
 
 def test_a_plot_has_every_point_where_it_belongs():

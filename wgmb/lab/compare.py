@@ -207,7 +207,7 @@ class Laboratory:
 
 
 def _slowest_of_pictures(report: Report, case: Case) -> list[float]:
-    entries = [e for e in report.of(case.name, kind="samples", shown=True) if e.seconds]
+    entries = [e for e in report.of(case.name, kind="samples", on_page=True) if e.seconds]
     pictures = [e for e in entries if not e.traced] or entries
     return [max(e.seconds or 0.0 for e in pictures)]
 

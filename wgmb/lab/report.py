@@ -149,7 +149,7 @@ def _means(report: Report, colors) -> str:
 
 def _case(report: Report, index: int, case: Case, colors) -> str:
     truth = Entry(case.name, "truth", "truth", {}, picture=case.truth)
-    still = [e for e in report.of(case.name, shown=True) if e.kind != "time"]
+    still = [e for e in report.of(case.name, on_page=True) if e.kind != "time"]
     timed = report.of(case.name, kind="time")
     parts = [
         f'<h2 id="case{index}">{escape(case.name)}</h2>',
