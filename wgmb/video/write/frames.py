@@ -6,10 +6,8 @@ from collections.abc import Collection
 from fractions import Fraction
 from pathlib import Path
 
-import av
 import numpy as np
 from av.error import FFmpegError
-from av.video.reformatter import Colorspace, VideoReformatter
 
 from ...color.coding import (
     BT709,
@@ -20,11 +18,10 @@ from ...color.coding import (
 from ...color.srgb import ToDisplay, to_display
 from ...errors import InputError
 from ...io import atomic
-from ..pixels import THREADS
-from .container import VideoFile, tag
 from .encoders import FINEST_RATE, Encoding, chosen
 from .encoders import SUFFIXES as SUFFIXES
-from .gif import TICK, Palettes, check_rate
+from .gif import check_rate
+from .pictures import CodedVideo
 
 SRGB_DISPLAY = frozenset({"srgb_rec709_display"})
 _DISPLAYS = {  # primaries and transfer of displays, by the names that configs give them
@@ -61,84 +58,47 @@ class Video:
     ):
         self.path, self.temporary, self.settings = path, temporary, settings
         self._encoding = encoding or chosen(path)
-        self._is_gif = self._encoding.codec == "gif"
-        if self._is_gif:
-            check_rate(path, fps)
-        else:
-            check_rate(path, fps, _RATES)
+        check_rate(path, fps, *(() if self._encoding.codec == "gif" else (_RATES,)))
         self.fps = fps.limit_denominator(FINEST_RATE)
         self._coding = self._encoding.coding(_coding(display, self._encoding.codec == "ffv1"))[0]
-        self._pixels = self._encoding.pixels(self._coding)
-        self._by = VideoReformatter()
-        self._file: VideoFile | None = None
-        self._palettes: Palettes | None = None
+        self._video: CodedVideo | None = None
         self._frames = 0
         self._size: tuple[int, ...] = ()
 
     def add(self, rgba: np.ndarray, convert: ToDisplay = to_display) -> None:
         """Append one frame of linear light, (height, width, 3 or 4); OSError if it cannot be."""
-        shown = convert(rgba, 8, over_black=True)
-        self._size = self._size or shown.shape
-        if shown.shape != self._size:
+        rgb = convert(rgba, 8, over_black=True)
+        self._size = self._size or rgb.shape
+        if rgb.shape != self._size:
             raise InputError(
-                f"frame of {shown.shape[1]} x {shown.shape[0]} in a video of "
+                f"frame of {rgb.shape[1]} x {rgb.shape[0]} in a video of "
                 f"{self._size[1]} x {self._size[0]}"
             )
         if self._encoding.encoder.even:
-            height, width = shown.shape[:2]
-            shown = np.pad(shown, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-        try:
-            self._file = self._file or self._begin(shown.shape[1], shown.shape[0])
-            self._encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(shown), format="rgb24"))
-        except FFmpegError as error:
-            raise atomic.about(self.path, error) from None
-
-    def _begin(self, width: int, height: int) -> VideoFile:
-        if self._is_gif:
-            self._palettes = Palettes(width, height)
-        return VideoFile(
-            self.path, self.temporary, self._encoding, self._coding, (width, height), self.fps,
-            TICK if self._is_gif else 1 / self.fps,
+            height, width = rgb.shape[:2]
+            rgb = np.pad(rgb, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+        self._video = self._video or CodedVideo(
+            self.path, self.temporary, self._encoding, self._coding,
+            (rgb.shape[1], rgb.shape[0]), self.fps, 1 / self.fps,
             metadata={"comment": f"wgmb {self.settings}"},
         )  # fmt: skip
-
-    def _encode(self, frame: av.VideoFrame | None) -> None:
-        """Write what can be written once `frame` is there; None: all the rest."""
-        assert self._file is not None
-        if self._palettes is None:
-            if frame is not None:
-                frame = self._by.reformat(
-                    frame, format=self._pixels, dst_colorspace=Colorspace.ITU709, threads=THREADS
-                )
-                tag(frame, self._coding)
-            self._file.encode(frame, self._frames)
-            self._frames += 1
-            return
-        for painted, tick in self._palettes.of(frame, self._tick(self._frames)):
-            self._file.encode(painted, tick)
-        self._frames += frame is not None
-        if frame is None:
-            self._file.encode(None)
-
-    def _tick(self, frame: int) -> int:
-        """Return the time at which a frame of a GIF is shown, in its ticks."""
-        return round(frame / (self.fps * TICK))
+        self._video.add_rgb(rgb, self._frames / self.fps)
+        self._frames += 1
 
     def close(self) -> None:
         """Finish the file and put it in place; OSError if it cannot be."""
-        if self._file is None:
+        if self._video is None:
             raise OSError(f"{self.path}: no frames")
         try:
-            self._encode(None)
+            self._video.close()
         except (FFmpegError, OSError) as error:
             self.abandon()
             raise atomic.about(self.path, error) from None
-        self._file.close()
 
     def abandon(self) -> None:
         """Leave nothing behind."""
-        if self._file is not None:
-            self._file.abandon()
+        if self._video is not None:
+            self._video.abandon()
         self.temporary.unlink(missing_ok=True)
 
 

@@ -9,16 +9,19 @@ from pathlib import Path
 
 import av
 import numpy as np
-from av.video.reformatter import VideoReformatter
+from av.error import FFmpegError
+from av.video.reformatter import Colorspace, VideoReformatter
 
 from ...color.coding import CodedPicture, Coding
 from ...errors import InputError
+from ...io import atomic
 from ..pixels import THREADS, frame_of, pixel_format
 from .container import VideoFile, tag
 from .encoders import NO_FACTS, Encoding, Facts
 from .gif import TICK, Palettes, check_rate
 from .other_streams import OtherStreams
 
+_RGB = "rgb24"
 _WHOLE = 0, 3  # planes of luma and alpha: of all sizes, even where chroma has one sample
 
 
@@ -84,18 +87,36 @@ class CodedVideo:
         now = round(time / self._base)
         if self._last is not None and now <= self._last:
             raise InputError(f"{self.path}: pictures at times that do not ascend ({float(time)} s)")
-        self._last = now
         frame = frame_of(self._filled(picture.planes), self._planar)
-        if self._palettes is not None:
-            frame = self._by.reformat(frame, format="rgb24", threads=THREADS)
-            self._paint(self._palettes, frame, now)
-        else:
+        if self._palettes is None:
             tag(frame, self._coding)
-            if self._pixels != self._planar:
-                frame = self._by.reformat(frame, format=self._pixels, threads=THREADS)
-            self.file.encode(frame, now)
+        kind = self._pixels if self._palettes is None else _RGB
+        if kind != self._planar:
+            frame = self._by.reformat(frame, format=kind, threads=THREADS)
+        self._put(frame, now)
         if self._others is not None:
             self.file.mux(self._others.until(time))
+
+    def add_rgb(self, rgb: np.ndarray, time: Fraction) -> None:
+        """Append a picture of display values (height, width, 3) uint8; see `add`."""
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(rgb), format=_RGB)
+        if self._palettes is None:
+            try:
+                frame = self._by.reformat(
+                    frame, format=self._pixels, dst_colorspace=Colorspace.ITU709, threads=THREADS
+                )
+            except FFmpegError as error:
+                raise atomic.about(self.path, error) from None
+            tag(frame, self._coding)
+        self._put(frame, round(time / self._base))
+
+    def _put(self, frame: av.VideoFrame, tick: int) -> None:
+        """Encode a picture in the encoder's format, or, of a GIF, in RGB."""
+        self._last = tick
+        if self._palettes is not None:
+            self._paint(self._palettes, frame, tick)
+        else:
+            self.file.encode(frame, tick)
 
     def _paint(self, palettes: Palettes, frame: av.VideoFrame | None, tick: int = 0) -> None:
         """Encode a picture of a GIF, or what is left of it."""
