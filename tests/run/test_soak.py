@@ -52,6 +52,11 @@ def test_damaged_files_are_read_or_refused_by_name_and_nothing_else(tmp_path):
 
 
 @pytest.mark.full
+def test_strange_words_in_any_text_are_read_or_refused_by_name(tmp_path):
+    check(damage.exchanges, 40, tmp_path)
+
+
+@pytest.mark.full
 def test_files_that_were_cut_off_are_refused(tmp_path):
     check(damage.truncations, 15, tmp_path)
 
@@ -196,6 +201,8 @@ def test_damage_is_the_same_again_and_differs_by_seed_kind_and_number(tmp_path):
                   (("png-8", data, 2, 0), ("jpeg", data, 1, 0), ("png-8", data, 1, 1))]  # fmt: skip
         assert one not in others
     assert len(damage.spoiled("cut", "png-8", data, 1, 0)) <= len(data) - 13
+    text = b'{"a": [1, 2.5], "b": "two"}'
+    assert {damage.spoiled("exchanged", "camera", text, 1, n) for n in range(9)}.isdisjoint({text})
 
 
 @pytest.mark.parametrize(

@@ -386,8 +386,8 @@ def test_a_manifest_beside_a_file_of_more_layers_is_read(tmp_path):
     ("file", "text", "says"),
     [
         ("m.json", None, r"m\.json: no such file"),
-        ("m.json", b"[1]", "nothing"),
-        ("m.json", 100_000 * b"[", "nothing"),
+        ("m.json", b"[1]", r"m\.json: is no JSON of names"),
+        ("m.json", 100_000 * b"[", r"m\.json: is no JSON of names"),
         ("m.json", b"\xff", r"m\.json: not UTF-8"),
         ("../m.json", b"{}", "without a folder"),
         ("/etc/passwd", b"{}", "without a folder"),

@@ -35,10 +35,14 @@ from wgmb import (
 from wgmb.cli import app
 from wgmb.color.srgb import to_display
 from wgmb.io import exr, stills
+from wgmb.run import job_file
+from wgmb.sequence.frame_file import about
 from wgmb.shots.cut_list import CutList
 from wgmb.video.read.reader import VideoReader
 from wgmb.viewer import State
 
+_NAMES = {"hero": "3f000001", "floor": "3f000002"}  # of a Cryptomatte
+_TEXTS = ".csv", ".edl", ".json", ".otio", ".ocio", ".toml"
 _VIDEOS = ".mov", ".ts", ".mkv"  # one that is cut off is read as far as it goes
 
 
@@ -54,6 +58,11 @@ class Kind:
 
     @property
     def is_text(self) -> bool:
+        """True if it is made of words and numbers."""
+        return self.suffix in _TEXTS
+
+    @property
+    def may_end_early(self) -> bool:
         """True if a truncated file may be sound, with another meaning."""
         return self.suffix in (".csv", ".edl", ".toml", ".ocio", *_VIDEOS)
 
@@ -96,6 +105,40 @@ def _read_masked(path: Path) -> str:
     clip = Clip(path, passes=Passes(holdout="CryptoObject=hero"))
     frame = clip.frame(clip.source(clip.numbers[0]))
     return _digest(frame.arrays.values())
+
+
+def _read_manifest(path: Path) -> str:
+    """A picture with a Cryptomatte whose names are in this file, beside it."""
+    picture = path.with_suffix(".exr")
+    _cryptomatte(picture, manif_file=path.name)
+    return _read_masked(picture)
+
+
+def _read_job(path: Path) -> str:
+    """A job whose seal is right, as its author makes it; then its frames are looked for."""
+    try:
+        content = json.loads(path.read_text("utf-8"))
+        kind = content.pop("wgmb_job")
+        content.pop("seal")
+        whole = {"wgmb_job": kind, "seal": job_file._seal(content)} | content
+        path.write_text(json.dumps(whole), "utf-8")
+    except (ValueError, RecursionError, KeyError, TypeError, AttributeError):
+        pass  # read as it is
+    stored = job_file.read_job(path)
+    with about(path):
+        stored.check(stored.job.numbers, str(path))
+    return hashlib.sha256(stored.text().encode()).hexdigest()
+
+
+def _read_options(path: Path) -> str:
+    """Options of the command line, as far as they go without a GPU: into a job."""
+    job = path.with_name("options-job.json")
+    make.write_exr(path.with_name("options.0001.exr"), make.frame(1))
+    files = (path.with_name(f"options{what}.####.exr") for what in ("", "-out"))
+    words = "job", next(files), "-o", next(files), "-j", job, "-q"
+    with about(path):
+        _command(path, *words, "--method", "tap", "--config", path)
+    return json.dumps(job_file.read_job(job).job.settings, sort_keys=True)
 
 
 def _read_camera(path: Path) -> str:
@@ -170,15 +213,36 @@ def _multipart(path: Path) -> None:
     make.write_parts(path, [make.part(picture, name="rgba"), make.part(motion, name="motion")])
 
 
-def _cryptomatte(path: Path) -> None:
+def _cryptomatte(path: Path, **other: str) -> None:
+    """`other`: where the names are, if not in the file."""
     ids, coverage = np.full((48, 64), 0x3F000001, np.uint32).view(np.float32), np.ones((48, 64))
     lead = "cryptomatte/0000000/"
-    about = {"name": "CryptoObject", "hash": "MurmurHash3_32", "conversion": "uint32_to_float32"}
-    about["manifest"] = json.dumps({"hero": "3f000001", "floor": "3f000002"})
+    facts = {"name": "CryptoObject", "hash": "MurmurHash3_32", "conversion": "uint32_to_float32"}
+    facts |= other or {"manifest": json.dumps(_NAMES)}
     make.write_exr(
         path,
         make.frame(1) | {"CryptoObject00.R": ids, "CryptoObject00.G": coverage.astype(np.float32)},
-        {lead + name: value for name, value in about.items()},
+        {lead + name: value for name, value in facts.items()},
+    )
+
+
+def _manifest(path: Path) -> None:
+    path.write_text(json.dumps(_NAMES))
+
+
+def _job(path: Path) -> None:
+    source = path.with_name("job-in.####.exr")
+    for number in (1, 2):
+        make.write_exr(path.with_name(f"job-in.{number:04}.exr"), make.frame(number))
+    out = path.with_name("job-out.####.exr")
+    _command(path, "job", source, "-o", out, "-j", path, "--method", "tap", "-q")
+
+
+def _options(path: Path) -> None:
+    path.write_text(
+        '[blur]\nshutter = 180.0\nphase = "centre"\ncurve = "box"\nsamples = 16\njitter = 0.5\n'
+        'max-blur = 40.0\nvectors = "blender"\nwindow = "grow"\ncompression = "zip"\nbits = 16\n'
+        'layers = "all"\nframes = "1"\n'
     )
 
 
@@ -274,6 +338,9 @@ KINDS = {
     "jpeg-progressive": Kind(".jpg", _pillow("RGB", progressive=True, quality=90), _read_still),
     "jpeg-grey": Kind(".jpg", _pillow("L", quality=90), _read_still),
     "camera": Kind(".json", _camera, _read_camera),
+    "manifest": Kind(".json", _manifest, _read_manifest),
+    "job": Kind(".json", _job, _read_job),
+    "options": Kind(".toml", _options, _read_options),
     "curve": Kind(".csv", _curve, _read_curve),
     "edl": Kind(".edl", _edl, _read_cuts),
     "otio": Kind(".otio", _otio, _read_cuts),

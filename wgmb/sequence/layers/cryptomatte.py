@@ -58,18 +58,23 @@ def ids(crypto: Attributes, value: str, folders: Iterable[Path] = ()) -> list[in
         raise InputError(f"Cryptomatte {crypto['name']!r}: choose an object with LAYER=NAME")
     if is_id(value):
         return [int(value, 16)]
-    manifest = _manifest(crypto, folders)
+    manifest, path = _manifest(crypto, folders)
+    its = f"its manifest {path}" if path else "its manifest"
     names = [value]
     if value not in manifest:
         pattern = any(c in value for c in "*?[")
         names = [n for n in manifest if fnmatchcase(n, value)] if pattern else []
     if not names:
         raise NoSuchNameError(
-            f"Cryptomatte {crypto['name']!r} has no {value!r}; its manifest has "
+            f"Cryptomatte {crypto['name']!r} has no {value!r}; {its} has "
             f"{_some(manifest) or 'nothing; give the id as 0x and eight digits'}"
             f"{did_you_mean(value, manifest)}"
         )
-    return [_as_id(crypto, name, manifest[name]) for name in names]
+    found = {name: manifest[name] for name in names}
+    for name, id_ in found.items():
+        if not isinstance(id_, str) or not re.fullmatch(r"[0-9a-fA-F]{1,8}", id_):
+            raise InputError(f"Cryptomatte {crypto['name']!r}: bad id for {name!r} in {its}")
+    return [int(str(id_), 16) for id_ in found.values()]
 
 
 def coverage(
@@ -108,39 +113,40 @@ def sidecar(crypto: Attributes, folders: Iterable[Path]) -> Path | None:
     return next((path for path in places if path.is_file()), places[0])
 
 
-def _manifest(crypto: Attributes, folders: Iterable[Path]) -> dict[str, object]:
-    """Ids as text by name; empty where there is none, or it is damaged."""
+def _manifest(crypto: Attributes, folders: Iterable[Path]) -> tuple[dict[str, object], Path | None]:
+    """Ids as text by name, and the file that they are from, None for the EXR.
+
+    Empty where the EXR holds none, or a damaged one.
+    """
     path = sidecar(crypto, folders)
     if path is None:
-        return _parsed(crypto.get("manifest") or "{}")
+        return _parsed(crypto.get("manifest") or "{}") or {}, None
     try:
         if not path.is_file():
             raise InputError(f"{path}: no such file; it is the manifest of {crypto['name']!r}")
         if path.stat().st_size > _MOST_BYTES:
             raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, too large for a manifest")
-        return _parsed(path.read_text("utf-8"))
+        manifest = _parsed(path.read_text("utf-8"))
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8") from None
     except OSError as error:
         raise InputError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+    if manifest is None:
+        raise InputError(f"{path}: is no JSON of names; it is the manifest of {crypto['name']!r}")
+    return manifest, path
 
 
 @lru_cache(maxsize=4)  # frame after frame has the same, of up to a hundred thousand names
-def _parsed(text: str) -> dict[str, object]:
+def _parsed(text: str) -> dict[str, object] | None:
+    """None for what is no table."""
     try:
         manifest = json.loads(text)
     except (ValueError, RecursionError):
-        return {}
-    return manifest if isinstance(manifest, dict) else {}
+        return None
+    return manifest if isinstance(manifest, dict) else None
 
 
 def _some(names: Mapping[str, object]) -> str:
     """The first names, and how many there are if these are not all."""
     text = ", ".join(list(names)[:_SHOWN])
     return f"{text}, ... ({len(names)} names)" if len(names) > _SHOWN else text
-
-
-def _as_id(crypto: Attributes, name: str, value: object) -> int:
-    if not isinstance(value, str) or not re.fullmatch(r"[0-9a-fA-F]{1,8}", value):
-        raise InputError(f"Cryptomatte {crypto['name']!r}: bad id for {name!r}")
-    return int(value, 16)
