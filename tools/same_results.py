@@ -1,6 +1,7 @@
 """Record what fixed inputs give, and compare it after a change that must change nothing.
 
 python tools/same_results.py record FOLDER    run every command; files, messages and exit codes
+python tools/same_results.py record FOLDER mp4      the same of commands with a word, beside others
 python tools/same_results.py compare FOLDER   the same again; exit code 1 and a list if any differ
 python tools/same_results.py compare FOLDER "blur clip8" perceive   only commands with these words
 
@@ -157,7 +158,7 @@ def _files(folder: Path) -> dict[str, str]:
 def _content(path: Path) -> bytes:
     """Its bytes; of a Matroska file, which has random numbers in it, what FFmpeg reads.
 
-    Without the seal of a record, a checksum of the whole file.
+    A checksum over those numbers is left out too.
     """
     if path.suffix not in (".mkv", ".webm"):
         return path.read_bytes()
@@ -212,10 +213,11 @@ def main() -> int:
     what, folder = sys.argv[1], Path(sys.argv[2]).resolve()
     kept = folder / "record.json"
     found = record(folder, sys.argv[3:])
+    known = json.loads(kept.read_text("utf-8")) if kept.exists() else {}
     if what == "record":
-        kept.write_text(json.dumps(found, indent=1), "utf-8")
+        kept.write_text(json.dumps(known | found, indent=1), "utf-8")
         return 0
-    known, faults = json.loads(kept.read_text("utf-8")), 0
+    faults = 0
     for line in found.keys() | (set() if sys.argv[3:] else known.keys()):
         for part in ("code", "out", "err", "files"):
             was, now = (one.get(line, {}).get(part) for one in (known, found))

@@ -38,9 +38,10 @@ if TYPE_CHECKING:
     from .png import show
     from .render import Render
     from .run.batch_report import BatchReport
+    from .run.file_sink import BlurredFrame
     from .run.pictures import PictureBlur, blur_pictures
     from .run.sequence import blur_sequence, vectors_sequence
-    from .run.stages import BlurredFrame, blurred
+    from .run.stages import blurred
     from .run.video import VideoReport, blur_video
     from .scene import Body, CameraPath, Scene
     from .sequence.clip import Clip, Passes
@@ -111,10 +112,11 @@ _PLACES = {
     "png": ("show",),
     "render": ("Render",),
     "run.batch_report": ("BatchReport",),
+    "run.file_sink": ("BlurredFrame",),
     "run.pictures": ("PictureBlur", "blur_pictures"),
     "run.sequence": ("blur_sequence", "vectors_sequence"),
     "run.video": ("VideoReport", "blur_video"),
-    "run.stages": ("BlurredFrame", "blurred"),
+    "run.stages": ("blurred",),
     "scene": ("Body", "Scene", "CameraPath"),
     "sequence.clip": ("Clip", "Passes"),
     "sequence.layers.camera_file": ("CameraFile",),

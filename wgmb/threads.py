@@ -22,16 +22,20 @@ def ahead(
 
     What the thread raises is raised here. When nobody reads on, it ends after the item that it is
     making, for which one waits at most `patience` [s]. An item that was given is not held here.
+    With a count of 0 there is no thread, and each item is made when it is asked for.
     """
+    if not count:
+        yield from items
+        return
     # Each item stands in a list of its own; None stands after the last one.
-    made: queue.SimpleQueue[list[_Item] | BaseException | None] = queue.SimpleQueue()
+    entries: queue.SimpleQueue[list[_Item] | BaseException | None] = queue.SimpleQueue()
     room, stop = threading.Semaphore(count), threading.Event()
 
     def make_one() -> bool:
         for item in items:
-            made.put([item])
+            entries.put([item])
             return True
-        made.put(None)
+        entries.put(None)
         return False
 
     def make() -> None:
@@ -39,12 +43,12 @@ def ahead(
             while _has_room(room, stop.is_set) and make_one():
                 pass
         except BaseException as error:  # raised where the items are read
-            made.put(error)
+            entries.put(error)
 
     thread = threading.Thread(target=make, name=name, daemon=True)
     thread.start()
     try:
-        while (entry := _taken(made)) is not None:
+        while (entry := _taken(entries)) is not None:
             room.release()
             if isinstance(entry, BaseException):
                 raise entry
@@ -81,9 +85,10 @@ def _has_room(room: threading.Semaphore, is_over: Callable[[], bool]) -> bool:
 class Behind(Generic[_Item]):
     """Calls `work` with items in a thread of its own, in their order.
 
-    `with Behind(work) as put:`; what it raises is raised by the next `put`, or at the end. `put`
-    returns when fewer than `count` items wait, so that `count` wait or are being made by the
-    caller, beside the one that is worked on.
+    `with Behind(work) as put:`; what it raises is raised by the next `put`, or at the end. What was
+    put is worked on if the caller fails, but not after an interruption. `put` returns when fewer
+    than `count` items wait, so that `count` wait or are being made by the caller, beside the one
+    that is worked on.
     """
 
     def __init__(self, work: Callable[[_Item], None], count: int = 1, name: str = "behind"):
@@ -100,7 +105,7 @@ class Behind(Generic[_Item]):
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
-            if kind is None:
+            if kind is None or issubclass(kind, Exception):
                 self._items.put(None)
                 _join(self._thread)
         finally:  # an interruption comes in the middle of it

@@ -25,8 +25,10 @@ class Frame:
 class Numbers:
     """Frames that are nothing but a number; `fails` has what is raised at a number."""
 
+    ahead = 1
+
     def __init__(self, count=COUNT, **fails):
-        self.numbers = range(1, count + 1)
+        self.numbers, self.total = range(1, count + 1), count
         self.fails, self.threads, self.alive = fails, {}, weakref.WeakSet()
         self.begun = []
 
@@ -160,6 +162,8 @@ def test_a_fault_is_raised_and_the_sink_abandoned(stage, error, way):
         engine.run(made, sink, on_error=way)
     assert sink.end == ["abandoned"] and not left()
     assert sink.numbers == [1, 2, 3][: len(sink.numbers)]
+    if isinstance(error, Exception):  # what was made before an error is kept
+        assert sink.numbers == [1, 2, 3]
 
 
 def test_frames_that_fail_are_reported_and_the_others_made():

@@ -26,7 +26,8 @@ from ..sequence.clip import Clip
 from ..sequence.data_windows import Placement, laid, union
 from ..sequence.frame_file import FrameFile
 from ..shutter import Shutter
-from .stages import BlurredFrame, ReadFrame, Stages
+from .file_sink import BlurredFrame
+from .stages import ReadFrame, Stages
 
 _SPARE = Fraction(1, 20)  # of an output frame: less at the end of the sequence is none
 
@@ -139,12 +140,12 @@ class RateConversionStages(Stages):
     def _cells(self, number: int, cuts: Collection[int]) -> list[Cell]:
         return self._conversion.cells(self._at(number), self._shutter, self._existing, cuts)
 
-    def _exposed(self, read: ReadFrame, found: list[Cell]) -> BlurredFrame:
+    def _exposed(self, read: ReadFrame, parts: list[Cell]) -> BlurredFrame:
         done = BlurredFrame(read.number, made_of=dict(read.made_of))
         sums: dict[str | None, _Sum] = {}
         at = float(self._at(read.number))
-        nearest = min(found, key=lambda cell: abs(cell.index - at)).index
-        for cell in found:
+        nearest = min(parts, key=lambda cell: abs(cell.index - at)).index
+        for cell in parts:
             self._blur.shutter = cell.shutter
             with self._reading:
                 one = super()._read(cell.index, {})

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from typing import Any, Literal, Protocol, TypeVar
 
@@ -29,8 +29,8 @@ IsDone = Callable[[int, dict[str, Any]], bool]
 """Called with a frame's number and what it depends on: True if the sink has it already."""
 
 
-class Made(Protocol):
-    """A frame that was made, or that failed."""
+class Blurred(Protocol):
+    """A frame that was blurred, or that failed."""
 
     number: int
     failed: str
@@ -40,29 +40,33 @@ class Made(Protocol):
 
 
 _Read = TypeVar("_Read")
-_Made = TypeVar("_Made", bound=Made)
-_MadeIn = TypeVar("_MadeIn", bound=Made, contravariant=True)
-_MadeOut = TypeVar("_MadeOut", bound=Made, covariant=True)
+_Blurred = TypeVar("_Blurred", bound=Blurred)
+_BlurredIn = TypeVar("_BlurredIn", bound=Blurred, contravariant=True)
+_BlurredOut = TypeVar("_BlurredOut", bound=Blurred, covariant=True)
 
 
-class Input(Protocol[_Read, _MadeOut]):
+class Input(Protocol[_Read, _BlurredOut]):
     """Frames to be made."""
 
+    ahead: int
+    """Number of them that are made ahead of each thread: 1 takes the least memory, more even out
+    what takes longer from time to time; 0 reads on the thread that blurs."""
+
     @property
-    def numbers(self) -> Sequence[int]:
-        """Numbers of the frames, in their order; empty where nobody knows them beforehand."""
+    def total(self) -> int:
+        """Number of frames; 0 where nobody knows it beforehand."""
         ...
 
     def read(self, is_done: IsDone) -> Iterator[_Read]:
         """Read for the frames that are not done; runs in the first thread."""
         ...
 
-    def blur(self, read: Iterator[_Read]) -> Iterator[_MadeOut]:
+    def blur(self, read: Iterator[_Read]) -> Iterator[_BlurredOut]:
         """Make frames of it, as many as there turn out to be; runs in the second thread."""
         ...
 
 
-class Sink(Protocol[_MadeIn]):
+class Sink(Protocol[_BlurredIn]):
     """Destination of frames."""
 
     is_whole: bool
@@ -72,7 +76,7 @@ class Sink(Protocol[_MadeIn]):
         """Return True if a frame of an earlier run is there, made of the same."""
         ...
 
-    def put(self, made: _MadeIn) -> None:
+    def put(self, frame: _BlurredIn) -> None:
         """Take a frame; runs in the third thread."""
         ...
 
@@ -89,7 +93,7 @@ class Sink(Protocol[_MadeIn]):
         ...
 
 
-def frames(input: Input[Any, _Made], stop: threading.Event | None = None) -> Iterator[_Made]:
+def frames(input: Input[Any, _Blurred], stop: threading.Event | None = None) -> Iterator[_Blurred]:
     """Every frame that `input` makes, blurred in a thread of its own while the caller works.
 
     Errors arrive where the frames are taken. Once `stop` is set, no other frame is begun, and the
@@ -98,12 +102,12 @@ def frames(input: Input[Any, _Made], stop: threading.Event | None = None) -> Ite
     is_over = (stop or threading.Event()).is_set
     with closing(_read_ahead(input, lambda number, made_of: False, is_over)) as read:
         blurred = input.blur(_until(is_over, read))
-        yield from ahead(blurred, name="blur", patience=math.inf)
+        yield from ahead(blurred, input.ahead, "blur", patience=math.inf)
 
 
 def run(
-    input: Input[Any, _Made],
-    sink: Sink[_Made],
+    input: Input[Any, _Blurred],
+    sink: Sink[_Blurred],
     *,
     resume: bool = False,
     progress: Progress | None = None,
@@ -127,7 +131,7 @@ def _read_ahead(
     input: Input[_Read, Any], is_done: IsDone, is_over: Callable[[], bool]
 ) -> Generator[_Read, None, None]:
     """The items that `input` reads, in a thread of its own."""
-    return ahead(_until(is_over, input.read(is_done)), name="read")
+    return ahead(_until(is_over, input.read(is_done)), input.ahead, "read")
 
 
 def _until(is_over: Callable[[], bool], items: Iterator[_Read]) -> Iterator[_Read]:
@@ -153,7 +157,7 @@ class _Run:
     ):
         self._input, self._sink, self._resume, self._goes_on = input, sink, resume, goes_on
         self._tell = progress or (lambda number, state: None)
-        self._asked = stop or threading.Event()
+        self._stop = stop or threading.Event()
         self._report = BatchReport()
         self._reasons: list[str] = []
 
@@ -161,7 +165,7 @@ class _Run:
         report = self._report
         try:
             self._flow()
-            if self._asked.is_set() and not report.stopped and self._rest():
+            if self._stop.is_set() and not report.stopped and self._rest():
                 report.stopped = ON_REQUEST
             self._end()
         except BaseException:
@@ -172,14 +176,14 @@ class _Run:
     def _flow(self) -> None:
         with (
             closing(_read_ahead(self._input, self._is_done, self._is_over)) as read,
-            Behind(self._put, name="write") as put,
+            Behind(self._put, max(1, self._input.ahead), "write") as put,
         ):
-            for made in self._input.blur(_until(self._is_over, read)):
-                put(made)
-                del made
+            for frame in self._input.blur(_until(self._is_over, read)):
+                put(frame)
+                del frame
 
     def _is_over(self) -> bool:
-        return bool(self._report.stopped) or self._asked.is_set()
+        return bool(self._report.stopped) or self._stop.is_set()
 
     def _is_done(self, number: int, made_of: dict[str, Any]) -> bool:
         if not (self._resume and self._sink.done(number, made_of)):
@@ -188,18 +192,18 @@ class _Run:
         self._tell(number, "skipped")
         return True
 
-    def _put(self, made: Made) -> None:
+    def _put(self, frame: Blurred) -> None:
         """The third stage, for one frame."""
-        report, number = self._report, made.number
-        if made.failed:
-            self._fail(number, made.failed)
+        report, number = self._report, frame.number
+        if frame.failed:
+            self._fail(number, frame.failed)
             return
         if report.stopped:
             return
-        if made.bad:
-            report.bad[number] = made.bad
+        if frame.bad:
+            report.bad[number] = frame.bad
         try:
-            self._sink.put(made)
+            self._sink.put(frame)
         except (Error, OSError, MemoryError, RuntimeError) as error:
             if not self._goes_on:
                 raise
@@ -224,7 +228,7 @@ class _Run:
         """The number of frames of which nothing was heard."""
         report = self._report
         return (
-            len(self._input.numbers)
+            self._input.total
             - len(report.done) - len(report.skipped) - len(report.failed)
         )  # fmt: skip
 

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 from .. import gpu
-from .._version import __version__
 from ..color.spaces import ColorSpace, Display
 from ..errors import InputError
 from ..io import atomic
@@ -34,7 +33,8 @@ from ..sequence.findings import SequenceFindings
 from ..sequence.frame_file import about
 from ..sequence.input_color import space_of
 from ..sequence.layers.masks import is_file, with_amount
-from ..settings import OutputSettings, plain
+from ..settings import OutputSettings
+from ..settings.record import record
 from ..settings.video import VideoSettings
 from .batch_report import Progress
 from .conversion import RateConversion
@@ -44,7 +44,6 @@ from .request import BlurRequest
 from .sequence import blur_sequence, convert_sequence
 
 _OWN = 0.5  # frame intervals around a frame that it stands for
-_NO_LOOK = "frames", "skip_missing", "max_mb"  # of InputSettings: they change no frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,12 +210,8 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     request = replace(request, blur=blur, video=video)
     blur, output = request.blur, request.output
     request.shutter.make()  # says what is wrong with it
-    settings = {"wgmb": __version__} | plain(blur) | plain(request.shutter) | plain(request.input)
-    for name in _NO_LOOK:
-        del settings[name]
-    settings |= {"samples": blur.settled_samples()} | output.looks
-    settings["curve"] = request.shutter.curve_read()
-    settings |= request.color_record(shown)
+    groups = blur, request.shutter, request.input, output
+    settings = record(*groups, samples=blur.settled_samples()) | request.color_record(shown)
     if request.confidence:
         check_confidence(blur.method or "", output)
         settings["confidence"] = True

@@ -1,66 +1,145 @@
-"""A video as it is perceived: each picture is held until the next, and earlier ones fade."""
+"""Frames as they are perceived: each is held until the next, and earlier ones fade."""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import wgpu
 
-from ..color.coding import CodedPicture, Coding
-from ..cone import Cone
+from ..errors import InputError, size_text
+from ..io.frame_numbers import frame_numbers
 from ..observer import Observer
-from ..video.clock import Clock
-from ..video.linear_frames import VideoPictures
-from ..video.read.reader import VideoReader
+from ..output.output import Output
+from ..output.result import Result
+from ..pipeline.blur import Blur
+from ..render import Render
+from ..scene import builtin
+from ..sequence.clip import Clip
+from ..sequence.data_windows import Placement, laid, union
+from ..sequence.frame_file import FrameFile
+from ..settings import InputSettings, OutputSettings, parameters_of, size_of
+from ..settings.perception import PerceptionSettings
+from ..settings.record import record
+from .batch_report import BatchReport, Progress
+from .engine import IsDone, run
+from .file_sink import BlurredFrame, FileSink
 
 
 @dataclass(frozen=True)
-class PerceivedVideo:
-    """A video that is looked at; after each picture, what is seen of it."""
+class PresentedFrame:
+    """A frame as it is shown: images, the last of which stands for it."""
 
-    reader: VideoReader
-    clock: Clock
-    pictures: VideoPictures
-    observer: Observer
-
-    @property
-    def device(self) -> wgpu.GPUDevice:
-        """The device that holds the pictures."""
-        return self.observer.device
-
-    def light(self) -> wgpu.GPUTexture:
-        """The perceived image in the middle of the last picture's time, as linear light
-        (rgba32float)."""
-        return self.observer.texture()
-
-    def coded(self, coding: Coding) -> CodedPicture:
-        """The same in the planes of a video."""
-        encoder = self.device.create_command_encoder(label="encode")
-        return self.pictures.planes.encode(encoder, self.light().create_view(), coding)
-
-    def perceived(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray, float]]:
-        """Pictures with their numbers, and how long each is held [s]: until the next one."""
-        times, before = self.reader.times, None
-        for number, color in self.pictures.read(first, last):
-            if before is not None:
-                yield *before, float(times[number] - times[before[0]])
-            before = number, color
-        if before is not None:
-            number = before[0]
-            ends = (
-                times[number + 1]
-                if number + 1 < len(times)
-                else times[number] + 1 / self.reader.rate
-            )
-            yield *before, float(ends - times[number])
+    source: FrameFile
+    images: Iterable[np.ndarray]
+    """(height, width, 3 or 4), linear light, at the observer's rate."""
+    placement: Placement | None = None
 
 
-def densest_rate(reader: VideoReader, cone: Cone) -> float:
-    """Images per second where they are densest, over as long as a cone cell remembers."""
-    times = reader.times.seconds
-    ends = np.searchsorted(times, times + cone.memory, side="right")
-    return float((ends - np.arange(len(times))).max()) / cone.memory
+class PerceivedFrames:
+    """After each frame, what an observer sees of it."""
+
+    ahead = 1
+
+    def __init__(self, observer: Observer, numbers: Sequence[int]):
+        self.observer, self.numbers, self.total = observer, numbers, len(numbers)
+
+    def read(self, is_done: IsDone) -> Iterator[PresentedFrame]:
+        """All frames, as each depends on those before it."""
+        raise NotImplementedError
+
+    def blur(self, read: Iterator[PresentedFrame]) -> Iterator[BlurredFrame]:
+        """Show them."""
+        return map(self._perceived, read)
+
+    def _perceived(self, frame: PresentedFrame) -> BlurredFrame:
+        channels = 0
+        for image in frame.images:
+            self.observer.present(image)
+            channels = image.shape[2]
+        seen = self.observer.perceived()[..., :channels]
+        result = Result(frame.source, seen, placement=frame.placement)
+        return BlurredFrame(frame.source.number, [result])
+
+
+class PerceivedSequence(PerceivedFrames):
+    """Frames of files on one canvas: the display window, and the overscan of the first one."""
+
+    def __init__(self, clip: Clip, observer: Observer):
+        super().__init__(observer, clip.numbers)
+        self._clip = clip
+
+    def read(self, is_done: IsDone) -> Iterator[PresentedFrame]:
+        """Read them; InputError for one of another size."""
+        first = self._clip.source(self._clip.numbers[0])
+        canvas = union([first.display_window, first.data_window])
+        for number in self._clip.numbers:
+            source = self._clip.source(number)
+            if source.display_window != first.display_window:
+                raise InputError(
+                    f"{source.path} is {size_text(source.whole)}, {first.path.name} "
+                    f"{size_text(first.whole)}"
+                )
+            image = laid(source.rgba, source.data_window, canvas)
+            yield PresentedFrame(source, [image], Placement(canvas, canvas))
+
+
+class PerceivedNature(PerceivedFrames):
+    """Frames of a scene in nearly continuous time: `steps` images for each."""
+
+    def __init__(self, render: Render, observer: Observer, numbers: Sequence[int], steps: int):
+        super().__init__(observer, numbers)
+        self._render, self._steps = render, steps
+        self._before = math.ceil(observer.cone.memory * observer.rate)
+
+    def read(self, is_done: IsDone) -> Iterator[PresentedFrame]:
+        """The images from one frame to the next, rendered when they are shown."""
+        done = -math.inf
+        for number in self.numbers:
+            end = number * self._steps
+            first = int(max(done + 1, end - self._before))
+            images = (self._render.sharp(k / self.observer.rate) for k in range(first, end + 1))
+            yield PresentedFrame(FrameFile(number, Path(), None, {}, {}), images)
+            done = end
+
+
+@dataclass(frozen=True)
+class PerceptionRun:
+    """Perceived frames and their output; call it."""
+
+    frames: PerceivedFrames
+    output: Output
+
+    def __call__(self, progress: Progress | None = None) -> BatchReport:
+        """Write what is seen of each frame; the first error ends it."""
+        return run(self.frames, FileSink(self.output), progress=progress)
+
+
+def perceive(
+    pattern: str,
+    output: OutputSettings,
+    input: InputSettings,
+    perception: PerceptionSettings,
+    device: wgpu.GPUDevice | str | None = None,
+) -> PerceptionRun:
+    """Frames of files, or of a scene of that name, as they are perceived."""
+    fps, inputs = float(output.rate), ()
+    if pattern in builtin.SCENES:
+        numbers = frame_numbers(input.frames or "0")
+        steps = max(1, round(perception.nature / fps))
+        scene = builtin.make(pattern, **parameters_of(perception.set))
+        blur, size = Blur("tap", device=device), size_of(perception.size)
+        render = Render(scene, blur, size=size, fps=fps)
+        observer = Observer(fps * steps, perception.cone, device=device)
+        frames = PerceivedNature(render, observer, numbers, steps)
+    else:
+        clip = input.open(pattern)
+        inputs = clip.inputs
+        frames = PerceivedSequence(clip, Observer(fps, perception.cone, device=device))
+    settings = record(perception, input=pattern, fps=str(output.rate))
+    return PerceptionRun(frames, output.make(settings, list(frames.numbers), inputs))

@@ -2,52 +2,67 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from ..frame import Frame
 from ..io import exr
 from ..output.output import Output
+from ..output.result import Result
 from ..render import Render
 from ..sequence.frame_file import FrameFile
-from .batch_report import Progress
+from .batch_report import BatchReport, Progress
+from .engine import IsDone, run
+from .file_sink import BlurredFrame, FileSink
+
+
+class RenderedFrames:
+    """Frames of a scene, as the input of a run.
+
+    `times` [s] by frame number. `sharp`: without blur. `passes`: with all that `wgmb blur` can
+    use. `confidence`: with how sure the method is.
+    """
+
+    ahead = 1
+
+    def __init__(
+        self,
+        render: Render,
+        times: dict[int, float],
+        *,
+        sharp: bool = False,
+        passes: bool = False,
+        confidence: bool = False,
+    ):
+        self._render, self._times, self.total = render, times, len(times)
+        self._sharp, self._passes, self._confidence = sharp, passes, confidence
+
+    def read(self, is_done: IsDone) -> Iterator[int]:
+        """The numbers of the frames that are not done."""
+        return (number for number in self._times if not is_done(number, {}))
+
+    def blur(self, read: Iterator[int]) -> Iterator[BlurredFrame]:
+        """Render them."""
+        return map(self._rendered, read)
+
+    def _rendered(self, number: int) -> BlurredFrame:
+        render, time = self._render, self._times[number]
+        source = FrameFile(number, Path(), None, {}, {})
+        if self._passes:
+            source = _with_passes(render, render.frame(time, number, light=True), number)
+        planes = {}
+        if self._confidence:
+            picture, planes = render.with_confidence(time, number)
+        else:
+            picture = render.sharp(time) if self._sharp else render(time, number)
+        return BlurredFrame(number, [Result(source, picture, planes)])
 
 
 def render_frames(
-    render: Render,
-    moments: dict[int, float],
-    output: Output,
-    sharp: bool,
-    passes: bool,
-    confidence: bool,
-    resume: bool,
-    progress: Progress | None,
-) -> int:
-    """Render every moment into `output`; returns how many were there already (`resume`).
-
-    `sharp`: without blur. `passes`: EXR with all that `wgmb blur` can use. `confidence`: EXR
-    with how sure the method is.
-    """
-    progress, skipped = progress or (lambda number, state: None), 0
-    for number, time in moments.items():
-        if resume and output.done(number):
-            skipped += 1
-            progress(number, "skipped")
-            continue
-        seen = render.frame(time, number, light=True) if passes else None
-        planes = {}
-        if confidence:
-            result, planes = render.with_confidence(time, number)
-        else:
-            result = render.sharp(time) if sharp else render(time, number)
-        source = (
-            _with_passes(render, seen, number)
-            if passes and seen
-            else FrameFile(number, Path(), None, {}, {})
-        )
-        output.write(result, source, planes)
-        progress(number, "done")
-    output.close()
-    return skipped
+    frames: RenderedFrames, output: Output, resume: bool, progress: Progress | None
+) -> BatchReport:
+    """Render every frame into `output`; the first error ends it."""
+    return run(frames, FileSink(output), resume=resume, progress=progress)
 
 
 def _with_passes(render: Render, frame: Frame, number: int) -> FrameFile:

@@ -19,7 +19,8 @@ from ..sequence.clip import Clip
 from .batch_report import BatchReport, Progress
 from .conversion import RateConversion, RateConversionStages
 from .engine import run
-from .stages import BlurredFrame, MotionStages, Stages
+from .file_sink import FileSink
+from .stages import MotionStages, Stages
 
 
 def blur_sequence(
@@ -103,19 +104,6 @@ def _run(
     if len(report.done) == len(stages.numbers):
         report.absent = stages.clip.absent
     return report
-
-
-class FileSink:
-    """Frames into an Output."""
-
-    def __init__(self, output: Output):
-        self._output, self.is_whole = output, output.is_video
-        self.done, self.why_hopeless = output.done, output.why_hopeless
-        self.close, self.abandon = output.close, output.abandon
-
-    def put(self, made: BlurredFrame) -> None:
-        """Write a frame."""
-        self._output.write_views(made.views, made.made_of)
 
 
 def vectors_sequence(

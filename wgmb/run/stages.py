@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,6 +23,7 @@ from ..sequence.clip import Clip
 from ..sequence.data_windows import Placement
 from ..sequence.frame_file import FrameFile
 from .engine import IsDone, frames
+from .file_sink import BlurredFrame
 
 
 @dataclass
@@ -35,29 +36,21 @@ class ReadFrame:
     failed: str = ""
 
 
-@dataclass
-class BlurredFrame:
-    """One frame of `blurred`."""
-
-    number: int
-    views: list[Result] = field(default_factory=list)
-    """A Result for every view, the default one first."""
-    made_of: dict[str, Any] = field(default_factory=dict)
-    """Files and facts on which it depends (see Clip.made_of), for Output.write_views."""
-    failed: str = ""
-    """The reason why it could not be read or blurred; then it has no views."""
-    bad: dict[str, int] = field(default_factory=dict)
-    """Pixels that are not finite, by input."""
-
-
 class Stages:
     """The frames of a clip, each with the reason if it fails."""
+
+    ahead = 1
 
     def __init__(self, clip: Clip, blur: Blur, confidence: bool = False, all_views: bool = True):
         self.clip, self._blur = clip, blur
         self._confidence, self._all_views = confidence, all_views
         self.reach = reach_of(blur.method)
-        self.numbers = clip.numbers
+        self.numbers: Sequence[int] = clip.numbers
+
+    @property
+    def total(self) -> int:
+        """Number of frames."""
+        return len(self.numbers)
 
     def read(self, is_done: IsDone) -> Iterator[ReadFrame]:
         """Read the frames that are not done."""
@@ -65,7 +58,7 @@ class Stages:
 
     def blur(self, read: Iterator[ReadFrame]) -> Iterator[BlurredFrame]:
         """Blur the frames that were read."""
-        return map(self._made, read)
+        return map(self._result, read)
 
     def _read_one(self, number: int, is_done: IsDone) -> ReadFrame | None:
         """A frame; None if it is done."""
@@ -77,7 +70,7 @@ class Stages:
         finally:
             self._forget(number)
 
-    def _made(self, read: ReadFrame) -> BlurredFrame:
+    def _result(self, read: ReadFrame) -> BlurredFrame:
         if read.failed:
             return BlurredFrame(read.number, failed=read.failed)
         try:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from pathlib import Path
@@ -14,7 +14,6 @@ from typing import Any, Literal, Unpack, get_type_hints
 import wgpu
 
 from .. import gpu
-from .._version import __version__
 from ..errors import InputError, did_you_mean
 from ..extras import install_command, is_installed
 from ..methods import FRAME_METHODS, check_method
@@ -25,20 +24,25 @@ from ..settings import (
     InputSettings,
     OutputSettings,
     ShutterSettings,
-    plain,
 )
+from ..settings.record import record
 from ..settings.video import VideoSettings
 from ..shots.cut_list import CutList
 from ..shots.motion import MotionSource
+from ..shots.reader import Picture
+from ..shutter import Shutter
 from ..video.clock import Clock
 from ..video.exposures import VideoBlur
 from ..video.holdouts import files_of, holdout_of
 from ..video.output_times import OutputFrame, OutputFrames
 from ..video.planes import Planes
 from ..video.read.reader import VideoReader
+from ..video.thumbnail import Thumbnail
 from ..video.write.encoders import FINEST_RATE, SUFFIXES
 from .batch_report import Progress
-from .video_output import PictureSink, put_exposures, write
+from .engine import Blurred, Input, IsDone
+from .video_output import write
+from .video_sink import Form
 
 _TAKEN = "frames", "cuts", "max_mb"  # of InputSettings
 
@@ -133,9 +137,7 @@ class VideoRun:
     @property
     def settings(self) -> dict[str, Any]:
         """Settings on which a result depends, for the record of a video."""
-        asked = self.request
-        found = {"wgmb": __version__} | plain(asked.blur) | plain(asked.shutter)
-        return found | plain(asked.video) | {"curve": asked.shutter.curve_read()}
+        return record(self.request.blur, self.request.shutter, self.request.video)
 
     @property
     def advice(self) -> str:
@@ -172,20 +174,16 @@ class VideoRun:
     def __call__(self, plan: VideoPlan, progress: Progress | None = None) -> VideoReport:
         """Blur a video into its output, which is complete, or is not there."""
         begun, request = time.perf_counter(), self.request
-        cuts, shutter = CutList(request.input.cuts or ""), request.shutter.make()
+        cuts = CutList(request.input.cuts or "")
         exposures = self.exposures(plan)
-
-        def blur_part(moments: Sequence[OutputFrame], sink: PictureSink) -> None:
-            put_exposures(exposures, shutter, moments, sink, progress)
-
         left_out = write(
-            exposures,
+            BlurredVideo(exposures, request.shutter.make()),
             plan.output,
             request.video,
             plan.wanted,
             self.settings | {"cuts": [cuts.is_search, sorted(cuts.frames(0))]},
-            blur_part,
-            files_of(request.blur.holdout),
+            masks=files_of(request.blur.holdout),
+            progress=progress,
         )
         found = exposures.shots
         return VideoReport(
@@ -203,6 +201,41 @@ class VideoRun:
             plan.reader.loss(),
             found is not None,
         )
+
+
+class BlurredVideo:
+    """A video whose pictures are blurred, as the source of an output."""
+
+    def __init__(self, exposures: VideoBlur, shutter: Shutter):
+        self._exposures, self._shutter = exposures, shutter
+        self.reader, self.clock = exposures.reader, exposures.clock
+        self.device = exposures.device
+
+    def frames(self, wanted: Sequence[OutputFrame], form: Form) -> Input[Any, Any]:
+        """Output frames in a form, as the input of a run."""
+        return ExposedFrames(self._exposures, self._shutter, wanted, form)
+
+
+class ExposedFrames:
+    """Output frames of a video: its pictures are read, and the exposures made of them."""
+
+    ahead = 3
+
+    def __init__(
+        self, exposures: VideoBlur, shutter: Shutter, wanted: Sequence[OutputFrame], form: Form
+    ):
+        self._exposures, self._shutter = exposures, shutter
+        self._wanted, self._form = wanted, form
+        self.total = len(wanted)
+
+    def read(self, is_done: IsDone) -> Iterator[Picture[Thumbnail]]:
+        """Decode the pictures; frames that are done were left out before."""
+        return self._exposures.pictures(self._shutter, self._wanted)
+
+    def blur(self, read: Iterator[Picture[Thumbnail]]) -> Iterator[Blurred]:
+        """Make the exposures."""
+        made = self._exposures.of(read, self._shutter, self._wanted)
+        return (self._form(frame, exposure) for frame, exposure in made)
 
 
 def check_fits(input: InputSettings, blur: BlurSettings) -> None:
@@ -298,36 +331,36 @@ def blur_video(
 
     Example: wgmb.blur_video("in.mp4", "out.mp4", fps=60, shutter=180)
     """
-    request, given = request_of(dict(settings), VideoKeywords)
+    request, keywords = request_of(dict(settings), VideoKeywords)
     run = request.open(device)
-    kept = {one.name: given[one.name] for one in fields(OutputSettings) if one.name in given}
+    kept = {one.name: keywords[one.name] for one in fields(OutputSettings) if one.name in keywords}
     return run(run.plan(source, OutputSettings(output=str(output), **kept)), progress)
 
 
 def request_of(
-    given: dict[str, Any], options: type[PictureKeywords]
+    keywords: dict[str, Any], options: type[PictureKeywords]
 ) -> tuple[VideoRequest, dict[str, Any]]:
     """The request of a user's keywords, and the keywords as the settings hold them.
 
     InputError for one that is not among the `options`.
     """
     hints = get_type_hints(options)
-    if unknown := sorted(given.keys() - hints.keys()):
+    if unknown := sorted(keywords.keys() - hints.keys()):
         near = did_you_mean(unknown[0], list(hints))
         raise InputError(f"unknown setting {unknown[0]!r}{near}")
     for name, kind in hints.items():
-        if name in given and name in _TIMES and not isinstance(given[name], str):
-            given[name] = f"{given[name]:.9f}"
-        elif name in given and name in _AS_TEXT:
-            given[name] = str(given[name])
-        elif name in given and kind is float:
-            given[name] = float(given[name])
-    if isinstance(given.get("holdout"), str):
-        given["holdout"] = (given["holdout"],)
-    given |= {"holdout": tuple(given["holdout"])} if "holdout" in given else {}
+        if name in keywords and name in _TIMES and not isinstance(keywords[name], str):
+            keywords[name] = f"{keywords[name]:.9f}"
+        elif name in keywords and name in _AS_TEXT:
+            keywords[name] = str(keywords[name])
+        elif name in keywords and kind is float:
+            keywords[name] = float(keywords[name])
+    if isinstance(keywords.get("holdout"), str):
+        keywords["holdout"] = (keywords["holdout"],)
+    keywords |= {"holdout": tuple(keywords["holdout"])} if "holdout" in keywords else {}
 
     def group(kind: type) -> dict[str, Any]:
-        return {one.name: given[one.name] for one in fields(kind) if one.name in given}
+        return {one.name: keywords[one.name] for one in fields(kind) if one.name in keywords}
 
     request = VideoRequest(
         blur=BlurSettings(**group(BlurSettings)),
@@ -335,4 +368,4 @@ def request_of(
         input=InputSettings(**group(InputSettings)),
         video=VideoSettings(**group(VideoSettings)),
     )
-    return request, given
+    return request, keywords

@@ -3,11 +3,10 @@
 The command line, the viewer and the laboratory share them. The string under a field is its help.
 """
 
-from pathlib import Path
-
 from .blur import METHOD_OPTIONS, BlurSettings
 from .input import InputSettings
 from .output import OutputSettings, rate_of
+from .record import plain
 from .scene import SceneSettings, parameters_of, size_of
 from .shutter import ShutterSettings
 
@@ -23,8 +22,3 @@ __all__ = [
     "rate_of",
     "size_of",
 ]
-
-
-def plain(options) -> dict:
-    """The options by name, as JSON can hold them."""
-    return {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items()}

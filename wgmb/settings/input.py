@@ -10,6 +10,9 @@ from ..io.frame_numbers import is_pattern, readable
 from ..sequence.clip import Clip, Passes
 from ..sequence.findings import SequenceFindings
 from ..sequence.layers import vectors
+from .record import plain
+
+_NO_LOOK = "frames", "skip_missing", "max_mb"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +61,11 @@ class InputSettings:
     "Skip missing frames instead of stopping with an error."
     max_mb: float = limits.MAX_MB
     "Largest allowed decoded size of an image file in megabytes (as 32-bit floats)."
+
+    @property
+    def looks(self) -> dict:
+        """The settings that change frames; the others select or limit them."""
+        return {k: v for k, v in plain(self).items() if k not in _NO_LOOK}
 
     def open(
         self,

@@ -10,6 +10,9 @@ from typing import Literal
 from ..color.spaces import Display
 from ..errors import InputError
 from ..output.output import Output
+from .record import plain
+
+_NO_LOOK = "output", "fps", "overwrite", "resume"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +43,8 @@ class OutputSettings:
 
     @property
     def looks(self) -> dict:
-        """Return the settings that change the contents of the files."""
-        shown = ("bits", "layers", "compression", "window")
-        return {name: getattr(self, name) for name in shown}
+        """The settings that change the contents of the files; the Output has them too."""
+        return {k: v for k, v in plain(self).items() if k not in _NO_LOOK}
 
     def make(
         self,
@@ -58,17 +60,14 @@ class OutputSettings:
             self.output,
             settings=settings,
             numbers=numbers,
-            bits=self.bits,
             fps=self.rate,
             inputs=inputs,
             overwrite=self.overwrite,
             resume=self.resume,
-            layers=self.layers,
-            compression=self.compression,
             views=views,
             display=display,
-            window=self.window,
             since=since,
+            **self.looks,
         )
 
     @property

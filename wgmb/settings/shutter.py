@@ -14,6 +14,7 @@ from ..shutter import (
     Shutter,
     read_curve,
 )
+from .record import plain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +49,11 @@ class ShutterSettings:
         if self.curve is None or self.curve in CURVES:
             return self.curve
         return f"{self.curve} (CRC-32 {zlib.crc32(Path(self.curve).read_bytes()):08x})"
+
+    @property
+    def looks(self) -> dict:
+        """The settings for a record."""
+        return plain(self) | {"curve": self.curve_read()}
 
     def make(self) -> Shutter:
         """Return the Shutter these settings describe; call `resolved` first."""

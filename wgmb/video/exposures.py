@@ -159,9 +159,10 @@ class VideoBlur(Exposures):
         self, shutter: Shutter, wanted: Sequence[OutputFrame]
     ) -> Iterator[tuple[OutputFrame, Exposure]]:
         """Every output frame and its exposure, which is valid until the next is asked for."""
-        return self.of(self._pictures(shutter, wanted), shutter, wanted)
+        pictures = ahead(self.pictures(shutter, wanted), _READ_AHEAD)
+        return self.of(pictures, shutter, wanted)
 
-    def _pictures(
+    def pictures(
         self, shutter: Shutter, wanted: Sequence[OutputFrame]
     ) -> Iterator[Picture[Thumbnail]]:
         """The video's pictures from before the first exposure to the end, on the output's clock."""
@@ -172,7 +173,7 @@ class VideoBlur(Exposures):
         )
         first = int(np.searchsorted(times.seconds, float(opens)))
         first, none = max(first - _BEFORE, 0), True
-        for number, picture in ahead(self.reader.pictures(first), _READ_AHEAD):
+        for number, picture in self.reader.pictures(first):
             none = False
             yield Picture(float(self.clock.out(times[number])), Thumbnail(picture), number)
         if none:

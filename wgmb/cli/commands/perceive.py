@@ -2,63 +2,31 @@
 
 from __future__ import annotations
 
-import math
 import time
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from cyclopts import Parameter
 
 from ... import charts
-from ..._version import __version__
-from ...cone import VIDEOS, Cone
-from ...errors import InputError, counted, size_text
+from ...cone import VIDEOS
+from ...errors import InputError, counted
 from ...extras import needed_by
 from ...io.atomic import write_file
-from ...io.frame_numbers import frame_numbers
 from ...lab.shutter_study import best_shutter, compare, perception_charts
-from ...observer import Observer
-from ...output.result import Result
-from ...pipeline.blur import Blur
-from ...render import Render
+from ...run.perceive import perceive as perceive_frames
 from ...scene import builtin
-from ...sequence.clip import Clip
-from ...sequence.data_windows import Placement, laid, union
-from ...sequence.frame_file import FrameFile, is_video
-from ...settings import (
-    InputSettings,
-    OutputSettings,
-    parameters_of,
-    plain,
-    size_of,
-)
+from ...sequence.frame_file import is_video
+from ...settings import OutputSettings
+from ...settings.perception import PerceptionSettings
+from ..exit_codes import DONE, SOME_FAILED
 from ..help import MAIN
 from ..options import Adapter, InputOptions, Inputs, PerceivedOutputs, Quiet
 from ..terminal import note, out, progress
 
-
-@dataclass(frozen=True, kw_only=True)
-class PerceptionSettings:
-    """Cone cell and scene."""
-
-    cone_rate: float = 50.0
-    "Decay rate of the cone cell's impulse response, 1/s."
-    cone_peak: float = 0.05
-    "Peak of the cone cell's impulse response, seconds after a flash."
-    nature: float = 480.0
-    "Scenes: images per second that approximate continuous time."
-    size: str = "640x360"
-    "Scenes: width x height in pixels."
-    set: tuple[str, ...] = ()
-    "Scenes: parameter as NAME=VALUE; may be repeated."
-
-    @property
-    def cone(self) -> Cone:
-        """The cone cell."""
-        return Cone(self.cone_rate, self.cone_peak)
-
+if TYPE_CHECKING:
+    from ...run.perceive_video import PerceivedVideo
 
 Who = Annotated[PerceptionSettings, Parameter(name="*", group=MAIN)]
 
@@ -113,81 +81,34 @@ def perceive(
         )
     if pattern not in builtin.SCENES and is_video(pattern):
         with needed_by(pattern, "video"):
-            from .perceive_video import perceive_video
-        return perceive_video(
-            pattern, output, input, perception.cone, plain(perception), adapter, quiet
+            from ...run.perceive_video import perceive_video
+        return _write_video(
+            perceive_video(pattern, output, input, perception, adapter), pattern, quiet
         )
-    if pattern in builtin.SCENES:
-        numbers, pictures, rate = _nature(pattern, input, perception, float(output.rate), adapter)
-        inputs = ()
-    else:
-        clip = input.open(pattern)
-        numbers, rate = clip.numbers, float(output.rate)
-        pictures = _on_display_window(clip)
-        inputs = clip.inputs
-    observer = Observer(rate, perception.cone, device=adapter)
-    settings = (
-        {"wgmb": __version__} | plain(perception) | {"input": pattern, "fps": str(output.rate)}
-    )
-    files = output.make(settings, numbers, inputs)
+    run = perceive_frames(pattern, output, input, perception, adapter)
     started = time.perf_counter()
-    with progress(len(numbers), quiet, "perceiving") as tick:
-        try:
-            for number, source, shown, placement in pictures:
-                for picture in shown:
-                    observer.present(picture)
-                seen = observer.perceived()[..., : picture.shape[2]]
-                files.write_views([Result(source, seen, placement=placement)])
-                tick(number, "done")
-            files.close()
-        except BaseException:
-            files.abandon()
-            raise
+    with progress(len(run.frames.numbers), quiet, "perceiving") as tick:
+        made = run(tick)
     if not quiet:
         seconds = time.perf_counter() - started
-        done = f"{counted(len(numbers), 'frame')} in {seconds:.1f} s -> {files.pattern}"
-        note(done)
-    return 0
+        note(f"{counted(len(made.done), 'frame')} in {seconds:.1f} s -> {run.output.pattern}")
+    return DONE
 
 
-def _on_display_window(clip: Clip):
-    """Every frame on one canvas: the display window, and the overscan of the first one."""
-    first = clip.source(clip.numbers[0])
-    canvas = union([first.display_window, first.data_window])
-    for number in clip.numbers:
-        source = clip.source(number)
-        if source.display_window != first.display_window:
-            raise InputError(
-                f"{source.path} is {size_text(source.whole)}, {first.path.name} "
-                f"{size_text(first.whole)}"
-            )
-        picture = laid(source.rgba, source.data_window, canvas)
-        yield number, source, [picture], Placement(canvas, canvas)
-
-
-def _nature(name: str, input: InputSettings, perception: PerceptionSettings, fps: float, adapter):
-    """Return frame numbers, the images between successive frames, and the rate of the images."""
-    numbers = frame_numbers(input.frames or "0")
-    steps = max(1, round(perception.nature / fps))
-    rate = fps * steps
-    renderer = Render(
-        builtin.make(name, **parameters_of(perception.set)),
-        Blur("tap", device=adapter),
-        size=size_of(perception.size),
-        fps=fps,
-    )
-    before = math.ceil(perception.cone.memory * rate)
-
-    def pictures():
-        done = numbers[0] * steps - before - 1
-        for number in numbers:
-            end = number * steps
-            done = max(done, end - before - 1)
-            shown = (renderer.sharp(k / rate) for k in range(done + 1, end + 1))
-            yield number, FrameFile(number, Path(), None, {}, {}), shown, None
-            done = end
-
-    return numbers, pictures(), rate
+def _write_video(video: PerceivedVideo, path: str, quiet: bool) -> int:
+    """Write a perceived video, and say so."""
+    for text in () if quiet else video.reader.notes:
+        note(f"{path}: {text}")
+    with progress(len(video.wanted), quiet, "perceiving") as tick:
+        report = video(tick)
+    if not quiet:
+        for text in report.left_out:
+            note(f"{report.output}: {text}")
+        note(f"{counted(report.frames, 'frame')} in {report.seconds:.1f} s -> {report.output}")
+    if report.loss:
+        note(f"wgmb: {report.loss}")
+        return SOME_FAILED
+    return DONE
 
 
 def _report(
@@ -215,4 +136,4 @@ def _report(
             f"its width per frame; the closest is --curve {name} --shutter {degrees:g} "
             f"(difference {off:.4f})"
         )
-    return 0
+    return DONE

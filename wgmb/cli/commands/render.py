@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 
-from ..._version import __version__
 from ...errors import InputError, counted
 from ...render import Render
 from ...run.job import check_confidence
-from ...run.scene import render_frames
-from ...settings import plain, size_of
+from ...run.scene import RenderedFrames, render_frames
+from ...settings import size_of
 from ...settings.color import DisplaySettings, color_record
+from ...settings.record import record
 from ..exit_codes import DONE
 from ..options import (
     Adapter,
@@ -84,9 +84,8 @@ def render(
     renderer = Render(
         picture, made, size=size_of(options.size), fps=fps, antialias=options.antialias
     )
-    settings = {"scene": scene, "sharp": sharp, "passes": passes} | output.looks
-    settings |= plain(blur) | plain(shutter) | plain(options) | {"wgmb": __version__, "fps": fps}
-    settings["samples"], settings["curve"] = blur.settled_samples(), shutter.curve_read()
+    how = {"scene": scene, "sharp": sharp, "passes": passes, "fps": fps}
+    settings = record(output, blur, shutter, options, **how, samples=blur.settled_samples())
     if confidence:
         check_confidence(made.method.name, output)
         settings["confidence"] = True
@@ -98,17 +97,12 @@ def render(
     if verbose:
         note(f"adapter: {renderer.blur.device.adapter.summary}")
         note(f"settings: {files.settings}")
+    frames = RenderedFrames(renderer, moments, sharp=sharp, passes=passes, confidence=confidence)
     started = time.perf_counter()
     with progress(len(moments), quiet, "rendering") as tick:
-        try:
-            skipped = render_frames(
-                renderer, moments, files, sharp, passes, confidence, output.resume, tick
-            )
-        except BaseException:
-            files.abandon()
-            raise
+        report = render_frames(frames, files, output.resume, tick)
     if not quiet:
-        seconds, made = time.perf_counter() - started, len(moments) - skipped
-        done = f"{counted(made, 'frame')} in {seconds:.1f} s -> {files.pattern}"
+        seconds, skipped = time.perf_counter() - started, len(report.skipped)
+        done = f"{counted(len(report.done), 'frame')} in {seconds:.1f} s -> {files.pattern}"
         note(done + (f", {skipped} already done" if skipped else ""))
     return DONE

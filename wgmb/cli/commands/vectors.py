@@ -7,13 +7,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..._version import __version__
 from ...errors import InputError, counted
 from ...output.vectors import PROGRAMS, VectorOutput
 from ...pipeline.blur import Blur
 from ...run.report import Outcome
 from ...run.sequence import vectors_sequence
-from ...settings import plain
+from ...settings.record import record
 from ..conclusion import conclude
 from ..options import Adapter, InputOptions, Inputs, Quiet, Verbose
 from ..terminal import note, progress
@@ -59,9 +58,7 @@ def vectors(
         Print errors only.
     """
     clip = input.open(pattern)
-    settings = {"wgmb": __version__, "as": program, "max_displace": max_displace} | plain(input)
-    for not_a_look in ("frames", "skip_missing", "max_mb"):
-        del settings[not_a_look]
+    settings = record(input, **{"as": program}, max_displace=max_displace)
     has = clip.has
     if has and "motion" not in has:
         raise InputError(f"{pattern}: no motion to write (neither vectors nor a camera)")

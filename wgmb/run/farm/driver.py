@@ -110,14 +110,14 @@ class Driver:
         if time.monotonic() < self._looked + _LOOK:
             return
         self._looked = time.monotonic()
-        there = self._asked(self._client.run_on_scheduler, plugin.addresses)
+        there = self._answer(self._client.run_on_scheduler, plugin.addresses)
         for address in [a for a in self._workers if a not in there]:
             self._gone(self._workers.pop(address))
         for address in there:
             self._workers.setdefault(address, Worker(address))
         unknown = [w for w in self._workers.values() if w.why_not is None]
         if unknown:
-            states = self._asked(
+            states = self._answer(
                 self._client.run,
                 plugin.state_of,
                 self._id,
@@ -127,17 +127,17 @@ class Driver:
             for worker in unknown:
                 self._learn(worker, states.get(worker.address))
 
-    def _asked(self, ask: Callable[..., Any], *given: Any, **named: Any) -> Any:
+    def _answer(self, ask: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
         """An answer of the scheduler or of workers; _LostError where there is none."""
         try:
-            return ask(*given, **named)
+            return ask(*arguments, **named)
         except (OSError, RuntimeError, ValueError):
             if self._client.status != "running":
                 raise _LostError from None
             time.sleep(_LOOK)
             if self._client.status != "running":
                 raise _LostError from None
-            return ask(*given, **named)
+            return ask(*arguments, **named)
 
     def _learn(self, worker: Worker, state: Any) -> None:
         if state is None or isinstance(state, (OSError, TimeoutError)):
