@@ -14,10 +14,12 @@ from pictures import IMAGES, enlarged, grid, levels, save
 from wgmb import (
     Blur,
     Clip,
+    Frame,
     Passes,
     Render,
     Shutter,
     Vectors,
+    blur_pictures,
 )
 from wgmb.cli import app
 from wgmb.lab.cases import SceneFrame
@@ -26,6 +28,7 @@ from wgmb.scene import builtin
 
 SAMPLE = IMAGES.parent.parent / "sample" / "crossing.####.exr"
 SIZE = 480, 270  # [px] of built-in scenes
+CROSSING = (95, 75), (200, 160)  # corner and size of the part of the sample with most motion [px]
 REFERENCE = 256  # rays a pixel
 
 
@@ -74,6 +77,45 @@ def holdout() -> None:
         "--holdout IndexOB=9": display(blur(sample(holdout="IndexOB=9"))),
     }
     save(grid(sheet, 2), "holdout.jpg")
+
+
+def five_settings() -> None:
+    """Three values of the settings that matter most; holdout() has a fourth setting."""
+    frame, shown = sample(), {}
+    for degrees in (90, 180, 360):
+        shown[f"--shutter {degrees}"] = blur_of(frame, shutter=degrees)
+    save(grid(shown, 3), "five-shutter.jpg")
+    shown = {f"--method {name}": blur_of(frame, name) for name in ("tap", "reproject", "gather")}
+    save(grid(shown, 3), "five-method.jpg")
+    shown = {}
+    for samples in (4, 16, 64):
+        shown[f"--samples {samples}"] = blur_of(frame, "tap", shutter=360, samples=samples)
+    save(grid(shown, 3), "five-samples.jpg")
+    shown = {"as filmed": levels(lamps()[2][..., :3] / 255.0)}
+    for highlights in (1, 8):
+        made = blur_pictures(lamps(), fps_in=24, fps=24, shutter=360, highlights=highlights)
+        shown[f"--highlights {highlights}"] = levels(list(made)[2] / 255.0)
+    save(grid(shown, 3), "five-highlights.jpg")
+
+
+def blur_of(frame: Frame, method: str = "gather", **options) -> np.ndarray:
+    """The part of the sample where bodies cross, blurred; twice as large."""
+    return enlarged(levels(display(Blur(method, **options)(frame))), *CROSSING, 2)
+
+
+def lamps() -> list[np.ndarray]:
+    """Five 8-bit pictures of three lamps before a dim wall, which a camera pans across."""
+    y, x = np.mgrid[:160, :200]
+    bricks = np.random.default_rng(1).integers(30, 90, (40, 100))
+    pictures = []
+    for n in range(5):
+        at = x + 12 * (n - 2)  # [px]
+        wall = bricks[y // 4, (at + 40) // 4]
+        picture = np.repeat(wall[..., None], 3, 2).astype(np.uint8)
+        for row, column, radius in ((40, 130, 5), (85, 60, 3), (120, 150, 4)):
+            picture[(at - column) ** 2 + (y - row) ** 2 <= radius**2] = 255
+        pictures.append(picture.repeat(2, axis=0).repeat(2, axis=1))
+    return pictures
 
 
 def wrong_vectors() -> None:
@@ -126,7 +168,16 @@ def drawn_by_commands() -> None:
     save(levels(shown), "motion.png")
 
 
-FIGURES = (methods, shutters, holdout, wrong_vectors, built_in, torusphere, drawn_by_commands)
+FIGURES = (
+    methods,
+    shutters,
+    holdout,
+    five_settings,
+    wrong_vectors,
+    built_in,
+    torusphere,
+    drawn_by_commands,
+)
 
 if __name__ == "__main__":
     for figure in FIGURES:
