@@ -171,3 +171,19 @@ def test_the_table_of_extras_has_them_all():
     text = PAGES["docs/reference/extras.md"]
     project = tomllib.loads((HERE / "pyproject.toml").read_text())["project"]
     assert re.findall(r"^\| `(\w+)` \|", text, re.M) == [*project["optional-dependencies"]]
+
+
+WRITING = re.compile(r"^wgmb .* -o ('[^']*'|\S+)", re.M)
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("page", PAGES)
+def test_no_example_of_a_page_writes_over_one_before_it(page):
+    """Whoever follows a page from its top is not told that the output exists."""
+    lines = [line for block in blocks(PAGES[page], "sh") for line in block.splitlines()]
+    found = [
+        match[1]
+        for line in lines
+        if (match := WRITING.match(line)) and not re.search("--(resume|overwrite)", line)
+    ]
+    assert not {name for name in found if found.count(name) > 1}

@@ -101,7 +101,6 @@ def gathered(
 
 
 _NOTHING_MOVES = "nothing moves, so it cannot be tested"
-_LEFT = "warping leaves {:.0%} of the difference to the neighbouring frame"
 _ZERO = (
     "by name; they are 0 everywhere, but the pictures differ, so nothing will be blurred: "
     "was the renderer's own motion blur on (Blender), or off (Arnold, Redshift)?"
@@ -133,12 +132,15 @@ def decide(vectors: Vectors, evidence: Sequence[Evidence]) -> ConventionFinding:
     if left > _EXPLAINS * still:
         text = f"{vectors}, by name; no interpretation of them predicts the neighbouring frame"
         return ConventionFinding(vectors, False, text + ": check them", notable=True)
-    then = _LEFT.format(stated / still)
     if (flip, scale) == ("", 1.0):
-        return ConventionFinding(vectors, True, f"{vectors}, tested: {then}")
+        text = (
+            f"moved along them, the next frame matches ({left / still:.0%} of the difference left)"
+        )
+        return ConventionFinding(vectors, True, f"{vectors}, tested: {text}")
     meant = replace(vectors, flip=_combine(vectors.flip, flip), scale=vectors.scale * scale)
     shown = f"{meant} (vectors of {1 / scale:.3g} frames)" if scale != 1 else f"{meant}"
-    text = f"{shown}, because with {vectors} {then}, with this {left / still:.0%}"
+    why = f"{left / still:.0%} of the difference to the next frame is left along them"
+    text = f"{shown}, because {why}, and {stated / still:.0%} with {vectors}"
     return ConventionFinding(meant, True, text, notable=True)
 
 
