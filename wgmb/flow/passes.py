@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
 import wgpu
 
 from .. import gpu
-from ..gpu import wgsl
 from ..gpu.textures import ScratchBuffer, TexturePool
 
 _USAGE = wgpu.TextureUsage
@@ -70,12 +68,7 @@ class FlowPasses:
 
     def uniform(self, file: str, struct: str, **values) -> wgpu.GPUBuffer:
         """The struct of `wgsl/flow/<file>` with these values, the others 0."""
-        data = np.zeros((), wgsl.load(f"flow/{file}").dtype(struct))
-        for name, value in values.items():
-            data[name] = value
-        return self.device.create_buffer_with_data(
-            label=struct, data=data, usage=wgpu.BufferUsage.UNIFORM
-        )
+        return gpu.uniform(self.device, f"flow/{file}", struct, **values)
 
     def take(self, size: tuple[int, int], kind: tuple[str, int]) -> wgpu.GPUTexture:
         """A texture of a format and so many layers; what is in it is undefined."""

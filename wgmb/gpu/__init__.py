@@ -13,7 +13,7 @@ from .device import (
     submit,
     texel,
 )
-from .kernels import FrameBindings, Kernel, kernel
+from .kernels import FrameBindings, Kernel, kernel, uniform
 
 __all__ = [
     "SOFTWARE",
@@ -31,4 +31,5 @@ __all__ = [
     "second_device",
     "submit",
     "texel",
+    "uniform",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -26,12 +27,16 @@ class FrameBindings:
     @classmethod
     def of_size(cls, device: wgpu.GPUDevice, size: tuple[int, int]) -> FrameBindings:
         """For passes that need no more of a frame than its size [px]."""
-        data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
-        data["size"] = size
-        usage = wgpu.BufferUsage.UNIFORM
-        return cls(
-            size, {"frame": device.create_buffer_with_data(label="frame", data=data, usage=usage)}
-        )
+        return cls(size, {"frame": uniform(device, "common/frame.wgsl", "Frame", size=size)})
+
+
+def uniform(device: wgpu.GPUDevice, file: str, struct: str, **values: Any) -> wgpu.GPUBuffer:
+    """A struct of a file in `wgsl/` as a uniform buffer, with these values, the others 0."""
+    data = np.zeros((), wgsl.load(file).dtype(struct))
+    for name, value in values.items():
+        data[name] = value
+    usage = wgpu.BufferUsage.UNIFORM
+    return device.create_buffer_with_data(label=struct, data=data, usage=usage)
 
 
 class Kernel:

@@ -34,18 +34,18 @@ class WeightedSum:
         """
         width, height, _ = output.size
         bindings = gpu.FrameBindings.of_size(self._device, (width, height))
-        uniform, create = wgpu.BufferUsage.UNIFORM, self._device.create_buffer_with_data
+        file = "gpu_frame/weighted_sum.wgsl"
         views = [picture.create_view() for picture in pictures]
         for first in range(0, len(views), EIGHT):
             begins = first == 0 and not onto
-            kernel = gpu.kernel(self._device, "gpu_frame/weighted_sum.wgsl", FIRST=begins)
-            share = np.zeros((), kernel.source.dtype("Share"))
-            share["weights"].flat[: len(views) - first] = weights[first : first + EIGHT]
-            kernel.run(
+            shares = np.zeros(EIGHT, np.float32)
+            shares[: len(views) - first] = weights[first : first + EIGHT]
+            share = gpu.uniform(self._device, file, "Share", weights=shares.reshape(2, 4))
+            gpu.kernel(self._device, file, FIRST=begins).run(
                 encoder,
                 "main",
                 bindings,
-                share=create(data=share, usage=uniform),
+                share=share,
                 sums=self._sums.at_least(16 * width * height),
                 output=output.create_view(),
                 **{f"picture{i}": views[min(first + i, len(views) - 1)] for i in range(EIGHT)},

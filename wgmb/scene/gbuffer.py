@@ -109,11 +109,7 @@ class SceneOnGpu:
             raise InputError(f"{bodies} bodies are too many for {antialias} x {antialias} rays")
         color = gpu.texel(self.device, 4)
         kernel = gpu.kernel(self.device, "scene/gbuffer.wgsl", {"Color": color}, **self.constants)
-        view = np.zeros((), kernel.source.dtype("View"))
-        view["time"] = time
-        buffer = self.device.create_buffer_with_data(
-            label="view", data=view, usage=wgpu.BufferUsage.UNIFORM
-        )
+        view = gpu.uniform(self.device, "scene/gbuffer.wgsl", "View", time=time)
         formats = {
             "color": color,
             "depth": "r32float",
@@ -122,7 +118,7 @@ class SceneOnGpu:
         }
         textures = {k: images.texture(f"{name} {k}", self.size, f) for k, f in formats.items()}
         views = {k: t.create_view() for k, t in textures.items()}
-        kernel.run(encoder, "main", bindings, view=buffer, **self.resources, **views)
+        kernel.run(encoder, "main", bindings, view=view, **self.resources, **views)
         return textures
 
     def encode_light(
@@ -142,16 +138,12 @@ class SceneOnGpu:
         if self.scene.backdrop is not None:
             return {}
         kernel = gpu.kernel(self.device, "scene/light.wgsl", None, **self.constants)
-        view = np.zeros((), kernel.source.dtype("View"))
-        view["time"] = time
-        buffer = self.device.create_buffer_with_data(
-            label="view", data=view, usage=wgpu.BufferUsage.UNIFORM
-        )
+        view = gpu.uniform(self.device, "scene/light.wgsl", "View", time=time)
         textures = {
             k: images.texture(f"{name} {k}", self.size, "rgba32float") for k in ("light", "albedo")
         }
         views = {k: t.create_view() for k, t in textures.items()}
-        kernel.run(encoder, "main", bindings, view=buffer, **self.resources, **views)
+        kernel.run(encoder, "main", bindings, view=view, **self.resources, **views)
         return {"diffuse_light": textures["light"], "diffuse_color": textures["albedo"]}
 
     def reprojections(self, time: float = 0.0) -> Reprojections:

@@ -131,16 +131,13 @@ class VideoFrames:
         """A copy of a motion, multiplied."""
         size = motion.size[0], motion.size[1]
         output = self._images.texture(f"motion {index % _FRAMES}", size, "rgba32float")
-        kernel = gpu.kernel(self._device, "video/gpu_frames.wgsl")
-        pace = np.zeros((), kernel.source.dtype("Pace"))
-        pace["factors"] = np.repeat(factors, 2)
-        uniform, create = wgpu.BufferUsage.UNIFORM, self._device.create_buffer_with_data
+        file = "video/gpu_frames.wgsl"
         encoder = self._device.create_command_encoder(label="pace")
-        kernel.run(
+        gpu.kernel(self._device, file).run(
             encoder,
             "main",
             gpu.FrameBindings.of_size(self._device, size),
-            pace=create(data=pace, usage=uniform),
+            pace=gpu.uniform(self._device, file, "Pace", factors=np.repeat(factors, 2)),
             motion=motion.create_view(),
             output=output.create_view(),
         )

@@ -72,11 +72,7 @@ class Stage:
 
     def uniform(self, file: str, struct: str, **values) -> wgpu.GPUBuffer:
         """The struct of a file with these values, the others 0."""
-        data = np.zeros((), wgsl.load(f"{FOLDER}/{file}.wgsl").dtype(struct))
-        for name, value in values.items():
-            data[name] = value
-        usage = wgpu.BufferUsage.UNIFORM
-        return self.device.create_buffer_with_data(label=struct, data=data, usage=usage)
+        return gpu.uniform(self.device, f"{FOLDER}/{file}.wgsl", struct, **values)
 
     def gated(self, change_flags: wgpu.GPUBuffer, sizes: list[tuple[int, int]]) -> Stage:
         """The same, whose passes of these sizes run only if `change_flags` says so."""
