@@ -46,6 +46,7 @@ EXTRAS = {
     "rendercanvas": Package("view", "rendercanvas", "rendercanvas"),
     "rich": Package("cli", "rich", "rich"),
     "tifffile": Package("images", "tifffile", "tifffile"),
+    "vapoursynth": Package("vapoursynth", "VapourSynth", "vapoursynth"),
 }
 """Every package of an extra, by the name that Python imports."""
 

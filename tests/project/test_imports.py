@@ -55,6 +55,7 @@ HOMES = {
     "rendercanvas": {"viewer"},
     "ipywidgets": {"hosts"},
     "pygfx": {"hosts"},
+    "vapoursynth": {"hosts"},
 }
 FILES = sorted(PACKAGE.rglob("*.py"))
 KERNELS = sorted(SHADERS.rglob("*.wgsl"))

@@ -1,1 +1,1 @@
-"""wgmb inside other programs: notebooks and pygfx scenes. Nothing else in wgmb imports it."""
+"""wgmb inside other programs: notebooks, pygfx, VapourSynth. Nothing else in wgmb imports it."""

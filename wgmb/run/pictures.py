@@ -26,7 +26,7 @@ from ..video.output_times import SPARE, OutputFrame
 from ..video.planes import Planes
 from ..video.thumbnail import Thumbnail
 from ..video.write.encoders import FINEST_RATE
-from .video import PictureKeywords, request_of
+from .video import PictureKeywords, VideoRun, request_of
 
 TRANSFERS = {"srgb": SRGB, "linear": LINEAR, "pq": PQ, "hlg": HLG, "bt709": BT709}
 _BITS = {"uint8": 8, "uint16": 16, "float16": FLOAT, "float32": FLOAT, "float64": FLOAT}
@@ -204,18 +204,26 @@ def blur_pictures(
         raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
     request.video.expansion.check_pictures(transfer not in ("linear", "pq", "hlg"))
     run = request.open(device)
-    cuts = CutList(run.request.input.cuts or "")
+    held = None if holdout is None else _matte(holdout)
+    made = steady(run, rate, rate if fps is None else _rate("fps", fps), held)
+    return PictureBlur(pictures, made, run.request.shutter.make(), transfer, run.how)
+
+
+def steady(
+    run: VideoRun, rate: Fraction, fps: Fraction, holdout: np.ndarray | None = None
+) -> SteadyExposures:
+    """The exposures of pictures at `rate`, `fps` of them a second; `holdout`: 1 stays sharp."""
+    request, cuts = run.request, CutList(run.request.input.cuts or "")
     exposures = Exposures(
         run.blur,
         run.motion,
-        holdout=None if holdout is None else _matte(holdout),
+        holdout=holdout,
         fill=request.video.duplicates == "fill",
         cuts=cuts.is_search,
         known_cuts=cuts.frames(0),
         planes=Planes(run.blur.device, request.video.expansion),
     )
-    steady = SteadyExposures(exposures, rate, rate if fps is None else _rate("fps", fps))
-    return PictureBlur(pictures, steady, run.request.shutter.make(), transfer, run.how)
+    return SteadyExposures(exposures, rate, fps)
 
 
 def _rate(name: str, rate: str | float | Fraction) -> Fraction:

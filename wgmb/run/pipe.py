@@ -19,17 +19,15 @@ from ..io.pipes import STDIN, STDOUT, PipeWriter, is_pipe
 from ..settings import OutputSettings
 from ..settings.output import rate_of
 from ..settings.video import VideoSettings
-from ..shots.cut_list import CutList
 from ..video.clock import tick
 from ..video.exposures import Exposure, Exposures
 from ..video.output_times import OutputFrame
-from ..video.planes import Planes
 from ..video.read.stream_reader import StreamReader
 from ..video.write.encoders import FINEST_RATE, SUFFIXES, Encoding, Facts, chosen
 from ..video.write.pictures import CodedVideo
 from ..video.write.streamed import MatroskaStream
 from ..video.y4m import Y4mReader, Y4mWriter, coding_in
-from .pictures import SteadyExposures
+from .pictures import steady
 from .video import VideoRequest, VideoRun
 
 _BUFFER = 1 << 20  # bytes
@@ -200,20 +198,14 @@ def _piped(reader: Reader, run: VideoRun, output: OutputSettings, fps_in: str | 
     rate = rate_of(fps_in, "fps_in") if fps_in else reader.rate
     if rate is None:
         raise InputError(f"{reader.name}: does not say its rate; set `fps_in`")
-    request, cuts = run.request, CutList(run.request.input.cuts or "")
-    exposures = Exposures(
-        run.blur,
-        run.motion,
-        fill=request.video.duplicates == "fill",
-        cuts=cuts.is_search,
-        known_cuts=cuts.frames(0),
-        planes=Planes(run.blur.device, request.video.expansion),
-    )
     fps = rate if output.fps in (None, "source") else output.rate_or(rate)
     fps = fps.limit_denominator(FINEST_RATE)
-    frames = SteadyExposures(exposures, rate, fps).of(reader.pictures(), request.shutter.make())
+    made = steady(run, rate, fps)
+    frames = made.of(reader.pictures(), run.request.shutter.make())
     space = reader.space if isinstance(reader, Y4mReader) else ""
-    return _Source(reader.size, reader.coding, reader.facts, fps, space, exposures, frames, reader)
+    return _Source(
+        reader.size, reader.coding, reader.facts, fps, space, made.exposures, frames, reader
+    )
 
 
 def _of_file(source: str, run: VideoRun, output: OutputSettings) -> _Source:

@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal, Unpack, get_type_hints
+from typing import Any, Literal, Unpack, get_args, get_origin, get_type_hints
 
 import wgpu
 
 from .. import gpu
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, check_choice, did_you_mean
 from ..extras import install_command, is_installed
 from ..methods import FRAME_METHODS, check_method
 from ..methods.keywords import MethodKeywords
@@ -309,6 +309,7 @@ class VideoKeywords(PictureKeywords, total=False):
 
 
 _TIMES = "begin", "end"
+_CHECKED = "method", "codec", "encoder", "bits"  # by what knows more about them
 _AS_TEXT = "phase", "speed", "fps"  # numbers that the settings hold as text
 
 
@@ -349,6 +350,8 @@ def request_of(
         near = did_you_mean(unknown[0], list(hints))
         raise InputError(f"unknown setting {unknown[0]!r}{near}")
     for name, kind in hints.items():
+        if name in keywords and get_origin(kind) is Literal and name not in _CHECKED:
+            check_choice(name, keywords[name], get_args(kind))
         if name in keywords and name in _TIMES and not isinstance(keywords[name], str):
             keywords[name] = f"{keywords[name]:.9f}"
         elif name in keywords and name in _AS_TEXT:
