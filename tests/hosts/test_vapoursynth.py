@@ -1,6 +1,7 @@
 """VapourSynth: the pictures of blur_pictures, in any order and from many threads."""
 
 import importlib
+import os
 import random
 import shutil
 import subprocess
@@ -9,10 +10,10 @@ from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from importlib.util import find_spec
 
-import fake_vapoursynth
 import numpy as np
 import pytest
 
+import fake_vapoursynth
 import make_clips
 import make_frames
 import wgmb
@@ -93,13 +94,13 @@ def test_frames_in_any_order_from_many_threads_are_those_of_blur_pictures(hosted
     want = list(wgmb.blur_pictures(
         (picture(n % COUNT) for n in range(long)), fps_in=24, fps=60, **settings
     ))  # fmt: skip
-    blurred = host.blur(clip, 180, 60, **settings)
+    blurred = host.blur(clip, shutter=180, fps=60, **settings)
     assert (blurred.num_frames, blurred.fps) == (len(want), 60)
     order = [99, 0, 40, *random.Random(1).sample(range(100), 9), 41, 39]
     with ThreadPoolExecutor(4) as pool:
         for n, frame in zip(order, pool.map(blurred.get_frame, order), strict=True):
             np.testing.assert_array_equal(np.stack(planes_of(frame), 2), want[n], f"frame {n}")
-    ahead = host.blur(clip, 180, 60, **settings)
+    ahead = host.blur(clip, shutter=180, fps=60, **settings)
     for n, frame in enumerate(ahead.frames(close=True)):
         np.testing.assert_array_equal(np.stack(planes_of(frame), 2), want[n], f"frame {n}")
 
@@ -214,7 +215,9 @@ def test_vspipe_gives_the_bytes_of_the_command_line(tmp_path):
         pytest.skip("vspipe does not run here: `vapoursynth config` sets it up")
     make_clips.write(tmp_path / "a.mkv", codec="ffv1", tags=(1, 1, 1, 1))
     (tmp_path / "a.vpy").write_text(SCRIPT)
-    ours = subprocess.run([vspipe, "-c", "y4m", "a.vpy", "-"], cwd=tmp_path, capture_output=True)
+    paths = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    how = {"cwd": tmp_path, "capture_output": True, "env": paths}
+    ours = subprocess.run([vspipe, "-c", "y4m", "a.vpy", "-"], **how)
     line = [
         sys.executable,
         "-m",
@@ -228,6 +231,6 @@ def test_vspipe_gives_the_bytes_of_the_command_line(tmp_path):
         "--flow",
         "dis",
     ]
-    want = subprocess.run(line, cwd=tmp_path, capture_output=True)
+    want = subprocess.run(line, **how)
     assert (ours.returncode, want.returncode) == (0, 0)
     assert ours.stdout.split(b"\n", 1)[1] == want.stdout.split(b"\n", 1)[1] != b""

@@ -1,6 +1,7 @@
 """Motion blur of a VapourSynth clip: a clip in, a clip at the output's rate out."""
 
-# pyright: reportAttributeAccessIssue=false  (without VapourSynth it takes this file for it)
+# Where VapourSynth is not installed, pyright takes this file for it.
+# pyright: reportAttributeAccessIssue=false
 
 from __future__ import annotations
 
@@ -32,17 +33,16 @@ _KEPT = 16  # output frames: VapourSynth asks for several at once, a little out 
 
 def blur(
     clip: vs.VideoNode,
-    shutter: float = 180.0,
-    fps: str | float | Fraction | None = None,
     *,
+    fps: str | float | Fraction | None = None,
     device: wgpu.GPUDevice | str | None = None,
     **settings: Unpack[PictureKeywords],
 ) -> vs.VideoNode:
     """Blur a clip along its motion, which is found in its pictures.
 
     `clip`: of one format and rate; integers of 8 to 16 bits (YUV, RGB, GRAY), or RGBS, RGBH.
-    `shutter`: degrees of an output frame's interval. `fps`: of the result; None: as the clip.
-    `settings`: options of `wgmb blur` with underscores, such as flow="search". Colours are those
+    `fps`: of the result; None: as the clip. `settings`: options of `wgmb blur` with underscores,
+    such as flow="search", and shutter=180 degrees of an output frame's interval. Colours are those
     that the first frame's properties state, or that players assume.
 
     Returns a clip of the same format; each frame has the properties of the clip's at that time.
@@ -54,7 +54,7 @@ def blur(
         _check(clip)
         rate = Fraction(clip.fps)
         wanted = rate if fps is None else rate_of(str(fps), "fps").limit_denominator(FINEST_RATE)
-        request, _ = request_of({"shutter": shutter, **settings}, PictureKeywords)
+        request, _ = request_of(dict(settings), PictureKeywords)
         with clip.get_frame(0) as first:
             coding = coding_of(first)
         run = request.open(device)
