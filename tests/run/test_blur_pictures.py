@@ -224,7 +224,7 @@ def test_pictures_are_read_as_far_as_is_needed_and_the_run_can_be_closed(device)
 
 @pytest.mark.full
 def test_memory_does_not_grow(device):
-    run = wgmb.blur_pictures((picture(n % 4) for n in range(500)), device=device, flow="dis")
+    run = wgmb.blur_pictures((picture(n % 4) for n in range(2000)), device=device, flow="dis")
     for _ in itertools.islice(run, 50):
         pass
     tracemalloc.start()

@@ -71,15 +71,15 @@ def blur(
 
 def coding_of(frame: vs.VideoFrame) -> Coding:
     """The coding that a frame's properties state, and what players assume for the rest."""
-    form, said = frame.format, frame.props
+    form, properties = frame.format, frame.props
     families: dict[int, Literal["rgb", "grey", "yuv"]] = {vs.RGB: "rgb", vs.GRAY: "grey"}
     model = families.get(int(form.color_family), "yuv")
     steps = 1 << form.subsampling_w, 1 << form.subsampling_h
     of = PlaneLayout("", None, model, form.bits_per_sample, steps, False, model == "rgb")
     matrix, transfer, primaries = (
-        int(said.get(name, UNSPECIFIED)) for name in ("_Matrix", "_Transfer", "_Primaries")
+        int(properties.get(name, UNSPECIFIED)) for name in ("_Matrix", "_Transfer", "_Primaries")
     )
-    tags = (_range(said), matrix, transfer, primaries)
+    tags = (_range(properties), matrix, transfer, primaries)
     coding, _ = assumed(of, (frame.width, frame.height), "h264", tags)
     if form.sample_type == vs.FLOAT:
         transfer = SRGB if transfer == UNSPECIFIED else transfer
@@ -87,15 +87,15 @@ def coding_of(frame: vs.VideoFrame) -> Coding:
     return coding
 
 
-def _range(said: vs.FrameProps) -> int:
+def _range(properties: vs.FrameProps) -> int:
     """Limited (1), full (2) or not told (0), as FFmpeg counts it.
 
     VapourSynth 81 has `_Range`, 1 for full; until then `_ColorRange` is 0 for full.
     """
-    if "_Range" in said:
-        return 2 if int(said["_Range"]) == 1 else 1
-    if "_ColorRange" in said:
-        return 2 if int(said["_ColorRange"]) == 0 else 1
+    if "_Range" in properties:
+        return 2 if int(properties["_Range"]) == 1 else 1
+    if "_ColorRange" in properties:
+        return 2 if int(properties["_ColorRange"]) == 0 else 1
     return 0
 
 
@@ -122,11 +122,11 @@ class _Frames:
 
     shutter: Shutter
 
-    def __init__(self, clip: vs.VideoNode, made: SteadyExposures, pace: Fraction, coding: Coding):
-        self._clip, self._steady, self._coding = clip, made, coding
+    def __init__(self, clip: vs.VideoNode, steady: SteadyExposures, pace: Fraction, coding: Coding):
+        self._clip, self._steady, self._coding = clip, steady, coding
         self._pace = pace
         """Input frames per output frame."""
-        self.count = made.count(clip.num_frames)
+        self.count = steady.count(clip.num_frames)
         self._lock = threading.Lock()
         self._kept: dict[int, CodedPicture] = {}
         self._run = iter(())
