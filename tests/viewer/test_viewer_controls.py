@@ -133,7 +133,7 @@ def test_every_key_of_the_help_does_something():
     layout = controls.WindowLayout((0, 0, 9, 9), (0, 0, 9, 9), tuple(METHODS), ("result", "sharp"),
                              ("off", "wipe"), ("left", "pair"))  # fmt: skip
     names = {"space": " ", "left, right": "ArrowLeft", "home, end": "End", "up, down": "ArrowUp",
-             "1 - 9": "2", "Esc": "Escape", "r": "R"}  # fmt: skip
+             "1 - 9": "2", "Esc": "Escape", "r": "R", "[ ] 0": "[", "+ -": "+"}  # fmt: skip
     moved = put(PLAIN, orbit=(5.0, 5.0))
     for name in controls.KEYS:
         state, action = controls.key(moved, layout, names.get(name, name))

@@ -44,7 +44,7 @@ def test_twice_the_pixels_show_the_same_twice_as_fine():
 def test_the_mouse_is_where_it_is_seen_at_any_ratio():
     state = put(PLAIN, compare="wipe", against="sharp")
     for ratio in (1.0, 1.5, 2.0):
-        hand = Hand(state, (640, 400), ratio)
+        hand = Hand(state, (640, 440), ratio)
         hand.drag((160, 200), (80, 200))
         assert hand.state.wipe == pytest.approx(0.25, abs=0.01)
         hand.drag((200, 200), (220, 200))

@@ -20,6 +20,7 @@ from ..video.write.frames import Video
 from .draw.draw_thread import DrawThread
 from .draw.renderer import Renderer
 from .draw.screen import Screen
+from .state.dropped import source_of
 from .state.state import State
 from .state.video_time import rate
 
@@ -43,10 +44,11 @@ class Actions:
         return self._video is not None
 
     def do(self, action: str, argument: str, state: State) -> State:
-        """Do it; the state afterwards, which only "load" changes."""
+        """Do it; the state afterwards, which only "open" and "load" change."""
         actions = {
             "quit": lambda: self._canvas.close(),
             "save": lambda: self._save(Path(argument), state),
+            "open": lambda: self._open(argument.split("\0"), state),
             "load": lambda: self._load(Path(argument)),
             "screenshot": lambda: self._screenshot(state),
             "record": lambda: self._record(state),
@@ -64,6 +66,15 @@ class Actions:
     def _save(self, path: Path, state: State) -> None:
         write_file(path, state.toml().encode())
         self._say(f"saved {path}")
+
+    def _open(self, paths: list[str], state: State) -> State:
+        """What was dropped onto the window: frames or a video, or saved settings."""
+        if len(paths) == 1 and paths[0].lower().endswith(".toml"):
+            return self._load(Path(paths[0]))
+        source = source_of(paths)
+        opened = state.opened(source)
+        self._say(f"opened {Path(source).name}")
+        return opened
 
     def _load(self, path: Path) -> State:
         state = State.read(path)

@@ -22,6 +22,9 @@ _DOLLY = (0.1, 10.0)
 _ZOOM = (0.25, 32.0)
 _NOTCH = 0.0012  # of a wheel's 100 units: how much nearer, as a power of e
 _GRIP = 8.0  # how near to the wipe's line it is taken hold of [logical px]
+SIZES = {"larger": 1.25, "smaller": 0.8}
+"""Factors of the interface's size, by action."""
+_STOPS = {"[": -0.5, "]": 0.5}
 _SUB = 0.1  # a step within a frame
 
 KEYS = {
@@ -34,6 +37,8 @@ KEYS = {
     "l": "next view",
     "e": "stereo frames: next eye, pair, red-cyan",
     "tab": "panel",
+    "[ ] 0": "exposure half a stop down, up; as it was",
+    "+ -": "size of the panel",
     "r": "reset the view",
     "s": "save image, PNG and EXR",
     "v": "start or stop recording MP4",
@@ -118,9 +123,14 @@ def wheel(state: State, layout: WindowLayout, x: float, y: float, dx: float, dy:
 
 
 def key(state: State, layout: WindowLayout, name: str) -> tuple[State, str | None]:
-    """A pressed key; with it an action: "screenshot", "record", "fullscreen" or "quit"."""
+    """A pressed key; with it an action: "screenshot", "record", "fullscreen", "quit" or one of
+    SIZES.
+    """
     low = name.lower()
-    actions = {"s": "screenshot", "v": "record", "f": "fullscreen", "escape": "quit"}
+    actions = {
+        "s": "screenshot", "v": "record", "f": "fullscreen", "escape": "quit",
+        "+": "larger", "=": "larger", "-": "smaller",
+    }  # fmt: skip
     if low in actions:
         return state, actions[low]
     steps = {"arrowleft": -1.0, "arrowright": 1.0, "arrowup": _SUB, "arrowdown": -_SUB}
@@ -137,6 +147,10 @@ def key(state: State, layout: WindowLayout, name: str) -> tuple[State, str | Non
         return replace(state, help=not state.help), None
     if low == "tab":
         return replace(state, panel=not state.panel), None
+    if low in _STOPS:
+        return replace(state, exposure=_held(state.exposure + _STOPS[low], -8, 8)), None
+    if low == "0":
+        return replace(state, exposure=0.0), None
     if low == "r":
         state = state.unmoved()
         own = ("cam_x=", "cam_y=")

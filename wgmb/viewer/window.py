@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import glfw
 import numpy as np
@@ -27,6 +28,7 @@ from .draw.slot import FrameStatus
 from .panel import overlay
 from .panel.panel import Info, Panel
 from .panel.theme import style
+from .scaled_canvas import SIZES, ScaledCanvas
 from .state.state import COMPARE, State
 
 TITLE = "wgmb"
@@ -44,9 +46,9 @@ _SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "char", "resize")
 class Viewer:
     """The viewer on a canvas: state, event handling and drawing.
 
-    `threaded`: pictures are drawn in a thread of their own, and the window never waits for them;
-    the thread has the window drawn by `call_soon`, of the canvas's loop. `failed` holds the
-    exception that ended it, if one did.
+    `interface`: size of the panel and its text. `threaded`: pictures are drawn in a thread of
+    their own, and the window never waits for them; the thread has the window drawn by `call_soon`,
+    of the canvas's loop. `failed` holds the exception that ended it, if one did.
     """
 
     def __init__(
@@ -56,10 +58,12 @@ class Viewer:
         *,
         device: wgpu.GPUDevice | None = None,
         threaded: bool = False,
+        interface: float = 1.0,
         call_soon: Callable[[Callable[[], None]], object] | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ):
-        self.canvas, self.state, self.clock = canvas, state, clock
+        self.canvas = canvas = ScaledCanvas(canvas, interface)
+        self.state, self.clock = state, clock
         self.device = device or gpu.open_device()
         self._context = canvas.get_wgpu_context()
         # Plain formats: the picture and ImGui's colours are display values already.
@@ -115,6 +119,16 @@ class Viewer:
         """True if pictures are drawn in a thread of their own."""
         return isinstance(self.stage, DrawThread)
 
+    def dropped(self, paths: Sequence[str]) -> None:
+        """Open files and folders that were dropped onto the window."""
+        self.do("open", "\0".join(paths))
+        self.canvas.request_draw()
+
+    def _resize_interface(self, factor: float) -> None:
+        low, high = SIZES
+        self.canvas.scale = min(max(self.canvas.scale * factor, low), high)
+        self.say(f"interface {self.canvas.scale:.0%}")
+
     def _on_any(self, event: dict) -> None:
         self._due = _AFTER_EVENT
         self.canvas.request_draw()
@@ -156,7 +170,9 @@ class Viewer:
         arrow = name.startswith("Arrow")
         self._key, self._repeating = (name, self.clock() + _REPEAT[0]) if arrow else None, False
         self.state, action = controls.key(self.state, self._layout(), name)
-        if action:
+        if action in controls.SIZES:
+            self._resize_interface(controls.SIZES[action])
+        elif action:
             self.do(action)
 
     def _repeat_key(self) -> None:
@@ -295,7 +311,10 @@ class Viewer:
             return
         size, ratio = self.canvas.get_logical_size(), self.canvas.get_pixel_ratio()
         key = key_box(self.state, self._drawn.report.kind, self._place(), self._area_px(), ratio)
-        logical = None if key is None else tuple(v / ratio for v in key)
+        logical = None
+        if key is not None:
+            x, y, width, height = (v / ratio for v in key)
+            logical = x, y, width, height
         self.state = self.panel.draw(self.state, self._info, size, self._area(), logical)
 
     def _ask_for_more(self, busy: bool) -> None:
@@ -341,8 +360,20 @@ def frame(viewer: Viewer) -> np.ndarray:
     return np.asarray(image)
 
 
-def view(state: State, *, adapter: str | None = None, size: tuple[int, int] = (1280, 720)) -> None:
-    """Open a window and return when it is closed; errors in it are raised."""
+def view(
+    state: State,
+    *,
+    adapter: str | None = None,
+    size: tuple[int, int] = (1280, 720),
+    interface: float = 1.0,
+) -> None:
+    """Open a window and return when it is closed; errors in it are raised.
+
+    `interface`: size of the panel and its text, times what the system says.
+    """
+    low, high = SIZES
+    if not low <= interface <= high:
+        raise InputError(f"`interface` must be {low:g} to {high:g}, got {interface:g}")
     device = gpu.open_device(adapter)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # GLFW's remarks; what it returns says the same
@@ -356,7 +387,12 @@ def view(state: State, *, adapter: str | None = None, size: tuple[int, int] = (1
     canvas = RenderCanvas(title=TITLE, size=size, update_mode="ondemand", max_fps=60)
     is_slow = device.adapter_info["adapter_type"] == gpu.SOFTWARE
     soon = loop.call_soon_threadsafe
-    viewer = Viewer(canvas, state, device=device, threaded=is_slow, call_soon=soon)
+    viewer = Viewer(
+        canvas, state, device=device, threaded=is_slow, interface=interface, call_soon=soon
+    )
+    window: Any = canvas._window
+    drop: Any = lambda _, paths: viewer.dropped(paths)  # noqa: E731
+    glfw.set_drop_callback(window, drop)
     loop.run()
     viewer.actions.close()
     viewer.stage.close()

@@ -35,6 +35,7 @@ def view(
     config: ConfigFile = None,
     fps: str | None = None,
     window: str = "1280x720",
+    interface: float = 1.0,
     adapter: Adapter = None,
 ) -> int:
     """View a scene, frames or a video interactively.
@@ -58,6 +59,8 @@ def view(
         source: a frame for each picture of the video, at its time.
     window
         Window size, WIDTHxHEIGHT.
+    interface
+        Size of the panel and its text, 0.5 to 4, times what the system says.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     """
@@ -82,5 +85,5 @@ def view(
         state = viewer.at_rate(state, fps)
     if color.remark:
         note(color.remark)
-    viewer.view(state, adapter=adapter, size=size_of(window))
+    viewer.view(state, adapter=adapter, size=size_of(window), interface=interface)
     return DONE

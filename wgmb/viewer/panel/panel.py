@@ -127,9 +127,22 @@ class Panel:
         changed, frame = imgui.slider_float("##frame", state.frame, first, max(last, first), form)
         self._ui.keep("frame")
         state = replace(state, frame=frame, playing=False) if changed else state
+        self._bar(state, info)
         if state.is_video:
             self._ui.dim(made_of(state, info.report.made_of))
         return state
+
+    def _bar(self, state: State, info: Info) -> None:
+        """Saving the picture, recording, and the command line, at once."""
+        third = (imgui.get_content_region_avail().x - 16) / 3
+        if self._ui.button("Picture (s)", third, "screenshot"):
+            self.actions.append(("screenshot", ""))
+        imgui.same_line()
+        if self._ui.button("Stop (v)" if info.recording else "Record (v)", third, "record"):
+            self.actions.append(("record", ""))
+        imgui.same_line()
+        if self._ui.button("Command", third, "copy command"):
+            self.actions.append(("copy", for_shell(state.command(self._files["output"]))))
 
     def _files_section(self, ui: Widgets, state: State, info: Info) -> State:
         self._file("settings")
@@ -139,12 +152,6 @@ class Panel:
         imgui.same_line()
         if ui.button("Load settings", half):
             self.actions.append(("load", self._files["settings"]))
-        if ui.button("Screenshot (s)", half, "screenshot"):
-            self.actions.append(("screenshot", ""))
-        imgui.same_line()
-        if ui.button("Stop (v)" if info.recording else "Record (v)", half, "record"):
-            self.actions.append(("record", ""))
-        imgui.spacing()
         self._file("output")
         command = for_shell(state.command(self._files["output"]))
         ui.dim(command)

@@ -12,9 +12,11 @@ from imgui_bundle import ImVec2, imgui
 
 from ...errors import InputError
 from ..controls import Box
+from ..state.groups import HELP
 from ..state.state import State
 
 LOG = int(imgui.SliderFlags_.logarithmic)
+_TOOLTIP = 320.0  # width of a setting's help [logical px]
 _LABEL = 96.0  # of the words before a slider [logical px]
 
 
@@ -32,6 +34,12 @@ class Widgets:
         """The last item drawn is called so."""
         low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
         self.places[name] = (low.x, low.y, high.x - low.x, high.y - low.y)
+        if name in HELP and imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
+            imgui.begin_tooltip()
+            imgui.push_text_wrap_pos(_TOOLTIP)
+            imgui.text(HELP[name])
+            imgui.pop_text_wrap_pos()
+            imgui.end_tooltip()
 
     def label(self, text: str) -> None:
         """The word; what comes next is beside it."""
@@ -68,6 +76,8 @@ class Widgets:
         room = wide - imgui.get_frame_height() - 2 * imgui.get_style().frame_padding.x
         text = shortened(text or now, lambda part: imgui.calc_text_size(part).x <= room)
         opened = imgui.begin_combo(f"##{name}", text, whole)
+        if not opened:
+            self.keep(name)
         if opened:
             for item in names:
                 picked, _ = imgui.selectable(plain(item), item == now)

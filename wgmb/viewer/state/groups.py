@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+import textwrap
 from dataclasses import fields
+from itertools import pairwise
 
 from ...settings import (
     METHOD_OPTIONS,
@@ -35,6 +39,23 @@ DEFAULTS = {
     f.name: f.default for group in (*GROUPS.values(), OutputSettings) for f in fields(group)
 }
 """Defaults of the command line's options."""
+
+
+def _help_of(group: type) -> dict[str, str]:
+    """The strings under the fields of a dataclass, by name."""
+    found: dict[str, str] = {}
+    for kind in reversed(group.__mro__[:-1]):
+        (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+        assert isinstance(body, ast.ClassDef)
+        for field, text in pairwise(body.body):
+            if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
+                found[field.target.id] = " ".join(text.value.value.split())  # pyright: ignore
+    return found
+
+
+HELP = {name: text for group in GROUPS.values() for name, text in _help_of(group).items()}
+HELP |= {name: help for name, (_, _, help) in METHOD_OPTIONS.items()}
+"""The help of an option, by its name."""
 MASKS = ("holdout", "scale")
 """Options of the blur that say what files hold."""
 
