@@ -34,6 +34,7 @@ python_use_unqualified_type_names = True
 html_theme = "furo"
 html_title = f"wgmb {version}"
 html_static_path = ["static"]
+html_favicon = "static/favicon.svg"
 html_extra_path = ["page.html"]  # made by tools/make_page.py
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"

@@ -3,6 +3,7 @@
 import base64
 import io
 import re
+import subprocess
 import sys
 
 import imageio.v3 as iio
@@ -49,6 +50,17 @@ def test_the_page_shows_what_the_run_shows(book):
     for a, b in both:
         a, b = (iio.imread(io.BytesIO(base64.b64decode(png))).astype(float) for png in (a, b))
         assert np.abs(a - b).mean() < 0.5
+
+
+def test_downloaded_alone_it_renders_its_own_frames(tmp_path):
+    first = nbformat.read(make_notebook.PATH, as_version=4).cells[1].source
+    (tmp_path / "alone").mkdir()
+    script = f"{first}\nprint(clip.numbers, sorted(clip[10].has))"
+    words = [sys.executable, "-c", script]
+    done = subprocess.run(
+        words, cwd=tmp_path / "alone", capture_output=True, text=True, timeout=120, check=True
+    )
+    assert done.stdout.strip() == "[9, 10, 11] ['color', 'depth', 'motion']"
 
 
 @pytest.fixture(scope="module")
