@@ -160,6 +160,20 @@ def test_pictures_that_do_not_fit_are_named(device, bad, said):
     assert "\n" not in str(error.value)
 
 
+def test_the_size_of_a_picture_is_checked_before_its_values(device):
+    huge = np.broadcast_to(np.float32(1), (40_000, 50_000, 3))
+    with pytest.raises(InputError, match=r"picture 0 must be at most 32768 .* got 50000 x 40000"):
+        next(wgmb.blur_pictures([huge], device=device))
+    with pytest.raises(InputError, match="holdout must be at most 32768"):
+        wgmb.blur_pictures([], holdout=huge[..., 0], device=device)
+
+
+@pytest.mark.parametrize("bad", [None, 5, "in.mp4", b"x"])
+def test_what_holds_no_pictures_is_refused_at_once(device, bad):
+    with pytest.raises(InputError, match=r"^pictures must be"):
+        wgmb.blur_pictures(bad, device=device)
+
+
 def test_what_is_not_finite_is_named(device):
     bad = picture(1, np.float32)
     bad[3, 4] = np.nan

@@ -10,6 +10,7 @@ from collections.abc import Generator, Iterable, Iterator
 from contextlib import suppress
 from fractions import Fraction
 from itertools import count
+from pathlib import Path
 from typing import Any, Literal, Unpack
 
 import numpy as np
@@ -17,6 +18,7 @@ import wgpu
 
 from ..color.coding import BT709, FLOAT, HLG, LINEAR, PQ, SRGB, CodedPicture, Coding
 from ..errors import InputError, check_choice
+from ..frame import MOST_SIDE
 from ..settings.output import rate_of
 from ..shots.cut_list import CutList
 from ..shots.reader import Picture
@@ -198,6 +200,10 @@ def blur_pictures(
     if fps is not None and fps_in is None:
         raise InputError("`fps` needs the rate of the pictures; set `fps_in`")
     check_choice("transfer", transfer, TRANSFERS)
+    if isinstance(pictures, (str, bytes, Path)):
+        raise InputError(f"pictures must be arrays, got a name; `blur_video` takes {pictures!r}")
+    if not isinstance(pictures, Iterable) and not hasattr(pictures, "__getitem__"):
+        raise InputError(f"pictures must be an iterable of arrays, got {type(pictures).__name__}")
     rate = _RATE if fps_in is None else _rate("fps_in", fps_in)
     request, _ = request_of(dict(settings), PictureKeywords)
     if holdout is not None and request.video.flow == "none":
@@ -231,10 +237,20 @@ def _rate(name: str, rate: str | float | Fraction) -> Fraction:
 
 
 def _matte(holdout: np.ndarray) -> np.ndarray:
-    found = np.asarray(holdout, np.float32)
+    found = np.asarray(holdout)
     if found.ndim != 2:
         raise InputError(f"holdout must be (height, width), got {found.shape}")
-    return found
+    _check_size("holdout", found)
+    return np.asarray(found, np.float32)
+
+
+def _check_size(name: str, array: np.ndarray) -> None:
+    """InputError for more pixels a side than a texture has, before any is copied."""
+    height, width = array.shape[:2]
+    if max(width, height) > MOST_SIDE:
+        raise InputError(
+            f"{name} must be at most {MOST_SIDE} pixels a side, got {width} x {height}"
+        )
 
 
 def _array(name: str, picture: Any) -> np.ndarray:
@@ -247,6 +263,7 @@ def _array(name: str, picture: Any) -> np.ndarray:
     array = np.asarray(picture)
     if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
         raise InputError(f"{name} must be (height, width, 3 or 4), got {array.shape}")
+    _check_size(name, array)
     if array.dtype.name not in _BITS:
         raise InputError(f"{name} must be {', '.join(_BITS)}; got {array.dtype}")
     return array
