@@ -1,6 +1,7 @@
 """The stopwatch: what is timed and written down; how fast is nobody's business here."""
 
 import json
+import re
 import signal
 from dataclasses import replace
 
@@ -14,9 +15,11 @@ from wgmb.lab import (
     bench,
     bench_figures,
     bench_report,
+    charts,
     report,
 )
 from wgmb.lab.cases import Candidate
+from wgmb.lab.results import Bars
 from wgmb.methods import METHODS
 
 SIZES = ((64, 36), (96, 54))
@@ -39,7 +42,8 @@ def test_methods_of_pictures_have_transfers_and_bytes(run):
         if "scene" in METHODS[f.method].needs:
             assert (f.call, f.upload, f.readback, f.bytes) == (None, None, None, 0)
         else:
-            assert f.call > 0 and f.upload > 0 and f.readback > 0
+            assert min(f.gpu, f.upload, f.readback) > 0
+            assert f.call == pytest.approx(f.upload + f.gpu + f.readback)
             # Colour, motion and the output are there at least, 16 bytes a pixel each.
             assert f.bytes >= 48 * f.width * f.height
             assert f.bandwidth == pytest.approx(f.bytes / (f.gpu / 1e3) / 1e9)
@@ -102,8 +106,21 @@ def test_text_and_page_tell_every_method(run):
         assert page.count(f"{method}</td>") >= 4
     several = {f.method for f in run.figures if len(f.passes) > 1}
     assert {"tiles", "gather", "reproject", "accumulate"} <= several
-    assert page.count("<svg") == 2 + len(several)
+    groups = {(f.size, f.samples) for f in run.figures}
+    assert page.count("<svg") == len(groups) + 2 + len(several)
+    assert "upload + gpu + readback" in said and "bandwidth, at least" in said
     assert "methods/accumulate.wgsl:main x 4" in said
+
+
+@pytest.mark.fast
+def test_bars_are_as_long_as_their_parts():
+    bars = Bars("times", "ms", {"tap": {"upload": 1.0, "GPU": 2.0}, "gather": {"GPU": 6.0}})
+    drawing = charts.bars_svg(bars, {"upload": "red", "GPU": "blue"})
+    found = re.findall(r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)"', drawing)
+    (left, _, one), (middle, _, two), (_, below, six) = (map(float, rect) for rect in found)
+    assert (two, six) == (pytest.approx(2 * one, abs=0.3), pytest.approx(6 * one, abs=0.6))
+    assert middle == pytest.approx(left + one, abs=0.1) and below > 0
+    assert ">3 ms</text>" in drawing and ">6 ms</text>" in drawing
 
 
 def test_without_entries_the_tables_are_the_csv(run):

@@ -31,7 +31,7 @@ from .timed import TimedFrame, TimedScene
 
 MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
 _COPY = 64 << 20  # bytes, of the copy that tells the machine's bandwidth
-_HEAVY = 3  # parts of a figure that draw a whole frame: work, passes, call
+_HEAVY = 2  # parts of a figure that draw a whole frame: passes, and call or work
 _MEMORY = 0.75  # share of the machine's memory that textures and buffers may take
 
 
@@ -146,13 +146,18 @@ class _Matrix:
         every = timing.alternate(jobs, self.rounds, self.limit / _HEAVY)
         median = {k: 1e3 * statistics.median(v) for k, v in every.items()}
         for name, one in timed.items():
-            parts = {part: median.get(f"{name} {part}") for part in ("call", "upload", "readback")}
+            parts: dict[str, float] = {}
+            if isinstance(one, TimedFrame):
+                upload, drawn, readback = (1e3 * seconds for seconds in one.typical)
+                parts = {"upload": upload, "readback": readback, "call": upload + drawn + readback}
+            else:
+                drawn = median[f"{name} work"]
             self.figures.append(
                 BenchFigure(
                     name,
                     *size,
                     samples,
-                    median[f"{name} work"],
+                    drawn,
                     **parts,
                     passes={
                         k: 1e3 * s for k, s in timing.medians(one.runs[1:] or one.runs).items()

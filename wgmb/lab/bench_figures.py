@@ -22,7 +22,8 @@ class BenchFigure:
     gpu: float
     """All passes, from recording to the end of the work."""
     call: float | None = None
-    """Arrays in, array out."""
+    """Arrays in, array out: `upload`, `gpu` and `readback` of the same call, whose time is the
+    median."""
     upload: float | None = None
     readback: float | None = None
     passes: dict[str, float] = field(default_factory=dict)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..gpu.timing import TimestampClock
 from .bench_figures import Bench, BenchFigure
-from .results import Plot, Report, Table
+from .results import Bars, Plot, Report, Table
 
 
 def text(run: Bench) -> str:
@@ -15,8 +15,9 @@ def text(run: Bench) -> str:
     for f in run.figures:
         pixels = f.width * f.height
         lines.append(f"{f.width} x {f.height}, {f.method}, {f.samples} samples")
-        rows = [("gpu", f.gpu), *((f"  {_times(f, k)}", v) for k, v in f.passes.items()),
-                ("upload", f.upload), ("readback", f.readback), ("call", f.call),
+        rows = [("call: upload + gpu + readback", f.call), ("  upload", f.upload),
+                ("  gpu", f.gpu), ("  readback", f.readback),
+                *((f"pass {_times(f, k)}", v) for k, v in f.passes.items()),
                 ("numba tap", f.numba)]  # fmt: skip
         for name, milliseconds in rows:
             if milliseconds is not None:
@@ -26,8 +27,10 @@ def text(run: Bench) -> str:
             lines.append(f"  gpu / numba tap{f.gpu / f.numba:36.2f}")
         if f.bytes:
             share = f.bandwidth / run.copy
-            lines.append(f"  at least{f.bandwidth:43.2f} GB/s {share:6.0%} of a copy")
-        lines.append(f"  holds{f.memory / 2**20:46.2f} MB {f.memory / pixels:8.1f} B per pixel")
+            lines.append(f"  bandwidth, at least{f.bandwidth:32.2f} GB/s {share:6.0%} of a copy")
+        lines.append(
+            f"  memory held{f.memory / 2**20:40.2f} MB {f.memory / pixels:8.1f} B per pixel"
+        )
     lines += run.notes
     return "\n".join(lines) + "\n"
 
@@ -69,15 +72,22 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
     """The figures as tables and plots, for report.py."""
     made = Report("Speed of the methods", command, run.machine, 0)
     columns = ["method", "size", "samples", "GPU [ms]", "ns per pixel", "/ numba tap"]
-    columns += ["upload [ms]", "readback [ms]", "call [ms]", "at least [GB/s]", "of a copy"]
+    columns += [
+        "upload [ms]",
+        "readback [ms]",
+        "call [ms]",
+        "bandwidth, at least [GB/s]",
+        "of a copy",
+    ]
     rows = []
     for f in run.figures:
         each, moved = 1e6 * f.gpu / (f.width * f.height), f.bandwidth if f.bytes else None
         values = (f.gpu, each, f.numba and f.gpu / f.numba, f.upload, f.readback, f.call, moved,
                   moved and moved / run.copy)  # fmt: skip
         rows.append([*_first(f), *map(_round, values), f.memory >> 20, f.peak >> 20])
-    columns += ["holds [MB]", "peak of the process [MB]"]
+    columns += ["memory held [MB]", "peak of the process [MB]"]
     note = (
+        "A call takes arrays and returns one: upload, GPU and readback. "
         f"A copy moves {run.copy:.1f} GB/s. Bytes count inputs and output, each once. "
         "Memory of a method is that of its textures and buffers, including inputs and output; "
         "memory of the process is the peak so far over all methods, in the order of the rows."
@@ -94,8 +104,20 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
     made.notes += run.notes
     if before:
         made.tables.append(against(run, before))
+    made.bars += _bars(run.figures)
     made.plots += _curves(run.figures)
     return made
+
+
+def _bars(figures: Sequence[BenchFigure]) -> list[Bars]:
+    """The parts of a call by method, for each size and number of samples."""
+    bars: dict[tuple, Bars] = {}
+    for f in figures:
+        title = f"Time of a frame, {f.width} x {f.height}, {f.samples} samples"
+        one = bars.setdefault((f.size, f.samples), Bars(title, "ms", {}))
+        parts = {"upload": f.upload, "GPU": f.gpu, "readback": f.readback}
+        one.rows[f.method] = {name: ms for name, ms in parts.items() if ms is not None}
+    return list(bars.values())
 
 
 def _curves(figures: Sequence[BenchFigure]) -> list[Plot]:

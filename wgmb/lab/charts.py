@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from html import escape
 
 from ..charts import Axes, log_ticks, ticks
-from .results import Plot
+from .results import Bars, Plot
 
 _WIDTH, _HEIGHT, _MARGINS = 380, 240, (46, 12, 10, 34)
 
@@ -53,4 +53,30 @@ def plot_svg(plot: Plot, colors: Mapping[str, str]) -> str:
     return (
         f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" '
         f'aria-label="{escape(plot.title)}">{"".join(parts)}</svg>'
+    )
+
+
+_ROW, _NAME, _VALUE = 24, 110, 70  # height of a bar's row, room for its name and its sum [px]
+
+
+def bars_svg(bars: Bars, colors: Mapping[str, str]) -> str:
+    """A report's bars, in the colours by part, styled by the page they stand on."""
+    sums = {name: sum(row.values()) for name, row in bars.rows.items()}
+    scale = (_WIDTH - _NAME - _VALUE) / (max(sums.values(), default=0) or 1)
+    parts = []
+    for i, (name, row) in enumerate(bars.rows.items()):
+        x, y = float(_NAME), i * _ROW + 4
+        parts.append(f'<text x="{_NAME - 6}" y="{y + 12}" text-anchor="end">{escape(name)}</text>')
+        for part, value in row.items():
+            parts.append(
+                f'<rect x="{x:.1f}" y="{y}" width="{scale * value:.1f}" height="{_ROW - 8}" '
+                f'style="fill:{colors[part]}"><title>{escape(f"{name}, {part}: {value:.4g}")} '
+                f"{escape(bars.unit)}</title></rect>"
+            )
+            x += scale * value
+        told = f"{sums[name]:.3g} {bars.unit}"
+        parts.append(f'<text x="{x + 6:.1f}" y="{y + 12}">{escape(told)}</text>')
+    return (
+        f'<svg viewBox="0 0 {_WIDTH} {len(bars.rows) * _ROW}" role="img" '
+        f'aria-label="{escape(bars.title)}">{"".join(parts)}</svg>'
     )

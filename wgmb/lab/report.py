@@ -22,8 +22,9 @@ from ..metrics import (
     flip_colors,
 )
 from .cases import Case
-from .charts import plot_svg
+from .charts import bars_svg, plot_svg
 from .results import (
+    Bars,
     Entry,
     Plot,
     Report,
@@ -114,7 +115,7 @@ def page(report: Report) -> str:
     if len(report.cases) > 1:
         parts.append(_means(report, colors))
     parts += [_table(t, colors) for t in report.tables]
-    parts += [_plots(report.plots, colors)]
+    parts += [_plots(report.plots, colors, report.bars)]
     parts += [_case(report, i, case, colors) for i, case in enumerate(report.cases)]
     parts.append(_foot(report))
     text = _TEMPLATE.read_text(encoding="utf-8")
@@ -338,18 +339,28 @@ def _curves(entries: list[Entry], floor: dict[str, float]) -> list[Plot]:
     return plots
 
 
-def _plots(plots: Iterable[Plot], colors) -> str:
-    drawn = "".join(_plot(p, colors) for p in plots)
+def _plots(plots: Iterable[Plot], colors, bars: Iterable[Bars] = ()) -> str:
+    drawn = "".join(map(_bars, bars)) + "".join(_plot(p, colors) for p in plots)
     return f'<div class="plots">{drawn}</div>' if drawn else ""
 
 
 def _plot(plot: Plot, colors: dict[str, str]) -> str:
     named = {k: colors.get(k, f"var(--c{i % _COLORS})") for i, k in enumerate(plot.curves)}
+    return _figure(plot.title, plot_svg(plot, named), named)
+
+
+def _bars(bars: Bars) -> str:
+    parts = dict.fromkeys(part for row in bars.rows.values() for part in row)
+    named = {part: f"var(--c{i % _COLORS})" for i, part in enumerate(parts)}
+    return _figure(bars.title, bars_svg(bars, named), named)
+
+
+def _figure(title: str, drawing: str, colors: dict[str, str]) -> str:
     legend = "".join(
         f'<span><i class="dot" style="background:{color}"></i>{escape(name)}</span>'
-        for name, color in named.items()
+        for name, color in colors.items()
     )
     return (
-        f'<figure class="plot"><figcaption><b>{escape(plot.title)}</b></figcaption>'
-        f"{plot_svg(plot, named)}<figcaption>{legend}</figcaption></figure>"
+        f'<figure class="plot"><figcaption><b>{escape(title)}</b></figcaption>'
+        f"{drawing}<figcaption>{legend}</figcaption></figure>"
     )

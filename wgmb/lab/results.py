@@ -63,6 +63,15 @@ class Plot:
     """The y value of a perfect image, if the truth has noise."""
 
 
+@dataclass(frozen=True)
+class Bars:
+    """A bar for each row, of parts that add up."""
+
+    title: str
+    unit: str
+    rows: dict[str, dict[str, float]]
+
+
 @dataclass
 class Report:
     """All that a run found out; report.py writes it down."""
@@ -75,6 +84,7 @@ class Report:
     entries: list[Entry] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
     plots: list[Plot] = field(default_factory=list)
+    bars: list[Bars] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def of(self, case: str, **wanted) -> list[Entry]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from dataclasses import replace
 
 import wgpu
@@ -65,7 +66,7 @@ class TimedScene(Timed):
 class TimedFrame(Timed):
     """A method of pictures, on one frame."""
 
-    parts = ("work", "passes", "call", "upload", "readback")
+    parts = ("passes", "call")
 
     def __init__(self, blur: Blur, clock: timing.Clock, frame: Frame):
         super().__init__(blur, clock, frame.size)
@@ -75,6 +76,7 @@ class TimedFrame(Timed):
             self.frame = replace(frame, **near)
         self.views = blur.upload(self.frame)
         self.bytes = _bytes(self.views, self.output)
+        self.calls: list[tuple[float, float, float]] = []
         self.work()
 
     def draw(self, encoder, clock):
@@ -83,17 +85,22 @@ class TimedFrame(Timed):
         self.blur.encode(encoder, output=output, timing=clock, **self.views)
 
     def call(self) -> None:
-        """Arrays in, array out."""
-        self.blur(self.frame)
-
-    def upload(self) -> None:
-        """The frame's arrays as textures."""
-        self.blur.upload(self.frame)
-        timing.work(self.blur.device, lambda encoder: None)
-
-    def readback(self) -> None:
-        """The result as an array."""
+        """Arrays in, array out, in three parts: to textures, all passes, back to an array."""
+        began = time.perf_counter()
+        self.views = self.blur.upload(self.frame)
+        timing.work(self.blur.device, lambda encoder: None)  # waits
+        uploaded = time.perf_counter()
+        timing.work(self.blur.device, lambda encoder: self.draw(encoder, None))
+        drawn = time.perf_counter()
         self.images.download(self.blur.device.create_command_encoder(), self.output)
+        ends = time.perf_counter()
+        self.calls.append((uploaded - began, drawn - uploaded, ends - drawn))
+
+    @property
+    def typical(self) -> tuple[float, float, float]:
+        """The parts [s] of the call whose time is the median of all but the first one's."""
+        calls = sorted(self.calls[1:] or self.calls, key=sum)
+        return calls[len(calls) // 2]
 
 
 def _held() -> int:

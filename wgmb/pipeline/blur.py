@@ -67,7 +67,7 @@ class Blur:
 
     def __init__(
         self,
-        method: MethodName,
+        method: MethodName = "gather",
         *,
         shutter: Shutter | float = 180,
         curve: Curve | Weight | None = None,
