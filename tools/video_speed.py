@@ -112,11 +112,11 @@ def codecs_alone(clip: Path, exact: Path, scratch: Path) -> None:
     """Decode the clip, and encode the pictures of `exact`, which were decoded before."""
     from wgmb.video.read.reader import VideoReader
     from wgmb.video.write.encoders import chosen
-    from wgmb.video.write.pictures import CodedVideo
+    from wgmb.video.write.writer import VideoWriter
 
     reader = VideoReader(exact)
     pictures = [picture for _, picture in reader]
-    writer = CodedVideo(
+    writer = VideoWriter(
         scratch, scratch.with_suffix(".part.mp4"), chosen(scratch), reader.coding, reader.size,
         reader.rate, 1 / reader.rate,
     )  # fmt: skip

@@ -20,7 +20,7 @@ from wgmb.io import (
 )
 from wgmb.output.output import Output
 from wgmb.sequence.clip import Clip
-from wgmb.video.write.frames import Video
+from wgmb.video.write.frames import FrameVideo
 
 
 @pytest.fixture(scope="module")
@@ -395,7 +395,7 @@ def test_a_video_that_cannot_go_on_says_so_once(tmp_path, capsys, monkeypatch, s
     def full(self, *picture):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Video, "add", full)
+    monkeypatch.setattr(FrameVideo, "add", full)
     pattern = make.write_sequence(tmp_path, range(1, 21))
     target = tmp_path / "out" / f"v.{suffix}"
     code, _, err = make.inside(capsys, "blur", pattern, "-o", target, "--method", "tap")

@@ -11,8 +11,8 @@ from wgmb.video.clock import Clock, tick
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.write.encoders import chosen
 from wgmb.video.write.other_streams import OtherStreams
-from wgmb.video.write.pictures import CodedVideo
 from wgmb.video.write.time_stretch import TimeStretch
+from wgmb.video.write.writer import VideoWriter
 
 pytestmark = pytest.mark.fast
 
@@ -43,7 +43,7 @@ def copied(source, path, clock=None, keeps_pitch=True, others=True) -> list[str]
     coding, _ = encoding.coding(reader.coding)
     beside = OtherStreams(source, reader.index, clock, keeps_pitch) if others else None
     base = tick(reader.times.base / clock.speed, clock.out(reader.times[0]))
-    video = CodedVideo(path, path.with_name("part"), encoding, coding, reader.size,
+    video = VideoWriter(path, path.with_name("part"), encoding, coding, reader.size,
                        reader.rate, base, others=beside)  # fmt: skip
     for number, picture in reader:
         time = reader.times[number]

@@ -20,8 +20,8 @@ from wgmb.video.read.reader import VideoReader
 from wgmb.video.write import segments as segmenting
 from wgmb.video.write.encoders import Facts, chosen
 from wgmb.video.write.other_streams import OtherStreams
-from wgmb.video.write.pictures import CodedVideo
 from wgmb.video.write.segments import Segments, remove_left
+from wgmb.video.write.writer import VideoWriter
 
 pytestmark = pytest.mark.fast
 
@@ -67,7 +67,7 @@ def fill(parts, coding, times, stop=None) -> list[int]:
 def in_one_run(path, codec, times, bits=8, others=None):
     encoding = chosen(path, codec)
     coding, _ = encoding.coding(Coding(bits=bits))
-    video = CodedVideo(path, path.with_name("part"), encoding, coding,
+    video = VideoWriter(path, path.with_name("part"), encoding, coding,
                        (clips.WIDTH, clips.HEIGHT), RATE, tick(*times, 1 / RATE),
                        others=others)  # fmt: skip
     for n, time in enumerate(times):

@@ -13,13 +13,13 @@ import make_frames as make
 from wgmb import InputError
 from wgmb.color.srgb import to_display
 from wgmb.output.output import Output
-from wgmb.video.write.frames import Video
+from wgmb.video.write.frames import FrameVideo
 
 SETTINGS = "{}"
 
 
-def written(path, frames, fps) -> Video:
-    video = Video(path, path.with_name("part"), Fraction(fps), SETTINGS)
+def written(path, frames, fps) -> FrameVideo:
+    video = FrameVideo(path, path.with_name("part"), Fraction(fps), SETTINGS)
     for rgb in frames:
         video.add(rgb)
     video.close()
@@ -65,7 +65,7 @@ def test_a_rate_that_a_video_cannot_have_is_refused_before_any_work(tmp_path, su
 
 def test_a_gif_goes_to_the_disk_as_its_frames_come(tmp_path):
     rng = np.random.default_rng(0)
-    video = Video(tmp_path / "v.gif", tmp_path / "part", Fraction(24), SETTINGS)
+    video = FrameVideo(tmp_path / "v.gif", tmp_path / "part", Fraction(24), SETTINGS)
     sizes = [0]
     for _ in range(2):
         for _ in range(16):
@@ -113,7 +113,7 @@ def test_rates_of_many_digits_are_taken(tmp_path, suffix, fps):
 
 def test_an_error_names_the_video_and_keeps_its_number(tmp_path):
     path = tmp_path / "v.mp4"
-    video = Video(path, tmp_path / "folder" / "v.part", Fraction(24), SETTINGS)
+    video = FrameVideo(path, tmp_path / "folder" / "v.part", Fraction(24), SETTINGS)
     with pytest.raises(OSError, match=r"v\.mp4: No such file") as error:
         video.add(plain(1)[0])
         video.close()

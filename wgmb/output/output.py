@@ -37,7 +37,7 @@ from .names import prepare, refuse_inputs, that_exist
 from .result import Result
 
 if TYPE_CHECKING:
-    from ..video.write.frames import Video
+    from ..video.write.frames import FrameVideo
 
 
 WINDOWS = ("grow", "keep")
@@ -87,7 +87,7 @@ class Output:
         self.settings = json.dumps(settings or {}, sort_keys=True)
         suffix = self.pattern.suffix.lower()
         self._views = tuple(views) if has_view(pattern) else (None,)
-        self._videos: dict[str | None, Video] = {}
+        self._videos: dict[str | None, FrameVideo] = {}
         self._overwrite, self._resume, self._since = overwrite, resume, since
         self._abandoned = False
         self._under_way: Path | None = None
@@ -118,7 +118,7 @@ class Output:
                 path = in_view(self.pattern, view)
                 temporary = atomic.temporary_name(path)
                 names = display.names if display else frames.SRGB_DISPLAY
-                self._videos[view] = frames.Video(path, temporary, fps, self.settings, names)
+                self._videos[view] = frames.FrameVideo(path, temporary, fps, self.settings, names)
 
     def _check_names(self, inputs: list[Path], is_video: bool) -> dict[Path, list[str]]:
         """Make the folders; return the names of the outputs in each.

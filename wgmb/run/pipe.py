@@ -24,8 +24,8 @@ from ..video.exposures import Exposure, Exposures
 from ..video.output_times import OutputFrame
 from ..video.read.stream_reader import StreamReader
 from ..video.write.encoders import FINEST_RATE, SUFFIXES, Encoding, Facts, chosen
-from ..video.write.pictures import CodedVideo
 from ..video.write.streamed import MatroskaStream
+from ..video.write.writer import VideoWriter
 from ..video.y4m import Y4mReader, Y4mWriter, coding_in
 from .pictures import steady
 from .video import VideoRequest, VideoRun
@@ -72,7 +72,7 @@ class _Sink(Protocol):
 
     left_out: list[str]
 
-    def put(self, moment: OutputFrame, exposure: Exposure) -> None: ...
+    def put(self, frame: OutputFrame, exposure: Exposure) -> None: ...
     def close(self) -> None: ...
     def abandon(self) -> None: ...
 
@@ -110,11 +110,11 @@ def blur_pipe(
         report = PipeReport()
         sink = _sink(output, found, encoding, stack, stdout)
         try:
-            for moment, exposure in found.frames:
-                sink.put(moment, exposure)
+            for frame, exposure in found.frames:
+                sink.put(frame, exposure)
                 report.frames += 1
                 if progress:
-                    progress(moment.number, "done")
+                    progress(frame.number, "done")
             sink.close()
         except BaseException:
             sink.abandon()
@@ -246,7 +246,7 @@ class _ToY4m:
         if source.coding.alpha and not self._coding.alpha:
             self.left_out.append("YUV4MPEG2 holds no such transparency; `codec='ffv1'` does")
 
-    def put(self, moment: OutputFrame, exposure: Exposure) -> None:
+    def put(self, frame: OutputFrame, exposure: Exposure) -> None:
         self._writer.add(exposure.coded(self._coding))
 
     def close(self) -> None:
@@ -265,7 +265,7 @@ class _ToMatroska:
         )
         self.close, self.abandon = self._writer.close, self._writer.abandon
 
-    def put(self, moment: OutputFrame, exposure: Exposure) -> None:
+    def put(self, frame: OutputFrame, exposure: Exposure) -> None:
         self._writer.add(exposure.coded(self._coding))
 
 
@@ -274,12 +274,12 @@ class _ToFile:
         self._coding, lost = encoding.coding(source.coding)
         is_new = not path.exists()
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._video = CodedVideo(
+        self._video = VideoWriter(
             path, atomic.temporary_name(path), encoding, self._coding, source.size, source.rate,
             tick(1 / source.rate), source.facts, is_new=is_new,
         )  # fmt: skip
         self.left_out = [*lost, *self._video.left_out]
         self.close, self.abandon = self._video.close, self._video.abandon
 
-    def put(self, moment: OutputFrame, exposure: Exposure) -> None:
-        self._video.add(exposure.coded(self._coding), moment.time)
+    def put(self, frame: OutputFrame, exposure: Exposure) -> None:
+        self._video.add(exposure.coded(self._coding), frame.time)

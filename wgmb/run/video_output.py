@@ -22,8 +22,8 @@ from ..video.output_times import OutputFrame, OutputFrames
 from ..video.read.reader import VideoReader
 from ..video.write.encoders import SUFFIXES, chosen
 from ..video.write.other_streams import OtherStreams
-from ..video.write.pictures import CodedVideo
 from ..video.write.segments import Segments, remove_left
+from ..video.write.writer import VideoWriter
 from .batch_report import Progress
 from .engine import Input, run
 from .file_sink import FileSink
@@ -121,7 +121,7 @@ def _write_video(
             return [*lost, *segments.join(texts, others)]
         finally:
             segments.release()
-    writer = CodedVideo(
+    writer = VideoWriter(
         path, atomic.temporary_name(path), *shape, facts, texts, others, is_new=not there
     )
     run(source.frames(wanted, form), VideoSink(writer), progress=progress)

@@ -16,7 +16,7 @@ from ..errors import Error, InputError
 from ..io import exr, stills
 from ..io.atomic import temporary_name, write_file
 from ..io.record import KEY
-from ..video.write.frames import Video
+from ..video.write.frames import FrameVideo
 from .draw.draw_thread import DrawThread
 from .draw.renderer import Renderer
 from .draw.screen import Screen
@@ -33,7 +33,7 @@ class Actions:
     ):
         self._window = getattr(canvas, "_window", None)  # of glfw, where there is one
         self._canvas, self._stage, self._screen, self._say = canvas, stage, screen, say
-        self._video: Video | None = None
+        self._video: FrameVideo | None = None
         self._windowed: tuple[int, int, int, int] | None = None
         self.export: tuple[subprocess.Popen, str] | None = None
         self.export_message = ""
@@ -98,7 +98,7 @@ class Actions:
     def _record(self, state: State) -> None:
         if self._video is None:
             path = _free(".mp4")
-            self._video = Video(path, temporary_name(path), rate(state), state.toml())
+            self._video = FrameVideo(path, temporary_name(path), rate(state), state.toml())
             return
         self.close()
 

@@ -21,7 +21,7 @@ from ...io import atomic
 from .encoders import FINEST_RATE, Encoding, chosen
 from .encoders import SUFFIXES as SUFFIXES
 from .gif import check_rate
-from .pictures import CodedVideo
+from .writer import VideoWriter
 
 SRGB_DISPLAY = frozenset({"srgb_rec709_display"})
 _DISPLAYS = {  # primaries and transfer of displays, by the names that configs give them
@@ -37,7 +37,7 @@ _DISPLAYS = {  # primaries and transfer of displays, by the names that configs g
 _RATES = Fraction(1, 1000), Fraction(1000)
 
 
-class Video:
+class FrameVideo:
     """A video being written under a temporary name; `close` gives it its own.
 
     Alpha is dropped (the colour is premultiplied, so it lies over black). Encoders that share
@@ -61,7 +61,7 @@ class Video:
         check_rate(path, fps, *(() if self._encoding.codec == "gif" else (_RATES,)))
         self.fps = fps.limit_denominator(FINEST_RATE)
         self._coding = self._encoding.coding(_coding(display, self._encoding.codec == "ffv1"))[0]
-        self._video: CodedVideo | None = None
+        self._video: VideoWriter | None = None
         self._frames = 0
         self._size: tuple[int, ...] = ()
 
@@ -77,7 +77,7 @@ class Video:
         if self._encoding.encoder.even:
             height, width = rgb.shape[:2]
             rgb = np.pad(rgb, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-        self._video = self._video or CodedVideo(
+        self._video = self._video or VideoWriter(
             self.path, self.temporary, self._encoding, self._coding,
             (rgb.shape[1], rgb.shape[0]), self.fps, 1 / self.fps,
             metadata={"comment": f"wgmb {self.settings}"},

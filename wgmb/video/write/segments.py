@@ -33,7 +33,7 @@ from ..read.container import opened, picture_stream
 from .container import NewFile, name_codec
 from .encoders import NO_FACTS, Encoding, Facts
 from .other_streams import OtherStreams
-from .pictures import CodedVideo
+from .writer import VideoWriter
 
 SECONDS = 10
 _NAME = re.compile(r"\d{5}\.(mp4|mov|mkv|webm|json)")
@@ -46,7 +46,7 @@ class Segments:
 
     `made_of`: what pictures depend on (settings, inputs); segments that were made of anything else
     are made again. Use: for every range of numbers in `to_do`, `begin` it, add its pictures, close
-    it; then `join`; `release` in any case. The other parameters are CodedVideo's. InputError for
+    it; then `join`; `release` in any case. The other parameters are VideoWriter's. InputError for
     a GIF, which has no segments.
     """
 
@@ -93,7 +93,7 @@ class Segments:
         index = self._ranges.index(numbers)
         path = self._file(index)
         path.with_suffix(".json").unlink(missing_ok=True)  # of what it is going to replace
-        return Segment(self, index, CodedVideo(
+        return Segment(self, index, VideoWriter(
             path, atomic.temporary_name(path), self._encoding, self._coding, self._size,
             self._rate, self._base, self._facts,
         ))  # fmt: skip
@@ -263,9 +263,9 @@ def _sweep(folder: Path) -> None:
 
 
 class Segment:
-    """A segment being written: CodedVideo's own words; `close` records it."""
+    """A segment being written: VideoWriter's own words; `close` records it."""
 
-    def __init__(self, segments: Segments, index: int, video: CodedVideo):
+    def __init__(self, segments: Segments, index: int, video: VideoWriter):
         self._segments, self._index, self._video = segments, index, video
         self._start: Fraction | None = None
 

@@ -85,16 +85,16 @@ def output(state: State) -> VideoOutput:
 
 def output_frame(state: State) -> OutputFrame:
     """The output frame that is shown."""
-    moments = output(state).frames
-    return moments[min(max(math.ceil(state.frame - 0.5), 0), len(moments) - 1)]
+    frames = output(state).frames
+    return frames[min(max(math.ceil(state.frame - 0.5), 0), len(frames) - 1)]
 
 
 def held_for(state: State, number: int) -> float:
     """Duration of an output frame [s]: until the next one."""
-    moments = output(state).frames
-    if number + 1 < len(moments):
-        return float(moments[number + 1].time - moments[number].time)
-    return float(moments[number].interval)
+    frames = output(state).frames
+    if number + 1 < len(frames):
+        return float(frames[number + 1].time - frames[number].time)
+    return float(frames[number].interval)
 
 
 def retimed(state: State, **changes: Any) -> State:
@@ -126,9 +126,9 @@ def passed(state: State, seconds: float) -> float:
     frames = float(rate(state))
     if not (state.is_video and state.own_times):
         return state.frame + seconds * frames
-    moments, frame = output(state).frames, state.frame
-    for number in range(max(math.floor(frame), 0), len(moments) - 1):
-        step = float(moments[number + 1].time - moments[number].time)
+    of_video, frame = output(state).frames, state.frame
+    for number in range(max(math.floor(frame), 0), len(of_video) - 1):
+        step = float(of_video[number + 1].time - of_video[number].time)
         left = (number + 1 - frame) * step
         if seconds < left:
             return frame + seconds / step

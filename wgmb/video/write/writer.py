@@ -25,7 +25,7 @@ _RGB = "rgb24"
 _WHOLE = 0, 3  # planes of luma and alpha: of all sizes, even where chroma has one sample
 
 
-class CodedVideo:
+class VideoWriter:
     """A video of CodedPictures; complete under its name after `close`, or absent.
 
     `coding` is what `encoding.coding` returned. `rate`: pictures a second, usually; `base`: the

@@ -17,7 +17,7 @@ from wgmb.video.hdr10 import LightLevel, Mastering
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.write import container, encoders
 from wgmb.video.write.encoders import CODECS, Facts, chosen
-from wgmb.video.write.pictures import CodedVideo
+from wgmb.video.write.writer import VideoWriter
 
 pytestmark = pytest.mark.fast
 
@@ -43,7 +43,7 @@ def write(path, coding, codec=None, times=None, made=None, quality=None, facts=N
     coding, _ = encoding.coding(coding)
     made = made or pictures(coding)
     times = times or [n / RATE for n in range(len(made))]
-    video = CodedVideo(path, path.with_name("part"), encoding, coding, made[0].size, RATE,
+    video = VideoWriter(path, path.with_name("part"), encoding, coding, made[0].size, RATE,
                        base or tick(*times), facts or Facts())  # fmt: skip
     for picture, time in zip(made, times, strict=True):
         assert not path.exists()
@@ -132,7 +132,7 @@ def test_a_hardware_encoder_opens_or_says_why_not(tmp_path, codec, kind):
         encoding = chosen(path, codec, encoder=kind)
         coding, _ = encoding.coding(Coding())
         part = tmp_path / "part"
-        CodedVideo(path, part, encoding, coding, (256, 256), RATE, 1 / RATE).abandon()
+        VideoWriter(path, part, encoding, coding, (256, 256), RATE, 1 / RATE).abandon()
     except InputError as error:
         name = dict(CODECS[codec].hardware)[kind].name
         why = str(error).removeprefix(f"encoder {name} ")
@@ -288,7 +288,7 @@ def test_times_that_do_not_ascend_are_refused(tmp_path):
 
 def test_a_video_without_pictures_is_none(tmp_path):
     encoding = chosen("v.mp4")
-    video = CodedVideo(tmp_path / "v.mp4", tmp_path / "part", encoding, Coding(), (64, 48), RATE,
+    video = VideoWriter(tmp_path / "v.mp4", tmp_path / "part", encoding, Coding(), (64, 48), RATE,
                        1 / RATE)  # fmt: skip
     with pytest.raises(InputError, match="no pictures to write"):
         video.close()
@@ -304,7 +304,7 @@ def test_a_picture_of_another_kind_is_refused(tmp_path):
 def test_what_cannot_be_written_names_the_file(tmp_path):
     encoding = chosen("v.mp4")
     with pytest.raises(OSError, match=r"v\.mp4: No such file"):
-        CodedVideo(tmp_path / "v.mp4", tmp_path / "none" / "part", encoding, Coding(), (64, 48),
+        VideoWriter(tmp_path / "v.mp4", tmp_path / "none" / "part", encoding, Coding(), (64, 48),
                    RATE, 1 / RATE)  # fmt: skip
 
 
