@@ -43,6 +43,8 @@ KEYS = {
     "s": "save image, PNG and EXR",
     "v": "start or stop recording MP4",
     "f": "full screen",
+    "i": "numbers under the mouse, and a histogram",
+    "a": "motion as arrows",
     "h": "this help",
     "Esc": "quit",
 }
@@ -70,7 +72,7 @@ def grip(
     state: State, layout: WindowLayout, x: float, y: float, button: int, modifiers
 ) -> str | None:
     """Return the drag that a press at x, y starts: "wipe", "orbit", "pan", or None."""
-    if not _inside(layout.area, x, y):
+    if not is_inside(layout.area, x, y):
         return None
     left, _, width, _ = layout.place
     if state.mode == "wipe" and abs(x - left - state.wipe * width) <= _GRIP:
@@ -108,7 +110,7 @@ def drag(state: State, layout: WindowLayout, held: str, dx: float, dy: float) ->
 
 def wheel(state: State, layout: WindowLayout, x: float, y: float, dx: float, dy: float) -> State:
     """Nearer or farther by dy / 100 notches; frames on disk: larger or smaller about x, y."""
-    if not _inside(layout.area, x, y):
+    if not is_inside(layout.area, x, y):
         return state
     factor = math.exp(_NOTCH * dy)
     if state.is_scene:
@@ -145,6 +147,10 @@ def key(state: State, layout: WindowLayout, name: str) -> tuple[State, str | Non
         return replace(state, playing=not state.playing), None
     if low == "h":
         return replace(state, help=not state.help), None
+    if low == "i":
+        return replace(state, inspect=not state.inspect), None
+    if low == "a":
+        return replace(state, arrows=not state.arrows), None
     if low == "tab":
         return replace(state, panel=not state.panel), None
     if low in _STOPS:
@@ -191,7 +197,8 @@ def _own_camera(state: State) -> tuple[float, float] | None:
     return float(values["cam_x"]), float(values["cam_y"])
 
 
-def _inside(box: Box, x: float, y: float) -> bool:
+def is_inside(box: Box, x: float, y: float) -> bool:
+    """Return True for a place in a box."""
     return box[0] <= x < box[0] + box[2] and box[1] <= y < box[1] + box[3]
 
 

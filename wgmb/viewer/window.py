@@ -25,7 +25,7 @@ from .draw.renderer import Renderer
 from .draw.request import Drawn, Request
 from .draw.screen import NOTHING, Screen, fit, key_box
 from .draw.slot import FrameStatus
-from .panel import overlay
+from .panel import inspector, overlay
 from .panel.panel import Info, Panel
 from .panel.theme import style
 from .scaled_canvas import SIZES, ScaledCanvas
@@ -93,6 +93,8 @@ class Viewer:
         self._timed = ("", "")
         self._info: Info | None = None
         self._sliding = False
+        self._mouse = -1.0, -1.0
+        self._histogram: tuple[object, np.ndarray | None] = None, None
         # Before ImGui's handlers, which keep to themselves what they take.
         canvas.add_event_handler(self._guarded(self._on_any), *_SEEN, order=-201)
         canvas.add_event_handler(self._guarded(self._on_event), *_HANDLED, order=-200)
@@ -135,6 +137,8 @@ class Viewer:
 
     def _on_event(self, event: dict) -> None:
         kind = event["event_type"]
+        if "x" in event:
+            self._mouse = event["x"], event["y"]
         if kind == "key_down":
             if not self._imgui.backend.io.want_text_input:
                 self._on_key(event["key"])
@@ -315,7 +319,28 @@ class Viewer:
         if key is not None:
             x, y, width, height = (v / ratio for v in key)
             logical = x, y, width, height
+        if self.state.inspect or self.state.arrows:
+            self._inspect(self._drawn)
         self.state = self.panel.draw(self.state, self._info, size, self._area(), logical)
+
+    def _inspect(self, drawn: Drawn) -> None:
+        """Draw arrows, and the numbers under the mouse."""
+        area, layout, under = self._area(), self._layout(), drawn.under
+        if self.state.arrows and "motion" in under:
+            inspector.draw_arrows(under["motion"], layout.place, area)
+        if not self.state.inspect:
+            return
+        light = under.get("light")
+        if light is not self._histogram[0]:
+            self._histogram = light, None if light is None else inspector.histogram(light)
+        (x, y), (left, top, width, height) = self._mouse, layout.place
+        u, v = (x - left) / width, (y - top) / height
+        text = [inspector.made_by(drawn.state, drawn.available)]
+        if 0 <= u < 1 and 0 <= v < 1 and controls.is_inside(area, x, y):
+            ratio = self.canvas.get_pixel_ratio()
+            display = self.screen.values(x * ratio, y * ratio)
+            text = inspector.lines(drawn.state, drawn.available, under, (u, v), display)
+        inspector.show(text, self._histogram[1], area)
 
     def _ask_for_more(self, busy: bool) -> None:
         waiting = self._now < self.message[1] or self.actions.export is not None

@@ -71,6 +71,7 @@ class Renderer:
         self._level, self._still_since, self._still = 0, 0.0, ()
         self._preview, self._ready = False, False
         self._moved = False
+        self._inspected: tuple[tuple, dict[str, np.ndarray]] = ((), {})
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._timing = timing
         if timing is None and TimestampClock.usable(device):
@@ -90,7 +91,28 @@ class Renderer:
             finding=getattr(choices.subject(state), "finding", ""),
             display=choices.displayed.display(state),
         )
-        return Drawn(request, state, report, available, self._on_screen, self.chromaticities)
+        looked_at = (state.inspect or state.arrows) and not (report.busy or request.moving)
+        under = self._under(state, available) if looked_at else {}
+        images = self._on_screen
+        return Drawn(request, state, report, available, images, under, self.chromaticities)
+
+    def _under(self, state: State, available: Available) -> dict[str, np.ndarray]:
+        """The first image and the passes that it was made from, as arrays."""
+        first = self._slots["first"]
+        key = first.key, first.fine, first.done
+        if self._inspected[0] != key:
+            arrays = {"light": self.download()}
+            passes = {"depth": "depth", "motion": "velocity"}
+            if any(look in available.looks for look in passes.values()):
+                subject = self.choices.subject(state)
+                assert first.texture is not None
+                subject.look_at(state, first.texture.size[:2], 1)
+                for name, texture in subject.passes().items():
+                    if passes.get(name) in available.looks:
+                        encoder = self.device.create_command_encoder(label="inspected")
+                        arrays[name] = self._images.download(encoder, texture)
+            self._inspected = key, arrays
+        return self._inspected[1]
 
     def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> FrameStatus:
         """Go on with what `state` shows in `area` [px] of the canvas, `now` [s].

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from ...color.spaces import Display
 from ...methods.options import Option
 from ..state.state import State
@@ -54,6 +56,9 @@ class Drawn:
     available: Available
     images: dict[str, Image]
     """By slot; colours as their display shows them, or linear light."""
+    under: dict[str, np.ndarray] = field(default_factory=dict)
+    """Where numbers or arrows are shown: "light" of the first image, and "depth" and "motion" (px)
+    where there are such; (height, width, channels)."""
     chromaticities: dict[str, Any] = field(default_factory=dict)
     """Of what is shown, as an attribute of an EXR."""
 

@@ -126,6 +126,15 @@ class Screen:
         canvas = self._images.download(encoder, self._picture())[..., :3].astype(np.float32)
         return canvas[y : y + h, x : x + w]
 
+    def values(self, x: float, y: float) -> np.ndarray | None:
+        """(3,) display values 0..1 of what was composed at a place [px]; None outside it."""
+        if not (0 <= x < self._size[0] and 0 <= y < self._size[1]):
+            return None
+        place = {"texture": self._picture(), "origin": (int(x), int(y), 0)}
+        layout = {"bytes_per_row": 8, "rows_per_image": 1}
+        texel: Any = self.device.queue.read_texture(place, layout, (1, 1, 1))
+        return np.frombuffer(texel, np.float16)[:3].astype(np.float32)
+
     def _picture(self) -> wgpu.GPUTexture:
         """The composition; pools of textures have those that compute shaders write."""
         if self._composition is None or self._composition.size[:2] != self._size:

@@ -89,6 +89,10 @@ class State:
     speed: float = 0.25
     panel: bool = True
     help: bool = False
+    inspect: bool = False
+    """Numbers under the mouse are shown."""
+    arrows: bool = False
+    """Motion is drawn as arrows."""
 
     @property
     def is_scene(self) -> bool:
@@ -319,4 +323,4 @@ class State:
         return state.settled()
 
 
-_SHOWING = (*(name for name in saved.VIEW if name != "frame"), "help")
+_SHOWING = (*(name for name in saved.VIEW if name != "frame"), "help", "inspect", "arrows")

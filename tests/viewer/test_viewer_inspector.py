@@ -1,0 +1,110 @@
+"""Numbers under the mouse, the histogram and arrows of motion."""
+
+import numpy as np
+import pytest
+
+from viewer_hand import ALONE, SAMPLE, Hand, put
+from wgmb.methods import METHODS
+from wgmb.viewer import controls
+from wgmb.viewer.draw.request import Available
+from wgmb.viewer.panel import inspector
+
+SIZE = 320, 180
+
+
+@pytest.fixture(scope="module")
+def hand():
+    made = Hand(put(ALONE, inspect=True), SIZE)
+    made.picture()
+    return made
+
+
+def test_the_numbers_are_those_of_the_picture_and_of_its_passes(hand):
+    drawn = hand.viewer._drawn
+    under = drawn.under
+    assert under.keys() == {"light", "depth", "motion"}
+    np.testing.assert_array_equal(under["light"], hand.viewer.stage.download())
+    at = 0.4, 0.6
+    text = inspector.lines(hand.state, drawn.available, under, at, np.array([0.0, 0.5, 1.0]))
+    x, y = int(0.4 * SIZE[0]), int(0.6 * SIZE[1])
+    light = under["light"][y, x]
+    assert text[1] == f"pixel    {x}, {y} of 320 x 180"
+    assert text[2] == "linear   " + " ".join(f"{value:.4g}" for value in light)
+    assert text[3] == "display  0 128 255"
+    to_next = under["motion"][y, x, 2:]
+    assert text[4].startswith(f"next     {to_next[0]:+.2f}, {to_next[1]:+.2f} px")
+    assert text[6] == f"depth    {under['depth'][y, x, 0]:.4g}"
+
+
+def test_the_displayed_value_is_what_is_on_the_screen(hand):
+    picture = hand.viewer.screen.picture()
+    for x, y in ((0, 0), (100, 50), (319, 179)):
+        np.testing.assert_array_equal(hand.viewer.screen.values(x + 0.5, y + 0.5), picture[y, x])
+    assert hand.viewer.screen.values(320, 0) is None
+
+
+def test_the_mouse_over_the_picture_changes_the_text_and_i_takes_it_away(hand, monkeypatch):
+    texts = []
+    monkeypatch.setattr(inspector, "show", lambda text, *_: texts.append(text))
+    for x in (30, 200):
+        hand.submit("pointer_move", x=x, y=90, button=0, buttons=())
+        hand.look()
+    assert texts[-1] != texts[0] and "200, 90" in texts[-1][1]
+    hand.submit("pointer_move", x=-5, y=90, button=0, buttons=())
+    hand.look()
+    assert len(texts[-1]) == 1
+    count = len(texts)
+    hand.press("i")
+    assert len(texts) <= count + 1 and not hand.state.inspect
+    hand.press("i")
+
+
+def test_frames_on_disk_have_the_vectors_that_are_in_the_file():
+    hand = Hand(put(ALONE.opened(SAMPLE), arrows=True, method="tap"), SIZE)
+    hand.picture()
+    under = hand.viewer._drawn.under
+    subject = hand.viewer.stage.choices.subject(hand.state)
+    frame = subject._frame(subject._now)
+    np.testing.assert_array_equal(under["depth"][..., 0], frame.depth)
+    assert np.abs(under["motion"]).max() > 1
+
+
+def available(methods, looks):
+    return Available(list(methods), list(looks), [], [], {})
+
+
+def test_it_says_which_method_and_why():
+    state = put(ALONE, samples=None)
+    assert (
+        inspector.made_by(state, available(METHODS, ["result", "depth"]))
+        == "method   tap, 16 samples"
+    )
+    flat = available(["tap", "tiles"], ["result", "velocity"])
+    assert inspector.made_by(state, flat) == "method   tap, 16 samples (no depth)"
+
+
+def test_the_histogram_counts_pixels_by_stops():
+    light = np.full((4, 8, 4), 0.25, np.float32)
+    light[0] = 4.0
+    light[1, :, :3] = np.inf
+    light[2, :, :3] = 0.0
+    shares = inspector.histogram(light)
+    low, high = inspector.STOPS
+    width = (high - low) / len(shares)
+    want = {int((-2 - low) / width): 0.25, int((2 - low) / width): 0.25, 63: 0.25, 0: 0.25}
+    assert {i: s for i, s in enumerate(shares) if s} == pytest.approx(want)
+
+
+def test_arrows_lead_to_where_the_next_frame_has_the_pixel():
+    motion = np.zeros((90, 160, 4), np.float32)
+    motion[:, 80:] = 9, 9, 10, -4
+    motion[:45, 80:] = np.nan
+    found = inspector.arrows(motion, (0, 0, 320, 180), (40, 0, 280, 180))
+    assert found and all(x >= 160 and y >= 90 for x, y, _, _ in found)
+    assert all((to_x - x, to_y - y) == pytest.approx((20, -8)) for x, y, to_x, to_y in found)
+
+
+def test_the_keys_are_toggles():
+    layout = controls.WindowLayout((0, 0, 9, 9), (0, 0, 9, 9))
+    state = controls.key(controls.key(ALONE, layout, "i")[0], layout, "a")[0]
+    assert state.inspect and state.arrows and state.picture == ALONE.picture

@@ -1,0 +1,135 @@
+"""The inspector: numbers under the mouse, a histogram, and motion as arrows over the picture."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+
+from ...color.primaries import REC709, luminance
+from ...methods import METHODS
+from ...pipeline.arguments import SAMPLES
+from ..controls import Box
+from ..draw.request import Available
+from ..draw.screen import overlap
+from ..state.state import State
+from .theme import ACCENT, packed
+
+STOPS = -10, 6
+"""Range of the histogram [stops from 1.0]."""
+_BINS = 64
+_STEP = 40.0  # from one arrow to the next [logical px]
+_SHORTEST = 0.5  # motion that has an arrow [px]
+_HEAD = 5.0  # of an arrow [logical px]
+
+
+def texel_at(array: np.ndarray, u: float, v: float) -> np.ndarray:
+    """The texel of an image (height, width, channels) at a place, 0 to 1 across and down."""
+    height, width = array.shape[:2]
+    return array[min(int(v * height), height - 1), min(int(u * width), width - 1)]
+
+
+def lines(
+    state: State,
+    available: Available,
+    under: dict[str, np.ndarray],
+    at: tuple[float, float],
+    display: np.ndarray | None,
+) -> list[str]:
+    """The text for a place `at`, 0 to 1 across and down; `display`: values on the screen there."""
+    found = [made_by(state, available)]
+    light = under.get("light")
+    if light is None:
+        return [*found, "..."]
+    height, width = light.shape[:2]
+    x, y = int(at[0] * width), int(at[1] * height)
+    found.append(f"pixel    {x}, {y} of {width} x {height}")
+    found.append("linear   " + " ".join(f"{value:.4g}" for value in texel_at(light, *at)))
+    if display is not None:
+        found.append("display  " + " ".join(f"{255 * value:.0f}" for value in display))
+    if "motion" in under:
+        before, after = np.split(texel_at(under["motion"], *at)[:4], 2)
+        speed = math.hypot(*map(float, after))
+        found.append(f"next     {after[0]:+.2f}, {after[1]:+.2f} px ({speed:.1f})")
+        found.append(f"previous {before[0]:+.2f}, {before[1]:+.2f} px")
+    if "depth" in under:
+        found.append(f"depth    {float(texel_at(under['depth'], *at).flat[0]):.4g}")
+    return found
+
+
+def made_by(state: State, available: Available) -> str:
+    """The method and its samples; why it is not gather, where that cannot be had."""
+    samples = state.suited_blur.samples or getattr(METHODS[state.method], "samples", SAMPLES)
+    text = f"method   {state.method}, {samples} samples"
+    if "gather" in available.methods or not available.methods:
+        return text
+    lacks = "no depth" if "depth" not in available.looks else "no pictures of instants"
+    return f"{text} ({lacks})"
+
+
+def histogram(light: np.ndarray) -> np.ndarray:
+    """Share of the pixels (64,) by their luminance, over STOPS; darker and brighter ones at ends.
+
+    `light`: (height, width, 3 or more), taken as Rec. 709.
+    """
+    colors = light[..., :3] if light.shape[2] >= 3 else light[..., :1].repeat(3, axis=2)
+    bright = np.nan_to_num(
+        colors @ np.asarray(luminance(REC709), np.float32), posinf=2.0 ** STOPS[1]
+    )
+    stops = np.log2(np.maximum(bright, 2.0 ** (STOPS[0] - 1)))
+    counts, _ = np.histogram(np.clip(stops, *STOPS), bins=_BINS, range=STOPS)
+    return (counts / max(stops.size, 1)).astype(np.float32)
+
+
+def arrows(motion: np.ndarray, place: Box, area: Box) -> list[tuple[float, ...]]:
+    """Arrows (x, y, x, y) [logical px] from a grid of pixels to where the next frame has them.
+
+    `motion`: (height, width, 4) [px]; `place` of the whole picture, `area` that is seen of it.
+    """
+    height, width = motion.shape[:2]
+    found = []
+    left, top, wide, high = overlap(place, area)
+    for y in np.arange(top + _STEP / 2, top + high, _STEP):
+        for x in np.arange(left + _STEP / 2, left + wide, _STEP):
+            dx, dy = texel_at(motion, (x - place[0]) / place[2], (y - place[1]) / place[3])[2:4]
+            if math.isfinite(dx + dy) and math.hypot(dx, dy) >= _SHORTEST:
+                end = x + dx * place[2] / width, y + dy * place[3] / height
+                found.append((float(x), float(y), float(end[0]), float(end[1])))
+    return found
+
+
+def draw_arrows(motion: np.ndarray, place: Box, area: Box) -> None:
+    """The arrows over the picture."""
+    ink, color = imgui.get_background_draw_list(), packed(ACCENT)
+    ink.push_clip_rect((area[0], area[1]), (area[0] + area[2], area[1] + area[3]))
+    for x, y, to_x, to_y in arrows(motion, place, area):
+        ink.add_line((x, y), (to_x, to_y), color, 1.2)
+        turn = math.atan2(to_y - y, to_x - x)
+        for side in (2.6, -2.6):
+            corner = to_x + _HEAD * math.cos(turn + side), to_y + _HEAD * math.sin(turn + side)
+            ink.add_line((to_x, to_y), corner, color, 1.2)
+    ink.pop_clip_rect()
+
+
+def show(text: list[str], shares: np.ndarray | None, area: Box) -> None:
+    """The text and the histogram in a corner of the picture."""
+    x, y, _, height = area
+    imgui.set_next_window_pos((x + 12, y + height - 12), pivot=(0.0, 1.0))
+    imgui.set_next_window_bg_alpha(0.88)
+    flags = imgui.WindowFlags_
+    fixed = flags.no_title_bar | flags.always_auto_resize | flags.no_move | flags.no_nav
+    imgui.begin("inspector", None, fixed | flags.no_inputs | flags.no_focus_on_appearing)
+    for line in text:
+        name, _, value = line.partition(" ")
+        imgui.text(name)
+        imgui.same_line(70)
+        imgui.text(value.strip())
+    if shares is not None:
+        peak = float(np.sqrt(shares).max())
+        imgui.plot_histogram(
+            "##histogram", np.sqrt(shares), scale_min=0.0, scale_max=peak,
+            graph_size=ImVec2(240, 48),
+        )  # fmt: skip
+        imgui.text_disabled(f"{STOPS[0]} to +{STOPS[1]} stops")
+    imgui.end()
