@@ -86,7 +86,9 @@ def test_a_cut_off_video_names_overwrite(clip, tmp_path):
     to = tmp_path / "o.mp4"
     blur_video(clip, to, **PLAIN)
     to.write_bytes(to.read_bytes()[: to.stat().st_size // 2])
-    with pytest.raises(InputError, match=r"exists and was made otherwise; `overwrite=True`"):
+    with pytest.raises(
+        InputError, match=r"exists and holds no record .* cut off.*; `overwrite=True`"
+    ):
         blur_video(clip, to, **PLAIN)
     assert blur_video(clip, to, overwrite=True, **PLAIN).is_new
 

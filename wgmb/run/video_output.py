@@ -29,6 +29,7 @@ from .engine import Input, run
 from .file_sink import FileSink
 from .video_sink import Form, LightForm, VideoSink, coded_form, frame_record
 
+_NOT_OURS = " and holds no record of a run: it is cut off, or of another program"
 FIRST = 1  # number of the first frame, where they are image files
 _RECORD = "comment", "description", "synopsis"  # texts of a video; the first that is free
 
@@ -102,7 +103,8 @@ def _write_video(
         remove_left(path)
         return ["is already done"]
     if there and not (output.overwrite or is_ours):
-        more = " and was made otherwise" if output.resume else ""
+        otherwise = " and was made otherwise" if stated else _NOT_OURS
+        more = otherwise if output.resume else ""
         raise InputError(f"{path} exists{more}; `overwrite=True` replaces it")
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic.sweep(path.parent, [path.name])
