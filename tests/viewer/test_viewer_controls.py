@@ -134,7 +134,7 @@ def test_every_key_of_the_help_does_something():
                              ("off", "wipe"), ("left", "pair"))  # fmt: skip
     names = {"space": " ", "left, right": "ArrowLeft", "home, end": "End", "up, down": "ArrowUp",
              "1 - 9": "2", "Esc": "Escape", "r": "R", "[ ] 0": "[", "+ -": "+"}  # fmt: skip
-    moved = put(PLAIN, orbit=(5.0, 5.0))
+    moved = put(put(PLAIN, orbit=(5.0, 5.0)).keeping(), samples=9)
     for name in controls.KEYS:
         state, action = controls.key(moved, layout, names.get(name, name))
         assert state != moved or action, name

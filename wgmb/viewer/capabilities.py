@@ -12,6 +12,7 @@ from .draw.display import DisplayCache
 from .state.files import reader_of
 from .state.state import (
     BOTH_EYES,
+    KEPT,
     LOOKS,
     REFERENCE,
     State,
@@ -117,7 +118,8 @@ class Choices:
         """Return the images that the result can be compared with."""
         sharp = ["sharp"] if "sharp" in self.looks(state) else []
         reference = [REFERENCE] if self.reference(state) else []
-        return [*sharp, *reference, *self.methods(state)]
+        kept = [KEPT] if state.kept and state.as_kept.method in self.methods(state) else []
+        return [*kept, *sharp, *reference, *self.methods(state)]
 
     def possible(self, state: State) -> State:
         """The same state; a method or look that is not to be had is replaced by one that is."""

@@ -34,6 +34,8 @@ KEYS = {
     "home, end": "first frame, last frame",
     "1 - 9": "method",
     "c": "next comparison",
+    "b": "keep the settings as B, to compare with",
+    "x": "exchange the settings and B",
     "l": "next view",
     "e": "stereo frames: next eye, pair, red-cyan",
     "tab": "panel",
@@ -147,6 +149,10 @@ def key(state: State, layout: WindowLayout, name: str) -> tuple[State, str | Non
         return replace(state, playing=not state.playing), None
     if low == "h":
         return replace(state, help=not state.help), None
+    if low == "b":
+        return state.keeping(), None
+    if low == "x":
+        return state.swapped(), None
     if low == "i":
         return replace(state, inspect=not state.inspect), None
     if low == "a":

@@ -19,7 +19,7 @@ from ...gpu.timing import Clock, TimestampClock
 from ...methods import METHODS
 from ...sequence.input_color import chromaticities
 from ..capabilities import QUICKEST, Choices
-from ..state.state import BOTH_EYES, REFERENCE, State
+from ..state.state import BOTH_EYES, KEPT, REFERENCE, State
 from ..subjects.subject import SceneSubject, Subject
 from ..subjects.video import VideoSubject
 from .adaptive import Pace
@@ -278,6 +278,9 @@ class Renderer:
     ) -> None:
         """Draw some of `name`; it is shown once it is no coarser than what it replaces."""
         shown, coming = self._slots[slot], self._coming[slot]
+        is_kept = name == KEPT
+        if is_kept:
+            state, name = state.as_kept, "result"
         eye = state.eye if name in ("perceived", REFERENCE) else None
         known = self._known(name, state, subject, full)
         frame = state.frame if name == "perceived" else None
@@ -290,6 +293,7 @@ class Renderer:
                 return
             texture = f"{slot} {1 + shown.name.endswith('1')}"
             label = self._label(name, state) + (f", {view}" if view else "")
+            label = f"{KEPT}: {label}" if is_kept else label
             coming = Slot(label, key, fine, texture, is_preview=is_preview)
             self._coming[slot] = coming
         if coming.ready:

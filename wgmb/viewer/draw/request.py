@@ -29,7 +29,15 @@ class Request:
     def picture(self) -> tuple:
         """All that the images depend on."""
         state = self.state
-        return state.picture, self.area, state.look, state.mode, state.against, state.eyes
+        return (
+            state.picture,
+            self.area,
+            state.look,
+            state.mode,
+            state.against,
+            state.eyes,
+            state.kept,
+        )
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
@@ -10,7 +11,7 @@ from imgui_bundle import imgui
 from ..controls import Box
 from ..draw.request import Available
 from ..draw.slot import FrameStatus
-from ..state.state import State
+from ..state.state import KEPT, State
 from ..state.video_time import output, output_frame
 from ..state.words import for_shell
 from . import overlay, sections
@@ -142,7 +143,7 @@ class Panel:
             self.actions.append(("record", ""))
         imgui.same_line()
         if self._ui.button("Command", third, "copy command"):
-            self.actions.append(("copy", for_shell(state.command(self._files["output"]))))
+            self.actions.append(("copy", commands(state, self._files["output"])))
 
     def _files_section(self, ui: Widgets, state: State, info: Info) -> State:
         self._file("settings")
@@ -153,7 +154,7 @@ class Panel:
         if ui.button("Load settings", half):
             self.actions.append(("load", self._files["settings"]))
         self._file("output")
-        command = for_shell(state.command(self._files["output"]))
+        command = commands(state, self._files["output"])
         ui.dim(command)
         ui.keep("command")
         if ui.button("Copy", half):
@@ -176,6 +177,16 @@ class Panel:
 def _subject(state: State) -> str:
     """Name of the view, as the title of its section."""
     return "Scene" if state.is_scene else "Video" if state.is_video else "Frames"
+
+
+def commands(state: State, output: str) -> str:
+    """The line that makes the video; with settings B, if they are compared with, a second one."""
+    lines = [for_shell(state.command(output))]
+    if state.kept and state.against == KEPT and state.compare != "off":
+        other = Path(output)
+        named = str(other.with_stem(f"{other.stem}-b"))
+        lines.append(for_shell(state.as_kept.command(named)))
+    return "\n".join(lines)
 
 
 def made_of(state: State, pictures: tuple[int, ...]) -> str:

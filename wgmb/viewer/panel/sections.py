@@ -278,6 +278,14 @@ def _compare(ui: Widgets, state: State, info: Info) -> State:
     if state.mode in BOTH_EYES:
         return state
     state = replace(state, compare=ui.combo("compare", state.compare, COMPARE))
+    half = (imgui.get_content_region_avail().x - 8) / 2
+    if ui.button("Keep as B (b)", half, "keep"):
+        state = state.keeping()
+    imgui.same_line()
+    imgui.begin_disabled(state.kept is None)
+    if ui.button("Exchange (x)", half, "exchange"):
+        state = state.swapped()
+    imgui.end_disabled()
     if state.compare == "off":
         return state
     state = replace(state, against=ui.combo("with", state.against, info.available.rivals))

@@ -39,6 +39,8 @@ LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")
 TONES = ("clip", "soft")
 FLOWS, QUALITIES = ("auto", "search", "dis", "none"), ("best", "fast")
 REFERENCE = "reference"
+KEPT = "B"
+"""The image by the settings that were kept."""
 _SCENE = SceneSettings(size="1280x720", antialias=2)
 _BLUR = BlurSettings(method="gather")
 _SHUTTER = ShutterSettings().resolved()
@@ -89,6 +91,8 @@ class State:
     speed: float = 0.25
     panel: bool = True
     help: bool = False
+    kept: tuple[BlurSettings, ShutterSettings] | None = None
+    """Settings B, which the present ones can be compared with."""
     inspect: bool = False
     """Numbers under the mouse are shown."""
     arrows: bool = False
@@ -136,6 +140,21 @@ class State:
         return same if self.is_scene else replace(same, frame=float(math.ceil(self.frame - 0.5)))
 
     @property
+    def as_kept(self) -> State:
+        """The same with settings B, if there are any."""
+        blur, shutter = self.kept or (self.blur, self.shutter)
+        return replace(self, blur=blur, shutter=shutter)
+
+    def keeping(self) -> State:
+        """The same, its settings kept as B and compared with."""
+        compare = "wipe" if self.compare == "off" else self.compare
+        return replace(self, kept=(self.blur, self.shutter), compare=compare, against=KEPT)
+
+    def swapped(self) -> State:
+        """The same with settings B, the present ones kept as B."""
+        return self if self.kept is None else replace(self.as_kept, kept=(self.blur, self.shutter))
+
+    @property
     def number(self) -> int:
         """Number of the frame on disk, or of the video's output frame, that is shown."""
         return min(math.ceil(self.frame - 0.5), self.span[1])
@@ -174,6 +193,7 @@ class State:
             color=replace(self.color, from_=None),
             video=VideoSettings(flow=self.video.flow, flow_quality=self.video.flow_quality),
             own_times=False,
+            kept=None,
         )
         was, suited = self.suited(), state.suited()
         if self.tone == self.suited_tone:  # what was as the last source asks for follows this one
@@ -323,4 +343,4 @@ class State:
         return state.settled()
 
 
-_SHOWING = (*(name for name in saved.VIEW if name != "frame"), "help", "inspect", "arrows")
+_SHOWING = (*(name for name in saved.VIEW if name != "frame"), "help", "kept", "inspect", "arrows")

@@ -1,0 +1,75 @@
+"""Two settings side by side: A, the present ones, and B, those that were kept."""
+
+import numpy as np
+import pytest
+
+from viewer_hand import ALONE, SAMPLE, SMALL, Hand, library, put
+from wgmb.color.srgb import srgb
+from wgmb.viewer import controls
+from wgmb.viewer.panel.panel import commands
+
+LAYOUT = controls.WindowLayout((0, 0, 9, 9), (0, 0, 9, 9))
+A = put(ALONE, shutter=360.0)
+B = put(ALONE, method="tiles", shutter=90.0, samples=8)
+
+
+def pressed(state, key):
+    return controls.key(state, LAYOUT, key)[0]
+
+
+def as_drawn(state):
+    render, moment = library(put(state, look="result"))
+    return srgb(np.clip(render(*moment)[..., :3], 0, 1))
+
+
+@pytest.fixture(scope="module")
+def hand():
+    return Hand(B, SMALL)
+
+
+def test_the_picture_is_a_on_one_side_and_b_on_the_other(hand):
+    kept = pressed(B, "b")
+    assert (kept.compare, kept.against, kept.kept) == ("wipe", "B", (B.blur, B.shutter))
+    hand.viewer.state = put(kept, method="tap", samples=4, shutter=360.0, wipe=0.5)
+    both = hand.picture()
+    half = SMALL[0] // 2
+    np.testing.assert_allclose(both[:, : half - 2], as_drawn(A)[:, : half - 2], atol=3e-3)
+    np.testing.assert_allclose(both[:, half + 2 :], as_drawn(B)[:, half + 2 :], atol=3e-3)
+    assert hand.viewer.stage.report.labels == ("tap", "B: tiles")
+    hand.viewer.state = put(hand.state, compare="difference", gain=1.0)
+    want = np.abs(as_drawn(A) - as_drawn(B))
+    np.testing.assert_allclose(hand.picture(), want, atol=4e-3)
+
+
+def test_a_setting_of_a_draws_b_no_more_than_once(hand, monkeypatch):
+    hand.viewer.state = put(pressed(B, "b"), method="tap", samples=4)
+    hand.picture()
+    before = hand.viewer.stage._slots["second"]
+    hand.viewer.state = put(hand.state, samples=6)
+    hand.picture()
+    assert hand.viewer.stage._slots["second"] is before
+
+
+def test_they_are_exchanged_and_back():
+    state = put(pressed(B, "b"), method="tap", samples=4, shutter=360.0)
+    other = pressed(state, "x")
+    assert (other.blur, other.shutter) == (B.blur, B.shutter)
+    assert other.kept == (state.blur, state.shutter)
+    assert pressed(other, "x") == state
+    assert pressed(ALONE, "x") == ALONE
+
+
+def test_another_source_has_no_b_and_none_is_offered(hand):
+    kept = pressed(B, "b")
+    assert kept.opened(SAMPLE).kept is None
+    choices = hand.viewer.stage.choices
+    assert "B" in choices.rivals(kept) and "B" not in choices.rivals(ALONE)
+    assert choices.possible(put(kept, kept=None)).against != "B"
+
+
+def test_both_have_a_command():
+    state = put(pressed(B, "b"), method="tap", samples=4, shutter=360.0)
+    first, second = commands(state, "out.mp4").splitlines()
+    assert "--method tap" in first and "-o out.mp4" in first and "--shutter 360" in first
+    assert "--method tiles" in second and "-o out-b.mp4" in second and "--shutter 90" in second
+    assert len(commands(put(state, compare="off"), "out.mp4").splitlines()) == 1
