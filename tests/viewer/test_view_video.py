@@ -270,7 +270,7 @@ def test_what_is_held_out_stays_sharp_as_by_the_command_line(clip, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("mask", "said"), [("Layer", "must be static, or an image file"), ("small.png", "96 x 64")]
+    ("mask", "said"), [("Layer", "must be static, none, or an image"), ("small.png", "96 x 64")]
 )
 def test_a_holdout_that_cannot_be_is_refused(clip, tmp_path, monkeypatch, mask, said):
     monkeypatch.chdir(tmp_path)

@@ -80,7 +80,8 @@ class BlurOptions(BlurSettings):
         Parameter(
             alias="--keep",
             help="Pixels that stay sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte; "
-            "names may have wildcards), an image file, or static (videos); may be repeated.",
+            "names may have wildcards), an image file; for videos also static, or none, as "
+            "displays are found; may be repeated.",
         ),
     ] = ()
 

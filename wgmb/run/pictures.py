@@ -24,6 +24,7 @@ from ..shots.cut_list import CutList
 from ..shots.reader import Picture
 from ..shutter import Shutter
 from ..video.exposures import Exposure, Exposures
+from ..video.holdouts import NONE, Holdout
 from ..video.output_times import SPARE, OutputFrame
 from ..video.planes import Planes
 from ..video.thumbnail import Thumbnail
@@ -176,7 +177,7 @@ def blur_pictures(
     fps_in: str | float | Fraction | None = None,
     fps: str | float | Fraction | None = None,
     transfer: Literal["srgb", "linear", "pq", "hlg", "bt709"] = "srgb",
-    holdout: np.ndarray | None = None,
+    holdout: np.ndarray | Literal["none"] | None = None,
     device: wgpu.GPUDevice | str | None = None,
     **settings: Unpack[PictureKeywords],
 ) -> PictureBlur:
@@ -188,8 +189,9 @@ def blur_pictures(
     next result needs: at most a dozen are held, and ten more while a flash is told from a cut.
     `fps_in`, `fps`: pictures per second of the input and of the output; without `fps`, there is a
     result for each picture. `transfer`: the meaning of the samples; floats that are "linear" are
-    not rounded and may exceed 1. `holdout` (height, width): 1 stays sharp. `settings`: options of
-    `wgmb blur` with underscores, such as shutter=180, flow="search", cuts="only:12".
+    not rounded and may exceed 1. `holdout` (height, width): 1 stays sharp; "none": nothing;
+    without it, displays that are found. `settings`: options of `wgmb blur` with underscores, such
+    as shutter=180, flow="search", cuts="only:12".
 
     Returns an iterator of pictures like those that were given. InputError for settings that do not
     fit, and, with its number, for a picture of another size or type, one that is not finite, or one
@@ -206,24 +208,27 @@ def blur_pictures(
         raise InputError(f"pictures must be an iterable of arrays, got {type(pictures).__name__}")
     rate = _RATE if fps_in is None else _rate("fps_in", fps_in)
     request, _ = request_of(dict(settings), PictureKeywords)
-    if holdout is not None and request.video.flow == "none":
+    if isinstance(holdout, np.ndarray) and request.video.flow == "none":
         raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
     request.video.expansion.check_pictures(transfer not in ("linear", "pq", "hlg"))
     run = request.open(device)
-    held = None if holdout is None else _matte(holdout)
+    held = _held(holdout)
     made = steady(run, rate, rate if fps is None else _rate("fps", fps), held)
     return PictureBlur(pictures, made, run.request.shutter.make(), transfer, run.how)
 
 
 def steady(
-    run: VideoRun, rate: Fraction, fps: Fraction, holdout: np.ndarray | None = None
+    run: VideoRun, rate: Fraction, fps: Fraction, holdout: Holdout | None = None
 ) -> SteadyExposures:
-    """The exposures of pictures at `rate`, `fps` of them a second; `holdout`: 1 stays sharp."""
+    """The exposures of pictures at `rate`, `fps` of them a second.
+
+    `holdout`: by default that of the run.
+    """
     request, cuts = run.request, CutList(run.request.input.cuts or "")
     exposures = Exposures(
         run.blur,
         run.motion,
-        holdout=holdout,
+        holdout=holdout or Holdout(displays=not request.blur.holdout),
         fill=request.video.duplicates == "fill",
         cuts=cuts.is_search,
         known_cuts=cuts.frames(0),
@@ -234,6 +239,14 @@ def steady(
 
 def _rate(name: str, rate: str | float | Fraction) -> Fraction:
     return rate_of(str(rate), name).limit_denominator(FINEST_RATE)
+
+
+def _held(holdout: np.ndarray | str | None) -> Holdout:
+    if holdout is None or isinstance(holdout, str):
+        if holdout not in (None, NONE):
+            raise InputError(f"holdout must be an array or {NONE!r}, got {holdout!r}")
+        return Holdout(displays=holdout is None)
+    return Holdout(_matte(holdout), displays=False)
 
 
 def _matte(holdout: np.ndarray) -> np.ndarray:

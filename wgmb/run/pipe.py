@@ -21,6 +21,7 @@ from ..settings.output import rate_of
 from ..settings.video import VideoSettings
 from ..video.clock import tick
 from ..video.exposures import Exposure, Exposures
+from ..video.holdouts import NONE
 from ..video.output_times import OutputFrame
 from ..video.read.stream_reader import StreamReader
 from ..video.write.encoders import FINEST_RATE, SUFFIXES, Encoding, Facts, chosen
@@ -47,6 +48,8 @@ class PipeReport:
     """Numbers of the input's pictures that begin a shot."""
     left_out: list[str] = field(default_factory=list)
     """Contents that the output cannot hold."""
+    held_out: str = ""
+    """A line about displays that stay sharp, if any were found."""
 
 
 Reader = Y4mReader | StreamReader
@@ -121,6 +124,7 @@ def blur_pipe(
             raise
         shots = found.exposures.shots
         report.cuts = sorted(shots.cuts) if shots else []
+        report.held_out = found.exposures.holdout.message
         report.loss = reader.loss if reader else ""
         report.left_out = sink.left_out
         if reader and not report.frames:
@@ -138,7 +142,7 @@ def _check(source: str, output: OutputSettings, request: VideoRequest) -> None:
             raise InputError(
                 f"`{[*used, 'frames'][0]}` is for files; a pipe is read from its beginning"
             )
-        if request.blur.holdout:
+        if request.blur.holdout not in ((), (NONE,)):
             raise InputError("`holdout` of a video is for files; a pipe is read once")
     elif not is_pipe(output.output):
         raise InputError("neither input nor output is a pipe")

@@ -33,7 +33,7 @@ from ..shots.reader import Picture
 from ..shutter import Shutter
 from ..video.clock import Clock
 from ..video.exposures import VideoBlur
-from ..video.holdouts import files_of, holdout_of
+from ..video.holdouts import NONE, check_masks, files_of, holdout_of
 from ..video.output_times import OutputFrame, OutputFrames
 from ..video.planes import Planes
 from ..video.read.reader import VideoReader
@@ -74,6 +74,8 @@ class VideoReport:
     """Pictures that could not be read, or are damaged, if there are any."""
     is_new: bool = True
     """False if it had been finished before (`resume`)."""
+    held_out: str = ""
+    """A line about displays that stay sharp, if any were found."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,8 @@ class VideoRequest:
             check_method(self.blur.method, FRAME_METHODS)
         check_fits(self.input, self.blur)
         self.video.check()
-        if self.blur.holdout and self.video.flow == "none":
+        check_masks(self.blur.holdout)
+        if self.blur.holdout not in ((), (NONE,)) and self.video.flow == "none":
             raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
         opened = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         chosen, how = self.video.chosen(opened)
@@ -200,6 +203,7 @@ class VideoRun:
             plan.reader.scaling(),
             plan.reader.loss(),
             found is not None,
+            exposures.holdout.message,
         )
 
 

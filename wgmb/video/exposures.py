@@ -26,6 +26,7 @@ from ..shutter import Shutter
 from ..threads import ahead
 from .clock import Clock
 from .gpu_frames import VideoFrames
+from .holdouts import Holdout
 from .output_times import OutputFrame
 from .planes import Average, Planes, averages
 from .read.reader import VideoReader
@@ -39,7 +40,7 @@ class Exposures:
     """The exposures of pictures in time, one after the other, wherever the pictures come from.
 
     `motion`: where motion comes from (wgmb/flow); None: pictures are averaged as they are.
-    `holdout` (height, width): 1 stays sharp. `fill`: repeated pictures are left out, and motion
+    `holdout`: what stays sharp. `fill`: repeated pictures are left out, and motion
     goes on over the gap. `cuts`: whether cuts are looked for, beside `known_cuts`, the numbers of
     pictures that begin a shot. `planes`: make their light, which may be expanded for the blur.
     `flash`: how long a flash of several pictures lasts at most [s]. `tolerance`: by how much their
@@ -51,7 +52,7 @@ class Exposures:
         blur: Blur,
         motion: MotionSource | None,
         *,
-        holdout: np.ndarray | None = None,
+        holdout: Holdout | None = None,
         fill: bool = False,
         cuts: bool = True,
         known_cuts: Collection[int] = (),
@@ -61,7 +62,8 @@ class Exposures:
     ):
         if reach_of(blur.method) > 1:
             raise InputError("a `reach` of 2 is for rendered frames, a video takes 1")
-        self._holdout, self._flash, self._tolerance = holdout, flash, tolerance
+        self.holdout = holdout or Holdout(displays=False)
+        self._flash, self._tolerance = flash, tolerance
         self._blur, self._motion = blur, motion
         self._sum, self._planes = ExposureSum(blur), planes or Planes(blur.device)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
@@ -91,7 +93,7 @@ class Exposures:
             flash=self._flash,
             tolerance=self._tolerance,
         )
-        views = VideoFrames(shots, self._blur, self._motion, self._holdout, self._planes)
+        views = VideoFrames(shots, self._blur, self._motion, self.holdout, self._planes)
         for frame in wanted:
             cells = shots.cells(float(frame.time), float(frame.interval), shutter)
             yield frame, Exposure(self, shots, views, cells)

@@ -15,6 +15,7 @@ from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
 from ..shots.motion import MotionSource
 from ..shots.reader import ShotReader
+from .holdouts import Holdout
 from .motion import VideoMotion
 from .planes import Planes
 from .thumbnail import Thumbnail
@@ -26,7 +27,7 @@ _FRAMES = 3  # with motion: a frame and its neighbours
 class VideoFrames:
     """Textures of the pictures of `shots`, on the device of the Blur that takes them.
 
-    `motion`: where motion comes from, or None. `holdout` (height, width): 1 stays sharp.
+    `motion`: where motion comes from, or None. `holdout`: what stays sharp, where there is motion.
     `planes`: make their light; motion is searched in light that is not expanded.
     """
 
@@ -35,7 +36,7 @@ class VideoFrames:
         shots: ShotReader[Thumbnail],
         blur: Blur,
         motion: MotionSource | None = None,
-        holdout: np.ndarray | None = None,
+        holdout: Holdout | None = None,
         planes: Planes | None = None,
     ):
         self._shots, self._device = shots, blur.device
@@ -43,10 +44,9 @@ class VideoFrames:
         self._neighbours = "neighbours" in blur.method.uses
         wants_depth = "depth" in blur.method.needs | blur.method.uses
         self._source = VideoMotion(motion, shots, blur.device, wants_depth) if motion else None
-        self._holdout: View | None = None
-        if holdout is not None and motion is not None:
-            texel = TEXTURES["holdout"]["format"]
-            self._holdout = self._images.upload("holdout", holdout, texel)
+        self._holdout = holdout or Holdout(displays=False)
+        self._held = self._holdout.of(shots)
+        self._mask: View | None = None
         self._lights: dict[int, str] = {}  # names of textures by index, the latest last
         self._frames: dict[int, FrameViews] = {}
 
@@ -71,7 +71,7 @@ class VideoFrames:
             return kept
         found = self._motion(index)
         motion, depth = found or (None, None)
-        holdout = self._holdout if found else None
+        holdout = self._held_out(index) if found else None
         made = FrameViews(color=light, motion=motion, depth=depth, holdout=holdout, key=object())
         while len(self._frames) >= _FRAMES:
             self._frames.pop(next(iter(self._frames)))
@@ -117,6 +117,17 @@ class VideoFrames:
             self._images.upload(f"motion {place}", motion, "rgba32float"),
             None if depth is None else self._images.upload(f"depth {place}", depth, "r32float"),
         )
+
+    def _held_out(self, index: int) -> View | None:
+        """Mask of what stays sharp in a picture."""
+        plane, texel = self._held(index), TEXTURES["holdout"]["format"]
+        if plane is None:
+            return None
+        if plane is not self._holdout.mask:
+            return self._images.upload(f"display {index % _FRAMES}", plane, texel)
+        if self._mask is None:
+            self._mask = self._images.upload("holdout", plane, texel)
+        return self._mask
 
     def _factors(self, index: int) -> tuple[float, float]:
         """See exposure.evened."""

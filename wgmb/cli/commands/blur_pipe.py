@@ -49,6 +49,8 @@ def blur_pipe(
         tell(text)
     if report.cuts:
         tell(f"camera cut before picture {', '.join(map(str, report.cuts))}")
+    if report.held_out:
+        tell(report.held_out)
     where = "stdout" if output.output == STDOUT else output.output
     tell(f"{counted(report.frames, 'frame')} -> {where}")
     if report.loss:

@@ -40,6 +40,8 @@ def blur_video(
             note(f"flash at picture {', '.join(map(str, report.flashes))}")
         if report.repeated:
             note(f"{report.repeated} repeated pictures left out")
+        if report.held_out:
+            note(as_options(report.held_out))
         if report.scaling:
             note(report.scaling)
         note(f"{counted(report.frames, 'frame')} in {took} -> {report.output}")

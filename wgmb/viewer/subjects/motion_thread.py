@@ -109,7 +109,7 @@ class MotionThread:
 
     def _keep(self, number: int, known: PictureFinding) -> None:
         self._known[number] = known
-        size = sum(a.nbytes for a in (known.motion, known.depth) if a is not None)
+        size = sum(a.nbytes for a in (known.motion, known.depth, known.holdout) if a is not None)
         most = max(_MEMORY // max(size, 1), _FEWEST)
         while len(self._known) > most:
             self._known.popitem(last=False)

@@ -16,7 +16,7 @@ import wgpu
 from ...shots.cut_list import CutList
 from ...shots.motion import MotionSource
 from ...shots.reader import NoPicturesError, Picture, ShotReader
-from ...video.holdouts import holdout_of
+from ...video.holdouts import NONE, Held, holdout_of
 from ...video.motion import VideoMotion
 from ...video.read.reader import VideoReader
 from ...video.thumbnail import Thumbnail, is_cut, is_double
@@ -74,7 +74,9 @@ class PictureFinder:
         self._reader, self._device, self._source = reader, device, motion
         self._times = reader.times.seconds
         self._fill, self._cuts = request.fill, CutList(request.cuts)
-        self._holdout = holdout_of(request.masks, reader) if motion is not None else None
+        masks = request.masks if motion is not None else (NONE,)
+        self._holdout = holdout_of(masks, reader)
+        self._held: Held | None = None
         self._shots: ShotReader[Thumbnail] | None = None
         self._motion: VideoMotion | None = None
         self._numbers: WeakKeyDictionary[Thumbnail, int] = WeakKeyDictionary()
@@ -104,7 +106,7 @@ class PictureFinder:
             ends=not shots.moves_on(here, here + 1),
             begins_shot=not shots.same_shot(here, here - 1),
             ends_shot=not shots.same_shot(here, here + 1),
-            holdout=None if found is None else self._holdout,
+            holdout=None if found is None or not self._held else self._held(here),
         )
 
     def _shots_around(self, number: int) -> ShotReader[Thumbnail]:
@@ -127,6 +129,7 @@ class PictureFinder:
         )
         source = self._source
         self._motion = VideoMotion(source, shots, self._device) if source else None
+        self._held = self._holdout.of(shots)
         return shots
 
     def _pictures(self, first: int) -> Iterator[Picture[Thumbnail]]:

@@ -1,0 +1,157 @@
+"""Displays and captions before moving ground stay legible, and nothing else is taken for one."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import wgmb
+from tests.made import make_displays as make
+from wgmb.errors import InputError
+from wgmb.video import displays
+from wgmb.video.displays import Displays
+from wgmb.video.holdouts import Holdout, check_masks
+
+COUNT = 12
+MIDDLE = 6
+
+
+def grey(picture):
+    red, green, blue = np.moveaxis(picture.astype(np.uint16), 2, 0)
+    return ((2 * red + 5 * green + blue) >> 3).astype(np.uint8)
+
+
+def finder(pictures, always=False):
+    found = [grey(one) for one in pictures]
+    return Displays(found.__getitem__, lambda _, n: 0 <= n < len(found), always)
+
+
+class Shots:
+    """Stands for a ShotReader of one shot, whose first picture has the number 100."""
+
+    def __init__(self, pictures):
+        self.pictures = pictures
+
+    def __getitem__(self, index):
+        content = SimpleNamespace(grey=grey(self.pictures[index]))
+        return SimpleNamespace(content=content, number=100 + index)
+
+    def moves_on(self, _, other):
+        return 0 <= other < len(self.pictures)
+
+
+def leaves(count, speed=make.SPEED):
+    big, nothing = make.ground(), np.zeros((*make.SIZE[::-1], 4), np.uint8)
+    return [make.over(nothing, make.seen(big, n, speed)) for n in range(count)]
+
+
+@pytest.fixture(scope="module")
+def clip():
+    return make.clip(COUNT)
+
+
+def test_text_before_moving_leaves_is_legible(clip, device):
+    pictures, truth, where = clip
+
+    def judged(holdout):
+        run = wgmb.blur_pictures(pictures, flow="dis", shutter=180, holdout=holdout, device=device)
+        out = [next(run) for _ in range(MIDDLE + 2)]
+        both = [
+            (make.decibels(out[n], truth[n], make.thin_text(where[n])),
+             make.decibels(out[n], truth[n], where[n]))
+            for n in (MIDDLE - 1, MIDDLE)
+        ]  # fmt: skip
+        return np.mean(both, axis=0)
+
+    text, display = judged("none")
+    assert text < 19 and display < 19
+    text, display = judged(None)
+    assert text > 28 and display > 33
+
+
+def test_it_is_found_where_it_is(clip):
+    pictures, _, where = clip
+    found = finder(pictures).mask(MIDDLE)
+    assert displays.SHARES[0] < found.mean() < displays.SHARES[1]
+    text = make.thin_text(where[MIDDLE])
+    strokes = text & (make.display(MIDDLE)[..., 3] > 220)
+    assert found[strokes].mean() > 0.8
+    assert (found & ~where[MIDDLE]).mean() < 0.03
+
+
+def test_digits_that_change_with_every_picture_are_found(clip):
+    pictures, _, _ = clip
+    before, here, after = (make.display(MIDDLE + k)[..., 3] for k in (-1, 0, 1))
+    digits = (here != before) & (here != after) & (here > 128)
+    digits[22:] = False  # of the score
+    assert digits.sum() > 20 and finder(pictures).mask(MIDDLE)[digits].mean() > 0.8
+
+
+def test_there_is_none_in_ground_that_moves_or_stands():
+    for pictures in (leaves(COUNT), leaves(COUNT, speed=1.0), leaves(COUNT, speed=0.0)):
+        assert finder(pictures).mask(MIDDLE) is None
+
+
+def test_a_camera_that_stands_makes_no_display_of_its_ground():
+    """Something that moves before half of it changes nothing of that."""
+    still, moves = leaves(COUNT, speed=0.0), leaves(COUNT)
+    for n, picture in enumerate(still):
+        picture[:, :110] = moves[n][:, :110]
+    assert finder(still).mask(MIDDLE) is None
+
+
+def test_a_caption_is_found_from_its_first_picture_on():
+    pictures, _, where = make.clip(COUNT, first=5)
+    found = finder(pictures)
+    text = make.thin_text(where[5]) & (make.display(5)[..., 3] > 220)
+    before = found.mask(4)
+    assert before is None or before[text].mean() < 0.1
+    assert found.mask(5)[text].mean() > 0.6
+
+
+def test_few_pictures_tell_nothing(clip):
+    assert finder(clip[0][:5]).mask(2) is None
+
+
+def test_a_mask_depends_on_the_pictures_around_alone(clip):
+    pictures = clip[0] + clip[0]
+    near = range(10 - displays.REACH, 10 + displays.REACH + 1)
+    shown = {n: grey(pictures[n]) for n in near}
+    in_order = finder(pictures)
+    for n in range(10):
+        in_order.mask(n)
+    alone = Displays(shown.__getitem__, lambda _, n: n in shown)
+    np.testing.assert_array_equal(in_order.mask(10), alone.mask(10))
+
+
+def test_sums_and_contrast_are_those_of_loops():
+    plane = np.random.default_rng(1).integers(0, 256, (19, 23)).astype(np.uint8)
+    contrast = displays._contrast(plane)
+    sums = displays._sum_around(plane > 128, 2)
+    for y, x in np.ndindex(plane.shape):
+        near = plane[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].astype(int)
+        assert contrast[y, x] == near.max() - near.min()
+        assert sums[y, x] == (plane > 128)[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3].sum()
+
+
+def test_the_line_tells_how_much_stays_sharp(clip):
+    shots, holdout = Shots(clip[0]), Holdout()
+    assert holdout.message == ""
+    plane = holdout.of(shots)(MIDDLE)
+    assert plane.dtype == np.float32 and set(np.unique(plane)) == {0, 1}
+    assert list(holdout.shares) == [100 + MIDDLE] and "8.1 % of 1 picture;" in holdout.message
+    assert Holdout(displays=False).of(shots)(MIDDLE) is None
+
+
+def test_a_mask_and_what_is_found_stay_sharp_together(clip):
+    mask = np.zeros(clip[0][0].shape[:2], np.float32)
+    mask[100:] = 0.5
+    held = Holdout(mask).of(Shots(clip[0]))
+    found = finder(clip[0]).mask(MIDDLE)
+    np.testing.assert_array_equal(held(MIDDLE), np.maximum(found, mask))
+
+
+def test_none_stands_alone():
+    check_masks(("none",))
+    with pytest.raises(InputError, match="stands alone"):
+        check_masks(("none", "static"))

@@ -1,0 +1,225 @@
+"""Displays and captions over a moving picture: counters, crosshairs, subtitles, logos.
+
+Thin strokes before moving ground take the motion of the ground, and would be blurred until nobody
+can read them. They are found pixel by pixel: pixels that do not change from picture to picture and
+differ from those beside them, while their surroundings change. Digits that change and the soft
+edges of strokes are found by their brightness, next to strokes that stand.
+"""
+
+# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+REACH = 5  # pictures to each side that are looked at
+_STILL = 5  # successive steps without a change, from which a pixel stands
+_NOISE = 5  # levels of 255 by which codecs change what stands
+_EDGE = 0.25  # of the contrast, by which they change it beside what moves
+_CONTRAST = 30, 50  # levels of 255 from which a pixel differs, or clearly, from those beside it
+_MOVING = 0.3  # share of changes around a pixel, from which its surroundings move
+_SUPPORT = 3  # pixels of 5 x 5 that must stand with one
+_TILE = 16  # px; surroundings are 5 x 5 tiles
+_NEAR = 8  # px; a digit that changes has what stands within one or two of these
+_ALIKE = 18  # levels of 255 by which strokes of one display differ
+_MIXED = 0.6  # of the way from a stroke to the ground: up to there a pixel belongs to the stroke
+SHARES = 0.001, 0.15  # of the picture, that a display takes
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """A picture in display values without colour, and the contrast around each pixel (uint8)."""
+
+    grey: np.ndarray
+    contrast: np.ndarray
+
+
+class Displays:
+    """Displays in pictures, one after the other.
+
+    `load(number)`: a picture (height, width) uint8, its display values without colour.
+    `leads(number, other)`: whether motion leads from a picture to another, which is there then.
+    `always`: also where their share of the picture, or a standing camera, speaks against a display.
+    """
+
+    def __init__(
+        self,
+        load: Callable[[int], np.ndarray],
+        leads: Callable[[int, int], bool],
+        always: bool = False,
+    ):
+        self._load, self._leads, self._always = load, leads, always
+        self._pictures: dict[int, _Picture] = {}
+        self._steps: dict[int, np.ndarray] = {}
+
+    def mask(self, number: int) -> np.ndarray | None:
+        """(height, width) bool, what stands; None if there is no display.
+
+        It depends on the REACH pictures before and after alone.
+        """
+        self._forget(number)
+        here = self._picture(number)
+        back, ahead = self._run(number, -1), self._run(number, 1)
+        if len(back) + len(ahead) < _STILL:
+            return None
+        textured, clearly = (here.contrast > least for least in _CONTRAST)
+        before, after = _length(back, textured), _length(ahead, textured)
+        stands = before + after >= _STILL
+        stands &= textured
+        if not self._always and 2 * np.count_nonzero(stands) > np.count_nonzero(textured):
+            return None  # the camera stands
+        core = stands & clearly & _moves_around(back + ahead, textured.shape)
+        core &= _sum_around(core, 2) >= _SUPPORT
+        if not core.any():
+            return None
+        core |= stands & (_sum_around(core, 2) > 0)
+        whole = core | _changing(core, textured, here.grey)
+        whole |= _edges(whole, here.grey)
+        low, high = SHARES
+        return whole if self._always or low <= whole.mean() <= high else None
+
+    def _picture(self, number: int) -> _Picture:
+        if number not in self._pictures:
+            grey = self._load(number)
+            self._pictures[number] = _Picture(grey, _contrast(grey))
+        return self._pictures[number]
+
+    def _run(self, number: int, way: int) -> list[np.ndarray]:
+        """Where nothing changes, step by step away from a picture, as far as there are any."""
+        found = []
+        for k in range(1, REACH + 1):
+            if not self._leads(number, number + way * k):
+                break
+            first = min(number + way * k, number + way * (k - 1))
+            if first not in self._steps:
+                self._steps[first] = self._step(first)
+            found.append(self._steps[first])
+        return found
+
+    def _step(self, number: int) -> np.ndarray:
+        """Where nothing changes from a picture to the next."""
+        one, two = self._picture(number), self._picture(number + 1)
+        change = np.maximum(one.grey, two.grey) - np.minimum(one.grey, two.grey)
+        least = np.minimum(one.contrast, two.contrast)
+        return change <= np.maximum(least // round(1 / _EDGE), _NOISE)
+
+    def _forget(self, number: int) -> None:
+        for kept in (self._pictures, self._steps):
+            for old in [n for n in kept if abs(n - number) > REACH + 1]:
+                del kept[old]
+
+
+def _contrast(grey: np.ndarray) -> np.ndarray:
+    """The greatest less the least of 3 x 3 pixels."""
+    most, least = grey.copy(), grey.copy()
+    for axis in (0, 1):
+        for found, choose in ((most, np.maximum), (least, np.minimum)):
+            whole = np.moveaxis(found, axis, 0)
+            before = whole.copy()
+            choose(whole[1:], before[:-1], out=whole[1:])
+            choose(whole[:-1], before[1:], out=whole[:-1])
+    return most - least
+
+
+def _length(steps: list[np.ndarray], among: np.ndarray) -> np.ndarray:
+    """Number of steps without a change from the picture on, of the pixels `among`."""
+    going, count = among.copy(), np.zeros(among.shape, np.uint8)
+    for still in steps:
+        going &= still
+        count += going
+    return count
+
+
+def _tiles(plane: np.ndarray, side: int) -> np.ndarray:
+    """(rows, columns, side, side): the tiles of a plane, its last ones filled from its edge."""
+    height, width = plane.shape
+    padded = np.pad(plane, ((0, -height % side), (0, -width % side)), mode="edge")
+    rows, columns = padded.shape[0] // side, padded.shape[1] // side
+    return padded.reshape(rows, side, columns, side).swapaxes(1, 2)
+
+
+def _spread(tiles: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarray:
+    """A value for each tile -> for each pixel."""
+    return np.repeat(np.repeat(tiles, side, 0), side, 1)[: shape[0], : shape[1]]
+
+
+def _moves_around(steps: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
+    """Where many pixels of the surroundings change."""
+    still = np.zeros(shape, np.uint8)
+    for step in steps:
+        still += step
+    rest = _tiles(still, _TILE).mean((2, 3)) / len(steps)
+    padded = np.pad(rest, 2, mode="edge")
+    views = np.lib.stride_tricks.sliding_window_view(padded, (5, 5))
+    return _spread(1 - views.mean((2, 3)) > _MOVING, _TILE, shape)
+
+
+def _sum_around(plane: np.ndarray, reach: int) -> np.ndarray:
+    """Number of pixels up to `reach` to each side that are set (uint8)."""
+    found = plane.astype(np.uint8)
+    for axis in (0, 1):
+        whole, total = np.moveaxis(found, axis, 0), np.moveaxis(found.copy(), axis, 0)
+        for k in range(1, reach + 1):
+            total[k:] += whole[:-k]
+            total[:-k] += whole[k:]
+        found = np.moveaxis(total, 0, axis)
+    return found
+
+
+def _changing(core: np.ndarray, candidates: np.ndarray, grey: np.ndarray) -> np.ndarray:
+    """Pixels as bright, or as dark, as the strokes near them: digits that change.
+
+    Where more pixels are so than stand, the ground is as bright, and nothing is told.
+    """
+    count = _tiles(core, _NEAR).sum((2, 3))
+    most = _tiles(np.where(core, grey, 0), _NEAR).max((2, 3))
+    least = _tiles(np.where(core, grey, 255), _NEAR).min((2, 3))
+    count = _near(count, 0).sum((2, 3))
+    most, least = _near(most, 0).max((2, 3)), _near(least, 255).min((2, 3))
+    places = np.nonzero(candidates & ~core & _spread(count > 0, _NEAR, core.shape))
+    tile = places[0] // _NEAR, places[1] // _NEAR
+    own, high, low = (a.astype(np.int16) for a in (grey[places], most[tile], least[tile]))
+    found = np.zeros(core.shape, bool)
+    for alike in (own >= high - _ALIKE, own <= low + _ALIKE):
+        these = np.zeros(core.shape, bool)
+        these[places] = alike
+        few = _near(_tiles(these, _NEAR).sum((2, 3)), 0).sum((2, 3)) <= count
+        found |= these & _spread(few, _NEAR, core.shape)
+    return found
+
+
+def _near(tiles: np.ndarray, beyond: int) -> np.ndarray:
+    """(rows, columns, 3, 5): every tile and those around it, along a line of text one further."""
+    padded = np.pad(tiles, ((1, 1), (2, 2)), constant_values=beyond)
+    return np.lib.stride_tricks.sliding_window_view(padded, (3, 5))
+
+
+def _edges(strokes: np.ndarray, grey: np.ndarray) -> np.ndarray:
+    """Pixels next to strokes that are partly theirs: they are nearer to them than to the ground."""
+    places = np.nonzero((_sum_around(strokes, 1) > 0) & ~strokes)
+    own = grey[places].astype(np.float32)
+    stroke = _mean_near(strokes, grey, places, (-1, 0, 1))
+    ground = _mean_near(_sum_around(strokes, 2) == 0, grey, places, (-6, -3, 0, 3, 6))
+    found = np.zeros(strokes.shape, bool)
+    found[places] = np.abs(own - stroke) < _MIXED * np.abs(ground - stroke)
+    return found
+
+
+def _mean_near(
+    among: np.ndarray, grey: np.ndarray, places: tuple[np.ndarray, ...], offsets: tuple[int, ...]
+) -> np.ndarray:
+    """The mean of the pixels `among` those at some offsets from each place; 0 without any."""
+    total = np.zeros(len(places[0]), np.float32)
+    count = np.zeros(len(places[0]), np.float32)
+    height, width = among.shape
+    for down in offsets:
+        for right in offsets:
+            y = np.clip(places[0] + down, 0, height - 1)
+            x = np.clip(places[1] + right, 0, width - 1)
+            counts = among[y, x]
+            total += np.where(counts, grey[y, x], 0)
+            count += counts
+    return total / np.maximum(count, 1)
