@@ -187,3 +187,11 @@ def test_no_example_of_a_page_writes_over_one_before_it(page):
         if (match := WRITING.match(line)) and not re.search("--(resume|overwrite)", line)
     ]
     assert not {name for name in found if found.count(name) > 1}
+
+
+@pytest.mark.fast
+def test_every_file_that_the_page_on_the_architecture_names_is_there():
+    page = PAGES["docs/development/architecture.md"].partition("## Where is it?")[2]
+    named = re.findall(r"`([a-z_0-9/]+/?\.?(?:py|wgsl)?)`", page.partition("\n## ")[0])
+    assert len(named) > 12
+    assert [n for n in named if not any((HERE / base / n).exists() for base in ("", "wgmb"))] == []
