@@ -8,10 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import make_frames as make
-from wgmb.run.batch_report import BatchReport
 from wgmb.run.farm.plugin import BlurPlugin
 from wgmb.run.job import Job, settle
-from wgmb.run.report import Outcome
+from wgmb.run.report import BatchReport, Outcome
 from wgmb.run.request import BlurRequest
 from wgmb.sequence.findings import SequenceFindings
 from wgmb.settings import (

@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from .pipeline.one_frame import blur
     from .png import show
     from .render import Render
-    from .run.batch_report import BatchReport
     from .run.file_sink import BlurredFrame
     from .run.pictures import PictureBlur, blur_pictures
+    from .run.report import BatchReport
     from .run.sequence import blur_sequence, vectors_sequence
     from .run.stages import blurred
     from .run.video import VideoReport, blur_video
@@ -111,7 +111,7 @@ _PLACES = {
     "pipeline.one_frame": ("blur",),
     "png": ("show",),
     "render": ("Render",),
-    "run.batch_report": ("BatchReport",),
+    "run.report": ("BatchReport",),
     "run.file_sink": ("BlurredFrame",),
     "run.pictures": ("PictureBlur", "blur_pictures"),
     "run.sequence": ("blur_sequence", "vectors_sequence"),

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
 
 interrupted = threading.Event()
 """Set by Ctrl-C: Python drops an exception that a signal raises within a destructor."""
@@ -173,3 +175,22 @@ def progress(frames: int, quiet: bool, doing: str = "blurring"):
             )
 
         yield tick
+
+
+@contextlib.contextmanager
+def share_of(tick: Callable[..., None], frames: int, name: str) -> Iterator[Callable[..., None]]:
+    """Yield a function to call after every frame of a share of a bar, under a name of its own.
+
+    `tick`: what `progress` yielded. Frames of which it was not told count as skipped in the end.
+    """
+    count = itertools.count()
+
+    def tick_share(number: int, status: str) -> None:
+        next(count)
+        tick(number, status, name)
+
+    try:
+        yield tick_share
+    finally:
+        for number in range(next(count), frames):
+            tick(number, "skipped", name)

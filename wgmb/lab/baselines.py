@@ -17,10 +17,16 @@ from ..gpu.timing import alternate
 from ..pipeline.blur import Blur
 from ..render import Render
 from ..scene import builtin
+from ..shutter import Shutter
 
 # Milliseconds by iTime [s] of the article's own fragment shader of the torusphere, 640 x 360,
 # software OpenGL (Mesa 22.3) on two cores; another machine's figures are another matter.
 ARTICLE = {31.0: 13.7, 20.5: 20.2, 16.0: 22.7, 12.0: 24.9, 7.5: 27.7, 0.0: 35.0}
+
+
+def article_blur(device: wgpu.GPUDevice) -> Blur:
+    """The blur of the article's scene."""
+    return Blur("volume", device=device, shutter=Shutter(720, curve="cosine"))
 
 
 def bench_torusphere(

@@ -19,7 +19,7 @@ from typing import Any, Literal, Protocol, TypeVar
 
 from ..errors import Error, reason
 from ..threads import Behind, ahead
-from .batch_report import BatchReport, Progress
+from .report import BatchReport, Progress
 
 HOPELESS = 3  # frames one after the other that cannot be written for the same reason
 ON_REQUEST = "on request"  # why a run stopped whose `stop` was set

@@ -36,10 +36,9 @@ from ..sequence.layers.masks import is_file, with_amount
 from ..settings import OutputSettings
 from ..settings.record import record
 from ..settings.video import VideoSettings
-from .batch_report import Progress
 from .conversion import RateConversion
 from .needs import check_needs
-from .report import Outcome
+from .report import Outcome, Progress
 from .request import BlurRequest
 from .sequence import blur_sequence, convert_sequence
 

@@ -26,9 +26,9 @@ from ..sequence.frame_file import FrameFile
 from ..settings import InputSettings, OutputSettings, parameters_of, size_of
 from ..settings.perception import PerceptionSettings
 from ..settings.record import record
-from .batch_report import BatchReport, Progress
 from .engine import IsDone, run
 from .file_sink import BlurredFrame, FileSink
+from .report import BatchReport, Progress
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,8 @@ from ..video.linear_frames import VideoPictures
 from ..video.output_times import OutputFrame, OutputFrames
 from ..video.planes import Planes
 from ..video.read.reader import VideoReader
-from .batch_report import Progress
 from .engine import Blurred, Input, IsDone
+from .report import Progress
 from .video import VideoReport, check_fits
 from .video_output import write
 from .video_sink import Form

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import wgpu
+
+from ..errors import InputError
 from ..frame import Frame
 from ..io import exr
 from ..output.output import Output
 from ..output.result import Result
 from ..render import Render
 from ..sequence.frame_file import FrameFile
-from .batch_report import BatchReport, Progress
+from ..settings import (
+    BlurSettings,
+    OutputSettings,
+    SceneSettings,
+    ShutterSettings,
+    size_of,
+)
+from ..settings.color import DisplaySettings, color_record
+from ..settings.record import record
 from .engine import IsDone, run
 from .file_sink import BlurredFrame, FileSink
+from .job import check_confidence
+from .report import BatchReport, Progress
 
 
 class RenderedFrames:
@@ -58,11 +72,68 @@ class RenderedFrames:
         return BlurredFrame(number, [Result(source, picture, planes)])
 
 
-def render_frames(
-    frames: RenderedFrames, output: Output, resume: bool, progress: Progress | None
-) -> BatchReport:
-    """Render every frame into `output`; the first error ends it."""
-    return run(frames, FileSink(output), resume=resume, progress=progress)
+@dataclass(frozen=True, kw_only=True)
+class SceneRequest:
+    """Request to render a scene, as `wgmb render` receives it; the last three: RenderedFrames."""
+
+    scene: str
+    output: OutputSettings
+    options: SceneSettings = field(default_factory=SceneSettings)
+    blur: BlurSettings = field(default_factory=BlurSettings)
+    shutter: ShutterSettings = field(default_factory=ShutterSettings)
+    color: DisplaySettings = field(default_factory=DisplaySettings)
+    sharp: bool = False
+    passes: bool = False
+    confidence: bool = False
+
+    def open(self, device: wgpu.GPUDevice | str | None = None) -> SceneRun:
+        """Open the GPU and the output; InputError for settings that make no sense together."""
+        output, options, fps = self.output, self.options, float(self.output.rate)
+        scene = options.make(self.scene)
+        blur, shutter = self.blur.resolved(scene), self.shutter.resolved(scene, fps)
+        self._check()
+        times = options.moments(fps)
+        made = blur.make(shutter.make(), device)
+        size = size_of(options.size)
+        render = Render(scene, made, size=size, fps=fps, antialias=options.antialias)
+        how = {"sharp": self.sharp, "passes": self.passes}
+        settings = record(
+            output, blur, shutter, options,
+            scene=self.scene, fps=fps, samples=blur.settled_samples(), **how,
+        )  # fmt: skip
+        if self.confidence:
+            check_confidence(made.method.name, output)
+            settings["confidence"] = True
+        display = self.color.open(needed=not output.is_exr)
+        settings |= color_record(display, output.output)
+        files = output.make(settings, list(times), display=display)
+        frames = RenderedFrames(render, times, confidence=self.confidence, **how)
+        return SceneRun(render, frames, files, output.resume)
+
+    def _check(self) -> None:
+        output = self.output
+        if self.blur.holdout or self.blur.scale:
+            raise InputError("`holdout` and `scale` need input files; use them with wgmb blur")
+        if self.passes and not output.is_exr:
+            raise InputError(f"`passes` needs an .exr output, got {output.output}")
+        if self.passes and output.layers == "picture":
+            raise InputError("`passes` cannot be combined with `layers` picture")
+        if self.confidence and self.sharp:
+            raise InputError("`confidence` cannot be combined with `sharp`")
+
+
+@dataclass(frozen=True)
+class SceneRun:
+    """Frames of a scene and their output; call it."""
+
+    render: Render
+    frames: RenderedFrames
+    output: Output
+    resume: bool
+
+    def __call__(self, progress: Progress | None = None) -> BatchReport:
+        """Render every frame; the first error ends it."""
+        return run(self.frames, FileSink(self.output), resume=self.resume, progress=progress)
 
 
 def _with_passes(render: Render, frame: Frame, number: int) -> FrameFile:

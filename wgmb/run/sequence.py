@@ -16,10 +16,10 @@ from ..output.output import Output
 from ..output.vectors import VectorOutput
 from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
-from .batch_report import BatchReport, Progress
 from .conversion import RateConversion, RateConversionStages
 from .engine import run
 from .file_sink import FileSink
+from .report import BatchReport, Progress
 from .stages import MotionStages, Stages
 
 

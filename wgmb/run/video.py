@@ -39,8 +39,8 @@ from ..video.planes import Planes
 from ..video.read.reader import VideoReader
 from ..video.thumbnail import Thumbnail
 from ..video.write.encoders import FINEST_RATE, SUFFIXES
-from .batch_report import Progress
 from .engine import Blurred, Input, IsDone
+from .report import Progress
 from .video_output import write
 from .video_sink import Form
 

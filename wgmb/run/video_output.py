@@ -24,9 +24,9 @@ from ..video.write.encoders import SUFFIXES, chosen
 from ..video.write.other_streams import OtherStreams
 from ..video.write.segments import Segments, remove_left
 from ..video.write.writer import VideoWriter
-from .batch_report import Progress
 from .engine import Input, run
 from .file_sink import FileSink
+from .report import Progress
 from .video_sink import Form, LightForm, VideoSink, coded_form, frame_record
 
 _NOT_OURS = " and holds no record of a run: it is cut off, or of another program"

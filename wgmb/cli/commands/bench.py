@@ -12,9 +12,7 @@ from ...errors import InputError
 from ...lab.cases import Candidate
 from ...lab.report import write
 from ...methods import METHODS
-from ...pipeline.blur import Blur
 from ...settings import size_of
-from ...shutter import Shutter
 from .. import terminal
 from ..options import Adapter, Quiet
 from ..pages import (
@@ -81,7 +79,7 @@ def bench(
 
     device, sizes = gpu.open_device(adapter), [size_of(text) for text in size or ["1920x1080"]]
     if article:
-        blur = Blur("volume", device=device, shutter=Shutter(720, curve="cosine"))
+        blur = baselines.article_blur(device)
         for width, height in sizes:
             _tell_article(baselines.bench_torusphere(blur, width, height, rounds), width, height)
         return 0

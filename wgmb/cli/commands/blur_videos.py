@@ -17,7 +17,7 @@ from ...video.write.encoders import SUFFIXES, chosen
 from ..exit_codes import DONE, SOME_FAILED
 from ..names import outputs_of, videos_of
 from ..spelling import as_options
-from ..terminal import complain, note, progress
+from ..terminal import complain, note, progress, share_of
 from .blur_video import tell_how
 
 Tell = Callable[..., None]
@@ -66,20 +66,13 @@ def blur_videos(
 
 def _one_of_many(plan: VideoPlan, run: VideoRun, tell: Tell, quiet: bool) -> bool:
     """Blur a video and say so in a line; returns whether all of it is done."""
-    path, told = plan.reader.path, [0]
-
-    def tell_name(number: int, status: str) -> None:
-        told[0] += 1
-        tell(number, status, f"{path.name}, frame")
-
+    path = plan.reader.path
     try:
-        report = run(plan, tell_name)
+        with share_of(tell, len(plan.wanted), f"{path.name}, frame") as tick:
+            report = run(plan, tick)
     except _FAILURES as error:
         complain(_reason(error, path))
         return False
-    finally:
-        for number in range(told[0], len(plan.wanted)):
-            tell_name(number, "skipped")
     if not quiet:
         took = f"{counted(report.frames, 'frame')} in {report.seconds:.1f} s"
         words = [took if report.is_new else "", *report.left_out, *report.notes]

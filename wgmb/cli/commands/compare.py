@@ -75,7 +75,9 @@ class CompareSettings:
         seconds = self.budget / 1e3
         return lambda report, case: [seconds]
 
-    def exposures(self, shutter: ShutterSettings, scene: Scene | None = None) -> dict[str, Shutter]:
+    def labelled_shutters(
+        self, shutter: ShutterSettings, scene: Scene | None = None
+    ) -> dict[str, Shutter]:
         """Return the shutters by label; unset fields are taken from the scene."""
         settled = shutter.resolved(scene)
         try:
@@ -167,12 +169,12 @@ def compare(
     cases: list[Callable[[], Case]] = []
     for name, made in map(make_scene, scene):
         scene_frame = SceneFrame(made, time, wanted, antialias=antialias)
-        for degrees, exposed in comparison.exposures(shutter, made).items():
+        for degrees, exposed in comparison.labelled_shutters(shutter, made).items():
             cases.append(partial(scene_case, f"{name}, {degrees}", exposed, reference,
                                  scene_frame, device, tell))  # fmt: skip
     if truth is not None and inputs:
         name = truth[0].parent.name or truth[0].stem
-        for degrees, exposed in comparison.exposures(shutter).items():
+        for degrees, exposed in comparison.labelled_shutters(shutter).items():
             cases.append(partial(clip_case, f"{name}, {degrees}", exposed, inputs, frame,
                                  truth, baselines, input.open))  # fmt: skip
     able = (

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import time
 
-from ...errors import InputError, counted
-from ...render import Render
-from ...run.job import check_confidence
-from ...run.scene import RenderedFrames, render_frames
-from ...settings import size_of
-from ...settings.color import DisplaySettings, color_record
-from ...settings.record import record
+from ...errors import counted
+from ...run.scene import SceneRequest
+from ...settings.color import DisplaySettings
 from ..exit_codes import DONE
 from ..options import (
     Adapter,
@@ -68,41 +64,28 @@ def render(
     quiet
         Print errors only.
     """
-    fps = float(output.rate)
-    picture = options.make(scene)
-    blur, shutter = blur.resolved(picture), shutter.resolved(picture, fps)
-    if blur.holdout or blur.scale:
-        raise InputError("--holdout and --scale need input files; use them with wgmb blur")
-    if passes and not output.is_exr:
-        raise InputError(f"--passes needs an .exr output, got {output.output}")
-    if passes and output.layers == "picture":
-        raise InputError("--passes cannot be combined with --layers picture")
-    moments = options.moments(fps)
-    if confidence and sharp:
-        raise InputError("--confidence cannot be combined with --sharp")
-    made = blur.make(shutter.make(), adapter)
-    renderer = Render(
-        picture, made, size=size_of(options.size), fps=fps, antialias=options.antialias
+    request = SceneRequest(
+        scene=scene,
+        output=output,
+        options=options,
+        blur=blur,
+        shutter=shutter,
+        color=color,
+        sharp=sharp,
+        passes=passes,
+        confidence=confidence,
     )
-    how = {"scene": scene, "sharp": sharp, "passes": passes, "fps": fps}
-    settings = record(output, blur, shutter, options, **how, samples=blur.settled_samples())
-    if confidence:
-        check_confidence(made.method.name, output)
-        settings["confidence"] = True
-    shown = color.open(needed=not output.is_exr)
-    settings |= color_record(shown, output.output)
-    files = output.make(settings, list(moments), display=shown)
+    run = request.open(adapter)
     if color.remark and not (quiet or output.is_exr):
         note(color.remark)
     if verbose:
-        note(f"adapter: {renderer.blur.device.adapter.summary}")
-        note(f"settings: {files.settings}")
-    frames = RenderedFrames(renderer, moments, sharp=sharp, passes=passes, confidence=confidence)
+        note(f"adapter: {run.render.blur.device.adapter.summary}")
+        note(f"settings: {run.output.settings}")
     started = time.perf_counter()
-    with progress(len(moments), quiet, "rendering") as tick:
-        report = render_frames(frames, files, output.resume, tick)
+    with progress(run.frames.total, quiet, "rendering") as tick:
+        report = run(tick)
     if not quiet:
         seconds, skipped = time.perf_counter() - started, len(report.skipped)
-        done = f"{counted(len(report.done), 'frame')} in {seconds:.1f} s -> {files.pattern}"
+        done = f"{counted(len(report.done), 'frame')} in {seconds:.1f} s -> {run.output.pattern}"
         note(done + (f", {skipped} already done" if skipped else ""))
     return DONE

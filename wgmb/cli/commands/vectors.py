@@ -7,12 +7,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ...errors import InputError, counted
-from ...output.vectors import PROGRAMS, VectorOutput
-from ...pipeline.blur import Blur
-from ...run.report import Outcome
-from ...run.sequence import vectors_sequence
-from ...settings.record import record
+from ...errors import counted
+from ...output.vectors import PROGRAMS
+from ...run.vectors import VectorsRequest
 from ..conclusion import conclude
 from ..options import Adapter, InputOptions, Inputs, Quiet, Verbose
 from ..terminal import note, progress
@@ -57,33 +54,26 @@ def vectors(
     quiet
         Print errors only.
     """
-    clip = input.open(pattern)
-    settings = record(input, **{"as": program}, max_displace=max_displace)
-    has = clip.has
-    if has and "motion" not in has:
-        raise InputError(f"{pattern}: no motion to write (neither vectors nor a camera)")
-    blur = Blur("tap", device=adapter)
-    files = VectorOutput(
-        output,
-        program,
-        numbers=clip.numbers,
+    request = VectorsRequest(
+        pattern=pattern,
+        output=output,
+        program=program,
+        input=input,
         max_displace=max_displace,
-        mask_of=clip.vector_mask,
-        settings=settings,
-        inputs=clip.inputs,
         overwrite=overwrite,
         resume=resume,
-        views=clip.chosen,
     )
+    run = request.open(adapter)
+    clip, files = run.clip, run.output
     if verbose:
         note(f"settings: {files.settings}")
     started = time.perf_counter()
     with progress(len(clip.numbers), quiet, "writing vectors") as tick:
-        report = vectors_sequence(clip, files, blur=blur, resume=resume, progress=tick)
+        outcome = run(tick)
     if not quiet:
         for number, count in sorted(files.clipped.items()):
             note(f"frame {number}: clipped {counted(count, 'pixel')} beyond --max-displace")
         if len(clip.chosen) > 1 and not files.takes_views:
             note(f"wrote only view {clip.chosen[0]}; %V in the output's name makes a file for each")
     took = f"{time.perf_counter() - started:.1f} s"
-    return conclude(Outcome.of(clip, report), files.pattern, took, quiet, verbose)
+    return conclude(outcome, files.pattern, took, quiet, verbose)

@@ -20,10 +20,9 @@ import numpy as np
 from ...errors import DeviceError, Error, InputError
 from ...io.frame_numbers import frame_list
 from ...sequence.findings import ranges
-from ..batch_report import Progress
 from ..engine import ON_REQUEST
 from ..job import Job
-from ..report import Outcome
+from ..report import Outcome, Progress
 from .workers import (
     Chunk,
     Worker,

@@ -10,10 +10,9 @@ from typing import Any
 
 from ...errors import InputError
 from ...extras import needed_by
-from ..batch_report import Progress
 from ..job import Job
 from ..job_file import stored, time_there
-from ..report import Outcome
+from ..report import Outcome, Progress
 from .driver import Driver
 from .local import closing, local_client
 from .workers import SMALLEST, WorkerPool, hardware_adapters

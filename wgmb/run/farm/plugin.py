@@ -20,9 +20,8 @@ from distributed import Worker, WorkerPlugin, get_worker
 from ..._version import __version__
 from ...errors import DeviceError, Error
 from ...sequence.findings import Range, numbers
-from ..batch_report import Progress
 from ..job_file import of_text
-from ..report import Outcome
+from ..report import Outcome, Progress
 
 _PAUSE = 0.25  # seconds between two messages on frames that are done
 
