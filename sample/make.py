@@ -1,5 +1,6 @@
 """Blur the sample: EXR and PNG frames, a short MP4, and a picture of before and after."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from wgmb.cli import app
 from wgmb.color.srgb import to_display
 from wgmb.sequence import clip
 
-HERE = Path(__file__).parent
+HERE = Path(os.path.relpath(Path(__file__).parent))
 OUT = HERE.parent / "out"
 FRAMES = str(HERE / "crossing.####.exr")
 

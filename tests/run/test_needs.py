@@ -3,6 +3,7 @@
 import pytest
 
 import make_frames as make
+from wgmb.cli.conclusion import cuts_told
 from wgmb.errors import counted
 from wgmb.io.frame_numbers import numbered
 
@@ -64,4 +65,6 @@ def test_one_frame_is_one_frame(line, shots, tmp_path, capsys, monkeypatch):
 def test_numbers_of_things_are_words():
     assert [counted(n, "frame") for n in (0, 1, 2)] == ["0 frames", "1 frame", "2 frames"]
     assert numbered([9]) == "frame 9"
+    assert cuts_told({4}, "frame") == "camera cut before frame 4"
+    assert cuts_told({9, 4}, "picture") == "camera cuts before pictures 4,9"
     assert numbered([9, 10, 12], "picture") == "pictures 9-10,12"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from ..errors import counted
@@ -11,6 +12,12 @@ from ..sequence.frame_file import odd_sizes
 from .exit_codes import DONE, SOME_FAILED
 from .spelling import as_options
 from .terminal import complain, note
+
+
+def cuts_told(cuts: Iterable[int], what: str) -> str:
+    """The line about camera cuts: before frame 4, before pictures 4,9."""
+    numbers = sorted(cuts)
+    return f"camera {'cut' if len(numbers) == 1 else 'cuts'} before {numbered(numbers, what)}"
 
 
 def conclude(outcome: Outcome, target: Path, took: str, quiet: bool, verbose: bool) -> int:
@@ -39,7 +46,7 @@ def conclude(outcome: Outcome, target: Path, took: str, quiet: bool, verbose: bo
             there = "{} to {}".format(*outcome.on_disk)
             note(f"cuts outside the frames {there} change nothing: {frame_list(stray)}")
         if outcome.cuts:
-            note(f"camera cut before frame {', '.join(map(str, sorted(outcome.cuts)))}")
+            note(cuts_told(outcome.cuts, "frame"))
         if odd := odd_sizes({n: size for size, at in outcome.sizes.items() for n in at}):
             note(odd)
         done = f"{counted(len(report.done), 'frame')} in {took} -> {target}"

@@ -13,6 +13,7 @@ from ...io.pipes import STDIN, STDOUT
 from ...run.pipe import blur_pipe as run
 from ...run.video import VideoRequest
 from ...settings import OutputSettings
+from ..conclusion import cuts_told
 from ..exit_codes import DONE, SOME_FAILED
 from ..spelling import as_options
 from ..terminal import check, note
@@ -48,7 +49,7 @@ def blur_pipe(
     for text in report.left_out:
         tell(text)
     if report.cuts:
-        tell(f"camera cut before picture {', '.join(map(str, report.cuts))}")
+        tell(cuts_told(report.cuts, "picture"))
     if report.held_out:
         tell(report.held_out)
     where = "stdout" if output.output == STDOUT else output.output

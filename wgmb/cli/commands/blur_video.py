@@ -7,6 +7,7 @@ import json
 from ...errors import counted
 from ...run.video import VideoRequest, VideoRun
 from ...settings import OutputSettings
+from ..conclusion import cuts_told
 from ..exit_codes import DONE, SOME_FAILED
 from ..spelling import as_options
 from ..terminal import note, progress
@@ -35,7 +36,7 @@ def blur_video(
         if report.method:
             took += f" with {report.method}"
         if report.cuts:
-            note(f"camera cut before picture {', '.join(map(str, report.cuts))}")
+            note(cuts_told(report.cuts, "picture"))
         if report.flashes:
             note(f"flash at picture {', '.join(map(str, report.flashes))}")
         if report.repeated:
