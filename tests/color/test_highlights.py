@@ -211,12 +211,13 @@ def test_lamps_of_pictures_streak_brighter_and_the_rest_stays(tmp_path, capsys):
 @pytest.mark.parametrize("times", ["0.5", "33", "nan", "-8"])
 def test_numbers_that_make_no_sense_are_one_line(tmp_path, capsys, times):
     source = video(tmp_path / "a.mkv", [lamp(0)] * 2)
-    Image.fromarray(np.zeros((8, 8, 3), "u1")).save(tmp_path / "a.1.png")
-    for given, out in ((source, "b.mkv"), (tmp_path / "a.1.png", "b.1.png")):
-        words = ["-o", tmp_path / out, "--flow", "none", f"--highlights={times}", "-q"]
+    for n in (1, 2):
+        Image.fromarray(np.zeros((8, 8, 3), "u1")).save(tmp_path / f"a.{n}.png")
+    for given, out in ((source, "b.mkv"), (tmp_path / "a.#.png", "b.#.png")):
+        words = ["-o", tmp_path / out, "--flow", "dis", f"--highlights={times}", "-q"]
         text = run(capsys, "blur", given, *words, code=2)
         assert "--highlights must be 1 to 32 times white" in text and text.count("\n") == 1
-    assert make.names_in(tmp_path) == ["a.1.png", "a.mkv"]
+    assert make.names_in(tmp_path) == ["a.1.png", "a.2.png", "a.mkv"]
 
 
 def test_light_above_white_is_refused(tmp_path, capsys):

@@ -117,7 +117,7 @@ def test_an_error_is_told_in_the_panel(panel, monkeypatch):
     monkeypatch.setattr(explorer.Explorer, "_blurred", failing)
     panel.shutter.value = 1 if panel.shutter.value != 1 else 2
     panel.wait()
-    assert panel.told.value == "too little GPU memory"
+    assert panel.status.value == "too little GPU memory"
 
 
 def test_a_frame_without_motion_is_refused():
