@@ -68,7 +68,7 @@ class Actions:
         self._say(f"saved {path}")
 
     def _open(self, paths: list[str], state: State) -> State:
-        """What was dropped onto the window: frames or a video, or saved settings."""
+        """The state with dropped files: frames, a video, or saved settings."""
         if len(paths) == 1 and paths[0].lower().endswith(".toml"):
             return self._load(Path(paths[0]))
         source = source_of(paths)

@@ -8,6 +8,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ...color.primaries import REC709, luminance
+from ...gpu import wgsl
 from ...methods import METHODS
 from ...pipeline.arguments import SAMPLES
 from ..controls import Box
@@ -16,8 +17,9 @@ from ..draw.screen import overlap
 from ..state.state import State
 from .theme import ACCENT, packed
 
-STOPS = -10, 6
-"""Range of the histogram [stops from 1.0]."""
+_COMPOSE = wgsl.load("viewer/draw/compose.wgsl")
+STOPS = int(_COMPOSE.constant("LOWEST")), int(_COMPOSE.constant("HIGHEST"))
+"""Range of the histogram and of false colours [stops from 1.0]."""
 _BINS = 64
 _STEP = 40.0  # from one arrow to the next [logical px]
 _SHORTEST = 0.5  # motion that has an arrow [px]

@@ -36,7 +36,7 @@ from .words import no_option, words_of
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
 BOTH_EYES = ("pair", "red-cyan")
 LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")
-TONES = ("clip", "soft")
+TONES = ("clip", "soft", "false")
 FLOWS, QUALITIES = ("auto", "search", "dis", "none"), ("best", "fast")
 REFERENCE = "reference"
 KEPT = "B"

@@ -41,6 +41,11 @@ const RED_CYAN: u32 = 5u;
 
 const CLIP: u32 = 0u;
 const SOFT: u32 = 1u;
+const FALSE: u32 = 2u;            // colours of brightness, LOWEST to HIGHEST
+
+const LOWEST: f32 = -10.0;        // [stops from 1.0]
+const HIGHEST: f32 = 6.0;
+const LUMINANCE: vec3f = vec3f(0.2126, 0.7152, 0.0722);  // of Rec. 709
 
 const BACKGROUND: vec3f = vec3f(0.075, 0.078, 0.086);
 
@@ -141,8 +146,14 @@ fn finite(color: vec4f) -> vec3f {
 /// Display values of linear light: exposure, tone curve, sRGB.
 fn displayed(light: vec3f) -> vec3f {
     var x = max(light * view.exposure, vec3f(0.0));
+    if TONE == FALSE { return false_color(dot(x, LUMINANCE)); }
     if TONE == SOFT { x = x / (1.0 + x); }
     return srgb_from_linear(min(x, vec3f(1.0)));
+}
+
+/// The colour of a luminance by its stops.
+fn false_color(bright: f32) -> vec3f {
+    return heat((log2(max(bright, 1e-20)) - LOWEST) / (HIGHEST - LOWEST));
 }
 
 /// Grey of a depth: near is bright, no depth is black.
