@@ -9,8 +9,8 @@ from ...gpu import wgsl
 from ...gpu.textures import TexturePool
 from ..options import MethodOptions, Range
 from .active_tiles import ActiveTiles
-from .kinds import PASSES, Shading, kinds_of
 from .layers import Layers
+from .light_inputs import PASSES, Shading, kinds_of
 from .scatter import Scatter
 from .search import Search
 from .shading import LightTimes, MovingLight
