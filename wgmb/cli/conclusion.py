@@ -14,10 +14,10 @@ from .spelling import as_options
 from .terminal import complain, note
 
 
-def cuts_told(cuts: Iterable[int], what: str) -> str:
+def cuts_told(cuts: Iterable[int], noun: str) -> str:
     """The line about camera cuts: before frame 4, before pictures 4,9."""
     numbers = sorted(cuts)
-    return f"camera {'cut' if len(numbers) == 1 else 'cuts'} before {numbered(numbers, what)}"
+    return f"camera {'cut' if len(numbers) == 1 else 'cuts'} before {numbered(numbers, noun)}"
 
 
 def conclude(outcome: Outcome, target: Path, took: str, quiet: bool, verbose: bool) -> int:
