@@ -27,7 +27,7 @@ FRAGMENT = 2  # GPUShaderStage
 PATTERNS = (
     "methods/volume.wgsl", "methods/tap.wgsl", "methods/tiles*.wgsl", "methods/gather/*.wgsl",
     "gpu_frame/velocity.wgsl", "gpu_frame/holdout.wgsl", "scene/gbuffer.wgsl",
-    "viewer/draw/compose.wgsl", "viewer/draw/blit.wgsl",
+    "hosts/block_search.wgsl", "viewer/draw/compose.wgsl", "viewer/draw/blit.wgsl",
 )  # fmt: skip
 """The shaders of the page; of these, files without an entry point come with those that have one."""
 

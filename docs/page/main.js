@@ -1,6 +1,7 @@
 // The page's behaviour: controls and address change one state, and what depends on it is drawn again.
 import { MEDIA, unpacked } from './packed.js';
 import { Gpu, openDevice } from './panel.js';
+import { Film, Own, pixelsOf, sizeOf } from './own.js';
 import { Sample } from './sample.js';
 import { showSource } from './source.js';
 import { Stage } from './stage.js';
@@ -21,7 +22,7 @@ const METHODS = {
 // For tests: size=640x360 in the address draws exactly that many pixels, whatever the canvas measures.
 const fixed = /(?:^|&)size=(\d+)x(\d+)/.exec(location.hash.slice(1))?.slice(1).map(Number) ?? null;
 const state = { ...DEFAULTS, still: calm.matches ? 1 : 0, ...parsed(location.hash) };
-const view = { stage: null, sample: null, seen: true, seenSample: false, flipped: false, losses: 0, dirty: true };
+const view = { stage: null, sample: null, own: null, given: null, seen: true, seenSample: false, flipped: false, losses: 0, dirty: true };
 const errors = [];
 window.wgmb = { state, view, errors, settled };
 
@@ -35,15 +36,16 @@ async function begin() {
   device.lost.then(() => lost());
   const [exported, recordings] = await Promise.all([unpacked('exported'), unpacked('recordings')]);
   setExport(exported);
-  Object.assign(view, { device, gpu: new Gpu(device, exported), recordings, isSlow, sample: null, dirty: true });
+  Object.assign(view, { device, gpu: new Gpu(device, exported), recordings, isSlow, sample: null, own: null, dirty: true });
   root.dataset.mode = 'live';
-  for (const id of ['torusphere', 'sample']) fresh(id);
+  for (const id of ['torusphere', 'sample', 'own']) fresh(id);
   view.stage = new Stage(view.gpu, $('torusphere'), { fixed, isSlow });
   if (!$('files').childElementCount) showSource(exported.shaders, $('source-lead'), $('files'));
   listenToCanvas();
   update();
   await view.stage.draw(shown(), true);
   if (view.seenSample) blurSample();
+  if (view.given) showOwn().catch(refuse);
   root.dataset.ready = '1';
 }
 
@@ -73,7 +75,7 @@ function tell(message) {
 }
 
 /** Without WebGPU: a recording of the torusphere, and the line between two images. */
-function fallBack(why = 'This browser does not offer WebGPU, so you see a recording; current versions of Chrome, Edge and Safari draw it live.') {
+function fallBack(why = 'This browser does not offer WebGPU, so you see a recording; current versions of Chrome, Edge, Safari and Firefox (on Windows, and on Macs with Apple processors) draw it live.') {
   view.stage = view.sample = null;
   root.dataset.mode = 'recording';
   root.dataset.ready = 'recording';
@@ -138,9 +140,71 @@ function blurSample() {
   return view.sample.draw(state).catch((error) => tell(error.message)); // the images stay
 }
 
+/** Take files of a visitor: a video, or pictures, of which the first two or three count. */
+async function take(files) {
+  const films = files.filter((file) => file.type.startsWith('video/')), images = files.filter((file) => file.type.startsWith('image/'));
+  if (!films.length && images.length < 2) throw new Error('Motion needs two pictures that follow one another, or a video.');
+  view.given?.film?.close();
+  if (films.length) {
+    const film = await Film.open(films[0]);
+    const { videoWidth, videoHeight, duration } = film.video;
+    view.given = { film, size: sizeOf(videoWidth, videoHeight, view.isSlow) };
+    $('own-time').max = duration;
+    $('own-time').value = duration / 2;
+  } else {
+    const chosen = images.slice(0, 3).sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
+    const maps = await Promise.all(chosen.map((file) => createImageBitmap(file).catch(() => { throw new Error(`${file.name}: this browser cannot read it.`); })));
+    const { width, height } = maps[0], other = maps.findIndex((one) => one.width !== width || one.height !== height);
+    if (other > 0) throw new Error(`${chosen[other].name} is ${maps[other].width} × ${maps[other].height}, ${chosen[0].name} ${width} × ${height}: pictures that follow one another have one size.`);
+    const size = sizeOf(width, height, view.isSlow);
+    view.given = { size, pixels: maps.map((one) => pixelsOf(one, size)) };
+  }
+  await showOwn();
+}
+
+/** Find the motion of what was given, at the time that is chosen, and show it blurred. */
+async function showOwn() {
+  const { film, size, pixels } = view.given;
+  $('own-note').hidden = true;
+  $('own-wipe').hidden = false;
+  $('own-controls').hidden = !film;
+  $('own-wipe').style.aspectRatio = `${size[0]} / ${size[1]}`;
+  let [before, here, next] = film ? [] : pixels.length > 2 ? pixels : [null, ...pixels];
+  if (film) {
+    const time = Number($('own-time').value), step = 1 / Math.max(1, Number($('own-fps').value) || 30);
+    $('own-time-shown').textContent = `${time.toFixed(2)} s`;
+    part($('own-time'));
+    before = await film.at(time - step, size);
+    here = await film.at(time, size);
+    next = await film.at(time + step, size);
+  }
+  view.own ??= new Own(view.gpu, $('own'), { native: fixed !== null });
+  await view.own.load(here, next, before);
+  await view.own.draw({ ...state });
+}
+
+function refuse(error) {
+  $('own-note').textContent = error.message;
+  $('own-note').hidden = false;
+}
+
+let asked = null; // the last wish while another is being shown
+/** The same once more, with another time or setting. */
+function againOwn(anew) {
+  if (!view.given || !view.own) return;
+  asked = { anew: anew || asked?.anew };
+  view.busyOwn ??= (async () => {
+    while (asked) {
+      const { anew: whole } = asked;
+      asked = null;
+      await (whole ? showOwn() : view.own.draw({ ...state }));
+    }
+  })().catch(refuse).finally(() => (view.busyOwn = null));
+}
+
 /** For tests: until everything that was asked for, and is in sight, is on the canvases. */
 async function settled() {
-  const busy = () => view.stage && (view.stage.flying || view.sample?.running || (view.seen && (view.dirty || quiet)));
+  const busy = () => view.stage && (view.stage.flying || view.busyOwn || view.sample?.running || (view.seen && (view.dirty || quiet)));
   do await new Promise(requestAnimationFrame); while (busy());
 }
 
@@ -213,7 +277,7 @@ function update(remember = false) {
 }
 
 function showLine() {
-  $('wipe').style.setProperty('--line', `${100 * state.line}%`);
+  for (const id of ['wipe', 'own-wipe']) $(id).style.setProperty('--line', `${100 * state.line}%`);
   $('line').setAttribute('aria-valuenow', Math.round(100 * state.line));
   document.querySelector('.tag.left').classList.toggle('away', state.line < 0.2);
   document.querySelector('.tag.right').classList.toggle('away', state.line > 0.75);
@@ -233,7 +297,10 @@ function address() {
 function change(changed) {
   Object.assign(state, changed);
   update(true);
-  if (['method', 'samples', 'deg2', 'curve2', 'line'].some((name) => name in changed)) blurSample();
+  if (['method', 'samples', 'deg2', 'curve2', 'line'].some((name) => name in changed)) {
+    blurSample();
+    againOwn(false);
+  }
 }
 
 function step(frames) {
@@ -322,11 +389,23 @@ function listen() {
     step(Math.sign(event.deltaY + event.deltaX));
   });
 
-  const toLine = (event) => {
-    const { left, width } = $('wipe').getBoundingClientRect();
-    change({ line: clamp((event.clientX - left) / width, 0, 1) });
-  };
-  onDrag($('wipe'), (dx, dy, event) => toLine(event), toLine);
+  for (const id of ['wipe', 'own-wipe']) {
+    const toLine = (event) => {
+      const { left, width } = $(id).getBoundingClientRect();
+      change({ line: clamp((event.clientX - left) / width, 0, 1) });
+    };
+    onDrag($(id), (dx, dy, event) => toLine(event), toLine);
+  }
+  const taken = (list) => { view.busyOwn = take([...list]).catch(refuse).finally(() => (view.busyOwn = null)); };
+  $('own-files').onchange = () => taken($('own-files').files);
+  for (const name of ['dragover', 'dragleave', 'drop']) {
+    $('drop').addEventListener(name, (event) => {
+      event.preventDefault();
+      $('drop').classList.toggle('over', name === 'dragover');
+      if (name === 'drop' && event.dataTransfer.files.length) taken(event.dataTransfer.files);
+    });
+  }
+  for (const id of ['own-time', 'own-fps']) $(id).oninput = () => againOwn(true);
   $('line').addEventListener('keydown', (event) => {
     const by = { ArrowLeft: -0.02, ArrowRight: 0.02, Home: -1, End: 1 }[event.key];
     if (!by) return;

@@ -27,6 +27,7 @@ const PARTS = [ // what no earlier part has
   ['tap', /methods\/tap/],
   ['tiles', /methods\/tiles/],
   ['gather', /methods\/gather/],
+  ['Motion between pictures', /block_search/],
   ['The frame as rendered, and what methods share', /^(?!viewer)/],
   ['From the result to the screen', /./],
 ];

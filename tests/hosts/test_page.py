@@ -19,7 +19,7 @@ import make_page
 import parts
 import standard
 from wgmb import Blur, Render, Shutter
-from wgmb.color.srgb import to_display
+from wgmb.color.srgb import linear, srgb, to_display
 from wgmb.scene import make
 
 HERE = Path(__file__).parents[1]
@@ -221,6 +221,67 @@ def test_without_webgpu_there_is_a_recording(visit):
         there = seen["results"][1]
         assert there["video"] >= 2 and there["images"] and there["canvases"] == 0
         assert "WebGPU" in there["note"]
+
+
+OWN = """(async () => {
+  const files = new DataTransfer();
+  for (let n = 0; n < COUNT; n++) {
+    const canvas = new OffscreenCanvas(160, 96), context = canvas.getContext('2d');
+    const box = (v, ...place) => {
+      context.fillStyle = `rgb(${v} ${v} ${v})`;
+      context.fillRect(...place);
+    };
+    box(60, 0, 0, 160, 96);
+    for (let j = 0; j < 16; j++) for (let i = 0; i < 16; i++) {
+      box(60 + (i * i * 31 + j * 57 + i * j * 19) % 190, 40 + 4 * i + 8 * n, 16 + 4 * j, 4, 4);
+    }
+    const blob = await canvas.convertToBlob();
+    files.items.add(new File([blob], `shot.${n}.png`, { type: 'image/png' }));
+  }
+  const input = document.getElementById('own-files');
+  input.files = files.files;
+  input.dispatchEvent(new Event('change'));
+  await wgmb.settled();
+  const note = document.getElementById('own-note');
+  return note.hidden ? '' : note.textContent;
+})()"""
+
+
+def own(number: int) -> np.ndarray:
+    """The picture of that number which OWN draws, as display values."""
+    found = np.full((96, 160), 60.0)
+    j, i = np.mgrid[:16, :16]
+    square = 60 + (i * i * 31 + j * 57 + i * j * 19) % 190
+    found[16:80, 40 + 8 * number :][:, :64] = square.repeat(4, 0).repeat(4, 1)
+    return found / 255
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_pictures_of_ones_own_are_blurred_along_their_motion(visit, tmp_path, count):
+    sharp, blurred = tmp_path / "sharp.png", tmp_path / "blurred.png"
+    give = {"do": "evaluate", "script": OWN.replace("COUNT", str(count))}
+    chosen = state(deg2=360, curve2="box", samples=32, line=0)
+    steps = [give, *picture("#own", blurred), go(state(deg2=360, curve2="box", line=1)),
+             *picture("#own", sharp)]  # fmt: skip
+    (seen,) = visit({"hash": chosen, "steps": steps})
+    assert seen["results"][0] == ""
+    shown = 1 if count == 3 else 0
+    got = iio.imread(sharp)[..., :3] / 255
+    np.testing.assert_allclose(got, own(shown)[..., None].repeat(3, 2), atol=0.006)
+    # The square moves 8 pixels a frame: the mean of its positions from 4 before to 4 after.
+    light = linear(own(shown))
+    moved = [np.roll(light, by, 1) for by in np.linspace(-3.875, 3.875, 32).round().astype(int)]
+    want, got = srgb(np.mean(moved, axis=0)), iio.imread(blurred)[..., 0] / 255
+    inner = np.s_[20:76, 40 + 8 * shown + 8 : 104 + 8 * shown - 8]
+    error = -10 * np.log10(np.mean((got - want)[inner] ** 2))
+    plain = -10 * np.log10(np.mean((own(shown) - want)[inner] ** 2))
+    assert error > plain + 6, (error, plain)
+
+
+def test_files_that_do_not_fit_are_told(visit):
+    one = {"do": "evaluate", "script": OWN.replace("COUNT", "1")}
+    (seen,) = visit({"hash": state(), "steps": [one]})
+    assert seen["results"] == ["Motion needs two pictures that follow one another, or a video."]
 
 
 def test_phones_and_desks(visit):
