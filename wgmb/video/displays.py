@@ -133,12 +133,12 @@ def _length(steps: list[np.ndarray], among: np.ndarray) -> np.ndarray:
     return count
 
 
-def _tiles(plane: np.ndarray, side: int) -> np.ndarray:
-    """(rows, columns, side, side): the tiles of a plane, its last ones filled from its edge."""
-    height, width = plane.shape
-    padded = np.pad(plane, ((0, -height % side), (0, -width % side)), mode="edge")
-    rows, columns = padded.shape[0] // side, padded.shape[1] // side
-    return padded.reshape(rows, side, columns, side).swapaxes(1, 2)
+def _tiles(plane: np.ndarray, side: int, choose: np.ufunc) -> np.ndarray:
+    """(rows, columns): the sum, least or greatest of each tile; the last ones repeat the edge."""
+    padded = np.pad(plane, [(0, -size % side) for size in plane.shape], mode="edge")
+    kind = np.uint32 if choose is np.add else None
+    strips = choose.reduce(padded.reshape(-1, side, padded.shape[1]), axis=1, dtype=kind)
+    return choose.reduce(strips.reshape(len(strips), -1, side), axis=2)
 
 
 def _spread(tiles: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarray:
@@ -151,7 +151,7 @@ def _moves_around(steps: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray
     still = np.zeros(shape, np.uint8)
     for step in steps:
         still += step
-    rest = _tiles(still, _TILE).mean((2, 3)) / len(steps)
+    rest = _tiles(still, _TILE, np.add) / (_TILE**2 * len(steps))
     padded = np.pad(rest, 2, mode="edge")
     views = np.lib.stride_tricks.sliding_window_view(padded, (5, 5))
     return _spread(1 - views.mean((2, 3)) > _MOVING, _TILE, shape)
@@ -174,9 +174,9 @@ def _changing(core: np.ndarray, candidates: np.ndarray, grey: np.ndarray) -> np.
 
     Where more pixels are so than stand, the ground is as bright, and nothing is told.
     """
-    count = _tiles(core, _NEAR).sum((2, 3))
-    most = _tiles(np.where(core, grey, 0), _NEAR).max((2, 3))
-    least = _tiles(np.where(core, grey, 255), _NEAR).min((2, 3))
+    count = _tiles(core, _NEAR, np.add)
+    most = _tiles(np.where(core, grey, 0), _NEAR, np.maximum)
+    least = _tiles(np.where(core, grey, 255), _NEAR, np.minimum)
     count = _near(count, 0).sum((2, 3))
     most, least = _near(most, 0).max((2, 3)), _near(least, 255).min((2, 3))
     places = np.nonzero(candidates & ~core & _spread(count > 0, _NEAR, core.shape))
@@ -186,7 +186,7 @@ def _changing(core: np.ndarray, candidates: np.ndarray, grey: np.ndarray) -> np.
     for alike in (own >= high - _ALIKE, own <= low + _ALIKE):
         these = np.zeros(core.shape, bool)
         these[places] = alike
-        few = _near(_tiles(these, _NEAR).sum((2, 3)), 0).sum((2, 3)) <= count
+        few = _near(_tiles(these, _NEAR, np.add), 0).sum((2, 3)) <= count
         found |= these & _spread(few, _NEAR, core.shape)
     return found
 
