@@ -235,6 +235,18 @@ def test_gather_is_its_twin_of_what_comes_nearer():
     assert differing_from_gather(sources, 360) < 0.01
 
 
+@pytest.mark.parametrize("left", [1.0, 0.5])
+def test_gather_is_its_twin_where_light_changes(left):
+    """The wall is darker in the neighbours, or its left half alone."""
+    sources = []
+    for offset in (0, -1, 1):
+        color, motion, depth = crossing((44, 64), offset)
+        darker = (depth > 5) & (np.arange(64) < 64 * left) & bool(offset)
+        color[darker, :3] *= 0.35
+        sources.append((offset, color, motion, depth))
+    assert differing_from_gather(sources, 360) < 0.01
+
+
 def differing_from_gather(sources, degrees):
     """Share of the pixels at which gather and its twin differ."""
     made = {o: wgmb.Frame(c, motion=m, depth=d) for o, c, m, d in sources}

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twins.five_positions import NO_DEPTH, bend, depth_ratio, moved, valid
+from twins.relight import gains
 from twins.tap import bilinear
 
 TILE, MOTIONS, BLOCK, SLICES = 16, 4, 4, 16
@@ -23,6 +24,9 @@ class Layers:
     inferred: np.ndarray  # the back layer was not seen
     edgeless: np.ndarray  # no edge that is separated in the 3 x 3
     smooth: np.ndarray  # no edge at all
+    single: np.ndarray  # of one layer
+    unsplit: np.ndarray  # the path of the pixel's own vectors
+    unsplit_depth: np.ndarray
 
 
 @dataclass
@@ -43,8 +47,20 @@ def gather(frames, times):
     at = {f[0]: f for f in frames}
     layers = [separate(*f, prev=at.get(f[0] - 1), next=at.get(f[0] + 1)) for f in frames[1:]]
     far = [layer for layer in layers if abs(layer.offset) > 1]
-    layers.insert(0, separate(*frames[0], prev=at.get(-1), next=at.get(1), far=far))
     span = times[0] - (times[1] - times[0]) / 2, times[-1] + (times[1] - times[0]) / 2
+    unlit = separate(*frames[0], prev=at.get(-1), next=at.get(1))
+    for layer in layers:
+        if abs(layer.offset) == 1:
+            offset, color, motion, depth = at[layer.offset]
+            gain = gains(unlit, layer, frames[0][1].astype(float), color.astype(float), span)
+            layer.color[0][..., :3] *= gain
+            at[offset] = (
+                offset,
+                np.concatenate([color[..., :3] * gain, color[..., 3:]], -1),
+                motion,
+                depth,
+            )
+    layers.insert(0, separate(*frames[0], prev=at.get(-1), next=at.get(1), far=far))
     tiles = [tile_candidates(f, span) for f in layers]
     for frame, its_tiles in zip(layers[: len(layers) - len(far)], tiles, strict=False):
         scatter(frame, its_tiles, span, min(SLICES, len(times)), own=layers[0])
@@ -118,7 +134,8 @@ def separate(offset, color, motion, depth, prev=None, next=None, far=()):
             smooth[y, x] = not any(edges[p] for p in near)
     paths = [trajectories(found[1]), trajectories(back[1])]
     depths = [found[2], back[2]]
-    return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred, edgeless, smooth)
+    return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred, edgeless, smooth,
+                  ~separated, trajectories(own), z * ratios)  # fmt: skip
 
 
 def in_crowd(shows_third):

@@ -9,6 +9,7 @@ import wgpu
 from ... import gpu
 from ...gpu.textures import ScratchBuffer, TexturePool
 from .edges import Edges
+from .relight import Relight
 
 
 def layer_view(images: TexturePool, texture: wgpu.GPUTexture, index: int) -> wgpu.GPUTextureView:
@@ -26,11 +27,16 @@ class Layers:
         self._device, self._images = device, images
         self._edges, self._edge_pixels = Edges(device, images), ScratchBuffer(device)
         self._edge_groups, self._unused = ScratchBuffer(device), ScratchBuffer(device)
+        self._relight = Relight(device)
         self.textures: dict[str, wgpu.GPUTexture] = {}
 
     def front_surface(self, slot: int) -> wgpu.GPUTextureView:
         """The foreground's surfaces of the frame in a slot."""
         return layer_view(self._images, self.textures["surfaces"], 2 * slot)
+
+    def _front_colors(self, slot: int) -> wgpu.GPUTextureView:
+        """The foreground's colours of the frame in a slot."""
+        return layer_view(self._images, self.textures["layer_colors"], 2 * slot)
 
     def _views(self, slot: int) -> dict[str, wgpu.GPUTextureView]:
         """The layers in a slot, by the names of their bindings."""
@@ -106,6 +112,7 @@ class Layers:
             HAS_NEXT=neighbours["next"] is not None,
             OWN_IS_PREV=frame.offset == 1,
             OWN_IS_NEXT=frame.offset == -1,
+            RELIT=not frame.offset,
             HAS_FAR_PREV=not frame.offset and any(f.offset == -2 for f in inputs.frames),
             HAS_FAR_NEXT=not frame.offset and any(f.offset == 2 for f in inputs.frames),
         )
@@ -115,6 +122,10 @@ class Layers:
             f"{side}_{name}": getattr(other, name, None) or inputs.unbound
             for side, other in neighbours.items()
             for name in ("color", "motion", "depth", "weight")
+        }
+        gains = {
+            f"{side}_gains": self._relight.gains(size, step)
+            for side, step in (("prev", -1), ("next", 1))
         }
         for entry, (indirect, worklist) in passes.items():
             sizing = entry == "size_dispatch"
@@ -134,10 +145,21 @@ class Layers:
                 **self._views(slot),
                 **self._far(inputs, frame.offset),
                 **others,
+                **gains,
             )
             if entry == "write_single_layer":
                 surfaces = self.textures["surfaces"]
                 _copy(encoder, (surfaces, 2 * slot), (surfaces, 2 * slot + 1))
+            if entry == "write_single_layer" and not frame.offset:
+                self._relit(encoder, inputs, cells)
+
+    def _relit(self, encoder, inputs, cells: dict) -> None:
+        """Record that the neighbours get the light of the frame where it hides what they show."""
+        for slot, frame in enumerate(inputs.frames):
+            if abs(frame.offset) == 1:
+                surfaces = self.front_surface(0), self.front_surface(slot)
+                relit = self._front_colors(slot)
+                self._relight.encode(encoder, inputs, frame, surfaces, relit, cells)
 
 
 def _is_like(image: wgpu.GPUTexture, layers: wgpu.GPUTexture) -> bool:

@@ -3,6 +3,7 @@
 //#include common/depth.wgsl
 //#include common/trajectory5.wgsl
 //#include common/frame.wgsl
+//#include methods/gather/gains.wgsl
 //#include methods/gather/surface.wgsl
 
 @group(1) @binding(12) var prev_color: texture_2d<f32>;
@@ -14,6 +15,9 @@
 @group(1) @binding(18) var next_depth: texture_2d<f32>;
 @group(1) @binding(19) var next_weight: texture_2d<f32>;
 
+@group(1) @binding(24) var<storage, read> prev_gains: array<u32>;   // per pixel, see relight.wgsl
+@group(1) @binding(25) var<storage, read> next_gains: array<u32>;
+
 // The layers of the frames beyond the neighbours, of each its FRONT and BACK.
 @group(1) @binding(21) var far_layer_colors: texture_2d_array<f32>;
 @group(1) @binding(22) var far_surfaces: texture_2d_array<u32>;
@@ -24,6 +28,7 @@ override HAS_PREV: bool = true;         // there is a frame before, and one afte
 override HAS_NEXT: bool = true;
 override OWN_IS_PREV: bool = false;     // the one before is the frame that is blurred, or the one after is
 override OWN_IS_NEXT: bool = false;
+override RELIT: bool = false;           // they have gains
 override HAS_FAR_PREV: bool = false;    // there is a frame beyond the one before, and beyond the one after
 override HAS_FAR_NEXT: bool = false;
 
@@ -111,18 +116,41 @@ fn look(sum: ptr<function, Background>, color_there: texture_2d<f32>, motion_the
     var counts = 1.0;
     if WEIGHTED { counts = interpolated(weight_there, at).x; }
     if is_clear && counts > 0.5 && dot(off, off) < BACKGROUND_RETURNS * BACKGROUND_RETURNS {
-        (*sum).color += interpolated(color_there, at) / counts;
+        (*sum).color += relit_background(color_there, at, is_next) / counts;
         (*sum).count += 1.0;
     }
 }
 
 /// Bilinear, for textures that samplers cannot filter.
 fn interpolated(image: texture_2d<f32>, at: vec2f) -> vec4f {
-    let corner = floor(at - 0.5);
-    let share = at - 0.5 - corner;
-    let low = vec2i(clamp(corner, vec2f(0.0), vec2f(frame.size) - 1.0));
-    let high = min(low + 1, vec2i(frame.size) - 1);
-    let above = mix(textureLoad(image, low, 0), textureLoad(image, vec2i(high.x, low.y), 0), share.x);
-    let below = mix(textureLoad(image, vec2i(low.x, high.y), 0), textureLoad(image, high, 0), share.x);
-    return mix(above, below, share.y);
+    let corners = corners_of(at);
+    let above = mix(textureLoad(image, corners.xy, 0), textureLoad(image, corners.zy, 0), share_of(at).x);
+    let below = mix(textureLoad(image, corners.xw, 0), textureLoad(image, corners.zw, 0), share_of(at).x);
+    return mix(above, below, share_of(at).y);
+}
+
+/// The same of a neighbour's colours with their gains.
+fn relit_background(image: texture_2d<f32>, at: vec2f, is_next: bool) -> vec4f {
+    if !RELIT { return interpolated(image, at); }
+    let c = corners_of(at);
+    let above = mix(relit_texel(image, c.xy, is_next), relit_texel(image, c.zy, is_next), share_of(at).x);
+    let below = mix(relit_texel(image, c.xw, is_next), relit_texel(image, c.zw, is_next), share_of(at).x);
+    return mix(above, below, share_of(at).y);
+}
+
+fn relit_texel(image: texture_2d<f32>, px: vec2i, is_next: bool) -> vec4f {
+    let k = px.y * i32(frame.size.x) + px.x;
+    var gain = 0u;
+    if is_next { gain = next_gains[k]; } else { gain = prev_gains[k]; }
+    return relit_color(textureLoad(image, px, 0), gain);
+}
+
+/// The first and the last of the 2 x 2 pixels around a position [px], and how far it is from the first to the last.
+fn corners_of(at: vec2f) -> vec4i {
+    let low = vec2i(clamp(floor(at - 0.5), vec2f(0.0), vec2f(frame.size) - 1.0));
+    return vec4i(low, min(low + 1, vec2i(frame.size) - 1));
+}
+
+fn share_of(at: vec2f) -> vec2f {
+    return fract(at - 0.5);
 }
