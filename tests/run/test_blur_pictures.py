@@ -44,12 +44,10 @@ def pictures(count=14, kind=np.uint8):
     return [picture(n, kind) for n in range(count)]
 
 
-@pytest.fixture(scope="module")
-def video(tmp_path_factory):
+def write_video(path, rate):
     """The same pictures in a file that keeps every sample."""
-    path = tmp_path_factory.mktemp("video") / "a.avi"
     with av.open(str(path), "w") as out:
-        stream = out.add_stream("ffv1", rate=24)
+        stream = out.add_stream("ffv1", rate=rate)
         stream.width, stream.height, stream.pix_fmt = *SIZE, "bgr0"
         stream.codec_context.color_trc = 13
         for array in pictures():
@@ -59,9 +57,10 @@ def video(tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize("fps", ["24", "60", "6"])
+@pytest.mark.parametrize("fps_in, fps", [(24, "24"), (24, "60"), (24, "6"), (60, "24")])
 @pytest.mark.parametrize("flow", ["none", "dis", pytest.param("search", marks=pytest.mark.full)])
-def test_pictures_are_those_of_the_file(video, device, flow, fps):
+def test_pictures_are_those_of_the_file(tmp_path, device, flow, fps_in, fps):
+    video = write_video(tmp_path / "a.avi", fps_in)
     settings = VideoSettings(flow=flow, flow_quality="fast")
     run = VideoRequest(video=settings, shutter=ShutterSettings(shutter=180)).open(device)
     plan = run.plan(video, OutputSettings(output="x.mkv", fps=fps))
@@ -72,7 +71,7 @@ def test_pictures_are_those_of_the_file(video, device, flow, fps):
         e.coded(coding).planes for _, e in blur.exposures(run.request.shutter.make(), plan.wanted)
     ]
     got = wgmb.blur_pictures(
-        iter(pictures()), fps_in=24, fps=fps, flow=flow, flow_quality="fast", device=device
+        iter(pictures()), fps_in=fps_in, fps=fps, flow=flow, flow_quality="fast", device=device
     )
     assert got.count(14) == len(want)
     for ours, planes in itertools.zip_longest(got, want):
