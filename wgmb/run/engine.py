@@ -50,11 +50,12 @@ class Input(Protocol[_Read, _BlurredOut]):
 
     ahead: int
     """Number of them that are made ahead of each thread: 1 takes the least memory, more even out
-    what takes longer from time to time; 0 reads on the thread that blurs."""
+    what takes longer from time to time; 0 reads on the thread that blurs, and `frames` blurs on
+    the caller's."""
 
     @property
     def total(self) -> int:
-        """Number of frames; 0 where nobody knows it beforehand."""
+        """Number of frames; 0 where nobody knows it beforehand, and the report lists none."""
         ...
 
     def read(self, is_done: IsDone) -> Iterator[_Read]:
@@ -93,7 +94,9 @@ class Sink(Protocol[_BlurredIn]):
         ...
 
 
-def frames(input: Input[Any, _Blurred], stop: threading.Event | None = None) -> Iterator[_Blurred]:
+def frames(
+    input: Input[Any, _Blurred], stop: threading.Event | None = None
+) -> Generator[_Blurred, None, None]:
     """Every frame that `input` makes, blurred in a thread of its own while the caller works.
 
     Errors arrive where the frames are taken. Once `stop` is set, no other frame is begun, and the
@@ -211,7 +214,8 @@ class _Run:
             self._give_up(self._sink.why_hopeless(error))
         else:
             self._reasons.clear()
-            report.done.append(number)
+            if self._input.total:  # what comes through a pipe may never end
+                report.done.append(number)
             self._tell(number, "done")
 
     def _fail(self, number: int, why: str) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from fractions import Fraction
 from itertools import count
@@ -29,6 +29,7 @@ from ..video.output_times import SPARE, OutputFrame
 from ..video.planes import Planes
 from ..video.thumbnail import Thumbnail
 from ..video.write.encoders import FINEST_RATE
+from .engine import IsDone, frames
 from .video import PictureKeywords, VideoRun, request_of
 
 TRANSFERS = {"srgb": SRGB, "linear": LINEAR, "pq": PQ, "hlg": HLG, "bt709": BT709}
@@ -77,6 +78,36 @@ class SteadyExposures:
             yield OutputFrame(number, number * interval, interval)
 
 
+class SteadyFrames:
+    """Output frames of pictures at a steady rate, as the input of a run.
+
+    `pictures`: with their numbers. They are read on the thread that blurs: a caller's iterator is
+    the caller's, and a thread that waits for a pipe cannot be interrupted. `form`: makes of an
+    exposure what is wanted.
+    """
+
+    ahead, total = 0, 0
+
+    def __init__(
+        self,
+        pictures: Iterable[tuple[int, CodedPicture]],
+        exposures: SteadyExposures,
+        shutter: Shutter,
+        form: Callable[[OutputFrame, Exposure], Any],
+    ):
+        self._pictures, self._exposures = pictures, exposures
+        self._shutter, self._form = shutter, form
+
+    def read(self, is_done: IsDone) -> Iterator[tuple[int, CodedPicture]]:
+        """The pictures."""
+        return iter(self._pictures)
+
+    def blur(self, read: Iterator[tuple[int, CodedPicture]]) -> Iterator[Any]:
+        """Make the exposures."""
+        exposed = self._exposures.of(read, self._shutter)
+        return (self._form(frame, exposure) for frame, exposure in exposed)
+
+
 class PictureBlur(Iterator[Any]):
     """Blurred pictures, each made when it is asked for; `blur_pictures` returns one."""
 
@@ -93,7 +124,8 @@ class PictureBlur(Iterator[Any]):
         self._steady, self._transfer = steady, transfer
         self._like: type = type(None)
         self._shape, self._dtype, self._coding = (0, 0, 0), np.dtype(np.uint8), Coding()
-        self._results = self._generate(pictures, shutter)
+        coded = ((number, self._coded(number, picture)) for number, picture in enumerate(pictures))
+        self._results = frames(SteadyFrames(coded, steady, shutter, self._result))
 
     def __next__(self) -> Any:
         """The next picture, as an array or a tensor like those that were given."""
@@ -127,11 +159,6 @@ class PictureBlur(Iterator[Any]):
         """Numbers of the repeated pictures that were left out (`duplicates` "fill")."""
         return list(self._steady.exposures.shots.doubles) if self._steady.exposures.shots else []
 
-    def _generate(self, pictures: Iterable[Any], shutter: Shutter) -> Generator[Any, None, None]:
-        coded = ((number, self._coded(number, picture)) for number, picture in enumerate(pictures))
-        for _, exposure in self._steady.of(coded, shutter):
-            yield self._result(exposure)
-
     def _coded(self, number: int, picture: Any) -> CodedPicture:
         """A copy of a picture: its owner may fill the same memory again."""
         array = _array(f"picture {number}", picture)
@@ -158,7 +185,7 @@ class PictureBlur(Iterator[Any]):
         signals[..., : array.shape[2]] = array
         return CodedPicture((signals,), self._coding)
 
-    def _result(self, exposure: Exposure) -> Any:
+    def _result(self, frame: OutputFrame, exposure: Exposure) -> Any:
         planes = exposure.coded(self._coding).planes
         if self._coding.bits < FLOAT:
             array = np.stack(planes, axis=2)

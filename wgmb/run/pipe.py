@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import Any, BinaryIO, Protocol
 
-from ..color.coding import Coding
+from ..color.coding import CodedPicture, Coding
 from ..errors import InputError
 from ..io import atomic
 from ..io.pipes import STDIN, STDOUT, PipeWriter, is_pipe
@@ -20,16 +20,18 @@ from ..settings import OutputSettings
 from ..settings.output import rate_of
 from ..settings.video import VideoSettings
 from ..video.clock import tick
-from ..video.exposures import Exposure, Exposures
+from ..video.exposures import Exposures
 from ..video.holdouts import NONE
-from ..video.output_times import OutputFrame
 from ..video.read.stream_reader import StreamReader
 from ..video.write.encoders import FINEST_RATE, SUFFIXES, Encoding, Facts, chosen
 from ..video.write.streamed import MatroskaStream
 from ..video.write.writer import VideoWriter
 from ..video.y4m import Y4mReader, Y4mWriter, coding_in
-from .pictures import steady
-from .video import VideoRequest, VideoRun
+from . import engine
+from .engine import Input
+from .pictures import SteadyFrames, steady
+from .video import ExposedFrames, VideoRequest, VideoRun
+from .video_sink import Form, PictureWriter, VideoSink, coded_form
 
 _BUFFER = 1 << 20  # bytes
 _OF_FILES = "begin", "end", "speed"  # of VideoSettings
@@ -66,18 +68,15 @@ class _Source:
     space: str
     """The name of the samples in YUV4MPEG2, if they came so."""
     exposures: Exposures
-    frames: Iterator[tuple[OutputFrame, Exposure]]
+    frames: Callable[[Form], Input[Any, Any]]
     reader: Reader | None
 
 
-class _Sink(Protocol):
-    """The output."""
+class _Writer(PictureWriter, Protocol):
+    """Writer of the output: how its pictures are coded, and what it cannot hold."""
 
+    coding: Coding
     left_out: list[str]
-
-    def put(self, frame: OutputFrame, exposure: Exposure) -> None: ...
-    def close(self) -> None: ...
-    def abandon(self) -> None: ...
 
 
 def blur_pipe(
@@ -111,22 +110,15 @@ def blur_pipe(
         for text in reader.notes if reader else ():
             tell(f"{_plain(source)}: {text}")
         report = PipeReport()
-        sink = _sink(output, found, encoding, stack, stdout)
-        try:
-            for frame, exposure in found.frames:
-                sink.put(frame, exposure)
-                report.frames += 1
-                if progress:
-                    progress(frame.number, "done")
-            sink.close()
-        except BaseException:
-            sink.abandon()
-            raise
+        writer = _writer(output, found, encoding, stack, stdout)
+        sink = VideoSink(writer)
+        engine.run(found.frames(coded_form(writer.coding)), sink, progress=progress)
+        report.frames = sink.count
         shots = found.exposures.shots
         report.cuts = sorted(shots.cuts) if shots else []
         report.held_out = found.exposures.holdout.message
         report.loss = reader.loss if reader else ""
-        report.left_out = sink.left_out
+        report.left_out = writer.left_out
         if reader and not report.frames:
             raise InputError(reader.loss or f"{_plain(source)}: holds no pictures")
         return report
@@ -204,8 +196,11 @@ def _piped(reader: Reader, run: VideoRun, output: OutputSettings, fps_in: str | 
         raise InputError(f"{reader.name}: does not say its rate; set `fps_in`")
     fps = rate if output.fps in (None, "source") else output.rate_or(rate)
     fps = fps.limit_denominator(FINEST_RATE)
-    made = steady(run, rate, fps)
-    frames = made.of(reader.pictures(), run.request.shutter.make())
+    made, shutter = steady(run, rate, fps), run.request.shutter.make()
+
+    def frames(form: Form) -> SteadyFrames:
+        return SteadyFrames(reader.pictures(), made, shutter, form)
+
     space = reader.space if isinstance(reader, Y4mReader) else ""
     return _Source(
         reader.size, reader.coding, reader.facts, fps, space, made.exposures, frames, reader
@@ -217,18 +212,22 @@ def _of_file(source: str, run: VideoRun, output: OutputSettings) -> _Source:
     reader, exposures = plan.reader, run.exposures(plan)
     if reader.is_variable and output.fps in (None, "source"):
         raise InputError(f"{source}: its rate is variable, that of a pipe cannot be; set `fps`")
-    frames = exposures.exposures(run.request.shutter.make(), plan.wanted)
+    shutter = run.request.shutter.make()
+
+    def frames(form: Form) -> ExposedFrames:
+        return ExposedFrames(exposures, shutter, plan.wanted, form)
+
     rate = 1 / plan.wanted[0].interval
     return _Source(reader.size, reader.coding, reader.facts, rate, "", exposures, frames, None)
 
 
-def _sink(
+def _writer(
     output: OutputSettings,
     source: _Source,
     encoding: Encoding | None,
     stack: ExitStack,
     stdout: BinaryIO | None,
-) -> _Sink:
+) -> _Writer:
     if not is_pipe(output.output):
         assert encoding is not None
         return _ToFile(Path(output.output), source, encoding)
@@ -241,17 +240,17 @@ def _sink(
 
 class _ToY4m:
     def __init__(self, stream: BinaryIO, source: _Source):
-        self._coding = coding_in(source.coding)
+        self.coding = coding_in(source.coding)
         aspect = source.facts.pixel_aspect
         self._writer = Y4mWriter(
-            stream, source.size, source.rate, self._coding, source.space, aspect
+            stream, source.size, source.rate, self.coding, source.space, aspect
         )
         self.left_out = []
-        if source.coding.alpha and not self._coding.alpha:
+        if source.coding.alpha and not self.coding.alpha:
             self.left_out.append("YUV4MPEG2 holds no such transparency; `codec='ffv1'` does")
 
-    def put(self, frame: OutputFrame, exposure: Exposure) -> None:
-        self._writer.add(exposure.coded(self._coding))
+    def add(self, picture: CodedPicture, time: Fraction) -> None:
+        self._writer.add(picture)
 
     def close(self) -> None:
         pass
@@ -262,28 +261,25 @@ class _ToY4m:
 
 class _ToMatroska:
     def __init__(self, stream: BinaryIO, source: _Source, encoding: Encoding):
-        self._coding, lost = encoding.coding(source.coding)
+        self.coding, lost = encoding.coding(source.coding)
         self.left_out = [*lost, *encoding.left_out(source.facts)]
         self._writer = MatroskaStream(
-            PipeWriter(stream), source.size, source.rate, self._coding, encoding, source.facts
+            PipeWriter(stream), source.size, source.rate, self.coding, encoding, source.facts
         )
         self.close, self.abandon = self._writer.close, self._writer.abandon
 
-    def put(self, frame: OutputFrame, exposure: Exposure) -> None:
-        self._writer.add(exposure.coded(self._coding))
+    def add(self, picture: CodedPicture, time: Fraction) -> None:
+        self._writer.add(picture)
 
 
 class _ToFile:
     def __init__(self, path: Path, source: _Source, encoding: Encoding):
-        self._coding, lost = encoding.coding(source.coding)
+        self.coding, lost = encoding.coding(source.coding)
         is_new = not path.exists()
         path.parent.mkdir(parents=True, exist_ok=True)
         self._video = VideoWriter(
-            path, atomic.temporary_name(path), encoding, self._coding, source.size, source.rate,
+            path, atomic.temporary_name(path), encoding, self.coding, source.size, source.rate,
             tick(1 / source.rate), source.facts, is_new=is_new,
         )  # fmt: skip
         self.left_out = [*lost, *self._video.left_out]
-        self.close, self.abandon = self._video.close, self._video.abandon
-
-    def put(self, frame: OutputFrame, exposure: Exposure) -> None:
-        self._video.add(exposure.coded(self._coding), frame.time)
+        self.add, self.close, self.abandon = self._video.add, self._video.close, self._video.abandon

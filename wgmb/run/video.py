@@ -330,7 +330,8 @@ def blur_video(
     `output`: a video (.mp4 .mov .mkv .webm .gif) or a pattern of frames such as out.####.png.
     `settings`: the command's options with underscores, such as fps=60, shutter=180, flow="search".
     `device`: your own wgpu device, the name of an adapter, or None for the best one. `progress` is
-    called with each output frame's number and "done", and may raise to end the run. A video is
+    called with each output frame's number and "done" once it is written, in the thread that writes,
+    and may raise to end the run. A video is
     complete under its name, or not there. InputError for settings that do not fit, a file that is
     no video, or an output that exists, unless `overwrite` or `resume` is set.
 

@@ -56,7 +56,7 @@ class VideoSink:
     is_whole = True
 
     def __init__(self, writer: PictureWriter):
-        self._writer = writer
+        self._writer, self.count = writer, 0
         self.close, self.abandon = writer.close, writer.abandon
 
     def done(self, number: int, made_of: dict[str, Any]) -> bool:
@@ -66,6 +66,7 @@ class VideoSink:
     def put(self, frame: CodedFrame) -> None:
         """Append a frame."""
         self._writer.add(frame.picture, frame.time)
+        self.count += 1
 
     def why_hopeless(self, error: BaseException) -> str:
         """Any error ends a video."""
