@@ -69,6 +69,8 @@ def _taken(entries: queue.SimpleQueue[Any]) -> Any:
 
 def _join(thread: threading.Thread, patience: float = math.inf) -> None:
     """Wait for the end of a thread; a join without limit would hold back Ctrl-C."""
+    if thread is threading.current_thread():
+        return  # it collects the garbage that it is part of
     until = time.monotonic() + patience
     while thread.is_alive() and time.monotonic() < until:
         thread.join(_POLL)

@@ -1,5 +1,6 @@
 """Reading ahead and writing behind: order, limits, errors, and ends."""
 
+import gc
 import itertools
 import threading
 import time
@@ -103,3 +104,26 @@ def test_work_that_is_begun_is_done_before_the_caller_goes_on_after_an_error(lef
         begun.wait()
         raise KeyboardInterrupt
     assert done == [1] and not left()
+
+
+def test_what_its_own_thread_collects_ends_without_a_word():
+    """In a cycle, a generator may be garbage that any thread finds, also the one it waits for."""
+    given_up, ended = threading.Event(), threading.Event()
+
+    def items():
+        yield 1
+        given_up.wait(10)
+        gc.collect()
+        ended.set()
+        yield 2
+
+    gc.disable()
+    try:
+        cycle = [ahead(items())]
+        cycle.append(cycle)
+        next(cycle[0])
+        del cycle
+        given_up.set()
+        assert ended.wait(10)
+    finally:
+        gc.enable()

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -113,8 +114,8 @@ def test_cuts_at_before_and_after_a_border_are_the_same(desk, capsys, cut, known
     options = ("--cuts", f"only:{cut}") if known else ()
     options = "--method", "gather", "--reach", reach, *options
     whole, told = check(capsys, "in/s.####.exr", ["1-5", "6-10"], *options)
-    assert f"camera cut before frame {cut}" in whole
-    assert f"camera cut before frame {cut}" in told
+    for text in (whole, told):  # in others the vectors may not fit the picture either
+        assert re.search(f"camera cuts? before frames? {cut}", text)
 
 
 def test_masks_layers_from_beside_cameras_and_curves_are_found_from_anywhere(desk, capsys):

@@ -90,7 +90,8 @@ def _outdated(place: Path, suffix: str, change: Callable[[Path, Path], list[str]
     again = wgmb("blur", source, "-o", old / name, *given, "--resume")
     how = [] if suffix == "png" else ["--resume"]  # segments round otherwise
     plain = wgmb("blur", source, "-o", fresh / name, *given, *how)
-    wrong = first.wrong(0) or again.wrong(0, 2, name="made otherwise") or plain.wrong(0)
+    said = "made otherwise" if change is not _damage else "exists and "  # it may hit the record
+    wrong = first.wrong(0) or again.wrong(0, 2, name=said) or plain.wrong(0)
     if wrong:
         return wrong
     if again.code == 2 or change is _no_change:

@@ -230,7 +230,7 @@ def blur_pictures(
         raise InputError("`fps` needs the rate of the pictures; set `fps_in`")
     check_choice("transfer", transfer, TRANSFERS)
     if isinstance(pictures, (str, bytes, Path)):
-        raise InputError(f"pictures must be arrays, got a name; `blur_video` takes {pictures!r}")
+        raise InputError(f"pictures must be arrays, got a name; wgmb.blur_video takes {pictures!r}")
     if not isinstance(pictures, Iterable) and not hasattr(pictures, "__getitem__"):
         raise InputError(f"pictures must be an iterable of arrays, got {type(pictures).__name__}")
     rate = _RATE if fps_in is None else _rate("fps_in", fps_in)

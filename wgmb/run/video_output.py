@@ -95,7 +95,7 @@ def _write_video(
     texts = _texts(reader, made_of)
     there = [path] if os.path.exists(os.path.realpath(path)) else []
     refuse_inputs(path.parent, [path.name], there, inputs)
-    is_ours = is_whole = False
+    stated, is_ours, is_whole = None, False, False
     if there and output.resume:
         stated, is_whole = _record_of(path)
         is_ours = stated == json.loads(json.dumps(made_of))
