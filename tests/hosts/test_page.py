@@ -256,6 +256,7 @@ def own(number: int) -> np.ndarray:
     return found / 255
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("count", [2, 3])
 def test_pictures_of_ones_own_are_blurred_along_their_motion(visit, tmp_path, count):
     sharp, blurred = tmp_path / "sharp.png", tmp_path / "blurred.png"

@@ -139,6 +139,7 @@ def test_masks_layers_from_beside_cameras_and_curves_are_found_from_anywhere(des
     assert "camera cut before frame 4" in whole
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("suffix", ["png", "tif"])
 def test_stills_with_a_config_of_the_environment_are_the_same(
     desk, capsys, shot, suffix, monkeypatch
