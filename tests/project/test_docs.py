@@ -1,5 +1,6 @@
 """The examples of the documentation work: Python, command lines, options, links."""
 
+import gc
 import re
 import shlex
 import tomllib
@@ -71,12 +72,14 @@ def test_python_blocks_run_in_their_order(page, tmp_path, monkeypatch):
 RECIPES = [block for text in PAGES.values() for block in blocks(text, "py")]
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # MoviePy's pipes
 @pytest.mark.parametrize("block", RECIPES, ids=lambda block: block.split()[1])
 def test_recipes_with_other_packages_run_where_those_are(block, tmp_path, monkeypatch):
     pytest.importorskip(block.split()[1])
     make_clips.write(tmp_path / "in.mp4", tone=0.1)
     monkeypatch.chdir(tmp_path)
     exec(compile(block, "recipe", "exec"), {"np": np, "wgmb": wgmb})
+    gc.collect()
 
 
 def test_the_pages_that_teach_python_have_blocks():
