@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from typing import Literal, Unpack
+from typing import Any, Literal, Unpack, cast
 
 import numpy as np
 import wgpu
@@ -71,7 +71,7 @@ def blur(
 
 def coding_of(frame: vs.VideoFrame) -> Coding:
     """The coding that a frame's properties state, and what players assume for the rest."""
-    form, properties = frame.format, frame.props
+    form, properties = frame.format, cast(Mapping[str, Any], frame.props)
     families: dict[int, Literal["rgb", "grey", "yuv"]] = {vs.RGB: "rgb", vs.GRAY: "grey"}
     model = families.get(int(form.color_family), "yuv")
     steps = 1 << form.subsampling_w, 1 << form.subsampling_h
@@ -87,7 +87,7 @@ def coding_of(frame: vs.VideoFrame) -> Coding:
     return coding
 
 
-def _range(properties: vs.FrameProps) -> int:
+def _range(properties: Mapping[str, Any]) -> int:
     """Limited (1), full (2) or not told (0), as FFmpeg counts it.
 
     VapourSynth 81 has `_Range`, 1 for full; until then `_ColorRange` is 0 for full.
