@@ -75,7 +75,9 @@ RECIPES = [block for text in PAGES.values() for block in blocks(text, "py")]
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # MoviePy's pipes
 @pytest.mark.parametrize("block", RECIPES, ids=lambda block: block.split()[1])
 def test_recipes_with_other_packages_run_where_those_are(block, tmp_path, monkeypatch):
-    pytest.importorskip(block.split()[1])
+    package = pytest.importorskip(block.split()[1])
+    if package.__name__ == "vapoursynth" and not hasattr(package.core, "bs"):
+        pytest.skip("VapourSynth has no BestSource here")
     make_clips.write(tmp_path / "in.mp4", tone=0.1)
     monkeypatch.chdir(tmp_path)
     exec(compile(block, "recipe", "exec"), {"np": np, "wgmb": wgmb})
