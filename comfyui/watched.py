@@ -14,7 +14,7 @@ class StoppedError(Exception):
 
 
 class Handle:
-    """What the work holds: a place for its items, and the wish to stop."""
+    """The state of the work: a place for its items, and the request to stop."""
 
     def __init__(self):
         self._stop = threading.Event()

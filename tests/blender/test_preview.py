@@ -48,7 +48,7 @@ def scene(folder):
 
 @pytest.fixture
 def pictures(monkeypatch):
-    """What the preview shows, in its order."""
+    """The images of the preview, in their order."""
     shown = []
     own = preview.show
     monkeypatch.setattr(preview, "show", lambda rgba, name: shown.append(rgba) or own(rgba, name))

@@ -30,7 +30,7 @@ def noise(shape, is_wall):
 
 @pytest.mark.parametrize("degrees", [180, 360])
 def test_a_wall_that_is_darker_in_other_frames_shows_no_seam(degrees):
-    """Where the box uncovers it: taken as it is, up to 0.32 is missing there, 0.03 to 0.04 RMS."""
+    """The ground that the box uncovers; taken as it is, up to 0.32 is missing, 0.03 to 0.04 RMS."""
     blur = wgmb.Blur("gather", shutter=degrees)
     want = blur(frame_of(sources(lambda shape, is_wall: np.ones(shape, "f4"))))
     got = blur(frame_of(sources(dark_wall)))

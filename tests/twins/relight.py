@@ -54,7 +54,7 @@ def pixel(at, shape):
 
 
 def shown(own, there, y, x):
-    """Where the surface of a neighbour's pixel is in the frame; if it shows it, if it hides it."""
+    """Place of the surface of a neighbour's pixel in the frame, and if it is shown or hidden."""
     size = np.array(there.single.shape[::-1])
     step = moved(there.trajectory[0][y, x], -there.offset)
     at = np.array([x, y]) + 0.5 + step

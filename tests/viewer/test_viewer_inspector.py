@@ -76,11 +76,11 @@ def available(methods, looks):
 def test_it_says_which_method_and_why():
     state = put(ALONE, samples=None)
     assert (
-        inspector.made_by(state, available(METHODS, ["result", "depth"]))
+        inspector.method_line(state, available(METHODS, ["result", "depth"]))
         == "method   tap, 16 samples"
     )
     flat = available(["tap", "tiles"], ["result", "velocity"])
-    assert inspector.made_by(state, flat) == "method   tap, 16 samples (no depth)"
+    assert inspector.method_line(state, flat) == "method   tap, 16 samples (no depth)"
 
 
 def test_the_histogram_counts_pixels_by_stops():

@@ -48,7 +48,7 @@ FEW_EXAMPLES = 3
 
 
 def place(names: Iterable[str]) -> int:
-    """Where an option of these names stands in MAIN."""
+    """The place in MAIN of an option of these names."""
     named = [name for name in names if name.startswith("--")]
     found = [FIRST.index(name) for name in named if name in FIRST]
     return min(found, default=len(FIRST))

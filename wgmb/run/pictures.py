@@ -120,7 +120,7 @@ class PictureBlur(Iterator[Any]):
         how: str,
     ):
         self.how = how
-        """Where the motion comes from, in words."""
+        """The source of the motion, in words."""
         self._steady, self._transfer = steady, transfer
         self._like: type = type(None)
         self._shape, self._dtype, self._coding = (0, 0, 0), np.dtype(np.uint8), Coding()

@@ -88,7 +88,7 @@ class Displays:
         return self._pictures[number]
 
     def _run(self, number: int, way: int) -> list[np.ndarray]:
-        """Where nothing changes, step by step away from a picture, as far as there are any."""
+        """The unchanged pixels, for up to REACH steps away from a picture within its shot."""
         found = []
         for k in range(1, REACH + 1):
             if not self._leads(number, number + way * k):
@@ -100,7 +100,7 @@ class Displays:
         return found
 
     def _step(self, number: int) -> np.ndarray:
-        """Where nothing changes from a picture to the next."""
+        """The pixels that do not change from a picture to the next."""
         one, two = self._picture(number), self._picture(number + 1)
         change = np.maximum(one.grey, two.grey) - np.minimum(one.grey, two.grey)
         least = np.minimum(one.contrast, two.contrast)
@@ -147,7 +147,7 @@ def _spread(tiles: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _moves_around(steps: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
-    """Where many pixels of the surroundings change."""
+    """The pixels in whose surroundings many others change."""
     still = np.zeros(shape, np.uint8)
     for step in steps:
         still += step

@@ -200,7 +200,7 @@ class Viewer:
         return controls.WindowLayout(self._area(), place, *words)
 
     def _place(self) -> controls.Box:
-        """Where the whole image is on the canvas [px]."""
+        """The place of the whole image on the canvas [px]."""
         shape = self._drawn.report.shape if self._drawn else (1, 1)
         return fit(shape, self._area_px(), self.state)
 
@@ -335,7 +335,7 @@ class Viewer:
             self._histogram = light, None if light is None else inspector.histogram(light)
         (x, y), (left, top, width, height) = self._mouse, layout.place
         u, v = (x - left) / width, (y - top) / height
-        text = [inspector.made_by(drawn.state, drawn.available)]
+        text = [inspector.method_line(drawn.state, drawn.available)]
         if 0 <= u < 1 and 0 <= v < 1 and controls.is_inside(area, x, y):
             ratio = self.canvas.get_pixel_ratio()
             display = self.screen.values(x * ratio, y * ratio)

@@ -59,7 +59,7 @@ class Drawn:
 
     request: Request
     state: State
-    """That of the request, as far as it is possible here."""
+    """The request's own, as far as it is possible here."""
     report: FrameStatus
     available: Available
     images: dict[str, Image]

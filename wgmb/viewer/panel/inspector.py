@@ -40,7 +40,7 @@ def lines(
     display: np.ndarray | None,
 ) -> list[str]:
     """The text for a place `at`, 0 to 1 across and down; `display`: values on the screen there."""
-    found = [made_by(state, available)]
+    found = [method_line(state, available)]
     light = under.get("light")
     if light is None:
         return [*found, "..."]
@@ -60,7 +60,7 @@ def lines(
     return found
 
 
-def made_by(state: State, available: Available) -> str:
+def method_line(state: State, available: Available) -> str:
     """The method and its samples; why it is not gather, where that cannot be had."""
     samples = state.suited_blur.samples or getattr(METHODS[state.method], "samples", SAMPLES)
     text = f"method   {state.method}, {samples} samples"
