@@ -59,7 +59,7 @@ class Layers:
 
     def live(self, size: tuple[int, int]) -> np.ndarray:
         """(rows, columns) of tiles: whether anything moves in them or may move into them."""
-        source = wgsl.load("methods/gather/active_tiles.wgsl")
+        source = wgsl.load("methods/gather/tiles/active_tiles.wgsl")
         across, down = tiles_of(size)
         words = -(-(across * down + int(source.constant("CELLS_WORD"))) // 64) * 64
         data = self._device.queue.read_buffer(self._lists)
@@ -196,7 +196,7 @@ def classified(frame: Frame, layers: Layers) -> None:
     """For every block, the share of the sample times at which one search is enough."""
     bits = layers.read("single-layer mask", 0)[..., 0]
     share = np.array([[int(word).bit_count() for word in row] for row in bits]) / 16
-    side = int(wgsl.load("methods/gather/search.wgsl").constant("BLOCK"))
+    side = int(wgsl.load("methods/gather/search/search.wgsl").constant("BLOCK"))
     share = share.repeat(side, 0).repeat(side, 1)[: frame.size[1], : frame.size[0]]
     live = pixels_of(layers.live(frame.size), frame.size)
     low, high = np.array([0.85, 0.25, 0.15]), np.array([0.2, 0.5, 0.85])

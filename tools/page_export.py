@@ -25,9 +25,10 @@ from wgmb.scene.volumes import Backdrop, Torus
 
 FRAGMENT = 2  # GPUShaderStage
 PATTERNS = (
-    "methods/volume.wgsl", "methods/tap.wgsl", "methods/tiles*.wgsl", "methods/gather/*.wgsl",
-    "gpu_frame/velocity.wgsl", "gpu_frame/holdout.wgsl", "scene/gbuffer.wgsl",
-    "hosts/block_search.wgsl", "viewer/draw/compose.wgsl", "viewer/draw/blit.wgsl",
+    "methods/volume.wgsl", "methods/tap.wgsl", "methods/tiles*.wgsl", "methods/gather/tiles/*.wgsl",
+    "methods/gather/layers/*.wgsl", "methods/gather/search/*.wgsl", "gpu_frame/velocity.wgsl",
+    "gpu_frame/holdout.wgsl", "scene/gbuffer.wgsl", "hosts/block_search.wgsl",
+    "viewer/draw/compose.wgsl", "viewer/draw/blit.wgsl",
 )  # fmt: skip
 """The shaders of the page; of these, files without an entry point come with those that have one."""
 

@@ -189,7 +189,7 @@ def test_both_clocks_tell_the_same_passes(device, monkeypatch, usable):
     counts = {f.method: f.counts for f in run.figures}
     assert counts["tap"] == {"methods/tap.wgsl:main": 1}
     assert counts["tiles"]["methods/tiles_velocity.wgsl:main"] == 1
-    assert counts["gather"]["methods/gather/edges.wgsl:detect_edges"] == 3  # of three frames
+    assert counts["gather"]["methods/gather/layers/edges.wgsl:detect_edges"] == 3  # of three frames
     assert counts["accumulate"] == {"scene/gbuffer.wgsl:main": 3, "methods/accumulate.wgsl:main": 3}
     if not usable:
         assert all(v >= 0 for f in run.figures for v in f.passes.values())

@@ -176,7 +176,7 @@ def test_textures_that_are_read_as_storage_show_the_same(sources, monkeypatch):
         monkeypatch.setattr(kernels, "reads_storage", lambda device, there=as_storage: there)
         monkeypatch.setattr(kernels, "_kernel", lru_cache(kernels._kernel.__wrapped__))
         shown.append(wgmb.Blur("gather", shutter=360, samples=5)(frame_of(sources)))
-        made = kernels.kernel(gpu.open_device(), "methods/gather/cubic.wgsl").source.text
+        made = kernels.kernel(gpu.open_device(), "methods/gather/search/cubic.wgsl").source.text
         assert ("<rgba32uint, read>" in made) == as_storage
     np.testing.assert_array_equal(*shown)
 

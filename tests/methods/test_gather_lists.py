@@ -10,7 +10,11 @@ from wgmb import Shutter
 from wgmb.gpu import kernels, wgsl
 
 SIZE = (150, 340)
-ALL_ACTIVE = "methods/gather/active_tiles.wgsl", "var nearest = MARGIN + 1;", "var nearest = 0;"
+ALL_ACTIVE = (
+    "methods/gather/tiles/active_tiles.wgsl",
+    "var nearest = MARGIN + 1;",
+    "var nearest = 0;",
+)
 SHORT_ROWS = (
     "methods/gather/worklist.wgsl",
     "const GROUPS_PER_ROW: u32 = 32768u;",

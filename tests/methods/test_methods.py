@@ -25,7 +25,7 @@ def test_contract(name):
         "self", "encoder", "inputs", "output",
     ]  # fmt: skip
     folder = wgsl.ROOT / "methods"
-    for shader in [folder / f"{name}.wgsl", *(folder / name).glob("*.wgsl")]:
+    for shader in [folder / f"{name}.wgsl", *(folder / name).rglob("*.wgsl")]:
         assert not shader.exists() or shader.read_text().startswith("// ")
     public = {n for n in vars(method) if not n.startswith("_")}
     if "confidence" in public:  # a name for each channel of what it shows then

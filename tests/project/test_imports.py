@@ -131,11 +131,12 @@ def test_what_is_not_of_the_core_has_an_extra():
 
 @pytest.mark.parametrize(
     "folder",
-    sorted({file.parent for file in FILES}),
+    sorted({file.parent for file in [*FILES, *KERNELS]}),
     ids=lambda folder: str(folder.relative_to(ROOT)),
 )
 def test_a_folder_can_be_looked_over(folder):
-    assert len(list(folder.glob("*.py"))) <= MOST_FILES
+    files = [file for kind in ("*.py", "*.wgsl") for file in folder.glob(kind)]
+    assert len(files) <= MOST_FILES
 
 
 def test_no_room_stands_empty():
@@ -160,12 +161,14 @@ def test_shaders_include_what_is_common_and_their_own(file):
 
 @pytest.mark.parametrize("file", KERNELS, ids=lambda f: str(f.relative_to(SHADERS)))
 def test_shaders_lie_where_their_python_does(file):
-    """`wgsl/X/y.wgsl` belongs to `wgmb/X/y.py`, or to `wgmb/X/` as one of its stages."""
+    """`wgsl/X/y.wgsl` is recorded by `wgmb/X/y.py`, or is a stage of `wgmb/X/` or `wgmb/X.py`."""
     own = file.relative_to(SHADERS)
     if own.parts[0] != "common":
         stem = PACKAGE / own.parent / own.stem
         begun = PACKAGE / own.parent / own.stem.split("_")[0]
-        places = stem.with_suffix(".py"), begun.with_suffix(".py"), PACKAGE / own.parent
+        room = PACKAGE / own.parent
+        names = [stem, begun] if room == PACKAGE else [stem, begun, room]
+        places = [room, *(name.with_suffix(".py") for name in names)]
         assert any(p.exists() and p != PACKAGE for p in places)
 
 

@@ -8,13 +8,13 @@ from typing import Annotated, ClassVar, Literal
 from ...gpu import wgsl
 from ...gpu.textures import TexturePool
 from ..options import MethodOptions, Range
-from .active_tiles import ActiveTiles
-from .layers import Layers
+from .layers.layers import Layers
 from .light_inputs import PASSES, Shading, kinds_of
-from .scatter import Scatter
 from .search import Search
 from .shading import LightTimes, MovingLight
-from .tile_motions import TileMotions
+from .tiles.active_tiles import ActiveTiles
+from .tiles.scatter import Scatter
+from .tiles.tile_motions import TileMotions
 
 
 class Gather:

@@ -11,9 +11,9 @@ import wgpu
 from ... import gpu
 from ...gpu import wgsl
 from ...gpu.textures import ScratchBuffer, TexturePool
-from .active_tiles import grid_of, uniform
-from .layers import layer_view
+from .layers.layers import layer_view
 from .shading import Added
+from .tiles.active_tiles import grid_of, uniform
 
 
 class Search:
@@ -34,7 +34,7 @@ class Search:
         timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
         timed["FAR"] = any(abs(frame.offset) > 1 for frame in inputs.frames)
         timed["WEIGHTED"] = inputs.frame.weight is not None
-        classify = gpu.kernel(self._device, "methods/gather/classify.wgsl", **timed)
+        classify = gpu.kernel(self._device, "methods/gather/search/classify.wgsl", **timed)
         data = np.zeros((), classify.source.dtype("SourceFrames"))
         near = [frame.offset for frame in inputs.frames if abs(frame.offset) <= 1]
         far = [frame.offset for frame in inputs.frames[len(near) :]]
@@ -87,7 +87,7 @@ class Search:
             for lit, groups in self._groups(encoder, inputs, cells, added):
                 kernel = gpu.kernel(
                     self._device,
-                    "methods/gather/resolve.wgsl",
+                    "methods/gather/search/resolve.wgsl",
                     {"Output": self._output, "mattes": layers["mattes"].format},
                     CONFIDENCE=self._confidence,
                     **kind,
@@ -129,7 +129,7 @@ class Search:
 
     def _light(self, added: Added | None) -> dict:
         """Bindings of the search for moving light, or for none."""
-        source = wgsl.load("methods/gather/moving_light.wgsl")
+        source = wgsl.load("methods/gather/search/moving_light.wgsl")
         nodes = np.zeros((), source.dtype("LightNodes"))
         if added is None:
             none = self._images.texture("no light", (1, 1), "rgba16float")
@@ -145,7 +145,7 @@ class Search:
     def _differences(self, encoder, inputs, surfaces, cells) -> wgpu.GPUTextureView:
         """Record the second differences of the frame's own colours."""
         differences = self._images.view("second differences", inputs.bindings.size, "rgba32uint")
-        kernel = gpu.kernel(self._device, "methods/gather/cubic.wgsl")
+        kernel = gpu.kernel(self._device, "methods/gather/search/cubic.wgsl")
         kernel.run(
             encoder,
             "main",

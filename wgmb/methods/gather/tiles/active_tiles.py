@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import wgpu
 
-from ... import gpu
-from ...gpu import wgsl
-from ...gpu.textures import ScratchBuffer
+from .... import gpu
+from ....gpu import wgsl
+from ....gpu.textures import ScratchBuffer
 
 
 def grid_of(size: tuple[int, int]) -> tuple[int, int]:
@@ -31,7 +31,7 @@ class ActiveTiles:
 
     def encode(self, encoder, inputs) -> dict[str, dict]:
         """Record which tiles are active; the worklists of active_tiles.wgsl, by name."""
-        kernel = gpu.kernel(self._device, "methods/gather/active_tiles.wgsl")
+        kernel = gpu.kernel(self._device, "methods/gather/tiles/active_tiles.wgsl")
         grid = grid_of(inputs.bindings.size)
         words = -(-(grid[0] * grid[1] + int(kernel.source.constant("CELLS_WORD"))) // 64) * 64
         size = 4 * words * int(kernel.source.constant("SECTIONS"))

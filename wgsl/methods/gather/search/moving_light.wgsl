@@ -3,7 +3,7 @@
 //#include common/loops.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
-//#include methods/gather/search.wgsl
+//#include methods/gather/search/search.wgsl
 
 struct LightNodes {
     first: f32,         // time of the first one [frame intervals]

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import wgpu
 
-from ... import gpu
-from ...gpu.textures import ScratchBuffer, TexturePool
+from .... import gpu
+from ....gpu.textures import ScratchBuffer, TexturePool
 from .edges import Edges
 from .relight import Relight
 
@@ -104,7 +104,7 @@ class Layers:
         }
         kernel = gpu.kernel(
             self._device,
-            "methods/gather/layers.wgsl",
+            "methods/gather/layers/layers.wgsl",
             {"Color": colors.format, "Mattes": self.textures["mattes"].format},
             WEIGHTED=frame.weight is not None,
             COPIED=copied,

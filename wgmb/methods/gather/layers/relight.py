@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import wgpu
 
-from ... import gpu
-from ...gpu.textures import ScratchBuffer
-from .active_tiles import grid_of, uniform
+from .... import gpu
+from ....gpu.textures import ScratchBuffer
+from ..tiles.active_tiles import grid_of, uniform
 
 
 class Relight:
@@ -34,7 +34,7 @@ class Relight:
         """
         kernel = gpu.kernel(
             self._device,
-            "methods/gather/relight.wgsl",
+            "methods/gather/layers/relight.wgsl",
             {"Color": relit.texture.format},
             WEIGHTED=frame.weight is not None,
         )

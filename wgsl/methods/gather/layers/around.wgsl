@@ -3,7 +3,7 @@
 //#include common/depth.wgsl
 //#include common/trajectory5.wgsl
 //#include common/frame.wgsl
-//#include methods/gather/gains.wgsl
+//#include methods/gather/layers/gains.wgsl
 //#include methods/gather/surface.wgsl
 
 @group(1) @binding(12) var prev_color: texture_2d<f32>;

@@ -1,9 +1,9 @@
 // Samples composited front to back, edges by the texels of their own surface.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
-//#include methods/gather/moving_light.wgsl
-//#include methods/gather/search.wgsl
-//#include methods/gather/visibility.wgsl
+//#include methods/gather/search/moving_light.wgsl
+//#include methods/gather/search/search.wgsl
+//#include methods/gather/search/visibility.wgsl
 
 @group(1) @binding(4) var layer_colors: texture_2d_array<f32>;  // front, back per frame; premultiplied by alpha, coverage, weight
 @group(1) @binding(5) var mattes: texture_2d_array<u32>;    // stored as r32uint, rg32uint if WEIGHTED: per frame, see pack_matte()

@@ -8,11 +8,11 @@
 //#include common/shutter.wgsl
 //#include methods/gather/worklist.wgsl
 //#include methods/gather/motion.wgsl
-//#include methods/gather/moving_light.wgsl
-//#include methods/gather/search.wgsl
-//#include methods/gather/composite.wgsl
-//#include methods/gather/hidden.wgsl
-//#include methods/gather/visibility.wgsl
+//#include methods/gather/search/moving_light.wgsl
+//#include methods/gather/search/search.wgsl
+//#include methods/gather/search/composite.wgsl
+//#include methods/gather/search/hidden.wgsl
+//#include methods/gather/search/visibility.wgsl
 
 @group(1) @binding(3) var single_layer_mask: texture_2d_array<u32>; // bits of times, see the classification
 @group(1) @binding(10) var output: Output;

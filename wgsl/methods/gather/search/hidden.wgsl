@@ -1,7 +1,7 @@
 // Colours of what no frame shows: taps of the frame itself, and what is filled from around.
 //#include common/frame.wgsl
-//#include methods/gather/composite.wgsl
-//#include methods/gather/search.wgsl
+//#include methods/gather/search/composite.wgsl
+//#include methods/gather/search/search.wgsl
 
 @group(1) @binding(7) var own_color: texture_2d<f32>;       // the frame as it came
 @group(1) @binding(8) var own_weight: texture_2d<f32>;

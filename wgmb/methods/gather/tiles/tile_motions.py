@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import wgpu
 
-from ... import gpu
-from ...gpu import wgsl
-from ...gpu.textures import ScratchBuffer, TexturePool
+from .... import gpu
+from ....gpu import wgsl
+from ....gpu.textures import ScratchBuffer, TexturePool
 from .active_tiles import grid_of, uniform
 
 
@@ -32,7 +32,7 @@ class TileMotions:
 
         `scattering`: gets its tiles to scatter, if any tile is crowded.
         """
-        kernel = gpu.kernel(self._device, "methods/gather/tile_motions.wgsl")
+        kernel = gpu.kernel(self._device, "methods/gather/tiles/tile_motions.wgsl")
         data = np.zeros((), kernel.source.dtype("SourceFrame"))
         data["offset"] = inputs.frames[index].offset
         data["first"] = index * int(kernel.source.constant("CANDIDATE_LAYERS"))

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import wgpu
 
-from ... import gpu
-from ...gpu import wgsl
-from ...gpu.textures import ScratchBuffer
+from .... import gpu
+from ....gpu import wgsl
+from ....gpu.textures import ScratchBuffer
 from .active_tiles import grid_of, uniform
 
 
@@ -31,7 +31,7 @@ class Scatter:
 
     def scattered(self, encoder, inputs) -> dict:
         """The buffer of all that is scattered, see scattered.wgsl; recorded to be empty."""
-        source = wgsl.load("methods/gather/scattered.wgsl")
+        source = wgsl.load("methods/gather/tiles/scattered.wgsl")
         tile, block, most = (int(source.constant(n)) for n in ("TILE", "BLOCK", "SLICES"))
         blocks = math.prod(grid_of(inputs.bindings.size)) * (tile // block) ** 2
         slice_size = 4 * blocks * len(_near(inputs))
@@ -46,7 +46,7 @@ class Scatter:
         a neighbour; `surfaces`: the front surfaces of the frame itself, and of that frame."""
         if index >= len(_near(inputs)):
             return
-        kernel = gpu.kernel(self._device, "methods/gather/scatter.wgsl")
+        kernel = gpu.kernel(self._device, "methods/gather/tiles/scatter.wgsl")
         data = np.zeros((), kernel.source.dtype("ScatteredFrame"))
         data["offset"], data["index"] = inputs.frames[index].offset, index
         data["count"] = len(_near(inputs))

@@ -1,6 +1,6 @@
 // Coverage of an edge pixel by its front surface: if vectors tell it, which some renderers filter, or else by colour.
 //#include common/frame.wgsl
-//#include methods/gather/edge_flags.wgsl
+//#include methods/gather/layers/edge_flags.wgsl
 
 const BETWEEN: f32 = 0.4;       // a vector from 0.1 to 0.9 of the way between two is a mixture of them
 const LEAST_CONTRAST: f32 = 0.05;   // of two colours that tell coverage

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import wgpu
 
-from ... import gpu
-from ...gpu.textures import ScratchBuffer, TexturePool
-from .active_tiles import grid_of
+from .... import gpu
+from ....gpu.textures import ScratchBuffer, TexturePool
+from ..tiles.active_tiles import grid_of
 
 
 class Edges:
@@ -26,7 +26,7 @@ class Edges:
         flags = self._images.view("edge flags", size, "r32uint")
         crowds = self._crowds.at_least(8 * math.prod(grid_of(size)))
         encoder.clear_buffer(crowds)
-        kernel = gpu.kernel(self._device, "methods/gather/edges.wgsl")
+        kernel = gpu.kernel(self._device, "methods/gather/layers/edges.wgsl")
         given = {
             "worklist": worklist,
             "motion": frame.motion,

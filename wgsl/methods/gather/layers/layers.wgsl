@@ -4,11 +4,11 @@
 //#include common/path.wgsl
 //#include methods/gather/worklist.wgsl
 //#include methods/gather/surface.wgsl
-//#include methods/gather/edge_flags.wgsl
-//#include methods/gather/sides.wgsl
-//#include methods/gather/coverage.wgsl
-//#include methods/gather/around.wgsl
-//#include methods/gather/crowd.wgsl
+//#include methods/gather/layers/edge_flags.wgsl
+//#include methods/gather/layers/sides.wgsl
+//#include methods/gather/layers/coverage.wgsl
+//#include methods/gather/layers/around.wgsl
+//#include methods/gather/layers/crowd.wgsl
 
 @group(1) @binding(6) var colors: Color;                // FRONT, premultiplied by coverage too, and BACK
 @group(1) @binding(7) var surfaces: Packed;             // FRONT and BACK, see pack_surface()

@@ -1,8 +1,8 @@
 // The two sides of an edge pixel: which pixels around it are in front and which behind, and the mean surface of either.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
-//#include methods/gather/around.wgsl
-//#include methods/gather/edge_flags.wgsl
+//#include methods/gather/layers/around.wgsl
+//#include methods/gather/layers/edge_flags.wgsl
 
 @group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
 @group(1) @binding(3) var weight: texture_2d<f32>;

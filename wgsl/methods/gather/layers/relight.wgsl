@@ -3,7 +3,7 @@
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include common/shutter.wgsl
-//#include methods/gather/gains.wgsl
+//#include methods/gather/layers/gains.wgsl
 //#include methods/gather/surface.wgsl
 //#include methods/gather/worklist.wgsl
 

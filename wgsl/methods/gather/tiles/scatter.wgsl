@@ -6,7 +6,7 @@
 //#include common/frame.wgsl
 //#include common/path.wgsl
 //#include common/shutter.wgsl
-//#include methods/gather/scattered.wgsl
+//#include methods/gather/tiles/scattered.wgsl
 
 struct ScatteredFrame {
     offset: f32,        // [frame intervals]

@@ -1,7 +1,7 @@
 // The nearest samples that are at a pixel by a time, by searches of all frames and layers.
 //#include common/depth.wgsl
 //#include methods/gather/motion.wgsl
-//#include methods/gather/search.wgsl
+//#include methods/gather/search/search.wgsl
 
 override CROWDED: bool = false;     // tiles are crowded: searches of front layers start from what is scattered too
 

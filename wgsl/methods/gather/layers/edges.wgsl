@@ -3,8 +3,8 @@
 //#include common/frame.wgsl
 //#include methods/gather/surface.wgsl
 //#include methods/gather/worklist.wgsl
-//#include methods/gather/edge_flags.wgsl
-//#include methods/gather/crowd.wgsl
+//#include methods/gather/layers/edge_flags.wgsl
+//#include methods/gather/layers/crowd.wgsl
 
 @group(1) @binding(5) var edge_flags_out: Flags;        // see flag_depth()
 @group(1) @binding(9) var<storage, read> worklist: WorkList;

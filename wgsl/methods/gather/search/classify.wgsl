@@ -5,7 +5,7 @@
 //#include common/loops.wgsl
 //#include common/shutter.wgsl
 //#include methods/gather/worklist.wgsl
-//#include methods/gather/search.wgsl
+//#include methods/gather/search/search.wgsl
 
 @group(1) @binding(3) var single_layer_mask: Mask;  // by block: words of bits, TIMES_PER_WORD a layer; last, 1 if all are set
 @group(1) @binding(4) var<storage, read> active_cells: WorkList;

@@ -1,0 +1,1 @@
+"""Tiles: where something moves, and from which motions a search starts there."""
