@@ -168,11 +168,10 @@ def kill(folder: Path, times: int = 20) -> None:
 
         thread = threading.Thread(target=shoot, args=(luck.uniform(0.0, 2.0),))
         thread.start()
-        outcome = Farm(workers=2).blur(job, lambda n, state, begun=begun: begun.set())
+        report = Farm(workers=2).blur(job, lambda n, state, begun=begun: begun.set())
         over.set()
         begun.set()
         thread.join()
-        report = outcome.report
         tally["killed"] += len(died)
         tally["complete"] += not report.failed and not report.stopped
         names = {p.name for p in out.iterdir()}
@@ -206,9 +205,9 @@ def farm(folder: Path, frames: int, workers: int, seconds: float) -> None:
             started, cpu = time.monotonic(), time.process_time()
         tick(number, state)
 
-    outcome = place.blur(job, first)
+    report = place.blur(job, first)
     took, used = time.monotonic() - started, time.process_time() - cpu
-    assert len(outcome.report.done) == frames, outcome.report
+    assert len(report.done) == frames, report
     waited = frames * seconds
     at = ", ".join(f"{count}: {mib:.0f}" for count, mib in memory)
     print(f"farm   {frames} frames of {seconds:g} s on {workers} simulated workers: {took:.0f} s, "

@@ -10,7 +10,7 @@ from pathlib import Path
 import make_frames as make
 from wgmb.run.farm.plugin import BlurPlugin
 from wgmb.run.job import Job, settle
-from wgmb.run.report import BatchReport, Outcome
+from wgmb.run.report import BatchReport
 from wgmb.run.request import BlurRequest
 from wgmb.sequence.findings import SequenceFindings
 from wgmb.settings import (
@@ -55,7 +55,7 @@ class Timed(BlurPlugin):
         super().prepare(adapter)
         self._log()
 
-    def blur(self, chosen, tell, stop) -> Outcome:
+    def blur(self, chosen, tell, stop) -> BatchReport:
         """Blur, and count."""
         made = super().blur(chosen, tell, stop)
         self._log()
@@ -73,15 +73,13 @@ class Waiting(BlurPlugin):
         """There is nothing to be opened."""
         self._seconds = float(os.environ.get("WGMB_STUB_SECONDS", "0.1"))
 
-    def blur(self, chosen, tell, stop) -> Outcome:
+    def blur(self, chosen, tell, stop) -> BatchReport:
         """Wait."""
-        made = Outcome(len(chosen), (chosen[0], chosen[-1]), "", False, [])
         for number in chosen:
             time.sleep(self._seconds)
             tell(number, "done")
-        made.report = BatchReport(done=list(chosen))
-        made.sizes = {(1920, 1080): list(chosen)}
-        return made
+        sizes = {(1920, 1080): list(chosen)}
+        return BatchReport(done=list(chosen), total=len(chosen), sizes=sizes)
 
 
 def memory_of(process: int) -> float:

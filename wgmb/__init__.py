@@ -39,10 +39,10 @@ if TYPE_CHECKING:
     from .render import Render
     from .run.file_sink import BlurredFrame
     from .run.pictures import PictureBlur, blur_pictures
-    from .run.report import BatchReport
+    from .run.report import BatchReport, VideoReport
     from .run.sequence import blur_sequence, vectors_sequence
     from .run.stages import blurred
-    from .run.video import VideoReport, blur_video
+    from .run.video import blur_video
     from .scene import Body, CameraPath, Scene
     from .sequence.clip import Clip, Passes
     from .sequence.layers.camera_file import CameraFile
@@ -111,11 +111,11 @@ _PLACES = {
     "pipeline.one_frame": ("blur",),
     "png": ("show",),
     "render": ("Render",),
-    "run.report": ("BatchReport",),
+    "run.report": ("BatchReport", "VideoReport"),
     "run.file_sink": ("BlurredFrame",),
     "run.pictures": ("PictureBlur", "blur_pictures"),
     "run.sequence": ("blur_sequence", "vectors_sequence"),
-    "run.video": ("VideoReport", "blur_video"),
+    "run.video": ("blur_video",),
     "run.stages": ("blurred",),
     "scene": ("Body", "Scene", "CameraPath"),
     "sequence.clip": ("Clip", "Passes"),

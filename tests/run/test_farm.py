@@ -72,9 +72,9 @@ def test_workers_that_die_leave_nothing_but_whole_files(shot, whole, tmp_path):
     job = as_farm_job(job_of(shot, out))
     ticks = []
     farm = Farm(workers=2, details=said.append, plugin=farm_stubs.Killing)
-    outcome = farm.blur(job, lambda n, state: ticks.append(n))
-    assert outcome.report.failed == {5: "its worker died twice"}
-    assert outcome.report.stopped == ""
+    report = farm.blur(job, lambda n, state: ticks.append(n))
+    assert report.failed == {5: "its worker died twice"}
+    assert report.stopped == ""
     assert sorted(ticks) == list(range(1, COUNT + 1))
     names = {name: data for name, data in whole.items() if name != "o.0005.exr"}
     assert contents(out) == names
@@ -85,8 +85,8 @@ def test_workers_that_die_leave_nothing_but_whole_files(shot, whole, tmp_path):
 def test_a_real_worker_without_a_gpu_is_named_once(shot, whole, tmp_path):
     notes = []
     farm = Farm(workers=2, note=notes.append, plugin=farm_stubs.WithoutGpu)
-    outcome = farm.blur(as_farm_job(job_of(shot, tmp_path)))
-    assert (outcome.report.failed, outcome.report.absent) == ({}, [])
+    report = farm.blur(as_farm_job(job_of(shot, tmp_path)))
+    assert (report.failed, report.absent) == ({}, [])
     assert contents(tmp_path) == whole
     assert len(notes) == 1
     assert "does nothing: no GPU adapter" in notes[0]

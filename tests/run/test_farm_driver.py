@@ -9,11 +9,11 @@ from make_job import job_of
 import make_frames as make
 from wgmb import BatchReport, DeviceError, InputError
 from wgmb.run.farm import driver as farm_driver
+from wgmb.run.farm import merge
 from wgmb.run.farm.driver import Driver
 from wgmb.run.farm.farm import Farm
 from wgmb.run.farm.plugin import WorkerState
 from wgmb.run.farm.workers import size_of_part
-from wgmb.run.report import Outcome
 from wgmb.sequence.findings import numbers
 
 COUNT = 12
@@ -48,7 +48,7 @@ class LostResult(Future):
 
 
 class Client:
-    """Workers by name; `behave(name, numbers)` gives an Outcome, an error, or None: it dies."""
+    """Workers by name; `behave(name, numbers)` gives a BatchReport, an error, or None: it dies."""
 
     def __init__(self, states: dict[str, WorkerState | BaseException], behave):
         self.states, self._behave, self.status = dict(states), behave, "running"
@@ -88,9 +88,9 @@ class Client:
         return Future("error" if isinstance(found, BaseException) else "finished", found)
 
 
-def well(chosen, **more) -> Outcome:
-    report = BatchReport(done=list(chosen), **more)
-    return Outcome(len(chosen), (1, COUNT), "", False, [], report, sizes={(64, 48): list(chosen)})
+def well(chosen, **more) -> BatchReport:
+    sizes = {(64, 48): list(chosen)}
+    return BatchReport(done=list(chosen), total=len(chosen), sizes=sizes, **more)
 
 
 GOOD = WorkerState("0", "here", 1)
@@ -99,7 +99,7 @@ NO_GPU = WorkerState("1", "there", 2, "no GPU adapter", lacks_gpu=True)
 
 @pytest.fixture
 def drive(shot, tmp_path, monkeypatch):
-    """Runs a job on such workers; returns the outcome, the client, what was said and ticked."""
+    """Runs a job on such workers; returns the report, the client, what was said and ticked."""
     monkeypatch.setattr(farm_driver, "_LOOK", 0.0)
 
     def run(states, behave, patience=0.3, cluster="tcp://x"):
@@ -115,25 +115,25 @@ def drive(shot, tmp_path, monkeypatch):
 
 def test_every_frame_is_given_once_and_counted_once(drive):
     states = {"a": GOOD, "b": GOOD}
-    outcome, client, notes, ticks = drive(states, lambda name, chosen: well(chosen))
-    assert outcome.report.done == list(range(1, COUNT + 1))
-    assert sorted(n for n, _ in ticks) == outcome.report.done
+    report, client, notes, ticks = drive(states, lambda name, chosen: well(chosen))
+    assert report.done == list(range(1, COUNT + 1))
+    assert sorted(n for n, _ in ticks) == report.done
     assert {name for name, _ in client.given} == {"a", "b"}
     assert [len(chosen) for _, chosen in client.given] == [4, 4, 4]
     assert not notes
 
 
 def test_a_worker_without_a_gpu_is_given_nothing_and_named_once(drive):
-    outcome, client, notes, _ = drive({"a": GOOD, "b": NO_GPU}, lambda name, chosen: well(chosen))
-    assert len(outcome.report.done) == COUNT
+    report, client, notes, _ = drive({"a": GOOD, "b": NO_GPU}, lambda name, chosen: well(chosen))
+    assert len(report.done) == COUNT
     assert {name for name, _ in client.given} == {"a"}
     assert notes == ["worker 1 on there does nothing: no GPU adapter"]
 
 
 def test_a_worker_without_wgmb_is_named(drive):
     states = {"a": GOOD, "b": ModuleNotFoundError("No module named 'wgmb'")}
-    outcome, _, notes, _ = drive(states, lambda name, chosen: well(chosen))
-    assert len(outcome.report.done) == COUNT
+    report, _, notes, _ = drive(states, lambda name, chosen: well(chosen))
+    assert len(report.done) == COUNT
     assert notes == ["worker b does nothing: ModuleNotFoundError: No module named 'wgmb'"]
 
 
@@ -175,9 +175,9 @@ def test_a_frame_that_kills_its_worker_twice_is_named_and_the_others_are_done(dr
             return None
         return well(chosen)
 
-    outcome, _, _, ticks = drive({"a": GOOD, "b": GOOD}, behave)
-    assert outcome.report.failed == {6: "its worker died twice"}
-    assert outcome.report.done == [n for n in range(1, COUNT + 1) if n != 6]
+    report, _, _, ticks = drive({"a": GOOD, "b": GOOD}, behave)
+    assert report.failed == {6: "its worker died twice"}
+    assert report.done == [n for n in range(1, COUNT + 1) if n != 6]
     assert deaths == {4: 2, 1: 2}
     assert (6, "failed") in ticks
 
@@ -191,8 +191,8 @@ def test_a_worker_that_dies_once_costs_nothing(drive):
             return None
         return well(chosen)
 
-    outcome, client, *_ = drive({"a": GOOD}, behave)
-    assert (len(outcome.report.done), outcome.report.failed) == (COUNT, {})
+    report, client, *_ = drive({"a": GOOD}, behave)
+    assert (len(report.done), report.failed) == (COUNT, {})
     assert len(client.given) == 4
 
 
@@ -206,8 +206,8 @@ def test_a_worker_that_dies_with_its_result_is_given_nothing_else(drive):
             return "died with its result"
         return well(chosen)
 
-    outcome, client, *_ = drive({"a": GOOD}, behave)
-    assert (len(outcome.report.done), outcome.report.failed) == (COUNT, {})
+    report, client, *_ = drive({"a": GOOD}, behave)
+    assert (len(report.done), report.failed) == (COUNT, {})
     assert [address for address, _ in client.given] == ["a", "a#1", "a#1", "a#1"]
 
 
@@ -215,8 +215,8 @@ def test_a_part_that_cannot_be_begun_is_tried_again_and_a_worker_that_never_can_
     def behave(name, chosen):
         return well(chosen) if name == "a" else InputError("no such folder")
 
-    outcome, client, notes, _ = drive({"a": GOOD, "b": WorkerState("1", "there", 2)}, behave)
-    assert len(outcome.report.done) == COUNT
+    report, client, notes, _ = drive({"a": GOOD, "b": WorkerState("1", "there", 2)}, behave)
+    assert len(report.done) == COUNT
     assert sum(name == "b" for name, _ in client.given) <= 2
     assert notes in ([], ["worker 1 on there does nothing: no such folder"])
 
@@ -225,10 +225,10 @@ def test_a_part_that_nobody_can_begin_fails_with_the_reason(drive):
     def behave(name, chosen):
         return ZeroDivisionError("a fault") if 5 in chosen else well(chosen)
 
-    outcome, *_ = drive({"a": GOOD, "b": GOOD}, behave)
-    assert set(outcome.report.failed) == {5, 6, 7, 8}
-    assert set(outcome.report.failed.values()) == {"ZeroDivisionError: a fault"}
-    assert len(outcome.report.done) == COUNT - 4
+    report, *_ = drive({"a": GOOD, "b": GOOD}, behave)
+    assert set(report.failed) == {5, 6, 7, 8}
+    assert set(report.failed.values()) == {"ZeroDivisionError: a fault"}
+    assert len(report.done) == COUNT - 4
 
 
 def test_a_worker_that_cannot_write_is_left_out_and_others_write_its_frames(drive):
@@ -240,9 +240,9 @@ def test_a_worker_that_cannot_write_is_left_out_and_others_write_its_frames(driv
             return made
         return well(chosen)
 
-    outcome, _, notes, _ = drive({"a": GOOD, "b": WorkerState("1", "there", 2)}, behave)
-    assert outcome.report.done == list(range(1, COUNT + 1))
-    assert (outcome.report.failed, outcome.report.stopped) == ({}, "")
+    report, _, notes, _ = drive({"a": GOOD, "b": WorkerState("1", "there", 2)}, behave)
+    assert report.done == list(range(1, COUNT + 1))
+    assert (report.failed, report.stopped) == ({}, "")
     assert notes == ["worker 1 on there does nothing: out: no space left"]
 
 
@@ -250,20 +250,20 @@ def test_where_nobody_can_write_the_run_stops_and_says_why(drive):
     def behave(name, chosen):
         return well([], failed=dict.fromkeys(chosen[:3], "full"), stopped="out: no space left")
 
-    outcome, *_ = drive({"a": GOOD, "b": WorkerState("1", "there", 2)}, behave)
-    assert outcome.report.stopped == "no worker is left: out: no space left"
-    assert outcome.report.done == []
-    assert outcome.rest == COUNT - len(outcome.report.failed)
+    report, *_ = drive({"a": GOOD, "b": WorkerState("1", "there", 2)}, behave)
+    assert report.stopped == "no worker is left: out: no space left"
+    assert report.done == []
+    assert report.rest == COUNT - len(report.failed)
 
 
 def test_a_scheduler_that_is_gone_is_one_reason(drive):
     def behave(name, chosen):
         return "gone" if 6 in chosen else well(chosen)
 
-    outcome, *_ = drive({"a": GOOD}, behave)
-    assert outcome.report.stopped.startswith("the scheduler is gone")
-    assert outcome.report.done == [1, 2, 3, 4]
-    assert outcome.rest == 8
+    report, *_ = drive({"a": GOOD}, behave)
+    assert report.stopped.startswith("the scheduler is gone")
+    assert report.done == [1, 2, 3, 4]
+    assert report.rest == 8
 
 
 @pytest.mark.fast
@@ -272,32 +272,32 @@ def test_parts_are_neither_tiny_nor_huge_and_many_for_each_worker():
 
 
 @pytest.mark.fast
-def test_outcomes_of_parts_are_those_of_the_whole():
+def test_reports_on_parts_are_those_of_the_whole():
     """Masks that no part has are absent; those that one part has are not."""
-    whole = Outcome(4, (1, 4), "", False, [])
+    whole = BatchReport(total=4)
     for numbers_, absent, cuts in (
         ([3, 4], ["a=1", "b=2"], {3}),
         ([1], ["b=2"], set()),
         ([2], ["b=2"], {2}),
     ):
-        part = Outcome(len(numbers_), (1, 4), "", False, [], BatchReport(done=numbers_))
-        part.absent, part.unseen, part.cuts = list(absent), [], cuts
+        part = BatchReport(done=numbers_, total=len(numbers_))
+        part.lacking, part.unseen, part.cuts = list(absent), [], cuts
         part.notes = {"deep": numbers_[:1]}
-        whole.add(part)
-    whole.end()
-    assert (whole.report.done, whole.report.absent, whole.cuts) == ([1, 2, 3, 4], ["b=2"], {2, 3})
+        merge.add(whole, part)
+    merge.sort(whole)
+    assert (whole.done, whole.absent, whole.cuts) == ([1, 2, 3, 4], ["b=2"], {2, 3})
     assert (whole.notes, whole.rest) == ({"deep": [1, 2, 3]}, 0)
 
 
 @pytest.mark.fast
 def test_numbers_of_another_process_take_no_memory_of_their_own():
     mine = list(range(1000, 1004))
-    sent = Outcome(4, (1000, 1003), "", False, [], BatchReport(done=list(mine)))
+    sent = BatchReport(done=list(mine), total=4)
     sent.notes, sent.sizes = {"deep": [1002]}, {(64, 48): list(mine), (8, 8): [5000]}
     whole = pickle.loads(pickle.dumps(sent))
-    assert whole.report.done[0] is not mine[0]
-    whole.share(mine)
+    assert whole.done[0] is not mine[0]
+    merge.share(whole, mine)
     assert whole == sent
-    for got in (whole.report.done, whole.sizes[64, 48]):
+    for got in (whole.done, whole.sizes[64, 48]):
         assert all(a is b for a, b in zip(got, mine, strict=True))
     assert whole.notes["deep"][0] is mine[2]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..errors import counted
 from ..io.frame_numbers import frame_list, numbered
-from ..run.report import Outcome
+from ..run.report import BatchReport
 from ..sequence.frame_file import odd_sizes
 from .exit_codes import DONE, SOME_FAILED
 from .spelling import as_options
@@ -20,37 +20,36 @@ def cuts_told(cuts: Iterable[int], noun: str) -> str:
     return f"camera {'cut' if len(numbers) == 1 else 'cuts'} before {numbered(numbers, noun)}"
 
 
-def conclude(outcome: Outcome, target: Path, took: str, quiet: bool, verbose: bool) -> int:
+def conclude(report: BatchReport, target: Path, took: str, quiet: bool, verbose: bool) -> int:
     """Print a summary of the run into `target`; return the exit code."""
-    report = outcome.report
     for number, why in sorted(report.failed.items()):
         complain(f"frame {number} failed: {why}")
     if report.stopped:
-        complain(f"stopped: {report.stopped}; {counted(outcome.rest, 'other frame')} not written")
+        complain(f"stopped: {report.stopped}; {counted(report.rest, 'other frame')} not written")
     for mask in report.absent:
         complain(f"{mask} is in no frame, so it changed nothing")
     if not quiet:
         for number, bad in sorted(report.bad.items()):
             what = ", ".join(f"{n} in {name}" for name, n in bad.items())
             note(f"frame {number}: ignored pixels that are not finite: {what}")
-        if verbose or outcome.is_finding_notable:
-            note(f"vectors: {outcome.finding}")
-        for text, told in outcome.notes.items():
+        if verbose or report.is_finding_notable:
+            note(f"vectors: {report.finding}")
+        for text, told in report.notes.items():
             if told:
                 text = as_options(text)
                 some = "" if len(told) == len(report.done) else f"{numbered(told)}: "
                 note(f"{some}{text}")
-        for mask in outcome.unseen:
+        for mask in report.unseen:
             note(f"{mask} is in no pixel of these frames, so it changed nothing")
-        if stray := outcome.stray_cuts:
-            there = "{} to {}".format(*outcome.on_disk)
+        if stray := report.stray_cuts:
+            there = "{} to {}".format(*report.on_disk)
             note(f"cuts outside the frames {there} change nothing: {frame_list(stray)}")
-        if outcome.cuts:
-            note(cuts_told(outcome.cuts, "frame"))
-        if odd := odd_sizes({n: size for size, at in outcome.sizes.items() for n in at}):
+        if report.cuts:
+            note(cuts_told(report.cuts, "frame"))
+        if odd := odd_sizes({n: size for size, at in report.sizes.items() for n in at}):
             note(odd)
         done = f"{counted(len(report.done), 'frame')} in {took} -> {target}"
         note(done + (f", {len(report.skipped)} already done" if report.skipped else ""))
     if report.failed:
-        complain(f"{len(report.failed)} of {counted(outcome.total, 'frame')} failed")
+        complain(f"{len(report.failed)} of {counted(report.total, 'frame')} failed")
     return SOME_FAILED if report.failed or report.stopped or report.absent else DONE

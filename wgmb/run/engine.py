@@ -161,14 +161,14 @@ class _Run:
         self._input, self._sink, self._resume, self._goes_on = input, sink, resume, goes_on
         self._tell = progress or (lambda number, state: None)
         self._stop = stop or threading.Event()
-        self._report = BatchReport()
+        self._report = BatchReport(total=input.total)
         self._reasons: list[str] = []
 
     def __call__(self) -> BatchReport:
         report = self._report
         try:
             self._flow()
-            if self._stop.is_set() and not report.stopped and self._rest():
+            if self._stop.is_set() and not report.stopped and report.rest:
                 report.stopped = ON_REQUEST
             self._end()
         except BaseException:
@@ -227,14 +227,6 @@ class _Run:
         self._reasons.append(why)
         if why and (self._sink.is_whole or self._reasons[-HOPELESS:] == HOPELESS * [why]):
             self._report.stopped = why
-
-    def _rest(self) -> int:
-        """The number of frames of which nothing was heard."""
-        report = self._report
-        return (
-            self._input.total
-            - len(report.done) - len(report.skipped) - len(report.failed)
-        )  # fmt: skip
 
     def _end(self) -> None:
         """Close the sink, or abandon it where it is not whole."""

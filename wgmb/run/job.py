@@ -38,7 +38,7 @@ from ..settings.record import record
 from ..settings.video import VideoSettings
 from .conversion import RateConversion
 from .needs import check_needs
-from .report import Outcome, Progress
+from .report import BatchReport, Progress
 from .request import BlurRequest
 from .sequence import blur_sequence, convert_sequence
 
@@ -170,15 +170,13 @@ class Run:
 
     def __call__(
         self, progress: Progress | None = None, stop: threading.Event | None = None
-    ) -> Outcome:
+    ) -> BatchReport:
         """Blur every frame; see blur_sequence and convert_sequence."""
         files = self.clip, self.blur, self.output
         how: dict[str, Any] = {"resume": self.resume, "progress": progress, "stop": stop}
         if self.conversion is not None:
-            report = convert_sequence(*files, self.conversion, **how)
-            return Outcome.of(self.clip, report, self.numbers)
-        report = blur_sequence(*files, confidence=self.confidence, **how)
-        return Outcome.of(self.clip, report)
+            return convert_sequence(*files, self.conversion, **how)
+        return blur_sequence(*files, confidence=self.confidence, **how)
 
 
 def settle(request: BlurRequest, adapter: str | None = None) -> Job:

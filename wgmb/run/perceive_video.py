@@ -27,8 +27,8 @@ from ..video.output_times import OutputFrame, OutputFrames
 from ..video.planes import Planes
 from ..video.read.reader import VideoReader
 from .engine import Blurred, Input, IsDone
-from .report import Progress
-from .video import VideoReport, check_fits
+from .report import Progress, VideoReport
+from .video import check_fits
 from .video_output import write
 from .video_sink import Form
 
@@ -74,9 +74,8 @@ class PerceivedVideo:
             self.output.output,
             len(self.wanted),
             time.perf_counter() - begun,
-            "",
-            self.reader.notes,
-            left_out,
+            notes=self.reader.notes,
+            left_out=left_out,
             loss=self.reader.loss(),
         )
 

@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
@@ -30,28 +31,13 @@ from ..video.y4m import Y4mReader, Y4mWriter, coding_in
 from . import engine
 from .engine import Input
 from .pictures import SteadyFrames, steady
+from .report import VideoReport
 from .video import ExposedFrames, VideoRequest, VideoRun
 from .video_sink import Form, PictureWriter, VideoSink, coded_form
 
 _BUFFER = 1 << 20  # bytes
 _OF_FILES = "begin", "end", "speed"  # of VideoSettings
 _Y4M = b"YUV4MPEG2"
-
-
-@dataclass
-class PipeReport:
-    """Result of a run through a pipe."""
-
-    frames: int = 0
-    """Number of output frames."""
-    loss: str = ""
-    """The loss at the end of an input that is cut off, in words."""
-    cuts: list[int] = field(default_factory=list)
-    """Numbers of the input's pictures that begin a shot."""
-    left_out: list[str] = field(default_factory=list)
-    """Contents that the output cannot hold."""
-    held_out: str = ""
-    """A line about displays that stay sharp, if any were found."""
 
 
 Reader = Y4mReader | StreamReader
@@ -90,7 +76,7 @@ def blur_pipe(
     color_in: str | None = None,
     tell: Callable[[str], None] = lambda text: None,
     progress: Callable[[int, str], None] | None = None,
-) -> PipeReport:
+) -> VideoReport:
     """Blur from a pipe, into a pipe, or both; the other end is a video's file.
 
     `stdout`: the unbuffered stream that STDOUT stands for. `fps_in`: pictures a second of a stream
@@ -98,7 +84,7 @@ def blur_pipe(
     called with lines that a user should know. InputError for settings that a pipe cannot have.
     """
     _check(source, output, request)
-    encoding = _encoding(output, request.video)
+    encoding, begun = _encoding(output, request.video), time.perf_counter()
     with ExitStack() as stack:
         reader = None
         if is_pipe(source):  # before the GPU: an empty stream is told at once
@@ -109,19 +95,22 @@ def blur_pipe(
         found = _piped(reader, run, output, fps_in) if reader else _of_file(source, run, output)
         for text in reader.notes if reader else ():
             tell(f"{_plain(source)}: {text}")
-        report = PipeReport()
         writer = _writer(output, found, encoding, stack, stdout)
         sink = VideoSink(writer)
         engine.run(found.frames(coded_form(writer.coding)), sink, progress=progress)
-        report.frames = sink.count
-        shots = found.exposures.shots
-        report.cuts = sorted(shots.cuts) if shots else []
-        report.held_out = found.exposures.holdout.message
-        report.loss = reader.loss if reader else ""
-        report.left_out = writer.left_out
-        if reader and not report.frames:
-            raise InputError(reader.loss or f"{_plain(source)}: holds no pictures")
-        return report
+        loss = reader.loss if reader else ""
+        if reader and not sink.count:
+            raise InputError(loss or f"{_plain(source)}: holds no pictures")
+        return run.report(
+            found.exposures,
+            path=Path(source),
+            output=output.output,
+            frames=sink.count,
+            seconds=time.perf_counter() - begun,
+            notes=reader.notes if reader else [],
+            left_out=writer.left_out,
+            loss=loss,
+        )
 
 
 def _check(source: str, output: OutputSettings, request: VideoRequest) -> None:

@@ -1,10 +1,11 @@
-"""Progress and result of a run over frames, of one process or of many."""
+"""Progress and result of a run: over frames, of one process or of many, or over a video."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from html import escape
+from pathlib import Path
 
 from ..io.frame_numbers import frame_list
 from ..sequence.clip import Clip
@@ -17,7 +18,7 @@ MOST_ROWS = 20  # of a report in a notebook, of a kind
 
 @dataclass
 class BatchReport:
-    """Result of a run."""
+    """Result of a run over frames, and what was seen in them; plain values."""
 
     done: list[int] = field(default_factory=list)
     """Numbers of the frames that were written, in the order in which they were finished."""
@@ -29,8 +30,37 @@ class BatchReport:
     """The reason why the run ended early, or has no video; "" otherwise."""
     bad: dict[int, dict[str, int]] = field(default_factory=dict)
     """Number of pixels that are not finite, by frame number and input (see Frame.bad)."""
-    absent: list[str] = field(default_factory=list)
-    """Masks by index or id that no frame has (see Clip.absent); empty unless all were read."""
+    total: int = 0
+    """Number of frames that were asked for; 0 where nobody knew it."""
+    cuts: set[int] = field(default_factory=set)
+    """Frames after a camera cut, of those that were read."""
+    stray_cuts: list[int] = field(default_factory=list)
+    """Given cuts at frames that do not exist."""
+    on_disk: tuple[int, int] | None = None
+    """The first and the last input frame that exist."""
+    finding: str = ""
+    """The vector convention, in words (see Clip.finding)."""
+    is_finding_notable: bool = False
+    """True if the vectors do not follow the convention of their names, or should be checked."""
+    notes: dict[str, list[int]] = field(default_factory=dict)
+    """Messages for the user, each with the finished frames to which it applies."""
+    unseen: list[str] = field(default_factory=list)
+    """Masks by name that are in no pixel of the frames that were read."""
+    lacking: list[str] = field(default_factory=list)
+    """Masks by index or id that none of the frames that were read has."""
+    sizes: dict[tuple[int, int], list[int]] = field(default_factory=dict)
+    """Frames that were done, by their size."""
+
+    @property
+    def absent(self) -> list[str]:
+        """Masks by index or id that no frame has (see Clip.absent); empty unless all were read."""
+        return self.lacking if len(self.done) == self.total else []
+
+    @property
+    def rest(self) -> int:
+        """Number of the frames of which nothing is known."""
+        known = len(self.done) + len(self.skipped) + len(self.failed)
+        return max(0, self.total - known)
 
     def __repr__(self) -> str:
         counts = {"done": self.done, "already there": self.skipped, "failed": self.failed}
@@ -59,96 +89,53 @@ class BatchReport:
 
 
 @dataclass
-class Outcome:
-    """A report, and what was seen in the frames on the way; plain values."""
+class VideoReport:
+    """Result of a run over a video, or over pictures that come or go through a pipe."""
 
-    total: int
-    """Frames that were asked for."""
-    on_disk: tuple[int, int]
-    """The first and the last frame that there is."""
-    finding: str
-    is_finding_notable: bool
-    stray_cuts: list[int]
-    report: BatchReport = field(default_factory=BatchReport)
-    cuts: set[int] = field(default_factory=set)
-    notes: dict[str, list[int]] = field(default_factory=dict)
-    """Messages for the user, each with the finished frames to which it applies."""
-    unseen: list[str] = field(default_factory=list)
-    absent: list[str] = field(default_factory=list)
-    """Masks that none of the frames read so far has; see Clip.absent."""
-    sizes: dict[tuple[int, int], list[int]] = field(default_factory=dict)
-    """Frames that were done, by their size."""
-
-    @classmethod
-    def begun(cls, clip: Clip) -> Outcome:
-        """Before anything is done."""
-        return cls(
-            len(clip.numbers),
-            (min(clip.on_disk), max(clip.on_disk)),
-            clip.finding,
-            clip.is_finding_notable,
-            clip.stray_cuts,
-        )
-
-    @classmethod
-    def of(cls, clip: Clip, report: BatchReport, converted: Sequence[int] | None = None) -> Outcome:
-        """After a run of one process; `converted`: the frames asked for, if the rate is another."""
-        made, done = cls.begun(clip), set(report.done)
-        made.report, made.cuts = report, set(clip.cuts)
-        made.notes = {text: sorted(done & set(at)) for text, at in clip.notes.items()}
-        made.unseen, made.absent = clip.unseen, clip.absent
-        if converted is not None:  # frames of the clip have other numbers
-            made.total = len(converted)
-            made.notes = {text: sorted(done) for text, at in clip.notes.items() if at}
-            return made
-        for number in report.done:
-            made.sizes.setdefault(clip.sizes[number], []).append(number)
-        return made
-
-    def share(self, numbers: Iterable[int]) -> None:
-        """Refer to these objects where a frame has such a number.
-
-        An outcome from another process has numbers of its own, four times as large as a reference.
-        """
-        known = {number: number for number in numbers}
-        report = self.report
-        for mine in (report.done, report.skipped, *self.notes.values(), *self.sizes.values()):
-            mine[:] = [known.get(number, number) for number in mine]
-
-    def add(self, other: Outcome) -> None:
-        """Take in what became of other frames of the same sequence."""
-        mine, its = self.report, other.report
-        if its.done:  # whoever has read no frame has seen no mask
-            is_first = not mine.done
-            self.unseen = _both(self.unseen, other.unseen, is_first)
-            self.absent = _both(self.absent, other.absent, is_first)
-        mine.done += its.done
-        mine.skipped += its.skipped
-        mine.failed |= its.failed
-        mine.bad |= its.bad
-        self.cuts |= other.cuts
-        for text, numbers in other.notes.items():
-            self.notes.setdefault(text, []).extend(numbers)
-        for size, numbers in other.sizes.items():
-            self.sizes.setdefault(size, []).extend(numbers)
-
-    def be_a_part(self) -> None:
-        """Count masks that these frames lack as unseen, as other frames may have them."""
-        self.unseen += self.report.absent
-        self.report.absent = []
-
-    def end(self) -> None:
-        """Nothing more will be added: say what no frame has, if all were read."""
-        for numbers in (self.report.done, self.report.skipped, *self.notes.values()):
-            numbers.sort()
-        self.report.absent = self.absent if len(self.report.done) == self.total else []
-
-    @property
-    def rest(self) -> int:
-        """The number of frames of which nothing is known."""
-        report = self.report
-        return self.total - len(report.done) - len(report.skipped) - len(report.failed)
+    path: Path
+    """The input."""
+    output: str
+    frames: int
+    """Number of output frames."""
+    seconds: float
+    method: str = ""
+    """The blur method; "" if pictures were averaged."""
+    notes: list[str] = field(default_factory=list)
+    """Assumptions about the input."""
+    left_out: list[str] = field(default_factory=list)
+    """Contents of the input that the output cannot hold."""
+    cuts: list[int] = field(default_factory=list)
+    """Numbers of the input's pictures that begin a shot."""
+    flashes: list[int] = field(default_factory=list)
+    repeated: int = 0
+    """Number of repeated pictures that were left out."""
+    scaling: str = ""
+    """Pictures of another size, if there are any."""
+    loss: str = ""
+    """Pictures that could not be read, or are damaged, or the missing end of a pipe's input."""
+    is_new: bool = True
+    """False if it had been finished before (`resume`)."""
+    held_out: str = ""
+    """A line about displays that stay sharp, if any were found."""
 
 
-def _both(mine: Sequence[str], its: Sequence[str], is_first: bool) -> list[str]:
-    return list(its) if is_first else [one for one in mine if one in its]
+def describe_input(report: BatchReport, clip: Clip) -> None:
+    """Say of which frames a report is."""
+    report.on_disk = min(clip.on_disk), max(clip.on_disk)
+    report.finding, report.is_finding_notable = clip.finding, clip.is_finding_notable
+    report.stray_cuts = clip.stray_cuts
+
+
+def describe_frames(report: BatchReport, clip: Clip, *, is_converted: bool = False) -> None:
+    """Say what was seen in the frames of a clip.
+
+    `is_converted`: the frames that were done have numbers other than those of the clip.
+    """
+    done = set(report.done)
+    report.cuts, report.unseen, report.lacking = set(clip.cuts), clip.unseen, clip.absent
+    if is_converted:
+        report.notes = {text: sorted(done) for text, at in clip.notes.items() if at}
+        return
+    report.notes = {text: sorted(done & set(at)) for text, at in clip.notes.items()}
+    for number in report.done:
+        report.sizes.setdefault(clip.sizes[number], []).append(number)

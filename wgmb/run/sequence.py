@@ -19,7 +19,7 @@ from ..sequence.clip import Clip
 from .conversion import RateConversion, RateConversionStages
 from .engine import run
 from .file_sink import FileSink
-from .report import BatchReport, Progress
+from .report import BatchReport, Progress, describe_frames, describe_input
 from .stages import MotionStages, Stages
 
 
@@ -101,8 +101,9 @@ def _run(
     """All frames into an output; one that fails is reported, and the others are made."""
     how: Any = {"resume": resume, "progress": progress, "stop": stop}
     report = run(stages, FileSink(output), **how, on_error="go on")
-    if len(report.done) == len(stages.numbers):
-        report.absent = stages.clip.absent
+    describe_input(report, stages.clip)
+    is_converted = isinstance(stages, RateConversionStages)
+    describe_frames(report, stages.clip, is_converted=is_converted)
     return report
 
 

@@ -14,7 +14,7 @@ from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
 from ..settings import InputSettings
 from ..settings.record import record
-from .report import Outcome, Progress
+from .report import BatchReport, Progress
 from .sequence import vectors_sequence
 
 
@@ -61,9 +61,8 @@ class VectorsRun:
     output: VectorOutput
     resume: bool
 
-    def __call__(self, progress: Progress | None = None) -> Outcome:
+    def __call__(self, progress: Progress | None = None) -> BatchReport:
         """Write the vectors of every frame; see vectors_sequence."""
-        report = vectors_sequence(
+        return vectors_sequence(
             self.clip, self.output, blur=self.blur, resume=self.resume, progress=progress
         )
-        return Outcome.of(self.clip, report)

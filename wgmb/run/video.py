@@ -32,7 +32,7 @@ from ..shots.motion import MotionSource
 from ..shots.reader import Picture
 from ..shutter import Shutter
 from ..video.clock import Clock
-from ..video.exposures import VideoBlur
+from ..video.exposures import Exposures, VideoBlur
 from ..video.holdouts import NONE, check_masks, files_of, holdout_of
 from ..video.output_times import OutputFrame, OutputFrames
 from ..video.planes import Planes
@@ -40,42 +40,11 @@ from ..video.read.reader import VideoReader
 from ..video.thumbnail import Thumbnail
 from ..video.write.encoders import FINEST_RATE, SUFFIXES
 from .engine import Blurred, Input, IsDone
-from .report import Progress
+from .report import Progress, VideoReport
 from .video_output import write
 from .video_sink import Form
 
 _TAKEN = "frames", "cuts", "max_mb"  # of InputSettings
-
-
-@dataclass
-class VideoReport:
-    """Result of a run over a video."""
-
-    path: Path
-    """The input."""
-    output: str
-    frames: int
-    """Number of output frames."""
-    seconds: float
-    method: str
-    """The blur method; "" if pictures were averaged."""
-    notes: list[str] = field(default_factory=list)
-    """Assumptions about the input."""
-    left_out: list[str] = field(default_factory=list)
-    """Contents of the input that the output cannot hold."""
-    cuts: list[int] = field(default_factory=list)
-    """Numbers of the input's pictures that begin a shot."""
-    flashes: list[int] = field(default_factory=list)
-    repeated: int = 0
-    """Number of repeated pictures that were left out."""
-    scaling: str = ""
-    """Pictures of another size, if there are any."""
-    loss: str = ""
-    """Pictures that could not be read, or are damaged, if there are any."""
-    is_new: bool = True
-    """False if it had been finished before (`resume`)."""
-    held_out: str = ""
-    """A line about displays that stay sharp, if any were found."""
 
 
 @dataclass(frozen=True)
@@ -188,22 +157,29 @@ class VideoRun:
             masks=files_of(request.blur.holdout),
             progress=progress,
         )
-        found = exposures.shots
+        return self.report(
+            exposures,
+            path=plan.reader.path,
+            output=plan.name,
+            frames=len(plan.wanted),
+            seconds=time.perf_counter() - begun,
+            notes=plan.notes,
+            left_out=left_out,
+            scaling=plan.reader.scaling(),
+            loss=plan.reader.loss(),
+        )
+
+    def report(self, exposures: Exposures, **facts: Any) -> VideoReport:
+        """The report on exposures that were made; `facts`: fields that they do not tell."""
+        shots = exposures.shots
         return VideoReport(
-            plan.reader.path,
-            plan.name,
-            len(plan.wanted),
-            time.perf_counter() - begun,
-            self.blur.method.name if self.motion is not None else "",
-            plan.notes,
-            left_out,
-            sorted(found.cuts) if found else [],
-            found.flashes if found else [],
-            len(found.doubles) if found else 0,
-            plan.reader.scaling(),
-            plan.reader.loss(),
-            found is not None,
-            exposures.holdout.message,
+            **facts,
+            method=self.blur.method.name if self.motion is not None else "",
+            cuts=sorted(shots.cuts) if shots else [],
+            flashes=shots.flashes if shots else [],
+            repeated=len(shots.doubles) if shots else 0,
+            is_new=shots is not None,
+            held_out=exposures.holdout.message,
         )
 
 

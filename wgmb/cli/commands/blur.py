@@ -246,9 +246,9 @@ def blur_on_farm(
     farm = Farm(cluster, workers, adapter, say, say if verbose else lambda text: None, check)
     started = time.perf_counter()
     with progress(len(job.numbers), quiet) as tick, muted():
-        outcome = farm.blur(job, tick)
+        report = farm.blur(job, tick)
     took = f"{time.perf_counter() - started:.1f} s with {job.request.blur.method}"
-    return conclude(outcome, Path(job.request.output.output), took, quiet, verbose)
+    return conclude(report, Path(job.request.output.output), took, quiet, verbose)
 
 
 def blur_frames(
@@ -263,8 +263,9 @@ def blur_frames(
         note(f"settings: {run.output.settings}")
     started = time.perf_counter()
     with progress(len(run.numbers), quiet) as tick:
-        outcome = run(tick)
+        report = run(tick)
     if len(run.clip.numbers) < len(job.numbers):
-        outcome.be_a_part()
+        report.unseen += report.absent  # other frames may have them
+        report.lacking = []
     took = f"{time.perf_counter() - started:.1f} s with {run.blur.method.name}"
-    return conclude(outcome, run.output.pattern, took, quiet, verbose)
+    return conclude(report, run.output.pattern, took, quiet, verbose)

@@ -69,11 +69,11 @@ def vectors(
         note(f"settings: {files.settings}")
     started = time.perf_counter()
     with progress(len(clip.numbers), quiet, "writing vectors") as tick:
-        outcome = run(tick)
+        report = run(tick)
     if not quiet:
         for number, count in sorted(files.clipped.items()):
             note(f"frame {number}: clipped {counted(count, 'pixel')} beyond --max-displace")
         if len(clip.chosen) > 1 and not files.takes_views:
             note(f"wrote only view {clip.chosen[0]}; %V in the output's name makes a file for each")
     took = f"{time.perf_counter() - started:.1f} s"
-    return conclude(outcome, files.pattern, took, quiet, verbose)
+    return conclude(report, files.pattern, took, quiet, verbose)

@@ -22,7 +22,8 @@ from ...io.frame_numbers import frame_list
 from ...sequence.findings import ranges
 from ..engine import ON_REQUEST
 from ..job import Job
-from ..report import Outcome, Progress
+from ..report import BatchReport, Progress, describe_input
+from . import merge
 from .workers import (
     Chunk,
     Worker,
@@ -58,9 +59,10 @@ class Driver:
         self._ticked = np.zeros(len(job.numbers), bool)
         self._looked, self._idle_since = 0.0, time.monotonic()
         self._deaths, self._tasks = 0, 0
-        self.outcome = Outcome.begun(job.clip)
+        self.report = BatchReport(total=len(job.clip.numbers))
+        describe_input(self.report, job.clip)
 
-    def run(self) -> Outcome:
+    def run(self) -> BatchReport:
         """Do all parts."""
         client = self._client
         try:
@@ -72,12 +74,12 @@ class Driver:
             self._end()
             raise
         except _LostError:
-            self.outcome.report.stopped = _GONE
-            self.outcome.end()
-            return self.outcome
+            self.report.stopped = _GONE
+            merge.sort(self.report)
+            return self.report
         self._tidy()
-        self.outcome.end()
-        return self.outcome
+        merge.sort(self.report)
+        return self.report
 
     def _go_on(self) -> None:
         while True:
@@ -178,7 +180,7 @@ class Driver:
         return any(worker.why_not == "" for worker in self._workers.values())
 
     def _is_hopeless(self) -> bool:
-        """Return True if no worker has been able to work for too long; the outcome says so then."""
+        """Return True if no worker has been able to work for too long; the report says so then."""
         now = time.monotonic()
         if self._is_anybody_ready():
             return False
@@ -190,7 +192,7 @@ class Driver:
         if not self._tasks:
             lacks_gpu = bool(self._refusals) and all(lacks for lacks, _ in self._refusals)
             raise (DeviceError if lacks_gpu else InputError)(f"no worker can do this: {why}")
-        self.outcome.report.stopped = f"no worker is left: {why}"
+        self.report.stopped = f"no worker is left: {why}"
         return True
 
     # ---- parts -----------------------------------------------------------------------------
@@ -258,8 +260,7 @@ class Driver:
         worker.part = part
         self._gone(worker)
 
-    def _took(self, worker: Worker, part: Chunk, outcome: Outcome) -> None:
-        report = outcome.report
+    def _took(self, worker: Worker, part: Chunk, report: BatchReport) -> None:
         worker.faults = 0
         done = [*report.done, *report.skipped]
         self._farm.details(f"worker {worker.name}: frames {frame_list(part.numbers)}")
@@ -274,8 +275,8 @@ class Driver:
                 report.failed = dict.fromkeys(rest, report.stopped)
             else:
                 self._parts.append(Chunk(rest, refused_by={worker.address}))
-        outcome.share(part.numbers)
-        self.outcome.add(outcome)
+        merge.share(report, part.numbers)
+        merge.add(self.report, report)
         for number in (*done, *report.failed):
             self._tick(number, "failed" if number in report.failed else "done")
 
@@ -296,7 +297,7 @@ class Driver:
 
     def _fail(self, part: Chunk, why: str) -> None:
         for number in part.numbers:
-            self.outcome.report.failed[number] = why
+            self.report.failed[number] = why
             self._tick(number, "failed")
 
     def _tick(self, number: int, state: str) -> None:

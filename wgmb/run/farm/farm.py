@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...extras import needed_by
 from ..job import Job
 from ..job_file import stored, time_there
-from ..report import Outcome, Progress
+from ..report import BatchReport, Progress
 from .driver import Driver
 from .local import closing, local_client
 from .workers import SMALLEST, WorkerPool, hardware_adapters
@@ -23,7 +23,7 @@ _CONNECT = 10  # seconds to reach a scheduler
 class Farm(WorkerPool):
     """A Place whose workers blur jobs."""
 
-    def blur(self, job: Job, progress: Progress | None = None) -> Outcome:
+    def blur(self, job: Job, progress: Progress | None = None) -> BatchReport:
         """Blur all frames of a job; its output has been looked at.
 
         DeviceError if no worker has a GPU, InputError if none can do the job. Interrupted, every

@@ -21,7 +21,7 @@ from ..._version import __version__
 from ...errors import DeviceError, Error
 from ...sequence.findings import Range, numbers
 from ..job_file import of_text
-from ..report import Outcome, Progress
+from ..report import BatchReport, Progress
 
 _PAUSE = 0.25  # seconds between two messages on frames that are done
 
@@ -89,11 +89,11 @@ class BlurPlugin(WorkerPlugin):
         stored.check(self._job.numbers[:1])
         self._job.run_with(self._blur, self._job.numbers[:1])  # is the folder there?
 
-    def blur(self, chosen: list[int], tell: Progress, stop: threading.Event) -> Outcome:
+    def blur(self, chosen: list[int], tell: Progress, stop: threading.Event) -> BatchReport:
         """Blur some frames."""
         return self._job.run_with(self._blur, chosen)(tell, stop)
 
-    def work(self, chosen: list[int]) -> Outcome:
+    def work(self, chosen: list[int]) -> BatchReport:
         """Blur some frames, and tell the driver of each."""
         told: list[tuple[int, str]] = []
         last = time.monotonic()
@@ -132,7 +132,7 @@ def _plugin(worker: Worker, run: str) -> Any:
     return worker.plugins[plugin_name(run)]
 
 
-def blur_part(run: str, ranges: Sequence[Range]) -> Outcome:
+def blur_part(run: str, ranges: Sequence[Range]) -> BatchReport:
     """The task: blur these frames of a run."""
     return _plugin(get_worker(), run).work(numbers(ranges))
 
