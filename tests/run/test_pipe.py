@@ -309,6 +309,9 @@ def test_a_stream_of_uneven_times_is_refused_and_pauses_leave_places(tmp_path):
     assert [n for n, _ in stream_at(uneven, keeps_time=False).pictures()] == list(range(6))
     with pytest.raises(InputError, match=r"nothing for 0 s after picture 3; `longest_pause=1`"):
         list(stream_at(even, pause=0.1).pictures())
+    one = clips.write(tmp_path / "one.ts").read_bytes()
+    with pytest.raises(InputError, match=r"stdin: its clock goes back by 0\.46 s after picture 11"):
+        list(StreamReader(Unseekable(2 * one), "stdin").pictures())
 
 
 def test_matroska_that_is_cut_off_or_damaged_is_said(tmp_path):

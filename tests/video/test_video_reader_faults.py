@@ -1,10 +1,12 @@
 """Videos that are damaged, cut off or none, and streams that are not the pictures."""
 
+import re
 from fractions import Fraction
 
 import av
 import numpy as np
 import pytest
+from av.video.frame import PictureType
 from PIL import Image
 
 import make_clips as clips
@@ -127,6 +129,72 @@ def test_pictures_of_another_size_are_scaled_to_that_of_the_first(tmp_path):
         assert picture.size == (64, 48)
         luma, want = picture.planes[0].astype(int), clips.planes(n % 4)[0]
         assert np.abs(luma - want).max() <= 2
+
+
+def joined(tmp_path, begins, sizes=((64, 48), (128, 96))):
+    """An MPEG-TS of parts that were written one by one, 12 pictures each, with B-frames."""
+    data = b""
+    for late, size in zip(begins, sizes, strict=True):
+        frames = [clips.frame(clips.planes(n, size), "yuv420p") for n in range(12)]
+        part = clips.write(tmp_path / "part.ts", frames, late=late, options={"bf": "2"})
+        data += part.read_bytes()
+    (tmp_path / "joined.ts").write_bytes(data)
+    return tmp_path / "joined.ts"
+
+
+def test_parts_that_follow_each_other_are_read_whole(tmp_path):
+    reader = VideoReader(joined(tmp_path, (0, 1)))
+    assert len(list(reader)) == 24 and reader.scaled == set(range(12, 24))
+    assert not reader.loss() and not any("of another" in note for note in reader.notes)
+
+
+def test_a_clock_that_goes_back_is_refused_with_what_helps(tmp_path):
+    """Files that are simply joined begin anew: half of their pictures had no place of their own."""
+    with pytest.raises(InputError) as error:
+        VideoReader(joined(tmp_path, (0, 0)))
+    said = str(error.value)
+    assert re.search(
+        r"joined\.ts: its clock goes back before picture 12, from 0.46 to 0.00 s", said
+    )
+    assert "`ffmpeg -i IN -c copy OUT.mkv` puts its parts one after the other" in said
+
+
+def test_pictures_with_the_time_of_another_are_counted(tmp_path):
+    """Parts that overlap: the first picture of a time is shown."""
+    reader = VideoReader(joined(tmp_path, (0, 12 / 24)))
+    (note,) = [note for note in reader.notes if "the time of another" in note]
+    assert re.match(r"2 pictures have the time of another, the first at 0.50 s: left out", note)
+    assert len(list(reader)) == len(reader) == 22 and not reader.loss()
+
+
+@pytest.mark.parametrize("first", [0, 9, 14])
+def test_times_of_decoding_that_begin_in_the_middle_are_noticed(tmp_path, first):
+    """Of 24 pictures 7 were said not to be decoded: their times are those of other pictures."""
+    parts = []
+    for size, kind in (((64, 48), PictureType.I), ((128, 96), PictureType.NONE)):
+        coder = av.CodecContext.create("libx264", "w")
+        coder.width, coder.height = size
+        coder.pix_fmt, coder.time_base, coder.framerate = "yuv420p", Fraction(1, 24), Fraction(24)
+        coder.options = {"bf": "2", "b-adapt": "0", "b-pyramid": "none"}
+        for n in range(12):
+            frame = clips.frame(clips.planes(n, size), "yuv420p")
+            frame.pts, frame.pict_type = n, kind
+            parts += coder.encode(frame)
+        parts += coder.encode(None)
+    path = tmp_path / "d.ts"
+    with av.open(str(path), "w") as out:
+        stream = out.add_stream("libx264", rate=24)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for n, packet in enumerate(parts):
+            packet.pts = packet.dts = n
+            packet.time_base, packet.stream = Fraction(1, 24), stream
+            out.mux(packet)
+    reader = VideoReader(path)
+    numbers = [n for n, _ in reader.pictures(first)]
+    assert numbers == list(range(first, 24)) and not reader.loss()
+    for n, picture in reader.pictures(first):
+        want = clips.planes(n % 12)[0]
+        assert np.abs(picture.planes[0].astype(int) - want).mean() < 4
 
 
 def test_a_single_picture_has_the_rate_that_its_file_states(tmp_path):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from itertools import chain, islice
 from pathlib import Path
 from typing import cast
 
@@ -18,6 +19,8 @@ from av.video.stream import VideoStream
 from .container import opened
 from .timeline import Timeline
 
+REORDERED = 12  # pictures that are looked at to tell times of decoding from times of showing
+
 
 class Decoder:
     """Decodes one stream of a file, whose pictures are shown at the times of a Timeline."""
@@ -29,17 +32,22 @@ class Decoder:
         """Frames and their numbers, which ascend, from one at or before `first` on.
 
         Frames that cannot be decoded are left out. Several threads decode until there is an error,
-        because they lose more than what is damaged; then one does. Others may be asked for
-        meanwhile, in other threads.
+        because they lose more than what is damaged; then one does. Frames are counted from where
+        their times turn out to be those of decoding. Others may be asked for meanwhile, in other
+        threads.
         """
-        last = -1
-        try:
-            for last, frame in self._begun(first, careful=False):
-                yield last, frame
-        except _DamagedError:
-            for number, frame in self._begun(max(last + 1, first), careful=True):
-                if number > last:
-                    yield number, frame
+        last, careful = -1, False
+        while True:
+            try:
+                for number, frame in self._begun(max(last + 1, first), careful):
+                    if number > last:
+                        last = number
+                        yield number, frame
+                return
+            except _DamagedError:
+                careful = True
+            except _DecodingTimesError as error:
+                self._timeline = error.counted
 
     def _begun(self, first: int, careful: bool) -> Iterator[tuple[int, av.VideoFrame]]:
         """Frames from the last key frame on that leads to `first`."""
@@ -77,9 +85,27 @@ class Decoder:
                 number = int(np.searchsorted(ticks, frame.pts))
                 if number == len(ticks) or ticks[number] != frame.pts:
                     continue  # what edits leave out
+                if number > before + 1 >= 1:
+                    frames = self._checked(frame, frames)
             if before < number < len(ticks):
                 before = number
                 yield number, frame
+
+    def _checked(
+        self, frame: av.VideoFrame, frames: Iterator[av.VideoFrame]
+    ) -> Iterator[av.VideoFrame]:
+        """The same frames after one that left out a time: some are lost, or all have another order.
+
+        The latter as in VC-1 and RealVideo, or where a program gave times of decoding only.
+        """
+        counted = self._timeline.counted
+        if counted is None or len(counted.times) != len(self._timeline.times):
+            return frames
+        ahead = list(islice(frames, REORDERED))
+        shown = [one.pts for one in (frame, *ahead) if one.pts is not None]
+        if shown != sorted(shown):
+            raise _DecodingTimesError(counted)
+        return chain(ahead, frames)
 
 
 def decoded(
@@ -117,3 +143,11 @@ def decoded(
 
 class _DamagedError(Exception):
     """A frame could not be decoded."""
+
+
+class _DecodingTimesError(Exception):
+    """Frames have the times of their decoding; they are to be counted."""
+
+    def __init__(self, counted: Timeline):
+        super().__init__()
+        self.counted = counted

@@ -37,14 +37,13 @@ from ..pixels import (
 from ..write.encoders import Facts
 from .color_tags import assumed, either, tags_of
 from .container import opened, picture_stream
-from .decoder import Decoder, decoded
+from .decoder import REORDERED, Decoder, decoded
 from .deinterlace import Deinterlaced
 from .rotation import rotation_of
 from .side_data import SideData, light_level_of, mastering_of, side_data_of
 from .timeline import Times, scanned
 
 _OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
-_REORDERED = 12  # pictures that are looked at to tell times of decoding from times of showing
 
 
 @dataclass(frozen=True)
@@ -102,6 +101,13 @@ class VideoReader:
             self._packets = scanned(container, stream)
         if not len(self._packets.times):
             raise InputError(f"{self.path}: {self._packets.problem or 'holds no pictures'}")
+        if self._packets.goes_back is not None:
+            number, before, after = self._packets.goes_back
+            raise InputError(
+                f"{self.path}: its clock goes back before picture {number}, from "
+                f"{float(before):.2f} to {float(after):.2f} s; `ffmpeg -i IN -c copy OUT.mkv` "
+                "puts its parts one after the other"
+            )
         self._probe()
 
     def _check_size(self, stream: VideoStream, max_mb: float) -> None:
@@ -128,7 +134,7 @@ class VideoReader:
             frames = decoded(container, stream)
             frame = next(frames, None)
             if (whole := self._packets.counted) is not None:
-                shown = [one.pts for one in islice(frames, _REORDERED) if one.pts is not None]
+                shown = [one.pts for one in islice(frames, REORDERED) if one.pts is not None]
                 if shown != sorted(shown):  # as in VC-1 and RealVideo: times of decoding
                     self._packets = whole
         if frame is None:
@@ -164,6 +170,12 @@ class VideoReader:
             self.notes.append(
                 f"interlaced: each of its {len(self._packets.times)} frames is taken as two "
                 f"pictures ({float(self.rate):g} a second)"
+            )
+        if many := len(self._packets.repeated):
+            at = float(int(self._packets.repeated[0]) * self._packets.times.base)
+            have = "picture has" if many == 1 else "pictures have"
+            self.notes.append(
+                f"{many} {have} the time of another, the first at {at:.2f} s: left out"
             )
         if self._packets.is_assumed:
             self.notes.append(f"does not say when its pictures are shown: {float(self.rate):g} a "

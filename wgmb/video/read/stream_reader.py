@@ -145,6 +145,10 @@ class StreamReader:
         passed = (following.pts - frame.pts) * base
         steps = max(int(passed * self.rate + _JITTER), 1)
         off = abs(passed - steps / self.rate)
+        if passed < -2 / self.rate:
+            raise InputError(
+                f"{self.name}: its clock goes back by {float(-passed):.2f} s after picture {number}"
+            )
         if passed > self._pause:
             raise InputError(
                 f"{self.name}: nothing for {float(passed):.0f} s after picture {number}; "

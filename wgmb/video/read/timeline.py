@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, overload
@@ -91,6 +91,10 @@ class Timeline:
     counted: Timeline | None = None
     """The timeline for decoded pictures that do not come in the order of their times; the times are
     then those of decoding, and pictures are counted. None if that is impossible."""
+    repeated: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Ticks of pictures that have the time of another one, and so are never shown."""
+    goes_back: tuple[int, Fraction, Fraction] | None = None
+    """The first packet whose clock begins anew: its number, the time before it, its own [s]."""
 
     @property
     def steps(self) -> np.ndarray:
@@ -218,12 +222,12 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
         is_encrypted=found.is_encrypted,
         stated=known_rate(stream.average_rate),
         lasts=found.lasts * base if container.format.name in _HOLDS else Fraction(0),
+        goes_back=None if is_assumed else _going_back(found.decoded, base),
     )
     if in_order:
         return timeline
-    return replace(
-        timeline, counted=_counted(timeline, found, bool(stream.codec_context.has_b_frames))
-    )
+    counted = _counted(timeline, found, bool(stream.codec_context.has_b_frames))
+    return replace(timeline, counted=counted, repeated=_repeated(shown))
 
 
 def known_rate(rate: Fraction | None) -> Fraction | None:
@@ -291,6 +295,25 @@ _HIDES = {"vp8": _hides_vp8, "vp9": _hides_vp9}
 
 def _sorted(ticks: array[int]) -> np.ndarray:
     return np.unique(np.frombuffer(ticks, np.int64)) if len(ticks) else np.zeros(0, np.int64)
+
+
+def _repeated(ticks: array[int]) -> np.ndarray:
+    values, counts = np.unique(np.frombuffer(ticks, np.int64), return_counts=True)
+    return np.repeat(values, counts - 1)
+
+
+def _going_back(decoded: array[int], base: Fraction) -> tuple[int, Fraction, Fraction] | None:
+    """See Timeline.goes_back. Two packets on each side agree, so that none is merely damaged."""
+    ticks = np.frombuffer(decoded, np.int64) if len(decoded) else np.zeros(0, np.int64)
+    if len(ticks) < 4:
+        return None
+    before, after = np.minimum(ticks[:-1], ticks[1:])[:-2], np.maximum(ticks[:-1], ticks[1:])[2:]
+    usual = np.median(np.abs(np.diff(ticks)))
+    places = np.flatnonzero(before - after > usual)
+    if not len(places):
+        return None
+    number = int(places[0]) + 2
+    return number, int(ticks[number - 1]) * base, int(ticks[number]) * base
 
 
 def _lacking(
