@@ -17,10 +17,7 @@ from wgmb.settings import (
     BlurSettings,
     InputSettings,
     OutputSettings,
-    ShutterSettings,
 )
-from wgmb.settings.color import ColorSettings
-from wgmb.settings.video import VideoSettings
 
 
 def job_of(pattern: str, out: Path, method: str = "tap") -> Job:
@@ -29,10 +26,7 @@ def job_of(pattern: str, out: Path, method: str = "tap") -> Job:
         pattern=pattern,
         output=OutputSettings(output=str(out / "o.####.exr")),
         blur=BlurSettings(method=method),
-        shutter=ShutterSettings(),
         input=InputSettings(vectors="blender"),
-        color=ColorSettings(),
-        video=VideoSettings(),
     )
     return settle(asked)
 

@@ -4,12 +4,8 @@ from wgmb.run.job import settle
 from wgmb.run.request import BlurRequest
 from wgmb.settings import (
     BlurSettings,
-    InputSettings,
     OutputSettings,
-    ShutterSettings,
 )
-from wgmb.settings.color import ColorSettings
-from wgmb.settings.video import VideoSettings
 
 
 def job_of(pattern, folder, **more):
@@ -19,9 +15,5 @@ def job_of(pattern, folder, **more):
             pattern=str(pattern),
             output=OutputSettings(output=str(folder / "o.####.exr"), **more),
             blur=BlurSettings(method="tap", samples=4),
-            shutter=ShutterSettings(),
-            input=InputSettings(),
-            color=ColorSettings(),
-            video=VideoSettings(),
         )
     )

@@ -30,19 +30,11 @@ _OTHERWISE = {
 @cache
 def options() -> dict[str, str]:
     """The option that each argument is set by; the settings' fields have both names."""
-    from .. import settings
-    from ..settings.color import ColorSettings, option_name
-    from ..settings.video import VideoSettings
+    from ..settings import OutputSettings, SceneSettings
+    from ..settings.color import option_name
+    from ..settings.groups import GROUPS
 
-    groups = (
-        settings.InputSettings,
-        settings.BlurSettings,
-        settings.ShutterSettings,
-        settings.OutputSettings,
-        settings.SceneSettings,
-        ColorSettings,
-        VideoSettings,
-    )
+    groups = *GROUPS.values(), OutputSettings, SceneSettings
     return {f.name: option_name(f.name) for group in groups for f in fields(group)} | _OTHERWISE
 
 

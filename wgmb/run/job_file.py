@@ -22,15 +22,7 @@ from ..io.suffixes import VIDEOS
 from ..sequence.findings import SequenceFindings, numbers, ranges
 from ..sequence.flow_motion import FAR
 from ..sequence.layers.masks import is_file, with_amount
-from ..settings import (
-    BlurSettings,
-    InputSettings,
-    OutputSettings,
-    ShutterSettings,
-)
-from ..settings.color import ColorSettings
 from ..settings.typed import restored, typed
-from ..settings.video import VideoSettings
 from ..shots.cut_list import CutList
 from ..shutter import CURVES
 from .job import Job
@@ -69,17 +61,9 @@ class Stored:
     def text(self) -> str:
         """The file's text."""
         job = self.job
-        request = job.request
         content: dict[str, Any] = {
             "wgmb": __version__,
-            "pattern": request.pattern,
-            "output": _plain(request.output),
-            "look": _plain(request.blur),
-            "when": _plain(request.shutter),
-            "given": _plain(request.input),
-            "color": _plain(request.color),
-            "video": _plain(request.video),
-            "confidence": request.confidence,
+            "request": asdict(job.request, dict_factory=_plain),
             "settings": job.settings,
             "flow": job.flow,
             "since": job.since,
@@ -167,18 +151,8 @@ def of_text(text: str, name: str) -> Stored:
 
 def _stored_of(content: dict[str, Any]) -> Stored:
     """The job from the tables of its file; the errors of Python where they are of other types."""
-    request = BlurRequest(
-        pattern=typed("pattern", content["pattern"], str),
-        output=restored(OutputSettings, content["output"]),
-        blur=restored(BlurSettings, content["look"]),
-        shutter=restored(ShutterSettings, content["when"]),
-        input=restored(InputSettings, content["given"]),
-        color=restored(ColorSettings, content["color"]),
-        video=restored(VideoSettings, content["video"]),
-        confidence=typed("confidence", content["confidence"], bool),
-    )
     job = Job(
-        request,
+        restored(BlurRequest, content["request"]),
         dict(content["settings"]),
         numbers(content["numbers"]),
         typed("flow", content["flow"], str),
@@ -269,8 +243,9 @@ def _size_and_time(path: Path) -> list[int]:
     return [found.st_size, found.st_mtime_ns]
 
 
-def _plain(settings: Any) -> dict[str, Any]:
-    return {k: str(v) if isinstance(v, Path) else v for k, v in asdict(settings).items()}
+def _plain(fields: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The fields of settings as JSON has them."""
+    return {name: str(v) if isinstance(v, Path) else v for name, v in fields}
 
 
 def _seal(content: dict[str, Any]) -> str:

@@ -36,8 +36,8 @@ class BatchReport:
     """Frames after a camera cut, of those that were read."""
     stray_cuts: list[int] = field(default_factory=list)
     """Given cuts at frames that do not exist."""
-    on_disk: tuple[int, int] | None = None
-    """The first and the last input frame that exist."""
+    on_disk: tuple[int, ...] = ()
+    """Numbers of the first and the last input frame that exist; empty without input frames."""
     finding: str = ""
     """The vector convention, in words (see Clip.finding)."""
     is_finding_notable: bool = False

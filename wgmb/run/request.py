@@ -10,29 +10,18 @@ from ..color.spaces import Display
 from ..errors import InputError
 from ..sequence.clip import Clip
 from ..sequence.findings import SequenceFindings
-from ..settings import (
-    BlurSettings,
-    InputSettings,
-    OutputSettings,
-    ShutterSettings,
-    rate_of,
-)
-from ..settings.color import ColorSettings, color_record
-from ..settings.video import VideoSettings
+from ..settings import OutputSettings, rate_of
+from ..settings.color import color_record
+from ..settings.groups import SettingsGroups
 from .conversion import RateConversion
 
 
 @dataclass(frozen=True, kw_only=True)
-class BlurRequest:
+class BlurRequest(SettingsGroups):
     """Request to blur rendered frames, as `wgmb blur` receives it."""
 
     pattern: str
     output: OutputSettings
-    blur: BlurSettings
-    shutter: ShutterSettings
-    input: InputSettings
-    color: ColorSettings
-    video: VideoSettings
     confidence: bool = False
     fps_in: str | None = None
     averages: bool = False

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Unpack, get_args, get_origin, get_type_hints
@@ -19,14 +19,9 @@ from ..extras import install_command, is_installed
 from ..methods import FRAME_METHODS, check_method
 from ..methods.keywords import MethodKeywords
 from ..pipeline.blur import Blur
-from ..settings import (
-    BlurSettings,
-    InputSettings,
-    OutputSettings,
-    ShutterSettings,
-)
+from ..settings import BlurSettings, InputSettings, OutputSettings
+from ..settings.groups import SettingsGroups, chosen, groups_of
 from ..settings.record import record
-from ..settings.video import VideoSettings
 from ..shots.cut_list import CutList
 from ..shots.motion import MotionSource
 from ..shots.reader import Picture
@@ -70,13 +65,11 @@ class VideoPlan:
 
 
 @dataclass(frozen=True, kw_only=True)
-class VideoRequest:
-    """Request to blur videos, as `wgmb blur` receives it: the settings that all of them share."""
+class VideoRequest(SettingsGroups):
+    """Request to blur videos, as `wgmb blur` receives it: the settings that all of them share.
 
-    blur: BlurSettings = field(default_factory=BlurSettings)
-    shutter: ShutterSettings = field(default_factory=ShutterSettings)
-    input: InputSettings = field(default_factory=InputSettings)
-    video: VideoSettings = field(default_factory=VideoSettings)
+    Videos keep their own colours; `color` has no part in it.
+    """
 
     def open(self, device: wgpu.GPUDevice | str | None = None) -> VideoRun:
         """Open the GPU and what all videos share; InputError for settings that do not fit."""
@@ -88,12 +81,12 @@ class VideoRequest:
         if self.blur.holdout not in ((), (NONE,)) and self.video.flow == "none":
             raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
         opened = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
-        chosen, how = self.video.chosen(opened)
+        flow, how = self.video.chosen(opened)
         shutter = self.shutter.resolved()
-        look = replace(self.blur, method=self.blur.method or chosen.method).for_pictures()
-        blur = look.make(shutter.make(), device)
-        motion, _ = chosen.source(blur.device)
-        return VideoRun(replace(self, blur=look, shutter=shutter), blur, motion, how)
+        settings = replace(self.blur, method=self.blur.method or flow.method).for_pictures()
+        blur = settings.make(shutter.make(), device)
+        motion, _ = flow.source(blur.device)
+        return VideoRun(replace(self, blur=settings, shutter=shutter), blur, motion, how)
 
 
 @dataclass(frozen=True)
@@ -315,8 +308,8 @@ def blur_video(
     """
     request, keywords = request_of(dict(settings), VideoKeywords)
     run = request.open(device)
-    kept = {one.name: keywords[one.name] for one in fields(OutputSettings) if one.name in keywords}
-    return run(run.plan(source, OutputSettings(output=str(output), **kept)), progress)
+    options = chosen(OutputSettings, keywords | {"output": str(output)})
+    return run(run.plan(source, options), progress)
 
 
 def request_of(
@@ -342,14 +335,4 @@ def request_of(
     if isinstance(keywords.get("holdout"), str):
         keywords["holdout"] = (keywords["holdout"],)
     keywords |= {"holdout": tuple(keywords["holdout"])} if "holdout" in keywords else {}
-
-    def group(kind: type) -> dict[str, Any]:
-        return {one.name: keywords[one.name] for one in fields(kind) if one.name in keywords}
-
-    request = VideoRequest(
-        blur=BlurSettings(**group(BlurSettings)),
-        shutter=ShutterSettings(**group(ShutterSettings)),
-        input=InputSettings(**group(InputSettings)),
-        video=VideoSettings(**group(VideoSettings)),
-    )
-    return request, keywords
+    return VideoRequest.of(groups_of(keywords)), keywords

@@ -19,6 +19,7 @@ from ...run.job_file import read_job
 from ...run.request import BlurRequest
 from ...sequence.frame_file import is_video
 from ...settings.color import ColorSettings, option_name
+from ...settings.groups import SettingsGroups
 from ..conclusion import conclude
 from ..help import INPUT, RUN, VIDEO
 from ..names import is_batch
@@ -117,15 +118,9 @@ def blur(
     """
     crew = _crew(workers, cluster)
     if job is not None:
-        rest = replace(input, frames=None), blur, shutter, color, video, output
-        plain = (
-            InputOptions(),
-            FrameBlurOptions(),
-            ShutterOptions(),
-            ColorSettings(),
-            VideoOptions(),
-        )
-        if patterns or confidence or fps_in or config or rest != (*plain, None):
+        rest = replace(input, frames=None), blur, shutter, color, video
+        is_changed = output or any(group != type(group)() for group in rest)
+        if patterns or confidence or fps_in or config or is_changed:
             raise InputError(NOT_WITH_JOB)
         return blur_job(job, input.frames, crew, adapter, verbose, quiet)
     if not patterns:
@@ -133,15 +128,15 @@ def blur(
     if output is None:
         such = "out.mp4" if is_video(patterns[0]) else "'blurred.####.exr'"
         raise InputError(f"--output is missing, such as -o {such}")
-    shutter, pattern = shutter.resolved(), patterns[0]
+    groups = SettingsGroups(blur=blur, shutter=shutter, input=input, color=color, video=video)
+    pattern = patterns[0]
     if is_pipe(pattern) or is_pipe(output.output):
         with needed_by("a pipe", "video"):
             from ...run.video import VideoRequest
             from .blur_pipe import blur_pipe
         if len(patterns) > 1 or confidence or crew:
             raise InputError("a pipe stands alone: one input, and no --confidence or --workers")
-        wanted = VideoRequest(blur=blur, shutter=shutter, input=input, video=video)
-        return blur_pipe(pattern, output, wanted, adapter, quiet, fps_in, color_in)
+        return blur_pipe(pattern, output, VideoRequest.of(groups), adapter, quiet, fps_in, color_in)
     if color_in:
         raise InputError("--color-in is for pipes; files state their colours, or are assumed to")
     if is_batch(patterns, output.output) or is_video(pattern):
@@ -155,21 +150,12 @@ def blur(
                 option = "--workers" if workers else "--cluster"
             raise InputError(f"{option} is for rendered frames")
         _tell_unused(color, quiet)
-        wanted = VideoRequest(blur=blur, shutter=shutter, input=input, video=video)
-        how = wanted, adapter, quiet, verbose
+        how = VideoRequest.of(groups), adapter, quiet, verbose
         if is_batch(patterns, output.output):
             return blur_videos(patterns, output, *how)
         return blur_video(pattern, output, *how)
-    request = BlurRequest(
-        pattern=pattern,
-        output=output,
-        blur=blur,
-        shutter=shutter,
-        input=input,
-        color=color,
-        video=video,
-        confidence=confidence,
-        fps_in=fps_in,
+    request = BlurRequest.of(
+        groups, pattern=pattern, output=output, confidence=confidence, fps_in=fps_in
     )
     made = settle(request, adapter)
     if crew and made.request.conversion:

@@ -8,25 +8,10 @@ import textwrap
 from dataclasses import fields
 from itertools import pairwise
 
-from ...settings import (
-    METHOD_OPTIONS,
-    BlurSettings,
-    InputSettings,
-    OutputSettings,
-    SceneSettings,
-    ShutterSettings,
-)
-from ...settings.color import ColorSettings
-from ...settings.video import VideoSettings
+from ...settings import METHOD_OPTIONS, OutputSettings, SceneSettings
+from ...settings.groups import GROUPS as BLUR_GROUPS
 
-GROUPS = {
-    "blur": BlurSettings,
-    "shutter": ShutterSettings,
-    "scene": SceneSettings,
-    "input": InputSettings,
-    "color": ColorSettings,
-    "video": VideoSettings,
-}
+GROUPS = BLUR_GROUPS | {"scene": SceneSettings}
 """Settings by the name of a State's field."""
 GROUP_OF = {
     field.name: name
