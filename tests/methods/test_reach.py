@@ -212,7 +212,7 @@ def test_a_clip_keeps_five_files_and_makes_every_frame_once(shot):
         while after is not None:
             assert made.setdefault(after.number, after.color) is after.color
             after = after.next
-        assert len(clip._stored._kept) <= 5
+        assert len(clip.cache._kept) <= 5
 
 
 def test_a_result_depends_on_the_files_of_five_frames(shot, tmp_path, capsys):

@@ -100,7 +100,7 @@ def test_confidence_and_bad_pixels_come_with_a_frame(tmp_path):
 def test_a_name_that_is_nowhere_is_told_before_the_first_frame(tmp_path):
     pattern = make.write_sequence(tmp_path, (1, 2))
     clip = Clip(pattern)
-    clip.check_masks = lambda: (_ for _ in ()).throw(InputError("no such name"))
+    clip.masks.check = lambda: (_ for _ in ()).throw(InputError("no such name"))
     with pytest.raises(InputError, match="no such name"):
         blurred(clip, Blur("tap"))
 

@@ -68,7 +68,7 @@ def test_frames_are_found_in_folders_of_any_name(tmp_path, folder):
     pattern = make.write_sequence(place, [3, 4])
     clip = Clip(pattern)
     assert clip.numbers == [3, 4]
-    assert clip.files(3) == [place / "shot.0003.exr"]
+    assert clip.dependencies.of(3) == [place / "shot.0003.exr"]
 
 
 def test_other_files_beside_the_frames_do_not_count(tmp_path, shot):
@@ -439,7 +439,7 @@ def test_frames_of_different_sizes_do_not_make_a_video_of_stretched_ones(tmp_pat
 def test_a_clip_holds_no_more_than_a_few_frames(shot):
     clip = Clip(shot)
     for _ in clip:
-        assert len(clip._stored._kept) <= 3
+        assert len(clip.cache._kept) <= 3
 
 
 def test_the_folder_of_the_output_is_made(tmp_path, capsys, shot):

@@ -323,7 +323,7 @@ def test_masks_and_other_files_may_be_of_a_view_each(tmp_path):
         assert clip.frame(source).holdout == pytest.approx(value)
         assert (source.channels["more.x"] == value).all()
         assert ("mono.x" in source.channels) == (view == "right")  # the default view's
-    names = {path.name for path in clip.files(1)}
+    names = {path.name for path in clip.dependencies.of(1)}
     assert names == {"s.0001.exr", "mono.exr", "matte.right.exr", "matte.left.exr",
                      "more.right.exr", "more.left.exr"}  # fmt: skip
 

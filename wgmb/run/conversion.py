@@ -91,7 +91,7 @@ class RateConversionStages(Stages):
         self.reach = max(self.reach, 1)
         self._conversion, self._shutter = conversion, blur.shutter
         self._existing = frozenset(clip.on_disk)
-        self._known = frozenset(n for n in clip.on_disk if clip.begins_shot(n))
+        self._known = frozenset(n for n in clip.on_disk if clip.cache.is_known_cut(n, -1))
         self._reading = threading.Lock()
 
     def _made_of(self, number: int) -> dict[str, Any]:

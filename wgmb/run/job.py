@@ -137,9 +137,15 @@ class Job:
         clip, shown = self._opened
         output = replace(self.request.output, resume=self._resumes)
         conversion = self.request.conversion
-        inputs, numbers = clip.inputs, conversion.numbers(clip) if conversion else clip.numbers
+        inputs, numbers = (
+            clip.dependencies.every(),
+            conversion.numbers(clip) if conversion else clip.numbers,
+        )
         if part is not None:  # those of the others were looked at when the job was made
-            inputs, numbers = (p for n in part.numbers for p in part.files(n)), part.numbers
+            inputs, numbers = (
+                (p for n in part.numbers for p in part.dependencies.of(n)),
+                part.numbers,
+            )
         return output.make(self.settings, numbers, inputs, clip.chosen, shown, self.since)
 
     def sweep(self) -> None:
@@ -189,7 +195,7 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     if request.blur.method is not None:
         check_method(request.blur.method, FRAME_METHODS)
     clip, shown = request.opened()
-    clip.check_layers()
+    clip.builder.check_layers()
     remarks = list(map(_of_scale, request.blur.scale))
     if request.color.space(shown) is None:
         remarks.append(_check_space(clip, shown))

@@ -49,11 +49,11 @@ class Stored:
         clip, there = self.job.clip, set(self.job.settled.on_disk)
         for number in sorted(_needed(self.job, chosen)):
             if number not in there:
-                if is_pattern(clip.pattern) and (new := clip.files(number)[0]).is_file():
+                if is_pattern(clip.pattern) and (new := clip.dependencies.of(number)[0]).is_file():
                     raise InputError(f"{new} did not exist when {name} was written; {_AGAIN}")
                 continue
             known = self.inputs.get(number, [])
-            for i, path in enumerate(clip.files(number)):
+            for i, path in enumerate(clip.dependencies.of(number)):
                 if _size_and_time(path) != known[2 * i : 2 * i + 2]:
                     gone = "has changed" if path.exists() else "is gone"
                     raise InputError(f"{path} {gone} since {name} was written; {_AGAIN}")
@@ -92,7 +92,7 @@ def stored(job: Job, chunk: int, *, frames: Sequence[int] | None = None) -> Stor
     settled, clip = job.settled, job.clip
     there = set(settled.on_disk)
     inputs = {
-        n: [value for path in clip.files(n) for value in _size_and_time(path)]
+        n: [value for path in clip.dependencies.of(n) for value in _size_and_time(path)]
         for n in sorted(_needed(job, job.numbers if frames is None else frames) & there)
     }
     part = replace(

@@ -139,7 +139,7 @@ def perceive(
         frames = PerceivedNature(render, observer, numbers, steps)
     else:
         clip = input.open(pattern)
-        inputs = clip.inputs
+        inputs = clip.dependencies.every()
         frames = PerceivedSequence(clip, Observer(fps, perception.cone, device=device))
     settings = record(perception, input=pattern, fps=str(output.rate))
     return PerceptionRun(frames, output.make(settings, list(frames.numbers), inputs))

@@ -132,7 +132,7 @@ def describe_frames(report: BatchReport, clip: Clip, *, is_converted: bool = Fal
     `is_converted`: the frames that were done have numbers other than those of the clip.
     """
     done = set(report.done)
-    report.cuts, report.unseen, report.lacking = set(clip.cuts), clip.unseen, clip.absent
+    report.cuts, report.unseen, report.lacking = set(clip.cuts), clip.masks.unseen, clip.absent
     if is_converted:
         report.notes = {text: sorted(done) for text, at in clip.notes.items() if at}
         return

@@ -75,7 +75,7 @@ def _check_names(clip: Clip, output: Output) -> None:
     """InputError where views or masks do not fit; the output is then abandoned."""
     try:
         _check_names_of_views(clip, output)
-        clip.check_masks()
+        clip.masks.check()
     except BaseException:
         output.abandon()
         raise

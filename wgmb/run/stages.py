@@ -162,7 +162,7 @@ def blurred(
 
     InputError, before any frame is read, where a mask names an object that no Cryptomatte has.
     """
-    clip.check_masks()
+    clip.masks.check()
     return frames(Stages(clip, blur, confidence), stop)
 
 

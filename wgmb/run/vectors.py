@@ -44,7 +44,7 @@ class VectorsRequest:
             max_displace=self.max_displace,
             mask_of=clip.vector_mask,
             settings=settings,
-            inputs=clip.inputs,
+            inputs=clip.dependencies.every(),
             overwrite=self.overwrite,
             resume=self.resume,
             views=clip.chosen,

@@ -45,6 +45,9 @@ class Clip:
     user, each with its frames, and `absent` the masks by index or id (`IndexOB=4`,
     `CryptoObject=0x...`) that none of them has.
 
+    Its parts, for what it has no method for: `cache` (files), `builder` (layers), `masks`, and
+    `dependencies` (the files that a result depends on).
+
     Stereo frames have `views`. Each view has its own picture, vectors, depth and masks; cuts and
     the vector convention are determined from the default view.
     """
@@ -88,7 +91,7 @@ class Clip:
         """Nothing has been read yet."""
         self.expansion = Expansion()
         settled, files, passes = self._settled, self._files, self.passes
-        self._stored = stored = FrameCache(
+        self.cache = cache = FrameCache(
             files,
             passes,
             numbers=self.numbers,
@@ -97,18 +100,18 @@ class Clip:
             space=self._space,
             max_mb=self._max_mb,
         )
-        self.sizes, self.notes, self.unread = stored.sizes, stored.notes, stored.unread
+        self.sizes, self.notes, self.unread = cache.sizes, cache.notes, cache.unread
         patterns = [str(pattern) for pattern in files.every_pattern]
-        self._masks = Masks(
+        self.masks = Masks(
             passes.holdout, passes.scale, patterns, self.numbers, self._max_mb, files.of_views
         )
-        self._finder = ConventionFinder(stored, settled.finding if settled else None)
-        self._dependencies = Dependencies(files, self._masks, (passes.camera, self._cut_list.path))
-        self._builder = FrameBuilder(stored, self._finder, self._masks, self._cameras)
-        self._neighbours = Neighbours(stored, self._builder, self._cut_list.is_search)
+        self._finder = ConventionFinder(cache, settled.finding if settled else None)
+        self.dependencies = Dependencies(files, self.masks, (passes.camera, self._cut_list.path))
+        self.builder = FrameBuilder(cache, self._finder, self.masks, self._cameras)
+        self._neighbours = Neighbours(cache, self.builder, self._cut_list.is_search)
         if settled is not None:
             self._neighbours.settle(settled.beyond)
-            self._masks.take_names_as_found()
+            self.masks.take_names_as_found()
             self.notes |= {text: list(self.numbers) for text in settled.notes}
 
     def settle(self) -> SequenceFindings:
@@ -118,7 +121,7 @@ class Clip:
         even if the files on disk have changed.
         """
         if self._settled is None:
-            self.check_masks()
+            self.masks.check()
             beyond = self._neighbours.beyond
             notes = tuple(text for text, at in self.notes.items() if len(at) == len(self.numbers))
             self._settled = SequenceFindings(
@@ -149,8 +152,8 @@ class Clip:
 
     def move_by(self, motion: MotionSource | None) -> None:
         """Find motion in the pictures (see wgmb/flow) if the files hold none; None: all stand."""
-        self._builder.picture_motion = PictureMotion(self._stored, motion) if motion else standing
-        self._stored.margin = FAR if motion else 0
+        self.builder.picture_motion = PictureMotion(self.cache, motion) if motion else standing
+        self.cache.margin = FAR if motion else 0
         self._neighbours.forget_all()
 
     def expand_highlights(self, highlights: float) -> None:
@@ -160,17 +163,8 @@ class Clip:
         Frames that hold light above white can then not be read.
         """
         self.expansion = Expansion(highlights)
-        self._builder.brighten = self.expansion.expanded
+        self.builder.brighten = self.expansion.expanded
         self._neighbours.forget_all()
-
-    @property
-    def highlights(self) -> float:
-        """Times white that white is in frames."""
-        return self.expansion.white
-
-    def begins_shot(self, number: int) -> bool:
-        """Return True if the user said that a new shot begins with the frame."""
-        return self._stored.is_known_cut(number, -1)
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -215,16 +209,6 @@ class Clip:
                 return self._neighbours.frame(self.source(number), frozenset()).has
         return frozenset()
 
-    def files(self, number: int) -> list[Path]:
-        """Every file that the result of frame `number` depends on."""
-        return self._dependencies.of(number)
-
-    @property
-    def inputs(self) -> Iterator[Path]:
-        """Iterate over all files that may be read, of all frames on disk."""
-        for number in self.on_disk:
-            yield from self.files(number)
-
     def made_of(self, number: int, reach: int) -> dict[str, Any]:
         """Return the inputs of frame `number` apart from the settings, as values for JSON.
 
@@ -233,24 +217,24 @@ class Clip:
         """
         convention = self._finder.finding.vectors
         return {
-            "files": self._dependencies.states(number, reach),
+            "files": self.dependencies.states(number, reach),
             "vectors_mean": str(convention) if convention else None,
         }
 
     def source(self, number: int, view: str | None = None) -> FrameFile:
         """Frame `number` as stored: `view`, by default the chosen view, or else the default one."""
-        return self._stored.source(number, view)
+        return self.cache.source(number, view)
 
     def sources(self, number: int) -> list[FrameFile]:
         """The views of frame `number` that are to be blurred, the default one first.
 
         These are all views with a picture, or the chosen one.
         """
-        return self._stored.sources(number)
+        return self.cache.sources(number)
 
     def forget(self, number: int) -> None:
         """Drop a frame from the cache."""
-        self._stored.forget(number)
+        self.cache.forget(number)
         self._neighbours.forget(number)
 
     @property
@@ -322,31 +306,12 @@ class Clip:
 
     def light_passes(self, source: FrameFile) -> LightPasses:
         """The passes of light of a frame's picture."""
-        return self._builder.light_passes(source)
-
-    @property
-    def unseen(self) -> list[str]:
-        """Masks by name that are in manifests, but in no pixel of the frames read so far."""
-        return self._masks.unseen
+        return self.builder.light_passes(source)
 
     @property
     def absent(self) -> list[str]:
         """Masks by index or id that no frame read so far has."""
-        return self._masks.absent
-
-    def check_masks(self) -> None:
-        """InputError if there is no file of a mask, or no Cryptomatte has the object it names.
-
-        The headers of the frames are searched once, up to the first with the name.
-        """
-        self._masks.check()
-
-    def check_layers(self) -> None:
-        """InputError if a layer that is given by its name is in none of the frames.
-
-        The first frame is examined, and the middle and the last one only if it lacks a layer.
-        """
-        self._builder.check_layers()
+        return self.masks.absent
 
 
 def _wanted(picture: bool, normal: bool, light: bool) -> frozenset[str]:

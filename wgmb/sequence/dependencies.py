@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from .files import SequenceFiles
@@ -18,6 +19,11 @@ class Dependencies:
     def of(self, number: int) -> list[Path]:
         """Every file that frame `number` depends on."""
         return [*self._files.every_path(number), *self._masks.files(number), *self._others]
+
+    def every(self) -> Iterator[Path]:
+        """All files that may be read, of all frames on disk."""
+        for number in self._files.on_disk:
+            yield from self.of(number)
 
     def states(self, number: int, reach: int) -> list[list[str | int]]:
         """Name, size [bytes] and time of change [ns] of every file that the result of frame

@@ -115,5 +115,5 @@ class InputSettings:
             max_mb=self.max_mb,
             settled=settled,
         )
-        clip.check_masks()
+        clip.masks.check()
         return clip

@@ -87,7 +87,7 @@ def describe(
     if output is not None and output.suffix.lower() not in stills.SUFFIXES:
         raise InputError(f"output {output}: must be an image, {', '.join(stills.SUFFIXES)}")
     if output is not None:
-        refuse_inputs(output.parent, [output.name], [output], clip.inputs)
+        refuse_inputs(output.parent, [output.name], [output], clip.dependencies.every())
     source = clip.source(clip.numbers[0])
     lines = [("file", str(source.path))]
     if len(clip.numbers) > 1:
