@@ -67,9 +67,9 @@ def test_pictures_are_those_of_the_file(tmp_path, device, flow, fps_in, fps):
     coding = plan.reader.coding
     assert (coding.model, coding.bits, coding.transfer) == ("rgb", 8, 13)
     blur = VideoBlur(plan.reader, run.blur, run.motion, clock=plan.clock)
-    want = [
-        e.coded(coding).planes for _, e in blur.exposures(run.request.shutter.make(), plan.wanted)
-    ]
+    shutter, wanted = run.request.shutter.make(), plan.wanted
+    exposed = blur.of(blur.pictures(shutter, wanted), shutter, wanted)
+    want = [exposure.coded(coding).planes for _, exposure in exposed]
     got = wgmb.blur_pictures(
         iter(pictures()), fps_in=fps_in, fps=fps, flow=flow, flow_quality="fast", device=device
     )

@@ -143,7 +143,8 @@ def command_line(
         planes=Planes(blur.device, video.expansion),
     )
     wanted = list(OutputFrames(footage, clock, None if fps is None else Fraction(fps)))
-    for moment, exposure in run.exposures(Shutter(**shutter), wanted):
+    exposes = Shutter(**shutter)
+    for moment, exposure in run.of(run.pictures(exposes, wanted), exposes, wanted):
         if moment.number == number:
             encoder = blur.device.create_command_encoder()
             return TexturePool(blur.device).download(encoder, exposure.light())[..., :3]
@@ -522,4 +523,4 @@ def test_where_nothing_can_be_decoded_a_picture_is_left_out_or_the_run_says_so(
     clock = VideoSettings(begin="0.9").clock(footage, None)
     run = VideoBlur(footage, Blur("tap", device=device), None, clock=clock)
     with pytest.raises(InputError, match=r"from 0\.[0-9]* s on can be decoded"):
-        next(run.exposures(Shutter(180), list(OutputFrames(footage, clock, Fraction(24)))))
+        next(run.pictures(Shutter(180), list(OutputFrames(footage, clock, Fraction(24)))))

@@ -23,7 +23,6 @@ from ..pipeline.exposure_sum import ExposureSum
 from ..shots.motion import MotionSource
 from ..shots.reader import FLASH, Picture, ShotReader
 from ..shutter import Shutter
-from ..threads import ahead
 from .clock import Clock
 from .gpu_frames import VideoFrames
 from .holdouts import Holdout
@@ -32,7 +31,6 @@ from .planes import Average, Planes, averages
 from .read.reader import VideoReader
 from .thumbnail import Thumbnail, is_cut, is_double
 
-_READ_AHEAD = 2  # coded pictures
 _BEFORE = 10  # pictures decoded before the first exposure, which its motion may depend on
 
 
@@ -156,13 +154,6 @@ class VideoBlur(Exposures):
         super().__init__(blur, motion, **more)
         self._planes.expansion.check_video(reader.path, reader.coding)
         self.reader, self.clock = reader, clock
-
-    def exposures(
-        self, shutter: Shutter, wanted: Sequence[OutputFrame]
-    ) -> Iterator[tuple[OutputFrame, Exposure]]:
-        """Every output frame and its exposure, which is valid until the next is asked for."""
-        pictures = ahead(self.pictures(shutter, wanted), _READ_AHEAD)
-        return self.of(pictures, shutter, wanted)
 
     def pictures(
         self, shutter: Shutter, wanted: Sequence[OutputFrame]
