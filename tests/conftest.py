@@ -21,12 +21,15 @@ os.environ.pop("OCIO", None)  # a config of whoever runs the tests
 pytest.register_assert_rewrite("viewer_hand")
 standard.record()  # every kernel that a test makes; they are sent through Dawn in the end
 
-# Files that take longest are begun first, so that all workers end at about the same time.
-LONGEST = ("test_blender", "test_page", "test_window", "test_viewer_controls",
-           "test_viewer_perceived", "test_viewer_pictures", "test_moving_light",
-           "test_pygfx", "test_farm", "test_twins", "test_faults",
-           "test_interruptions", "test_volume", "test_flow",
-           "test_experiments", "test_reference", "test_blur_video", "test_perceive")  # fmt: skip
+# Files that take longest are begun first, so that all workers end at about the same time; those
+# whose kernels another file compiles too come last, and find them in the driver's cache.
+FIRST = ("test_blender", "test_flow", "test_twins", "test_page", "test_window",
+         "test_viewer_controls", "test_viewer_perceived", "test_viewer_pictures", "test_farm",
+         "test_faults", "test_interruptions", "test_volume", "test_reference", "test_blur_video",
+         "test_perceive", "test_standard")  # fmt: skip
+LAST = ("test_flow_repeats", "test_moving_light", "test_docs", "test_experiments", "test_pygfx",
+        "test_gather", "test_reach", "test_shot_reader", "test_crowded_tiles",
+        "test_flow_lights")  # fmt: skip
 
 
 def pytest_configure(config):
@@ -34,8 +37,8 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(items):
-    rank = {name: place for place, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
+    rank = {name: place for place, name in enumerate((*FIRST, None, *LAST))}
+    items.sort(key=lambda item: rank.get(item.path.stem, rank[None]))
 
 
 @pytest.fixture(autouse=True)

@@ -303,6 +303,7 @@ def test_the_page_is_made_the_same_every_time(page):
     assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//|@import|url\(""", text)
 
 
+@pytest.mark.full
 def test_the_committed_page_is_made_of_this_tree(page):
     """But for last bits of recorded buffers, which another machine's library may round."""
 

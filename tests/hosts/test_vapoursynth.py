@@ -81,6 +81,7 @@ def planes_of(frame):
     return [np.array(frame[i]) for i in range(frame.format.num_planes)]
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("flow", ["none", "dis", pytest.param("search", marks=pytest.mark.full)])
 def test_frames_in_any_order_from_many_threads_are_those_of_blur_pictures(hosted, device, flow):
     vs, host = hosted

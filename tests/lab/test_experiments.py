@@ -127,6 +127,7 @@ def test_chen_compares_rates_faces_and_alphas(chen):
         ]
 
 
+@pytest.mark.full
 def test_chens_verdict_is_that_of_the_rates(chen):
     rates = chen.tables[0]
     milliseconds = {row[0]: row[-1] for row in rates.rows}
@@ -139,6 +140,7 @@ def test_chens_verdict_is_that_of_the_rates(chen):
         assert said[2] == ("holds" if times > 1.05 else "does not hold")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("scene", ["scaling", "crossing"])
 def test_chens_printed_weights_brighten_instead_of_blurring(chen, scene):
     """Normalised, they take gradients away as the truth does; as printed they add to them."""
@@ -154,6 +156,7 @@ def test_chens_printed_weights_brighten_instead_of_blurring(chen, scene):
             assert errors == sorted(errors) and errors[-1] > 1.1 * errors[0]
 
 
+@pytest.mark.full
 def test_the_page_of_experiments_takes_its_tables_from_reports(chen):
     found = report.as_json(chen)
     spec = importlib.util.spec_from_file_location("gallery", ROOT / "tools" / "gallery.py")

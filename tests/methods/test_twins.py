@@ -235,6 +235,7 @@ def test_gather_is_its_twin_of_what_comes_nearer():
     assert differing_from_gather(sources, 360) < 0.01
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("left", [1.0, 0.5])
 def test_gather_is_its_twin_where_light_changes(left):
     """The wall is darker in the neighbours, or its left half alone."""

@@ -100,7 +100,7 @@ def test_workers_have_the_environment_of_today(shot, whole, tmp_path, monkeypatc
     with pytest.raises(DeviceError, match="no adapter matches 'nonsense'; found"):
         Farm(workers=1).blur(job)
     monkeypatch.setenv("WGMB_ADAPTER", "")
-    assert not Farm(workers=1).blur(job).report.failed
+    assert not Farm(workers=1).blur(job).failed
     assert contents(tmp_path / "out") == whole
 
 

@@ -31,22 +31,34 @@ const IS_REPEAT: u32 = 1u;      // bits of what is found: leads to a repeat,
 const IS_HIDDEN: u32 = 0x1000u;     // seems hidden where the guide matches better,
 const MAY_TURN: u32 = 0x1000000u;   // is led by the guide if enough around are so
 
-/// Least difference of the patch from the own picture around a displacement.
-fn own_cost(px: vec2i, by: vec2f) -> f32 {
-    var least = OUTSIDE;
-    for (var k = 0; k < 9; k++) {
-        least = min(least, whole_cost(here, px + vec2i(round(by)) + vec2i(k % 3, k / 3) - 1, least));
+/// True if the own picture repeats after `by`: the patch is found again after it, but not half way. One loop, because
+/// every place of the text that compares a patch takes seconds to compile on the CPU.
+fn repeats(px: vec2i, by: vec2f) -> bool {
+    var least = vec2f(OUTSIDE);     // differences around the way, and around its half
+    for (var k = 0; k < 18; k++) {
+        let half_way = k / 9;
+        let at = px + vec2i(round(select(by, 0.5 * by, half_way == 1))) + vec2i(k % 3, k / 3 % 3) - 1;
+        let cost = whole_cost(here, at, least[half_way]);
+        least[half_way] = min(least[half_way], cost);
     }
-    return least;
+    return least.x < ALIKE * least.y;
 }
 
-/// True if a pixel's displacement differs from the guide's by a repeat of the picture, and matches better: its patch is
-/// found again after the difference, but not half way.
-fn is_repeat(px: vec2i, other: texture_2d_array<f32>, own: vec2f, guided: vec2f) -> bool {
-    let by = own - guided;
-    if own_cost(px, by) >= ALIKE * own_cost(px, 0.5 * by) { return false; }
-    let guided_cost = whole_cost(other, px + vec2i(round(guided)), OUTSIDE);
-    return whole_cost(other, px + vec2i(round(own)), guided_cost) < guided_cost;
+/// What a side costs by a pixel's own displacement, and by the guide's.
+fn near_costs(px: vec2i, own: vec2f, guided: vec2f) -> vec2f {
+    var costs = vec2f(0.0);
+    for (var k = 0; k < 2; k++) {
+        costs[k] = whole_cost(near, px + vec2i(round(select(own, guided, k == 1))), OUTSIDE);
+    }
+    return costs;
+}
+
+fn far_costs(px: vec2i, own: vec2f, guided: vec2f) -> vec2f {
+    var costs = vec2f(0.0);
+    for (var k = 0; k < 2; k++) {
+        costs[k] = whole_cost(far, px + vec2i(round(select(own, guided, k == 1))), OUTSIDE);
+    }
+    return costs;
 }
 
 /// Where a state leads: displacements to the near frame and the far one.
@@ -74,10 +86,9 @@ fn comes_back(px: vec2i, way: vec2f, back: texture_2d_array<f32>) -> bool {
     return max(missed.x, missed.y) <= MOST_MISSED;
 }
 
-/// True if a side seems hidden where the guide matches.
-fn is_hidden(px: vec2i, other: texture_2d_array<f32>, own: vec2f, guided: vec2f) -> bool {
-    let cost = whole_cost(other, px + vec2i(round(own)), OUTSIDE);
-    return cost > HIDDEN && cost < OUTSIDE && whole_cost(other, px + vec2i(round(guided)), cost) < cost - LESS;
+/// True if a side that costs so much seems hidden where the guide matches.
+fn is_hidden(costs: vec2f) -> bool {
+    return costs.x > HIDDEN && costs.x < OUTSIDE && costs.y < costs.x - LESS;
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -91,23 +102,25 @@ fn find(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     var result = 0u;
     if max(by.x, by.y) > TURNS {
         load_search_patch(px);
-        var has_repeat = false;
-        if IS_COARSEST && max(by.x, by.y) > APART {
-            has_repeat = is_repeat(px, near, own.xy, guided.xy);
-            if VIEWS == AROUND { has_repeat = has_repeat || is_repeat(px, far, own.zw, guided.zw); }
+        let to_near = near_costs(px, own.xy, guided.xy);
+        var to_far = vec2f(0.0);
+        if VIEWS == AROUND { to_far = far_costs(px, own.zw, guided.zw); }
+        if IS_COARSEST && max(by.x, by.y) > APART {     // a displacement that matches better may be off by a repeat
+            for (var side = 0; side < 2; side++) {
+                let is_better = select(to_near.x < to_near.y, to_far.x < to_far.y, side == 1);
+                let way = own - guided;
+                if is_better && repeats(px, select(way.xy, way.zw, side == 1)) { result = IS_REPEAT; }
+            }
         }
         if VIEWS == AROUND {
             let is_one_sided = min(by.x, by.y) <= APART
                 && max(by.x, by.y) <= MOST_TURN * f32(max(frame.size.x, frame.size.y));
             if is_one_sided && comes_back(px, guided.xy, near_back)
                 && comes_back(px, guided.zw, far_back) {
-                var seems_hidden = false;
-                if by.x > TURNS { seems_hidden = is_hidden(px, near, own.xy, guided.xy); }
-                if by.y > TURNS { seems_hidden = is_hidden(px, far, own.zw, guided.zw); }
-                result = MAY_TURN + select(0u, IS_HIDDEN, seems_hidden);
+                let seems_hidden = select(by.x > TURNS && is_hidden(to_near), is_hidden(to_far), by.y > TURNS);
+                result += MAY_TURN + select(0u, IS_HIDDEN, seems_hidden);
             }
         }
-        result += select(0u, IS_REPEAT, has_repeat);
     }
     textureStore(found_out, id, vec4u(result));
 }
