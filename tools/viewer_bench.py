@@ -23,6 +23,7 @@ from wgmb import Blur, Frame, Render
 from wgmb.io import exr
 from wgmb.scene import builtin
 from wgmb.viewer import State, Viewer
+from wgmb.viewer.window import open_devices
 
 SIZE = (1280, 720)
 _EVERY = 1 / 24  # seconds from one frame of the panel to the next, at best
@@ -57,8 +58,11 @@ def frames(folder: Path) -> str:
         rgba = np.ascontiguousarray(frame.color[..., :4])
         motion = np.zeros((*rgba.shape[:2], 4), np.float32)
         motion[:] = 12.0, 0.0, 12.0, 0.0
-        layers = {f"Vector.{c}": motion[..., i] for i, c in enumerate("XYZW")}
+        layers: dict[str, np.ndarray] = {
+            f"Vector.{c}": motion[..., i] for i, c in enumerate("XYZW")
+        }
         made = exr.new(rgba)
+        assert frame.depth is not None
         made.parts[0].channels.update(layers | {"Depth.Z": frame.depth})
         (folder / f"a.{number:04d}.exr").write_bytes(exr.encode(made))
     return str(folder / "a.####.exr")
@@ -85,7 +89,8 @@ def measure(name: str, source: str, threaded: bool) -> None:
     """Open a source, then change the shutter, then another method."""
     canvas = RenderCanvas(title="wgmb", size=SIZE, update_mode="manual", vsync=False)
     state, news = State().opened(source), []
-    viewer = Viewer(canvas, state, threaded=threaded, call_soon=news.append)
+    devices = open_devices() if threaded else {}
+    viewer = Viewer(canvas, state, **devices, call_soon=news.append)
     steps = (
         ("opened", lambda: state, False),
         ("shutter", lambda: viewer.state.with_settings(shutter=90.0), False),
@@ -100,8 +105,7 @@ def measure(name: str, source: str, threaded: bool) -> None:
             f"{name:7} {step:21} first {first:5.2f} s  final {final:6.2f} s  a frame took {still}\n"
         )
         sys.stdout.flush()
-    viewer.actions.close()
-    viewer.stage.close()
+    viewer.close()
     canvas.close()
 
 

@@ -9,7 +9,7 @@ from wgmb.color.srgb import srgb
 from wgmb.scene import builtin
 from wgmb.viewer import controls
 from wgmb.viewer.draw import renderer
-from wgmb.viewer.draw.screen import key_box
+from wgmb.viewer.draw.place import key_box
 
 pytest_plugins = ["viewer_hand"]
 

@@ -23,8 +23,7 @@ AREA = (0, 0, *SMALL)
 def viewer():
     made = offscreen(STATE, SMALL, threaded=True)
     yield made
-    made.actions.close()
-    made.stage.close()
+    made.close()
 
 
 def seen_until(viewer, done):
@@ -92,7 +91,7 @@ def test_the_window_goes_on_while_something_is_drawn(monkeypatch):
         gate.opened.set()
     finally:
         gate.opened.set()
-        viewer.stage.close()
+        viewer.close()
 
 
 def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
@@ -151,7 +150,7 @@ def test_a_state_that_cannot_be_drawn_at_first_ends_the_viewer():
     viewer = offscreen(put(STATE, set=("posts=1",)), SMALL, threaded=True)
     with pytest.raises(InputError, match="posts"):
         seen_until(viewer, lambda: False)
-    viewer.stage.close()
+    viewer.close()
 
 
 def test_a_recording_has_every_frame_in_full(viewer, tmp_path, monkeypatch):
@@ -171,5 +170,5 @@ def test_a_recording_has_every_frame_in_full(viewer, tmp_path, monkeypatch):
 def test_the_thread_ends_with_the_window():
     viewer = offscreen(STATE, SMALL, threaded=True)
     frame(viewer)
-    viewer.stage.close()
-    assert not viewer.stage._thread.is_alive()
+    viewer.close()
+    assert not viewer.stage._thread.is_alive() and not viewer.screen._thread.is_alive()

@@ -20,9 +20,9 @@ SIZE = 800, 720  # of the window; its picture is 480 wide
 PATIENCE = 90  # seconds: a busy machine without a GPU is slow
 BROKEN = """
 from wgmb.viewer import State, view
-from wgmb.viewer.draw.screen import Screen
+from wgmb.viewer.draw.composer import Composer
 def compose(*_): raise ZeroDivisionError("broken")
-Screen.compose = compose
+Composer.compose = compose
 view(State().with_settings(method="tap"))
 """
 CLOSE = """

@@ -14,6 +14,7 @@ from .device import (
     texel,
 )
 from .kernels import FrameBindings, Kernel, kernel, uniform
+from .priority import yielding
 
 __all__ = [
     "SOFTWARE",
@@ -32,4 +33,5 @@ __all__ = [
     "submit",
     "texel",
     "uniform",
+    "yielding",
 ]

@@ -19,7 +19,7 @@ from ..io.record import KEY
 from ..video.write.frames import FrameVideo
 from .draw.draw_thread import DrawThread
 from .draw.renderer import Renderer
-from .draw.screen import Screen
+from .draw.screen import Screen, ScreenThread
 from .state.dropped import source_of
 from .state.state import State
 from .state.video_time import rate
@@ -29,7 +29,11 @@ class Actions:
     """Runs actions and tracks those in progress; failures are shown as messages."""
 
     def __init__(
-        self, canvas, stage: Renderer | DrawThread, screen: Screen, say: Callable[[str], None]
+        self,
+        canvas,
+        stage: Renderer | DrawThread,
+        screen: Screen | ScreenThread,
+        say: Callable[[str], None],
     ):
         self._window = getattr(canvas, "_window", None)  # of glfw, where there is one
         self._canvas, self._stage, self._screen, self._say = canvas, stage, screen, say

@@ -20,10 +20,12 @@ from .. import gpu
 from ..errors import DeviceError, InputError
 from . import controls
 from .actions import Actions
+from .draw.composer import NOTHING, View
 from .draw.draw_thread import DrawThread
+from .draw.place import fit, key_box
 from .draw.renderer import Renderer
 from .draw.request import Drawn, Request
-from .draw.screen import NOTHING, Screen, fit, key_box
+from .draw.screen import Screen, ScreenThread
 from .draw.slot import FrameStatus
 from .panel import inspector, overlay
 from .panel.panel import Info, Panel
@@ -46,9 +48,10 @@ _SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "char", "resize")
 class Viewer:
     """The viewer on a canvas: state, event handling and drawing.
 
-    `interface`: size of the panel and its text. `threaded`: pictures are drawn in a thread of
-    their own, and the window never waits for them; the thread has the window drawn by `call_soon`,
-    of the canvas's loop. `failed` holds the exception that ended it, if one did.
+    `interface`: size of the panel and its text. `threaded`: pictures are drawn in a thread with
+    `drawing_device` and composed in another one, and the window never waits for them; the threads
+    have the window drawn by `call_soon`, of the canvas's loop. `failed` holds the exception that
+    ended the viewer, if one did.
     """
 
     def __init__(
@@ -57,6 +60,7 @@ class Viewer:
         state: State,
         *,
         device: wgpu.GPUDevice | None = None,
+        drawing_device: wgpu.GPUDevice | None = None,
         threaded: bool = False,
         interface: float = 1.0,
         call_soon: Callable[[Callable[[], None]], object] | None = None,
@@ -69,8 +73,15 @@ class Viewer:
         # Plain formats: the picture and ImGui's colours are display values already.
         format = self._context.get_preferred_format(self.device.adapter).removesuffix("-srgb")
         self._context.configure(device=self.device, format=format)
-        self.stage = DrawThread(self.device, self._on_news) if threaded else Renderer(self.device)
-        self.screen, self.panel = Screen(self.device, format), Panel()
+        self.stage: Renderer | DrawThread
+        self.screen: Screen | ScreenThread
+        if threaded:
+            other = drawing_device or gpu.second_device(self.device)
+            self.stage = DrawThread(other, self._on_news)
+            self.screen = ScreenThread(self.device, format, self._on_news)
+        else:
+            self.stage, self.screen = Renderer(self.device), Screen(self.device, format)
+        self.panel = Panel()
         self.actions = Actions(canvas, self.stage, self.screen, self.say)
         self.failed: BaseException | None = None
         self.message = ("", 0.0)  # and until when it is shown
@@ -120,6 +131,12 @@ class Viewer:
     def is_threaded(self) -> bool:
         """True if pictures are drawn in a thread of their own."""
         return isinstance(self.stage, DrawThread)
+
+    def close(self) -> None:
+        """End what goes on beside the window: a video is finished, an export goes on by itself."""
+        self.actions.close()
+        self.stage.close()
+        self.screen.close()
 
     def dropped(self, paths: Sequence[str]) -> None:
         """Open files and folders that were dropped onto the window."""
@@ -212,7 +229,7 @@ class Viewer:
     # ---- drawing -------------------------------------------------------------------------
 
     def _on_news(self) -> None:
-        """The thread has drawn something; called there."""
+        """A thread has drawn something; called there."""
         if self._call_soon is not None:
             self._call_soon(self.canvas.request_draw)
 
@@ -237,8 +254,10 @@ class Viewer:
         width, height = self.canvas.get_physical_size()
         images = drawn.sides(self._flicked()) if drawn else (NOTHING, NOTHING)
         area = self._area_px() if drawn else (0, 0, 0, 0)
-        size = max(width, 1), max(height, 1)
-        self.screen.compose(state, images, self._place(), area, size, ratio)
+        # The panel is over the rest, but for the part of a pixel that rounding leaves.
+        free = min(width, area[2] + 1) if drawn else width
+        size = max(round(free), 1), max(height, 1)
+        self.screen.show(View(state, images, self._place(), area, size, ratio))
         self.screen.paint(self._context.get_current_texture())
         if drawn:
             self._note_times(drawn.report)
@@ -385,6 +404,16 @@ def frame(viewer: Viewer) -> np.ndarray:
     return np.asarray(image)
 
 
+def open_devices(adapter: str | None = None) -> dict[str, Any]:
+    """The devices that a Viewer needs: without a GPU, one for the window and one beside it."""
+    with gpu.yielding():
+        device = gpu.open_device(adapter)
+    if device.adapter_info["adapter_type"] != gpu.SOFTWARE:
+        return {"device": device}
+    # The window's is the second one: its threads keep their priority.
+    return {"device": gpu.second_device(device), "drawing_device": device, "threaded": True}
+
+
 def view(
     state: State,
     *,
@@ -399,7 +428,7 @@ def view(
     low, high = SIZES
     if not low <= interface <= high:
         raise InputError(f"`interface` must be {low:g} to {high:g}, got {interface:g}")
-    device = gpu.open_device(adapter)
+    devices = open_devices(adapter)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # GLFW's remarks; what it returns says the same
         if not glfw.init():
@@ -410,17 +439,13 @@ def view(
     from rendercanvas.glfw import RenderCanvas, loop  # only now: without a display it aborts
 
     canvas = RenderCanvas(title=TITLE, size=size, update_mode="ondemand", max_fps=60)
-    is_slow = device.adapter_info["adapter_type"] == gpu.SOFTWARE
     soon = loop.call_soon_threadsafe
-    viewer = Viewer(
-        canvas, state, device=device, threaded=is_slow, interface=interface, call_soon=soon
-    )
+    viewer = Viewer(canvas, state, **devices, interface=interface, call_soon=soon)
     window: Any = canvas._window
     drop: Any = lambda _, paths: viewer.dropped(paths)  # noqa: E731
     glfw.set_drop_callback(window, drop)
     loop.run()
-    viewer.actions.close()
-    viewer.stage.close()
+    viewer.close()
     if viewer.failed is not None:
         raise viewer.failed
 

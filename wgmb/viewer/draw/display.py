@@ -10,8 +10,8 @@ from ...errors import DeviceError, InputError
 from ...gpu.textures import TexturePool
 from ...settings.color import ColorSettings
 from ..state.state import State
+from .composer import Image
 from .ocio_shader import OUTPUT, OcioShader
-from .screen import Image
 
 
 class DisplayCache:

@@ -2,7 +2,7 @@
 
 Without a GPU, passes of seconds run on the same processor as the panel. Here they run in the
 driver's threads while the window goes on, each pass by itself, so that all is dropped at once when
-something else is wanted. Images come as arrays; the window's own device gets them as textures.
+something else is wanted. Images come as arrays of halves.
 """
 
 from __future__ import annotations
@@ -16,19 +16,17 @@ from typing import Any
 import numpy as np
 import wgpu
 
-from ... import gpu
 from ...gpu.textures import TexturePool
+from .composer import Image
 from .portions import DroppedError, Portions
 from .renderer import Renderer
 from .request import Drawn, Request
-from .screen import Image
 from .slot import FrameStatus
 
 _PLAYED = 1 / 24  # seconds that a frame may take while it plays
 _POLL = 0.2  # seconds after which the thread looks whether it should end
 _PAUSE = 0.03  # seconds between two looks at whether there is something to do
 _HALF_MAX = 65504.0
-_CHANNELS = {1: "r", 2: "rg", 4: "rgba"}
 
 
 @dataclass
@@ -36,22 +34,18 @@ class _Answer:
     """An answer of the thread to a request."""
 
     drawn: Drawn
-    arrays: dict[str, np.ndarray]
-    """The images by slot; (height, width, channels), float16 where they are colours."""
     light: np.ndarray
     """The first image as it was drawn."""
 
 
 class DrawThread:
-    """Draws what is requested; `draw` returns the last answer at once.
+    """Draws what is requested with a device of its own; `draw` returns the last answer at once.
 
     `news` is called in the thread when there is an answer.
     """
 
     def __init__(self, device: wgpu.GPUDevice, news: Callable[[], None] = lambda: None):
-        self.device, self._news = device, news
-        self._images = TexturePool(device)
-        self._uploaded: dict[str, Image] = {}
+        self._news = news
         self._changed = threading.Condition()
         self._wanted: Request | None = None
         self._drawing: Request | None = None
@@ -59,9 +53,8 @@ class DrawThread:
         self._failed: tuple[Request, Exception] | None = None
         self._taken: _Answer | None = None
         self._ended = False
-        beside = gpu.second_device(device)
         self._thread = threading.Thread(
-            target=self._work, args=(beside,), name="drawing", daemon=True
+            target=self._work, args=(device,), name="drawing", daemon=True
         )
         self._thread.start()
 
@@ -83,19 +76,8 @@ class DrawThread:
         if answer is None:
             return None
         report = replace(answer.drawn.report, changed=answer is not self._taken)
-        if answer is not self._taken:
-            self._taken = answer
-            self._upload(answer)
-        return replace(answer.drawn, report=report, images=dict(self._uploaded))
-
-    def _upload(self, answer: _Answer) -> None:
-        for slot, image in answer.drawn.images.items():
-            held, array = self._uploaded.get(slot), answer.arrays[slot]
-            if held is None or held.stamp != image.stamp:
-                texel = f"{_CHANNELS[array.shape[2]]}{8 * array.itemsize}float"
-                self._images.upload(slot, array, texel)
-                texture = self._images.texture(slot, (array.shape[1], array.shape[0]), texel)
-                self._uploaded[slot] = Image(texture, image.kind, image.stamp)
+        self._taken = answer
+        return replace(answer.drawn, report=report)
 
     @property
     def report(self) -> FrameStatus:
@@ -184,11 +166,12 @@ class _Downloads:
         """The drawing with its images as arrays."""
         first = renderer.first
         light = self._array("light", first)
-        arrays = {}
+        images = {}
         for slot, image in drawn.images.items():
             whole = light if image.stamp == first.stamp else self._array(slot, image)
-            arrays[slot] = self._colors(slot, image, whole)
-        return _Answer(drawn, arrays, light)
+            halves = self._halves(slot, image, whole)
+            images[slot] = Image(None, image.kind, image.stamp, halves)
+        return _Answer(replace(drawn, images=images), light)
 
     def _array(self, name: str, image: Image) -> np.ndarray:
         if name not in self._kept or self._kept[name][0] != image.stamp:
@@ -198,14 +181,13 @@ class _Downloads:
             self._kept[name] = image.stamp, array.astype(np.float32, copy=False)
         return self._kept[name][1]
 
-    def _colors(self, slot: str, image: Image, array: np.ndarray) -> np.ndarray:
-        """Colours as half floats, which are half as much to copy in the window's thread."""
-        if image.kind not in ("COLOR", "DISPLAY"):
-            return array
+    def _halves(self, slot: str, image: Image, array: np.ndarray) -> np.ndarray:
+        """An image (height, width, 4) of half floats: shaders are compiled for one format."""
         name = f"{slot} as halves"
         if name not in self._kept or self._kept[name][0] != image.stamp:
-            with np.errstate(over="ignore"):
-                halves = np.clip(array, -_HALF_MAX, _HALF_MAX).astype(np.float16)
+            halves = np.zeros((*array.shape[:2], 4), np.float16)
+            finite = np.where(np.isinf(array), array, np.clip(array, -_HALF_MAX, _HALF_MAX))
+            halves[..., : array.shape[2]] = finite
             self._kept[name] = image.stamp, halves
         return self._kept[name][1]
 

@@ -24,16 +24,12 @@ from ..subjects.subject import SceneSubject, Subject
 from ..subjects.video import VideoSubject
 from .adaptive import Pace
 from .blurs import Blurs
+from .composer import Image
 from .perception import Perceived, seen_frames
+from .place import Box, fit, whole
 from .portions import DroppedError
 from .quality import Measured, Quality
 from .request import Available, Drawn, Request
-from .screen import (
-    Box,
-    Image,
-    fit,
-    whole,
-)
 from .slot import FrameStatus, Slot
 from .video_light import VideoLight, primaries_of
 

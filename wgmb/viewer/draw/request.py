@@ -10,7 +10,8 @@ import numpy as np
 from ...color.spaces import Display
 from ...methods.options import Option
 from ..state.state import State
-from .screen import NOTHING, Box, Image
+from .composer import NOTHING, Image
+from .place import Box
 from .slot import FrameStatus
 
 

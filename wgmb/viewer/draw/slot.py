@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 import wgpu
 
+from .composer import Image
+from .place import Box
 from .quality import Measured
-from .screen import Box, Image
 
 
 @dataclass

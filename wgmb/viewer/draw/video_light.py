@@ -14,7 +14,7 @@ from ...color.primaries import (
     luminance,
 )
 from ...gpu.textures import TexturePool
-from .screen import Image
+from .composer import Image
 
 _TEXEL = "rgba32float"
 

@@ -12,8 +12,8 @@ from ...gpu import wgsl
 from ...methods import METHODS
 from ...pipeline.arguments import SAMPLES
 from ..controls import Box
+from ..draw.place import overlap
 from ..draw.request import Available
-from ..draw.screen import overlap
 from ..state.state import State
 from .theme import ACCENT, packed
 

@@ -1,0 +1,132 @@
+"""Composing beside the window: the same picture, in bands, and a window that does not wait."""
+
+import subprocess
+import sys
+import threading
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from viewer_hand import ALONE
+from wgmb import gpu
+from wgmb.viewer.draw import composer
+from wgmb.viewer.draw.composer import Composer, Image, View
+from wgmb.viewer.draw.place import fit
+from wgmb.viewer.draw.screen import Screen, ScreenThread
+
+SIZE = 90, 60
+AREA = (0, 0, *SIZE)
+RNG = np.random.default_rng(0)
+FIRST, SECOND = (RNG.random((21, 30, 4)).astype(np.float16) for _ in range(2))
+LOWER = """
+import os, sys, threading
+from pathlib import Path
+from wgmb import gpu
+def priorities():
+    of_python = {t.native_id for t in threading.enumerate()} - {threading.get_native_id()}
+    tasks = (t for t in Path("/proc/self/task").iterdir() if int(t.name) not in of_python)
+    return {int(t.name): ((t / "comm").read_text().strip(),
+                          os.getpriority(os.PRIO_PROCESS, int(t.name))) for t in tasks}
+own = os.getpriority(os.PRIO_PROCESS, 0)
+start = priorities()
+with gpu.yielding():
+    first = gpu.open_device()
+if first.adapter_info["adapter_type"] != gpu.SOFTWARE:
+    sys.exit(7)
+opened = {k: v for k, v in priorities().items() if k not in start}
+low = {name for name, priority in opened.values() if priority >= min(own + 10, 19)}
+high = {name for name, priority in opened.values() if priority == own}
+assert high and all(name.startswith("llvmpipe-") for name in high), opened
+assert len(opened) - len(high) >= 2 and not any(n.startswith("llvmpipe-") for n in low), opened
+assert priorities()[threading.get_native_id()][1] == own
+second = gpu.second_device(first)
+later = {k: v for k, v in priorities().items() if k not in start and k not in opened}
+assert later and all(priority == own for _, priority in later.values()), later
+"""
+
+
+def view_of(first, second, **changes):
+    state = replace(ALONE, **changes)
+    images = (
+        Image(None, "COLOR", (id(first),), first),
+        Image(None, "COLOR", (id(second),), second),
+    )
+    return View(state, images, fit((30, 21), AREA, state), AREA, SIZE, 1.0)
+
+
+@pytest.fixture
+def beside():
+    made = ScreenThread(gpu.open_device(), "rgba8unorm", lambda: None)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("mode", ["off", "wipe", "split", "difference"])
+def test_a_view_is_the_same_composed_beside_the_window_and_in_bands(beside, mode, monkeypatch):
+    view = view_of(FIRST, SECOND, compare=mode, zoom=1.5)
+    here = Screen(gpu.open_device(), "rgba8unorm")
+    here.show(view)
+    whole = here.picture()
+    assert whole.std() > 0.1
+    monkeypatch.setattr(composer, "_BAND", 7 * SIZE[0])
+    beside.show(view)
+    np.testing.assert_allclose(beside.picture(), whole, atol=0.75 / 255)
+    there = here.values(40.5, 30.5)
+    assert there is not None
+    np.testing.assert_allclose(beside.values(40.5, 30.5), there, atol=0.75 / 255)
+    assert beside.values(SIZE[0], 3) is None
+
+
+def test_the_window_does_not_wait_for_composing_and_shows_the_last_view(beside, monkeypatch):
+    opened, compose = threading.Event(), Composer.compose
+    first, second = view_of(FIRST, SECOND), view_of(SECOND, FIRST)
+    beside.show(first)
+    was = beside.picture()
+
+    def held(self, view):
+        opened.wait(60)
+        compose(self, view)
+
+    monkeypatch.setattr(Composer, "compose", held)
+    canvas = gpu.open_device().create_texture(
+        size=(*SIZE, 1), format="rgba8unorm", usage=0x10 | 0x4 | 0x1
+    )
+    beside.show(replace(first, state=replace(first.state, exposure=1.0)))
+    beside.show(second)  # the one before is not composed any more
+    beside.paint(canvas)
+    np.testing.assert_array_equal(painted(canvas)[:, 2:88], np.round(255 * was))
+    opened.set()
+    now = beside.picture()
+    assert np.abs(now - was).mean() > 0.1
+    beside.paint(canvas)
+    np.testing.assert_array_equal(painted(canvas)[:, 2:88], np.round(255 * now))
+
+
+def painted(canvas):
+    """(height, width, 3) of what is on a canvas."""
+    device = gpu.open_device()
+    layout = {"bytes_per_row": 4 * SIZE[0], "rows_per_image": SIZE[1]}
+    texels: Any = device.queue.read_texture({"texture": canvas}, layout, (*SIZE, 1))
+    return np.frombuffer(texels, np.uint8).reshape(SIZE[1], SIZE[0], 4)[..., :3]
+
+
+def test_what_goes_wrong_in_composing_is_raised_in_the_window(beside, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("broken")
+
+    monkeypatch.setattr(Composer, "compose", broken)
+    beside.show(view_of(FIRST, SECOND))
+    with pytest.raises(ZeroDivisionError):
+        beside.picture()
+    with pytest.raises(ZeroDivisionError):
+        beside.show(view_of(FIRST, SECOND))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="priorities of threads are Linux's")
+def test_threads_that_compute_yield_to_those_of_the_window():
+    done = subprocess.run([sys.executable, "-c", LOWER], capture_output=True, text=True)
+    if done.returncode == 7:
+        pytest.skip("the adapter is no software")
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,43 @@
+"""Priority of a software driver's threads: what is computed beside a window yields to it."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_TASKS = Path("/proc/self/task")
+_RASTERIZER = "llvmpipe-"  # how Mesa calls the threads that draw triangles, such as a window's
+_LOWER, _LOWEST = 10, 19
+
+
+@contextmanager
+def yielding() -> Iterator[None]:
+    """Lower the priority of the threads that a driver starts meanwhile to compute with.
+
+    A software driver starts them with the first device of the process; those that rasterize, and
+    those of devices that are opened later, keep theirs. On Linux only.
+    """
+    before = _threads()
+    yield
+    of_python = {thread.native_id for thread in threading.enumerate()}
+    for thread, name in _threads().items():
+        if thread in before or thread in of_python or name.startswith(_RASTERIZER):
+            continue
+        with suppress(OSError):  # it has ended
+            lower = min(os.getpriority(os.PRIO_PROCESS, thread) + _LOWER, _LOWEST)
+            os.setpriority(os.PRIO_PROCESS, thread, lower)
+
+
+def _threads() -> dict[int, str]:
+    """Names of the process's threads by their ids."""
+    if sys.platform != "linux":
+        return {}
+    found = {}
+    for folder in _TASKS.iterdir():
+        with suppress(OSError):
+            found[int(folder.name)] = (folder / "comm").read_text().strip()
+    return found
