@@ -112,14 +112,14 @@ def codecs_alone(clip: Path, exact: Path, scratch: Path) -> None:
     """Decode the clip, and encode the pictures of `exact`, which were decoded before."""
     from wgmb.video.read.reader import VideoReader
     from wgmb.video.write.encoders import chosen
+    from wgmb.video.write.format import VideoFormat
     from wgmb.video.write.writer import VideoWriter
 
     reader = VideoReader(exact)
     pictures = [picture for _, picture in reader]
-    writer = VideoWriter(
-        scratch, scratch.with_suffix(".part.mp4"), chosen(scratch), reader.coding, reader.size,
-        reader.rate, 1 / reader.rate,
-    )  # fmt: skip
+    size, rate = reader.size, reader.rate
+    form = VideoFormat(chosen(scratch), reader.coding, size, rate, 1 / rate)
+    writer = VideoWriter(scratch, scratch.with_suffix(".part.mp4"), form)
     before, began = resource.getrusage(resource.RUSAGE_SELF), time.perf_counter()
     every = 0
     with av.open(str(clip)) as container:

@@ -10,6 +10,7 @@ import make_clips as clips
 from wgmb.video.clock import Clock, tick
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.write.encoders import chosen
+from wgmb.video.write.format import VideoFormat
 from wgmb.video.write.other_streams import OtherStreams
 from wgmb.video.write.time_stretch import TimeStretch
 from wgmb.video.write.writer import VideoWriter
@@ -43,8 +44,8 @@ def copied(source, path, clock=None, keeps_pitch=True, others=True) -> list[str]
     coding, _ = encoding.coding(reader.coding)
     beside = OtherStreams(source, reader.index, clock, keeps_pitch) if others else None
     base = tick(reader.times.base / clock.speed, clock.out(reader.times[0]))
-    video = VideoWriter(path, path.with_name("part"), encoding, coding, reader.size,
-                       reader.rate, base, others=beside)  # fmt: skip
+    form = VideoFormat(encoding, coding, reader.size, reader.rate, base)
+    video = VideoWriter(path, path.with_name("part"), form, others=beside)
     for number, picture in reader:
         time = reader.times[number]
         if (clock.first or time) <= time < (clock.end or time + 1):

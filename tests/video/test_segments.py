@@ -19,6 +19,7 @@ from wgmb.video.hdr10 import LightLevel
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.write import segments as segmenting
 from wgmb.video.write.encoders import Facts, chosen
+from wgmb.video.write.format import VideoFormat
 from wgmb.video.write.other_streams import OtherStreams
 from wgmb.video.write.segments import Segments, remove_left
 from wgmb.video.write.writer import VideoWriter
@@ -45,8 +46,8 @@ def segmented(path, codec=None, times=None, made_of=None, bits=8, facts=None):
     coding, _ = encoding.coding(Coding(bits=bits))
     base = tick(*times, 1 / RATE)
     size = clips.WIDTH, clips.HEIGHT
-    parts = Segments(path, encoding, coding, size, RATE, base, times, made_of or {"a": 1},
-                     facts or Facts())  # fmt: skip
+    form = VideoFormat(encoding, coding, size, RATE, base, facts or Facts())
+    parts = Segments(path, form, times, made_of or {"a": 1})
     return parts, coding, times
 
 
@@ -67,9 +68,9 @@ def fill(parts, coding, times, stop=None) -> list[int]:
 def in_one_run(path, codec, times, bits=8, others=None):
     encoding = chosen(path, codec)
     coding, _ = encoding.coding(Coding(bits=bits))
-    video = VideoWriter(path, path.with_name("part"), encoding, coding,
-                       (clips.WIDTH, clips.HEIGHT), RATE, tick(*times, 1 / RATE),
-                       others=others)  # fmt: skip
+    size, base = (clips.WIDTH, clips.HEIGHT), tick(*times, 1 / RATE)
+    form = VideoFormat(encoding, coding, size, RATE, base)
+    video = VideoWriter(path, path.with_name("part"), form, others=others)
     for n, time in enumerate(times):
         video.add(picture(n, coding), time)
     video.close()

@@ -24,6 +24,7 @@ from wgmb.video.output_times import OutputFrames
 from wgmb.video.read.container import READERS
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.write.encoders import chosen
+from wgmb.video.write.format import VideoFormat
 from wgmb.video.write.segments import Segments
 
 
@@ -158,10 +159,9 @@ def test_output_frames_of_short_pauses_are_not_listed(tmp_path):
     assert len(plan.wanted) > 100_000_000
     assert plan.wanted.times[-1] - plan.wanted.times[0] > 117_000
     assert plan.wanted.tick == Fraction(1, 1000)
-    segments = Segments(
-        tmp_path / "o.mp4", chosen(tmp_path / "o.mp4"), Coding(), (32, 32), Fraction(1000),
-        plan.wanted.tick, plan.wanted.times, {},
-    )  # fmt: skip
+    path, tick = tmp_path / "o.mp4", plan.wanted.tick
+    form = VideoFormat(chosen(path), Coding(), (32, 32), Fraction(1000), tick)
+    segments = Segments(path, form, plan.wanted.times, {})
     assert len(segments.to_do()) > 10_000
     segments.release()
     assert tracemalloc.get_traced_memory()[1] < 20 << 20

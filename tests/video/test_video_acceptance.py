@@ -21,6 +21,7 @@ from wgmb.video.clock import tick
 from wgmb.video.hdr10 import LightLevel, Mastering
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.write.encoders import Facts, chosen
+from wgmb.video.write.format import VideoFormat
 from wgmb.video.write.writer import VideoWriter
 
 P3 = ((0.68, 0.32), (0.265, 0.69), (0.15, 0.06), (0.3127, 0.329))
@@ -83,8 +84,9 @@ def still(path, coding, facts, codec, size=(64, 48)):
     encoding = chosen(path, codec)
     stored, _ = encoding.coding(coding)
     times = [Fraction(n, 48) for n in range(6)]
-    video = VideoWriter(path, path.with_name("part"), encoding, stored, size, Fraction(48),
-                       tick(*times, Fraction(1, 48)), facts)  # fmt: skip
+    base = tick(*times, Fraction(1, 48))
+    form = VideoFormat(encoding, stored, size, Fraction(48), base, facts)
+    video = VideoWriter(path, path.with_name("part"), form)
     planes = clips.planes(2, size, stored.steps, stored.bits)
     for time in times:
         video.add(CodedPicture(planes, stored), time)

@@ -17,6 +17,7 @@ from wgmb.video.hdr10 import LightLevel, Mastering
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.write import container, encoders
 from wgmb.video.write.encoders import CODECS, Facts, chosen
+from wgmb.video.write.format import VideoFormat
 from wgmb.video.write.writer import VideoWriter
 
 pytestmark = pytest.mark.fast
@@ -43,8 +44,9 @@ def write(path, coding, codec=None, times=None, made=None, quality=None, facts=N
     coding, _ = encoding.coding(coding)
     made = made or pictures(coding)
     times = times or [n / RATE for n in range(len(made))]
-    video = VideoWriter(path, path.with_name("part"), encoding, coding, made[0].size, RATE,
-                       base or tick(*times), facts or Facts())  # fmt: skip
+    base, facts = base or tick(*times), facts or Facts()
+    form = VideoFormat(encoding, coding, made[0].size, RATE, base, facts)
+    video = VideoWriter(path, path.with_name("part"), form)
     for picture, time in zip(made, times, strict=True):
         assert not path.exists()
         video.add(picture, Fraction(time))
@@ -132,7 +134,8 @@ def test_a_hardware_encoder_opens_or_says_why_not(tmp_path, codec, kind):
         encoding = chosen(path, codec, encoder=kind)
         coding, _ = encoding.coding(Coding())
         part = tmp_path / "part"
-        VideoWriter(path, part, encoding, coding, (256, 256), RATE, 1 / RATE).abandon()
+        form = VideoFormat(encoding, coding, (256, 256), RATE, 1 / RATE)
+        VideoWriter(path, part, form).abandon()
     except InputError as error:
         name = dict(CODECS[codec].hardware)[kind].name
         why = str(error).removeprefix(f"encoder {name} ")
@@ -288,8 +291,8 @@ def test_times_that_do_not_ascend_are_refused(tmp_path):
 
 def test_a_video_without_pictures_is_none(tmp_path):
     encoding = chosen("v.mp4")
-    video = VideoWriter(tmp_path / "v.mp4", tmp_path / "part", encoding, Coding(), (64, 48), RATE,
-                       1 / RATE)  # fmt: skip
+    form = VideoFormat(encoding, Coding(), (64, 48), RATE, 1 / RATE)
+    video = VideoWriter(tmp_path / "v.mp4", tmp_path / "part", form)
     with pytest.raises(InputError, match="no pictures to write"):
         video.close()
     assert list(tmp_path.iterdir()) == []
@@ -304,8 +307,8 @@ def test_a_picture_of_another_kind_is_refused(tmp_path):
 def test_what_cannot_be_written_names_the_file(tmp_path):
     encoding = chosen("v.mp4")
     with pytest.raises(OSError, match=r"v\.mp4: No such file"):
-        VideoWriter(tmp_path / "v.mp4", tmp_path / "none" / "part", encoding, Coding(), (64, 48),
-                   RATE, 1 / RATE)  # fmt: skip
+        form = VideoFormat(encoding, Coding(), (64, 48), RATE, 1 / RATE)
+        VideoWriter(tmp_path / "v.mp4", tmp_path / "none" / "part", form)
 
 
 # ---- the clock ------------------------------------------------------------------------------

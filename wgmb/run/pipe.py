@@ -25,6 +25,7 @@ from ..video.exposures import Exposures
 from ..video.holdouts import NONE
 from ..video.read.stream_reader import StreamReader
 from ..video.write.encoders import FINEST_RATE, SUFFIXES, Encoding, Facts, chosen
+from ..video.write.format import VideoFormat
 from ..video.write.streamed import MatroskaStream
 from ..video.write.writer import VideoWriter
 from ..video.y4m import Y4mReader, Y4mWriter, coding_in
@@ -56,6 +57,11 @@ class _Source:
     exposures: Exposures
     frames: Callable[[Form], Input[Any, Any]]
     reader: Reader | None
+
+    def format(self, encoding: Encoding, base: Fraction) -> tuple[VideoFormat, list[str]]:
+        """The form in which the output is written; and what is lost, in words."""
+        coding, lost = encoding.coding(self.coding)
+        return VideoFormat(encoding, coding, self.size, self.rate, base, self.facts), lost
 
 
 class _Writer(PictureWriter, Protocol):
@@ -250,11 +256,9 @@ class _ToY4m:
 
 class _ToMatroska:
     def __init__(self, stream: BinaryIO, source: _Source, encoding: Encoding):
-        self.coding, lost = encoding.coding(source.coding)
-        self.left_out = [*lost, *encoding.left_out(source.facts)]
-        self._writer = MatroskaStream(
-            PipeWriter(stream), source.size, source.rate, self.coding, encoding, source.facts
-        )
+        form, lost = source.format(encoding, 1 / source.rate)
+        self.coding, self.left_out = form.coding, [*lost, *form.left_out]
+        self._writer = MatroskaStream(PipeWriter(stream), form)
         self.close, self.abandon = self._writer.close, self._writer.abandon
 
     def add(self, picture: CodedPicture, time: Fraction) -> None:
@@ -263,12 +267,10 @@ class _ToMatroska:
 
 class _ToFile:
     def __init__(self, path: Path, source: _Source, encoding: Encoding):
-        self.coding, lost = encoding.coding(source.coding)
+        form, lost = source.format(encoding, tick(1 / source.rate))
         is_new = not path.exists()
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._video = VideoWriter(
-            path, atomic.temporary_name(path), encoding, self.coding, source.size, source.rate,
-            tick(1 / source.rate), source.facts, is_new=is_new,
-        )  # fmt: skip
-        self.left_out = [*lost, *self._video.left_out]
+        temporary = atomic.temporary_name(path)
+        self._video = VideoWriter(path, temporary, form, is_new=is_new)
+        self.coding, self.left_out = form.coding, [*lost, *self._video.left_out]
         self.add, self.close, self.abandon = self._video.add, self._video.close, self._video.abandon

@@ -21,6 +21,7 @@ from ..video.clock import Clock
 from ..video.output_times import OutputFrame, OutputFrames
 from ..video.read.reader import VideoReader
 from ..video.write.encoders import SUFFIXES, chosen
+from ..video.write.format import VideoFormat
 from ..video.write.other_streams import OtherStreams
 from ..video.write.segments import Segments, remove_left
 from ..video.write.writer import VideoWriter
@@ -90,7 +91,6 @@ def _write_video(
     path, reader = Path(output.output), source.reader
     encoding = chosen(path, video.codec, video.quality, video.encoder)
     coding, lost = encoding.coding(reader.coding)
-    facts = reader.facts
     made_of = settings | {"times": wanted.key}
     texts = _texts(reader, made_of)
     there = [path] if os.path.exists(os.path.realpath(path)) else []
@@ -108,25 +108,24 @@ def _write_video(
         raise InputError(f"{path} exists{more}; `overwrite=True` replaces it")
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic.sweep(path.parent, [path.name])
-    shape = encoding, coding, reader.size, 1 / wanted[0].interval, wanted.tick
+    rate, tick = 1 / wanted[0].interval, wanted.tick
+    form = VideoFormat(encoding, coding, reader.size, rate, tick, reader.facts)
     others = None
     if video.streams == "all":
         keeps_pitch = video.pitch == "keep"
         others = OtherStreams(reader.path, reader.index, source.clock, keeps_pitch)
-    form = coded_form(coding)
+    coded = coded_form(coding)
     if output.resume and encoding.codec != "gif":  # which has one palette after another
-        segments = Segments(path, *shape, wanted.times, made_of, facts)
+        segments = Segments(path, form, wanted.times, made_of)
         try:
             for numbers in segments.to_do():
-                part = source.frames(wanted[numbers.start : numbers.stop], form)
+                part = source.frames(wanted[numbers.start : numbers.stop], coded)
                 run(part, VideoSink(segments.begin(numbers)), progress=progress)
             return [*lost, *segments.join(texts, others)]
         finally:
             segments.release()
-    writer = VideoWriter(
-        path, atomic.temporary_name(path), *shape, facts, texts, others, is_new=not there
-    )
-    run(source.frames(wanted, form), VideoSink(writer), progress=progress)
+    writer = VideoWriter(path, atomic.temporary_name(path), form, texts, others, is_new=not there)
+    run(source.frames(wanted, coded), VideoSink(writer), progress=progress)
     remove_left(path)
     return [*lost, *writer.left_out]
 

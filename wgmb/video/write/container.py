@@ -7,7 +7,6 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterable
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
@@ -21,13 +20,8 @@ from av.video.stream import VideoStream
 from ...color.coding import Coding
 from ...errors import InputError
 from ...io import atomic, record
-from .encoders import (
-    CONTAINERS,
-    HARDWARE,
-    NO_FACTS,
-    Encoding,
-    Facts,
-)
+from .encoders import CONTAINERS, HARDWARE, Encoding
+from .format import VideoFormat
 from .scheduling import kept_scheduling
 
 _RANGES = {False: 1, True: 2}  # limited, full, as FFmpeg counts them
@@ -118,30 +112,25 @@ class NewFile:
 class VideoFile(NewFile):
     """A video with one stream of pictures, encoded here, and others beside it.
 
-    Frames are given with exact times, in ticks of `base`. InputError for an encoder that does not
-    start.
+    Frames are given with exact times, in ticks of the format's `base`. InputError for an encoder
+    that does not start.
     """
 
     def __init__(
         self,
         path: Path,
         temporary: Path,
-        encoding: Encoding,
-        coding: Coding,
-        size: tuple[int, int],
-        rate: Fraction,
-        base: Fraction,
-        facts: Facts = NO_FACTS,
+        format: VideoFormat,
         metadata: dict[str, str] | None = None,
     ):
-        super().__init__(path, temporary, encoding.suffix, metadata or {})
-        self._base, self._rate, self._packets = base, rate, 0
-        self._late_times = encoding.encoder.name == "libx265"
+        super().__init__(path, temporary, format.encoding.suffix, metadata or {})
+        self._base, self._rate, self._packets = format.base, format.rate, 0
+        self._late_times = format.encoding.encoder.name == "libx265"
         try:
-            self._stream = begin(self.container, encoding, coding, size, rate, base, facts)
+            self._stream = begin(self.container, format)
         except (FFmpegError, OSError) as error:
             self.abandon()
-            raise _why(path, encoding, error) from None
+            raise _why(path, format.encoding, error) from None
 
     def encode(self, frame: av.VideoFrame | None, tick: int = 0) -> None:
         """Write what can be written once `frame`, of the encoder's format, is there."""
@@ -168,27 +157,20 @@ class VideoFile(NewFile):
         self.encode(None)
 
 
-def begin(
-    container: OutputContainer,
-    encoding: Encoding,
-    coding: Coding,
-    size: tuple[int, int],
-    rate: Fraction,
-    base: Fraction,
-    facts: Facts = NO_FACTS,
-) -> VideoStream:
+def begin(container: OutputContainer, format: VideoFormat) -> VideoStream:
     """Add a stream of pictures to a container, and start its encoder."""
+    encoding, aspect = format.encoding, format.facts.pixel_aspect
     if encoding.codec == "av1":
         os.environ.setdefault("SVT_LOG", "1")  # it writes pages to the terminal otherwise
-    options, name = encoding.options(coding, facts), encoding.encoder.name
+    name, rate, options = encoding.encoder.name, format.rate, format.options
     stream = cast(VideoStream, container.add_stream(name, rate=rate, options=options))
-    stream.width, stream.height = size
+    stream.width, stream.height = format.padded
     context = stream.codec_context
-    context.pix_fmt, context.time_base = encoding.pixels(coding), base
-    if facts.pixel_aspect != 1:
-        context.sample_aspect_ratio = facts.pixel_aspect
+    context.pix_fmt, context.time_base = format.pixels, format.base
+    if aspect != 1:
+        context.sample_aspect_ratio = aspect
     if encoding.codec != "gif":
-        tag(context, coding)
+        tag(context, format.coding)
     name_codec(stream, encoding)
     with kept_scheduling():
         context.open()

@@ -20,6 +20,7 @@ from ...errors import InputError
 from ...io import atomic
 from .encoders import FINEST_RATE, Encoding, chosen
 from .encoders import SUFFIXES as SUFFIXES
+from .format import VideoFormat
 from .gif import check_rate
 from .writer import VideoWriter
 
@@ -77,11 +78,11 @@ class FrameVideo:
         if self._encoding.encoder.even:
             height, width = rgb.shape[:2]
             rgb = np.pad(rgb, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-        self._video = self._video or VideoWriter(
-            self.path, self.temporary, self._encoding, self._coding,
-            (rgb.shape[1], rgb.shape[0]), self.fps, 1 / self.fps,
-            metadata={"comment": f"wgmb {self.settings}"},
-        )  # fmt: skip
+        if self._video is None:
+            size = rgb.shape[1], rgb.shape[0]
+            form = VideoFormat(self._encoding, self._coding, size, self.fps, 1 / self.fps)
+            texts = {"comment": f"wgmb {self.settings}"}
+            self._video = VideoWriter(self.path, self.temporary, form, texts)
         self._video.add_rgb(rgb, self._frames / self.fps)
         self._frames += 1
 

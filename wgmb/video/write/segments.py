@@ -26,12 +26,12 @@ import numpy as np
 from av.packet import Packet
 from av.video.stream import VideoStream
 
-from ...color.coding import CodedPicture, Coding
+from ...color.coding import CodedPicture
 from ...errors import InputError
 from ...io import atomic, record
 from ..read.container import opened, picture_stream
 from .container import NewFile, name_codec
-from .encoders import NO_FACTS, Encoding, Facts
+from .format import VideoFormat
 from .other_streams import OtherStreams
 from .writer import VideoWriter
 
@@ -46,39 +46,33 @@ class Segments:
 
     `made_of`: what pictures depend on (settings, inputs); segments that were made of anything else
     are made again. Use: for every range of numbers in `to_do`, `begin` it, add its pictures, close
-    it; then `join`; `release` in any case. The other parameters are VideoWriter's. InputError for
-    a GIF, which has no segments.
+    it; then `join`; `release` in any case. InputError for a GIF, which has no segments.
     """
 
     def __init__(
         self,
         path: Path,
-        encoding: Encoding,
-        coding: Coding,
-        size: tuple[int, int],
-        rate: Fraction,
-        base: Fraction,
+        format: VideoFormat,
         times: Sequence[Fraction],
         made_of: dict[str, Any],
-        facts: Facts = NO_FACTS,
     ):
+        encoding = format.encoding
         if encoding.codec == "gif":
             raise InputError(f"output {path}: a GIF cannot be resumed")
         self.path, self.folder = path, folder_of(path)
         self._claim: tuple[Path, int] | None = None
-        self._encoding, self._coding, self._size = encoding, coding, size
-        self._rate, self._base, self._times, self._facts = rate, base, times, facts
-        per = max(round(SECONDS * rate), 1)
+        self._format, self._times = format, times
+        per = max(round(SECONDS * format.rate), 1)
         self._ranges = [
             range(n, min(n + per, len(times))) for n in range(0, len(times), per)
         ]  # fmt: skip
         self._made_of = made_of | {
-            "encoding": [encoding.suffix, encoding.encoder.name, encoding.options(coding, facts)],
-            "coding": list(asdict(coding).values()),
-            "size": list(size),
-            "rate": str(rate),
-            "base": str(base),
-            "pixel_aspect": str(facts.pixel_aspect),
+            "encoding": [encoding.suffix, encoding.encoder.name, format.options],
+            "coding": list(asdict(format.coding).values()),
+            "size": list(format.size),
+            "rate": str(format.rate),
+            "base": str(format.base),
+            "pixel_aspect": str(format.facts.pixel_aspect),
             "encoders": {name: list(v) for name, v in av.library_versions.items()},
         }
 
@@ -93,10 +87,7 @@ class Segments:
         index = self._ranges.index(numbers)
         path = self._file(index)
         path.with_suffix(".json").unlink(missing_ok=True)  # of what it is going to replace
-        return Segment(self, index, VideoWriter(
-            path, atomic.temporary_name(path), self._encoding, self._coding, self._size,
-            self._rate, self._base, self._facts,
-        ))  # fmt: skip
+        return Segment(self, index, VideoWriter(path, atomic.temporary_name(path), self._format))
 
     def join(
         self, metadata: dict[str, str] | None = None, others: OtherStreams | None = None
@@ -107,7 +98,7 @@ class Segments:
         """
         texts = (metadata or {}) | (others.metadata if others else {})
         temporary = atomic.temporary_name(self.path)
-        file = NewFile(self.path, temporary, self._encoding.suffix, texts)
+        file = NewFile(self.path, temporary, self._format.encoding.suffix, texts)
         try:
             left_out = self._written(file, others)
             file.close()
@@ -121,7 +112,7 @@ class Segments:
         return left_out
 
     def _written(self, file: NewFile, others: OtherStreams | None) -> list[str]:
-        left_out = self._encoding.left_out(self._facts)
+        left_out = self._format.left_out
         orders = [self._display_order(self._file(n), r) for n, r in enumerate(self._ranges)]
         delay = max(min(o) + at - number for o in orders for at, number in enumerate(o))
         into: VideoStream | None = None
@@ -131,8 +122,8 @@ class Segments:
                 stream = picture_stream(container, path)
                 if into is None:
                     into = file.container.add_stream_from_template(stream, opaque=True)
-                    into.time_base = self._base
-                    name_codec(into, self._encoding)
+                    into.time_base = self._format.base
+                    name_codec(into, self._format.encoding)
                     if others is not None:
                         left_out += others.attach(file.container)
                 for packet, number in self._timed(container.demux(stream), order, delay):
@@ -149,7 +140,7 @@ class Segments:
     ) -> Iterator[tuple[Packet[VideoStream], int]]:
         """The packets of a segment with the video's times, and the numbers of their pictures."""
         for at, (packet, number) in enumerate(zip(packets, order, strict=False)):
-            packet.time_base = self._base
+            packet.time_base = self._format.base
             packet.pts, packet.dts = self._tick(number), self._tick(min(order) + at - delay)
             packet.duration = self._tick(number + 1) - packet.pts
             yield packet, number
@@ -161,7 +152,7 @@ class Segments:
         """
         with opened(path) as container:
             stream = picture_stream(container, path)
-            base = stream.time_base or self._base
+            base = stream.time_base or self._format.base
             shown = [p.pts for p in container.demux(stream) if p.size and p.pts is not None]
         exact = np.array([float(self._times[n] - self._times[numbers[0]]) for n in numbers])
         times = (np.array(shown) - shown[:1]) * float(base)
@@ -177,7 +168,9 @@ class Segments:
         """Time of a picture in ticks; numbers before the first and after the last continue the
         rate."""
         inside = min(max(number, 0), len(self._times) - 1)
-        return round((self._times[inside] + (number - inside) / self._rate) / self._base)
+        return round(
+            (self._times[inside] + (number - inside) / self._format.rate) / self._format.base
+        )
 
     def _claimed(self) -> None:
         """Make the folder, without what dead runs left half done, and tell others it is in use."""
@@ -211,7 +204,7 @@ class Segments:
         remove_left(self.path)
 
     def _file(self, index: int) -> Path:
-        return self.folder / f"{index:05d}{self._encoding.suffix}"
+        return self.folder / f"{index:05d}{self._format.encoding.suffix}"
 
     def finished(self, index: int) -> None:
         """Write the record of a segment that is in place."""

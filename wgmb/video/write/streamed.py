@@ -5,44 +5,35 @@
 from __future__ import annotations
 
 import contextlib
-from fractions import Fraction
 
 import av
 from av.error import FFmpegError
 from av.video.reformatter import VideoReformatter
 
-from ...color.coding import CodedPicture, Coding
+from ...color.coding import CodedPicture
 from ...io.pipes import PipeWriter
 from ..pixels import THREADS, frame_of, pixel_format
 from .container import begin, tag
-from .encoders import Encoding, Facts
+from .format import VideoFormat
 
 
 class MatroskaStream:
-    """Writes pictures of one size into a stream. `coding` is what `encoding.coding` returned."""
+    """Writes pictures of one size into a stream, one tick of the format's clock for each."""
 
-    def __init__(
-        self,
-        stream: PipeWriter,
-        size: tuple[int, int],
-        rate: Fraction,
-        coding: Coding,
-        encoding: Encoding,
-        facts: Facts,
-    ):
-        self._out, self._coding = stream, coding
-        self._planar, self._pixels = pixel_format(coding), encoding.pixels(coding)
-        self._by, self._base, self._count = VideoReformatter(), 1 / rate, 0
+    def __init__(self, stream: PipeWriter, format: VideoFormat):
+        self._out, self._format = stream, format
+        self._planar, self._pixels = pixel_format(format.coding), format.pixels
+        self._by, self._count = VideoReformatter(), 0
         self._container = av.open(stream, "w", format="matroska")
-        self._stream = begin(self._container, encoding, coding, size, rate, self._base, facts)
+        self._stream = begin(self._container, format)
 
     def add(self, picture: CodedPicture) -> None:
         """Append a picture."""
         frame = frame_of(picture.planes, self._planar)
-        tag(frame, self._coding)
+        tag(frame, self._format.coding)
         if self._pixels != self._planar:
             frame = self._by.reformat(frame, format=self._pixels, threads=THREADS)
-        frame.pts, frame.time_base = self._count, self._base
+        frame.pts, frame.time_base = self._count, self._format.base
         self._container.mux(self._stream.encode(frame))
         self._count += 1
         self._out.pictures = self._count

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,12 +13,12 @@ import numpy as np
 from av.error import FFmpegError
 from av.video.reformatter import Colorspace, VideoReformatter
 
-from ...color.coding import CodedPicture, Coding
+from ...color.coding import CodedPicture
 from ...errors import InputError
 from ...io import atomic
 from ..pixels import THREADS, frame_of, pixel_format
 from .container import VideoFile, tag
-from .encoders import NO_FACTS, Encoding, Facts
+from .format import VideoFormat
 from .gif import TICK, Palettes, check_rate
 from .other_streams import OtherStreams
 
@@ -28,10 +29,8 @@ _WHOLE = 0, 3  # planes of luma and alpha: of all sizes, even where chroma has o
 class VideoWriter:
     """A video of CodedPictures; complete under its name after `close`, or absent.
 
-    `coding` is what `encoding.coding` returned. `rate`: pictures a second, usually; `base`: the
-    tick of the file's clock [s], of which all times should be multiples (see clock.tick).
     Encoders that share colour between pixels may need even sizes: the last row or column is then
-    repeated, which `padding` says. A GIF counts hundredths of a second, and has 256 colours a
+    repeated (VideoFormat.padding). A GIF counts hundredths of a second, and has 256 colours a
     picture. OSError if the file cannot be written, InputError for an encoder
     that does not start. `others`: streams to put beside the pictures, with their texts and
     dates; what of them the file cannot hold is in `left_out`. `is_new`: OSError, when it is
@@ -42,33 +41,23 @@ class VideoWriter:
         self,
         path: Path,
         temporary: Path,
-        encoding: Encoding,
-        coding: Coding,
-        size: tuple[int, int],
-        rate: Fraction,
-        base: Fraction,
-        facts: Facts = NO_FACTS,
+        format: VideoFormat,
         metadata: dict[str, str] | None = None,
         others: OtherStreams | None = None,
         *,
         is_new: bool = False,
     ):
-        is_gif = encoding.codec == "gif"
-        if is_gif:
-            check_rate(path, rate)
-            base = TICK
-        self.path, self._coding, self._base = path, coding, base
-        self._others = others
-        self._size = size
+        if is_gif := format.encoding.codec == "gif":
+            check_rate(path, format.rate)
+            format = replace(format, base=TICK)
+        self.path, self._format, self._others = path, format, others
         self._last: int | None = None  # tick of the picture before
-        self.padding = padded(size, encoding, coding)
-        whole = size[0] + self.padding[0], size[1] + self.padding[1]
-        self._planar, self._pixels = pixel_format(coding), encoding.pixels(coding)
+        self._planar, self._pixels = pixel_format(format.coding), format.pixels
         self._by = VideoReformatter()
-        self._palettes = Palettes(*whole) if is_gif else None
+        self._palettes = Palettes(*format.padded) if is_gif else None
         texts = (metadata or {}) | (others.metadata if others else {})
-        self.left_out = encoding.left_out(facts)
-        self.file = VideoFile(path, temporary, encoding, coding, whole, rate, base, facts, texts)
+        self.left_out = format.left_out
+        self.file = VideoFile(path, temporary, format, texts)
         self.file.is_new = is_new
         try:
             if others is not None:
@@ -79,17 +68,18 @@ class VideoWriter:
 
     def add(self, picture: CodedPicture, time: Fraction) -> None:
         """Append a picture that is shown at `time` [s], later than the one before."""
-        if picture.coding != self._coding or picture.size != self._size:
+        coding, size = self._format.coding, self._format.size
+        if picture.coding != coding or picture.size != size:
             raise InputError(
                 f"{self.path}: picture of {picture.size} as {picture.coding} in a video of "
-                f"{self._size} as {self._coding}"
+                f"{size} as {coding}"
             )
-        now = round(time / self._base)
+        now = round(time / self._format.base)
         if self._last is not None and now <= self._last:
             raise InputError(f"{self.path}: pictures at times that do not ascend ({float(time)} s)")
         frame = frame_of(self._filled(picture.planes), self._planar)
         if self._palettes is None:
-            tag(frame, self._coding)
+            tag(frame, coding)
         kind = self._pixels if self._palettes is None else _RGB
         if kind != self._planar:
             frame = self._by.reformat(frame, format=kind, threads=THREADS)
@@ -107,8 +97,8 @@ class VideoWriter:
                 )
             except FFmpegError as error:
                 raise atomic.about(self.path, error) from None
-            tag(frame, self._coding)
-        self._put(frame, round(time / self._base))
+            tag(frame, self._format.coding)
+        self._put(frame, round(time / self._format.base))
 
     def _put(self, frame: av.VideoFrame, tick: int) -> None:
         """Encode a picture in the encoder's format, or, of a GIF, in RGB."""
@@ -124,7 +114,7 @@ class VideoWriter:
             self.file.encode(painted, at)
 
     def _filled(self, planes: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-        across, down = self.padding
+        across, down = self._format.padding
         if not (across or down):
             return planes
         return tuple(  # chroma was rounded up already
@@ -150,11 +140,3 @@ class VideoWriter:
         self.file.abandon()
         if self._others is not None:
             self._others.close()
-
-
-def padded(size: tuple[int, int], encoding: Encoding, coding: Coding) -> tuple[int, int]:
-    """Columns and rows that the encoder needs beyond `size`."""
-    if not encoding.encoder.even:
-        return 0, 0
-    across, down = (-length % step for length, step in zip(size, coding.steps, strict=True))
-    return across, down
