@@ -2,6 +2,7 @@
 
 import os
 import time
+from dataclasses import replace
 from fractions import Fraction
 from itertools import count
 
@@ -35,6 +36,9 @@ from wgmb.video.output_times import OutputFrames
 from wgmb.video.planes import Planes
 from wgmb.video.read.reader import VideoReader
 from wgmb.viewer import State, controls, offscreen
+from wgmb.viewer.draw.portions import DroppedError, Portions
+from wgmb.viewer.draw.renderer import Renderer
+from wgmb.viewer.draw.request import Request
 from wgmb.viewer.state.state import video_time
 from wgmb.viewer.subjects.video import VideoSubject
 from wgmb.viewer.subjects.video_motion import MotionRequest, PictureFinder, PictureFinding
@@ -227,6 +231,35 @@ def test_a_finding_that_comes_meanwhile_leaves_nothing_out(clip, monkeypatch):
         )
         assert subject.stamp([viewer.state], shutter, False) == whole or subject.busy
     viewer.stage.choices.close()
+
+
+@pytest.mark.parametrize("flow", ["dis", "none"])
+def test_an_exposure_is_dropped_before_its_next_picture_and_leaves_nothing_behind(clip, flow):
+    viewer = opened(clip, flow=flow, fps=12.0, shutter=360.0, frame=1.0)
+    state = viewer.state
+    viewer.stage.choices.close()
+    left = [10**9]
+
+    def wanted():
+        left[0] -= 1
+        return left[0] > 0
+
+    renderer = Renderer(gpu.open_device(), Portions(gpu.open_device(), wanted))
+    request = Request(state, (0, 0, *WINDOW), full=True)
+    renderer.draw(request, 0.0)
+    whole, checks = renderer.download(), 10**9 - left[0]
+    assert checks >= 4
+    other = replace(request, state=put(state, shutter=180.0))
+    renderer.draw(other, 0.0)
+    for after in range(1, checks):
+        left[0] = after
+        with pytest.raises(DroppedError):
+            renderer.draw(request, 0.0)
+        assert left[0] == 0
+    left[0] = 10**9
+    renderer.draw(request, 0.0)
+    np.testing.assert_array_equal(renderer.download(), whole)
+    renderer.choices.close()
 
 
 TIMES = [Fraction(n, 48) for n in (0, 1, 2, 4, 5, 7, 8, 9, 12, 13, 14, 16, 17, 18)]

@@ -26,6 +26,9 @@ class _Clock:
     def __init__(self, device: wgpu.GPUDevice):
         self.device, self.labels, self.counts = device, [], {}
 
+    def check(self) -> None:
+        """Raise an exception if nobody wants the work any more; a clock alone never does."""
+
     def _seconds(self) -> list[float]:
         raise NotImplementedError
 

@@ -272,12 +272,12 @@ class Blur:
             picture = self._images.download(encoder, output)
         return picture[..., : frame.color.shape[2]].astype("f4", copy=False)
 
-    def draw(self, frame: Frame, output: View) -> None:
-        """Submit the blur of a frame into `output`, a texture as for `encode`, without waiting."""
+    def draw(self, frame: Frame, output: View, timing: Clock | None = None) -> None:
+        """Submit the blur of a frame into `output`, without waiting; all as for `encode`."""
         self._require(frame.has)
         with self._working(frame.size):
             encoder = self.device.create_command_encoder(label="wgmb")
-            self.encode(encoder, output=output, **self._views(frame))
+            self.encode(encoder, output=output, timing=timing, **self._views(frame))
             gpu.submit(self.device, encoder)
 
     def with_confidence(

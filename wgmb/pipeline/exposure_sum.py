@@ -13,6 +13,7 @@ from .. import gpu
 from ..exposure import Cell
 from ..frame import Frame
 from ..gpu.textures import TexturePool
+from ..gpu.timing import Clock
 from ..gpu_frame.residency import padded
 from ..gpu_frame.views import FrameInShot, FrameViews
 from ..gpu_frame.weighted_sum import WeightedSum
@@ -45,17 +46,24 @@ class ExposureSum:
         return output
 
     def draw(
-        self, parts: Iterable[tuple[Cell, FrameInShot | Frame]], output: wgpu.GPUTexture
+        self,
+        parts: Iterable[tuple[Cell, FrameInShot | Frame]],
+        output: wgpu.GPUTexture,
+        timing: Clock | None = None,
     ) -> None:
         """Submit the exposure into `output`, rgba32float of the pictures' size.
 
-        The Blur keeps the shutter of the last cell.
+        `timing` takes the time of the blur's passes, and may end the work before a cell. The Blur
+        keeps the shutter of the last cell.
         """
         waiting: list[tuple[float, wgpu.GPUTexture]] = []
         begun = False
         with gpu.reported((output.size[0], output.size[1])):
             for cell, frame in parts:
-                waiting.append((cell.share, self._picture(f"part {len(waiting)}", cell, frame)))
+                if timing is not None:
+                    timing.check()
+                name = f"part {len(waiting)}"
+                waiting.append((cell.share, self._picture(name, cell, frame, timing)))
                 if len(waiting) == _AT_ONCE:
                     self._add(waiting, output, begun)
                     begun, waiting = True, []
@@ -70,14 +78,16 @@ class ExposureSum:
         self._sum.encode(encoder, [texture for _, texture in waiting], shares, output, onto=onto)
         gpu.submit(self.blur.device, encoder)
 
-    def _picture(self, name: str, cell: Cell, frame: FrameInShot | Frame) -> wgpu.GPUTexture:
+    def _picture(
+        self, name: str, cell: Cell, frame: FrameInShot | Frame, timing: Clock | None
+    ) -> wgpu.GPUTexture:
         sharp = frame.frame if isinstance(frame, FrameInShot) else frame
         if "motion" not in sharp.has or cell.shutter.degrees <= 0:
             return self._sharp(name, sharp)
         self.blur.shutter = cell.shutter
         texture = self._images.texture(name, sharp.size, self.blur.output)
         if isinstance(frame, Frame):
-            self.blur.draw(frame, texture.create_view())
+            self.blur.draw(frame, texture.create_view(), timing)
             return texture
         encoder = self.blur.device.create_command_encoder(label="cell")
         self.blur.encode(
@@ -87,6 +97,7 @@ class ExposureSum:
             prev=frame.prev,
             next=frame.next,
             number=frame.number,
+            timing=timing,
         )
         gpu.submit(self.blur.device, encoder)
         return texture

@@ -21,7 +21,7 @@ _COMPOSED: list[dict] = [{"buffer": {"type": "uniform"}}] + 2 * [
     {"texture": {"sample_type": "unfilterable-float"}}
 ]
 _MOST_TAPS = 4  # texels a side that are averaged for one pixel
-_BAND = 1 << 18  # pixels that are drawn at once where the window's own drawing must get in between
+_BAND = 1 << 17  # pixels that are drawn at once where the window's own drawing must get in between
 
 
 @dataclass(frozen=True)

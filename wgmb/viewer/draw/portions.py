@@ -1,4 +1,4 @@
-"""Work in portions: every pass is submitted alone, and between two the work may be dropped.
+"""Work in portions: every pass is submitted alone, and the work may be dropped after each.
 
 The passes are the same, in the same order, so that the picture has the same bits.
 """
@@ -17,7 +17,7 @@ class DroppedError(Exception):
 
 
 class Portions(WallClock):
-    """A clock of passes that raises DroppedError after one once `wanted` returns False."""
+    """A clock of passes that raises DroppedError once `wanted` returns False."""
 
     def __init__(self, device: wgpu.GPUDevice, wanted: Callable[[], bool]):
         super().__init__(device)
@@ -27,6 +27,10 @@ class Portions(WallClock):
         """Submit the one pass in `encoder`, and time it."""
         self._took.append(self._run(encoder))
         self.labels.append(label)
+        self.check()
+
+    def check(self) -> None:
+        """DroppedError if nobody wants the work any more."""
         if not self._wanted():
             self.read()
             raise DroppedError

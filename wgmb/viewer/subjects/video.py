@@ -217,8 +217,8 @@ class VideoSubject:
         neighbours = "neighbours" in blur.method.uses
         found = self._exposure(self._state, shutter).cells
         try:
-            parts = [(cell, self._frames(cell.index, neighbours)) for cell in found]
-            self._sum(blur).draw(parts, light)
+            parts = ((cell, self._frames(cell.index, neighbours)) for cell in found)
+            self._sum(blur).draw(parts, light, timing)
         finally:
             blur.shutter = shutter
         if light is not target:
