@@ -220,7 +220,7 @@ def test_a_result_depends_on_the_files_of_five_frames(shot, tmp_path, capsys):
     names = [name for name, *_ in clip.made_of(3, 2)["files"]]
     assert sorted(names) == [f"b.{n:04d}.exr" for n in range(1, 6)]
     for n in range(1, 7):
-        source = clip.files(n)[0]
+        source = clip.dependencies.of(n)[0]
         (tmp_path / source.name).write_bytes(source.read_bytes())
     command = "blur", tmp_path / "b.####.exr", "-o", tmp_path / "o.####.exr", "--reach", 2
     make.inside(capsys, *command)

@@ -251,7 +251,7 @@ def test_a_file_of_cuts_is_an_input(tmp_path):
     pattern = make.write_sequence(tmp_path, range(1, 11))
     text = shots(tmp_path / "cut.edl")
     found = Clip(pattern, cuts=f"only:{text}@24")
-    assert tmp_path / "cut.edl" in found.files(3)
+    assert tmp_path / "cut.edl" in found.dependencies.of(3)
     before = found.made_of(3, reach=0)
     edl(tmp_path / "cut.edl", [event(1, 0, 5), event(2, 5, 6)])
     assert Clip(pattern, cuts=f"only:{text}@24").made_of(3, reach=0) != before
