@@ -32,13 +32,14 @@ from soaking import (
     stopping,
     strangers,
     videos,
+    viewing,
 )
 from soaking.processes import wgmb
 from soaking.table import HEAD, ROWS, Row, run_rows, write_whole
 
 MODULES = (
-    memory, stopping, damage, hostile, resuming, numbers, devices, disks, names, videos, footage,
-    strangers,
+    memory, viewing, stopping, damage, hostile, resuming, numbers, devices, disks, names, videos,
+    footage, strangers,
 )  # fmt: skip
 LISTED = [
     row for module in MODULES for row in ROWS.values() if row.run.__module__ == module.__name__

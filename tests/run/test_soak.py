@@ -25,6 +25,7 @@ from soaking import (
     stopping,
     strangers,
     table,
+    viewing,
 )
 from soaking.forked import forked
 from soaking.processes import Ended, apart, growth, limits, run, use, wgmb
@@ -54,6 +55,13 @@ def test_damaged_files_are_read_or_refused_by_name_and_nothing_else(tmp_path):
 @pytest.mark.full
 def test_strange_words_in_any_text_are_read_or_refused_by_name(tmp_path):
     check(damage.exchanges, 40, tmp_path)
+
+
+@pytest.mark.full
+def test_the_viewer_bears_whatever_is_done_to_it(tmp_path):
+    ended = apart(viewing.used, 20, SEED, str(tmp_path), seconds=300)
+    assert ended.value is not None, ended.wrong(0)
+    assert ended.value[1] >= 10
 
 
 @pytest.mark.full

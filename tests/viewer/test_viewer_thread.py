@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+import make_clips as clips
 from viewer_hand import ALONE, SMALL, put
 from wgmb import InputError, gpu
 from wgmb.viewer import offscreen
@@ -151,6 +152,31 @@ def test_a_state_that_cannot_be_drawn_at_first_ends_the_viewer():
     with pytest.raises(InputError, match="posts"):
         seen_until(viewer, lambda: False)
     viewer.close()
+
+
+def test_a_video_is_opened_while_a_scene_is_still_on_the_screen(tmp_path, monkeypatch):
+    video = clips.write(tmp_path / "a.mp4")
+    viewer = offscreen(put(STATE, panel=True), (640, 360), threaded=True)
+    try:
+        seen_until(viewer, lambda: is_final(viewer))
+        gate = Gate(monkeypatch)
+        viewer.dropped([str(video)])
+        for _ in range(2):  # the panel is about the video, the picture is still that of the scene
+            frame(viewer)
+        assert viewer.state.source == str(video) != viewer._drawn.state.source
+        gate.opened.set()
+        seen_until(viewer, lambda: viewer._drawn.state.source == str(video))
+    finally:
+        viewer.close()
+
+
+def test_what_goes_wrong_in_the_panel_is_what_ends_the_viewer(viewer, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("broken")
+
+    monkeypatch.setattr("wgmb.viewer.panel.overlay.tell", broken)
+    with pytest.raises(ZeroDivisionError, match="broken"):
+        seen_until(viewer, lambda: False)
 
 
 def test_a_recording_has_every_frame_in_full(viewer, tmp_path, monkeypatch):

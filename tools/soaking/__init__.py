@@ -7,7 +7,7 @@ kinds      a sound file of every kind, and what reads it; spoiled: bytes that ar
 shots      frames on disk, and what an unbroken run makes of them
 parts      all that may draw a frame: every method and variant, scenes, the viewer
 
-memory, damage, hostile, stopping, resuming, numbers, devices, disks, names, videos,
+memory, viewing, damage, hostile, stopping, resuming, numbers, devices, disks, names, videos,
 footage, strangers: the rows
 """
 

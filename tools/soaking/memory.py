@@ -110,30 +110,3 @@ def _watched(arguments: list[str], out) -> tuple[list[list[float]], int]:
             held.append([written, *vars(now).values()])
         time.sleep(0.25)
     return held or [[0, 0.0, 0, 0]], process.wait()
-
-
-def played(name: str, seconds: float) -> list[float]:
-    """In a process of its own: seconds, frames and MiB that playing for so long took."""
-    step, number = parts.make(name), 0
-    while number < 40:
-        step(number)
-        number += 1
-    started, before = time.perf_counter(), use().memory
-    while time.perf_counter() - started < seconds:
-        step(number)
-        number += 1
-    took = time.perf_counter() - started
-    return [took, number - 40, (use().memory - before) / 1024]
-
-
-@row(full=600)
-def viewer(trial: Trial) -> Iterator[Line]:
-    """The viewer playing a scene, for ten minutes."""
-    for name in ("viewer tap", "viewer gather"):
-        ended = apart(played, name, trial.count / 2, seconds=120 + trial.count)
-        if ended.value is None:
-            raise RuntimeError(ended.wrong(0))
-        took, count, mib = ended.value
-        ok = 60 * mib / took <= 8
-        yield Line(f"{name}, playing `crossing`", f"{took:.0f} s, {count:.0f} frames",
-                   "yes" if ok else "no", f"{60 * mib / took:+.1f} MiB a minute", ok)  # fmt: skip

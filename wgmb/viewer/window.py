@@ -91,7 +91,8 @@ class Viewer:
         self._is_answered = False  # the last request, which is what is on the screen
         self._imgui = ImguiRenderer(self.device, canvas)
         style()
-        self._imgui.set_gui(self._gui)
+        self._imgui.set_gui(self._noted_gui)
+        self._gui_error: Exception | None = None
         self._held: tuple[str, float, float] | None = None  # by the mouse, and where
         self._key: tuple[str, float] | None = None  # an arrow that is down, and when it is due
         self._repeating = False
@@ -261,7 +262,10 @@ class Viewer:
         self.screen.paint(self._context.get_current_texture())
         if drawn:
             self._note_times(drawn.report)
-        self._imgui.render()
+        try:
+            self._imgui.render()
+        except RuntimeError:  # ImGui's own, of a panel that was left half drawn
+            raise self._gui_error or RuntimeError("the panel cannot be drawn") from None
         if self._is_answered:
             self.actions.add_frame()
         for action, what in self.panel.actions:
@@ -327,6 +331,14 @@ class Viewer:
 
     def _flicked(self) -> bool:
         return self.state.mode == "flicker" and int(self._now / _FLICKER) % 2 == 1
+
+    def _noted_gui(self) -> None:
+        """Draw the panel; what goes wrong is kept, which ImGui would hide behind its own error."""
+        try:
+            self._gui()
+        except Exception as error:
+            self._gui_error = error
+            raise
 
     def _gui(self) -> None:
         if self._info is None or self._drawn is None:

@@ -193,6 +193,9 @@ def made_of(state: State, pictures: tuple[int, ...]) -> str:
     """The output frame of a video on display, and the pictures that contribute to it."""
     now = output_frame(state)
     since = float(now.time - output(state).frames[0].time)
+    text = f"output frame {now.number}, {since:.3f} s"
+    if not pictures:  # nothing of the video has been drawn yet
+        return text
     numbers = " - ".join(str(n) for n in dict.fromkeys((min(pictures), max(pictures))))
     word = "pictures" if len(pictures) > 1 else "picture"
-    return f"output frame {now.number}, {since:.3f} s: {word} {numbers}"
+    return f"{text}: {word} {numbers}"
