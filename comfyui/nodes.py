@@ -13,10 +13,10 @@ from comfy.utils import ProgressBar
 from comfy_api.latest import InputImpl, io
 
 import wgmb
-
-from .watched import watched
+from wgmb.threads import Stop, ahead
 
 CATEGORY = "image/video"
+THREAD = "wgmb"  # pictures are made in it, so that a stop is heard at once
 _REMEDY = (
     "wgmb draws with Vulkan. In a container, pass the GPU's graphics as well: "
     "NVIDIA_DRIVER_CAPABILITIES=all, and the package libvulkan1; without a GPU, "
@@ -135,22 +135,17 @@ class MotionBlurVideo(io.ComfyNode):
 def blurred(images, fps_in, fps, settings):
     """The images (frames, height, width, channels), blurred."""
 
-    def read(handle):
-        for image in images:
-            handle.check()
-            yield image.cpu()
-
-    def work(handle):
-        run = wgmb.blur_pictures(read(handle), fps_in=fps_in, fps=fps, device=device(), **settings)
+    def work():
+        read = (image.cpu() for image in images)
+        run = wgmb.blur_pictures(read, fps_in=fps_in, fps=fps, device=device(), **settings)
         logging.info("wgmb: motion by %s", run.how)
         try:
-            handle.put(run.count(len(images)))
-            for image in run:
-                handle.put(image)
+            yield run.count(len(images))
+            yield from run
         finally:
             run.close()
 
-    items = watched(work, throw_exception_if_processing_interrupted)
+    items = ahead(work(), 2, THREAD, patience=0, check=throw_exception_if_processing_interrupted)
     count = next(items)
     bar = ProgressBar(count)
     made = images.new_empty((count, *images.shape[1:]), device="cpu")
@@ -175,16 +170,31 @@ def blurred_file(video, fps, settings):
             file.write(source.getbuffer())
         source = path
 
-    def work(handle):
-        def progress(number, state):
-            handle.put(number)
-
-        made = wgmb.blur_video(source, output, device=device(), progress=progress, **settings)
-        for text in [*made.notes, *made.left_out, *filter(None, [made.loss])]:
-            logging.info("wgmb: %s", text)
-
     rate = fps or float(getattr(video, "get_frame_rate", lambda: 24)())
-    bar = ProgressBar(max(1, round(video.get_duration() * rate)))
-    for _ in watched(work, throw_exception_if_processing_interrupted):
-        bar.update(1)
+    bar, stop, done = ProgressBar(max(1, round(video.get_duration() * rate))), Stop(), []
+
+    def progress(number, state):
+        if stop.is_set():
+            raise StoppedError
+        done.append(number)
+
+    def check():  # a bar belongs to the thread that executes a node
+        throw_exception_if_processing_interrupted()
+        while done:
+            done.pop()
+            bar.update(1)
+
+    def work():
+        yield wgmb.blur_video(source, output, device=device(), progress=progress, **settings)
+
+    try:
+        (made,) = ahead(work(), 1, THREAD, patience=0, check=check)
+    finally:
+        stop.set()
+    for text in [*made.notes, *made.left_out, *filter(None, [made.loss])]:
+        logging.info("wgmb: %s", text)
     return InputImpl.VideoFromFile(output)
+
+
+class StoppedError(Exception):
+    """Ends the blur of a video that nobody wants any more."""

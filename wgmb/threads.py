@@ -1,4 +1,7 @@
-"""Work beside the caller's thread: items made ahead of it, results worked on behind it."""
+"""Work beside the caller's thread: items made ahead of it, results worked on behind it.
+
+Threads start here and nowhere else.
+"""
 
 # pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
 
@@ -9,27 +12,53 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Generic, TypeVar
 
 _Item = TypeVar("_Item")
 _POLL = 0.05  # seconds after which a thread looks whether it should stop
 
+Stop = threading.Event
+"""Request to end, which any thread may make: once it is set, nothing else is begun."""
+
+
+def begin(work: Callable[[], None], name: str) -> threading.Thread:
+    """Run `work` in a thread of its own, which does not keep the program alive."""
+    thread = threading.Thread(target=work, name=name, daemon=True)
+    thread.start()
+    return thread
+
+
+def crew(count: int, name: str) -> ThreadPoolExecutor:
+    """As many threads, for calls whose results are waited for."""
+    return ThreadPoolExecutor(count, name)
+
+
+def is_main() -> bool:
+    """Return True on the thread on which the program began, which alone may handle signals."""
+    return threading.current_thread() is threading.main_thread()
+
 
 def ahead(
-    items: Iterator[_Item], count: int = 1, name: str = "ahead", patience: float = 1.0
+    items: Iterator[_Item],
+    count: int = 1,
+    name: str = "ahead",
+    patience: float = 1.0,
+    check: Callable[[], None] = lambda: None,
 ) -> Generator[_Item, None, None]:
     """The items, up to `count` of them made beforehand in a thread of their own.
 
     What the thread raises is raised here. When nobody reads on, it ends after the item that it is
-    making, for which one waits at most `patience` [s]. An item that was given is not held here.
-    With a count of 0 there is no thread, and each item is made when it is asked for.
+    making, for which one waits at most `patience` [s], and closes a generator. An item that was
+    given is not held here. `check` is called every 0.05 s while an item is waited for, and may
+    raise. With a count of 0 there is no thread, and each item is made when it is asked for.
     """
     if not count:
         yield from items
         return
     # Each item stands in a list of its own; None stands after the last one.
     entries: queue.SimpleQueue[list[_Item] | BaseException | None] = queue.SimpleQueue()
-    room, stop = threading.Semaphore(count), threading.Event()
+    room, stop = threading.Semaphore(count), Stop()
 
     def make_one() -> bool:
         for item in items:
@@ -42,13 +71,14 @@ def ahead(
         try:
             while _has_room(room, stop.is_set) and make_one():
                 pass
+            if isinstance(items, Generator):
+                items.close()
         except BaseException as error:  # raised where the items are read
             entries.put(error)
 
-    thread = threading.Thread(target=make, name=name, daemon=True)
-    thread.start()
+    thread = begin(make, name)
     try:
-        while (entry := _taken(entries)) is not None:
+        while (entry := _taken(entries, check)) is not None:
             room.release()
             if isinstance(entry, BaseException):
                 raise entry
@@ -58,9 +88,10 @@ def ahead(
         _join(thread, patience)
 
 
-def _taken(entries: queue.SimpleQueue[Any]) -> Any:
+def _taken(entries: queue.SimpleQueue[Any], check: Callable[[], None]) -> Any:
     """The next entry; a wait without limit would hold back Ctrl-C."""
     while True:
+        check()
         try:
             return entries.get(timeout=_POLL)
         except queue.Empty:
@@ -98,11 +129,10 @@ class Behind(Generic[_Item]):
         self._items: queue.SimpleQueue[list[_Item] | None] = queue.SimpleQueue()
         self._room = threading.Semaphore(count - 1)
         self._error: BaseException | None = None
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._stop, self._name = Stop(), name
 
     def __enter__(self) -> Callable[[_Item], None]:
-        self._thread.start()
+        self._thread = begin(self._run, self._name)
         return self._put
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:

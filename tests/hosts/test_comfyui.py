@@ -40,12 +40,10 @@ def pack(server, monkeypatch):
     )
     module = module_from_spec(spec)
     monkeypatch.setitem(sys.modules, name, module)
-    for part in ("nodes", "watched"):
-        monkeypatch.delitem(sys.modules, f"{name}.{part}", raising=False)
+    monkeypatch.delitem(sys.modules, f"{name}.nodes", raising=False)
     spec.loader.exec_module(module)
     yield importlib.import_module(f"{name}.nodes")
-    for part in ("nodes", "watched"):
-        sys.modules.pop(f"{name}.{part}", None)
+    sys.modules.pop(f"{name}.nodes", None)
 
 
 def nodes_of(pack):
@@ -148,7 +146,6 @@ def test_a_stop_is_heard_while_a_picture_is_being_made(pack, server, monkeypatch
     assert not ended.is_set()
     goes_on.set()
     assert ended.wait(30), "the work goes on although nobody wants it"
-    assert importlib.import_module(f"{pack.__package__}.watched").POLL < 0.5
 
 
 def test_errors_of_the_work_arrive(pack):

@@ -57,6 +57,11 @@ HOMES = {
     "pygfx": {"hosts"},
     "vapoursynth": {"hosts"},
 }
+LOCKS = {  # modules that take locks, beside `threads`, where threads start
+    "gpu/priority", "hosts/explorer", "hosts/vapoursynth", "io/exr_library", "observer",
+    "pipeline/blur", "render", "run/conversion", "viewer/draw/draw_thread", "viewer/draw/screen",
+    "viewer/subjects/motion_thread",
+}  # fmt: skip
 FILES = sorted(PACKAGE.rglob("*.py"))
 KERNELS = sorted(SHADERS.rglob("*.wgsl"))
 
@@ -66,9 +71,9 @@ def room_of(file: Path) -> str:
     return first.removesuffix(".py")
 
 
-def imported(file: Path):
+def imported(file: Path, home: Path = PACKAGE):
     """Every imported module, as its parts: those of wgmb from its name on."""
-    here = ("wgmb", *file.relative_to(PACKAGE).with_suffix("").parts)
+    here = ("wgmb", *file.relative_to(home).with_suffix("").parts)
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -137,6 +142,19 @@ def test_what_is_not_of_the_core_has_an_extra():
 def test_a_folder_can_be_looked_over(folder):
     files = [file for kind in ("*.py", "*.wgsl") for file in folder.glob(kind)]
     assert len(files) <= MOST_FILES
+
+
+def test_threads_start_in_one_module():
+    starters, holders = set(), set()
+    for file in [*FILES, *sorted((ROOT / "comfyui").glob("*.py"))]:
+        home = PACKAGE if PACKAGE in file.parents else ROOT
+        name = file.relative_to(home).with_suffix("").as_posix()
+        if ["threading"] in [module[:1] for module in imported(file, home)]:
+            holders.add(name)
+        if re.search(r"\b(Thread|Timer|ThreadPoolExecutor)\(", file.read_text()):
+            starters.add(name)
+    assert starters == {"threads"}
+    assert holders - {"threads"} == LOCKS
 
 
 def test_no_room_stands_empty():

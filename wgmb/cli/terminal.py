@@ -6,11 +6,12 @@ import contextlib
 import itertools
 import os
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 
-interrupted = threading.Event()
+from ..threads import Stop
+
+interrupted = Stop()
 """Set by Ctrl-C: Python drops an exception that a signal raises within a destructor."""
 
 

@@ -6,7 +6,6 @@ import contextlib
 import os
 import shutil
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..extras import is_installed, needed_by
+from ..threads import crew
 
 _BUILT_IN = {"builtin": "ocio://default", "studio": "ocio://studio-config-latest"}
 _BLENDER = "*/datafiles/colormanagement/config.ocio"
@@ -77,7 +77,7 @@ def applied(processor: Any, rgb: np.ndarray) -> np.ndarray:
     if rgb.size < 1 << 16 or len(bands) == 1:
         processor.applyRGB(rgb)
         return rgb
-    with ThreadPoolExecutor(len(bands)) as pool:  # it lets go of Python's lock
+    with crew(len(bands), "ocio") as pool:  # it lets go of Python's lock
         list(pool.map(processor.applyRGB, bands))
     return rgb
 

@@ -15,6 +15,7 @@ from ..frame import Frame
 from ..methods import METHODS, default_method
 from ..pipeline.blur import Blur
 from ..png import show
+from ..threads import begin
 
 MOST_DEGREES = 720
 MOST_SAMPLES = 64
@@ -70,7 +71,7 @@ class Explorer(ipywidgets.VBox):
             if self._busy:
                 return
             self._busy = True
-        threading.Thread(target=self._draw, name="wgmb.explore", daemon=True).start()
+        begin(self._draw, "wgmb.explore")
 
     def _draw(self) -> None:
         """Draw until the picture is that of the latest values."""

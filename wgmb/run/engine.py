@@ -12,13 +12,12 @@ memory, each with all its views.
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from typing import Any, Literal, Protocol, TypeVar
 
 from ..errors import Error, reason
-from ..threads import Behind, ahead
+from ..threads import Behind, Stop, ahead
 from .report import BatchReport, Progress
 
 HOPELESS = 3  # frames one after the other that cannot be written for the same reason
@@ -95,14 +94,14 @@ class Sink(Protocol[_BlurredIn]):
 
 
 def frames(
-    input: Input[Any, _Blurred], stop: threading.Event | None = None
+    input: Input[Any, _Blurred], stop: Stop | None = None
 ) -> Generator[_Blurred, None, None]:
     """Every frame that `input` makes, blurred in a thread of its own while the caller works.
 
     Errors arrive where the frames are taken. Once `stop` is set, no other frame is begun, and the
     generator ends. One that is not read to its end should be closed.
     """
-    is_over = (stop or threading.Event()).is_set
+    is_over = (stop or Stop()).is_set
     with closing(_read_ahead(input, lambda number, made_of: False, is_over)) as read:
         blurred = input.blur(_until(is_over, read))
         yield from ahead(blurred, input.ahead, "blur", patience=math.inf)
@@ -114,7 +113,7 @@ def run(
     *,
     resume: bool = False,
     progress: Progress | None = None,
-    stop: threading.Event | None = None,
+    stop: Stop | None = None,
     on_error: Literal["stop", "go on"] = "stop",
 ) -> BatchReport:
     """Put every frame that `input` makes into `sink`, and close it.
@@ -155,12 +154,12 @@ class _Run:
         sink: Sink[Any],
         resume: bool,
         progress: Progress | None,
-        stop: threading.Event | None,
+        stop: Stop | None,
         goes_on: bool,
     ):
         self._input, self._sink, self._resume, self._goes_on = input, sink, resume, goes_on
         self._tell = progress or (lambda number, state: None)
-        self._stop = stop or threading.Event()
+        self._stop = stop or Stop()
         self._report = BatchReport(total=input.total)
         self._reasons: list[str] = []
 

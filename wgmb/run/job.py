@@ -6,7 +6,6 @@ of its own, and have the bytes that one run over all of them gives.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -36,6 +35,7 @@ from ..sequence.layers.masks import is_file, with_amount
 from ..settings import OutputSettings
 from ..settings.record import record
 from ..settings.video import VideoSettings
+from ..threads import Stop
 from .conversion import RateConversion
 from .needs import check_needs
 from .report import BatchReport, Progress
@@ -174,9 +174,7 @@ class Run:
         """The frames of the output."""
         return self.conversion.numbers(self.clip) if self.conversion else self.clip.numbers
 
-    def __call__(
-        self, progress: Progress | None = None, stop: threading.Event | None = None
-    ) -> BatchReport:
+    def __call__(self, progress: Progress | None = None, stop: Stop | None = None) -> BatchReport:
         """Blur every frame; see blur_sequence and convert_sequence."""
         files = self.clip, self.blur, self.output
         how: dict[str, Any] = {"resume": self.resume, "progress": progress, "stop": stop}

@@ -7,7 +7,6 @@ A failing frame is reported, and the others are made; see engine.py for the thre
 
 from __future__ import annotations
 
-import threading
 from typing import Any
 
 from ..errors import InputError
@@ -16,6 +15,7 @@ from ..output.output import Output
 from ..output.vectors import VectorOutput
 from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
+from ..threads import Stop
 from .conversion import RateConversion, RateConversionStages
 from .engine import run
 from .file_sink import FileSink
@@ -31,7 +31,7 @@ def blur_sequence(
     resume: bool = False,
     confidence: bool = False,
     progress: Progress | None = None,
-    stop: threading.Event | None = None,
+    stop: Stop | None = None,
 ) -> BatchReport:
     """Blur every frame of `clip` into `output`; `confidence` adds confidence layers.
 
@@ -60,7 +60,7 @@ def convert_sequence(
     *,
     resume: bool = False,
     progress: Progress | None = None,
-    stop: threading.Event | None = None,
+    stop: Stop | None = None,
 ) -> BatchReport:
     """Blur `clip` into `output` at another rate; numbers are those of the output's frames.
 
@@ -96,7 +96,7 @@ def _run(
     output: Output,
     resume: bool,
     progress: Progress | None,
-    stop: threading.Event | None,
+    stop: Stop | None,
 ) -> BatchReport:
     """All frames into an output; one that fails is reported, and the others are made."""
     how: Any = {"resume": resume, "progress": progress, "stop": stop}
@@ -114,7 +114,7 @@ def vectors_sequence(
     blur: Blur | None = None,
     resume: bool = False,
     progress: Progress | None = None,
-    stop: threading.Event | None = None,
+    stop: Stop | None = None,
 ) -> BatchReport:
     """Write the motion of every frame of `clip` into `output`, in the form of another program.
 

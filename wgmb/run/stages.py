@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,6 +21,7 @@ from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
 from ..sequence.data_windows import Placement
 from ..sequence.frame_file import FrameFile
+from ..threads import Stop
 from .engine import IsDone, frames
 from .file_sink import BlurredFrame
 
@@ -151,7 +151,7 @@ def blurred(
     blur: Blur,
     *,
     confidence: bool = False,
-    stop: threading.Event | None = None,
+    stop: Stop | None = None,
 ) -> Iterator[BlurredFrame]:
     """Yield every frame of `clip` in its order, blurred, for programs that write or show it.
 

@@ -9,7 +9,6 @@ import asyncio
 import os
 import signal
 import socket
-import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from distributed import Worker, WorkerPlugin, get_worker
 from ..._version import __version__
 from ...errors import DeviceError, Error
 from ...sequence.findings import Range, numbers
+from ...threads import Stop, is_main
 from ..job_file import of_text
 from ..report import BatchReport, Progress
 
@@ -59,9 +59,9 @@ class BlurPlugin(WorkerPlugin):
 
     async def setup(self, worker: Worker) -> None:
         """Called by the worker; it may open a device as long as it likes."""
-        if self.is_embedded and threading.current_thread() is threading.main_thread():
+        if self.is_embedded and is_main():
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # the driver tells when to stop
-        self._worker, self._stop, self._idle = worker, threading.Event(), threading.Event()
+        self._worker, self._stop, self._idle = worker, Stop(), Stop()
         self._idle.set()
         adapter = None
         if self.adapters:
@@ -89,7 +89,7 @@ class BlurPlugin(WorkerPlugin):
         stored.check(self._job.numbers[:1])
         self._job.run_with(self._blur, self._job.numbers[:1])  # is the folder there?
 
-    def blur(self, chosen: list[int], tell: Progress, stop: threading.Event) -> BatchReport:
+    def blur(self, chosen: list[int], tell: Progress, stop: Stop) -> BatchReport:
         """Blur some frames."""
         return self._job.run_with(self._blur, chosen)(tell, stop)
 

@@ -17,6 +17,7 @@ import numpy as np
 import wgpu
 
 from ...gpu.textures import TexturePool
+from ...threads import begin
 from .composer import Image
 from .portions import DroppedError, Portions
 from .renderer import Renderer
@@ -53,10 +54,7 @@ class DrawThread:
         self._failed: tuple[Request, Exception] | None = None
         self._taken: _Answer | None = None
         self._ended = False
-        self._thread = threading.Thread(
-            target=self._work, args=(device,), name="drawing", daemon=True
-        )
-        self._thread.start()
+        self._thread = begin(lambda: self._work(device), "drawing")
 
     # ---- of the window -------------------------------------------------------------------
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...color.srgb import srgb
+from ...threads import crew
 
 
 @dataclass
@@ -27,7 +28,7 @@ class Quality:
     ENOUGH = 64  # samples of the reference before it is worth measuring against
 
     def __init__(self):
-        self._worker = ThreadPoolExecutor(1, "flip")
+        self._worker = crew(1, "flip")
         self._last: tuple[tuple, Measured] | None = None
 
     def latest(self, key: tuple) -> Measured | None:

@@ -11,6 +11,7 @@ import wgpu
 
 from ... import gpu
 from ...gpu.textures import TexturePool
+from ...threads import begin
 from .composer import BLIT, Composer, View, draw, pipeline, visible
 from .place import overlap
 
@@ -62,9 +63,7 @@ class ScreenThread:
         self._failed: Exception | None = None
         self._ended, self.seconds = False, 0.0
         beside = gpu.second_device(device)
-        work = {"target": self._work, "args": (beside,), "name": "composing"}
-        self._thread = threading.Thread(**work, daemon=True)
-        self._thread.start()
+        self._thread = begin(lambda: self._work(beside), "composing")
 
     def show(self, view: View) -> None:
         """Have a view composed next."""

@@ -18,6 +18,7 @@ from ... import gpu
 from ...errors import Error
 from ...settings.video import FlowSettings
 from ...shots.motion import MotionSource
+from ...threads import begin
 from ...video.read.reader import VideoReader
 from .video_motion import MotionRequest, PictureFinder, PictureFinding
 
@@ -51,9 +52,7 @@ class MotionThread:
         self._ended = threading.Event()
         self._wanted: tuple[int, ...] = ()
         self._making: tuple[int, float] | None = None
-        work = self._work, (beside, motion)
-        self._thread = threading.Thread(target=work[0], args=work[1], name="motion", daemon=True)
-        self._thread.start()
+        self._thread = begin(lambda: self._work(beside, motion), "motion")
 
     def known(self, number: int) -> PictureFinding | None:
         """The finding about a picture; None until there is one."""
