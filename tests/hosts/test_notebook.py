@@ -30,6 +30,7 @@ def shown(book, kind: str) -> list[str]:
     return [o.data[kind] for o in outputs if kind in o.get("data", {})]
 
 
+@pytest.mark.full
 def test_it_runs_without_a_word_on_stderr(book):
     outputs = [o for cell in book.cells for o in cell.get("outputs", ())]
     assert not [o for o in outputs if o.get("name") == "stderr" or o.output_type == "error"]

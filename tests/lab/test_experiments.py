@@ -59,6 +59,7 @@ def test_taylor_has_two_budgets_and_his_findings(taylor):
     assert len(fixed.rows) == 4
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("metric", ["flip", "psnr"])
 def test_taylors_verdicts_are_those_of_the_figures(taylor, metric):
     """The verdicts depend on the speed of the machine; their truth does not."""
@@ -80,6 +81,7 @@ def test_taylors_verdicts_are_those_of_the_figures(taylor, metric):
     assert said == ["holds" if it else "does not hold" for it in want]
 
 
+@pytest.mark.full
 def test_taylors_reprojection_gains_little_by_more_samples_and_distributed_gains_much(taylor):
     """His finding, at equal samples, where no clock has a say."""
 

@@ -62,12 +62,15 @@ def decibel(frame, way, method="gather", **options):
     return -10 * np.log10(np.mean((got - truth) ** 2))
 
 
+def more(*values):
+    return pytest.param(*values, marks=pytest.mark.full)
+
+
 @pytest.mark.parametrize("method, path, gain", [
-    ("gather", swings, 12), ("gather", circles, 16), ("gather", starts, 20),
-    ("gather", bounces, 18), ("reproject", swings, 3), ("reproject", circles, 5),
-    ("reproject", starts, 7), ("reproject", bounces, 6),
+    ("gather", swings, 12), more("gather", circles, 16), more("gather", starts, 20),
+    more("gather", bounces, 18), more("reproject", swings, 3), ("reproject", circles, 5),
+    more("reproject", starts, 7), more("reproject", bounces, 6),
 ])  # fmt: skip
-@pytest.mark.covers(1)
 def test_a_path_bends_as_five_positions_say(method, path, gain):
     sources = [shot(path, t) for t in (0, -1, 1)]
     known = decibel(frame_of(sources), path, method)

@@ -118,7 +118,7 @@ def test_masks_hold_where_nothing_moves():
     np.testing.assert_allclose(out[:, 200:], frame.color[:, 200:], atol=1e-6)
 
 
-@pytest.mark.covers(0)
+@pytest.mark.full
 @pytest.mark.parametrize("kept", [True, False])
 def test_lists_may_be_longer_than_a_row_of_workgroups(with_shader, kept):
     frame = shot(30, 10)

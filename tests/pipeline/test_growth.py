@@ -187,7 +187,7 @@ PARTS |= {
 }
 
 
-USUAL = {"gather", "tap", "reproject", "render accumulate", "render gather", "perceive", "viewer"}
+USUAL = {"gather", "tap", "render gather", "viewer"}
 
 
 @pytest.mark.parametrize(

@@ -218,7 +218,7 @@ def test_a_scene_of_nothing_is_sky():
     np.testing.assert_allclose(seen.color[-1, :, :3], [Scene.horizon] * SIZE[0], atol=1e-6)
 
 
-@pytest.mark.covers(1)
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(
     "name, setting",
     [("translation", "speed=9"), ("scaling", "dolly=1"), ("scaling", "zoom=2"),
