@@ -14,6 +14,7 @@ Foreign conventions are translated in sequence/layers/ (vectors.py, camera_file.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields
 
@@ -26,6 +27,7 @@ from .gpu import wgsl
 from .png import show
 
 _F32_MAX = float(np.finfo(np.float32).max)
+_BAND = 256  # rows that are looked at together
 _CHANNELS = {
     "to_next": (2,),
     "to_prev": (2,),
@@ -131,9 +133,8 @@ class Frame:
         if self.motion is not None and not (self.to_next is None and self.to_prev is None):
             raise InputError("pass either motion or to_next/to_prev, not both")
         self._check_neighbours()
-        brightest = wgsl.load("common/finite.wgsl").constant("BRIGHTEST")
         for name in ("color", "to_next", "to_prev", "motion", "scale", "holdout"):
-            most = brightest if name == "color" else _F32_MAX
+            most = _brightest() if name == "color" else _F32_MAX
             if given := _count_bad(getattr(self, name), most):
                 self.bad[name] = given
         if self.camera is not None and self.depth is not None:
@@ -217,6 +218,17 @@ MOST_SIDE = 32768
 _SHORT = ("to_next", "to_prev", "motion", "depth", "camera", "object_id", "normal", "holdout",
           "scale", "prev", "next")  # fmt: skip
 PASSES = tuple(f.name for f in fields(Frame) if f.init and f.name != "color")
+
+
+def bad_colors(planes: Sequence[np.ndarray]) -> int:
+    """Pixels of a picture that Frame.bad counts; `planes`: its channels, (height, width) each."""
+    bands = range(0, len(planes[0]), _BAND)
+    most = _brightest()
+    return sum(_count_bad(np.stack([p[y : y + _BAND] for p in planes], 2), most) for y in bands)
+
+
+def _brightest() -> float:
+    return wgsl.load("common/finite.wgsl").constant("BRIGHTEST")
 
 
 def _size_of(color: ArrayLike) -> tuple[int, int]:

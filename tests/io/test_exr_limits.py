@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import textwrap
+import tracemalloc
 
 import numpy as np
 import OpenEXR
@@ -10,6 +11,7 @@ import pytest
 
 import make_frames as make
 from wgmb import InputError
+from wgmb.cli.app import main
 from wgmb.io import exr, limits, stills
 
 
@@ -120,3 +122,21 @@ def test_want_of_memory_is_told_apart_from_damage(tmp_path):
     assert second == f"{png}: not enough memory for its pixels"
     assert third.startswith(f"{damaged}: damaged or cut off: ")
     assert fourth == "read"
+
+
+def test_a_description_holds_no_more_than_the_file_does(tmp_path, capsys):
+    """The picture was put together once more, only to count its bad pixels."""
+    planes = {c: np.zeros((1000, 1000), np.float32) for c in "RGB"}
+    planes["R"][7, 5], planes["G"][7, 5], planes["B"][900, 3] = np.nan, np.inf, -np.inf
+    window = (0, 0, 999, 999)
+    path = tmp_path / "a.exr"
+    path.write_bytes(exr.encode(exr.Exr(path, [exr.Part("", planes, {}, window, window)])))
+    tracemalloc.start()
+    try:
+        assert main(["info", str(path)]) == 0
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    said = capsys.readouterr().out
+    assert "not finite or not in front of the camera: 2 pixels of color" in said
+    assert peak < 20e6, peak  # 12 MB are stored; a picture without light has 6

@@ -12,6 +12,7 @@ from ...color.spaces import Display
 from ...color.srgb import motion_picture
 from ...errors import InputError, counted
 from ...extras import needed_by
+from ...frame import bad_colors
 from ...io import stills
 from ...io.atomic import write_file
 from ...io.frame_numbers import frame_list
@@ -132,10 +133,13 @@ def _views_text(clip: Clip, source: FrameFile) -> str:
 
 def _about_motion(clip: Clip, source: FrameFile, output: Path | None) -> list[tuple[str, str]]:
     """Return lines about the frame's motion, and draw it into `output`."""
-    frame = clip.frame(source, picture=source.reference_channel is not None)
-    lines = []
-    if frame.bad:
-        found = [f"{counted(n, 'pixel')} of {name}" for name, n in frame.bad.items()]
+    frame = clip.frame(source, picture=False, normal=False, light=False)
+    lines, bad = [], dict(frame.bad)
+    if source.reference_channel is not None:
+        colors = bad_colors([source.channels[name] for name in source.color if name])
+        bad = {"color": colors, **bad} if colors else bad
+    if bad:
+        found = [f"{counted(n, 'pixel')} of {name}" for name, n in bad.items()]
         lines.append(("bad", f"not finite or not in front of the camera: {', '.join(found)}"))
     if "motion" not in frame.has:
         if output:
