@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import os
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -32,6 +33,7 @@ from ..io.frame_numbers import (
 from ..io.suffixes import STILLS, VIDEOS
 from ..sequence.frame_file import FrameFile, about
 from ..sequence.input_color import space_of
+from . import finished
 from .exr_layers import with_results
 from .names import prepare, refuse_inputs, that_exist
 from .result import Result
@@ -89,7 +91,7 @@ class Output:
         self._views = tuple(views) if has_view(pattern) else (None,)
         self._videos: dict[str | None, FrameVideo] = {}
         self._overwrite, self._resume, self._since = overwrite, resume, since
-        self._abandoned = False
+        self._abandoned, self._is_whole, self._count, self._replaces = False, True, 0, overwrite
         self._under_way: Path | None = None
         if suffix not in (".exr", *STILLS, *VIDEOS):
             known = ", ".join((".exr", *STILLS, *VIDEOS))
@@ -102,10 +104,6 @@ class Output:
                 from ..video.write import frames
         elif suffix in STILLS:
             stills.require(suffix)
-        if is_video and resume:
-            raise InputError(
-                "`resume` is not available for videos of rendered frames, only for frame files"
-            )
         if not is_video and len(numbers) > 1 and not is_pattern(pattern):
             raise InputError(
                 f"output {pattern}: {len(numbers)} frames need a pattern such as out.####.exr"
@@ -118,7 +116,34 @@ class Output:
                 path = in_view(self.pattern, view)
                 temporary = atomic.temporary_name(path)
                 names = display.names if display else frames.SRGB_DISPLAY
-                self._videos[view] = frames.FrameVideo(path, temporary, fps, self.settings, names)
+                self._videos[view] = frames.FrameVideo(path, temporary, fps, "", names)
+            self._settle({"fps": str(fps)})
+
+    def _settle(self, more: dict[str, Any]) -> None:
+        """Write `more` into the record of a video."""
+        self.settings = json.dumps(json.loads(self.settings) | more, sort_keys=True)
+        for video in self._videos.values():
+            video.text = record.blank(json.loads(self.settings))
+
+    def is_finished(self, frames: Iterable[tuple[int, dict[str, Any]]]) -> bool:
+        """Return True if this is a video that an earlier run made of the same (see finished.py).
+
+        `frames`: the numbers of all frames, and what each is made of (see Clip.made_of), which its
+        record then has. To be asked before the first frame is written. InputError where a video is
+        there that is not to be replaced.
+        """
+        if not self._videos:
+            return False
+        crc = 0
+        for number, made_of in frames:
+            crc = zlib.crc32(json.dumps([number, made_of]).encode(), crc)
+        self._settle({"frames": f"{crc:08x}"})
+        how = {"resume": self._resume, "overwrite": self._overwrite}
+        expected = self._expected(None)
+        paths = [video.path for video in self._videos.values()]
+        done = [finished.is_finished(path, expected, **how) for path in paths]
+        self._replaces = self._overwrite or any(path.exists() for path in paths)
+        return all(done)
 
     def _check_names(self, inputs: list[Path], is_video: bool) -> dict[Path, list[str]]:
         """Make the folders; return the names of the outputs in each.
@@ -176,9 +201,11 @@ class Output:
         """Return True if frame `number` exists and is complete, with the same settings and inputs.
 
         `made_of`: the frame's inputs (see Clip.made_of). The whole file is read and its checksum
-        compared. Raises InputError if another program wrote it.
+        compared. Raises InputError if another program wrote it. A video is never done in part.
         """
-        return all(self._is_done(self.path(number, view), made_of) for view in self._views)
+        return not self._videos and all(
+            self._is_done(self.path(number, view), made_of) for view in self._views
+        )
 
     def _is_done(self, path: Path, made_of: dict[str, Any] | None) -> bool:
         try:
@@ -220,6 +247,8 @@ class Output:
         """
         if self._abandoned:
             return
+        self._count += 1
+        self._is_whole = self._is_whole and "unread" not in (made_of or {})
         told = {f"confidence.{name}": None for result in results for name in result.confidence}
         if told and self.pattern.suffix.lower() != ".exr":
             raise InputError(f"{self.pattern}: only an .exr can store {', '.join(told)}")
@@ -267,12 +296,16 @@ class Output:
             return self._display.of(space_of(result.source, self._display.config))
 
     def close(self) -> None:
-        """Finish a video; OSError if that fails. Files of single frames are finished already."""
+        """Finish a video; OSError if that fails. Files of single frames are finished already.
+
+        The record of one that lacks frames has no seal.
+        """
+        is_complete = self._is_whole and self._count == len(self.numbers)
         for one in self._videos.values():
             try:
-                if not self._overwrite and one.path.exists():
+                if not self._replaces and one.path.exists():
                     raise OSError("was written by another process during this run")
-                one.close()
+                one.close(is_complete=is_complete)
             except OSError as error:
                 self.abandon()
                 raise atomic.about(one.path, error) from None

@@ -94,7 +94,7 @@ class RateConversionStages(Stages):
         self._known = frozenset(n for n in clip.on_disk if clip.cache.is_known_cut(n, -1))
         self._reading = threading.Lock()
 
-    def _made_of(self, number: int) -> dict[str, Any]:
+    def made_of(self, number: int) -> dict[str, Any]:
         """The files of all frames that may share the exposure, and its time among them."""
         at = self._at(number)
         files: dict[tuple[Any, ...], None] = {}

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..errors import Error, reason
 from ..output.output import Output
 from ..output.result import Result
+from .engine import Input, run
+from .report import BatchReport, Progress
 
 
 @dataclass
@@ -35,3 +39,38 @@ class FileSink:
     def put(self, frame: BlurredFrame) -> None:
         """Write a frame."""
         self._output.write_views(frame.views, frame.made_of)
+
+
+def run_into(
+    output: Output,
+    input: Input[Any, BlurredFrame],
+    numbers: Sequence[int],
+    made_of: Callable[[int], dict[str, Any]] = lambda number: {},
+    *,
+    progress: Progress | None = None,
+    **how: Any,
+) -> BatchReport:
+    """`engine.run` into an Output; nothing where a resumed run finds its video finished.
+
+    `made_of`: the files and facts on which each of the `numbers` depends.
+    """
+
+    def frames() -> Iterator[tuple[int, dict[str, Any]]]:
+        for number in numbers:
+            try:
+                yield number, made_of(number)
+            except (Error, OSError) as error:  # its turn to fail comes
+                yield number, {"failed": reason(error)}
+
+    try:
+        is_finished = output.is_finished(frames())
+    except BaseException:
+        output.abandon()
+        raise
+    if not is_finished:
+        return run(input, FileSink(output), progress=progress, **how)
+    output.abandon()
+    for number in numbers:
+        if progress is not None:
+            progress(number, "skipped")
+    return BatchReport(total=len(numbers), skipped=list(numbers))

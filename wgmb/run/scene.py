@@ -24,8 +24,8 @@ from ..settings import (
 )
 from ..settings.color import DisplaySettings, color_record
 from ..settings.record import record
-from .engine import IsDone, run
-from .file_sink import BlurredFrame, FileSink
+from .engine import IsDone
+from .file_sink import BlurredFrame, run_into
 from .job import check_confidence
 from .report import BatchReport, Progress
 
@@ -133,7 +133,8 @@ class SceneRun:
 
     def __call__(self, progress: Progress | None = None) -> BatchReport:
         """Render every frame; the first error ends it."""
-        return run(self.frames, FileSink(self.output), resume=self.resume, progress=progress)
+        numbers = self.output.numbers
+        return run_into(self.output, self.frames, numbers, resume=self.resume, progress=progress)
 
 
 def _with_passes(render: Render, frame: Frame, number: int) -> FrameFile:

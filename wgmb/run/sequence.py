@@ -17,8 +17,7 @@ from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
 from ..threads import Stop
 from .conversion import RateConversion, RateConversionStages
-from .engine import run
-from .file_sink import FileSink
+from .file_sink import run_into
 from .report import BatchReport, Progress, describe_frames, describe_input
 from .stages import MotionStages, Stages
 
@@ -99,8 +98,8 @@ def _run(
     stop: Stop | None,
 ) -> BatchReport:
     """All frames into an output; one that fails is reported, and the others are made."""
-    how: Any = {"resume": resume, "progress": progress, "stop": stop}
-    report = run(stages, FileSink(output), **how, on_error="go on")
+    how: Any = {"resume": resume, "progress": progress, "stop": stop, "on_error": "go on"}
+    report = run_into(output, stages, stages.numbers, stages.made_of, **how)
     describe_input(report, stages.clip)
     is_converted = isinstance(stages, RateConversionStages)
     describe_frames(report, stages.clip, is_converted=is_converted)

@@ -63,7 +63,7 @@ class Stages:
     def _read_one(self, number: int, is_done: IsDone) -> ReadFrame | None:
         """A frame; None if it is done."""
         try:
-            made_of = self._made_of(number)
+            made_of = self.made_of(number)
             return None if is_done(number, made_of) else self._read(number, made_of)
         except (Error, OSError, MemoryError) as error:
             return ReadFrame(number, failed=reason(error))
@@ -78,7 +78,7 @@ class Stages:
         except (InputError, GpuMemoryError) as error:
             return BlurredFrame(read.number, failed=reason(error))
 
-    def _made_of(self, number: int) -> dict[str, Any]:
+    def made_of(self, number: int) -> dict[str, Any]:
         """Files and facts on which a frame depends."""
         return self.clip.made_of(number, self.reach)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import zlib
 from collections.abc import Sequence
@@ -12,8 +11,8 @@ from typing import Any, Protocol
 
 import wgpu
 
-from ..errors import InputError
 from ..io import atomic, record
+from ..output.finished import is_finished
 from ..output.names import refuse_inputs
 from ..settings import OutputSettings
 from ..settings.video import VideoSettings
@@ -30,7 +29,6 @@ from .file_sink import FileSink
 from .report import Progress
 from .video_sink import Form, LightForm, VideoSink, coded_form, frame_record
 
-_NOT_OURS = " and holds no record of a run: it is cut off, or of another program"
 FIRST = 1  # number of the first frame, where they are image files
 _RECORD = "comment", "description", "synopsis"  # texts of a video; the first that is free
 
@@ -95,17 +93,9 @@ def _write_video(
     texts = _texts(reader, made_of)
     there = [path] if os.path.exists(os.path.realpath(path)) else []
     refuse_inputs(path.parent, [path.name], there, inputs)
-    stated, is_ours, is_whole = None, False, False
-    if there and output.resume:
-        stated, is_whole = _record_of(path)
-        is_ours = stated == json.loads(json.dumps(made_of))
-    if is_ours and is_whole:
+    if is_finished(path, made_of, resume=output.resume, overwrite=output.overwrite):
         remove_left(path)
         return ["is already done"]
-    if there and not (output.overwrite or is_ours):
-        otherwise = " and was made otherwise" if stated else _NOT_OURS
-        more = otherwise if output.resume else ""
-        raise InputError(f"{path} exists{more}; `overwrite=True` replaces it")
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic.sweep(path.parent, [path.name])
     rate, tick = 1 / wanted[0].interval, wanted.tick
@@ -134,14 +124,6 @@ def _texts(reader: VideoReader, made_of: dict[str, Any]) -> dict[str, str]:
     """The record of a video, under the first text that its input leaves free."""
     free = next((name for name in _RECORD if name not in reader.metadata), _RECORD[0])
     return {free: record.blank(made_of)}
-
-
-def _record_of(path: Path) -> tuple[dict[str, Any] | None, bool]:
-    """The content of a video's record, and True if the video is whole."""
-    try:
-        return record.read_file(path)
-    except OSError as error:
-        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}") from None
 
 
 def _made_of(source: VideoSource, masks: Sequence[Path]) -> dict[str, Any]:

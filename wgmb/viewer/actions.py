@@ -102,7 +102,8 @@ class Actions:
     def _record(self, state: State) -> None:
         if self._video is None:
             path = _free(".mp4")
-            self._video = FrameVideo(path, temporary_name(path), rate(state), state.toml())
+            text = f"wgmb {state.toml()}"
+            self._video = FrameVideo(path, temporary_name(path), rate(state), text)
             return
         self.close()
 

@@ -34,13 +34,13 @@ class NewFile:
     """A file of some container. Until `close` there is nothing at `path`.
 
     `metadata`: texts of the whole file. `is_new`, which may be set: no file of another process is
-    replaced. A text that is a record (see io/record.py) gets its seal. OSError, whose text names
-    `path`, if it cannot be written.
+    replaced. A text that is a record (see io/record.py) gets its seal if the file `is_complete`.
+    OSError, whose text names `path`, if it cannot be written.
     """
 
     def __init__(self, path: Path, temporary: Path, suffix: str, metadata: dict[str, str]):
         self.path, self.temporary = path, temporary
-        self.is_new = False
+        self.is_new, self.is_complete = False, True
         self._record = next(filter(record.is_begun, metadata.values()), "")
         self._container: OutputContainer | None = None
         self._lock: int | None = None
@@ -91,7 +91,8 @@ class NewFile:
         if self.path.suffix.lower() == ".gif":
             with open(self.temporary, "ab") as file:
                 file.write(self._record.encode())
-        record.seal_file(self.temporary, self._record)
+        if self.is_complete:
+            record.seal_file(self.temporary, self._record)
 
     def _unlock(self) -> None:
         if self._lock is not None:
