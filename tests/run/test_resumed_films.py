@@ -68,6 +68,15 @@ def test_a_changed_frame_is_noticed_also_through_a_rate_conversion(tmp_path, cap
         assert code == 2 and "was made otherwise" in err
 
 
+def test_output_frames_of_a_higher_rate_are_named_and_stay(tmp_path, capsys, shot):
+    to = tmp_path / "o.####.png"
+    code, err = blur(capsys, shot, to, "--fps-in", "24", "--fps", "24")
+    assert code == 0 and "remain" not in err
+    code, err = blur(capsys, shot, to, "--fps-in", "24", "--fps", "12")
+    assert code == 0 and "o.####.png: frames 3-4 of a longer run remain" in err
+    assert len(list(tmp_path.glob("o.*.png"))) == 4
+
+
 def test_what_lacks_frames_is_not_done(tmp_path, capsys, shot):
     broken = tmp_path / "in" / "shot.0002.exr"
     whole = broken.read_bytes()

@@ -162,3 +162,15 @@ def test_frames_that_lack_are_made_and_the_others_stay(clip, tmp_path):
     changed = {name for name, now in stamps(tmp_path).items() if now != before[name]}
     assert changed == {"o.0003.png", "o.0005.png"}
     assert (tmp_path / "o.0003.png").read_bytes() == whole
+
+
+@pytest.mark.parametrize("how", ["resume", "overwrite"])
+def test_frames_of_a_longer_run_are_named_and_stay(clip, tmp_path, how):
+    to, settings = tmp_path / "o.####.png", {"flow": "none", "fps": 24}
+    assert blur_video(clip, to, **settings).left_out == []
+    whole = set(stamps(tmp_path))
+    said = blur_video(clip, to, **settings, end=0.1, **{how: True}).left_out
+    assert f"frames 4-{len(whole)} of a longer run remain" in said
+    assert set(stamps(tmp_path)) == whole
+    again = blur_video(clip, to, **settings, end=0.1, resume=True).left_out
+    assert again == ["is already done", said[-1]]

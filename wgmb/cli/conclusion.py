@@ -48,6 +48,8 @@ def conclude(report: BatchReport, target: Path, took: str, quiet: bool, verbose:
             note(cuts_told(report.cuts, "frame"))
         if odd := odd_sizes({n: size for size, at in report.sizes.items() for n in at}):
             note(odd)
+        if report.beyond:
+            note(f"{target}: {report.beyond}")
         done = f"{counted(len(report.done), 'frame')} in {took} -> {target}"
         note(done + (f", {len(report.skipped)} already done" if report.skipped else ""))
     if report.failed:

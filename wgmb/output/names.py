@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..errors import InputError
+from ..io.frame_numbers import is_pattern, numbered, numbers_on_disk
 
 
 def refuse_inputs(
@@ -47,6 +48,21 @@ def that_exist(folder: Path, names: Iterable[str]) -> list[Path]:
     except OSError:  # not there yet, or said when it is prepared
         return []
     return [folder / name for name in names if name in existing]
+
+
+def beyond(pattern: str | Path, last: int) -> str:
+    """A line on the files of `pattern` with higher numbers than `last`; "" if there are none.
+
+    They are of a longer run, where numbers count output frames. They are never deleted.
+    """
+    try:
+        numbers = [n for n in numbers_on_disk(pattern) if n > last] if is_pattern(pattern) else []
+    except InputError:  # there are none at all
+        numbers = []
+    if not numbers:
+        return ""
+    remain = "remains" if len(numbers) == 1 else "remain"
+    return f"{numbered(numbers)} of a longer run {remain}"
 
 
 def prepare(folder: Path) -> None:

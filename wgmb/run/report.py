@@ -50,6 +50,8 @@ class BatchReport:
     """Masks by index or id that none of the frames that were read has."""
     sizes: dict[tuple[int, int], list[int]] = field(default_factory=dict)
     """Frames that were done, by their size."""
+    beyond: str = ""
+    """A line on the files of a longer run at another rate, which remain; "" if there are none."""
 
     @property
     def absent(self) -> list[str]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..io.frame_numbers import has_view
+from ..output.names import beyond
 from ..output.output import Output
 from ..output.vectors import VectorOutput
 from ..pipeline.blur import Blur
@@ -67,7 +68,9 @@ def convert_sequence(
     """
     _check_names(clip, output)
     stages = RateConversionStages(clip, blur, conversion, output.takes_views)
-    return _run(stages, output, resume, progress, stop)
+    report = _run(stages, output, resume, progress, stop)
+    report.beyond = beyond(output.pattern, stages.numbers[-1])
+    return report
 
 
 def _check_names(clip: Clip, output: Output) -> None:

@@ -13,7 +13,7 @@ import wgpu
 
 from ..io import atomic, record
 from ..output.finished import is_finished
-from ..output.names import refuse_inputs
+from ..output.names import beyond, refuse_inputs
 from ..settings import OutputSettings
 from ..settings.video import VideoSettings
 from ..video.clock import Clock
@@ -157,10 +157,11 @@ def _write_frames(
         left = [
             frame for frame in wanted if not files.done(FIRST + frame.number, frame_record(frame))
         ]
+    remain = list(filter(None, [beyond(output.output, numbers[-1])]))
     if not left:
-        return ["is already done"]
+        return ["is already done", *remain]
     channels = 4 if source.reader.coding.alpha else 3
     form = LightForm(source.device, channels, FIRST)
     run(source.frames(left, form), FileSink(files), progress=progress)
     done = len(wanted) - len(left)
-    return [f"{done} of {len(wanted)} frames were done before"] if done else []
+    return [f"{done} of {len(wanted)} frames were done before", *remain] if done else remain
