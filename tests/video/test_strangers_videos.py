@@ -168,6 +168,28 @@ def test_output_frames_of_short_pauses_are_not_listed(tmp_path):
     tracemalloc.stop()
 
 
+@pytest.mark.parametrize(
+    ("suffix", "holds", "longest"),
+    [(".mp4", 170_000, "178,956"), (".mov", 170_000, "178,956"), (".gif", 600, "655")],
+)
+def test_what_a_container_can_hold_between_pictures_is_said(tmp_path, suffix, holds, longest):
+    """FFmpeg ended with "Invalid argument", or wrote the times as one tick, 11 minutes, ..."""
+    for pause in (holds, 1_000_000):
+        path = write(tmp_path / "in.mkv", [0, 42, 84, 1000 * pause, 1000 * pause + 42])
+        to = tmp_path / f"o{suffix}"
+        more = {"flow": "none", "longest_pause": 1e9, "fps": "source", "overwrite": True}
+        if pause == holds:
+            blur_video(path, to, **more)
+            assert float(VideoReader(to).times[3]) == pytest.approx(pause, rel=1e-3)
+            continue
+        with pytest.raises(InputError) as error:
+            blur_video(path, to, **more)
+        assert f"{suffix} holds at most {longest} s from one picture" in str(error.value)
+        assert "got 1,000,000 s; .mkv holds more" in str(error.value)
+    blur_video(path, tmp_path / "o.mkv", **more)
+    assert float(VideoReader(tmp_path / "o.mkv").times[3]) == 1_000_000
+
+
 @pytest.mark.parametrize("fps", [None, Fraction(30)])
 def test_output_frames_have_a_key_of_their_own(tmp_path, fps):
     reader = VideoReader(write(tmp_path / "in.mkv", [0, 42, 84, 126, 170, 201]))

@@ -96,6 +96,7 @@ def _write_video(
     if is_finished(path, made_of, resume=output.resume, overwrite=output.overwrite):
         remove_left(path)
         return ["is already done"]
+    encoding.check_pause(path, wanted.longest, wanted.tick)
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic.sweep(path.parent, [path.name])
     rate, tick = 1 / wanted[0].interval, wanted.tick

@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from typing import overload
 
 import numpy as np
@@ -86,6 +87,14 @@ class OutputFrames(Sequence[OutputFrame]):
     def times(self) -> Sequence[Fraction]:
         """Their times [s]; nothing is listed."""
         return _Times(self)
+
+    @property
+    def longest(self) -> Fraction:
+        """The longest time from one to the next, or their interval [s]."""
+        if self._own is None:
+            return self._step
+        pauses = (after - before for before, after in pairwise(self._own))
+        return max(max(pauses, default=Fraction(0)) / self._clock.speed, self._step)
 
     @property
     def tick(self) -> Fraction:

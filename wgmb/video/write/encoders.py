@@ -8,6 +8,7 @@ number of constant quality: smaller is better and larger.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -26,6 +27,9 @@ FINEST_RATE = 1_001_000  # denominator of a rate: FFmpeg counts in 32 bits
 CONTAINERS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska", ".webm": "webm", ".gif": "gif"}
 """FFmpeg's names of the containers, by suffix; the first codec that has one is its default."""
 HARDWARE = ("nvenc", "qsv", "amf", "videotoolbox", "v4l2m2m")
+_MOST_TICKS = (1 << 31) - 1  # from one picture to the next in an MP4 or MOV
+_FEWEST_TICKS = 10_000  # a second there
+_MOST_HUNDREDTHS = (1 << 16) - 1  # of a second, for which a GIF shows a picture
 _LAMBDA = 118  # FFmpeg's units of a global quality to one of `-q` (FF_QP2LAMBDA)
 
 
@@ -168,6 +172,24 @@ class Encoding:
     def container(self) -> str:
         """FFmpeg's name of the container."""
         return CONTAINERS[self.suffix]
+
+    def check_pause(self, path: Path, pause: Fraction, base: Fraction) -> None:
+        """InputError where pictures are further apart [s] than the container counts.
+
+        `base`: see VideoWriter. FFmpeg would write other times, or end with a line about itself.
+        """
+        ticks, longest = base.denominator, math.inf
+        while ticks < _FEWEST_TICKS:
+            ticks *= 2  # as FFmpeg does
+        if self.suffix in (".mp4", ".mov"):
+            longest = _MOST_TICKS / ticks
+        elif self.suffix == ".gif":
+            longest = _MOST_HUNDREDTHS / 100
+        if pause > longest:
+            raise InputError(
+                f"output {path}: {self.suffix} holds at most {int(longest):,} s from one picture "
+                f"to the next at this rate, got {math.ceil(pause):,} s; .mkv holds more"
+            )
 
     def options(self, coding: Coding, facts: Facts) -> dict[str, str]:
         """For the encoder, by name."""
