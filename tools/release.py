@@ -67,7 +67,7 @@ ADAPTERS = "import json, wgmb.gpu; print(json.dumps([a.summary for a in wgmb.gpu
 
 
 def run(line: list[str], folder: str) -> str:
-    """What a program printed; its errors are shown and end this one."""
+    """The output of a program; its errors are shown and end this one."""
     done = subprocess.run(line, cwd=folder, capture_output=True, text=True, timeout=600)
     if done.returncode:
         sys.exit(f"{' '.join(line[1:])}: exit {done.returncode}: {done.stderr}{done.stdout}")

@@ -126,7 +126,7 @@ def make_inputs(folder: Path) -> None:
 
 
 def run(line: str, folder: Path) -> dict:
-    """What a command gives: its exit code, messages, and each file that it made or changed."""
+    """The results of a command: its exit code, messages, and each file that it made or changed."""
     from wgmb.cli import app
 
     before = _files(folder)

@@ -1,4 +1,4 @@
-"""How soon the viewer shows what is set, and how long its panel stands still meanwhile.
+"""The time until the viewer shows what is set, and for which its panel stands still meanwhile.
 
     xvfb-run -s '-screen 0 1920x1080x24' python tools/viewer_bench.py [--inline] [SUBJECT ...]
 

@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import InputError
 from .shutter import Shutter
@@ -57,21 +58,21 @@ class Cone:
             raise InputError(f"{rate:g} images per second: too many to hold, at most {MOST_HELD}")
         return count
 
-    def impulse_response(self, x: np.ndarray | float) -> np.ndarray:
+    def impulse_response(self, x: np.ndarray | float) -> NDArray[np.float64]:
         """Return W(x), the response `x` seconds after a flash, 1/s."""
         late = np.minimum(self.shift - self.rate * np.asarray(x, float), 80)
         return self.rate * np.exp(late - np.exp(late))
 
-    def step_response(self, x: np.ndarray | float) -> np.ndarray:
+    def step_response(self, x: np.ndarray | float) -> NDArray[np.float64]:
         """Return F(x), the share of the response completed `x` seconds after a flash."""
         return np.exp(-np.exp(np.minimum(self.shift - self.rate * np.asarray(x, float), 80)))
 
-    def weights(self, ages: np.ndarray, held: np.ndarray | float) -> np.ndarray:
+    def weights(self, ages: np.ndarray, held: np.ndarray | float) -> NDArray[np.float64]:
         """Return the weights of images shown for `held` [s], on average `ages` [s] ago."""
         ages = np.asarray(ages, float)
         return self.step_response(ages + held / 2) - self.step_response(ages - held / 2)
 
-    def shares(self, count: int, rate: float, after: float = 0.0) -> np.ndarray:
+    def shares(self, count: int, rate: float, after: float = 0.0) -> NDArray[np.float64]:
         """Return the weights of the last images, newest first; the oldest includes all earlier.
 
         `rate`: images per second, each held until the next. `after`: time since the middle of the
@@ -81,7 +82,7 @@ class Cone:
         weights[-1] += 1 - weights.sum()
         return weights
 
-    def shares_held(self, held: np.ndarray, after: float = 0.0) -> np.ndarray:
+    def shares_held(self, held: np.ndarray, after: float = 0.0) -> NDArray[np.float64]:
         """Return the weights of images each held for its own time [s], as `shares`.
 
         `held`: of the newest image first. `after`: time since the middle of the newest one [s].

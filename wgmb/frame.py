@@ -17,9 +17,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .camera import Reprojections, Window, window_of
 from .errors import InputError
@@ -43,6 +44,11 @@ _CHANNELS = {
 }
 
 
+Floats = NDArray[np.floating[Any]]
+"""Array of float16, float32 or float64."""
+Integers = NDArray[np.integer[Any]]
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """Input of a method. Only `color` is required.
@@ -50,15 +56,15 @@ class Frame:
     Arrays of floats are float16, float32 or float64; masked arrays are refused.
     """
 
-    color: np.ndarray
+    color: Floats
     """(height, width, 3 or 4) float, linear, premultiplied alpha."""
-    to_next: np.ndarray | None = None
+    to_next: Floats | None = None
     """(height, width, 2) float [px]."""
-    to_prev: np.ndarray | None = None
+    to_prev: Floats | None = None
     """(height, width, 2) float [px]."""
-    motion: np.ndarray | None = None
+    motion: Floats | None = None
     """(height, width, 4) float [px]: to_prev and to_next side by side, instead of the two."""
-    depth: np.ndarray | None = None
+    depth: Floats | None = None
     """(height, width) float [scene units], required if motion comes from `camera`."""
     window: Window | None = None
     """Position of the image in the display window, of which it may hold a part, or more: x, y of
@@ -66,13 +72,13 @@ class Frame:
     the image is the whole display window."""
     camera: Reprojections | None = None
     """Camera and body motion around this frame; gives motion from depth."""
-    object_id: np.ndarray | None = None
+    object_id: Integers | None = None
     """(height, width) integer: index of each pixel's body in `camera`; 0 is the world."""
-    normal: np.ndarray | None = None
+    normal: Floats | None = None
     """(height, width, 3) float: unit vectors in world space; 0 for empty pixels."""
-    holdout: np.ndarray | None = None
+    holdout: Floats | None = None
     """(height, width) float 0..1: 1 stays sharp and out of its neighbours' blur."""
-    scale: np.ndarray | None = None
+    scale: Floats | None = None
     """(height, width) float: multiplies the motion."""
     object_motion: bool = False
     """`to_next`, `to_prev` exclude the camera's motion, which is added."""
@@ -83,14 +89,14 @@ class Frame:
     """The frame after, and its own `next`."""
     number: int = 0
     """Frame number; varies the jitter."""
-    diffuse_light: np.ndarray | None = None
+    diffuse_light: Floats | None = None
     """(height, width, 3) float, linear: the light that matt surfaces scatter, before it is
     multiplied by `diffuse_color`; with it the neighbours' own, so that shadows can move."""
-    diffuse_color: np.ndarray | None = None
+    diffuse_color: Floats | None = None
     """(height, width, 3) float, linear: the colour of matt surfaces (albedo)."""
-    glossy_light: np.ndarray | None = None
+    glossy_light: Floats | None = None
     """(height, width, 3) float, linear: what glossy surfaces reflect, before `glossy_color`."""
-    glossy_color: np.ndarray | None = None
+    glossy_color: Floats | None = None
     """(height, width, 3) float, linear: the colour of glossy surfaces."""
     bad: dict[str, int] = field(init=False, default_factory=dict)
     """Number of pixels per input that are not finite, or have no depth in front of the camera.

@@ -9,10 +9,12 @@ from collections import deque
 
 import numpy as np
 import wgpu
+from numpy.typing import NDArray
 
 from . import gpu
 from .cone import Cone
 from .errors import InputError
+from .frame import Floats
 from .gpu.textures import TexturePool
 from .gpu_frame.weighted_sum import WeightedSum
 
@@ -41,7 +43,7 @@ class Observer:
         self._held_for: deque[float | None] = deque(maxlen=self.held)  # the newest first
         self._lock = threading.RLock()
 
-    def present(self, picture: np.ndarray, held: float | None = None) -> None:
+    def present(self, picture: Floats, held: float | None = None) -> None:
         """Show another image: (height, width, 3 or 4) floats, linear light, for `held` [s].
 
         `held` is 1 / `rate` if None; if images are held for different times, each needs its own.
@@ -64,7 +66,7 @@ class Observer:
             self._count += 1
             self._held_for.appendleft(held)
 
-    def perceived(self, after: float = 0.0) -> np.ndarray:
+    def perceived(self, after: float = 0.0) -> NDArray[np.float32]:
         """(height, width, 4) float32: the perceived image `after` [s] the last one's middle."""
         output = self.texture(after)
         with self._lock, gpu.reported(self._size):

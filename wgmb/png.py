@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import struct
 import zlib
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .color.srgb import to_display
 from .errors import InputError
@@ -26,7 +28,7 @@ class NotebookImage:
         return self.png
 
 
-def show(image: np.ndarray, exposure: float = 0.0) -> NotebookImage:
+def show(image: NDArray[np.floating[Any]], exposure: float = 0.0) -> NotebookImage:
     """A picture for a notebook: the last value of a cell is shown.
 
     `image`: (height, width) or (height, width, 1, 3 or 4) float, linear, premultiplied alpha.

@@ -18,6 +18,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import charts
 from .errors import InputError, check_choice
@@ -115,7 +116,7 @@ class Shutter:
         x, y = ROLLING[self.rolling] if self.rolling else (0, 0)
         return x * self.rolling_duration, y * self.rolling_duration
 
-    def integral(self, steps: int = 4096) -> tuple[np.ndarray, np.ndarray]:
+    def integral(self, steps: int = 4096) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return times from opening to closing [frame intervals] and the share exposed by each."""
         x = np.linspace(0, 1, steps + 1)
         curve = CURVES[self.curve] if isinstance(self.curve, str) else self.curve
@@ -150,7 +151,7 @@ class Shutter:
         middle = scale * (opens + closes) / 2 + offset
         return replace(self, degrees=scale * self.degrees, phase=middle)
 
-    def weight(self, times: np.ndarray) -> np.ndarray:
+    def weight(self, times: np.ndarray) -> NDArray[np.float64]:
         """Return the weight of each time [frame intervals], per frame interval; 0 while closed."""
         edges, integral = self.integral()
         if edges[0] == edges[-1]:
@@ -161,14 +162,14 @@ class Shutter:
         at = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(slopes) - 1)
         return np.where(inside, slopes[at], 0.0)
 
-    def overlap(self, times: np.ndarray) -> np.ndarray:
+    def overlap(self, times: np.ndarray) -> NDArray[np.float64]:
         """Sum of the weights of this and all other frames at the times [frame intervals]."""
         opens, closes = self.span
         times = np.asarray(times, np.float64)
         first, last = math.floor(times.min() - closes), math.ceil(times.max() - opens)
         return np.sum([self.weight(times - n) for n in range(first, last + 1)], axis=0)
 
-    def time(self, shares: np.ndarray) -> np.ndarray:
+    def time(self, shares: np.ndarray) -> NDArray[np.float64]:
         """Return the times at which shares (0..1) of the exposure are reached [frame intervals]."""
         times, integral = self.integral()
         # A flat stretch (weight 0) is jumped over: only the ends of rising steps count.
@@ -176,12 +177,12 @@ class Shutter:
         used = np.append(rises, False) | np.insert(rises, 0, False)
         return np.interp(shares, integral[used], times[used])
 
-    def strata(self, samples: int) -> np.ndarray:
+    def strata(self, samples: int) -> NDArray[np.float32]:
         """(samples, 3) float32: begin, middle and end of equal shares of the exposure."""
         edges = self.time(np.arange(2 * samples + 1) / (2 * samples))
         return np.stack([edges[:-1:2], edges[1::2], edges[2::2]], 1).astype(np.float32)
 
-    def sample_times(self, samples: int, shift: float = 0.0) -> np.ndarray:
+    def sample_times(self, samples: int, shift: float = 0.0) -> NDArray[np.float32]:
         """(samples,) one time in every stratum, `shift` -0.5..0.5 from its middle."""
         begin, middle, end = self.strata(samples).T
         return middle + 2 * shift * (middle - begin if shift < 0 else end - middle)

@@ -43,7 +43,7 @@ def installed(capsys, shell: str, *more) -> list[str]:
 
 
 def completed(home: Path, line: str) -> set[str]:
-    """What bash offers at the end of a line."""
+    """The words that bash offers at the end of a line."""
     *_, before, last = line.split(" ")
     script = f"""
         . "$HOME/{PLACES["bash"]}"

@@ -212,7 +212,7 @@ def attribute_bytes(name: str, kind: str, value: bytes) -> bytes:
 
 
 def error_lines(err: str) -> list[str]:
-    """What a command said of its failure, which is no traceback."""
+    """The message of a command that failed, which is no traceback."""
     assert "Traceback" not in err
     return err.splitlines()
 

@@ -1,4 +1,4 @@
-"""Whether anybody opens a file, by inotify; Linux only."""
+"""A watch on a file, which tells whether anybody opens it: inotify; Linux only."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ def lamp(degrees, t):
 @pytest.mark.parametrize("degrees", [80, 95, 110])
 @pytest.mark.parametrize("shutter", [180, 360])
 def test_a_small_light_on_a_circle_is_found_at_all_times(degrees, shutter):
-    """Where searches start beside it, off the circle, 51 to 78 % of the light is left."""
+    """Searches that start beside it, off the circle, leave 51 to 78 % of the light."""
     frame = frame_of([lamp(degrees, t) for t in (0, -1, 1)])
     got = wgmb.Blur("gather", shutter=shutter, samples=16)(frame)
     wall = np.array([0.1, 0.08, 0.06])

@@ -1,4 +1,4 @@
-"""What the frame hides comes from its neighbours, but in the light of the frame."""
+"""Surfaces that the frame hides come from its neighbours, but in the light of the frame."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a release is made of: links and description of the package, notes, the tag, bundles."""
+"""Parts of a release: links and description of the package, notes, the tag, bundles."""
 
 import re
 import tomllib
@@ -37,7 +37,7 @@ def test_without_an_address_nothing_leads_astray_and_no_address_is_made_up():
 
 
 def test_the_address_is_set_in_one_place():
-    """Where it is set, CITATION.cff repeats it, as the form of that file asks."""
+    """If it is set, CITATION.cff repeats it, as the form of that file asks."""
     address = metadata_hook.address_of(ROOT)
     text = (ROOT / "CITATION.cff").read_text("utf-8")
     cited = re.findall(r"^repository-code: (\S+)$", text, re.M)

@@ -34,7 +34,7 @@ WRONG = """
 import numpy as np
 import wgmb
 
-color = np.zeros((8, 8, 3), np.float32)
+color, coded = np.zeros((8, 8, 3), np.float32), np.zeros((8, 8, 3), np.uint8)
 wgmb.Blur("gathr")  # wrong
 wgmb.Blur("tap", shuter=180)  # wrong
 wgmb.Blur("tap", path="strait")  # wrong
@@ -42,6 +42,8 @@ wgmb.Blur("tap", curve="cosin")  # wrong
 wgmb.Blur("tap", samples="many")  # wrong
 wgmb.blur(color, method="tapp")  # wrong
 wgmb.blur(color, dept=color)  # wrong
+wgmb.blur(coded)  # wrong
+wgmb.Frame(color, object_id=color)  # wrong
 wgmb.blur_video("in.mp4", "out.mp4", flow="diss")  # wrong
 wgmb.blur_video("in.mp4", "out.mp4", sutter=180)  # wrong
 wgmb.blur_pictures([color], transfer="log")  # wrong

@@ -123,7 +123,7 @@ def test_few_pictures_are_no_exception(device, count):
 
 
 class Tensor:
-    """What another library's tensor shows of itself."""
+    """The protocol by which another library's tensor shows itself."""
 
     def __init__(self, array, where=1):
         self.array, self.where = array, where

@@ -1,4 +1,4 @@
-"""What may come under a video's name: lists of other files, views, pauses of years, links."""
+"""Files that may come under a video's name: lists of other files, views, pauses of years, links."""
 
 import contextlib
 import itertools

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..sequence.data_windows import (
     Placement,
@@ -24,9 +25,9 @@ class Result:
 
     source: FrameFile
     """The frame as stored, whose other layers and attributes an EXR keeps."""
-    picture: np.ndarray
+    picture: NDArray[np.float32]
     """(height, width, 3 or 4) float32, linear, premultiplied alpha."""
-    confidence: Mapping[str, np.ndarray] = field(default_factory=dict)
+    confidence: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     """(height, width) float32, by the names of `Blur.confidence`; empty without confidence."""
     placement: Placement | None = None
     """Position of the picture; None: it fills the source's data window."""

@@ -19,7 +19,7 @@ from .. import gpu
 from ..camera import Window
 from ..errors import InputError
 from ..extent import Extent
-from ..frame import Frame
+from ..frame import Floats, Frame
 from ..gpu.textures import TexturePool
 from ..gpu.timing import Clock
 from ..gpu_frame.bindings import AUTO_STRATA, FrameConstants
@@ -255,7 +255,7 @@ class Blur:
             self._judge.encode(encoder, inputs, confidence)
 
     def __call__(
-        self, color: NDArray[Any] | Frame, to_next: NDArray[Any] | None = None, **passes: Any
+        self, color: Floats | Frame, to_next: Floats | None = None, **passes: Any
     ) -> NDArray[np.float32]:
         """Blur one frame: a Frame, or a colour array and its passes (see Frame).
 

@@ -11,7 +11,7 @@ import wgpu
 from numpy.typing import NDArray
 
 from ..camera import Reprojections, Window
-from ..frame import PASSES, Frame
+from ..frame import PASSES, Floats, Frame, Integers
 from ..methods import default_method
 from ..methods.keywords import Curve, MethodKeywords, MethodName
 from ..shutter import Shutter, Weight
@@ -25,28 +25,28 @@ class FrameKeywords(MethodKeywords, total=False):
     max_blur: float | None
     device: wgpu.GPUDevice | str | None
     output: Literal["rgba32float", "rgba16float"]
-    to_prev: NDArray[Any] | None
-    motion: NDArray[Any] | None
-    depth: NDArray[Any] | None
+    to_prev: Floats | None
+    motion: Floats | None
+    depth: Floats | None
     window: Window | None
     camera: Reprojections | None
-    object_id: NDArray[Any] | None
-    normal: NDArray[Any] | None
-    holdout: NDArray[Any] | None
-    scale: NDArray[Any] | None
+    object_id: Integers | None
+    normal: Floats | None
+    holdout: Floats | None
+    scale: Floats | None
     object_motion: bool
     prev: Frame | None
     next: Frame | None
     number: int
-    diffuse_light: NDArray[Any] | None
-    diffuse_color: NDArray[Any] | None
-    glossy_light: NDArray[Any] | None
-    glossy_color: NDArray[Any] | None
+    diffuse_light: Floats | None
+    diffuse_color: Floats | None
+    glossy_light: Floats | None
+    glossy_color: Floats | None
 
 
 def blur(
-    color: NDArray[Any],
-    to_next: NDArray[Any] | None = None,
+    color: Floats,
+    to_next: Floats | None = None,
     *,
     method: MethodName | None = None,
     shutter: Shutter | float = 180,

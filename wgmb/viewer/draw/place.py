@@ -1,4 +1,4 @@
-"""Where a picture and its parts lie on the canvas."""
+"""Places of a picture and its parts on the canvas."""
 
 from __future__ import annotations
 

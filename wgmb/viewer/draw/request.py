@@ -66,8 +66,8 @@ class Drawn:
     images: dict[str, Image]
     """By slot; colours as their display shows them, or linear light."""
     under: dict[str, np.ndarray] = field(default_factory=dict)
-    """Where numbers or arrows are shown: "light" of the first image, and "depth" and "motion" (px)
-    where there are such; (height, width, channels)."""
+    """Images for numbers or arrows, if these are shown, (height, width, channels): "light" of the
+    first image, and "depth" and "motion" (px) where there are such."""
     chromaticities: dict[str, Any] = field(default_factory=dict)
     """Of what is shown, as an attribute of an EXR."""
 
