@@ -39,6 +39,8 @@ from wgmb.viewer import State, controls, offscreen
 from wgmb.viewer.draw.portions import DroppedError, Portions
 from wgmb.viewer.draw.renderer import Renderer
 from wgmb.viewer.draw.request import Request
+from wgmb.viewer.panel import overlay
+from wgmb.viewer.panel.panel import commands
 from wgmb.viewer.state.state import video_time
 from wgmb.viewer.subjects.video import VideoSubject
 from wgmb.viewer.subjects.video_motion import MotionRequest, PictureFinder, PictureFinding
@@ -231,6 +233,56 @@ def test_a_finding_that_comes_meanwhile_leaves_nothing_out(clip, monkeypatch):
         )
         assert subject.stamp([viewer.state], shutter, False) == whole or subject.busy
     viewer.stage.choices.close()
+
+
+def test_b_may_find_the_motion_in_another_way(clip):
+    settings = {"fps": 12.0, "shutter": 360.0, "frame": 1.0}
+    viewer = opened(clip, flow="none", **settings)
+    viewer.state = put(viewer.state.keeping(), flow="dis", compare="difference", gain=1.0)
+    first = settled(viewer)
+    second = viewer.stage.download(viewer.stage._slots["second"])[..., :3]
+    averaged = VideoSettings(flow="none")
+    made = {"fps": 12, "degrees": 360}
+    np.testing.assert_allclose(first, command_line(clip, 1, **made), atol=2e-5)
+    np.testing.assert_allclose(second, command_line(clip, 1, video=averaged, **made), atol=2e-5)
+    assert np.abs(first - second).max() > 0.05
+    both = [*viewer.stage.choices._clips.values()]
+    assert len(both) == 2
+    viewer.state = put(viewer.state.swapped(), exposure=1.0)
+    assert (viewer.state.video.flow, viewer.state.kept.flow) == ("none", "dis")
+    np.testing.assert_allclose(settled(viewer), second, atol=1e-6)
+    assert {*viewer.stage.choices._clips.values()} == {*both}  # nothing was opened again
+    one, other = commands(viewer.state, "out.mp4").splitlines()
+    assert "--flow none" in one and "--flow dis" in other
+    viewer.state = put(viewer.state, kept=None, compare="off", flow="search", flow_quality="fast")
+    settled(viewer)
+    assert len(viewer.stage.choices._clips) == 1
+    for subject in both:
+        subject._maker._thread.join(20)
+        assert not subject._maker._thread.is_alive()
+    viewer.stage.choices.close()
+
+
+def test_quick_motion_is_called_a_draft_in_the_picture(clip, monkeypatch):
+    said, tag = [], overlay.tag
+
+    def noted(text, *place, **how):
+        said.append(text)
+        tag(text, *place, **how)
+
+    monkeypatch.setattr(overlay, "tag", noted)
+    for changes, is_draft in (
+        ({"flow": "dis"}, True),
+        ({"flow": "dis", "look": "sharp"}, False),
+        ({"flow": "search", "flow_quality": "fast"}, False),
+        ({"flow": "none"}, False),
+    ):
+        viewer = opened(clip, **changes)
+        settled(viewer)
+        said.clear()
+        frame(viewer)
+        assert any(text.startswith("draft motion: dense inverse") for text in said) == is_draft
+        viewer.stage.choices.close()
 
 
 @pytest.mark.parametrize("flow", ["dis", "none"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from viewer_hand import ALONE, SAMPLE, Hand, put
+from viewer_hand import ALONE, SAMPLE, Hand, library, put
 from wgmb.methods import METHODS
 from wgmb.viewer import controls
 from wgmb.viewer.draw.request import Available
@@ -34,6 +34,25 @@ def test_the_numbers_are_those_of_the_picture_and_of_its_passes(hand):
     to_next = under["motion"][y, x, 2:]
     assert text[4].startswith(f"next     {to_next[0]:+.2f}, {to_next[1]:+.2f} px")
     assert text[6] == f"depth    {under['depth'][y, x, 0]:.4g}"
+
+
+def test_it_tells_how_sure_gather_is_of_the_pixel():
+    state = put(ALONE, method="gather", inspect=True)
+    hand = Hand(state, (96, 54))
+    hand.picture()
+    under, available = hand.viewer._drawn.under, hand.viewer._drawn.available
+    sure = under["confidence"]
+    render, moment = library(put(state, look="confidence"), (96, 54))
+    np.testing.assert_allclose(sure, render(*moment), atol=1e-3)
+    assert sure[..., 0].min() < 0.9 < sure[..., 0].max()
+    text = inspector.lines(state, available, under, (0.4, 0.6), None)
+    values = sure[int(0.6 * 54), int(0.4 * 96)]
+    names = ("accepted", "disocclusion", "residual", "left")
+    want = [f"{name} {value:.2f}" for name, value in zip(names, values, strict=True)]
+    assert text[-4:] == want
+    hand.viewer.state = put(state, inspect=False, arrows=True)  # which need no second blur
+    hand.picture()
+    assert "confidence" not in hand.viewer._drawn.under
 
 
 def test_the_displayed_value_is_what_is_on_the_screen(hand):
@@ -67,6 +86,8 @@ def test_frames_on_disk_have_the_vectors_that_are_in_the_file():
     frame = subject._frame(subject._now)
     np.testing.assert_array_equal(under["depth"][..., 0], frame.depth)
     assert np.abs(under["motion"]).max() > 1
+    text = inspector.lines(hand.state, hand.viewer._drawn.available, under, (0.5, 0.5), None)
+    assert text[1] == "layer    ViewLayer.Combined, depth ViewLayer.Depth.Z"
 
 
 def available(methods, looks):
@@ -81,6 +102,20 @@ def test_it_says_which_method_and_why():
     )
     flat = available(["tap", "tiles"], ["result", "velocity"])
     assert inspector.method_line(state, flat) == "method   tap, 16 samples (no depth)"
+
+
+def test_a_preview_is_not_called_by_the_method_that_it_stands_for():
+    state, can = put(ALONE, method="gather"), available(METHODS, ["result", "depth"])
+    assert inspector.method_line(state, can, True) == "method   tap, a preview of gather"
+    assert inspector.lines(state, can, {}, (0.5, 0.5), None, True)[0].startswith("method   tap")
+    texts = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(inspector, "show", lambda text, *_: texts.append(text[0]))
+        state = put(ALONE, method="gather", samples=4, shading="off", inspect=True)
+        hand = Hand(state, (96, 54))
+        assert hand.viewer.stage.report.preview.startswith("preview by tap")
+        hand.picture()
+    assert "a preview of gather" in texts[0] and texts[-1] == "method   gather, 4 samples"
 
 
 def test_the_histogram_counts_pixels_by_stops():

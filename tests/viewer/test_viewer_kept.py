@@ -7,6 +7,7 @@ from viewer_hand import ALONE, SAMPLE, SMALL, Hand, library, put
 from wgmb.color.srgb import srgb
 from wgmb.viewer import controls
 from wgmb.viewer.panel.panel import commands
+from wgmb.viewer.state.state import Kept
 
 LAYOUT = controls.WindowLayout((0, 0, 9, 9), (0, 0, 9, 9))
 A = put(ALONE, shutter=360.0)
@@ -29,7 +30,7 @@ def hand():
 
 def test_the_picture_is_a_on_one_side_and_b_on_the_other(hand):
     kept = pressed(B, "b")
-    assert (kept.compare, kept.against, kept.kept) == ("wipe", "B", (B.blur, B.shutter))
+    assert (kept.compare, kept.against, kept.kept) == ("wipe", "B", Kept.of(B))
     hand.viewer.state = put(kept, method="tap", samples=4, shutter=360.0, wipe=0.5)
     both = hand.picture()
     half = SMALL[0] // 2
@@ -54,7 +55,7 @@ def test_they_are_exchanged_and_back():
     state = put(pressed(B, "b"), method="tap", samples=4, shutter=360.0)
     other = pressed(state, "x")
     assert (other.blur, other.shutter) == (B.blur, B.shutter)
-    assert other.kept == (state.blur, state.shutter)
+    assert other.kept == Kept.of(state)
     assert pressed(other, "x") == state
     assert pressed(ALONE, "x") == ALONE
 

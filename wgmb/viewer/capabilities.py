@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import replace
 
 import wgpu
@@ -30,7 +31,7 @@ class Choices:
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self.displayed = device, DisplayCache(device)
         self._scene: SceneSubject | None = None
-        self._clip: tuple[tuple, ClipSubject | VideoSubject] | None = None
+        self._clips: OrderedDict[tuple, ClipSubject | VideoSubject] = OrderedDict()
 
     def subject(self, state: State) -> Subject:
         """The scene or the frames that the state is about."""
@@ -39,23 +40,28 @@ class Choices:
             return self._scene
         masks = state.blur.holdout, state.blur.scale
         key = (state.source, state.input, masks, state.read_as, _motion_of(state))
-        if self._clip is None or self._clip[0] != key:
-            self._clip = key, self._opened(state)
-        return self._clip[1]
+        if key not in self._clips:
+            made = self._opened(state)
+            self._forget(1 if state.kept else 0)  # B may find the motion in another way
+            self._clips[key] = made
+        self._clips.move_to_end(key)
+        return self._clips[key]
 
     def _opened(self, state: State) -> ClipSubject | VideoSubject:
-        """The video or the frames; what was shown before is let go of."""
         if state.is_video:
-            made = VideoSubject(self._device, state)
-        else:
-            made = ClipSubject(self._device, state, self.displayed.display(state))
-        self.close()
-        return made
+            return VideoSubject(self._device, state)
+        return ClipSubject(self._device, state, self.displayed.display(state))
+
+    def _forget(self, left: int) -> None:
+        """Let go of all but the last of what was shown before."""
+        while len(self._clips) > left:
+            _, clip = self._clips.popitem(last=False)
+            if isinstance(clip, VideoSubject):
+                clip.close()
 
     def close(self) -> None:
         """End what goes on beside the window."""
-        if self._clip is not None and isinstance(self._clip[1], VideoSubject):
-            self._clip[1].close()
+        self._forget(0)
 
     def methods(self, state: State) -> list[str]:
         """Names of the methods that can be used."""

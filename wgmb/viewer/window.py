@@ -366,11 +366,13 @@ class Viewer:
             self._histogram = light, None if light is None else inspector.histogram(light)
         (x, y), (left, top, width, height) = self._mouse, layout.place
         u, v = (x - left) / width, (y - top) / height
-        text = [inspector.method_line(drawn.state, drawn.available)]
+        preview = bool(drawn.report.preview)
+        text = [inspector.method_line(drawn.state, drawn.available, preview)]
         if 0 <= u < 1 and 0 <= v < 1 and controls.is_inside(area, x, y):
             ratio = self.canvas.get_pixel_ratio()
             display = self.screen.values(x * ratio, y * ratio)
-            text = inspector.lines(drawn.state, drawn.available, under, (u, v), display)
+            at = u, v
+            text = inspector.lines(drawn.state, drawn.available, under, at, display, preview)
         inspector.show(text, self._histogram[1], area)
 
     def _ask_for_more(self, busy: bool) -> None:

@@ -25,6 +25,7 @@ from ..subjects.video import VideoSubject
 from .adaptive import Pace
 from .blurs import Blurs
 from .composer import Image
+from .inspected import Inspected
 from .perception import Perceived, seen_frames
 from .place import Box, fit, whole
 from .portions import DroppedError
@@ -67,11 +68,11 @@ class Renderer:
         self._level, self._still_since, self._still = 0, 0.0, ()
         self._preview, self._ready = False, False
         self._moved = False
-        self._inspected: tuple[tuple, dict[str, np.ndarray]] = ((), {})
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._timing = timing
         if timing is None and TimestampClock.usable(device):
             self._timing = TimestampClock(device)
+        self._inspected = Inspected(device, self.choices, self._blurs, self._timing)
 
     def draw(self, request: Request, now: float) -> Drawn:
         """Go on with what is requested, `now` [s]; InputError if it cannot be shown."""
@@ -85,30 +86,15 @@ class Renderer:
             rivals=choices.rivals(state),
             options=choices.options(state.method),
             finding=getattr(choices.subject(state), "finding", ""),
+            layers=getattr(choices.subject(state), "layers", {}),
             display=choices.displayed.display(state),
         )
         looked_at = (state.inspect or state.arrows) and not (report.busy or request.moving)
-        under = self._under(state, available) if looked_at else {}
+        under = {}
+        if looked_at:
+            under = self._inspected(state, available.looks, self._slots["first"], report)
         images = self._on_screen
         return Drawn(request, state, report, available, images, under, self.chromaticities)
-
-    def _under(self, state: State, available: Available) -> dict[str, np.ndarray]:
-        """The first image and the passes that it was made from, as arrays."""
-        first = self._slots["first"]
-        key = first.key, first.fine, first.done
-        if self._inspected[0] != key:
-            arrays = {"light": self.download()}
-            passes = {"depth": "depth", "motion": "velocity"}
-            if any(look in available.looks for look in passes.values()):
-                subject = self.choices.subject(state)
-                assert first.texture is not None
-                subject.look_at(state, first.texture.size[:2], 1)
-                for name, texture in subject.passes().items():
-                    if passes.get(name) in available.looks:
-                        encoder = self.device.create_command_encoder(label="inspected")
-                        arrays[name] = self._images.download(encoder, texture)
-            self._inspected = key, arrays
-        return self._inspected[1]
 
     def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> FrameStatus:
         """Go on with what `state` shows in `area` [px] of the canvas, `now` [s].
@@ -130,11 +116,17 @@ class Renderer:
         size, antialias = self._size(state, size, place)
         report = FrameStatus(full_size, shape, place, area, moving)
         quick = (moving or self._preview) and not full
-        slots = ("first", "second")[: len(names)]
+        slots, lacks = ("first", "second")[: len(names)], False
         for slot, (name, eye) in zip(slots, names, strict=True):
             if name != "perceived":
                 self._perceived[slot].forget()
-            self._advance(slot, name, eye, state, subject, size, antialias, quick, full, report)
+            of_slot = self.choices.subject(state.as_kept) if name == KEPT else subject
+            self._advance(slot, name, eye, state, of_slot, size, antialias, quick, full, report)
+            if isinstance(of_slot, VideoSubject) and name != "sharp":
+                report.waiting = report.waiting or of_slot.waiting
+                lacks |= of_slot.busy
+                if name in ("result", KEPT) and (draft := of_slot.draft):
+                    report.drafts.append(f"{KEPT}: {draft}" if name == KEPT else draft)
         first, last = self._slots["first"], self._slots[slots[-1]]
         assert first.texture is not None
         report.size, report.kind = first.texture.size[:2], first.kind
@@ -145,13 +137,9 @@ class Renderer:
             report.preview = f"preview by {QUICKEST}{of_size}"
         self._on_screen = self._displayed(slots, state, subject)
         self._ready = all(self._coming[slot].ready for slot in slots)
-        report.busy = moving or not self._ready or self._level > 0 or self._preview
+        report.busy = moving or not self._ready or self._level > 0 or self._preview or lacks
         if isinstance(subject, VideoSubject):
-            report.draft = subject.draft if state.look == "result" else ""
             report.made_of = subject.made_of(state, state.shutter.make())
-            if any(name != "sharp" for name, _ in names):
-                report.waiting = subject.waiting
-                report.busy |= subject.busy
         if names[-1][0] == REFERENCE:
             report.reference = last.done, last.total
             report.measured = measured = self._measure(first, last)

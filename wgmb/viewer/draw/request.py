@@ -51,6 +51,8 @@ class Available:
     rivals: list[str]
     options: dict[str, Option]
     finding: str = ""
+    layers: dict[str, str] = field(default_factory=dict)
+    """Of frames on disk: names in their files, by "picture" and "depth"."""
     display: Display | None = None
 
 
@@ -67,7 +69,7 @@ class Drawn:
     """By slot; colours as their display shows them, or linear light."""
     under: dict[str, np.ndarray] = field(default_factory=dict)
     """Images for numbers or arrows, if these are shown, (height, width, channels): "light" of the
-    first image, and "depth" and "motion" (px) where there are such."""
+    first image, and "depth", "motion" (px) and "confidence" where there are such."""
     chromaticities: dict[str, Any] = field(default_factory=dict)
     """Of what is shown, as an attribute of an EXR."""
 

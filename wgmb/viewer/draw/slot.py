@@ -47,7 +47,7 @@ class FrameStatus:
     moving: bool = False
     size: tuple[int, int] = (0, 0)
     preview: str = ""  # of what, where a quick method stands for the one that is set
-    draft: str = ""  # in what way a video's motion is no more than a draft
+    drafts: list[str] = field(default_factory=list)  # in what way motion is no more than a draft
     seconds: dict[str, float] = field(default_factory=dict)  # on the clock
     passes: dict[str, float] = field(default_factory=dict)  # on the GPU, where it tells
     labels: tuple[str, str] = ("", "")

@@ -11,6 +11,7 @@ from ...color.primaries import REC709, luminance
 from ...gpu import wgsl
 from ...methods import METHODS
 from ...pipeline.arguments import SAMPLES
+from ..capabilities import QUICKEST
 from ..controls import Box
 from ..draw.place import overlap
 from ..draw.request import Available
@@ -23,6 +24,7 @@ STOPS = int(_COMPOSE.constant("LOWEST")), int(_COMPOSE.constant("HIGHEST"))
 _BINS = 64
 _STEP = 40.0  # from one arrow to the next [logical px]
 _SHORTEST = 0.5  # motion that has an arrow [px]
+_VALUES = 96.0  # where they begin, beside their names [logical px]
 _HEAD = 5.0  # of an arrow [logical px]
 
 
@@ -38,9 +40,15 @@ def lines(
     under: dict[str, np.ndarray],
     at: tuple[float, float],
     display: np.ndarray | None,
+    is_preview: bool = False,
 ) -> list[str]:
-    """The text for a place `at`, 0 to 1 across and down; `display`: values on the screen there."""
-    found = [method_line(state, available)]
+    """The text for a place `at`, 0 to 1 across and down; `display`: values on the screen there.
+
+    `is_preview`: the quickest method stands for the one that is set.
+    """
+    found = [method_line(state, available, is_preview)]
+    if available.layers:
+        found.append("layer    " + ", depth ".join(available.layers.values()))
     light = under.get("light")
     if light is None:
         return [*found, "..."]
@@ -57,11 +65,16 @@ def lines(
         found.append(f"previous {before[0]:+.2f}, {before[1]:+.2f} px")
     if "depth" in under:
         found.append(f"depth    {float(texel_at(under['depth'], *at).flat[0]):.4g}")
+    if "confidence" in under:
+        names, sure = METHODS[state.method].confidence, texel_at(under["confidence"], *at)
+        found += [f"{name} {value:.2f}" for name, value in zip(names, sure, strict=True)]
     return found
 
 
-def method_line(state: State, available: Available) -> str:
+def method_line(state: State, available: Available, is_preview: bool = False) -> str:
     """The method and its samples; why it is not gather, where that cannot be had."""
+    if is_preview:
+        return f"method   {QUICKEST}, a preview of {state.method}"
     samples = state.suited_blur.samples or getattr(METHODS[state.method], "samples", SAMPLES)
     text = f"method   {state.method}, {samples} samples"
     if "gather" in available.methods or not available.methods:
@@ -125,7 +138,7 @@ def show(text: list[str], shares: np.ndarray | None, area: Box) -> None:
     for line in text:
         name, _, value = line.partition(" ")
         imgui.text(name)
-        imgui.same_line(70)
+        imgui.same_line(_VALUES)
         imgui.text(value.strip())
     if shares is not None:
         peak = float(np.sqrt(shares).max())

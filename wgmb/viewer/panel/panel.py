@@ -67,7 +67,7 @@ class Panel:
         overlay.name_images(state, report.labels, info.flicked, x, y + 12, wide)
         if key is not None:
             overlay.explain(state, key, report.full[1])
-        for n, remark in enumerate(filter(None, (report.preview, report.draft))):
+        for n, remark in enumerate(filter(None, (report.preview, *report.drafts))):
             overlay.tag(remark, x + 12, y + 40 + 28 * n)
         overlay.tell(info.recording, info.message, area)
         if state.help:

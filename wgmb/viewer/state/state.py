@@ -47,6 +47,27 @@ _SHUTTER = ShutterSettings().resolved()
 
 
 @dataclass(frozen=True)
+class Kept:
+    """Settings that are kept to be compared with: how things move, and how they are blurred."""
+
+    blur: BlurSettings
+    shutter: ShutterSettings
+    flow: str
+    flow_quality: str
+
+    @staticmethod
+    def of(state: State) -> Kept:
+        """Those of a state."""
+        video = state.video
+        return Kept(state.blur, state.shutter, video.flow, video.flow_quality)
+
+    def put_into(self, state: State) -> State:
+        """The state with these settings."""
+        video = replace(state.video, flow=self.flow, flow_quality=self.flow_quality)
+        return replace(state, blur=self.blur, shutter=self.shutter, video=video)
+
+
+@dataclass(frozen=True)
 class State:
     """A scene or frames on disk, how they are blurred, and how that is shown."""
 
@@ -91,7 +112,7 @@ class State:
     speed: float = 0.25
     panel: bool = True
     help: bool = False
-    kept: tuple[BlurSettings, ShutterSettings] | None = None
+    kept: Kept | None = None
     """Settings B, which the present ones can be compared with."""
     inspect: bool = False
     """Numbers under the mouse are shown."""
@@ -142,17 +163,16 @@ class State:
     @property
     def as_kept(self) -> State:
         """The same with settings B, if there are any."""
-        blur, shutter = self.kept or (self.blur, self.shutter)
-        return replace(self, blur=blur, shutter=shutter)
+        return self.kept.put_into(self) if self.kept else self
 
     def keeping(self) -> State:
         """The same, its settings kept as B and compared with."""
         compare = "wipe" if self.compare == "off" else self.compare
-        return replace(self, kept=(self.blur, self.shutter), compare=compare, against=KEPT)
+        return replace(self, kept=Kept.of(self), compare=compare, against=KEPT)
 
     def swapped(self) -> State:
         """The same with settings B, the present ones kept as B."""
-        return self if self.kept is None else replace(self.as_kept, kept=(self.blur, self.shutter))
+        return self if self.kept is None else replace(self.as_kept, kept=Kept.of(self))
 
     @property
     def number(self) -> int:

@@ -28,6 +28,7 @@ from ...sequence.data_windows import (
 )
 from ...sequence.frame_file import FrameFile
 from ...sequence.input_color import space_of, without_pixels
+from ...sequence.layers import names
 from ...settings import size_of
 from ..state.state import BOTH_EYES, State
 from .video import VideoSubject
@@ -116,6 +117,7 @@ class ClipSubject:
         blur, space = state.blur, state.color.space(display)
         self._clip = state.input.open(state.source, blur.holdout, blur.scale, space)
         self._headers: dict[tuple, FrameFile] = {}  # what the frames say of their colours
+        self._layers: dict[tuple, dict[str, str]] = {}
         self._frames: OrderedDict[_Which, Frame] = OrderedDict()
         self._sharp = Blur("tap", device=device)
         self._uploaders: dict[tuple, Blur] = {}
@@ -145,6 +147,12 @@ class ClipSubject:
         """The colour space of the frame; InputError if it is unknown."""
         self._frame(self._now)
         return space_of(self._headers[self._now[:2]], config)
+
+    @property
+    def layers(self) -> dict[str, str]:
+        """Names of the layers in the frame's file: "picture", and "depth" if it has one."""
+        self._frame(self._now)
+        return self._layers[self._now[:2]]
 
     @property
     def eyes(self) -> list[str]:
@@ -190,6 +198,7 @@ class ClipSubject:
             source = self._clip.source(*key[:2])
             frame = self._clip.with_neighbours(source, extent=EVERYWHERE, reach=key[3])
             self._headers[key[:2]] = without_pixels(source)
+            self._layers[key[:2]] = _layers(source, self._clip.passes.depth)
             least, most = _FRAMES_KEPT
             around = 2 * key[3] + 1
             kept = min(max(_MEMORY // (around * _bytes(frame)), least), most)
@@ -238,6 +247,14 @@ class ClipSubject:
         blur.encode(encoder, output=view, timing=timing, **self._inputs(blur))
         gpu.submit(self._device, encoder)
         return blur.samples
+
+
+def _layers(source: FrameFile, wanted_depth: str | None) -> dict[str, str]:
+    """Names of the picture's layer and of the depth's channel."""
+    picture = next((name for name in source.color if name), "")
+    depth = names.find_depth(source.channels, wanted_depth, source.reference_channel)
+    found = {"picture": picture.rpartition(".")[0] or ", ".join(filter(None, source.color))}
+    return found | ({"depth": depth} if depth else {})
 
 
 def _canvas(frame: Frame) -> Window:
