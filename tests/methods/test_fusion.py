@@ -91,7 +91,7 @@ def test_missing_depth_is_named(square):
     (["Image.N"], ""),
 ])  # fmt: skip
 def test_normals_are_found_by_name(names, found):
-    assert "".join(n[-1] for n in layers.find_normal(names)) == found
+    assert "".join(n[-1] for n in layers.find_triple(names, layers.TRIPLES["normal"])) == found
 
 
 def test_normals_of_a_file_reach_the_frame(tmp_path):

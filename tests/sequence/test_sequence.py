@@ -391,12 +391,6 @@ def test_the_same_run_twice_gives_the_same_bytes(tmp_path, capsys, shot):
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
-def test_a_video_is_not_resumed(tmp_path, shot, capsys):
-    code, _, err = make.inside(capsys, "blur", shot, "-o", tmp_path / "v.mp4", "--resume")
-    assert code == 2
-    assert "--resume" in err
-
-
 @pytest.mark.parametrize("name", ["o.bmp", "o", "o.exr.gz"])
 def test_an_output_of_unknown_kind_is_refused_with_what_there_is(tmp_path, name):
     with pytest.raises(InputError, match=r"\.exr.*\.png.*\.mp4"):

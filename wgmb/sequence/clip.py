@@ -315,6 +315,6 @@ class Clip:
 
 
 def _wanted(picture: bool, normal: bool, light: bool) -> frozenset[str]:
-    """Those of OPTIONAL that three options stand for."""
+    """OPTIONAL, without those that three options switch off."""
     named = ("color", picture), ("normal", normal), ("diffuse_light", light)
-    return frozenset(name for name, is_wanted in named if is_wanted)
+    return OPTIONAL - {name for name, is_wanted in named if not is_wanted}

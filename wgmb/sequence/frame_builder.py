@@ -23,7 +23,7 @@ from .layers.vector_convention import ConventionFinder
 
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
 
-OPTIONAL = frozenset({"color", "normal", "diffuse_light"})
+OPTIONAL = frozenset({"color", "diffuse_light", *layers.TRIPLES})
 """Inputs that are read only if they are wanted; "diffuse_light" stands for all passes of light."""
 
 
@@ -79,7 +79,7 @@ class FrameBuilder:
                 else np.zeros((*source.size[::-1], 3), np.float16),
                 motion=motion,
                 depth=depth,
-                normal=self._normal(source) if "normal" in wanted else None,
+                **self._triples(source, wanted),
                 **(self._light(source) if "diffuse_light" in wanted else {}),
                 window=source.window,
                 camera=reprojections,
@@ -128,11 +128,15 @@ class FrameBuilder:
                 depth = np.where(depth > 0, 1 / depth, np.inf).astype(np.float32)
         return depth
 
-    def _normal(self, source: FrameFile) -> np.ndarray | None:
-        names = layers.find_normal(self._stored.own(source), source.reference_channel)
-        if not names:
-            return None
-        return np.stack([source.channels[name] for name in names], 2, dtype=np.float32)
+    def _triples(self, source: FrameFile, wanted: frozenset[str]) -> dict[str, Any]:
+        """Fields of Frame that are layers of three channels, as far as there are such."""
+        made = {}
+        for name in wanted & layers.TRIPLES.keys():
+            stems, near = layers.TRIPLES[name], source.reference_channel
+            if names := layers.find_triple(self._stored.own(source), stems, near):
+                planes = [source.channels[channel] for channel in names]
+                made[name] = np.stack(planes, 2, dtype=np.float32)
+        return made
 
     def _light(self, source: FrameFile) -> dict[str, Any]:
         """Fields of Frame; what is there in vain is noted."""

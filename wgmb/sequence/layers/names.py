@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 
@@ -22,7 +22,8 @@ _COMPONENTS = (
     {"red": 0, "green": 1, "blue": 2, "alpha": 3},
 )
 _COLOR = ("combined", "rgba", "rgb", "beauty", "color", "colour", "image", "final", "noisy image")
-_NORMAL = ("normal", "normals", "n")
+TRIPLES = {"normal": ("normal", "normals", "n")}
+"""Layers of three channels, as stems of their names, by the input of a Frame that they are."""
 _DEPTH = ("depth", "z", "zdepth", "vrayzdepth", "z-depth", "z_depth", "worlddepth")
 
 
@@ -119,12 +120,12 @@ def find_depth(
     return by_layer[named[0]][0] if named else None
 
 
-def find_normal(names: Iterable[str], near: str | None = None) -> list[str]:
-    """The three channels (x, y, z or r, g, b) of a layer called normal, normals or n, in any
-    case, beside the channel `near`; none if no name says so.
+def find_triple(names: Iterable[str], stems: Collection[str], near: str | None = None) -> list[str]:
+    """The three channels (x, y, z or r, g, b) of a layer with one of these names, in any case,
+    beside the channel `near`; none if no name says so.
     """
     for layer, members in layers(names, near).items():
-        if stem(layer) in _NORMAL and len(members) == 3:
+        if stem(layer) in stems and len(members) == 3:
             return members
     return []
 
