@@ -18,11 +18,33 @@ from wgmb.viewer.window import frame
 ROOT = Path(__file__).parents[2]
 SIZE = 800, 720  # of the window; its picture is 480 wide
 PATIENCE = 90  # seconds: a busy machine without a GPU is slow
+WATCHED = """
+import os, weakref, glfw
+from wgpu.backends.wgpu_native import GPUCanvasContext as Surface
+from wgmb.viewer import State, view, window
+surfaces, make, destroy = weakref.WeakSet(), Surface.__init__, glfw.destroy_window
+def made(self, *arguments):
+    make(self, *arguments)
+    surfaces.add(self)
+def destroyed(its):
+    if surfaces:
+        os.write(2, b"the window goes before its surface")
+        os._exit(9)
+    destroy(its)
+Surface.__init__, glfw.destroy_window = made, destroyed
+"""
 BROKEN = """
-from wgmb.viewer import State, view
 from wgmb.viewer.draw.composer import Composer
 def compose(*_): raise ZeroDivisionError("broken")
 Composer.compose = compose
+view(State().with_settings(method="tap"))
+"""
+QUITTING = """
+draw = window.Viewer._draw
+def quitting(self):
+    draw(self)
+    self.do("quit")
+window.Viewer._draw = quitting
 view(State().with_settings(method="tap"))
 """
 CLOSE = """
@@ -275,10 +297,14 @@ def test_closing_the_window_ends_the_program(desk):
 
 
 def test_an_error_while_drawing_ends_the_program(desk):
-    it = desk("-c", BROKEN)
+    it = desk("-c", WATCHED + BROKEN)
     code, said = it.end()
-    assert code == 1
+    assert code == 1, said
     assert "ZeroDivisionError: broken" in said
+
+
+def test_quitting_while_drawing_releases_the_surface_first(desk):
+    assert desk("-c", WATCHED + QUITTING).end() == (0, "")
 
 
 def test_without_a_display_it_says_so(tmp_path):

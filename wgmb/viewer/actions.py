@@ -34,9 +34,10 @@ class Actions:
         stage: Renderer | DrawThread,
         screen: Screen | ScreenThread,
         say: Callable[[str], None],
+        quit: Callable[[], None],
     ):
         self._window = getattr(canvas, "_window", None)  # of glfw, where there is one
-        self._canvas, self._stage, self._screen, self._say = canvas, stage, screen, say
+        self._stage, self._screen, self._say, self._quit = stage, screen, say, quit
         self._video: FrameVideo | None = None
         self._windowed: tuple[int, int, int, int] | None = None
         self.export: tuple[subprocess.Popen, str] | None = None
@@ -50,7 +51,7 @@ class Actions:
     def do(self, action: str, argument: str, state: State) -> State:
         """Do it; the state afterwards, which only "open" and "load" change."""
         actions = {
-            "quit": lambda: self._canvas.close(),
+            "quit": self._quit,
             "save": lambda: self._save(Path(argument), state),
             "open": lambda: self._open(argument.split("\0"), state),
             "load": lambda: self._load(Path(argument)),

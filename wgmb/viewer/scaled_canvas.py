@@ -13,6 +13,7 @@ class ScaledCanvas:
 
     def __init__(self, canvas: Any, scale: float = 1.0):
         self._canvas, self.scale = canvas, scale
+        self._contexts: list[_Context] = []
 
     def __getattr__(self, name: str):
         return getattr(self._canvas, name)
@@ -28,7 +29,17 @@ class ScaledCanvas:
 
     def get_wgpu_context(self) -> Any:
         """The canvas's context, with the same sizes."""
-        return _Context(self._canvas.get_wgpu_context(), self)
+        self._contexts.append(_Context(self._canvas.get_wgpu_context(), self))
+        return self._contexts[-1]
+
+    def release_surface(self) -> None:
+        """Let go of the surface while its window exists. Nothing can be drawn afterwards.
+
+        Mesa frees a surface's images by the connection of its window: after the window, that was
+        an X error, and after the connection, a heap that is damaged.
+        """
+        for context in self._contexts:
+            context.release()
 
     def add_event_handler(self, handler: Callable[[dict], None], *types: str, **options) -> None:
         """As of the canvas; `handler` gets positions in pixels of the interface."""
@@ -50,6 +61,9 @@ class ScaledCanvas:
 class _Context:
     def __init__(self, context: Any, canvas: ScaledCanvas):
         self._context, self._scaled = context, canvas
+
+    def release(self) -> None:
+        self._context = None
 
     def __getattr__(self, name: str):
         return getattr(self._context, name)

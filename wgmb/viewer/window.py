@@ -6,6 +6,7 @@ import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -82,7 +83,7 @@ class Viewer:
         else:
             self.stage, self.screen = Renderer(self.device), Screen(self.device, format)
         self.panel = Panel()
-        self.actions = Actions(canvas, self.stage, self.screen, self.say)
+        self.actions = Actions(canvas, self.stage, self.screen, self.say, self._quit)
         self.failed: BaseException | None = None
         self.message = ("", 0.0)  # and until when it is shown
         self._good = self._requested = state  # drawn without an error, and requested last
@@ -110,7 +111,7 @@ class Viewer:
         # Before ImGui's handlers, which keep to themselves what they take.
         canvas.add_event_handler(self._guarded(self._on_any), *_SEEN, order=-201)
         canvas.add_event_handler(self._guarded(self._on_event), *_HANDLED, order=-200)
-        canvas.request_draw(self._guarded(self._draw))
+        canvas.request_draw(self._draw_unless_failed)
 
     # ---- events --------------------------------------------------------------------------
 
@@ -124,9 +125,14 @@ class Viewer:
                 function(*arguments)
             except Exception as error:
                 self.failed = _translated(error)
-                self.canvas.close()
+                self._quit()
 
         return guarded
+
+    def _quit(self) -> None:
+        """Close the window, after what is being drawn: it is presented on the window."""
+        close = self.canvas.close
+        close() if self._call_soon is None else self._call_soon(close)
 
     @property
     def is_threaded(self) -> bool:
@@ -233,6 +239,12 @@ class Viewer:
         """A thread has drawn something; called there."""
         if self._call_soon is not None:
             self._call_soon(self.canvas.request_draw)
+
+    def _draw_unless_failed(self) -> None:
+        """Draw a frame; one that cannot be drawn is not presented either."""
+        self._guarded(self._draw)()
+        if self.failed is not None:
+            raise wgpu.DrawCancelled
 
     def _draw(self) -> None:
         started = time.perf_counter()
@@ -452,7 +464,15 @@ def view(
             )
     from rendercanvas.glfw import RenderCanvas, loop  # only now: without a display it aborts
 
-    canvas = RenderCanvas(title=TITLE, size=size, update_mode="ondemand", max_fps=60)
+    class Window(RenderCanvas):
+        """A window whose surface is released before it closes."""
+
+        def close(self) -> None:
+            _forget_locals(viewer.failed)
+            viewer.canvas.release_surface()
+            super().close()
+
+    canvas = Window(title=TITLE, size=size, update_mode="ondemand", max_fps=60)
     soon = loop.call_soon_threadsafe
     viewer = Viewer(canvas, state, **devices, interface=interface, call_soon=soon)
     window: Any = canvas._window
@@ -462,6 +482,14 @@ def view(
     viewer.close()
     if viewer.failed is not None:
         raise viewer.failed
+
+
+def _forget_locals(error: BaseException | None) -> None:
+    """Clear the variables of an error's callers that have ended: the canvas's hold its surface."""
+    frame = error.__traceback__.tb_frame if error and error.__traceback__ else None
+    while frame := frame and frame.f_back:
+        with suppress(RuntimeError):  # it has not ended
+            frame.clear()
 
 
 def _translated(error: Exception) -> Exception:
