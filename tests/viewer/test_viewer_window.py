@@ -82,7 +82,7 @@ def test_an_error_while_drawing_is_not_swallowed(monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("broken")
 
-    monkeypatch.setattr(hand.viewer.screen, "compose", broken)
+    monkeypatch.setattr(hand.viewer.screen, "show", broken)
     with pytest.raises(ZeroDivisionError):
         hand.look()
     assert hand.viewer.canvas.get_closed()
