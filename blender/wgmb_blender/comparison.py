@@ -14,8 +14,7 @@ def show(rgba: np.ndarray, name: str = COMPARISON) -> bpy.types.Image:
     height, width = rgba.shape[:2]
     image = bpy.data.images.get(name)
     if image is not None and tuple(image.size) != (width, height):
-        bpy.data.images.remove(image)
-        image = None
+        image.scale(width, height)  # another one would not be in the editor that shows this one
     if image is None:
         image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
         image.alpha_mode = "PREMUL"

@@ -8,7 +8,7 @@ import pytest
 
 import scenes
 from wgmb_blender import job, preview
-from wgmb_blender.comparison import PREVIEW
+from wgmb_blender.comparison import PREVIEW, show
 from wgmb_blender.sharp import LIGHT_PASSES
 from wgmb_blender.wanted import Report, Wanted
 
@@ -53,6 +53,16 @@ def pictures(monkeypatch):
     own = preview.show
     monkeypatch.setattr(preview, "show", lambda rgba, name: shown.append(rgba) or own(rgba, name))
     return shown
+
+
+def test_an_image_keeps_its_place_in_an_editor_when_its_size_changes():
+    small = show(np.zeros((9, 16, 4), np.float32), "sized")
+    whole = np.random.default_rng(0).random((18, 40, 4)).astype(np.float32)
+    assert show(whole, "sized") == small and tuple(small.size) == (40, 18)
+    pixels = np.empty(whole.size, np.float32)
+    small.pixels.foreach_get(pixels)
+    np.testing.assert_array_equal(pixels.reshape(whole.shape)[::-1], whole)
+    bpy.data.images.remove(small)
 
 
 def until(count: int, pictures: list) -> np.ndarray:

@@ -73,6 +73,39 @@ def work():
 steps = work()
 bpy.app.timers.register(lambda: next(steps, None), first_interval=2)
 """
+LIVE = """
+import bpy
+import numpy as np
+from pathlib import Path
+FOLDER = Path(bpy.data.filepath).parent
+def seen(area):
+    image = area.spaces.active.image
+    if image is None:
+        return "nothing"
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    return f"{image.name} {tuple(image.size)} {pixels.std():.4f}"
+def work():
+    from bl_ext.user_default.wgmb import preview
+    window = bpy.context.window_manager.windows[0]
+    area = max(window.screen.areas, key=lambda area: area.width * area.height)
+    area.type = "IMAGE_EDITOR"
+    yield 1
+    window.scene.frame_set(5)
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area):
+        bpy.ops.wgmb.preview()
+    for shutter in (1.0, 0.1):
+        window.scene.render.motion_blur_shutter = shutter
+        yield 1
+        while not preview.text().startswith("Preview of frame"):
+            yield 0.1
+        yield 3
+        with (FOLDER / "seen").open("a") as file:
+            file.write(seen(area) + "\\n")
+    bpy.ops.wm.quit_blender()
+steps = work()
+bpy.app.timers.register(lambda: next(steps, None), first_interval=2)
+"""
 
 
 @pytest.fixture(scope="module")
@@ -149,6 +182,20 @@ def test_the_window(shot):
                 program.kill()
     assert sorted(p.name for p in shot.glob("*.png")) == [f"blurred_000{n}.png" for n in (4, 5, 6)]
     assert "3 frames blurred" in (shot / "log").read_text()
+
+
+@pytest.mark.skipif(not shutil.which("Xvfb"), reason="needs Xvfb")
+def test_the_live_preview_is_in_the_image_editor_and_follows_the_shutter(shot):
+    file = shot / "shot.blend"
+    done = blender(shot, "-b", file, "-c", "wgmb", "--frames", "5")
+    assert done.returncode == 0, done.stdout + done.stderr
+    (shot / "live.py").write_text(LIVE)
+    with display() as number:
+        words = ["--window-geometry", "0", "0", "800", "600", file, "-P", shot / "live.py"]
+        done = blender(shot, *words, DISPLAY=number)
+    first, second = (shot / "seen").read_text().splitlines()
+    assert first.startswith("Motion Blur: preview (64, 36) "), done.stdout + done.stderr
+    assert second.startswith("Motion Blur: preview (64, 36) ") and first != second
 
 
 @contextlib.contextmanager
