@@ -84,9 +84,9 @@ def test_what_is_scattered_is_its_twin():
     blur(frame_of(frames))
     given = [(offset, *frame) for offset, frame in zip((0, -1, 1), frames, strict=True)]
     layers = [
-        gather_twin.separate(*given[0], prev=given[1], next=given[2]),
-        gather_twin.separate(*given[1], next=given[0]),
-        gather_twin.separate(*given[2], prev=given[0]),
+        gather_twin.separate(*given[0], 0.5, prev=given[1], next=given[2]),
+        gather_twin.separate(*given[1], 0.5, next=given[0]),
+        gather_twin.separate(*given[2], 0.5, prev=given[0]),
     ]
     for frame, got in zip(layers, words_of(blur, 3, 4), strict=True):
         tiles = gather_twin.tile_candidates(frame, (-0.5, 0.5))

@@ -219,8 +219,16 @@ def test_gather_is_its_twin(size, frames, degrees, wall):
 def test_gather_is_its_twin_in_a_crowd():
     """Grass, over a fifth of whose pixels show three surfaces: nothing is separated there."""
     sources = [(offset, *blades((36, 52), offset)) for offset in (0, -1, 1)]
-    assert not (gather_twin.separate(*sources[0]).depth[1] > 0).any()
+    assert not (gather_twin.separate(*sources[0], 0.25).depth[1] > 0).any()
     assert differing_from_gather(sources, 180) < 0.01
+
+
+def test_gather_is_its_twin_where_surfaces_hardly_move_apart():
+    """Vectors are not filtered: nothing is separated, and edges are smooth."""
+    sources = [(offset, *crossing((36, 52), offset, wall=False)) for offset in (0, -1, 1)]
+    assert not (gather_twin.separate(*sources[0], 0.04).depth[1] > 0).any()
+    assert (gather_twin.separate(*sources[0], 0.25).depth[1] > 0).any()
+    assert differing_from_gather(sources, 28) < 0.01
 
 
 @pytest.mark.full

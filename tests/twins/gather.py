@@ -23,7 +23,7 @@ class Layers:
     coverage: np.ndarray
     inferred: np.ndarray  # the back layer was not seen
     edgeless: np.ndarray  # no edge that is separated in the 3 x 3
-    smooth: np.ndarray  # no edge at all
+    smooth: np.ndarray  # no edge that is seen while the shutter is open
     single: np.ndarray  # of one layer
     unsplit: np.ndarray  # the path of the pixel's own vectors
     unsplit_depth: np.ndarray
@@ -45,10 +45,13 @@ class Sample:
 def gather(frames, times):
     """Mean over `times`; frames: (offset, color, motion, depth), the frame itself first."""
     at = {f[0]: f for f in frames}
-    layers = [separate(*f, prev=at.get(f[0] - 1), next=at.get(f[0] + 1)) for f in frames[1:]]
-    far = [layer for layer in layers if abs(layer.offset) > 1]
     span = times[0] - (times[1] - times[0]) / 2, times[-1] + (times[1] - times[0]) / 2
-    unlit = separate(*frames[0], prev=at.get(-1), next=at.get(1))
+    longest = max(-span[0], span[1])
+    layers = [
+        separate(*f, longest, prev=at.get(f[0] - 1), next=at.get(f[0] + 1)) for f in frames[1:]
+    ]
+    far = [layer for layer in layers if abs(layer.offset) > 1]
+    unlit = separate(*frames[0], longest, prev=at.get(-1), next=at.get(1))
     for layer in layers:
         if abs(layer.offset) == 1:
             offset, color, motion, depth = at[layer.offset]
@@ -60,7 +63,7 @@ def gather(frames, times):
                 motion,
                 depth,
             )
-    layers.insert(0, separate(*frames[0], prev=at.get(-1), next=at.get(1), far=far))
+    layers.insert(0, separate(*frames[0], longest, prev=at.get(-1), next=at.get(1), far=far))
     tiles = [tile_candidates(f, span) for f in layers]
     for frame, its_tiles in zip(layers[: len(layers) - len(far)], tiles, strict=False):
         scatter(frame, its_tiles, span, min(SLICES, len(times)), own=layers[0])
@@ -91,15 +94,16 @@ def around(height, width, y, x, radius):
             yield j, i
 
 
-def separate(offset, color, motion, depth, prev=None, next=None, far=()):
+def separate(offset, color, motion, depth, longest, prev=None, next=None, far=()):
     """Separate pixels that show two surfaces into a front layer and what is behind it.
 
-    `prev`, `next`: the frames around, as those of `gather`; `far`: Layers of those beyond.
+    `longest`: time from the instant of the frame that is blurred, at which it is exposed. `prev`,
+    `next`: the frames around, as those of `gather`; `far`: Layers of those beyond.
     """
     height, width = depth.shape
     color, motion = color.astype(float), motion.astype(float)
     z = valid(depth)
-    edges, shows_third = np.zeros((2, height, width), bool)
+    edges, shows_third, slow, fast, mixed = np.zeros((5, height, width), bool)
     for y in range(height):
         for x in range(width):
             near = list(around(height, width, y, x, 1))
@@ -111,7 +115,11 @@ def separate(offset, color, motion, depth, prev=None, next=None, far=()):
             shows_third[y, x] = edges[y, x] and any(
                 min(depths) * k < d < max(depths) / k for d in depths
             )
-    separated = edges & ~in_crowd(shows_third)
+            slow[y, x] = apart * longest < 1
+            fast[y, x] = edges[y, x] and apart > 2
+            mixed[y, x] = fast[y, x] and is_mixed(motion, z, (y, x), near)
+    seen = edges & ~(slow & unfiltered(fast, mixed))
+    separated = seen & ~in_crowd(shows_third)
     bends, ratios = np.zeros((height, width, 3)), np.ones((height, width))
     for y in range(height):
         for x in range(width):
@@ -131,21 +139,47 @@ def separate(offset, color, motion, depth, prev=None, next=None, far=()):
         for x in range(width):
             near = list(around(height, width, y, x, 1))
             edgeless[y, x] = not any(separated[p] for p in near)
-            smooth[y, x] = not any(edges[p] for p in near)
+            smooth[y, x] = not any(seen[p] for p in near)
     paths = [trajectories(found[1]), trajectories(back[1])]
     depths = [found[2], back[2]]
     return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred, edgeless, smooth,
                   ~separated, trajectories(own), z * ratios)  # fmt: skip
 
 
-def in_crowd(shows_third):
-    """True where over a fifth of the pixels in the 7 x 7 tiles around show three surfaces."""
-    out = np.zeros_like(shows_third)
-    for top in range(0, shows_third.shape[0], TILE):
-        for left in range(0, shows_third.shape[1], TILE):
+def is_mixed(motion, z, at, near):
+    """True if motions on the pixel's own side of an edge differ by over a fifth of those across."""
+    nearest, farthest = min(z[p] for p in near), max(z[p] for p in near)
+    between = 1.5 * nearest if farthest >= NO_DEPTH else np.sqrt(nearest * farthest)
+    off = {p: np.linalg.norm(motion[p] - motion[at]) for p in near}
+    sides = [[off[p] for p in near if (z[p] < between) == side] for side in (True, False)]
+    same, other = sides if z[at] < between else sides[::-1]
+    return max(same) > 0.2 * max(other, default=0)
+
+
+def around_tiles(size):
+    """Every tile, and the 7 x 7 tiles around it."""
+    for top in range(0, size[0], TILE):
+        for left in range(0, size[1], TILE):
             low = max(top - 3 * TILE, 0), max(left - 3 * TILE, 0)
-            share = shows_third[low[0] : top + 4 * TILE, low[1] : left + 4 * TILE].mean()
-            out[top : top + TILE, left : left + TILE] = share > 0.2
+            yield (
+                np.s_[top : top + TILE, left : left + TILE],
+                np.s_[low[0] : top + 4 * TILE, low[1] : left + 4 * TILE],
+            )
+
+
+def in_crowd(shows_third):
+    """True where over a fifth of the pixels in the tiles around show three surfaces."""
+    out = np.zeros_like(shows_third)
+    for tile, there in around_tiles(out.shape):
+        out[tile] = shows_third[there].mean() > 0.2
+    return out
+
+
+def unfiltered(fast, mixed):
+    """True where less than three tenths of the fast edges in the tiles around are mixed."""
+    out = np.zeros_like(fast)
+    for tile, there in around_tiles(out.shape):
+        out[tile] = mixed[there].sum() < 0.3 * fast[there].sum()
     return out
 
 

@@ -24,9 +24,10 @@ class Edges:
         "edge_flags" per pixel and "crowds" per tile."""
         size = inputs.bindings.size
         flags = self._images.view("edge flags", size, "r32uint")
-        crowds = self._crowds.at_least(8 * math.prod(grid_of(size)))
-        encoder.clear_buffer(crowds)
         kernel = gpu.kernel(self._device, "methods/gather/layers/edges.wgsl")
+        kinds = int(kernel.source.constant("KINDS"))
+        crowds = self._crowds.at_least(4 * kinds * math.prod(grid_of(size)))
+        encoder.clear_buffer(crowds)
         given = {
             "worklist": worklist,
             "motion": frame.motion,
@@ -36,5 +37,5 @@ class Edges:
         }
         kernel.run(encoder, "detect_edges", inputs.bindings, worklist, **given)
         tiles = replace(inputs.bindings, size=grid_of(size))
-        kernel.run(encoder, "find_crowds", tiles, **given)
+        kernel.run(encoder, "look_around_tiles", tiles, **given)
         return {"edge_flags": flags, "crowds": crowds}

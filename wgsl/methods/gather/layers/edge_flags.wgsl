@@ -5,7 +5,8 @@
 @group(1) @binding(1) var motion: texture_2d<f32>;      // of one frame: to_prev, to_next [px]
 @group(1) @binding(2) var depth: texture_2d<f32>;
 
-const EDGE: u32 = 1u;           // the last bit of a depth: the pixel may show two surfaces
+const EDGE: u32 = 1u;           // the last two bits of a depth: the pixel may show two surfaces,
+const SLOW: u32 = 2u;           // and they hardly move apart while the shutter is open
 const EDGE_MOTION: f32 = 0.5;   // difference of the motions of different surfaces [px]
 
 fn clamped(px: vec2i) -> vec2i {
@@ -16,9 +17,9 @@ fn depth_at(px: vec2i) -> f32 {
     return valid_depth(textureLoad(depth, clamped(px), 0).x);
 }
 
-/// A depth packed with the flag of an edge.
-fn flag_depth(z: f32, is_at_edge: bool) -> u32 {
-    return (bitcast<u32>(z) & ~EDGE) | select(0u, EDGE, is_at_edge);
+/// A depth packed with the flags of an edge.
+fn flag_depth(z: f32, is_at_edge: bool, is_slow: bool) -> u32 {
+    return (bitcast<u32>(z) & ~(EDGE | SLOW)) | select(0u, EDGE, is_at_edge) | select(0u, SLOW, is_at_edge && is_slow);
 }
 
 fn is_edge(flags: u32) -> bool {
@@ -27,5 +28,5 @@ fn is_edge(flags: u32) -> bool {
 
 /// The depth that is packed with flags.
 fn flagged_depth(flags: u32) -> f32 {
-    return bitcast<f32>(flags & ~EDGE);
+    return bitcast<f32>(flags & ~(EDGE | SLOW));
 }

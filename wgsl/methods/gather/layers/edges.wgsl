@@ -1,6 +1,7 @@
-// Edges: the pixels that may show two surfaces, which layers.wgsl separates, and the crowds of surfaces, where it does not.
+// Edges: the pixels that may show two surfaces, which layers.wgsl separates, and the tiles where it does not.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
+//#include methods/gather/motion.wgsl
 //#include methods/gather/surface.wgsl
 //#include methods/gather/worklist.wgsl
 //#include methods/gather/layers/edge_flags.wgsl
@@ -15,6 +16,9 @@ alias Flags = texture_storage_2d<r32uint, write>;
 // down to LEAST_SHARE of its difference from 1, which is above what half floats round.
 const APART_MOTION: f32 = 4.0;
 const LEAST_SHARE: f32 = 0.1;
+const FAST: f32 = 2.0;          // difference of the motions at an edge that tells whether vectors are filtered [px],
+const MIXED: f32 = 0.2;         // where they differ by more than this share of it on the same side of the edge
+const SLOW_MOTION: f32 = 1.0;   // how far surfaces move apart, at most, that hardly do while the shutter is open, by both vectors [px]
 
 /// First pass: a pixel is at an edge if depths differ in its 3 x 3, and motions from its own too. The more motions differ,
 /// the less depths have to: what moves so differently is no smooth surface.
@@ -31,22 +35,36 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
     let nearest = min(min(least.x, least.y), least.z);
     let farthest = max(max(most.x, most.y), most.z);
     let own = textureLoad(motion, px, 0);
-    var difference2 = 0.0;
+    let between = select(sqrt(nearest * farthest), 1.5 * nearest, farthest >= NO_DEPTH);
+    let is_front = here.y < between;
+    var same2 = 0.0;            // squared difference from motions on its own side of the edge, and on the other
+    var other2 = 0.0;
     let beyond = farthest - nearest;
     let apart = nearest * (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO - 1.0);   // the 3 x 3 is two pixels from side to side
     let count = select(0, 9, beyond > LEAST_SHARE * apart);
     for (var i = 0; i < count; i++) {
         let difference = textureLoad(motion, clamped(px + vec2i(i % 3, i / 3) - 1), 0) - own;
-        difference2 = max(difference2, dot(difference, difference));
+        let row = select(select(below, here, i < 6), above, i < 3);
+        let is_same = (row[i % 3] < between) == is_front;
+        same2 = max(same2, select(0.0, dot(difference, difference), is_same));
+        other2 = max(other2, select(dot(difference, difference), 0.0, is_same));
     }
+    let difference2 = max(same2, other2);
     let share = clamp(APART_MOTION * inverseSqrt(max(difference2, 1e-12)), LEAST_SHARE, 1.0);
     let is_there = difference2 > EDGE_MOTION * EDGE_MOTION && beyond > share * apart;
     if is_there {
         let low = nearest + apart;
         let high = farthest / (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO);
-        if any(are_between(above, low, high) | are_between(here, low, high) | are_between(below, low, high)) { count_in_crowd(px); }
+        let has_third = any(are_between(above, low, high) | are_between(here, low, high) | are_between(below, low, high));
+        if has_third { count_edge(px, THIRD_SURFACE); }
+        if difference2 > FAST * FAST {
+            count_edge(px, FAST_EDGE);
+            if same2 > MIXED * MIXED * other2 { count_edge(px, MIXED_EDGE); }
+        }
     }
-    textureStore(edge_flags_out, px, vec4u(flag_depth(here.y, is_there)));
+    let longest = max_abs_time(0.0);
+    let is_slow = difference2 * longest * longest < SLOW_MOTION * SLOW_MOTION;
+    textureStore(edge_flags_out, px, vec4u(flag_depth(here.y, is_there, is_slow)));
 }
 
 /// Of a pixel and the ones to its left and right. Written out, as is what works on 3 x 3 pixels: lavapipe unrolls no loop.
@@ -58,8 +76,8 @@ fn are_between(z: vec3f, low: f32, high: f32) -> vec3<bool> {
     return (z > vec3f(low)) & (z < vec3f(high));
 }
 
-/// Second pass: which tiles are in a crowd. An invocation is a tile; beyond the last, that one.
+/// Second pass: what is around a tile. An invocation is a tile; beyond the last, that one.
 @compute @workgroup_size(WG_X, WG_Y)
-fn find_crowds(@builtin(global_invocation_id) id: vec3u) {
-    find_crowd(min(id.xy, tiles_of(frame.size) - 1u));
+fn look_around_tiles(@builtin(global_invocation_id) id: vec3u) {
+    look_around(min(id.xy, tiles_of(frame.size) - 1u));
 }

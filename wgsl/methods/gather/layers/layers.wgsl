@@ -49,32 +49,34 @@ fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(work
     if k >= worklist.count || any(px >= vec2i(frame.size)) { return; }
     let counts = weight_at(px);
     let here = flags_at(px);
-    var near_edge = is_edge(three_flags(px - vec2i(0, 1)) | three_flags(px) | three_flags(px + vec2i(0, 1)));
-    var smooth_here = !near_edge;   // one surface of one weight in the 3 x 3
+    let flags_around = three_flags(px - vec2i(0, 1)) | three_flags(px) | three_flags(px + vec2i(0, 1));
+    var beside = vec2<bool>(false); // an edge in the 3 x 3, one that is separated
+    if is_edge(flags_around) { beside = edges_beside(px); }
+    var smooth_here = !beside.x;    // one surface of one weight in the 3 x 3
     if WEIGHTED {
         for (var i = 0; i < 9; i++) {
             smooth_here = smooth_here && weight_at(px + vec2i(i % 3, i / 3) - 1) == counts;
         }
     }
-    if near_edge { near_edge = is_near_separated(px); }
     let around = surface_around(px, textureLoad(motion, px, 0), flagged_depth(here));
     let z = flagged_depth(here) * around.depth_ratio;
     if !COPIED { textureStore(colors, px, FRONT, textureLoad(color, px, 0)); }
-    let flags = SINGLE | select(0u, SMOOTH, smooth_here);
-    textureStore(surfaces, px, FRONT, pack_surface(around.trajectory, select(z, -z, near_edge), flags));
+    let flags = SINGLE | select(0u, SMOOTH, smooth_here) | select(0u, EDGELESS, smooth_here && !is_edge(flags_around));
+    textureStore(surfaces, px, FRONT, pack_surface(around.trajectory, select(z, -z, beside.y), flags));
     textureStore(mattes, px, pack_matte(Matte(z, false, 1.0, counts)));
-    if is_edge(here) && !is_in_crowd(px) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
+    if is_separated(here, around_tile(px)) { edges.pixels[atomicAdd(&edges.count, 1u)] = pack_cell(vec2u(px)); }
 }
 
-/// True if an edge of the 3 x 3 is separated, where there are edges: all are, but in crowds.
-fn is_near_separated(px: vec2i) -> bool {
+/// True if there is an edge in the 3 x 3, where flags say so; and if one is separated. All are, but in some tiles.
+fn edges_beside(px: vec2i) -> vec2<bool> {
     let low = clamped(px - 1);
     let high = clamped(px + 1);
-    let has_crowd = is_in_crowd(low) || is_in_crowd(high) || is_in_crowd(vec2i(low.x, high.y)) || is_in_crowd(vec2i(high.x, low.y));
-    var result = !has_crowd;
-    for (var i = 0; i < select(0, 9, has_crowd); i++) {
+    let around = around_tile(low) | around_tile(high) | around_tile(vec2i(low.x, high.y)) | around_tile(vec2i(high.x, low.y));
+    var result = vec2<bool>(around == 0u);
+    for (var i = 0; i < select(9, 0, around == 0u); i++) {
         let at = clamped(px + vec2i(i % 3, i / 3) - 1);
-        result = result || (is_edge(flags_at(at)) && !is_in_crowd(at));
+        let flags = flags_at(at);
+        result = result | vec2<bool>(is_visible_edge(flags, around_tile(at)), is_separated(flags, around_tile(at)));
     }
     return result;
 }

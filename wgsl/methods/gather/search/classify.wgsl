@@ -106,7 +106,7 @@ fn corners_agree(block: Block, t: f32, f: u32, candidates: Candidates, wanted: b
         *deepest = max(*deepest, z);
         let nearer = may_be_nearer(candidates, select(visible_depth, z, f == 0u) / handicap);
         let is_there = found.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL;
-        is_single = is_single && (found.word & SMOOTH) != 0u && is_there && z >= visible_depth;
+        is_single = is_single && (found.word & EDGELESS) != 0u && is_there && z >= visible_depth;
         var seeds = Seeds(starts.pending & nearer & ~are_solution(starts, found.d), starts.x, starts.y);
         loop {
             let is_pending = seeds.pending != 0u;

@@ -1,0 +1,88 @@
+"""Scenes in which a simple method may be as good as a clever one: fine structure, leaves, soft
+edges, and the first scene that everybody makes."""
+
+import numpy as np
+
+from wgmb import Body, CameraPath, Scene
+from wgmb.scene.bodies import at, moving, rotation, translation
+
+FPS = 24.0
+CREAM, GREEN, BLUE, RED = (0.88, 0.84, 0.74), (0.1, 0.35, 0.08), (0.1, 0.2, 0.6), (0.7, 0.1, 0.08)
+BRICK, MORTAR, GREY = (0.5, 0.2, 0.13), (0.62, 0.58, 0.53), (0.6, 0.6, 0.6)
+
+
+def _room():
+    wall = Body("box", (14, 6, 0.3), at(0, 3, -3), BRICK, MORTAR, "BRICKS", (6, 6))
+    return wall, _floor()
+
+
+def _floor():
+    return Body("box", (40, 0.5, 40), at(0, -0.5, 0), GREY, specular=0.1)
+
+
+def shaken():
+    """A camera in a hand, 1.6 radians of phase per frame, before thin bars and a detailed wall."""
+    phase = 1.6 * FPS
+    shot = CameraPath(
+        lambda t: (0.05 * np.sin(phase * t), 1.4, 2.6),
+        yaw=lambda t: 0.05 * np.sin(phase * t + 0.4),
+        pitch=lambda t: -0.04 + 0.035 * np.sin(1.3 * phase * t + 2),
+    )
+    upright = [Body("box", (0.02, 1.6, 0.02), at(x, 1.4, 0), CREAM) for x in np.arange(-3, 3, 0.23)]
+    across = [Body("box", (4, 0.015, 0.015), at(0, y, 0.05), BLUE) for y in np.arange(0.2, 3, 0.31)]
+    return Scene("shaken", (*_room(), *upright, *across), shot)
+
+
+def foliage():
+    """Leaves that flutter before a detailed wall."""
+    random = np.random.default_rng(7)
+    leaves = []
+    for _ in range(220):
+        x, y, z = random.uniform((-2.2, 0.1, -1.2), (2.2, 2.7, 0.2))
+        turn, lean, phase, swing = random.uniform((0, 0, 0, 0.08), (6, 3, 6, 0.25))
+        tone = random.uniform(0.4, 2.2)
+        path = _flutter(x, y, z, turn, lean, phase, swing)
+        leaves.append(Body("sphere", (0.1, 0.05, 0.012), path, tuple(tone * c for c in GREEN)))
+    shot = CameraPath(lambda t: (0 * t, 1.4, 2.6), pitch=lambda t: -0.04 + 0 * t)
+    return Scene("foliage", (*_room(), *leaves), shot)
+
+
+def _flutter(x, y, z, turn, lean, phase, swing):
+    way = 0.9 * FPS
+
+    def path(t):
+        aside = swing * np.sin(way * t + phase)
+        up = 0.6 * swing * np.sin(1.2 * way * t + 2 * phase)
+        turned = rotation("z", turn + 0.4 * np.sin(way * t + phase), t)
+        return translation(x + aside, y + up, z, t) @ turned @ rotation("x", lean, t)
+
+    return path
+
+
+def beginner():
+    """The first scene of a beginner: a ball and a cube slide over a floor, under a sun."""
+    v = 5.0
+    bodies = (
+        Body("box", (0.5, 0.5, 0.5), moving((0.7, 0.5, -1.4), (-v, 0, 0.3 * v)), BLUE),
+        Body("sphere", (0.55,) * 3, moving((-1.0, 0.55, -1.0), (v, 0, 0)), RED, specular=0.3),
+    )
+    shot = CameraPath(lambda t: (0 * t, 1.9, 1.1), pitch=lambda t: -0.5 + 0 * t)
+    return Scene("beginner", (_floor(), *bodies), shot)
+
+
+SCENES = {scene.__name__: scene for scene in (shaken, foliage, beginner)}
+
+
+def soft_disk(t, size=(90, 160), speed=18.0, soft=10.0):
+    """Colour, motion and depth of a disk out of focus before a detailed wall, `t` frames later.
+
+    Its rim is `soft` px wide. Vectors are averaged over the lens, depth is one sample's.
+    """
+    y, x = np.mgrid[: size[0], : size[1]] + 0.5
+    wall = 0.45 + 0.3 * np.sign(np.sin(0.9 * x) * np.sin(0.7 * y + 0.2 * x))
+    far = np.hypot(x - 80 - speed * t, y - 45)
+    cover = np.clip((28 - far) / soft + 0.5, 0, 1)[..., None]
+    color = wall[..., None] * (0.9, 0.7, 0.5) * (1 - cover) + np.multiply((0.1, 0.3, 0.8), cover)
+    motion = cover * np.array([-speed, 0, speed, 0])
+    depth = np.where(cover[..., 0] >= 0.5, 3.0, 9.0)
+    return tuple(a.astype("f4") for a in (color, motion, depth))
