@@ -187,6 +187,7 @@ def test_what_is_not_finite_is_named(device):
     ({"shuter": 90}, "unknown setting 'shuter'.*shutter"),
     ({"flow": "best"}, "flow must be .* got 'best'"),
     ({"flow_quality": "bets"}, "flow_quality must be .* did you mean 'best'"),
+    ({"flow": "dis", "flow_quality": "draft"}, "`flow_quality` draft is for `flow` search"),
     ({"duplicates": "z"}, "duplicates must be"),
     ({"codec": "h264"}, "unknown setting 'codec'"),
     ({"holdout": np.zeros((64, 96)), "flow": "none"}, "`holdout` needs motion"),

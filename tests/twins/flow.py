@@ -417,3 +417,45 @@ def depth(motion, to_prev, to_next):
             near = [at(apart, x + i, y + j) for j in range(-2, 3) for i in range(-2, 3)]
             out[y, x] = 1 / (1 + 0.005 * np.median(near, axis=0).max())
     return out
+
+
+def reduced(picture, size):
+    """A linear picture at a smaller `size` (height, width): means over the areas of its pixels."""
+    height, width = picture.shape[:2]
+    out = np.zeros((*size, 3))
+    for y in range(size[0]):
+        for x in range(size[1]):
+            top, left = y * height / size[0], x * width / size[1]
+            bottom, right = (y + 1) * height / size[0], (x + 1) * width / size[1]
+            for j in range(height):
+                for i in range(width):
+                    down = max(0, min(j + 1, bottom) - max(j, top))
+                    across = max(0, min(i + 1, right) - max(i, left))
+                    out[y, x] += down * across * np.clip(picture[j, i], 0, 1)
+            out[y, x] /= (bottom - top) * (right - left)
+    return out
+
+
+def raised(shown, small, states, depth):
+    """States and depth at the size of `shown`: those of the likest of 3 x 3 small pixels."""
+    height, width = shown.shape[:2]
+    rows, columns = depth.shape
+    by_y, by_x = height / rows, width / columns
+    out, deep = np.zeros((height, width, 8)), np.zeros((height, width))
+    for y in range(height):
+        for x in range(width):
+            at_y, at_x = (y + 0.5) / by_y - 0.5, (x + 0.5) / by_x - 0.5
+            best = None
+            for j in range(int(at_y + 0.5) - 1, int(at_y + 0.5) + 2):
+                for i in range(int(at_x + 0.5) - 1, int(at_x + 0.5) + 2):
+                    row, column = min(max(j, 0), rows - 1), min(max(i, 0), columns - 1)
+                    unlike = np.abs(small[row, column] - shown[y, x]).sum()
+                    unlike += 0.02 * (abs(row - at_y) + abs(column - at_x))
+                    if best is None or unlike < best[0]:
+                        best = unlike, row, column
+            _, row, column = best
+            state = moved(states[row, column], at_x - column, at_y - row)
+            ratio = by_x / by_y
+            out[y, x] = state * [by_x, by_y, by_x, by_y, 1, ratio, 1 / ratio, 1]
+            deep[y, x] = depth[row, column]
+    return out, deep

@@ -8,7 +8,7 @@ import wgpu
 from .. import gpu
 from ..errors import InputError, did_you_mean
 from .passes import FlowPasses
-from .shot import EFFORTS, Load, Shot
+from .shot import EFFORTS, IN_SOFTWARE, Load, Shot
 
 
 class Flow:
@@ -19,8 +19,9 @@ class Flow:
     al., "PatchMatch", 2009; planes: Bleyer, Rhemann and Rother, "PatchMatch Stereo", 2011) on ever
     finer ones. Pixels that are not found again move as what they belong to.
 
-    `quality`: "best", or "fast", which ends at half the size. `device`: your own wgpu device, the
-    name of an adapter, or None for the best one.
+    `quality`: "best", "fast", which ends at half the size, or "draft", which searches pictures of
+    at most 440 px along the longer side. Without a GPU, "fast" searches those longer than 1280 px
+    at 960 px. `device`: your own wgpu device, the name of an adapter, or None for the best one.
     """
 
     def __init__(
@@ -33,8 +34,9 @@ class Flow:
             known = ", ".join(EFFORTS)
             hint = did_you_mean(quality, EFFORTS)
             raise InputError(f"no flow quality {quality!r}; available: {known}{hint}")
-        self._effort = EFFORTS[quality]
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
+        in_software = self.device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        self._effort = (EFFORTS | IN_SOFTWARE if in_software else EFFORTS)[quality]
 
     def shot(self, load: Load, depth: bool = True) -> Shot:
         """Flow of the frames of a shot.

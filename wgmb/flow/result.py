@@ -27,9 +27,10 @@ def result(
     size: tuple[int, int],
     views: Views,
     states: wgpu.GPUTexture,
+    depth: wgpu.GPUTexture | None = None,
 ) -> Motion:
-    """Motion and depth from the states of a frame."""
-    motion, depth = (passes.take(size, (k, 1)) for k in ("rgba32float", "r32float"))
+    """Motion and depth from the states of a frame; `depth`: if it is known already."""
+    motion = passes.take(size, ("rgba32float", 1))
     apart = passes.scratch(size, "rgba32float", "apart")
     spacing = max(1, round(max(size) / ACROSS))
     values = {
@@ -56,6 +57,9 @@ def result(
         )
 
     run("write_motion", size, motion_out=motion)
+    if depth is not None:
+        return Motion(motion, depth)
+    depth = passes.take(size, ("r32float", 1))
     few = -(-size[0] // spacing), -(-size[1] // spacing)
     thin = passes.scratch(few, "rgba32float", "thin")
     run("thin", few, motion, apart_out=thin)

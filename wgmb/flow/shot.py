@@ -7,13 +7,15 @@ searched(n, level): mended(n, coarser), and searched(n - 1, coarser) and (n + 1,
 mended(n, level): searched(n - 1, level), (n, level) and (n + 1, level);
 motion(n): mended(n, 0), or searched(n, 0) where the finest level has no sweeps.
 
+A picture that is searched at a smaller size has its levels there, and its motion is raised.
 With three levels, pictures n - 4 to n + 4 may have a say in the motion of frame n.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +31,7 @@ from .match import matched
 from .mend import mend
 from .passes import STATES, FlowPasses
 from .pyramid import all_sizes, features, level_sizes
+from .raising import raised, reduced
 from .repeats import follow_guide
 from .result import Motion, result
 from .search import FullSearch
@@ -45,6 +48,8 @@ class Effort:
     `polish`: how often parts of a pixel are refined and noise is removed, on every level.
     `block`: pixels along those that share a first state. `aside`: price of moving otherwise than
     most, see sweep.wgsl. `led`: on how many levels the guide may lead, from the coarsest on.
+    `above`: longer sides [px] above which a picture is searched at a smaller size, whose longer
+    side is `longest`.
     """
 
     coarsest: int
@@ -54,6 +59,15 @@ class Effort:
     block: int
     aside: float
     led: int
+    above: float = math.inf
+    longest: int = 0
+
+    def searched_size(self, size: tuple[int, int]) -> tuple[int, int]:
+        """Width, height at which a picture of a size is searched, in the same proportion."""
+        if max(size) <= self.above:
+            return size
+        by = self.longest / max(size)
+        return max(1, round(by * size[0])), max(1, round(by * size[1]))
 
     def sweeps(self, level: int, levels: int) -> int:
         """Sweeps on a level; 0 is the finest."""
@@ -65,10 +79,13 @@ class Effort:
 EFFORTS = {
     "best": Effort(3, 2, 2, 2, block=2, aside=0.4, led=2),
     "fast": Effort(3, 2, 0, 1, block=4, aside=0.15, led=1),
+    "draft": Effort(3, 2, 0, 1, block=4, aside=0.15, led=1, above=440, longest=440),
 }
+IN_SOFTWARE = {"fast": replace(EFFORTS["fast"], above=1280, longest=960)}  # instead, without a GPU
 LARGEST = 4  # px across a light on the coarsest level: what is larger, the search finds
 KEPT = {
     "pictures": 4,
+    "display": 4,
     "lights": 2,
     "most": 1,
     "guides": 1,
@@ -147,14 +164,18 @@ class Shot:
             raise InputError(f"frame {number} is {size[0]} x {size[1]}, others are {expected}")
         self._size = size
         if isinstance(picture, wgpu.GPUTexture):
-            return features(self._passes, picture.create_view(), size)
-        view = self._passes.images.upload("picture", picture, "rgba32float")
-        return features(self._passes, view, size)
+            view = picture.create_view()
+        else:
+            view = self._passes.images.upload("picture", picture, "rgba32float")
+        if self._sizes[0] != size:
+            view, display = reduced(self._passes, view, size, self._sizes[0])
+            self._results["display", number, 0] = display
+        return features(self._passes, view, self._sizes[0])
 
     @property
     def _sizes(self) -> list[tuple[int, int]]:
         assert self._size is not None
-        return level_sizes(self._size)
+        return level_sizes(self._effort.searched_size(self._size))
 
     def _views(self, number: int) -> Views | None:
         return views_of(number, lambda other: self._features(other) is not None)
@@ -256,10 +277,11 @@ class Shot:
 
     def _motion(self, number: int, _: int) -> Motion:
         views = self._views(number)
+        assert self._size is not None
         if views is None:
-            states = self._passes.take(self._sizes[0], STATES)
+            states = self._passes.take(self._size, STATES)
             alone = Views(number, number, None, BESIDE)
-            made = result(self._passes, self._sizes[0], alone, states)
+            made = result(self._passes, self._size, alone, states)
             self._passes.give(states)
             return made
         is_swept = self._effort.sweeps(0, len(self._sizes)) > 0
@@ -269,9 +291,21 @@ class Shot:
         states = self._polished(states, self._sizes[0], bound)
         states = settle(self._passes, self._sizes[0], bound, views, states)
         made = result(self._passes, self._sizes[0], views, states)
+        if self._sizes[0] != self._size:
+            made, states = self._raised(number, views, made, states)
         self._passes.give(states)
         self._forget(number)
         return made
+
+    def _raised(
+        self, number: int, views: Views, small: Motion, states: wgpu.GPUTexture
+    ) -> tuple[Motion, wgpu.GPUTexture]:
+        """Motion and states at the picture's own size; what was searched is taken back."""
+        assert self._size is not None
+        display, here = self._results["display", number, 0], (self._features(number) or [])[0]
+        larger, depth = raised(self._passes, display, here, states, small.depth)
+        self._passes.give(states, small.motion, small.depth)
+        return result(self._passes, self._size, views, larger, depth), larger
 
     def _followed(self, views: Views) -> np.ndarray:
         """Small lights of a frame and their motion; none if no coarse level loses them."""

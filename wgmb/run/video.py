@@ -254,7 +254,7 @@ class PictureKeywords(MethodKeywords, total=False):
     rolling_duration: float
     cuts: str
     flow: Literal["auto", "search", "dis", "none"]
-    flow_quality: Literal["best", "fast"]
+    flow_quality: Literal["best", "fast", "draft"]
     duplicates: Literal["keep", "fill"]
     highlights: float
 

@@ -29,8 +29,8 @@ class FlowSettings:
 
     flow: Literal["auto", "search", "dis", "none"] = "auto"
     "Source of the motion: search (best), dis (quick, OpenCV), none (pictures are averaged)."
-    flow_quality: Literal["best", "fast"] = "best"
-    "Quality of the motion: best or fast."
+    flow_quality: Literal["best", "fast", "draft"] = "best"
+    "Quality of the motion: best, fast, or draft, which searches smaller pictures."
 
     @property
     def method(self) -> str:
@@ -59,9 +59,13 @@ class FlowSettings:
             return self, "none: pictures are averaged"
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         quality, why = self.flow_quality, ""
-        if self.flow == "auto" and software:
+        is_draft = quality == "draft"
+        if is_draft and self.flow == "dis":
+            raise InputError("`flow_quality` draft is for `flow` search; dis is best or fast")
+        if self.flow == "auto" and software and not is_draft:
             quality, why = "fast", " (fast, because there is no GPU)"
-        if self.flow == "dis" or (self.flow == "auto" and software and is_installed("cv2")):
+        quick = self.flow == "auto" and software and not is_draft and is_installed("cv2")
+        if self.flow == "dis" or quick:
             return replace(self, flow="dis", flow_quality=quality), f"dense inverse search{why}"
         return replace(self, flow="search", flow_quality=quality), f"search{why}"
 

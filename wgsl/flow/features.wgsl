@@ -1,4 +1,5 @@
 // Weights of the features of pyramid.wgsl in the comparison of two pixels.
+//#include common/finite.wgsl
 
 const LUMA: vec3f = vec3f(0.299, 0.587, 0.114);     // ITU-R BT.601
 const DIRECTION_SCALE: f32 = 0.25;      // directions are stored this many times too large, inverted
@@ -22,4 +23,9 @@ fn shaded_difference(a0: vec4f, a1: vec3f, b0: vec4f, b1: vec3f, most: f32) -> f
 fn likeness(a: vec3f, b: vec3f) -> f32 {
     let d = dot(abs(a - b), vec3f(1.0));
     return 1.0 / (1.0 + LIKENESS * d * d) + LEAST_WEIGHT;
+}
+
+/// What flow sees of a linear colour: 0 to 1.
+fn limited(color: vec4f) -> vec4f {
+    return vec4f(select(vec3f(0.0), clamp(color.rgb, vec3f(0.0), vec3f(1.0)), is_color(vec4f(color.rgb, 0.0))), 1.0);
 }

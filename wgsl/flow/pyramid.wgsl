@@ -1,7 +1,6 @@
 // Linear pictures of half the size, and the features of a picture that flow compares: colour, gradient, and the
 // direction of the gradient whatever its strength.
 //#include common/color.wgsl
-//#include common/finite.wgsl
 //#include common/frame.wgsl
 //#include flow/features.wgsl
 
@@ -22,7 +21,7 @@ const DIRECTION_WEIGHT: f32 = 0.05;     // of the direction among the features
 @compute @workgroup_size(WG_X, WG_Y)
 fn limit(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
-    textureStore(output, id.xy, limited(vec2i(id.xy)));
+    textureStore(output, id.xy, limited(textureLoad(picture, id.xy, 0)));
 }
 
 /// The mean of 2 x 2 pixels; the last row and column count twice where they have no other.
@@ -77,11 +76,6 @@ fn write_features(@builtin(global_invocation_id) id: vec3u) {
     let shown = textureLoad(display, id.xy, 0).rgb;
     textureStore(features, id.xy, 0u, vec4f(shown, gradient.x + 0.5));
     textureStore(features, id.xy, 1u, vec4f(gradient.y + 0.5, direction + 0.5, 0.0));
-}
-
-fn limited(px: vec2i) -> vec4f {
-    let color = textureLoad(picture, px, 0);
-    return vec4f(select(vec3f(0.0), clamp(color.rgb, vec3f(0.0), vec3f(1.0)), is_color(vec4f(color.rgb, 0.0))), 1.0);
 }
 
 fn luma(px: vec2i) -> f32 {

@@ -37,7 +37,7 @@ COMPARE = ("off", "wipe", "split", "difference", "flicker")
 BOTH_EYES = ("pair", "red-cyan")
 LOOKS = ("result", "sharp", "perceived", "depth", "velocity", "error")
 TONES = ("clip", "soft", "false")
-FLOWS, QUALITIES = ("auto", "search", "dis", "none"), ("best", "fast")
+FLOWS, QUALITIES = ("auto", "search", "dis", "none"), ("best", "fast", "draft")
 REFERENCE = "reference"
 KEPT = "B"
 """The image by the settings that were kept."""
