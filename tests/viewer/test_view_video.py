@@ -263,6 +263,25 @@ def test_b_may_find_the_motion_in_another_way(clip):
     viewer.stage.choices.close()
 
 
+def test_the_next_video_finds_its_motion_with_what_was_compiled_for_the_last(clip, monkeypatch):
+    used, source = [], FlowSettings.source
+
+    def noted(self, device):
+        used.append(device)
+        return source(self, device)
+
+    monkeypatch.setattr(FlowSettings, "source", noted)
+    device, state = gpu.open_device(), opened(clip, flow="none").state
+    first = VideoSubject(device, state)
+    other = VideoSubject(device, state)
+    first.close()
+    first._maker._thread.join(20)
+    third = VideoSubject(device, state)
+    assert used[0] is not used[1] and used[2] is used[0]
+    for subject in (other, third):
+        subject.close()
+
+
 def test_quick_motion_is_called_a_draft_in_the_picture(clip, monkeypatch):
     said, tag = [], overlay.tag
 

@@ -130,6 +130,27 @@ def second_device(device: wgpu.GPUDevice) -> wgpu.GPUDevice:
     return _opened(choose_adapter(device.adapter.summary))
 
 
+def borrow_device(device: wgpu.GPUDevice) -> wgpu.GPUDevice:
+    """As `second_device`, but one that was given back, with all that is compiled for it, if there
+    is one.
+    """
+    idle = _idle.setdefault(device.adapter.summary, [])
+    while idle:
+        other = idle.pop()
+        with suppress(wgpu.GPUError):  # it was lost
+            other.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_DST)
+            return other
+    return second_device(device)
+
+
+def give_back(device: wgpu.GPUDevice) -> None:
+    """Keep a borrowed device, which nothing uses any more, for the next one who borrows."""
+    _idle.setdefault(device.adapter.summary, []).append(device)
+
+
+_idle: dict[str, list[wgpu.GPUDevice]] = {}
+
+
 @cache
 def _device(name: str) -> wgpu.GPUDevice:
     return _opened(choose_adapter(name))

@@ -1,6 +1,6 @@
 """Motion of a video's pictures, made in a thread of its own while the window goes on.
 
-The thread has its own device and its own reader, so that the window never waits for it. What it
+The thread has a device and a reader of its own, so that the window never waits for it. What it
 has found of a picture is kept, as far as memory allows.
 """
 
@@ -43,7 +43,7 @@ class MotionThread:
         request: MotionRequest,
     ):
         self._path, self._max_mb, self._request = path, max_mb, request
-        beside = gpu.second_device(device)
+        beside = gpu.borrow_device(device)
         motion, self.how = settings.source(beside)
         self.problem = ""
         self._known: OrderedDict[int, PictureFinding] = OrderedDict()
@@ -92,6 +92,7 @@ class MotionThread:
             self.problem = " ".join(str(error).split()) or "not enough memory"
         finally:
             self._making = None
+            gpu.give_back(device)
 
     def _to_do(self) -> Iterator[int]:
         """The next picture that is wanted and not known, until the thread is to end."""
