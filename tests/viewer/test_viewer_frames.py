@@ -107,6 +107,19 @@ def test_a_scene_that_loops_is_there_for_its_whole_loop():
     assert state.opened("fence").frames == PLAIN.frames
 
 
+@pytest.mark.parametrize("look", ["result", "sharp"])
+def test_a_frame_is_there_from_its_number_until_that_of_the_next_one(reel, look):
+    pictures = {}
+    for at in (9.0, 9.9, 10.0, 10.6, 11.0, 11.99):
+        reel.viewer.state = state = put(reel.state, look=look, frame=at)
+        assert state.number == int(at)
+        pictures.setdefault(state.number, []).append(reel.picture())
+    for first, second in pictures.values():
+        np.testing.assert_array_equal(first, second)
+    assert not np.array_equal(pictures[9][0], pictures[10][0])
+    assert put(reel.state, frames="9,11", frame=10.5).number == 9
+
+
 @pytest.mark.parametrize("look", ["result", "perceived"])
 def test_between_frames_on_disk_no_stale_picture_is_seen(reel, look):
     first = float(reel.state.span[0])

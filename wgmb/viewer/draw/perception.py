@@ -36,7 +36,7 @@ class _Held:
 
 def seen_frames(state: State) -> list[State]:
     """The state at each frame that counts in what is perceived, the newest first."""
-    newest = math.floor(state.frame + 0.5)
+    newest = math.floor(state.moment + 0.5)
     if not state.is_video:
         count = state.eye.frames_needed(state.fps) if state.eye else 1
         return [replace(state, frame=float(n)) for n in range(newest, newest - count, -1)]
@@ -135,7 +135,7 @@ class Perceived:
 
 def _shares(state: State, eye: Cone, numbers: list[int]) -> np.ndarray:
     """The weights of frames, the newest first."""
-    after = state.frame - numbers[0]
+    after = state.moment - numbers[0]
     if not (state.is_video and state.own_times):
         return eye.shares(len(numbers), state.fps, after / state.fps)
     held = np.array([held_for(state, number) for number in numbers])

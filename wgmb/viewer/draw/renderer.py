@@ -267,7 +267,7 @@ class Renderer:
             state, name = state.as_kept, "result"
         eye = state.eye if name in ("perceived", REFERENCE) else None
         known = self._known(name, state, subject, full)
-        frame = state.frame if name == "perceived" else None
+        frame = state.moment if name == "perceived" else None
         key = (name, view, state.picture, eye, frame, tuple(known))
         is_preview = self._preview and self.choices.has_preview(state, name)
         fine = (size, antialias, self._level if quick else None, is_preview)

@@ -124,10 +124,12 @@ class Panel:
             state = replace(state, playing=not state.playing)
         imgui.same_line()
         imgui.set_next_item_width(-1)
-        form = "frame %.1f" if state.is_scene else f"frame {state.number}"
-        changed, frame = imgui.slider_float("##frame", state.frame, first, max(last, first), form)
+        if state.is_scene:
+            changed, frame = imgui.slider_float("##frame", state.frame, first, last, "frame %.1f")
+        else:
+            changed, frame = imgui.slider_int("##frame", state.number, first, last, "frame %d")
         self._ui.keep("frame")
-        state = replace(state, frame=frame, playing=False) if changed else state
+        state = replace(state, frame=float(frame), playing=False) if changed else state
         self._bar(state, info)
         if state.is_video:
             self._ui.dim(made_of(state, info.report.made_of))

@@ -158,7 +158,7 @@ class State:
         plain = State()
         same = replace(self, **{name: getattr(plain, name) for name in _SHOWING})
         same = replace(same, color=self.read_as)
-        return same if self.is_scene else replace(same, frame=float(math.ceil(self.frame - 0.5)))
+        return same if self.is_scene else replace(same, frame=float(math.floor(self.frame)))
 
     @property
     def as_kept(self) -> State:
@@ -177,7 +177,20 @@ class State:
     @property
     def number(self) -> int:
         """Number of the frame on disk, or of the video's output frame, that is shown."""
-        return min(math.ceil(self.frame - 0.5), self.span[1])
+        if self.is_scene or self.is_video:
+            return min(math.floor(self.frame), self.span[1])
+        numbers = frame_numbers.frame_numbers(self.frames)
+        return max((n for n in numbers if n <= self.frame), default=min(numbers))
+
+    @property
+    def moment(self) -> float:
+        """The moment at which it is looked at what is perceived [frame intervals].
+
+        Frames and videos that stand still are looked at in the middle of a frame's time.
+        """
+        if self.is_scene:
+            return self.frame
+        return self.frame - 0.5 if self.playing else float(math.floor(self.frame))
 
     @property
     def read_as(self) -> ColorSettings:

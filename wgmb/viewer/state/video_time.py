@@ -86,7 +86,7 @@ def output(state: State) -> VideoOutput:
 def output_frame(state: State) -> OutputFrame:
     """The output frame that is shown."""
     frames = output(state).frames
-    return frames[min(max(math.ceil(state.frame - 0.5), 0), len(frames) - 1)]
+    return frames[min(max(math.floor(state.frame), 0), len(frames) - 1)]
 
 
 def held_for(state: State, number: int) -> float:

@@ -176,7 +176,8 @@ class ClipSubject:
         self._now = self._which(state, eye)
 
     def _which(self, state: State, eye: str | None = None) -> _Which:
-        number = min(self._clip.numbers, key=lambda n: abs(n - state.frame))
+        numbers = self._clip.numbers
+        number = max((n for n in numbers if n <= state.frame), default=min(numbers))
         default = self.eyes[0] if self.eyes else None
         eye = eye or (state.eyes if state.eyes in self.eyes else default)
         reach = state.setting("reach")
