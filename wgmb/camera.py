@@ -1,7 +1,5 @@
 """Cameras and rigid bodies over time: the matrices that turn depth into motion."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

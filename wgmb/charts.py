@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -77,7 +78,15 @@ def _chart(chart: Chart, colors: Mapping[str, str]) -> str:
 class Axes:
     """Values to pixels: `margins` are left, right, top, bottom [px]; `log`: x is logarithmic."""
 
-    def __init__(self, width, height, margins, x_range, y_range, log: bool = False):
+    def __init__(
+        self,
+        width: float,
+        height: float,
+        margins: tuple[float, float, float, float],
+        x_range: tuple[float, float],
+        y_range: tuple[float, float],
+        log: bool = False,
+    ):
         left, right, top, bottom = margins
         self.left, self.right, self.top, self.bottom = left, width - right, top, height - bottom
         self._x, self._y, self._along = x_range, y_range, math.log if log else float
@@ -93,7 +102,7 @@ class Axes:
         low, high = self._y
         return self.bottom - (value - low) / ((high - low) or 1) * (self.bottom - self.top)
 
-    def grid(self, x_ticks, y_ticks, attributes: str) -> str:
+    def grid(self, x_ticks: Iterable[float], y_ticks: Iterable[float], attributes: str) -> str:
         """A line and its number at every tick; `attributes`: of the lines."""
         across = "".join(
             f'<line {attributes} x1="{self.left}" x2="{self.right}" y1="{self.y(t):.1f}" '
@@ -133,28 +142,28 @@ def log_ticks(low: float, high: float) -> list[float]:
     return inside if 2 <= len(inside) <= 8 else [t for t in inside if f"{t:e}"[0] == "1"] or [low]
 
 
-def _line(x1, y1, x2, y2, color: str, wide: int = 1) -> str:
+def _line(x1: float, y1: float, x2: float, y2: float, color: str, wide: int = 1) -> str:
     return (
         f'<line x1="{x1:.2f}" y1="{y1:.2f}" x2="{x2:.2f}" y2="{y2:.2f}" '
         f'stroke="{color}" stroke-width="{wide}"/>'
     )
 
 
-def _text(x, y, text: str, anchor: str = "start", weight: str = "normal") -> str:
+def _text(x: float, y: float, text: str, anchor: str = "start", weight: str = "normal") -> str:
     return (
         f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-weight="{weight}" '
         f'fill="#222">{escape(text)}</text>'
     )
 
 
-def shutter_chart(shutter, name: str, points: int = 1201) -> Chart:
+def shutter_chart(shutter: Any, name: str, points: int = 1201) -> Chart:
     """A shutter's curve."""
     t = np.linspace(*_reach(shutter), points)
     return Chart(f"{name}, {shutter.degrees:g} degrees", _TIME, "weight",
                  {"curve": (t, shutter.weight(t))})  # fmt: skip
 
 
-def shutter_charts(shutter, name: str) -> tuple[Chart, Chart, Chart]:
+def shutter_charts(shutter: Any, name: str) -> tuple[Chart, Chart, Chart]:
     """A shutter's curve, its integral, and the sum of neighbouring frames' windows."""
     opens, closes = shutter.span
     low, high = _reach(shutter)
@@ -171,7 +180,7 @@ def shutter_charts(shutter, name: str) -> tuple[Chart, Chart, Chart]:
     )  # fmt: skip
 
 
-def _reach(shutter) -> tuple[float, float]:
+def _reach(shutter: Any) -> tuple[float, float]:
     """The times that are drawn."""
     reach = max(1.5, 1.25 * max(map(abs, shutter.span)))
     return -reach, reach

@@ -4,8 +4,6 @@ The response x seconds after a flash is W(x) = rate exp(shift - rate x) F(x); it
 F(x) = exp(-exp(shift - rate x)) (Cusa 2022, after Howlett et al. 2017).
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

@@ -13,6 +13,7 @@ spells it as its option.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 TYPE_CHECKING = False  # typing's own, without the time that loading it takes
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def size_text(of: NDArray | tuple[int, int]) -> str:
+def size_text(of: NDArray[Any] | tuple[int, int]) -> str:
     """Width x height of a plane, or of a pair, for messages."""
     width, height = of if isinstance(of, tuple) else of.shape[::-1]
     return f"{width} x {height}"

@@ -6,8 +6,6 @@ the part of its cell that is exposed, and counts as much as the shutter weighs t
 so covers 240 frames a second made 60, 144 made 60, 24 as 24, and variable rates.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Extent of a frame's content: to its neighbours, and while the shutter is open."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -10,8 +10,6 @@ matrix   `clip_from_world`: destination first, so that products read as chains
 Foreign conventions are translated in sequence/layers/ (vectors.py, camera_file.py), nowhere else.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Sequence

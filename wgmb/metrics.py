@@ -131,7 +131,9 @@ def _linear(picture: np.ndarray) -> np.ndarray:
     return np.nan_to_num(np.asarray(picture)[..., :3].astype(np.float64), posinf=0, neginf=0)
 
 
-def _pair(picture, truth, prepare) -> tuple[np.ndarray, np.ndarray]:
+def _pair(
+    picture: np.ndarray, truth: np.ndarray, prepare: Callable[[np.ndarray], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
     shapes = np.shape(picture), np.shape(truth)
     for name, shape in zip(("picture", "truth"), shapes, strict=True):
         if len(shape) != 3 or shape[2] not in (3, 4) or 0 in shape:
@@ -174,7 +176,7 @@ def check_flip() -> None:
         import flip_evaluator  # noqa: F401  # pyright: ignore[reportMissingImports]
 
 
-def _flip(picture, truth) -> tuple[np.ndarray, float]:
+def _flip(picture: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, float]:
     with needed_by("FLIP"):
         from flip_evaluator import evaluate  # pyright: ignore[reportMissingImports]
     a, b = _pair(picture, truth, display)

@@ -1,7 +1,5 @@
 """An observer: simulates the perception of successive images, on the GPU."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import threading

@@ -1,7 +1,5 @@
 """Rendering of scenes with motion blur, for `wgmb render` and the viewer."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

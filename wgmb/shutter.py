@@ -6,8 +6,6 @@ integrates to 1. This file is the only place where a curve is written: the GPU g
 times.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import csv

@@ -3,8 +3,6 @@
 Threads start here and nowhere else.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

@@ -8,6 +8,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from ..threads import Stop
 
@@ -21,7 +22,7 @@ def interrupt(*_) -> None:
     raise KeyboardInterrupt
 
 
-def hush(unraisable) -> None:
+def hush(unraisable: Any) -> None:
     """Replace sys.unraisablehook: after an interruption, what a destructor raises is not printed.
 
     It is the interruption itself, or comes from an object that it left half made.
@@ -126,7 +127,7 @@ def muted():
         os.close(nowhere)
 
 
-def _number(stream) -> int | None:
+def _number(stream: Any) -> int | None:
     try:
         return stream.fileno()
     except (OSError, ValueError, AttributeError):

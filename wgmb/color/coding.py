@@ -1,7 +1,5 @@
 """Colour coding of a video: planes, bits, range, matrix, transfer, primaries (ITU-T H.273)."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from dataclasses import dataclass

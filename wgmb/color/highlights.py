@@ -8,8 +8,6 @@ in two only; the others keep their ratio to it, so that hues stay.
 `wgsl/common/highlights.wgsl` is the same for videos.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable

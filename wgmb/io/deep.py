@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -140,7 +140,7 @@ def _summed(samples: np.ndarray, transmittance: np.ndarray, counts: np.ndarray) 
 # ---- how large ------------------------------------------------------------------------------
 
 
-def needed(path: Path, parts: Sequence) -> int:
+def needed(path: Path, parts: Sequence[Any]) -> int:
     """Bytes that the deep parts of a file take in memory, from the headers of their chunks.
 
     `parts`: of OpenEXR.File, without pixels. What is damaged counts as nothing: reading the
@@ -153,7 +153,7 @@ def needed(path: Path, parts: Sequence) -> int:
         return 0
 
 
-def _needed(file: BinaryIO, parts: Sequence) -> int:
+def _needed(file: BinaryIO, parts: Sequence[Any]) -> int:
     many = _skip_headers(file)
     at, total = file.tell(), 0
     for part in parts:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenEXR
@@ -61,7 +62,7 @@ class Part:
 
     name: str
     channels: dict[str, np.ndarray]
-    attributes: dict
+    attributes: dict[str, Any]
     data_window: tuple[int, int, int, int]  # left, top, right, bottom; the last pixels belong to it
     display_window: tuple[int, int, int, int]
     compression: OpenEXR.Compression = OpenEXR.ZIP_COMPRESSION  # as it was stored
@@ -143,7 +144,7 @@ def read(
     return Exr(path, promised)
 
 
-def _fill(path: Path, part: Part, stored, data_layers: Collection[str]) -> None:
+def _fill(path: Path, part: Part, stored: Any, data_layers: Collection[str]) -> None:
     """Give a part, promised by its header, the planes of what is stored."""
     sampling: dict[str, tuple[int, int]] = {}
     for name in part.channels:
@@ -243,7 +244,7 @@ def _cryptomatte(part: Part) -> str | None:
     return None
 
 
-def new(rgba: np.ndarray, attributes: dict | None = None) -> Exr:
+def new(rgba: np.ndarray, attributes: dict[str, Any] | None = None) -> Exr:
     """A file with one part of half channels R, G, B and, for four channels, A."""
     height, width, count = rgba.shape
     window = (0, 0, width - 1, height - 1)
@@ -278,7 +279,7 @@ def _short_of_memory(heard: list[str], needed: int) -> bool:
     return False
 
 
-def _promised(path: Path, part) -> Part:
+def _promised(path: Path, part: Any) -> Part:
     """Return the part as declared by its header, with empty arrays."""
     header = part.header
     data, display = (_corners(header[k]) for k in ("dataWindow", "displayWindow"))
@@ -295,7 +296,7 @@ def _promised(path: Path, part) -> Part:
     return Part(name, channels, attributes, data, display, compression)
 
 
-def _corners(box) -> tuple[int, int, int, int]:
+def _corners(box: Any) -> tuple[int, int, int, int]:
     (left, top), (right, bottom) = box
     return int(left), int(top), int(right), int(bottom)
 

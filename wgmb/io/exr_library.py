@@ -13,6 +13,7 @@ import os
 import sys
 import threading
 from collections.abc import Iterator
+from typing import Any
 
 import OpenEXR
 
@@ -86,7 +87,7 @@ if hasattr(os, "register_at_fork"):
 class _Sieve:
     """A text stream that keeps what the library says from coming through."""
 
-    def __init__(self, stream, heard: dict[int, list[str]]):
+    def __init__(self, stream: Any, heard: dict[int, list[str]]):
         self.stream, self._heard = stream, heard
 
     def write(self, text: str) -> int:
@@ -147,7 +148,7 @@ class _Hush:
             undo.callback(_put_back, before, sieve)
             self._undo = undo.pop_all()
 
-    def _sieve_of(self, stream) -> _Sieve:
+    def _sieve_of(self, stream: Any) -> _Sieve:
         """The sieve before a stream, the same one every time.
 
         `print` in another thread may be within one that is no longer sys.stdout, and does not hold
@@ -160,7 +161,7 @@ class _Hush:
         return self._sieves[-1]
 
 
-def _put_back(before, sieve: _Sieve) -> None:
+def _put_back(before: Any, sieve: _Sieve) -> None:
     if sys.stdout is sieve:  # else it is somebody else's by now
         sys.stdout = before
 

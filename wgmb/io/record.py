@@ -14,6 +14,7 @@ import mmap
 import re
 import zlib
 from pathlib import Path
+from typing import Any
 
 KEY = "wgmb"  # attribute or keyword of the record
 _BLANK = b"0" * 12 + b"-" + b"0" * 8  # length, CRC-32
@@ -23,7 +24,7 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 _AFTER_KEYWORD = len(b"tEXt" + KEY.encode() + b"\0")
 
 
-def blank(content: dict) -> str:
+def blank(content: dict[str, Any]) -> str:
     """The record's text, to be put into a file that is then sealed."""
     return json.dumps({"seal": _BLANK.decode(), **dict(sorted(content.items()))})
 
@@ -37,7 +38,7 @@ def seal(data: bytes, text: str) -> list[bytes | memoryview]:
     return _sealed(memoryview(data), at, at + len(record))
 
 
-def read(data: bytes | mmap.mmap) -> dict | None:
+def read(data: bytes | mmap.mmap) -> dict[str, Any] | None:
     """The content of the record of a file that is whole; None where there is none or it is not."""
     for found in _SEAL.finditer(data):
         if (stated := _stated(data, found.start())) is None:
@@ -53,7 +54,7 @@ def read(data: bytes | mmap.mmap) -> dict | None:
     return None
 
 
-def _stated(data: bytes | mmap.mmap, begin: int) -> tuple[dict, int] | None:
+def _stated(data: bytes | mmap.mmap, begin: int) -> tuple[dict[str, Any], int] | None:
     """The content of the record that begins there, and its length [bytes]; None if it is broken."""
     text = data[begin : begin + 65536].decode("latin-1")
     try:
@@ -76,7 +77,7 @@ def seal_file(path: Path, text: str) -> None:
         data[begin : begin + len(digits)] = digits
 
 
-def read_file(path: Path) -> tuple[dict | None, bool]:
+def read_file(path: Path) -> tuple[dict[str, Any] | None, bool]:
     """The content of a large file's record, None without one; and True if the file is whole.
 
     OSError if it cannot be read.

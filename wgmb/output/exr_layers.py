@@ -1,7 +1,5 @@
 """The EXR file of a result: its source's file with the pictures replaced."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The names of outputs: which exist, and which must not be written."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import os

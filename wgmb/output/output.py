@@ -1,7 +1,5 @@
 """Output files: images or a video, each complete under its name or absent."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import json

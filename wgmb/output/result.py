@@ -1,7 +1,5 @@
 """A result on its way to a file."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Motion vectors as other programs read them: the inverse of vectors.py."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence

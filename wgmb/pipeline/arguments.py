@@ -1,7 +1,5 @@
 """The arguments of a Blur: defaults, limits and checks, without a device."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Mapping

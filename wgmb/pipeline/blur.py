@@ -1,7 +1,5 @@
 """The pipeline: arrays -> textures -> velocity -> one method -> array."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import threading

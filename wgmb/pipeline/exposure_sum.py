@@ -1,7 +1,5 @@
 """Output frames that input frames share: each is blurred over its cell, and all are summed."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Iterable

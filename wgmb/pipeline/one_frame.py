@@ -1,7 +1,5 @@
 """One frame blurred in one call."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from typing import Any, Literal, Unpack

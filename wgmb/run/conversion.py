@@ -4,8 +4,6 @@ An output frame is the sum of the input frames whose cells its exposure covers (
 in linear light.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

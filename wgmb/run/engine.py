@@ -7,8 +7,6 @@ begins its next frame when the one before was taken from it, so that three frame
 memory, each with all its views.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

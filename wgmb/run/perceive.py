@@ -1,7 +1,5 @@
 """Frames as they are perceived: each is held until the next, and earlier ones fade."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

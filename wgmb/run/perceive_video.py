@@ -1,7 +1,5 @@
 """A video as it is perceived: each picture is held until the next, and earlier ones fade."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import time

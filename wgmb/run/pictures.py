@@ -1,7 +1,5 @@
 """Pictures from anywhere in Python, such as lists, generators and tensors, blurred one by one."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

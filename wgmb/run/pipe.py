@@ -1,7 +1,5 @@
 """Videos through pipes, at one end or at both; nothing is known of the end of what comes."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import os

@@ -1,7 +1,5 @@
 """A request to blur rendered frames: every setting, as `wgmb blur` receives it."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 A failing frame is reported, and the others are made; see engine.py for the threads.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from typing import Any

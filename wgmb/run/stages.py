@@ -3,8 +3,6 @@
 `blurred` gives them to other programs; run/sequence.py puts them into files.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence

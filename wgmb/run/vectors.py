@@ -1,7 +1,5 @@
 """Motion vectors of frames in the form of another program: a request, and its run."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from dataclasses import dataclass

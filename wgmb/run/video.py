@@ -1,7 +1,5 @@
 """Videos from file to file: a request, what it opens once, and the run of each video."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import time

@@ -1,7 +1,5 @@
 """Frames of a video on their way: the form in which a sink takes them, and the sink of a video."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable

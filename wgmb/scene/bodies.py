@@ -5,8 +5,6 @@ cylinder (along z) or ring (about y) that `place(t)` puts into the world; patter
 wgsl/scene/pattern.wgsl. Every function of time takes an array of times.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable

@@ -8,12 +8,14 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
 from .bodies import (
     Body,
+    Color,
     at,
     moving,
     rotation,
@@ -31,7 +33,7 @@ INK, WOOD = (0.05, 0.05, 0.07), (0.42, 0.24, 0.12)
 TURN = 2 * math.pi
 
 
-def _ground(color=SAND, other=STONE) -> Body:
+def _ground(color: Color = SAND, other: Color = STONE) -> Body:
     return Body(
         "box", (40, 0.5, 40), at(0, -0.5, 0), color, other, "CHECKER", (0.5, 0.5), specular=0.1
     )
@@ -220,7 +222,9 @@ def wheel(speed: float = 24.0, roll: float = 0.0) -> Scene:
     return Scene("wheel", tuple(bodies), _still_camera())
 
 
-def _on_wheel(hub, travel: float, turn: float, angle: float, radius: float, twist: float = 0.0):
+def _on_wheel(
+    hub: Any, travel: float, turn: float, angle: float, radius: float, twist: float = 0.0
+):
     """A place on a turning wheel: at `angle` and `radius`, turned by `twist` there."""
     x, y, z = hub
     return lambda t: (

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -59,5 +60,5 @@ class Figure:
             row["ways"], time = WAYS, number / RATE
         row["rotation"] = row["circle"] = self._angle(time)
 
-    def _angle(self, time):
+    def _angle(self, time: Any):
         return np.remainder(self.rotation + self.speed * time, 2 * math.pi)

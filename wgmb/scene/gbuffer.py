@@ -1,7 +1,5 @@
 """A scene on the GPU: its bodies, where they are over a span of time, and pictures of instants."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from functools import cached_property

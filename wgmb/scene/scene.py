@@ -1,7 +1,5 @@
 """Scenes as data: rigid bodies, volumes, a camera and light, anywhere in time."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

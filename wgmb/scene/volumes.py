@@ -1,7 +1,5 @@
 """Volumes whose blur has a closed form, and the backdrop they are shown on (Cusa 2022)."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

@@ -1,7 +1,5 @@
 """Frame sequences on disk: a pattern in, Frames out."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

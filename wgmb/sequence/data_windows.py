@@ -6,8 +6,6 @@ Where it ends with the display window, or cuts through the picture, what lies be
 and the pixels at its edge stand for it. Overscan beyond the display window counts as picture.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Iterable

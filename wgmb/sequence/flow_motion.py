@@ -1,7 +1,5 @@
 """Motion of a clip's frames from their pictures, where the files hold none."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A frame's file to a Frame: picture, vectors, depth and masks by their layers."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """The frames of a sequence as stored: read once, the last few kept for their neighbours."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections import OrderedDict

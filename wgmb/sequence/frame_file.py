@@ -1,7 +1,5 @@
 """One frame as stored on disk: the layers of all its files, in one data window."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

@@ -1,7 +1,5 @@
 """Frames among their neighbours: camera cuts left out, different data windows on one canvas."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

@@ -1,7 +1,7 @@
 """Settings of the blur: the method, and the options of all methods."""
 
 from dataclasses import dataclass, replace
-from typing import Literal, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 import wgpu
 
@@ -99,7 +99,7 @@ class BlurSettings:
             **self._method_options(),
         )
 
-    def _method_options(self) -> dict:
+    def _method_options(self) -> dict[str, Any]:
         """The method's own options that are set."""
         own = {name: getattr(self, name) for name in METHOD_OPTIONS}
         return {k: v for k, v in own.items() if v is not None and v is not False}

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from ..color.spaces import ColorSpace
 from ..io import limits
@@ -63,7 +63,7 @@ class InputSettings:
     "Largest allowed decoded size of an image file in megabytes (as 32-bit floats)."
 
     @property
-    def looks(self) -> dict:
+    def looks(self) -> dict[str, Any]:
         """The settings that change frames; the others select or limit them."""
         return {k: v for k, v in plain(self).items() if k not in _NO_LOOK}
 

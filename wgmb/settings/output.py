@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from ..color.spaces import Display
 from ..errors import InputError
@@ -42,13 +42,13 @@ class OutputSettings:
         return self.output.lower().endswith(".exr")
 
     @property
-    def looks(self) -> dict:
+    def looks(self) -> dict[str, Any]:
         """The settings that change the contents of the files; the Output has them too."""
         return {k: v for k, v in plain(self).items() if k not in _NO_LOOK}
 
     def make(
         self,
-        settings: dict,
+        settings: dict[str, Any],
         numbers: list[int],
         inputs: Iterable[Path] = (),
         views: Sequence[str] = (),

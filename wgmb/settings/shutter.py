@@ -3,7 +3,7 @@
 import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from ..errors import check_choice
 from ..io.frame_numbers import readable
@@ -51,7 +51,7 @@ class ShutterSettings:
         return f"{self.curve} (CRC-32 {zlib.crc32(Path(self.curve).read_bytes()):08x})"
 
     @property
-    def looks(self) -> dict:
+    def looks(self) -> dict[str, Any]:
         """The settings for a record."""
         return plain(self) | {"curve": self.curve_read()}
 

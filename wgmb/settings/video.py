@@ -1,7 +1,5 @@
 """User settings of videos as plain values; the string under a field is its help."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import re

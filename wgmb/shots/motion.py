@@ -1,7 +1,5 @@
 """Motion of frames without vectors: its source, and the shot in which a frame's motion is found."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable

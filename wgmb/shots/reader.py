@@ -6,8 +6,6 @@ A flash is no shot: a picture, or some for up to a 24th of a second, that differ
 them, which agree with each other. They are exposed with those around, but no motion leads to them.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections import deque

@@ -6,8 +6,6 @@ differ from those beside them, while their surroundings change. Digits that chan
 edges of strokes are found by their brightness, next to strokes that stand.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable

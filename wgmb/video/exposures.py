@@ -1,7 +1,5 @@
 """Exposures of pictures in time, and of a video, at the output's own times."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """The pictures of a video's shots on the GPU, with the motion between them: nothing comes down."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import numpy as np

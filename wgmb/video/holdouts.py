@@ -1,7 +1,5 @@
 """Holdouts of a video: its displays, image files, or the pixels that never change."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable

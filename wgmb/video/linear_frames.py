@@ -1,7 +1,5 @@
 """The pictures of a video as arrays of linear light."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Iterator

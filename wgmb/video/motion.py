@@ -1,7 +1,5 @@
 """Motion of a video's pictures, by a source that takes textures or display values."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from typing import Any

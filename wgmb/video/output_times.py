@@ -1,7 +1,5 @@
 """The output frames of a video: which part of it they are made from, and when each is shown."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

@@ -5,8 +5,6 @@ sorted into planes of the same samples; no sample changes its value, except that
 bits are spread over 8.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import re

@@ -1,7 +1,5 @@
 """Static areas of a video whose surroundings change: a head-up display, a logo, borders."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import numpy as np

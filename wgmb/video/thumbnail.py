@@ -1,7 +1,5 @@
 """A coded picture at a glance: small copies that tell cuts, repeats and motion apart."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from functools import cache, cached_property

@@ -4,8 +4,6 @@ A line of text for the stream, such as `YUV4MPEG2 W640 H360 F30:1 Ip A1:1 C420mp
 picture the line `FRAME` and its planes. It says nothing of matrix, transfer and primaries.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import re

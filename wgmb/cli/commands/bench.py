@@ -118,7 +118,7 @@ def bench(
     return 0
 
 
-def _tell_article(results: dict, width: int, height: int) -> None:
+def _tell_article(results: dict[float, tuple[float, ...]], width: int, height: int) -> None:
     from ...lab.baselines import ARTICLE
 
     out(f"{width} x {height}, torusphere, published density")

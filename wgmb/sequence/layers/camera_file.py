@@ -1,7 +1,5 @@
 """Cameras and rigid bodies from JSON."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import json

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class NoSuchNameError(InputError):
     """No object in the manifest has the name."""
 
 
-def find(attributes: Mapping, layer: str) -> Attributes | None:
+def find(attributes: Mapping[str, Any], layer: str) -> Attributes | None:
     """Metadata of the Cryptomatte called `layer` in a file's `attributes`; None without one."""
     found: dict[str, dict[str, str]] = {}
     for name, value in attributes.items():

@@ -213,7 +213,7 @@ def product(factors: Iterable[tuple[np.ndarray, float | None]]) -> np.ndarray | 
 
 
 def of_layer(
-    channels: Channels, attributes: Mapping, wanted: str, folders: Iterable[Path] = ()
+    channels: Channels, attributes: Mapping[str, Any], wanted: str, folders: Iterable[Path] = ()
 ) -> np.ndarray:
     """A mask 0..1 from `LAYER` or `LAYER=VALUE`.
 
@@ -237,7 +237,7 @@ def of_layer(
     return (np.abs(plane - number) < 0.5).astype(np.float32)
 
 
-def asks_by_number(attributes: Mapping, wanted: str) -> bool:
+def asks_by_number(attributes: Mapping[str, Any], wanted: str) -> bool:
     """Return True for `LAYER=VALUE` with an index or an id, which no manifest can tell wrong."""
     layer, _, value = wanted.partition("=")
     crypto = cryptomatte.find(attributes, layer)

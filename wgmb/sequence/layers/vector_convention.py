@@ -1,7 +1,5 @@
 """Meaning of a sequence's vectors, decided once for all of its frames."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

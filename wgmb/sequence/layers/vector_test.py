@@ -5,8 +5,6 @@ neighbouring frames where those of the frame are. Up to _PROBES moving pixels ar
 all frames that are tested together.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -4,8 +4,6 @@ Foreign conventions end here. A convention is what the numbers mean; detect.py f
 they do.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,5 @@
 """Stored planes of videos to linear light and back, on the GPU: matrix, range, transfer, alpha."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import numpy as np

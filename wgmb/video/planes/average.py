@@ -1,7 +1,5 @@
 """Weighted means of coded pictures in linear light: from planes to planes in one pass."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Samples to signals and back: matrix coefficients and range (ITU-T H.273, section 8.3)."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The planes of a picture as bytes on the GPU, and their way down."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from dataclasses import dataclass

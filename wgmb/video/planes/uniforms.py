@@ -1,7 +1,5 @@
 """Uniforms of the passes over planes: sizes, and the meaning of samples."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import numpy as np

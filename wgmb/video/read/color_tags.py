@@ -1,7 +1,5 @@
 """Colour tags of a video, and the assumptions where tags are missing."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import av

@@ -1,7 +1,5 @@
 """Decode the pictures of a video, from any of them on, each with its number."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

@@ -4,8 +4,6 @@ A video is read forwards once, from the key frame before the first picture asked
 as they are stored (color/coding.py), upright and without interlacing. Colours are not converted.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Pictures that a phone or a camera stored lying on their side, upright."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import struct

@@ -1,7 +1,5 @@
 """Facts that a decoded frame has beside its samples: turns, displays, light levels."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

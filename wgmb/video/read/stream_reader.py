@@ -1,7 +1,5 @@
 """Videos from a stream that cannot be sought: whatever FFmpeg reads so, such as Matroska."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Iterator

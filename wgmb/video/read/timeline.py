@@ -4,8 +4,6 @@ Times are those in the file, on the clock that all its streams share: with edit 
 and variable rates. The number of a picture says nothing about its time.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from array import array

@@ -1,7 +1,5 @@
 """Sound at another speed: decoded, stretched or resampled, and encoded again."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

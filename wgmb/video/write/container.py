@@ -1,7 +1,5 @@
 """A video file being written: under a temporary name, then complete under its own, or absent."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

@@ -4,8 +4,6 @@ One table serves videos made of frames and videos made of videos. `quality` is t
 number of constant quality: smaller is better and larger.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

@@ -5,8 +5,6 @@ dispositions; chapters and the file's own texts and dates come along. What the n
 hold is left out, and said. Times go by a Clock; at another speed, sound is encoded again.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

@@ -6,8 +6,6 @@ a checksum (see record.py). When all are there their packets are copied into the
 that one run would have given them, and the folder is removed.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

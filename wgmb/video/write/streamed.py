@@ -1,7 +1,5 @@
 """Matroska with FFV1 into a stream that cannot be sought: no loss, and the colours are stated."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import contextlib

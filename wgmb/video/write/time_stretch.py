@@ -8,8 +8,6 @@ onset of a sound is copied to where it belongs, once, as it is: pieces near it d
 end before it or begin after it. FFmpeg's atempo puts sounds up to 75 ms early at a speed of 0.4.
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from fractions import Fraction

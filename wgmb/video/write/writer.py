@@ -1,7 +1,5 @@
 """Write coded pictures as a video, at exact times, with the other streams beside them."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from dataclasses import replace
