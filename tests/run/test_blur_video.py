@@ -291,6 +291,20 @@ def test_the_method_suits_where_motion_comes_from(tmp_path, capsys, flow, asked,
     assert request.open().blur.method.name == method
 
 
+@pytest.mark.parametrize("settings, method, said", [
+    ({"flow": "search"}, None, "`flow_quality=fast` takes less"),
+    ({"flow": "search", "flow_quality": "fast"}, None, "`flow_quality=draft` takes less"),
+    ({"flow": "search", "flow_quality": "draft"}, None, "`flow=dis` takes less"),
+    ({"flow": "dis"}, None, "`flow_quality=fast` takes less"),
+    ({"flow": "dis", "flow_quality": "fast"}, "gather", "`method=tap` takes less"),
+    ({"flow": "dis", "flow_quality": "fast"}, None, "`flow=none`"),
+    ({"flow": "none"}, None, "`end` ends earlier"),
+])  # fmt: skip
+def test_the_next_quicker_choice_is_named(settings, method, said):
+    request = VideoRequest(blur=BlurSettings(method=method), video=VideoSettings(**settings))
+    assert request.open().quicker.startswith(said)
+
+
 def test_without_a_gpu_and_opencv_a_line_says_what_would_be_quicker(capsys, monkeypatch):
     for module in ("wgmb.settings.video", "wgmb.run.video"):
         monkeypatch.setattr(f"{module}.is_installed", lambda package: False)

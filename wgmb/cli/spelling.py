@@ -22,6 +22,7 @@ _OTHERWISE = {
     "sharp": "--sharp",
     "max_displace": "--max-displace",
     "space": "--from",
+    "try": "--try",
     "workers": "--workers",
 }
 """Arguments whose options have other names, or are those of one command."""

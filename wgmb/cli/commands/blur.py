@@ -65,6 +65,7 @@ def blur(
     color_in: Annotated[
         Literal["bt601", "bt709", "bt2020-pq", "bt2020-hlg"] | None, Parameter(group=VIDEO)
     ] = None,
+    trial: Annotated[int | None, Parameter(name="--try", group=VIDEO)] = None,
     confidence: Confidence = False,
     config: ConfigFile = None,
     adapter: Adapter = None,
@@ -78,6 +79,8 @@ def blur(
     Example: wgmb blur in.mp4 -o out.mp4 --shutter 180 --fps 60
 
     Example: wgmb blur a.mp4 b.mkv -o out/ --fps 60
+
+    Example: wgmb blur in.mp4 -o try.mp4 --try 5
 
     Example: wgmb blur night.mp4 -o out.mp4 --highlights 8
 
@@ -105,6 +108,9 @@ def blur(
         another.
     color_in
         Colours of a pipe, which does not state them; by default as players assume.
+    trial
+        Blur only so many places of a video, a second each, beside the original; into an image file,
+        a frame of each.
     confidence
         Add confidence layers, confidence.* (EXR output, method gather); doubles the time.
     config
@@ -119,7 +125,7 @@ def blur(
     crew = _crew(workers, cluster)
     if job is not None:
         rest = replace(input, frames=None), blur, shutter, color, video
-        is_changed = output or any(group != type(group)() for group in rest)
+        is_changed = output or trial or any(group != type(group)() for group in rest)
         if patterns or confidence or fps_in or config or is_changed:
             raise InputError(NOT_WITH_JOB)
         return blur_job(job, input.frames, crew, adapter, verbose, quiet)
@@ -134,8 +140,10 @@ def blur(
         with needed_by("a pipe", "video"):
             from ...run.video import VideoRequest
             from .blur_pipe import blur_pipe
-        if len(patterns) > 1 or confidence or crew:
-            raise InputError("a pipe stands alone: one input, and no --confidence or --workers")
+        if len(patterns) > 1 or confidence or crew or trial is not None:
+            raise InputError(
+                "a pipe stands alone: one input, and no --confidence, --try or --workers"
+            )
         return blur_pipe(pattern, output, VideoRequest.of(groups), adapter, quiet, fps_in, color_in)
     if color_in:
         raise InputError("--color-in is for pipes; files state their colours, or are assumed to")
@@ -152,8 +160,12 @@ def blur(
         _tell_unused(color, quiet)
         how = VideoRequest.of(groups), adapter, quiet, verbose
         if is_batch(patterns, output.output):
+            if trial is not None:
+                raise InputError("--try is for one video, and its output is a file")
             return blur_videos(patterns, output, *how)
-        return blur_video(pattern, output, *how)
+        return blur_video(pattern, output, *how, trial)
+    if trial is not None:
+        raise InputError("--try is for videos; of frames, --frames selects some")
     request = BlurRequest.of(
         groups, pattern=pattern, output=output, confidence=confidence, fps_in=fps_in
     )

@@ -1,0 +1,48 @@
+"""The time that a long run will take, told after its first frames with what would be quicker."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+FIRST = 3  # frames from which the rest is estimated
+LONG = 600.0  # seconds above which it is told
+
+
+def spelled(seconds: float) -> str:
+    """80 -> 1 min, 7500 -> 2 h 5 min."""
+    hours, minutes = divmod(max(1, round(seconds / 60)), 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+
+
+class Estimate:
+    """A `progress` that passes on to `tell`, and says once if the frames left take long.
+
+    `total`: number of frames; `quicker`: what takes less time; `say`: takes the line.
+    """
+
+    def __init__(
+        self,
+        tell: Callable[..., None],
+        total: int,
+        quicker: str,
+        say: Callable[[str], None],
+        clock: Callable[[], float] = time.perf_counter,
+    ):
+        self._tell, self._total, self._quicker = tell, total, quicker
+        self._say, self._clock = say, clock
+        self._count, self._times = 0, list[float]()
+
+    def __call__(self, number: int, status: str) -> None:
+        """One frame more; `status`: done, skipped or failed."""
+        self._tell(number, status)
+        self._count += 1
+        if status != "done" or len(self._times) == FIRST:
+            return
+        self._times.append(self._clock())
+        if len(self._times) < FIRST:
+            return
+        # The first frame also started the GPU, and is left out.
+        left, each = self._total - self._count, (self._times[-1] - self._times[0]) / (FIRST - 1)
+        if left * each > LONG:
+            self._say(f"about {spelled(left * each)} for {left} more frames; {self._quicker}")
