@@ -36,7 +36,8 @@ def test_the_picture_is_a_on_one_side_and_b_on_the_other(hand):
     half = SMALL[0] // 2
     np.testing.assert_allclose(both[:, : half - 2], as_drawn(A)[:, : half - 2], atol=3e-3)
     np.testing.assert_allclose(both[:, half + 2 :], as_drawn(B)[:, half + 2 :], atol=3e-3)
-    assert hand.viewer.stage.report.labels == ("tap", "B: tiles")
+    labels = hand.viewer.stage.report.labels
+    assert labels == ("tap, 4 samples, 360 deg", "B: tiles, 8 samples, 90 deg")
     hand.viewer.state = put(hand.state, compare="difference", gain=1.0)
     want = np.abs(as_drawn(A) - as_drawn(B))
     np.testing.assert_allclose(hand.picture(), want, atol=4e-3)

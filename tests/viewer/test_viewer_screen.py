@@ -104,6 +104,19 @@ def test_the_window_does_not_wait_for_composing_and_shows_the_last_view(beside, 
     np.testing.assert_array_equal(painted(canvas)[:, 2:88], np.round(255 * now))
 
 
+@pytest.mark.parametrize("mode", ["wipe", "split", "difference"])
+def test_a_comparison_waits_for_its_second_image(mode):
+    screen = Screen(gpu.open_device(), "rgba8unorm")
+    view = view_of(FIRST, SECOND)
+    screen.show(view)
+    alone = screen.picture()
+    compared = replace(view, state=replace(view.state, compare=mode))
+    screen.show(replace(compared, images=(view.images[0], composer.NOTHING)))
+    np.testing.assert_array_equal(screen.picture(), alone)
+    screen.show(compared)
+    assert np.abs(screen.picture() - alone).max() > 0.1
+
+
 def painted(canvas):
     """(height, width, 3) of what is on a canvas."""
     device = gpu.open_device()

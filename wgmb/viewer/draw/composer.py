@@ -61,7 +61,9 @@ class View:
 
     @property
     def mode(self) -> str:
-        """The constant of compose.wgsl for the comparison."""
+        """The constant of compose.wgsl for the comparison; none before there is a second image."""
+        if self.images[1] == NOTHING:
+            return "ONE"
         names = {"off": "ONE", "flicker": "ONE", "pair": "SPLIT", "red-cyan": "RED_CYAN"}
         return names.get(self.state.mode, self.state.mode.upper())
 

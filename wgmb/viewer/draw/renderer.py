@@ -131,6 +131,9 @@ class Renderer:
         assert first.texture is not None
         report.size, report.kind = first.texture.size[:2], first.kind
         report.labels = (first.label, last.label)
+        if state.is_compared_with_kept:
+            own, other = state.differences(state.as_kept), state.as_kept.differences(state)
+            report.labels = ", ".join([first.label, *own]), ", ".join([last.label, *other])
         if any(self._slots[slot].is_preview for slot in slots):
             share = report.size[0] / max(full_size[0], 1)
             of_size = f" at {share:.0%}" if share < 0.995 else ""

@@ -25,6 +25,7 @@ _BINS = 64
 _STEP = 40.0  # from one arrow to the next [logical px]
 _SHORTEST = 0.5  # motion that has an arrow [px]
 _VALUES = 96.0  # where they begin, beside their names [logical px]
+_NARROWEST = 260.0  # so wide it is at least [logical px]
 _HEAD = 5.0  # of an arrow [logical px]
 
 
@@ -129,9 +130,9 @@ def draw_arrows(motion: np.ndarray, place: Box, area: Box) -> None:
 
 def show(text: list[str], shares: np.ndarray | None, area: Box) -> None:
     """The text and the histogram in a corner of the picture."""
-    x, y, _, height = area
+    x, y, width, height = area
     imgui.set_next_window_pos((x + 12, y + height - 12), pivot=(0.0, 1.0))
-    imgui.set_next_window_bg_alpha(0.88)
+    imgui.set_next_window_bg_alpha(0.92)
     flags = imgui.WindowFlags_
     fixed = flags.no_title_bar | flags.always_auto_resize | flags.no_move | flags.no_nav
     imgui.begin("inspector", None, fixed | flags.no_inputs | flags.no_focus_on_appearing)
@@ -139,7 +140,9 @@ def show(text: list[str], shares: np.ndarray | None, area: Box) -> None:
         name, _, value = line.partition(" ")
         imgui.text(name)
         imgui.same_line(_VALUES)
+        imgui.push_text_wrap_pos(max(width - 36, _NARROWEST))
         imgui.text(value.strip())
+        imgui.pop_text_wrap_pos()
     if shares is not None:
         peak = float(np.sqrt(shares).max())
         imgui.plot_histogram(

@@ -9,6 +9,7 @@ from ..state.state import State
 from .theme import ACCENT, INK, packed
 
 _RED = (0.95, 0.3, 0.25, 1.0)
+_HELP_WIDTH, _HELP_MARGIN = 540.0, 24.0  # of the help, around its lines [logical px]
 _BEHIND = (0.05, 0.05, 0.06, 0.72)
 
 
@@ -72,15 +73,20 @@ def tag(text: str, x: float, y: float, *, right=False, middle=False, color=INK) 
 def give_help(area: Box) -> None:
     """All that the mouse and the keys do."""
     x, y, width, height = area
-    imgui.set_next_window_pos((x + width / 2, y + height / 2), pivot=(0.5, 0.5))
-    imgui.set_next_window_bg_alpha(0.94)
+    lines = len(MOUSE) + len(KEYS) + 2
+    size = min((height - _HELP_MARGIN) / (lines * imgui.get_text_line_height_with_spacing()), 1.0)
+    middle = max(x + width / 2, size * _HELP_WIDTH / 2)  # over the panel where there is no room
+    imgui.set_next_window_pos((middle, y + height / 2), pivot=(0.5, 0.5))
+    imgui.set_next_window_bg_alpha(1.0)
     flags = imgui.WindowFlags_
     fixed = flags.no_title_bar | flags.always_auto_resize | flags.no_move | flags.no_nav
+    imgui.push_font(None, size * imgui.get_style().font_size_base)  # pyright: ignore[reportArgumentType]
     imgui.begin("help", None, fixed | flags.no_inputs)
     for table in (MOUSE, KEYS):
         for name, what in table.items():
             imgui.text_colored(ACCENT, name)
-            imgui.same_line(160)
+            imgui.same_line(160 * size)
             imgui.text(what)
         imgui.spacing()
     imgui.end()
+    imgui.pop_font()

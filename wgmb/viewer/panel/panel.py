@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 from ..controls import Box
 from ..draw.request import Available
 from ..draw.slot import FrameStatus
-from ..state.state import KEPT, State
+from ..state.state import State
 from ..state.video_time import output, output_frame
 from ..state.words import for_shell
 from . import overlay, sections
@@ -184,7 +184,7 @@ def _subject(state: State) -> str:
 def commands(state: State, output: str) -> str:
     """The line that makes the video; with settings B, if they are compared with, a second one."""
     lines = [for_shell(state.command(output))]
-    if state.kept and state.against == KEPT and state.compare != "off":
+    if state.is_compared_with_kept:
         other = Path(output)
         named = str(other.with_stem(f"{other.stem}-b"))
         lines.append(for_shell(state.as_kept.command(named)))

@@ -170,6 +170,25 @@ class State:
         compare = "wipe" if self.compare == "off" else self.compare
         return replace(self, kept=Kept.of(self), compare=compare, against=KEPT)
 
+    @property
+    def is_compared_with_kept(self) -> bool:
+        """True if settings B are what the picture is compared with."""
+        return bool(self.kept) and self.against == KEPT and self.compare != "off"
+
+    def differences(self, other: State) -> list[str]:
+        """The settings, of those that are kept as B, that are others; the method is left out."""
+        shutter, video = self.shutter, self.video
+        found = []
+        if self.suited_blur.samples != other.suited_blur.samples:
+            found.append(f"{self.suited_blur.samples or 'own'} samples")
+        if shutter.shutter != other.shutter.shutter:
+            found.append(f"{shutter.shutter:g} deg")
+        if (shutter.phase, shutter.curve) != (other.shutter.phase, other.shutter.curve):
+            found.append(f"{shutter.phase}, {shutter.curve}")
+        if (video.flow, video.flow_quality) != (other.video.flow, other.video.flow_quality):
+            found.append(f"{video.flow}, {video.flow_quality}")
+        return found
+
     def swapped(self) -> State:
         """The same with settings B, the present ones kept as B."""
         return self if self.kept is None else replace(self.as_kept, kept=Kept.of(self))
