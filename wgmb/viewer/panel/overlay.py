@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
 
 from ..controls import KEYS, MOUSE, Box
 from ..state.state import State
 from .theme import ACCENT, INK, packed
 
 _RED = (0.95, 0.3, 0.25, 1.0)
-_HELP_WIDTH, _HELP_MARGIN = 540.0, 24.0  # of the help, around its lines [logical px]
+_HELP_WIDTH, _HELP_MARGIN = 540.0, 28.0  # of the help, around its lines [logical px]
 _BEHIND = (0.05, 0.05, 0.06, 0.72)
 
 
@@ -81,6 +81,8 @@ def give_help(area: Box) -> None:
     flags = imgui.WindowFlags_
     fixed = flags.no_title_bar | flags.always_auto_resize | flags.no_move | flags.no_nav
     imgui.push_font(None, size * imgui.get_style().font_size_base)  # pyright: ignore[reportArgumentType]
+    spacing = imgui.get_style().item_spacing
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, size * spacing.y))
     imgui.begin("help", None, fixed | flags.no_inputs)
     for table in (MOUSE, KEYS):
         for name, what in table.items():
@@ -89,4 +91,5 @@ def give_help(area: Box) -> None:
             imgui.text(what)
         imgui.spacing()
     imgui.end()
+    imgui.pop_style_var()
     imgui.pop_font()
