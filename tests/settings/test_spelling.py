@@ -108,7 +108,6 @@ def test_every_option_there_is_exists():
         ("--max-mb 0.01", r"; --max-mb 1 allows it$"),
         ("--max-blur -1", r"^wgmb: --max-blur must be 0 or more"),
         ("--rolling up --rolling-duration nan", r"^wgmb: --rolling-duration must be"),
-        ("--resume -o o.mp4", r"^wgmb: --resume is not available for videos"),
         ("--layer nope", "no colour layer 'nope'"),
     ],
 )

@@ -473,7 +473,11 @@ def view(
             super().close()
 
     canvas = Window(title=TITLE, size=size, update_mode="ondemand", max_fps=60)
-    soon = loop.call_soon_threadsafe
+
+    def soon(call: Callable[[], None]) -> None:
+        with suppress(AttributeError, RuntimeError):  # the loop has ended
+            loop.call_soon_threadsafe(call)
+
     viewer = Viewer(canvas, state, **devices, interface=interface, call_soon=soon)
     window: Any = canvas._window
     drop: Any = lambda _, paths: viewer.dropped(paths)  # noqa: E731
