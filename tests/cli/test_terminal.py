@@ -225,6 +225,22 @@ app.run(["info"])
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "wgmb: interrupted\n")
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_while_python_ends_changes_nothing(number):
+    """One of 60 runs that were interrupted as they ended had died by the signal."""
+    late = f"""
+import os, signal
+from wgmb.cli import app
+class Late:
+    def __del__(self, kill=os.kill, me=os.getpid()):
+        kill(me, {int(number)})
+signal.late = Late()
+app.run(["--version"])
+"""
+    done = subprocess.run([sys.executable, "-c", late], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_the_command_of_the_package_hears_interruptions_first():
     assert '\nwgmb = "wgmb.__main__:main"\n' in (ROOT / "pyproject.toml").read_text()
 

@@ -262,10 +262,13 @@ def run(arguments: list[str] | None = None) -> None:
 
 
 def _insist(codes: list[int]) -> None:
-    """End an interrupted process with its exit code.
+    """End the process with its exit code.
 
-    Where the interruption was raised within `exec()` of a text, as dataclasses use it, `python -m`
-    would end the process by SIGINT, although the exception was caught.
+    Where an interruption was raised within `exec()` of a text, as dataclasses use it, `python -m`
+    would end the process by SIGINT, although the exception was caught. And Python gives up its
+    handlers of signals before it has ended.
     """
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, signal.SIG_IGN)
     if codes == [INTERRUPTED]:
         os._exit(INTERRUPTED)
