@@ -1,6 +1,7 @@
 """Promises of SECURITY.md about the whole program: nothing is executed, nothing connects."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -83,3 +84,16 @@ def test_a_connection_and_a_program_would_be_seen(tmp_path):
             "subprocess.run(['true'])")]  # fmt: skip
     done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, timeout=300)
     assert "subprocess.Popen" in done.stderr
+
+
+@pytest.mark.fast
+def test_each_promise_of_the_page_has_a_test_that_exists():
+    page = (ROOT / "SECURITY.md").read_text("utf-8")
+    promised = page[page.index("## What is promised") : page.index("How this is tested:")]
+    promises = [lead.rstrip(".") for lead in re.findall(r"^- \*\*([^*]+)\*\*", promised, re.M)]
+    assert len(promises) >= 7
+    rows = dict(re.findall(r"^\| ([^|]+) \| (`[^|]+) \|$", page, re.M))
+    assert list(rows) == promises
+    for tests in rows.values():
+        for file, name in re.findall(r"`([^`]+)::([^`]+)`", tests):
+            assert f"def {name}(" in (ROOT / "tests" / file).read_text("utf-8"), (file, name)

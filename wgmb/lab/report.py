@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import math
+import re
 from collections.abc import Iterable
 from html import escape
 from pathlib import Path
@@ -119,7 +120,8 @@ def page(report: Report) -> str:
     parts += [_case(report, i, case, colors) for i, case in enumerate(report.cases)]
     parts.append(_foot(report))
     text = _TEMPLATE.read_text(encoding="utf-8")
-    return text.replace("{{title}}", escape(report.title)).replace("{{body}}", "\n".join(parts))
+    places = {"title": escape(report.title), "body": "\n".join(parts)}
+    return re.sub(r"\{\{(title|body)\}\}", lambda place: places[place[1]], text)
 
 
 def _head(report: Report) -> str:
