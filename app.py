@@ -2,6 +2,9 @@
 
 import sys
 
-from wgmb.__main__ import main
+try:
+    from wgmb.__main__ import main
+except ImportError as error:  # of a Python that is too old
+    sys.exit(f"app.py: {error}")
 
 main(["view", *sys.argv[1:]])

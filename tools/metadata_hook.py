@@ -8,8 +8,12 @@ pictures are left out.
 from __future__ import annotations
 
 import re
-import tomllib
+import sys
 from pathlib import Path
+
+if sys.version_info < (3, 11):  # noqa: UP036
+    sys.exit("wgmb needs Python 3.11 or newer, got " + sys.version.split()[0])
+import tomllib
 
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 

@@ -10,7 +10,12 @@ Scene ─────┘              └─ motion
 `blur` blurs a single frame; `Blur` is compiled once, for many frames or your own encoder.
 """
 
+import sys
+
 from ._version import __version__ as __version__
+
+if sys.version_info < (3, 11):  # noqa: UP036
+    raise ImportError(f"wgmb needs Python 3.11 or newer, got {sys.version.split()[0]}")
 
 TYPE_CHECKING = False  # typing's own, without the time that loading it takes
 if TYPE_CHECKING:

@@ -1,6 +1,8 @@
 """Parts of a release: links and description of the package, notes, the tag, bundles."""
 
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -80,3 +82,26 @@ def test_the_supported_pythons_are_those_of_the_workflow():
     tried = re.search(r"python: \[(.*)\]", text)[1].replace('"', "").split(", ")
     said = [c.rpartition(" ")[2] for c in PROJECT["project"]["classifiers"] if ":: 3." in c]
     assert tried == said
+
+
+OLD = "import sys; sys.version_info = (3, 10, 13); sys.version = '3.10.13 (of a test)'; "
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("import wgmb", "ImportError: wgmb needs Python 3.11 or newer, got 3.10.13"),
+        ("import runpy; runpy.run_path('app.py')",
+         "app.py: wgmb needs Python 3.11 or newer, got 3.10.13"),
+        ("import runpy; runpy.run_path('tools/metadata_hook.py')",
+         "wgmb needs Python 3.11 or newer, got 3.10.13"),
+    ],
+)  # fmt: skip
+def test_a_python_that_is_too_old_is_one_line(line, said):
+    """pip listed every version of wgpu; the command named packages to install."""
+    done = subprocess.run(
+        [sys.executable, "-c", OLD + line], cwd=ROOT, capture_output=True, text=True
+    )
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == said
+    assert len(done.stderr.splitlines()) == 1 or "ImportError" in said
