@@ -391,6 +391,19 @@ def test_the_same_run_twice_gives_the_same_bytes(tmp_path, capsys, shot):
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
+def test_a_report_says_what_was_seen_in_the_frames(tmp_path):
+    shot = make.write_sequence(tmp_path, range(1, 7))
+    (tmp_path / "shot.0002.exr").write_bytes(b"damaged")
+    clip = Clip(shot, frames="1-5", cuts="4,99")
+    output = Output(tmp_path / "o.####.exr", numbers=clip.numbers, overwrite=True)
+    report = wgmb.blur_sequence(clip, Blur("tap", samples=2), output)
+    assert (report.done, list(report.failed)) == ([1, 3, 4, 5], [2])
+    assert (report.total, report.rest) == (5, 0)
+    assert (report.cuts, report.stray_cuts, report.on_disk) == ({4}, [99], (1, 6))
+    assert report.finding == clip.finding
+    assert report.sizes == {clip[1].size: [1, 3, 4, 5]}
+
+
 @pytest.mark.parametrize("name", ["o.bmp", "o", "o.exr.gz"])
 def test_an_output_of_unknown_kind_is_refused_with_what_there_is(tmp_path, name):
     with pytest.raises(InputError, match=r"\.exr.*\.png.*\.mp4"):
