@@ -1,16 +1,18 @@
 """Files dropped onto the window, the size of the interface, and help where the mouse rests."""
 
+import os
 from pathlib import Path
 
 import imageio.v3 as iio
 import numpy as np
 import pytest
 
-from viewer_hand import ALONE, SAMPLE, SIZE, SMALL, Hand
+from viewer_hand import ALONE, PLAIN, SAMPLE, SIZE, SMALL, Hand
 from wgmb import InputError
 from wgmb.viewer import controls, offscreen
 from wgmb.viewer.state.dropped import pattern_of, source_of
 from wgmb.viewer.state.groups import DEFAULTS, GROUP_OF, HELP
+from wgmb.viewer.state.recent import RecentFiles
 from wgmb.viewer.window import frame
 
 FRAMES = sorted(Path(SAMPLE).parent.glob("crossing.*.exr"))
@@ -99,3 +101,42 @@ def test_every_option_has_help_and_the_command_is_a_button():
         assert y + height < 200
     hand.touch("copy command")
     assert hand.viewer.message[0] == "copied"
+
+
+def test_files_that_were_shown_can_be_opened_again(tmp_path, folder):
+    kept = tmp_path / "state/wgmb/recent.json"
+    hand = Hand(PLAIN)
+    hand.viewer._recent = RecentFiles(kept)
+    hand.viewer.dropped([str(FRAMES[0])])
+    hand.look_until(lambda: kept.exists())
+    still = folder / "still.png"
+    hand.viewer.dropped([str(still)])
+    hand.look_until(lambda: hand.viewer._recent.sources[0] == str(still))
+    again = RecentFiles(kept)
+    assert again.sources == [str(still), os.path.abspath(SAMPLE)]
+    hand.choose("shown", os.path.abspath(SAMPLE))
+    assert hand.state.source == os.path.abspath(SAMPLE)
+    still.unlink()
+    hand.look(1.0)
+    hand.choose("shown", str(still))  # which is there no more
+    assert hand.state.source == os.path.abspath(SAMPLE) and "still.png" in hand.viewer.message[0]
+    for _ in range(2):
+        for number in range(10):
+            again.add(str(tmp_path / f"{number}.mp4"))
+    assert len(again.sources) == 8 and again.sources[0].endswith("9.mp4")
+
+
+@pytest.mark.parametrize("text", ["", "[1, 2]", '{"a": 1}', "[", "\x00"])
+def test_a_list_of_files_that_is_damaged_is_an_empty_one(tmp_path, text):
+    (tmp_path / "recent.json").write_text(text)
+    recent = RecentFiles(tmp_path / "recent.json")
+    assert recent.sources == []
+    recent.add("a.mp4")
+    assert RecentFiles(tmp_path / "recent.json").sources == [os.path.abspath("a.mp4")]
+
+
+def test_a_list_that_cannot_be_written_stops_nothing(tmp_path):
+    (tmp_path / "file").write_text("")
+    recent = RecentFiles(tmp_path / "file" / "recent.json")
+    recent.add("a.mp4")
+    assert recent.sources == [os.path.abspath("a.mp4")]

@@ -1,5 +1,6 @@
 """The real window, on a display of its own: xdotool's mouse and keys in, pictures out."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -64,6 +65,41 @@ event.data[0] = atom(b"WM_DELETE_WINDOW")
 x.XSendEvent(display, ctypes.c_ulong(window), 0, ctypes.c_long(0), ctypes.byref(event))
 x.XSync(display, 0)
 """
+DROP = """
+import ctypes, sys
+x = ctypes.CDLL("libX11.so.6")
+long = ctypes.c_ulong
+x.XOpenDisplay.restype = ctypes.c_void_p
+x.XInternAtom.restype = x.XDefaultRootWindow.restype = x.XCreateSimpleWindow.restype = long
+display = ctypes.c_void_p(x.XOpenDisplay(None))
+atom = lambda name: x.XInternAtom(display, name, 0)
+root, window = x.XDefaultRootWindow(display), int(sys.argv[1])
+own = x.XCreateSimpleWindow(display, long(root), 0, 0, 9, 9, 0, long(0), long(0))
+files = "".join(f"{name}\\r\\n" for name in sys.argv[2:]).encode()
+def send(to, *values):
+    event = (ctypes.c_long * 24)(*values)
+    x.XSendEvent(display, long(to), 0, ctypes.c_long(0), ctypes.byref(event))
+    x.XFlush(display)
+def tell(name, *data):
+    send(window, 33, 0, 1, 0, window, atom(name), 32, own, *data)
+x.XSetSelectionOwner(display, long(atom(b"XdndSelection")), long(own), long(0))
+tell(b"XdndEnter", 5 << 24, atom(b"text/uri-list"))
+tell(b"XdndPosition", 0, 150 << 16 | 360, 0, atom(b"XdndActionCopy"))
+event = (ctypes.c_long * 24)()
+while True:
+    x.XNextEvent(display, ctypes.byref(event))
+    kind, what = event[0] & 0xFFFFFFFF, event[5]
+    if kind == 33 and what == atom(b"XdndStatus"):
+        tell(b"XdndDrop", 0, 0)
+    elif kind == 30:  # what is dropped is asked for
+        asks, selection, target, where, time = event[5:10]
+        x.XChangeProperty(
+            display, long(asks), long(where), long(target), 8, 0, files, len(files)
+        )
+        send(asks, 31, 0, 1, 0, asks, selection, target, where, time)
+    elif kind == 33 and what == atom(b"XdndFinished"):
+        sys.exit(0 if event[8] & 1 else "refused")
+"""
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +130,8 @@ class Desk:
 
     def __init__(self, display, *words, cwd):
         self.display = display
-        self.env = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
+        own = {"DISPLAY": display, "PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(cwd)}
+        self.env = os.environ | own
         self.program = subprocess.Popen(
             [sys.executable, *words], env=self.env, cwd=cwd, stderr=subprocess.PIPE, text=True
         )
@@ -165,6 +202,11 @@ class Desk:
     def ask_to_close(self):
         """The message of a window manager when its cross is clicked."""
         words = [sys.executable, "-c", CLOSE, self.window]
+        subprocess.run(words, env=self.env, check=True, timeout=PATIENCE)
+
+    def drop(self, *files):
+        """Files let go of over the window, as a file manager does it (XDND 5)."""
+        words = [sys.executable, "-c", DROP, self.window, *(Path(f).as_uri() for f in files)]
         subprocess.run(words, env=self.env, check=True, timeout=PATIENCE)
 
     def end(self):
@@ -243,6 +285,13 @@ def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     while not (tmp_path / "wgmb-001.exr").exists() and time.monotonic() < until:
         time.sleep(0.1)
     assert (tmp_path / "wgmb-001.png").exists()
+
+    before = it.settled()
+    it.drop(ROOT / "sample/crossing.0010.exr")
+    assert it.shows_other_than(before)
+    it.settled()
+    recent = json.loads((tmp_path / "wgmb/recent.json").read_text())
+    assert recent == [str(ROOT / "sample/crossing.####.exr")]
 
     it.do("windowsize", it.window, 900, 600)
     time.sleep(1)

@@ -32,6 +32,7 @@ from .panel import inspector, overlay
 from .panel.panel import Info, Panel
 from .panel.theme import style
 from .scaled_canvas import SIZES, ScaledCanvas
+from .state.recent import RecentFiles, default_path
 from .state.state import COMPARE, State
 
 TITLE = "wgmb"
@@ -51,7 +52,8 @@ class Viewer:
 
     `interface`: size of the panel and its text. `threaded`: pictures are drawn in a thread with
     `drawing_device` and composed in another one, and the window never waits for them; the threads
-    have the window drawn by `call_soon`, of the canvas's loop. `failed` holds the exception that
+    have the window drawn by `call_soon`, of the canvas's loop. `recent`: files that can be opened
+    again, and where those that are shown are noted. `failed` holds the exception that
     ended the viewer, if one did.
     """
 
@@ -64,6 +66,7 @@ class Viewer:
         drawing_device: wgpu.GPUDevice | None = None,
         threaded: bool = False,
         interface: float = 1.0,
+        recent: RecentFiles | None = None,
         call_soon: Callable[[Callable[[], None]], object] | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ):
@@ -86,6 +89,7 @@ class Viewer:
         self.actions = Actions(canvas, self.stage, self.screen, self.say, self._quit)
         self.failed: BaseException | None = None
         self.message = ("", 0.0)  # and until when it is shown
+        self._recent = recent
         self._good = self._requested = state  # drawn without an error, and requested last
         self._call_soon = call_soon
         self._drawn: Drawn | None = None
@@ -327,6 +331,8 @@ class Viewer:
         if possible.method != state.method:
             self.say(f"method {state.method!r} is not available here")
         report = drawn.report
+        if self._recent is not None and not drawn.state.is_scene:
+            self._recent.add(drawn.state.source)
         self._info = Info(
             report=report,
             adapter=self.device.adapter.summary,
@@ -336,6 +342,7 @@ class Viewer:
             passes={k: v for k, v in self._passes.items() if k != "draw"},
             recording="recording" if full else "",
             export=self.actions.export_message,
+            recent=self._recent.sources if self._recent else [],
             message=self.message[0] if self._now < self.message[1] else report.waiting,
             flicked=self._flicked(),
         )
@@ -478,7 +485,8 @@ def view(
         with suppress(AttributeError, RuntimeError):  # the loop has ended
             loop.call_soon_threadsafe(call)
 
-    viewer = Viewer(canvas, state, **devices, interface=interface, call_soon=soon)
+    recent = RecentFiles(default_path())
+    viewer = Viewer(canvas, state, **devices, interface=interface, recent=recent, call_soon=soon)
     window: Any = canvas._window
     drop: Any = lambda _, paths: viewer.dropped(paths)  # noqa: E731
     glfw.set_drop_callback(window, drop)

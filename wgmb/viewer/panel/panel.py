@@ -34,6 +34,8 @@ class Info:
     recording: str = ""
     export: str = ""
     message: str = ""
+    recent: list[str] = field(default_factory=list)
+    """Files that were looked at before."""
     flicked: bool = False
 
 

@@ -44,11 +44,13 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
     """Another scene, its parameters, its camera; of frames on disk what was found out, of videos
     where motion comes from.
     """
-    names = list(builtin.SCENES) if state.is_scene else [state.source, *builtin.SCENES]
+    names = [*info.recent, *builtin.SCENES]
+    if state.source not in names:
+        names = [state.source, *names]
     label = "scene" if state.is_scene else "shown"
     chosen = ui.combo(label, state.source, names, text=plain(state.source))
     if chosen != state.source:
-        return state.opened(chosen)
+        return ui.tried(state, lambda: state.opened(chosen, state.input.max_mb))
     if not state.is_scene:
         if info.available.finding:
             ui.dim(info.available.finding)

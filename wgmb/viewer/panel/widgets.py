@@ -80,7 +80,8 @@ class Widgets:
             self.keep(name)
         if opened:
             for item in names:
-                picked, _ = imgui.selectable(plain(item), item == now)
+                # What follows ## tells apart files of one name.
+                picked, _ = imgui.selectable(f"{plain(item)}##{item}", item == now)
                 self.keep(f"{name}: {item}")
                 if picked:
                     now = item
