@@ -150,6 +150,40 @@ def test_what_changes_is_its_twin(stages, close):
         assert np.abs(want).max() > 0.5
 
 
+def test_tiles_near_changes_are_found(stages):
+    """A change marks its tile and those a pixel away; two tiles around these are near."""
+    changes = np.any([stages[f"changes {side}"][..., :3] != 0 for side in (-1, 1)], axis=(0, 3))
+    beside = np.pad(changes, 1)
+    beside = np.any([beside[j : j + SIZE[0], i : i + SIZE[1]]
+                     for j, i in ((0, 0), (0, 2), (2, 0), (2, 2))], axis=0)  # fmt: skip
+    tiles = [range(0, n, 16) for n in SIZE]
+    want = np.array([[beside[y : y + 16, x : x + 16].any() for x in tiles[1]] for y in tiles[0]])
+    words = stages.found[1:].reshape(want.shape)
+    marked = words & 2 != 0
+    assert (want <= marked).all()  # changes are kept in half floats: the least become 0
+    near = [[marked[max(j - 2, 0) : j + 3, max(i - 2, 0) : i + 3].any()
+             for i in range(want.shape[1])] for j in range(want.shape[0])]  # fmt: skip
+    assert np.array_equal(words & 4 != 0, near)
+    assert want.any() and not marked.all()
+
+
+def test_far_from_moving_light_the_picture_is_that_without():
+    """Nothing is left there of the frame before, whose light moved elsewhere."""
+    size = (40, 200)
+    blur, off = (Blur("gather", shutter=180, samples=8, shading=s) for s in ("auto", "off"))
+    one = around(size=size)
+
+    def elsewhere(frame, at):
+        color, light = (np.roll(array, at, axis=1) for array in (frame.color, frame.diffuse_light))
+        return replace(frame, color=color, diffuse_light=light, prev=None, next=None)
+
+    frames = [elsewhere(frame, 150) for frame in (one, one.prev, one.next)]
+    blur(frames[0].between(*frames[1:]))
+    got = blur(one)
+    assert np.array_equal(got[:, 120:], off(one)[:, 120:])
+    assert not np.array_equal(got[:, :60], off(one)[:, :60])
+
+
 def test_values_are_their_twin(stages, close):
     before, after = (stages[f"changes {side}"][..., :3] for side in (-1, 1))
     here = stages.frames[0]

@@ -26,12 +26,11 @@ def changes(
     frames: Mapping[int, SurfaceLight],
     albedo: View | None,
     by_color: bool,
-    change_flags: wgpu.GPUBuffer,
 ) -> dict[int, View]:
     """Changes of the logarithm of light to each neighbour, by its offset; black where unknown.
 
-    `frames`: by their offsets, 0 the frame itself. `by_color`: the light is the picture itself.
-    `change_flags`: its first word gets 1 if there are any.
+    `frames`: by their offsets, 0 the frame itself. `by_color`: the light is the picture itself. The
+    stage's change flags are told.
     """
     here = frames[0]
     plain = {}
@@ -87,7 +86,7 @@ def changes(
                 coherence=coherence if entry == "find_gain" else none,
                 ratio_out=ratio_out,
                 scalar_out=scalar_out,
-                found=change_flags,
+                found=stage.change_flags,
             )
         result[offset] = limited
     return result

@@ -100,8 +100,9 @@ def flow(
 def blurred(stage: Stage, source: View, sigma: float, output: View) -> None:
     """A Gaussian of `sigma` [px]."""
     half = stage.texture("half blurred", "rgba32float")
-    stage.run("blur", "across", constants={"SIGMA": sigma}, source=source, output=half)
-    stage.run("blur", "down", constants={"SIGMA": sigma}, source=half, output=output)
+    given: dict[str, Any] = {"constants": {"SIGMA": sigma}, "found": stage.change_flags}
+    stage.run("blur", "across", source=source, output=half, **given)
+    stage.run("blur", "down", source=half, output=output, **given)
 
 
 def _filled(stage: Stage, name: str, flow: View, back: View, bindings: dict[str, Any]) -> View:
@@ -132,9 +133,12 @@ def _search(stage: Stage, name: str, here: list[View], other: list[View], linear
             ("propagate", grid, second, first, no_flow),
             ("write_flow", sizes[i], first, no_patches, found),
         ):
+            if entry == "propagate" and i == 0:
+                continue  # patches of the coarser level were
             stage.run(
-                "flow", entry, size=size, here=here[i], there=other[i], coarse=coarse,
-                patches=patches, linear=linear, patches_out=patches_out, flow_out=flow_out,
+                "flow", entry, size=size, constants={"FINEST": i == 0}, here=here[i],
+                there=other[i], coarse=coarse, patches=patches, linear=linear,
+                patches_out=patches_out, flow_out=flow_out, changes=stage.change_flags,
             )  # fmt: skip
         coarse = found
     return coarse

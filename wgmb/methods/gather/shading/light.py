@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -88,22 +90,36 @@ class MovingLight:
         """Record all passes. `weight`: of every pixel (see PreparedFrame)."""
         usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
         change_flags = self._device.create_buffer_with_data(
-            label="found", data=np.zeros(1 + _tiles(bindings.size), np.uint32), usage=usage
+            label="change flags",
+            data=np.zeros(1 + math.prod(_tile_grid(bindings.size)), np.uint32),
+            usage=usage,
         )
-        stage = Stage(self._device, self._images, encoder, bindings, "", False, {})
+        lists: dict[str, Any] = {
+            name: self._device.create_buffer(
+                label=name,
+                size=16 * (2 + change_flags.size // 16),
+                usage=usage | wgpu.BufferUsage.INDIRECT,
+            )
+            for name in ("changing", "close")
+        }
+        stage = Stage(
+            self._device, self._images, encoder, bindings, "", False, {}, change_flags, lists
+        )
         stages = [
             replace(stage, name="glossy" if kind.pulled else "diffuse", pulled=kind.pulled)
             for kind in kinds
         ]
         changed = [
-            changes(stage, kind.frames, kind.albedo, kind.by_color, change_flags)
+            changes(stage, kind.frames, kind.albedo, kind.by_color)
             for stage, kind in zip(stages, kinds, strict=True)
         ]
-        gated = stage.gated(change_flags, grids(stage.size)).gates
+        for entry, over in (("main", _tile_grid(stage.size)), ("size_lists", (1, 1))):
+            stage.run("near", entry, size=over, found=change_flags, **lists)
+        gated = stage.gated(grids(stage.size)).gates
         earlier = None
         for stage, kind, by_side in zip(stages, kinds, changed, strict=True):
             stage = replace(stage, gates=gated)
-            earlier = self._layers(stage, kind, by_side, times, weight, earlier, change_flags)
+            earlier = self._layers(stage, kind, by_side, times, weight, earlier)
         assert earlier is not None, "no kind of light"
         return Added(earlier, times, change_flags)
 
@@ -115,7 +131,6 @@ class MovingLight:
         times: LightTimes,
         weight: View | None,
         earlier: wgpu.GPUTexture | None,
-        change_flags: wgpu.GPUBuffer,
     ) -> wgpu.GPUTexture:
         """Record the layers of one kind, added to the `earlier` ones."""
         present = values(stage, kind.frames[0], changed, kind.by_color)
@@ -153,12 +168,12 @@ class MovingLight:
                     ("from_there", 1 - share, there, way.back),
                 ):
                     push = stage.uniform("push", "Push", along=along)
-                    stage.run("push", push=push, values=value, flow=by, found=change_flags,
-                              pushed=buffers[name])  # fmt: skip
+                    stage.run("push", over="close", push=push, values=value, flow=by,
+                              found=stage.change_flags, pushed=buffers[name])  # fmt: skip
             before, after = (changed.get(one, none) for one in (-1, 1))
-            stage.run(
+            compose = partial(
+                stage.run,
                 "compose",
-                entry,
                 constants=constants,
                 node=stage.uniform("compose", "Node", time=share),
                 light_here=kind.frames[0].light,
@@ -173,16 +188,19 @@ class MovingLight:
                 explained=way.explained,
                 earlier=none if earlier is None else layer_of(earlier, i),
                 linear=self._linear,
-                found=change_flags,
                 added=layer_of(result, i),
                 **buffers,
             )
+            if entry == "main":
+                compose("begin")
+            compose(entry, over="changing" if entry == "main" else None)
         return result
 
 
-def _tiles(size: tuple[int, int]) -> int:
+def _tile_grid(size: tuple[int, int]) -> tuple[int, int]:
+    """Tiles of the change flags across and down."""
     side = int(wgsl.load(f"{FOLDER}/active.wgsl").constant("LIGHT_TILE"))
-    return -(-size[0] // side) * -(-size[1] // side)
+    return -(-size[0] // side), -(-size[1] // side)
 
 
 def layer_of(texture: wgpu.GPUTexture, index: int) -> View:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,7 @@ class Stage:
     """Records passes over `bindings.size` into `encoder`.
 
     `name`: of the kind of light. `gates`: workgroups of passes by their sizes; none: all run.
+    `change_flags`: see Added. `lists`: of tiles that are "changing" and that are "close" to them.
     """
 
     device: wgpu.GPUDevice
@@ -29,6 +31,8 @@ class Stage:
     name: str
     pulled: bool
     gates: dict[tuple[int, int], dict]
+    change_flags: wgpu.GPUBuffer
+    lists: Mapping[str, wgpu.GPUBuffer]
 
     @property
     def size(self) -> tuple[int, int]:
@@ -53,10 +57,11 @@ class Stage:
         entry: str = "main",
         *,
         size: tuple[int, int] | None = None,
+        over: str | None = None,
         constants: dict[str, float] | None = None,
         **resources,
     ) -> None:
-        """Record one entry point over `size` invocations, or over the image.
+        """Record one entry point over `size` invocations, over a list of tiles, or over the image.
 
         The textures of another size than the frame's come with their own.
         """
@@ -66,6 +71,10 @@ class Stage:
         kernel = gpu.kernel(self.device, path, None, **given)
         size = size or self.size
         gate = self.gates.get(size) if self.gates else None
+        if over:
+            gate = {"buffer": self.lists[over], "offset": 0, "size": 12}
+        if "> listed:" in wgsl.load(path).text:
+            resources["listed"] = self.lists[over or "changing"]
         if self.gates and gate is None:
             raise KeyError(f"no gate for passes of {size}")
         kernel.run(self.encoder, entry, replace(self.bindings, size=size), gate, **resources)
@@ -74,7 +83,7 @@ class Stage:
         """The struct of a file with these values, the others 0."""
         return gpu.uniform(self.device, f"{FOLDER}/{file}.wgsl", struct, **values)
 
-    def gated(self, change_flags: wgpu.GPUBuffer, sizes: list[tuple[int, int]]) -> Stage:
+    def gated(self, sizes: list[tuple[int, int]]) -> Stage:
         """The same, whose passes of these sizes run only if `change_flags` says so."""
         assert len(sizes) <= _GATES
         counts = np.zeros((_GATES, 4), np.uint32)
@@ -85,7 +94,7 @@ class Stage:
             label="gates", size=length, usage=usage.STORAGE | usage.INDIRECT
         )
         self.run("gate", size=(1, 1), sizes=self.uniform("gate", "Sizes", counts=counts),
-                 found=change_flags, gates=gates)  # fmt: skip
+                 found=self.change_flags, gates=gates)  # fmt: skip
         each = {
             size: {"buffer": gates, "offset": 12 * i, "size": 12} for i, size in enumerate(sizes)
         }

@@ -23,7 +23,7 @@ struct Node {
 @group(1) @binding(12) var linear: sampler;
 @group(1) @binding(13) var<storage, read_write> from_here: array<u32>;   // see push.wgsl
 @group(1) @binding(14) var<storage, read_write> from_there: array<u32>;
-@group(1) @binding(15) var<storage, read> found: array<u32>;    // one word, then those of tiles: see gain.wgsl
+@group(1) @binding(15) var<storage, read> listed: array<u32>;   // the tiles of `main`, see active.wgsl
 @group(1) @binding(16) var added: Added;                // [linear, premultiplied by weight]; a: how sure it is, 0 to 1
 
 alias Added = texture_storage_2d<rgba16float, write>;
@@ -42,12 +42,22 @@ fn step_around(x: f32, half: f32) -> f32 {
     return smoothstep(0.5 - half, 0.5 + half, x);
 }
 
+/// Nothing yet: light rests where it changes in no frame, and that is sure.
 @compute @workgroup_size(WG_X, WG_Y)
-fn main(@builtin(global_invocation_id) id: vec3u) {
+fn begin(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
-    var change = vec4f(0.0, 0.0, 0.0, 1.0);
-    if found[1u + light_tile(id.xy)] == 1u { change = moved(px); }
+    var before = vec3f(0.0);
+    if ONTO { before = textureLoad(earlier, id.xy, 0).rgb; }
+    textureStore(added, id.xy, vec4f(before, as_sure_as(vec2i(id.xy), 1.0)));
+}
+
+/// The tiles in which light changes.
+@compute @workgroup_size(WG_X, WG_Y)
+fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let k = listed_index(group);
+    let px = vec2i(pixel_in_tile(listed[FIRST_LISTED + k], group, local));
+    if k >= listed[LISTED] || any(px >= vec2i(frame.size)) { return; }
+    let change = moved(px);
     store(px, change.rgb, as_sure_as(px, change.a));
 }
 

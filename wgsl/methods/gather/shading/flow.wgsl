@@ -2,6 +2,7 @@
 // "Fast Optical Flow using Dense Inverse Search", 2016) of small pictures without texture. Patches on a grid are
 // compared without their means; each starts from the coarser level, from standing still, and from its neighbours.
 //#include common/frame.wgsl
+//#include methods/gather/shading/active.wgsl
 //#include methods/gather/shading/light.wgsl
 
 @group(1) @binding(0) var here: texture_2d<f32>;        // a level of pyramid.wgsl
@@ -11,9 +12,12 @@
 @group(1) @binding(4) var linear: sampler;
 @group(1) @binding(5) var patches_out: Patches;         // flow [px], squared difference
 @group(1) @binding(6) var flow_out: Flow;
+@group(1) @binding(7) var<storage, read> changes: array<u32>;     // one word, then those of tiles: see active.wgsl
 
 alias Patches = texture_storage_2d<rgba32float, write>;
 alias Flow = texture_storage_2d<rgba16float, write>;
+
+override FINEST: bool = false;  // the level is the frame itself, and only what is near changes counts
 
 const PATCH: i32 = 12;          // side [px]
 const STRIDE: i32 = 4;          // from one patch to the next [px]
@@ -114,12 +118,22 @@ fn coarse_flow(px: vec2i, last: vec2i) -> vec2f {
     return 2.0 * textureLoad(coarse, clamp(px / 2, vec2i(0), size - 1), 0).xy;
 }
 
+/// False for a pixel of the finest level that is far from all changes.
+fn counts(px: vec2i, size: vec2i) -> bool {
+    if !FINEST { return true; }
+    return (changes[1u + light_tile_of(vec2u(px), vec2u(size))] & NEAR) != 0u;
+}
+
 /// Each patch by itself.
 @compute @workgroup_size(WG_X, WG_Y)
 fn search(@builtin(global_invocation_id) id: vec3u) {
     let size = vec2i(textureDimensions(here));
     if any(vec2i(id.xy) >= patches_along(size)) { return; }
     let last = size - 1;
+    if !counts(min(corner_of(vec2i(id.xy), size) + PATCH / 2, last), size) {
+        textureStore(patches_out, id.xy, vec4f(0.0));
+        return;
+    }
     let one = patch_at(corner_of(vec2i(id.xy), size), last);
     let middle = one.corner + PATCH / 2;
     var best = Best(vec2f(0.0), compare(one, vec2f(0.0), last));
@@ -162,12 +176,16 @@ fn write_flow(@builtin(global_invocation_id) id: vec3u) {
     let size = vec2i(textureDimensions(here));
     if any(vec2i(id.xy) >= size) { return; }
     let px = vec2i(id.xy);
+    if !counts(px, size) {
+        textureStore(flow_out, px, vec4f(0.0));
+        return;
+    }
     let count = patches_along(size);
     let own = textureLoad(here, px, 0).x;
-    let first = (px - PATCH + STRIDE) / STRIDE - 1;
+    let first = px / STRIDE - PATCH / STRIDE + 1;     // three cover the pixel, at the picture's end a fourth
     var sum = vec3f(0.0);
-    for (var k = 0; k < 25; k++) {
-        let index = clamp(first + vec2i(k % 5, k / 5), vec2i(0), count - 1);
+    for (var k = 0; k < 16; k++) {
+        let index = clamp(first + vec2i(k % 4, k / 4), vec2i(0), count - 1);
         let corner = corner_of(index, size);
         let covers = all(px >= corner) && all(px < corner + PATCH);
         let flow = textureLoad(patches, index, 0).xy;

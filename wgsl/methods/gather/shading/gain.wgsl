@@ -14,7 +14,7 @@
 
 struct Found {
     any: atomic<u32>,   // 1 if light changes anywhere
-    tiles: array<atomic<u32>>,  // 1 if it does in a tile or beside it
+    tiles: array<atomic<u32>>,  // see active.wgsl
 }
 
 alias Ratio = texture_storage_2d<rgba16float, write>;
@@ -30,6 +30,7 @@ const SHOWN: f32 = 0.02;        // light times albedo from which on a change is 
 const MOST: f32 = 4.0;          // greatest change of the logarithm
 const FALLOFF: f32 = 0.5;       // 1 / (2 sigma^2), sigma = 1 px
 const RADIUS: i32 = 3;          // of that Gaussian [px]
+const CAREFUL: f32 = 0.99;      // for rounding
 const NARROW_FALLOFF: f32 = 2.0;    // sigma = 0.5 px
 
 /// A Gaussian of half a pixel over what is seen.
@@ -45,7 +46,18 @@ fn smooth_ratio(@builtin(global_invocation_id) id: vec3u) {
         sum += exp(-NARROW_FALLOFF * f32(by.x * by.x + by.y * by.y)) * there.a * vec4f(there.rgb, 1.0);
     }
     let mean = select(own.rgb, sum.rgb / max(sum.a, 1e-6), !PULLED);
+    if own.a > 0.0 && abs(dot(mean, LUMINANCE)) > CAREFUL * LEAST { atomicOr(&found.tiles[light_tile(id.xy)], MAY_CHANGE); }
     textureStore(ratio_out, px, select(vec4f(0.0), vec4f(mean, 1.0), own.a > 0.0));
+}
+
+/// True if light may change within a distance of a pixel, of a tile's half at most [px].
+fn may_change(px: vec2i, distance: i32) -> bool {
+    var around = 0u;
+    for (var k = 0; k < 4; k++) {
+        let corner = vec2u(inside(px + distance * (2 * vec2i(k & 1, k >> 1u) - 1)));
+        around |= atomicLoad(&found.tiles[light_tile(corner)]);
+    }
+    return (around & MAY_CHANGE) != 0u;
 }
 
 /// The visibility of a change.
@@ -53,6 +65,10 @@ fn smooth_ratio(@builtin(global_invocation_id) id: vec3u) {
 fn find_peaks(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let px = vec2i(id.xy);
+    if !may_change(px, RADIUS) {
+        textureStore(scalar_out, px, vec4f(0.0));
+        return;
+    }
     var sum = 0.0;
     var total = 0.0;
     for (var y = -RADIUS; y <= RADIUS; y++) {
@@ -94,6 +110,10 @@ fn find_coherence(@builtin(global_invocation_id) id: vec3u) {
 @compute @workgroup_size(WG_X, WG_Y)
 fn find_gain(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
+    if !may_change(vec2i(id.xy), RADIUS + 2) {
+        textureStore(scalar_out, id.xy, vec4f(0.0));
+        return;
+    }
     var most = 0.0;
     for (var k = 0; k < 25; k++) {
         most = max(most, textureLoad(scalar, inside(vec2i(id.xy) + vec2i(k % 5, k / 5) - 2), 0).x);
@@ -114,6 +134,10 @@ fn find_gain(@builtin(global_invocation_id) id: vec3u) {
 fn limit_ratio(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let px = vec2i(id.xy);
+    if !may_change(px, 2 * RADIUS + 2) {
+        textureStore(ratio_out, px, vec4f(0.0, 0.0, 0.0, textureLoad(ratio, px, 0).a));
+        return;
+    }
     var sum = 0.0;
     var total = 0.0;
     for (var y = -RADIUS; y <= RADIUS; y++) {
@@ -129,7 +153,7 @@ fn limit_ratio(@builtin(global_invocation_id) id: vec3u) {
         atomicMax(&found.any, 1u);
         for (var k = 0; k < 4; k++) {
             let near = vec2u(inside(px + 2 * vec2i(k & 1, k >> 1u) - 1));
-            atomicMax(&found.tiles[light_tile(near)], 1u);
+            atomicOr(&found.tiles[light_tile(near)], CHANGES);
         }
     }
     textureStore(ratio_out, px, vec4f(change, own.a));
