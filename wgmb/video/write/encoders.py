@@ -28,6 +28,8 @@ HARDWARE = ("nvenc", "qsv", "amf", "videotoolbox", "v4l2m2m")
 _MOST_TICKS = (1 << 31) - 1  # from one picture to the next in an MP4 or MOV
 _FEWEST_TICKS = 10_000  # a second there
 _MOST_HUNDREDTHS = (1 << 16) - 1  # of a second, for which a GIF shows a picture
+# x264 chooses between algorithms by what it takes the processor for, which differs between runs.
+_ALWAYS = {"libx264": ("cpu-independent=1",), "libx265": ("log-level=error",)}
 _LAMBDA = 118  # FFmpeg's units of a global quality to one of `-q` (FF_QP2LAMBDA)
 
 
@@ -199,9 +201,9 @@ class Encoding:
         return found
 
     def _parameters(self, facts: Facts) -> dict[str, str]:
-        """Of the encoder itself: HDR10 data, and silence."""
+        """Of the encoder itself: the same bytes on every processor, HDR10 data, and silence."""
         name, display = self.encoder.name, facts.mastering
-        said = ["log-level=error"] if name == "libx265" else []
+        said = list(_ALWAYS.get(name, ()))
         if display is not None and display.is_whole:
             option = "master-display" if name == "libx265" else "mastering-display"
             as_text = display.for_svt_av1 if name == "libsvtav1" else display.for_x265
