@@ -233,6 +233,20 @@ def picture_of(whole):
     return whole[:, : SIZE[0] - 320]
 
 
+def test_the_mouse_turns_the_scene_and_escape_ends_the_program(desk):
+    words = ["--window", "{}x{}".format(*SIZE), "--samples", "4", "--method", "tap"]
+    it = desk(str(ROOT / "app.py"), *words)
+    it.wait_for_window()
+    it.plays()
+    it.do("key", "space")
+    first = it.settled()
+    it.drag((150, 360), (300, 380))
+    assert it.shows_other_than(first)
+    it.do("key", "Escape")
+    assert it.end() == (0, "")
+
+
+@pytest.mark.full
 def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     words = [ROOT / "app.py", "--window", "{}x{}".format(*SIZE), "--samples", "4"]
     words += ["--method", "tap"]  # without a GPU, others take longer than a picture has to settle
@@ -337,6 +351,7 @@ def test_a_video_plays_and_is_scrubbed_to_its_ends(desk, tmp_path):
     assert it.end() == (0, "")
 
 
+@pytest.mark.full
 def test_closing_the_window_ends_the_program(desk):
     it = desk(str(ROOT / "app.py"), "wheel", "--window", "500x300")
     it.wait_for_window()
@@ -345,6 +360,7 @@ def test_closing_the_window_ends_the_program(desk):
     assert it.end()[0] == 0
 
 
+@pytest.mark.full
 def test_an_error_while_drawing_ends_the_program(desk):
     it = desk("-c", WATCHED + BROKEN)
     code, said = it.end()
@@ -384,6 +400,7 @@ print("alive")
 """
 
 
+@pytest.mark.full
 def test_a_host_that_draws_with_opengl_lives(display):
     """wgpu looks for OpenGL adapters too, and ends a process whose context is in its way."""
     env = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
