@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from tempfile import TemporaryDirectory
@@ -41,7 +42,8 @@ _QUIET: dict[str, Any] = {
 _LOADED_ONCE = ["distributed", "wgpu.backends.wgpu_native", "wgmb.run.farm.plugin"]
 _CLOSING = 5.0  # seconds
 _STARTING = 20.0  # seconds, after all processes have begun
-_STARTS = 3
+_LOOKING = 0.3  # seconds between two looks at whether one is lost
+_MOST_LOST = 3  # for each worker, until the run is given up
 
 
 @contextmanager
@@ -59,33 +61,41 @@ def local_client(count: int) -> Iterator[Any]:
     ):
         if method == "forkserver":
             _load_once()
-        for _ in range(_STARTS):
-            cluster = LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                dashboard_address="127.0.0.1:0",
-                silence_logs=50,
-                memory_limit=0,
-                host="tls://127.0.0.1",
-                security=Security.temporary(),
-                local_directory=folder,
-                env=dict(os.environ),  # that of the first process that loaded modules may be older
-            )
-            with closing(cluster), closing(Client(cluster, set_as_default=False)) as client:
-                if _are_there(client, count):
-                    yield client
-                    return
-        raise DeviceError(f"{count} workers should answer on this machine; {_STARTS} times, some "
-                          "did not")  # fmt: skip
+        cluster = LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=50,
+            memory_limit=0,
+            host="tls://127.0.0.1",
+            security=Security.temporary(),
+            local_directory=folder,
+            env=dict(os.environ),  # that of the first process that loaded modules may be older
+        )
+        with closing(cluster), closing(Client(cluster, set_as_default=False)) as client:
+            _wait_for(cluster, client, count)
+            yield client
 
 
-def _are_there(client: Any, count: int) -> bool:
-    """True if all workers answer: one may lose its first connection where keys are new."""
-    try:
-        client.wait_for_workers(count, timeout=_STARTING)
-    except TimeoutError:
-        return False
-    return True
+def _wait_for(cluster: Any, client: Any, count: int) -> None:
+    """Wait until all workers answer, and start another one for each that was lost.
+
+    With Python 3.13 and OpenSSL 3.5, an error that an ended connection leaves in its thread's queue
+    can end another connection, of a worker that has just come.
+    """
+    from distributed.core import Status
+
+    ended = Status.closing_gracefully, Status.closing, Status.closed, Status.failed
+    replaced, until = 0, time.monotonic() + _STARTING
+    while time.monotonic() < until:
+        with suppress(TimeoutError):
+            client.wait_for_workers(count, timeout=_LOOKING)
+            return
+        lost = sum(nanny.status in ended for nanny in cluster.workers.values())
+        if replaced < lost <= _MOST_LOST * count:
+            cluster.scale(len(cluster.worker_spec) + lost - replaced)
+            replaced, until = lost, time.monotonic() + _STARTING
+    raise DeviceError(f"{count} workers should answer on this machine; some did not")
 
 
 def _load_once() -> None:
