@@ -227,3 +227,14 @@ def begun(line, has_begun, **options) -> subprocess.Popen:
         assert process.poll() is None, process.communicate()
         time.sleep(0.002)
     return process
+
+
+def disc_before_squares(count, speed):
+    """Grey pictures (120, 240) uint8 of a disc of noise that moves by `speed` px a picture."""
+    y, x = np.mgrid[:120, :240]
+    squares = (np.random.default_rng(1).random((12, 24)) * 60).astype(np.uint8)
+    squares = np.kron(squares, np.ones((10, 10), np.uint8)) + np.uint8(20)
+    noise = (np.random.default_rng(2).random((120, 240)) * 110 + 120).astype(np.uint8)
+    for n in range(count):
+        is_disc = np.hypot(x - 120 - speed * (n - 2), y - 60) < 22
+        yield np.where(is_disc, np.roll(noise, speed * n, axis=1), squares)

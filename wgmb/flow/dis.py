@@ -17,6 +17,7 @@ import numpy as np
 from .. import extras
 from ..color.srgb import to_display
 from ..errors import InputError
+from .consistency import Consistency
 
 QUALITIES = ("fast", "best")
 _LEAST = 16  # pixels a side that OpenCV needs
@@ -48,6 +49,7 @@ class Dis:
         self._flow: Any = cv2.DISOpticalFlow_create(preset)
         if not fast:
             self._flow.setFinestScale(0)
+        self._shots: list[Consistency] = []
 
     def shot(self, load: Load, depth: bool = True) -> Callable[[int], Found | None]:
         """Motion (height, width, 4) to_prev, to_next [px] and depth of a shot's frames.
@@ -57,6 +59,8 @@ class Dis:
         motion takes half the time.
         """
         grey: dict[int, np.ndarray | None] = {}
+        consistency = Consistency()
+        self._shots.append(consistency)
 
         def picture(number: int) -> np.ndarray | None:
             if number not in grey:
@@ -71,9 +75,21 @@ class Dis:
             near = [picture(number + side) for side in (-1, 1)]
             if here is None or all(one is None for one in near):
                 return None
-            return self._between(near[0], here, near[1], depth)
+            motion, order = self._between(near[0], here, near[1], depth)
+            consistency.add(number, motion[..., :2], motion[..., 2:])
+            return motion, order
 
         return motion_of
+
+    @property
+    def lost(self) -> int:
+        """Number of pictures so far in which something was lost, of those that were `checked`."""
+        return sum(shot.lost for shot in self._shots)
+
+    @property
+    def checked(self) -> int:
+        """Number of pictures so far that lie between two others of their shot."""
+        return sum(len(shot.shares) for shot in self._shots)
 
     def _grey(self, color: np.ndarray) -> np.ndarray:
         if color.ndim == 2:

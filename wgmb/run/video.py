@@ -37,6 +37,7 @@ from .report import Progress, VideoReport
 from .video_output import write
 from .video_sink import Form
 
+LOST = 0.05  # share of pictures with something lost, above which it is told
 _TAKEN = "frames", "cuts", "max_mb"  # of InputSettings
 
 
@@ -155,6 +156,7 @@ class VideoRun:
     def __call__(self, plan: VideoPlan, progress: Progress | None = None) -> VideoReport:
         """Blur a video into its output, which is complete, or is not there."""
         begun, request = time.perf_counter(), self.request
+        before = self._lost_so_far()
         cuts = CutList(request.input.cuts or "")
         exposures = self.exposures(plan)
         left_out = write(
@@ -176,6 +178,21 @@ class VideoRun:
             left_out=left_out,
             scaling=plan.reader.scaling(),
             loss=plan.reader.loss(),
+            lost=self._told_lost(before),
+        )
+
+    def _lost_so_far(self) -> tuple[int, int]:
+        """Number of pictures in which the source lost something, and of those it checked."""
+        return getattr(self.motion, "lost", 0), getattr(self.motion, "checked", 0)
+
+    def _told_lost(self, before: tuple[int, int]) -> str:
+        """A line about pictures since `before` in which something fast was lost, or ''."""
+        lost, checked = (now - old for now, old in zip(self._lost_so_far(), before, strict=True))
+        if lost <= LOST * checked:
+            return ""
+        return (
+            f"something moves too fast for dense inverse search in {lost} of {checked} pictures, "
+            "and stays sharp: `flow=search` follows more, soonest with `flow_quality=draft`"
         )
 
     def report(self, exposures: Exposures, **facts: Any) -> VideoReport:

@@ -50,6 +50,8 @@ def blur_video(
             note(f"{report.repeated} repeated pictures left out")
         if report.held_out:
             note(as_options(report.held_out))
+        if report.lost:
+            note(as_options(report.lost))
         if report.scaling:
             note(report.scaling)
         note(f"{counted(report.frames, 'frame')} in {took} -> {report.output}")

@@ -78,7 +78,7 @@ def _one_of_many(plan: VideoPlan, run: VideoRun, tell: Tell, quiet: bool) -> boo
         words = [took if report.is_new else "", *report.left_out, *report.notes]
         if report.repeated:
             words.append(f"{report.repeated} repeated pictures left out")
-        words += [report.held_out, report.scaling]
+        words += [report.held_out, report.lost, report.scaling]
         note(as_options(f"{path}: {'; '.join(filter(None, words))} -> {report.output}"))
     if report.loss:
         complain(report.loss)

@@ -1,0 +1,71 @@
+"""Ways that do not lead back tell what a quick search lost."""
+
+import numpy as np
+import pytest
+
+import make_frames as make
+from wgmb.flow.consistency import APART, SHARE, Consistency, returns
+from wgmb.flow.dis import Dis
+
+pytestmark = pytest.mark.fast
+
+
+def returns_slowly(way, back, spacing):
+    out = np.ones(way.shape[:2], bool)
+    height, width = out.shape
+    for y in range(height):
+        for x in range(width):
+            to_x, to_y = round(x + way[y, x, 0] / spacing), round(y + way[y, x, 1] / spacing)
+            if 0 <= to_x < width and 0 <= to_y < height:
+                out[y, x] = np.hypot(*(way[y, x] + back[to_y, to_x])) <= APART
+    return out
+
+
+def test_ways_there_and_back_are_compared_where_they_lead():
+    rng = np.random.default_rng(3)
+    way = rng.integers(-20, 20, (9, 14, 2)) + 0.25
+    back = -np.roll(way, 1, axis=1)
+    found = returns(way, back, 4)
+    assert (found == returns_slowly(way, back, 4)).all() and 0.1 < found.mean() < 0.9
+
+
+def steady(dx, height=64, width=96):
+    way = np.zeros((height, width, 2), np.float32)
+    way[..., 0] = dx
+    return way
+
+
+def test_a_steady_motion_and_what_one_side_hides_are_not_lost():
+    kept = Consistency()
+    for n in range(5):
+        to_prev, to_next = steady(-6), steady(6)
+        if n == 2:
+            to_next[20:40, 30:60] = 40  # the next picture hides it
+        kept.add(n, to_prev, to_next)
+    assert list(kept.shares) == [1, 2, 3] and kept.lost == 0
+    assert max(kept.shares.values()) < SHARE
+
+
+def test_what_leads_back_from_neither_side_is_lost():
+    kept = Consistency()
+    for n in range(3):
+        to_prev, to_next = steady(-6), steady(6)
+        if n == 1:
+            to_prev[20:40, 30:60] = to_next[20:40, 30:60] = 15
+        kept.add(n, to_prev, to_next)
+    assert kept.shares[1] == pytest.approx(20 * 30 / (64 * 96), abs=0.01) and kept.lost == 1
+
+
+def test_dense_inverse_search_says_what_it_lost():
+    """A disc that is far too fast for it, and one that is not."""
+    pytest.importorskip("cv2")
+
+    def lost(speed):
+        source = Dis()
+        shot = source.shot(dict(enumerate(make.disc_before_squares(5, speed))).get, depth=False)
+        for n in range(5):
+            shot(n)
+        return source.lost, source.checked
+
+    assert lost(1) == (0, 3)
+    assert lost(45)[0] >= 2

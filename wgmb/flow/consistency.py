@@ -1,0 +1,57 @@
+"""Pictures in which a quick search lost something: ways there and back that do not agree."""
+
+from __future__ import annotations
+
+import numpy as np
+
+SPACING = 4  # px from one pixel that is looked at to the next
+APART = 2.0  # px by which the way there and back may end beside its start
+SHARE = 0.0125  # of a picture, above which it counts as lost
+
+
+def returns(way: np.ndarray, back: np.ndarray, spacing: int) -> np.ndarray:
+    """(height, width) bool: where the way [px] to another picture and back ends near its start.
+
+    Both (height, width, 2), of every pixel `spacing` px apart; True where a way leaves the picture.
+    """
+    height, width = way.shape[:2]
+    y, x = np.mgrid[:height, :width]
+    to_x = np.rint(x + way[..., 0] / spacing).astype(np.int32)
+    to_y = np.rint(y + way[..., 1] / spacing).astype(np.int32)
+    is_inside = (to_x >= 0) & (to_x < width) & (to_y >= 0) & (to_y < height)
+    apart = way + back[to_y.clip(0, height - 1), to_x.clip(0, width - 1)]
+    return ~is_inside | (np.hypot(apart[..., 0], apart[..., 1]) <= APART)
+
+
+class Consistency:
+    """The share of each picture of a shot whose ways to both neighbours do not lead back.
+
+    What one neighbour hides leads back from the other. A picture is known as soon as its own ways
+    and those of both neighbours are added; only every 4th pixel along each axis is kept.
+    """
+
+    def __init__(self) -> None:
+        self._ways: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self.shares: dict[int, float] = {}
+        """By the picture's number."""
+
+    def add(self, number: int, to_prev: np.ndarray, to_next: np.ndarray) -> None:
+        """Take the ways (height, width, 2) [px] of a picture."""
+        thin = (way[::SPACING, ::SPACING].copy() for way in (to_prev, to_next))
+        self._ways[number] = next(thin), next(thin)
+        for old in [n for n in self._ways if abs(n - number) > 2]:
+            del self._ways[old]
+        for n in (number - 1, number, number + 1):
+            if n not in self.shares and all(k in self._ways for k in (n - 1, n, n + 1)):
+                self.shares[n] = self._share(n)
+
+    def _share(self, number: int) -> float:
+        to_prev, to_next = self._ways[number]
+        prev_back, next_back = self._ways[number - 1][1], self._ways[number + 1][0]
+        found = returns(to_prev, prev_back, SPACING) | returns(to_next, next_back, SPACING)
+        return 1 - float(found.mean())
+
+    @property
+    def lost(self) -> int:
+        """Number of pictures in which something was lost."""
+        return sum(share > SHARE for share in self.shares.values())
