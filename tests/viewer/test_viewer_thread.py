@@ -11,6 +11,7 @@ import make_clips as clips
 from viewer_hand import ALONE, SMALL, put
 from wgmb import InputError, gpu
 from wgmb.viewer import offscreen
+from wgmb.viewer.draw.composer import NOTHING
 from wgmb.viewer.draw.portions import DroppedError, Portions
 from wgmb.viewer.draw.renderer import Renderer
 from wgmb.viewer.draw.request import Request
@@ -105,6 +106,31 @@ def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
     assert seen[-1] == ("", SMALL, False)
     widths = [size[0] for _, size, _ in seen]
     assert widths == sorted(widths)  # it never jumps back
+
+
+def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with():
+    renderer = Renderer(gpu.open_device())
+    kept = put(STATE, shutter=90.0).keeping()
+    state = put(kept.with_method("tap"), compare="flicker")
+    seen = []
+    for now in range(8):
+        drawn = renderer.draw(Request(state, AREA), float(now))
+        slots = renderer._slots["first"], renderer._slots["second"]
+        widths = [slot.texture.size[0] for slot in slots]
+        seen.append((*widths, slots[1].is_preview, drawn.report.busy))
+        assert {*drawn.images} == {"first", "second"}
+        if not drawn.report.busy:
+            break
+    whole, half = SMALL[0], SMALL[0] // 2
+    assert seen[0] == (half, half, True, True)  # both at once, the slow one by `tap`
+    assert (whole, half, False, True) in seen  # then the quick one in full
+    assert seen[-1] == (whole, whole, False, False)
+
+
+def test_a_side_that_is_not_drawn_yet_does_not_flicker(viewer):
+    seen_until(viewer, lambda: is_final(viewer))
+    first, second = viewer._drawn.sides(True)
+    assert first is viewer._drawn.images["first"] and second is NOTHING
 
 
 def test_work_that_nobody_wants_is_dropped_between_two_passes_and_leaves_nothing_behind():

@@ -116,6 +116,7 @@ class Choices:
     def has_preview(self, state: State, name: str) -> bool:
         """True if the quickest method may stand for `name`, a look or method, until it is drawn."""
         method = state.method if name in ("result", "perceived") else name
+        method = state.as_kept.method if name == KEPT else method
         if method not in METHODS or method == QUICKEST or QUICKEST not in self.methods(state):
             return False
         return METHODS[QUICKEST].needs <= METHODS[method].needs  # others add samples meanwhile

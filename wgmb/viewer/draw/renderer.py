@@ -108,7 +108,8 @@ class Renderer:
         place = fit(shape, area, state)
         full_size = whole(place) if state.is_scene else size
         names = self._wanted(state)
-        slow = self._is_slow and not full and self.choices.has_preview(state, names[0][0])
+        can = any(self.choices.has_preview(state, name) for name, _ in names)
+        slow = self._is_slow and not full and can
         if slow:
             self._slow_quality(state, place, moving)
         else:
@@ -116,7 +117,7 @@ class Renderer:
         size, antialias = self._size(state, size, place)
         report = FrameStatus(full_size, shape, place, area, moving)
         quick = (moving or self._preview) and not full
-        slots, lacks = ("first", "second")[: len(names)], False
+        slots, lacks, is_first_alone = ("first", "second")[: len(names)], False, False
         for slot, (name, eye) in zip(slots, names, strict=True):
             if name != "perceived":
                 self._perceived[slot].forget()
@@ -127,6 +128,9 @@ class Renderer:
                 lacks |= of_slot.busy
                 if name in ("result", KEPT) and (draft := of_slot.draft):
                     report.drafts.append(f"{KEPT}: {draft}" if name == KEPT else draft)
+            is_first_alone = slow and not self._preview and report.changed and slot != slots[-1]
+            if is_first_alone:  # it is shown before the second one, which may take long
+                break
         first, last = self._slots["first"], self._slots[slots[-1]]
         assert first.texture is not None
         report.size, report.kind = first.texture.size[:2], first.kind
@@ -139,7 +143,7 @@ class Renderer:
             of_size = f" at {share:.0%}" if share < 0.995 else ""
             report.preview = f"preview by {QUICKEST}{of_size}"
         self._on_screen = self._displayed(slots, state, subject)
-        self._ready = all(self._coming[slot].ready for slot in slots)
+        self._ready = not is_first_alone and all(self._coming[slot].ready for slot in slots)
         report.busy = moving or not self._ready or self._level > 0 or self._preview or lacks
         if isinstance(subject, VideoSubject):
             report.made_of = subject.made_of(state, state.shutter.make())

@@ -74,9 +74,9 @@ class Drawn:
     """Of what is shown, as an attribute of an EXR."""
 
     def sides(self, flicked: bool) -> tuple[Image, Image]:
-        """The images of both sides; `flicked`: the second one for both."""
+        """The images of both sides; `flicked`: the second one for both, once it is there."""
         first, second = self.images["first"], self.images.get("second", NOTHING)
-        return (second if flicked else first), second
+        return (second if flicked and second != NOTHING else first), second
 
     def corrected(self, state: State) -> State:
         """A state, with what is not possible here replaced as in `self.state`."""
