@@ -530,8 +530,8 @@ def hidden(frame, x, y, color):
             if not (0 <= i < width and 0 <= j < height):
                 continue
             if frame.edgeless[j, i] and frame.depth[0][j, i] > 1.1 * frame.depth[0][y, x]:
-                sum_ = sum_ + frame.color[0][j, i] / distance**2
-                total += 1 / distance**2
+                sum_ = sum_ + frame.color[0][j, i] / distance**0.5
+                total += 1 / distance**0.5
                 break
     return sum_ / total if total else color[y, x]
 

@@ -33,7 +33,7 @@ fn at_border(p: vec2f, n: u32) -> vec2f {
 }
 
 /// Add what is hidden behind the pixel in all frames: the nearest surfaces behind its own, in FILL_DIRECTIONS
-/// directions, weighted by the inverse square of their distances.
+/// directions, weighted by the inverse root of their distances: the nearest alone would change from pixel to pixel.
 fn add_hidden(sum: ptr<function, Composite>, id: vec2u, share: f32) {
     let z = abs(unpack_depth(surface_of(vec2i(id), 0u)));
     let count = select(0u, FILL_DIRECTIONS, share > 0.0);
@@ -48,7 +48,7 @@ fn add_hidden(sum: ptr<function, Composite>, id: vec2u, share: f32) {
             let is_there = step < FILL_STEPS && all(px >= vec2i(0)) && all(px < vec2i(frame.size));
             let is_behind = unpack_depth(surface_of(px, 0u)) > z * FILL_DEPTH_RATIO;
             if is_there && is_behind {
-                let part = 1.0 / (distance * distance);
+                let part = inverseSqrt(distance);
                 let counts = matte_at(vec2u(px), 0u).weight;
                 add(&filled, Composite(textureLoad(layer_colors, px, 0, 0), counts, 1.0, 0.0, 0.0, 0.0), part);
                 step = FILL_STEPS;
