@@ -71,7 +71,13 @@ def test_files_that_were_cut_off_are_refused(tmp_path):
 
 @pytest.mark.full
 @pytest.mark.parametrize(
-    ("rows", "count"), [(strangers.lists, 6), (strangers.jumps, 3), (strangers.outdated_videos, 2)]
+    ("rows", "count"),
+    [
+        (strangers.lists, 6),
+        (strangers.jumps, 3),
+        (strangers.joined, 4),
+        (strangers.outdated_videos, 2),
+    ],
 )
 def test_strangers_videos_do_no_harm(rows, count, tmp_path):
     check(rows, count, tmp_path)

@@ -12,6 +12,8 @@ from file_lists import LISTS
 from PIL import Image
 
 import make_clips as clips
+from wgmb import InputError
+from wgmb.video.read.reader import VideoReader
 
 from .processes import wgmb
 from .shots import contents
@@ -62,6 +64,39 @@ def jumps(trial: Trial) -> Iterator[Line]:
             wrong = wrong or ended.wrong(0, 2, name=path.name) or much
         tally.note(f"seed {trial.seed}, {number}", wrong)
     yield tally.line(f"slowest {slowest:.1f} s, most {largest:.0f} MiB")
+
+
+@row(quick=4, full=100)
+def joined(trial: Trial) -> Iterator[Line]:
+    """Videos of two parts, of any sizes and times: refused, or no picture is lost unsaid."""
+    tally, rng = (
+        Tally("videos that were simply joined", "videos"),
+        np.random.default_rng(trial.seed),
+    )
+    refused = 0
+    for number in range(trial.count):
+        data, many, codec = b"", 0, str(rng.choice(["libx264", "libx265"]))
+        for _ in range(2):
+            count, late = int(rng.integers(2, 14)), Fraction(int(rng.integers(0, 24)), 24)
+            size = [2 * int(side) for side in rng.integers(16, 40, 2)]
+            frames = [clips.frame(clips.planes(n, size), "yuv420p") for n in range(count)]
+            part = trial.folder / "part.ts"
+            data += clips.write(part, frames, late=float(late), codec=codec).read_bytes()
+            many += count
+        path = trial.folder / f"{number}.ts"
+        path.write_bytes(data)
+        wrong = wgmb("info", path, "--scan", seconds=_SECONDS).wrong(0, 1, 2, name=path.name)
+        try:
+            reader = VideoReader(path)
+            found = sum(1 for _ in reader)
+        except InputError as error:
+            refused += 1
+            wrong = wrong or ("" if "its clock goes back" in str(error) else str(error))
+        else:
+            told = bool(reader.loss() or any("the time of another" in n for n in reader.notes))
+            wrong = wrong or ("" if found == many or told else f"{found} of {many} pictures")
+        tally.note(f"seed {trial.seed}, {number}", wrong)
+    yield tally.line(f"{refused} refused")
 
 
 @row(quick=1, full=len(_FORMATS))
