@@ -69,7 +69,7 @@ def drawn(text: str) -> str:
 
 
 def of_a_run(text: str) -> str:
-    """What a notebook shows of a run."""
+    """The output of a run in a notebook."""
     return BatchReport(done=[1], failed={2: text}, stopped=text)._repr_html_()
 
 
