@@ -1,0 +1,190 @@
+"""Blurs of recorded clips against their own pictures: python tools/real_clips.py FOLDER [CLIP ...]
+
+Prints the table of docs/laboratory/recorded-clips.md. FOLDER holds the clips of CLIPS, each under
+the name of its file; see that page for where they are from. A clip whose motion is small is thinned
+to every 4th or 8th picture. The truth of a picture that is kept is the mean, in linear light, of
+those around it over half of the interval, the first and the last by half. Every result goes through
+the same 8-bit YUV 4:4:4 as FFmpeg's minterpolate works in. `--frames 2` blurs two successive
+pictures and adds flicker: the mean change of the error from one to the next, in levels of 255.
+`--crops FOLDER` writes the pictures. Takes minutes on a GPU, half an hour without.
+"""
+
+import argparse
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import av
+import cv2
+import numpy as np
+
+from wgmb import Blur, Flow, Frame, metrics
+from wgmb.color.srgb import linear, srgb, to_display
+from wgmb.flow.dis import Dis
+from wgmb.io import stills
+
+DEGREES = 180
+COPIES = 16  # pictures that minterpolate makes of one
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A clip, the picture in the middle, the step from one kept picture to the next, its size."""
+
+    file: str
+    middle: int
+    step: int
+    is_halved: bool = True
+
+
+CLIPS = {
+    "drone": Clip("karma.mp4", 108, 8),
+    "walk": Clip("max-heromode.mp4", 104, 4),
+    "walk, faster": Clip("max-heromode.mp4", 104, 8),
+    "golf": Clip("test_video.mp4", 140, 4, is_halved=False),
+    "somersault": Clip("demo.mp4", 178, 4),
+    "walker": Clip("demo.mp4", 84, 4),
+    "signs": Clip("book.mkv", 46, 4),
+    "bottles": Clip("bottle-detection.mp4", 203, 4, is_halved=False),
+    "signs, unseen": Clip("walk.mkv", 40, 4),
+}
+"""The last two were looked at only when all was done."""
+
+Pictures = dict[int, np.ndarray]
+"""Linear pictures (height, width, 3) by number, 0 the one in the middle."""
+
+
+def read(folder: Path, clip: Clip, frames: int) -> tuple[Pictures, Pictures]:
+    """The pictures that are kept, and the truths of the `frames` in the middle."""
+    reach = clip.step // 4
+    last = clip.middle + frames * clip.step
+    found = {}
+    with av.open(str(folder / clip.file)) as file:
+        for number, frame in enumerate(file.decode(video=0)):
+            if number > last + reach:
+                break
+            if number >= clip.middle - clip.step:
+                found[number] = _linear(frame.to_ndarray(format="rgb24"), clip.is_halved)
+    weights = np.ones(2 * reach + 1)
+    weights[[0, -1]] = 0.5
+    kept, truths = {}, {}
+    for k in range(-1, frames + 1):
+        at = clip.middle + k * clip.step
+        kept[k] = linear(to_display(found[at], 8) / np.float32(255))
+        if 0 <= k < frames:
+            around = [found[at + j] for j in range(-reach, reach + 1)]
+            truths[k] = np.average(around, axis=0, weights=weights).astype(np.float32)
+    return kept, truths
+
+
+def _linear(shown: np.ndarray, is_halved: bool) -> np.ndarray:
+    light = linear(shown / np.float32(255))
+    if not is_halved:
+        return light
+    height, width = (n // 2 for n in light.shape[:2])
+    return cv2.resize(light[: 2 * height, : 2 * width], (width, height), interpolation=3)
+
+
+def blurred(source: Any, method: Literal["tap", "gather"]) -> Callable[[Pictures, int], Pictures]:
+    """Blur by a source of motion and a method."""
+    blur = Blur(method, shutter=DEGREES, samples="auto" if method == "tap" else None)
+
+    def make(kept: Pictures, frames: int) -> Pictures:
+        shot = source.shot(kept.get)
+        moved = {}
+        for n, picture in kept.items():
+            motion, depth = shot(n)
+            moved[n] = Frame(picture, motion=motion, depth=depth)
+        return {
+            n: blur(moved[n].between(moved[n - 1], moved[n + 1]))[..., :3] for n in range(frames)
+        }
+
+    return make
+
+
+def interpolated(kept: Pictures, frames: int) -> Pictures:
+    """The mean of the pictures that FFmpeg's minterpolate makes around each."""
+    shown = [to_display(kept[n], 8) for n in sorted(kept)]
+    shown = [shown[0], *shown, shown[-1]]  # it drops what is at the ends
+    height, width = shown[0].shape[:2]
+    options = f"fps={COPIES}:mi_mode=mci:mc_mode=aobmc:me_mode=bidir:vsbmc=1:scd=none"
+    words = ["ffmpeg", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-r", "1"]
+    words += ["-s", f"{width}x{height}", "-i", "-", "-vf"]
+    words += [f"format=yuv444p,minterpolate={options},format=rgb24", "-f", "rawvideo", "-"]
+    data = b"".join(np.ascontiguousarray(picture).tobytes() for picture in shown)
+    made = subprocess.run(words, input=data, capture_output=True, check=True).stdout
+    copies = np.frombuffer(made, np.uint8).reshape(-1, height, width, 3)
+    reach = COPIES * DEGREES // 720
+    weights = np.ones(2 * reach + 1)
+    weights[[0, -1]] = 0.5
+    out = {}
+    for n in range(frames):
+        apart = [np.abs(copy - shown[n + 2].astype(int)).mean() for copy in copies]
+        middle = int(np.argmin(apart))
+        around = [linear(copies[middle + j] / np.float32(255)) for j in range(-reach, reach + 1)]
+        out[n] = np.average(around, axis=0, weights=weights).astype(np.float32)
+    return out
+
+
+def in_yuv(picture: np.ndarray) -> np.ndarray:
+    """A linear picture as it comes back from 8-bit YUV 4:4:4."""
+    frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(to_display(picture, 8)), "rgb24")
+    back = frame.reformat(format="yuv444p").reformat(format="rgb24").to_ndarray()
+    return linear(back / np.float32(255))
+
+
+def makers() -> Iterator[tuple[str, Callable[[Pictures, int], Pictures]]]:
+    """Names and makers of the results that are compared."""
+    yield "sharp", lambda kept, frames: {n: kept[n] for n in range(frames)}
+    yield "`dis` fast, `tap`", blurred(Dis("fast"), "tap")
+    yield "`dis` best, `gather`", blurred(Dis("best"), "gather")
+    yield "`search` draft, `gather`", blurred(Flow(quality="draft"), "gather")
+    yield "`search` fast, `gather`", blurred(Flow(quality="fast"), "gather")
+    yield "minterpolate 16x", interpolated
+
+
+def scores(results: Pictures, truths: Pictures) -> str:
+    """FLIP, dB, and flicker of more than one frame."""
+    flip = np.mean([metrics.flip(results[n], truths[n]) for n in truths])
+    decibel = np.mean([metrics.psnr(results[n], truths[n]) for n in truths])
+    text = f"{flip:.4f} {decibel:.1f}"
+    if len(truths) > 1:
+        errors = [srgb(results[n]) - srgb(truths[n]) for n in sorted(truths)]
+        text += f" {255 * np.abs(np.diff(errors, axis=0)).mean():.2f}"
+    return text
+
+
+def main() -> None:
+    """Print the table, and write the crops."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("clips", nargs="*", default=list(CLIPS), help=f"of {', '.join(CLIPS)}")
+    parser.add_argument("--frames", type=int, default=1)
+    parser.add_argument("--crops", type=Path)
+    given = parser.parse_args()
+    made = list(makers())
+    print(f"| | {' | '.join(name for name, _ in made)} |")
+    print(f"| --- |{' --- |' * len(made)}")
+    for name in given.clips:
+        kept, truths = read(given.folder, CLIPS[name], given.frames)
+        cells = []
+        for k, (_, make) in enumerate(made):
+            results = {n: in_yuv(r) for n, r in make(kept, given.frames).items()}
+            cells.append(scores(results, truths))
+            if given.crops:
+                write(given.crops / f"{name.replace(', ', '_')}_{k}.png", results[0])
+        if given.crops:
+            write(given.crops / f"{name.replace(', ', '_')}_truth.png", truths[0])
+        print(f"| {name} | {' | '.join(cells)} |", flush=True)
+
+
+def write(path: Path, picture: np.ndarray) -> None:
+    """A linear picture as a PNG."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(stills.encode(picture, path.suffix, 8, ""))
+
+
+if __name__ == "__main__":
+    main()
