@@ -31,7 +31,7 @@ from ..io.frame_numbers import (
 from ..io.suffixes import STILLS, VIDEOS
 from ..sequence.frame_file import FrameFile, about
 from ..sequence.input_color import space_of
-from . import finished
+from . import finished_videos
 from .exr_layers import with_results
 from .names import prepare, refuse_inputs, that_exist
 from .result import Result
@@ -124,7 +124,7 @@ class Output:
             video.text = record.blank(json.loads(self.settings))
 
     def is_finished(self, frames: Iterable[tuple[int, dict[str, Any]]]) -> bool:
-        """Return True if this is a video that an earlier run made of the same (see finished.py).
+        """Return True if this is a video that an earlier run made of the same (finished_videos.py).
 
         `frames`: the numbers of all frames, and what each is made of (see Clip.made_of), which its
         record then has. To be asked before the first frame is written. InputError where a video is
@@ -139,7 +139,7 @@ class Output:
         how = {"resume": self._resume, "overwrite": self._overwrite}
         expected = self._expected(None)
         paths = [video.path for video in self._videos.values()]
-        done = [finished.is_finished(path, expected, **how) for path in paths]
+        done = [finished_videos.is_finished(path, expected, **how) for path in paths]
         self._replaces = self._overwrite or any(path.exists() for path in paths)
         return all(done)
 

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import wgpu
 
 from ..io import atomic, record
-from ..output.finished import is_finished
+from ..output.finished_videos import is_finished
 from ..output.names import beyond, refuse_inputs
 from ..settings import OutputSettings
 from ..settings.video import VideoSettings
