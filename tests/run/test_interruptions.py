@@ -130,11 +130,12 @@ def test_a_library_that_breaks_by_itself_is_not(monkeypatch):
 @pytest.mark.parametrize(("words", "code"), [("--version", 0), ("nonsense", 2)])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_after_the_end_changes_no_exit_code(words, code, number):
-    script = (
+    script = (  # as libraries do, which the command loads
         "import atexit, os, time\n"
-        "from wgmb.cli.app import run\n"
-        "atexit.register(lambda: (os.write(1, b'over'), time.sleep(60)))\n"
-        f"run([{words!r}])\n"
+        "from wgmb.cli import app\n"
+        "main, end = app.main, lambda: (os.write(1, b'over'), time.sleep(60))\n"
+        "app.main = lambda words: atexit.register(end) and main(words)\n"
+        f"app.run([{words!r}])\n"
     )
     line = [sys.executable, "-c", script]
     with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
