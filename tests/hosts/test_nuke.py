@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[2]
 BLOCK = re.search(r"```py\n(import nuke.*?)```", (ROOT / "docs/artists/nuke.md").read_text(), re.S)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for the program is a script")
 def test_the_menu_entry_renders_blurs_and_reads(tmp_path, monkeypatch):
     said, menu = {}, {}

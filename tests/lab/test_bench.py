@@ -37,6 +37,7 @@ def test_every_method_has_a_figure_for_every_size_and_number(run):
     assert all(f.gpu > 0 for f in run.figures)
 
 
+@pytest.mark.full
 def test_methods_of_pictures_have_transfers_and_bytes(run):
     for f in run.figures:
         if "scene" in METHODS[f.method].needs:

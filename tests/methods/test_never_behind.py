@@ -88,6 +88,7 @@ def assert_not_behind(name, degrees):
     assert flip < min(f for _, f in simpler) * max(SHARE, share * ROUNDING[1])
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(
     ("name", "degrees"), [("foliage", 90), ("scaling", 180), ("soft_disk", 360)]
 )

@@ -50,6 +50,7 @@ command.load()()
 """
 
 
+@pytest.mark.full
 def test_installed_by_itself_it_renders_a_scene(wheel, tmp_path):
     """In an environment of its own, which borrows what wgmb depends on, but not wgmb."""
     venv.create(tmp_path / "venv", with_pip=False)

@@ -31,6 +31,7 @@ def on_the_gpu(device, display, space, rgba: np.ndarray, exposure: float) -> np.
     return pool.download(device.create_command_encoder(), shown)[..., :3].astype("f4")
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(
     ("config", "view"),
     [("film", "Film"), ("builtin", None), ("builtin", "Un-tone-mapped"), (ACES13, None)],

@@ -82,6 +82,7 @@ def test_who_perceives_is_set_in_the_panel(hand):
     assert np.array_equal(hand.picture(), quick)
 
 
+@pytest.mark.full
 def test_the_reference_of_what_is_perceived_is_perceived_nature(small):
     """Nature is a video of very many frames."""
     state = put(ALONE, look="perceived", compare="wipe", against="reference", wipe=0.0,
