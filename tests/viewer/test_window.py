@@ -233,21 +233,8 @@ def picture_of(whole):
     return whole[:, : SIZE[0] - 320]
 
 
-def test_the_mouse_turns_the_scene_and_escape_ends_the_program(desk):
-    words = ["--window", "{}x{}".format(*SIZE), "--samples", "4", "--method", "tap"]
-    it = desk(str(ROOT / "app.py"), *words)
-    it.wait_for_window()
-    it.plays()
-    it.do("key", "space")
-    first = it.settled()
-    it.drag((150, 360), (300, 380))
-    assert it.shows_other_than(first)
-    it.do("key", "Escape")
-    assert it.end() == (0, "")
-
-
-@pytest.mark.full
-def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
+def turned(desk):
+    """The viewer after a drag of the mouse, and its picture before it."""
     words = [ROOT / "app.py", "--window", "{}x{}".format(*SIZE), "--samples", "4"]
     words += ["--method", "tap"]  # without a GPU, others take longer than a picture has to settle
     it = desk(*map(str, words))
@@ -255,9 +242,20 @@ def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
     it.plays()
     it.do("key", "space")
     first = it.settled()
-
     it.drag((150, 360), (300, 380))
     assert it.shows_other_than(first)
+    return it, first
+
+
+def test_the_mouse_turns_the_scene_and_escape_ends_the_program(desk):
+    it, _ = turned(desk)
+    it.do("key", "Escape")
+    assert it.end() == (0, "")
+
+
+@pytest.mark.full
+def test_mouse_keys_slider_resize_and_escape(desk, tmp_path):
+    it, first = turned(desk)
     it.do("key", "r")
     assert it.shows_again(first)
 
