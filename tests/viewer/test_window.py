@@ -98,7 +98,7 @@ while True:
         )
         send(asks, 31, 0, 1, 0, asks, selection, target, where, time)
     elif kind == 33 and what == atom(b"XdndFinished"):
-        sys.exit(0 if event[8] & 1 else "refused")
+        sys.exit(0 if event[8] else "refused")  # GLFW tells the number of bytes it took
 """
 
 
