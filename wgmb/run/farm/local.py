@@ -51,7 +51,8 @@ def local_client(count: int) -> Iterator[Any]:
     """A client of `count` new workers of one thread each; they end with it."""
     import dask.config
     from distributed import Client, LocalCluster
-    from distributed.security import Security
+
+    from .encryption import Encryption
 
     method = "forkserver" if sys.platform.startswith("linux") else "spawn"
     settings = {**_QUIET, "distributed.worker.multiprocessing-method": method}
@@ -68,7 +69,7 @@ def local_client(count: int) -> Iterator[Any]:
             silence_logs=50,
             memory_limit=0,
             host="tls://127.0.0.1",
-            security=Security.temporary(),
+            security=Encryption.temporary(),
             local_directory=folder,
             env=dict(os.environ),  # that of the first process that loaded modules may be older
         )
@@ -78,11 +79,7 @@ def local_client(count: int) -> Iterator[Any]:
 
 
 def _wait_for(cluster: Any, client: Any, count: int) -> None:
-    """Wait until all workers answer, and start another one for each that was lost.
-
-    With Python 3.13 and OpenSSL 3.5, an error that an ended connection leaves in its thread's queue
-    can end another connection, of a worker that has just come.
-    """
+    """Wait until all workers answer, and start another one for each that was lost."""
     from distributed.core import Status
 
     ended = Status.closing_gracefully, Status.closing, Status.closed, Status.failed

@@ -1,0 +1,59 @@
+"""Encrypted connections of a run's own workers, with keys that are never written to disk.
+
+In Python 3.12 and 3.13 with OpenSSL 3.4 or newer, the error of a write to an ended connection stays
+in OpenSSL's queue of the thread, and the next read of a sound connection reports it (CPython's
+issue 148594): workers, or the run itself, lost connections at random. Here each error is forgotten
+once it is raised.
+"""
+
+from __future__ import annotations
+
+import ssl
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from distributed.security import Security
+
+
+class _Socket(ssl.SSLSocket):
+    def do_handshake(self, *arguments: Any) -> None:
+        return _alone(super().do_handshake, *arguments)
+
+    def send(self, *arguments: Any) -> int:
+        return _alone(super().send, *arguments)
+
+    def recv_into(self, *arguments: Any) -> int:
+        return _alone(super().recv_into, *arguments)
+
+
+class Encryption(Security):
+    """Security whose sockets keep their errors to themselves."""
+
+    __slots__ = Security.__slots__  # the names of the settings that it takes
+
+    def get_connection_args(self, role: str) -> dict[str, Any]:
+        """Return what a connection is opened with."""
+        return _with_sockets(super().get_connection_args(role))
+
+    def get_listen_args(self, role: str) -> dict[str, Any]:
+        """Return what connections are accepted with."""
+        return _with_sockets(super().get_listen_args(role))
+
+
+def _with_sockets(arguments: dict[str, Any]) -> dict[str, Any]:
+    if context := arguments["ssl_context"]:
+        context.sslsocket_class = _Socket
+    return arguments
+
+
+def _alone(call: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a function of a socket; an error that it raises is no longer in OpenSSL's queue."""
+    try:
+        return call(*arguments)
+    except (ssl.SSLWantReadError, ssl.SSLWantWriteError):
+        raise
+    except OSError:
+        with suppress(ssl.SSLError):  # the only call without effects that empties the queue
+            ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).set_ciphers("none")
+        raise
