@@ -15,11 +15,13 @@ from wgmb.viewer.draw import composer
 from wgmb.viewer.draw.composer import Composer, Image, View
 from wgmb.viewer.draw.place import fit
 from wgmb.viewer.draw.screen import Screen, ScreenThread
+from wgmb.viewer.state.state import TONES
 
 SIZE = 90, 60
 AREA = (0, 0, *SIZE)
 RNG = np.random.default_rng(0)
 FIRST, SECOND = (RNG.random((21, 30, 4)).astype(np.float16) for _ in range(2))
+SETTINGS: list[dict[str, Any]] = [{}, {"compare": "wipe"}, {"tone": "soft"}]
 LOWER = """
 import os, sys, threading
 from pathlib import Path
@@ -115,6 +117,30 @@ def test_a_comparison_waits_for_its_second_image(mode):
     np.testing.assert_array_equal(screen.picture(), alone)
     screen.show(compared)
     assert np.abs(screen.picture() - alone).max() > 0.1
+
+
+def test_only_the_last_pipelines_are_kept_and_none_that_makes_no_difference(monkeypatch):
+    monkeypatch.setattr(composer, "_KEPT", 2)
+    made, pipeline = [], composer.pipeline
+    monkeypatch.setattr(composer, "pipeline", lambda *a: made.append(a) or pipeline(*a))
+    one = Composer(gpu.open_device(), "rgba8unorm")
+    clip, wipe, soft = (view_of(FIRST, SECOND, **c) for c in SETTINGS)
+    pictures = [composed(one, view) for view in (clip, wipe, soft)]
+    assert len(made) == 3 and len(one._pipelines) == 2
+    for view, picture in zip((soft, wipe, clip), pictures[::-1], strict=True):
+        np.testing.assert_array_equal(composed(one, view), picture)
+    assert len(made) == 4  # the one that was used longest ago is made anew
+
+    motion = replace(clip, images=(replace(clip.images[0], kind="MOTION"), composer.NOTHING))
+    for tone in TONES:
+        one.compose(replace(motion, state=replace(motion.state, tone=tone)))
+    one.compose(replace(motion, images=(motion.images[0], replace(soft.images[1], kind="DEPTH"))))
+    assert len(made) == 5  # motion has no tone, and alone it is seen without a second image
+
+
+def composed(one, view):
+    one.compose(view)
+    return one.picture()
 
 
 def painted(canvas):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,6 +22,7 @@ _COMPOSED: list[dict] = [{"buffer": {"type": "uniform"}}] + 2 * [
     {"texture": {"sample_type": "unfilterable-float"}}
 ]
 _MOST_TAPS = 4  # texels a side that are averaged for one pixel
+_KEPT = 12  # pipelines: each takes 3 MiB without a GPU, and there are over a thousand
 _BAND = 1 << 17  # pixels that are drawn at once where the window's own drawing must get in between
 
 
@@ -84,7 +86,7 @@ class Composer:
     def __init__(self, device: wgpu.GPUDevice, format: str, in_bands: bool = False):
         self.device, self._images, self._format = device, TexturePool(device), format
         self._none = self._images.view("none", (1, 1), "rgba16float")
-        self._pipelines: dict[tuple, Any] = {}
+        self._pipelines: OrderedDict[tuple, Any] = OrderedDict()
         self._uploaded: dict[str, tuple] = {}
         self._texture: wgpu.GPUTexture | None = None
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
@@ -163,10 +165,13 @@ class Composer:
 
     def _pipeline(self, constants: tuple[tuple[str, float], ...]):
         if constants not in self._pipelines:
+            while len(self._pipelines) >= _KEPT:
+                self._pipelines.popitem(last=False)
             layouts = [_layout(self.device, []), _layout(self.device, _COMPOSED)]
             layout = self.device.create_pipeline_layout(bind_group_layouts=layouts)
             made = pipeline(self.device, _COMPOSE, self._format, layout, dict(constants))
             self._pipelines[constants] = made
+        self._pipelines.move_to_end(constants)
         return self._pipelines[constants]
 
 
@@ -229,15 +234,18 @@ def _layout(device: wgpu.GPUDevice, entries: list[dict]):
 
 def _constants(view: View) -> dict[str, float]:
     """Constants of the pipeline: drivers without a GPU evaluate every branch that they do not
-    decide.
+    decide. Those that make no difference to the view are not told apart.
     """
-    source, (first, second) = wgsl.load(_COMPOSE), view.images
+    source, mode = wgsl.load(_COMPOSE), view.mode
+    first, second = (image.kind for image in view.images)
+    seen = {first} if mode == "ONE" else {first, second}
+    taps = _taps(view.images, whole(view.place), mode) if seen & {"COLOR", "DISPLAY"} else 1
     return {
-        "FIRST": source.constant(first.kind),
-        "SECOND": source.constant(second.kind),
-        "COMPARE": source.constant(view.mode),
-        "TONE": source.constant(view.state.tone.upper()),
-        "TAPS": _taps(view.images, whole(view.place), view.mode),
+        "FIRST": source.constant(first),
+        "SECOND": source.constant("COLOR" if mode == "ONE" else second),
+        "COMPARE": source.constant(mode),
+        "TONE": source.constant(view.state.tone.upper() if "COLOR" in seen else "CLIP"),
+        "TAPS": taps,
     }
 
 
