@@ -1,11 +1,18 @@
 """Two settings side by side: A, the present ones, and B, those that were kept."""
 
+import weakref
+
 import numpy as np
 import pytest
 
 from viewer_hand import ALONE, SAMPLE, SMALL, Hand, library, put
+from wgmb import gpu
 from wgmb.color.srgb import srgb
 from wgmb.viewer import controls
+from wgmb.viewer.capabilities import Choices
+from wgmb.viewer.draw import blurs
+from wgmb.viewer.draw.adaptive import Pace
+from wgmb.viewer.draw.blurs import Blurs
 from wgmb.viewer.panel.panel import commands
 from wgmb.viewer.state.state import Kept
 
@@ -75,3 +82,20 @@ def test_both_have_a_command():
     assert "--method tap" in first and "-o out.mp4" in first and "--shutter 360" in first
     assert "--method tiles" in second and "-o out-b.mp4" in second and "--shutter 90" in second
     assert len(commands(put(state, compare="off"), "out.mp4").splitlines()) == 1
+
+
+def test_blurs_are_kept_as_far_as_memory_allows(monkeypatch):
+    device = gpu.open_device()
+    kept = Blurs(device, Choices(device), Pace())
+    states = [put(A, samples=count) for count in range(4, 9)]
+
+    def asked(size):
+        made = [weakref.ref(kept("first", "result", state, size, None)) for state in states]
+        return [ref() is not None for ref in made]
+
+    small, large = (64, 36), (640, 360)
+    monkeypatch.setattr(blurs, "_MEMORY", 4 * blurs._PIXEL * 64 * 36)
+    assert asked(small) == [False, True, True, True, True]
+    assert asked(large) == [False, False, False, True, True]
+    monkeypatch.undo()
+    assert asked(large) == 5 * [True]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import wgpu
 
@@ -19,20 +20,38 @@ from .adaptive import QUICK, Pace
 from .portions import DroppedError
 
 REFERENCE_SAMPLES = 1024
-_KEPT = 12
+_KEPT = 12  # Blurs at most
+_MEMORY = 2 << 30  # bytes of them all, if that is more than the last two take
+_PIXEL = 240  # bytes that the largest, `gather`, takes for a pixel
+
+
+@dataclass
+class _Kept:
+    blur: Blur
+    bytes: int = 0
+    """For the largest picture so far."""
 
 
 class Blurs:
-    """Makes Blurs; `level` of the `pace` says how quick those are that are to be quick."""
+    """Makes Blurs, and keeps the last ones, as far as memory allows.
+
+    `level` of the `pace` says how quick those are that are to be quick.
+    """
 
     def __init__(self, device: wgpu.GPUDevice, choices: Choices, pace: Pace):
         self._device, self._choices, self._pace = device, choices, pace
-        self._blurs: dict[tuple, Blur] = {}
+        self._blurs: OrderedDict[tuple, _Kept] = OrderedDict()
 
     def __call__(
-        self, slot: str, name: str, state: State, quick: int | None, stand_in: str | None = None
+        self,
+        slot: str,
+        name: str,
+        state: State,
+        size: tuple[int, int],
+        quick: int | None,
+        stand_in: str | None = None,
     ) -> Blur:
-        """The Blur for `name` (a look, a method or the reference) in a slot.
+        """The Blur for `name` (a look, a method or the reference) in a slot, at a size [px].
 
         `quick`: the level of detail while something moves, 0 the finest; None: in full.
         `stand_in`: the method that is used instead.
@@ -57,14 +76,25 @@ class Blurs:
             settings = self._quick(settings, quick)
         kept = slot, name == "perceived"  # each has the sums of a picture of its own
         key = kept, settings
-        if key not in self._blurs:
-            while len(self._blurs) >= _KEPT:
-                del self._blurs[next(iter(self._blurs))]
-            self._blurs[key] = settings.make(shutter, self._device)
-        blur = self._blurs[key] = self._blurs.pop(key)
-        if blur.shutter != shutter:
-            blur.shutter = shutter
-        return blur
+        held = self._blurs.pop(key, None)
+        size_in_memory = max(_PIXEL * size[0] * size[1], held.bytes if held else 0)
+        self._make_room(size_in_memory)
+        held = held or _Kept(settings.make(shutter, self._device))
+        held.bytes = size_in_memory
+        self._blurs[key] = held
+        if held.blur.shutter != shutter:
+            held.blur.shutter = shutter
+        return held.blur
+
+    def _make_room(self, coming: int) -> None:
+        """Let go of those that were used longest ago, of all but one if need be."""
+
+        def lacks_room() -> bool:
+            held = sum(kept.bytes for kept in self._blurs.values())
+            return len(self._blurs) >= _KEPT or held + coming > _MEMORY
+
+        while len(self._blurs) > 1 and lacks_room():
+            self._blurs.popitem(last=False)
 
     @contextmanager
     def kept_if_done(self, blur: Blur):
@@ -72,7 +102,8 @@ class Blurs:
         try:
             yield
         except DroppedError:
-            self._blurs = {key: one for key, one in self._blurs.items() if one is not blur}
+            for key in [key for key, held in self._blurs.items() if held.blur is blur]:
+                del self._blurs[key]
             raise
 
     def _quick(self, settings: BlurSettings, level: int) -> BlurSettings:

@@ -55,7 +55,7 @@ class Inspected:
                     arrays[name] = self._array(texture)
         if state.inspect and state.look == "result" and _SURE in looks:
             subject.look_at(state, size, antialias)
-            blur = self._blurs("first", _SURE, state, None)
+            blur = self._blurs("first", _SURE, state, size, None)
             texture = self._images.texture(_SURE, size, blur.output)
             with self._blurs.kept_if_done(blur):
                 subject.draw(blur, texture, (0, float("inf")), self._timing)

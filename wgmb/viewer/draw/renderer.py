@@ -343,7 +343,7 @@ class Renderer:
             coming.kind = {"depth": "DEPTH", "velocity": "MOTION"}.get(name, "COLOR")
             return
         stand_in = QUICKEST if coming.is_preview else None
-        blur = self._blurs(slot, name, state, self._level if quick else None, stand_in)
+        blur = self._blurs(slot, name, state, size, self._level if quick else None, stand_in)
         coming.texture = self._images.texture(coming.name, size, blur.output)
         if name == "perceived" and (eye := state.eye):
             if state.is_scene:  # of its own, so that what else is drawn keeps its moment
