@@ -15,6 +15,12 @@ from wgmb.extras import EXTRAS, install_command
 from wgmb.lab import cases
 
 
+@pytest.fixture
+def packages_are_sound(monkeypatch):
+    """Python's import of every package, which takes a second, is left to other tests."""
+    monkeypatch.setattr(doctor, "_import_faults", lambda _: {})
+
+
 def told(capsys, code=0) -> list[str]:
     got, out, err = make.inside(capsys, "doctor")
     assert (got, err) == (code, "")
@@ -33,6 +39,7 @@ def test_it_tells_versions_extras_adapters_and_a_right_blur(capsys, monkeypatch)
     assert len(lines) < 40
 
 
+@pytest.mark.usefixtures("packages_are_sound")
 def test_names_of_people_are_not_shown(capsys, monkeypatch):
     monkeypatch.setattr(Path, "home", lambda: Path("/home/jane"))
     monkeypatch.setenv("OCIO", "/home/jane/film/config.ocio")
@@ -45,6 +52,7 @@ def test_names_of_people_are_not_shown(capsys, monkeypatch):
     assert not [line for line in lines if "jane" in line]
 
 
+@pytest.mark.usefixtures("packages_are_sound")
 def test_without_an_adapter_the_remedy_is_told(capsys, monkeypatch):
     def none(*_):
         raise DeviceError("no GPU adapter")
@@ -56,6 +64,7 @@ def test_without_an_adapter_the_remedy_is_told(capsys, monkeypatch):
     assert lines[-2:] == ["test blur: no GPU adapter", doctor.REMEDY]
 
 
+@pytest.mark.usefixtures("packages_are_sound")
 def test_a_wrong_blur_is_told(capsys, monkeypatch):
     monkeypatch.setattr(wgmb.Blur, "__call__", lambda self, frame: frame.color)
     assert told(capsys, code=1)[-1].startswith("test blur: wrong by up to 0.4")
@@ -88,6 +97,7 @@ def test_a_package_that_hangs_is_told(capsys, monkeypatch, tmp_path):
     assert found == ["  tifffile cannot be imported: no end after 2 s"]
 
 
+@pytest.mark.usefixtures("packages_are_sound")
 def test_wgpu_that_cannot_be_used_is_a_line(capsys, monkeypatch):
     def broken(*_):
         raise RuntimeError("libvulkan\nis odd")

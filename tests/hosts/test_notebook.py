@@ -41,6 +41,7 @@ def test_it_runs_without_a_word_on_stderr(book):
     assert shown(book, "text/plain")[-1] == "True"
 
 
+@pytest.mark.full
 def test_the_page_shows_what_the_run_shows(book):
     """The stored outputs are of these cells; `tools/make_notebook.py` makes them."""
     stored = nbformat.read(make_notebook.PATH, as_version=4)

@@ -242,11 +242,11 @@ def test_a_rolling_shutter_exposes_every_line_in_its_time(way):
 
     def shown(**when):
         blur = wgmb.Blur("volume", shutter=Shutter(120, curve="triangle", **when))
-        return wgmb.Render(several(), blur, fps=24, size=(96, 54))(0.3)
+        return wgmb.Render(several(), blur, fps=24, size=(64, 36))(0.3)
 
     rolled = shown(rolling=way, rolling_duration=0.8)
-    for at in (0, 30, 53 if way == "down" else 95):
-        height = 54 if way == "down" else 96
+    for at in (0, 20, 35 if way == "down" else 63):
+        height = 36 if way == "down" else 64
         late = 0.8 * ((at + 0.5) / height - 0.5) * (1 if way == "down" else -1)
         whole = shown(phase=late)
         line = np.index_exp[at] if way == "down" else np.index_exp[:, at]
@@ -286,8 +286,8 @@ def several():
 @pytest.mark.parametrize("curve", [pytest.param("box", marks=pytest.mark.full), "triangle"])
 def test_several_volumes_are_their_twin(curve):
     shutter = Shutter(360, curve=curve)
-    got = wgmb.Render(several(), wgmb.Blur("volume", shutter=shutter), fps=24, size=(96, 54))(0.3)
-    want = twin.picture(several(), 0.3, shutter, 24, (96, 54))
+    got = wgmb.Render(several(), wgmb.Blur("volume", shutter=shutter), fps=24, size=(64, 36))(0.3)
+    want = twin.picture(several(), 0.3, shutter, 24, (64, 36))
     apart = np.abs(srgb(got[..., :3]) - want).max(axis=-1)
     assert (apart > 0.01).mean() < 0.005
 

@@ -187,7 +187,7 @@ PARTS |= {
 }
 
 
-USUAL = {"gather", "tap", "render gather", "viewer"}
+USUAL = {"gather", "tap", "viewer"}
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import core_alone
 import parts
 from wgmb.extras import EXTRAS
 
+pytestmark = pytest.mark.full
 PYTHON = Path(__file__).parents[2] / "build/core/bin/python"
 
 
@@ -35,7 +36,6 @@ def test_nothing_of_an_extra_is_installed_there(alone):
     assert said["numpy"].startswith(("1.26.", "2.1."))
 
 
-@pytest.mark.full
 def test_every_method_scene_and_batch_has_the_same_bits_there(alone, tmp_path):
     _, made = alone
     here = core_alone.results(tmp_path)

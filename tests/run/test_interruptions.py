@@ -13,7 +13,7 @@ import make_frames as make
 from wgmb import Blur
 from wgmb.cli import app, terminal
 
-LONG = 96  # frames: many more than a run makes before it is interrupted
+LONG = 64  # frames: many more than a run makes before it is interrupted
 
 
 @pytest.fixture(scope="module")

@@ -168,6 +168,7 @@ def test_a_pipe_gives_the_pictures_of_the_file(source, piped, tmp_path, flow):
     assert "--color-in" in stated
 
 
+@pytest.mark.full
 def test_one_side_may_be_a_file(source, piped, tmp_path):
     done = wgmb(source, "-o", "-", "--flow", "none", "-q")
     assert (done.returncode, done.stderr) == (0, b"")
@@ -275,6 +276,7 @@ class Unseekable(io.BufferedReader):
         raise io.UnsupportedOperation
 
 
+@pytest.mark.full
 def test_matroska_goes_out_with_its_colours_and_bits(tmp_path):
     tags = (1, 9, 16, 9)
     frames = [clips.frame(clips.planes(n, bits=10), "yuv420p10le") for n in range(5)]

@@ -31,7 +31,7 @@ def test_what_is_perceived_is_what_the_library_says(small, frame, newest, after)
     assert np.abs(small.picture() - want).mean() > 0.005
 
 
-@pytest.mark.parametrize("method", ["distributed", "gather"])
+@pytest.mark.parametrize("method", ["distributed", pytest.param("gather", marks=pytest.mark.full)])
 def test_what_stands_still_is_perceived_as_it_is(small, method):
     state = put(ALONE, set=("speed=0",), samples=16, method=method, frame=2.0)
     small.viewer.state = state
