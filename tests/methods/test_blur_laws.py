@@ -279,7 +279,7 @@ def test_a_lone_good_pixel_fills_its_bad_neighbours(method):
     assert not out[0].any()
 
 
-@pytest.mark.parametrize("curve", ["box", "cosine"])
+@pytest.mark.parametrize("curve", ["box", pytest.param("cosine", marks=pytest.mark.full)])
 def test_auto_takes_as_many_samples_as_it_needs(method, noise, curve):
     """7.5 px of streak, a little jitter: as good as 64 samples to a pixel's own share of it."""
     smooth = np.repeat(np.repeat(noise[::4, ::4], 4, axis=0), 4, axis=1)

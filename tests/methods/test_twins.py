@@ -206,7 +206,7 @@ def test_reproject_is_its_twin(size, neighbours):
 
 @pytest.mark.covers(1)
 @pytest.mark.parametrize("frames", [1, 2, 3, pytest.param(5, marks=pytest.mark.full)])
-@pytest.mark.parametrize("size", [(36, 52), (1, 1)])
+@pytest.mark.parametrize("size", [(28, 42), (1, 1)])
 @pytest.mark.parametrize("degrees", [180, 400])
 @pytest.mark.parametrize("wall", [True, False])
 def test_gather_is_its_twin(size, frames, degrees, wall):

@@ -55,7 +55,7 @@ CHECKERS = {
 }
 
 
-@pytest.mark.covers(0)
+@pytest.mark.full
 @pytest.mark.parametrize("checker", CHECKERS)
 def test_a_typo_is_found_and_what_is_right_is_not(checker, tmp_path):
     (tmp_path / "right.py").write_text(RIGHT)

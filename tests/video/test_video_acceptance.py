@@ -39,6 +39,7 @@ def blur(capsys, *words, code=0):
 VARIED = [Fraction(n, 100) for n in np.cumsum([0] + [4, 3, 5, 4, 8, 4, 2, 4, 4] * 4).tolist()]
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize(
     ("name", "late", "times", "more"),
     [("a.mp4", 0, None, {}), ("a.mkv", 0.123, None, {}), ("a.mp4", 0, VARIED, {}),
