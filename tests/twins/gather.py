@@ -22,6 +22,7 @@ class Layers:
     depth: list  # of a neighbour, as it is in the frame itself; back: 0 where there is none
     coverage: np.ndarray
     inferred: np.ndarray  # the back layer was not seen
+    by_color: np.ndarray  # of two layers, whose coverage colours may have told
     edgeless: np.ndarray  # no edge that is separated in the 3 x 3
     smooth: np.ndarray  # no edge that is seen while the shutter is open
     single: np.ndarray  # of one layer
@@ -115,10 +116,11 @@ def separate(offset, color, motion, depth, longest, prev=None, next=None, far=()
             shows_third[y, x] = edges[y, x] and any(
                 min(depths) * k < d < max(depths) / k for d in depths
             )
-            slow[y, x] = apart * longest < 1
+            slow[y, x] = apart * longest < (8 if edges[y, x] and is_wide(z, (y, x), near) else 1)
             fast[y, x] = edges[y, x] and apart > 2
             mixed[y, x] = fast[y, x] and is_mixed(motion, z, (y, x), near)
-    seen = edges & ~(slow & unfiltered(fast, mixed))
+    told_by_color = unfiltered(fast, mixed)
+    seen = edges & ~(slow & told_by_color)
     separated = seen & ~in_crowd(shows_third)
     bends, ratios = np.zeros((height, width, 3)), np.ones((height, width))
     for y in range(height):
@@ -142,14 +144,29 @@ def separate(offset, color, motion, depth, longest, prev=None, next=None, far=()
             smooth[y, x] = not any(seen[p] for p in near)
     paths = [trajectories(found[1]), trajectories(back[1])]
     depths = [found[2], back[2]]
-    return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred, edgeless, smooth,
+    return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred,
+                  separated & told_by_color, edgeless, smooth,
                   ~separated, trajectories(own), z * ratios)  # fmt: skip
+
+
+def is_wide(z, at, near):
+    """True if 3 x 3 pixels are all in front, not farther than two pixels from an edge."""
+    y, x = at
+    z, between = np.pad(z, 2, mode="edge"), middle(z, near)
+    return any(
+        (z[j : j + 3, i : i + 3] < between).all() for j in range(y, y + 3) for i in range(x, x + 3)
+    )
+
+
+def middle(z, near):
+    """A depth between the nearest and the farthest of these pixels."""
+    nearest, farthest = min(z[p] for p in near), max(z[p] for p in near)
+    return 1.5 * nearest if farthest >= NO_DEPTH else np.sqrt(nearest * farthest)
 
 
 def is_mixed(motion, z, at, near):
     """True if motions on the pixel's own side of an edge differ by over a fifth of those across."""
-    nearest, farthest = min(z[p] for p in near), max(z[p] for p in near)
-    between = 1.5 * nearest if farthest >= NO_DEPTH else np.sqrt(nearest * farthest)
+    between = middle(z, near)
     off = {p: np.linalg.norm(motion[p] - motion[at]) for p in near}
     sides = [[off[p] for p in near if (z[p] < between) == side] for side in (True, False)]
     same, other = sides if z[at] < between else sides[::-1]
@@ -240,8 +257,7 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     """
     height, width = z.shape
     inner = list(around(height, width, y, x, 1))
-    nearest, farthest = min(z[p] for p in inner), max(z[p] for p in inner)
-    between = 1.5 * nearest if farthest >= NO_DEPTH else np.sqrt(nearest * farthest)
+    between = middle(z, inner)
     outer = list(around(height, width, y, x, 2))
     nearer = [p for p in outer if z[p] < between]
     # The corners are too far away for a background.
@@ -588,7 +604,7 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
     behind = hidden and any(tiles[f]["edges"] for f in near)
     if behind:
         search_layer(0, True, None, None)
-    if len(order) > 1 and (hidden or abs(t) > 0.25):
+    if len(order) > 1 and ((hidden and not is_complement(layers[0], seen[0])) or abs(t) > 0.25):
         search_front(order[1])
         if len(order) > 2 and inferred():
             search_front(order[2])
@@ -599,6 +615,15 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
             if behind and inferred() and (np.isinf(seen[0].depth) or np.isinf(seen[1].depth)):
                 search_layer(f, True, None, None)
     return seen, min(misses)
+
+
+def is_complement(own, found):
+    """True if a back of the frame itself makes up a colour with a front of uncertain coverage."""
+    if (found.frame, found.back) != (0, True):
+        return False
+    height, width = own.edgeless.shape
+    i, j = np.clip(found.at, 0, (width - 1, height - 1)).astype(int)
+    return own.by_color[j, i]
 
 
 def is_hidden(own, frame, found):

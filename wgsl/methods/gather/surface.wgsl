@@ -39,6 +39,7 @@ fn pack_halves(v: vec2f) -> u32 {
 
 const SMOOTH: u32 = 1u;         // of a front layer: one surface of one weight in its 3 x 3
 const EDGELESS: u32 = 4u;       // of a front layer: SMOOTH, without an edge that is not seen while the shutter is open
+const BY_COLOR: u32 = 4u;       // of a front layer that is separated: colours alone may have told its coverage
 const SEEN: u32 = 1u;           // of a back layer: it was seen, not inferred
 const KINK: u32 = 2u;           // of the trajectory
 const AROUND: u32 = 4u;         // of a back layer: its colour is that of neighbouring frames

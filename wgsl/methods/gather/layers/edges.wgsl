@@ -18,7 +18,9 @@ const APART_MOTION: f32 = 4.0;
 const LEAST_SHARE: f32 = 0.1;
 const FAST: f32 = 2.0;          // difference of the motions at an edge that tells whether vectors are filtered [px],
 const MIXED: f32 = 0.2;         // where they differ by more than this share of it on the same side of the edge
-const SLOW_MOTION: f32 = 1.0;   // how far surfaces move apart, at most, that hardly do while the shutter is open, by both vectors [px]
+const SLOW_MOTION: f32 = 1.0;   // how far surfaces move apart, at most, that hardly do while the shutter is open, by both vectors [px];
+const WIDE_MOTION: f32 = 8.0;   // the same of a wide front: its rim is a small part of it
+const WHOLE_SQUARES: u32 = 0x1ce7u; // of the 5 x 5 bits, the first three of the first three rows: 3 x 3 that begin there end within
 
 /// First pass: a pixel is at an edge if depths differ in its 3 x 3, and motions from its own too. The more motions differ,
 /// the less depths have to: what moves so differently is no smooth surface.
@@ -63,8 +65,21 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
         }
     }
     let longest = max_abs_time(0.0);
-    let is_slow = difference2 * longest * longest < SLOW_MOTION * SLOW_MOTION;
+    let apart2 = difference2 * longest * longest;
+    let wide = is_wide(px, between, is_there && apart2 < WIDE_MOTION * WIDE_MOTION);
+    let is_slow = wide || apart2 < SLOW_MOTION * SLOW_MOTION;
     textureStore(edge_flags_out, px, vec4u(flag_depth(here.y, is_there, is_slow)));
+}
+
+/// True if, in the 5 x 5 around an edge, some 3 x 3 pixels are all in front; not looked for unless `wanted`.
+fn is_wide(px: vec2i, between: f32, wanted: bool) -> bool {
+    var front = 0u;             // a bit per pixel, row by row
+    for (var i = 0; i < select(0, 25, wanted); i++) {
+        front |= u32(depth_at(px + vec2i(i % 5, i / 5) - 2) < between) << u32(i);
+    }
+    let threes = front & (front >> 1u) & (front >> 2u);     // of a row
+    let squares = threes & (threes >> 5u) & (threes >> 10u);
+    return (squares & WHOLE_SQUARES) != 0u;
 }
 
 /// Of a pixel and the ones to its left and right. Written out, as is what works on 3 x 3 pixels: lavapipe unrolls no loop.

@@ -188,7 +188,8 @@ fn store_layers(edge: EdgePixel, split: Split) {
     let z = split.front_z * front_path.depth_ratio;
     let back_z = split.back_z * back_path.depth_ratio;
     let has_back = back_z > 0.0;
-    textureStore(surfaces, edge.px, FRONT, pack_surface(front_path.trajectory, -z, 0u));
+    let by_color = (around_tile(edge.px) & UNFILTERED) != 0u;
+    textureStore(surfaces, edge.px, FRONT, pack_surface(front_path.trajectory, -z, select(0u, BY_COLOR, by_color)));
     if has_back { textureStore(colors, edge.px, BACK, split.back); }     // else nobody reads it
     textureStore(surfaces, edge.px, BACK,
                  pack_surface(back_path.trajectory, max(back_z, 0.0), select(SINGLE, split.told, has_back)));

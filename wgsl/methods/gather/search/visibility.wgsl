@@ -59,8 +59,8 @@ fn resolve_visibility(x: vec2f, starts: Starts, t: f32,
     return visible;
 }
 
-/// The search after `last`. The back of the frame itself where its front is `hidden`; the neighbour there too, or far
-/// from the frame's own instant; the other neighbour if the background is at best inferred; the frames beyond them if
+/// The search after `last`. The back of the frame itself where its front is `hidden`; the neighbour there too, unless that back
+/// belongs to what is before it, or far from the frame's own instant; the other neighbour if the background is at best inferred; the frames beyond them if
 /// there is none; the neighbours' backs at last, where it is at best inferred and no edge is before it.
 fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool) -> u32 {
     let none = visible.opaque.depth >= INFINITE;
@@ -69,7 +69,7 @@ fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool
     let try_neighbours_back = try_back && inferred && (none || visible.front_edge.depth >= INFINITE);
     var next = last + 1u;
     if next == OWN_BACK && !try_back { next = NEIGHBOUR_FRONT; }
-    if next == NEIGHBOUR_FRONT && !(sources.count > 1u && (hidden || abs(t) > TRUSTED_TIME)) { next = SEARCHES; }
+    if next == NEIGHBOUR_FRONT && !(sources.count > 1u && ((hidden && !is_complement(visible.opaque)) || abs(t) > TRUSTED_TIME)) { next = SEARCHES; }
     if next == OTHER_FRONT && !(sources.count > 2u && inferred) { next = FAR_FRONT; }
     if next == FAR_FRONT && !(FAR && none) { next = NEIGHBOUR_BACK; }
     if next == OTHER_FAR && !(sources.far_count > 1u && none) { next = NEIGHBOUR_BACK; }
@@ -218,6 +218,14 @@ fn is_hidden(found: Sample) -> bool {
     let here = found.at + displacement5(unpack_trajectory(surface), -offset_of(found.layer / 2u));
     let own = abs(unpack_depth(surface_of(vec2i(nearest_pixel(here)), 0u)));
     return !is_inside(here) || own * SURFACE_DEPTH_RATIO < found.true_depth;
+}
+
+/// True if this is a back layer of the frame itself which makes up the colour of its pixel with a front of uncertain coverage: no other
+/// background does.
+fn is_complement(found: Sample) -> bool {
+    if found.layer != OWN_BACK { return false; }
+    let front = surface_of(vec2i(nearest_pixel(found.at)), OWN_FRONT).w;
+    return (front & (SINGLE | BY_COLOR)) == BY_COLOR;
 }
 
 fn nothing() -> Sample {
