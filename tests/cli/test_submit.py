@@ -73,6 +73,7 @@ def check_calls(capsys, count: int) -> None:
     assert parts == whole
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize("desk", FOLDERS[2:], indirect=True)
 def test_an_openjd_template_is_checked_and_run(desk, capsys):
     written(capsys, "--chunk", 4, "--openjd", "shot.yaml")

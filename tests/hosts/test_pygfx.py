@@ -81,18 +81,12 @@ OBJECTS = {"tap": 32.9, "tiles": 33.4, "reproject": 35.4, "gather": 37.2}
 CAMERA_ALONE = {"tap": 30.3, "tiles": 30.6, "reproject": 30.8, "gather": 30.1}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("boxes", "moving", "sharp", "tables"),
     [
         pytest.param(60, False, 32.4, {False: CAMERA}, id="camera"),
-        pytest.param(
-            40,
-            True,
-            29.2,
-            {False: CAMERA_ALONE, True: OBJECTS},
-            id="objects",
-            marks=pytest.mark.full,
-        ),
+        pytest.param(40, True, 29.2, {False: CAMERA_ALONE, True: OBJECTS}, id="objects"),
     ],
 )
 def test_it_comes_as_near_to_the_truth_as_was_measured(boxes, moving, sharp, tables):

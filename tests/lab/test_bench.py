@@ -219,6 +219,7 @@ def test_what_takes_too_long_is_left_out_and_said(device):
                for note in run.notes)  # fmt: skip
 
 
+@pytest.mark.full
 def test_what_does_not_fit_into_memory_is_left_out(device, monkeypatch):
     tap = bench.bench(device, [Candidate("tap")], SIZES[:1], (2,), 1).figures[0]
     monkeypatch.setattr(bench, "_memory", lambda: 2 * tap.memory)
@@ -227,6 +228,7 @@ def test_what_does_not_fit_into_memory_is_left_out(device, monkeypatch):
     assert "skipped: it would hold" in run.notes[0]
 
 
+@pytest.mark.full
 def test_a_size_that_no_texture_has_is_left_out(device):
     huge = 1 << 20, 4
     run = bench.bench(device, [Candidate("tap")], [huge, SIZES[0]], (2,), 1)
@@ -236,6 +238,7 @@ def test_a_size_that_no_texture_has_is_left_out(device):
         bench.bench(device, [Candidate("tap")], [huge], (2,), 1)
 
 
+@pytest.mark.full
 def test_the_time_to_come_is_told(device):
     said = []
     bench.bench(device, [Candidate("tap")], SIZES, (2, 4), 1, tell=said.append)

@@ -142,6 +142,7 @@ def test_a_scene_is_seen_without_frames(tmp_path, capsys):
     assert np.abs(nature - seen).mean() < 0.03  # before its first frame the video stood still
 
 
+@pytest.mark.full
 def test_the_report_is_drawn_and_recommends(tmp_path, capsys):
     code, out, err = make.inside(capsys, "perceive", "--report", "-o", tmp_path / "r.svg",
                                  "--fps", 60, "--speed", 100)  # fmt: skip

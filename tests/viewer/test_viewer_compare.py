@@ -78,6 +78,7 @@ def test_the_error_is_shown_however_others_are_compared(bare):
     assert all(picture.max() > 0.3 for picture in shown)  # flicker would show black in between
 
 
+@pytest.mark.full
 def test_the_reference_converges_and_is_measured(small, monkeypatch):
     monkeypatch.setattr(renderer, "_STEP", 0.0)  # a sample a frame, however fast the machine is
     at = 7 / 24  # a moment that no other test has measured
