@@ -69,3 +69,20 @@ def test_dense_inverse_search_says_what_it_lost():
 
     assert lost(1) == (0, 3)
     assert lost(45)[0] >= 2
+
+
+@pytest.mark.parametrize("size, loses", [(6, False), (16, True)])
+def test_what_is_lost_of_the_little_that_changes_counts_too(size, loses):
+    """Of a walker before a room that stands, a limb is a small share of the picture."""
+    kept, change = Consistency(), np.zeros((32, 48), np.uint8)
+    change[5:15, 10:26] = 40
+    for n in range(3):
+        to_prev, to_next = (np.zeros((128, 192, 2), np.float32) for _ in range(2))
+        if n == 1:
+            to_prev[24 : 24 + size, 48 : 48 + size] = to_next[24 : 24 + size, 48 : 48 + size] = 15
+        kept.add(n, to_prev, to_next, change)
+    assert kept.shares[1] < SHARE and kept.loses[1] == loses
+    still = Consistency()
+    for n in range(3):
+        still.add(n, to_prev * 0, to_next * 0, 0 * change)
+    assert still.loses == {1: False}

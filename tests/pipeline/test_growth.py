@@ -202,12 +202,12 @@ def test_exposures_of_cells_leave_nothing_behind():
     """Also where shutters, shares and numbers of cells change from one to the next."""
     blur = Blur("tap", samples=4)
     shots = ShotReader(Picture(n / 144, _coded(n), n) for n in range(10_000))
-    views, exposer, number = VideoFrames(shots, blur, _Sideways()), ExposureSum(blur), 0
+    views, exposer, number = VideoFrames(shots, blur, _Sideways()), ExposureSum(blur.device), 0
 
     def step():
         nonlocal number
         cells = shots.cells(number / 60, 1 / 60, Shutter(180))
-        exposer.texture(SIZE, ((cell, views.in_shot(cell.index)) for cell in cells))
+        exposer.texture(SIZE, ((cell, views.in_shot(cell.index), blur) for cell in cells))
         number += 1
 
     assert growth(step) <= MOST

@@ -57,17 +57,14 @@ class VideoExposure:
     """Exposures of a shots as arrays."""
 
     def __init__(self, shots, blur, motion=None):
-        self.shots, self.views, self._exposer = (
-            shots,
-            VideoFrames(shots, blur, motion),
-            ExposureSum(blur),
-        )
+        self.shots, self.views, self._blur = shots, VideoFrames(shots, blur, motion), blur
+        self._exposer = ExposureSum(blur.device)
         self._images = TexturePool(blur.device)
 
     def __call__(self, at, interval, shutter):
         cells = self.shots.cells(at, interval, shutter)
         size = self.shots[cells[0].index].content.coded.size
-        parts = ((cell, self.views.in_shot(cell.index)) for cell in cells)
+        parts = ((cell, self.views.in_shot(cell.index), self._blur) for cell in cells)
         texture = self._exposer.texture(size, parts)
         return self.array(texture)[..., :3]
 

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 SPACING = 4  # px from one pixel that is looked at to the next
+REACH = 2  # pictures to either side whose ways tell whether one, or one beside it, loses something
 APART = 2.0  # px by which the way there and back may end beside its start
 SHARE = 0.0125  # of a picture, above which it counts as lost
+SHARE_OF_CHANGES = 0.06  # of what changes in it, above which that counts as lost too
+LEAST = 0.005  # share of a picture that must change for that
+CHANGE = 15.0  # levels of 255 that a block differs from both neighbours where it changes
 
 
 def returns(way: np.ndarray, back: np.ndarray, spacing: int) -> np.ndarray:
@@ -24,7 +28,7 @@ def returns(way: np.ndarray, back: np.ndarray, spacing: int) -> np.ndarray:
 
 
 class Consistency:
-    """The share of each picture of a shot whose ways to both neighbours do not lead back.
+    """Tells in which pictures of a shot the ways of too many pixels do not lead back.
 
     What one neighbour hides leads back from the other. A picture is known as soon as its own ways
     and those of both neighbours are added; only every 4th pixel along each axis is kept.
@@ -32,26 +36,50 @@ class Consistency:
 
     def __init__(self) -> None:
         self._ways: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._changes: dict[int, np.ndarray] = {}
         self.shares: dict[int, float] = {}
-        """By the picture's number."""
+        """The share of a picture that is lost, by the picture's number."""
+        self.loses: dict[int, bool] = {}
+        """True for a picture if that is too much of it, or of what changes in it."""
 
-    def add(self, number: int, to_prev: np.ndarray, to_next: np.ndarray) -> None:
-        """Take the ways (height, width, 2) [px] of a picture."""
+    def add(
+        self,
+        number: int,
+        to_prev: np.ndarray,
+        to_next: np.ndarray,
+        change: np.ndarray | None = None,
+    ) -> None:
+        """Take the ways (height, width, 2) [px] of a picture.
+
+        `change`: by how much blocks of 4 x 4 pixels differ from both neighbours, 0 to 255.
+        """
         thin = (way[::SPACING, ::SPACING].copy() for way in (to_prev, to_next))
         self._ways[number] = next(thin), next(thin)
-        for old in [n for n in self._ways if abs(n - number) > 2]:
+        if change is not None:
+            self._changes[number] = change
+        for old in [n for n in self._ways if abs(n - number) > 2 * REACH]:
             del self._ways[old]
+            self._changes.pop(old, None)
         for n in (number - 1, number, number + 1):
             if n not in self.shares and all(k in self._ways for k in (n - 1, n, n + 1)):
-                self.shares[n] = self._share(n)
+                self._judge(n)
 
-    def _share(self, number: int) -> float:
+    def knows(self, number: int) -> bool:
+        """True if the ways of a picture are kept."""
+        return number in self._ways
+
+    def _judge(self, number: int) -> None:
         to_prev, to_next = self._ways[number]
         prev_back, next_back = self._ways[number - 1][1], self._ways[number + 1][0]
         found = returns(to_prev, prev_back, SPACING) | returns(to_next, next_back, SPACING)
-        return 1 - float(found.mean())
+        self.shares[number] = 1 - float(found.mean())
+        self.loses[number] = self.shares[number] > SHARE
+        if number in self._changes:
+            changes = self._changes[number] > CHANGE
+            share = float(np.mean(~found[changes])) if changes.mean() > LEAST else 0.0
+            self.loses[number] |= share > SHARE_OF_CHANGES
 
     @property
     def lost(self) -> int:
         """Number of pictures in which something was lost."""
-        return sum(share > SHARE for share in self.shares.values())
+        return sum(self.loses.values())

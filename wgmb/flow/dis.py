@@ -17,7 +17,7 @@ import numpy as np
 from .. import extras
 from ..color.srgb import to_display
 from ..errors import InputError
-from .consistency import Consistency
+from .consistency import REACH, SPACING, Consistency
 
 QUALITIES = ("fast", "best")
 _LEAST = 16  # pixels a side that OpenCV needs
@@ -51,35 +51,16 @@ class Dis:
             self._flow.setFinestScale(0)
         self._shots: list[Consistency] = []
 
-    def shot(self, load: Load, depth: bool = True) -> Callable[[int], Found | None]:
+    def shot(self, load: Load, depth: bool = True) -> DisShot:
         """Motion (height, width, 4) to_prev, to_next [px] and depth of a shot's frames.
 
         `load(number)`: the picture (height, width, 3 or 4), linear, or (height, width) uint8, its
         display values without colour; None outside the shot. Without `depth` it is None, and the
         motion takes half the time.
         """
-        grey: dict[int, np.ndarray | None] = {}
-        consistency = Consistency()
-        self._shots.append(consistency)
-
-        def picture(number: int) -> np.ndarray | None:
-            if number not in grey:
-                for old in [n for n in grey if abs(n - number) > 2]:
-                    del grey[old]
-                color = load(number)
-                grey[number] = None if color is None else self._grey(color)
-            return grey[number]
-
-        def motion_of(number: int) -> Found | None:
-            here = picture(number)
-            near = [picture(number + side) for side in (-1, 1)]
-            if here is None or all(one is None for one in near):
-                return None
-            motion, order = self._between(near[0], here, near[1], depth)
-            consistency.add(number, motion[..., :2], motion[..., 2:])
-            return motion, order
-
-        return motion_of
+        shot = DisShot(self, load, depth)
+        self._shots.append(shot.consistency)
+        return shot
 
     @property
     def lost(self) -> int:
@@ -91,15 +72,17 @@ class Dis:
         """Number of pictures so far that lie between two others of their shot."""
         return sum(len(shot.shares) for shot in self._shots)
 
-    def _grey(self, color: np.ndarray) -> np.ndarray:
+    def grey(self, color: np.ndarray) -> np.ndarray:
+        """A picture's display values without colour, (height, width) uint8."""
         if color.ndim == 2:
             return color
         shown = to_display(np.asarray(color[..., :3], np.float32), 8)
         return self._cv2.cvtColor(shown, self._cv2.COLOR_RGB2GRAY)
 
-    def _between(
+    def between(
         self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None, depth: bool
     ) -> Found:
+        """Motion and depth of a picture, from the grey of its neighbours, one of which is there."""
         back = None if prev is None else self._way(here, prev)
         ahead = None if next is None else self._way(here, next)
         found = [way for way in (back, ahead) if way is not None]
@@ -107,6 +90,16 @@ class Dis:
         ahead = -found[0] if ahead is None else ahead
         motion = np.concatenate([back, ahead], axis=2)
         return motion, functools.reduce(np.minimum, map(self._depth, found)) if depth else None
+
+    def change(self, prev: np.ndarray, here: np.ndarray, next: np.ndarray) -> np.ndarray:
+        """By how much blocks of `SPACING` differ from both neighbours, 0 to 255."""
+        size = tuple(-(-n // SPACING) for n in here.shape[::-1])
+        area = self._cv2.INTER_AREA
+        prev, next = (
+            self._cv2.resize(self._cv2.absdiff(here, other), size, interpolation=area)
+            for other in (prev, next)
+        )
+        return np.minimum(prev, next)
 
     def _way(self, here: np.ndarray, other: np.ndarray) -> np.ndarray:
         if min(here.shape) < _LEAST:
@@ -135,3 +128,49 @@ class Dis:
         across *= _APART
         across += 1
         return self._cv2.medianBlur(np.reciprocal(across, out=across), 5)
+
+
+class DisShot:
+    """Motion of the pictures of a shot by a Dis, and what it loses in them; made by `Dis.shot`."""
+
+    def __init__(self, dis: Dis, load: Load, depth: bool):
+        self._dis, self._load, self._depth = dis, load, depth
+        self._grey: dict[int, np.ndarray | None] = {}
+        self._ahead: dict[int, Found] = {}
+        self.consistency = Consistency()
+
+    def __call__(self, number: int) -> Found | None:
+        """Motion (height, width, 4) [px] and depth of a picture; None where it is alone."""
+        return self._ahead.pop(number, None) or self._motion_of(number)
+
+    def loses(self, number: int) -> bool:
+        """True if too much is lost in a picture or one beside it, whatever was asked for before.
+
+        Their motion is found for that, and kept until it is asked for.
+        """
+        for old in [n for n in self._ahead if n < number - 1]:
+            del self._ahead[old]
+        for n in range(number - REACH, number + REACH + 1):
+            if not self.consistency.knows(n) and (found := self._motion_of(n)) is not None:
+                self._ahead[n] = found
+        return any(self.consistency.loses.get(n) for n in (number - 1, number, number + 1))
+
+    def _picture(self, number: int) -> np.ndarray | None:
+        if number not in self._grey:
+            for old in [n for n in self._grey if abs(n - number) > 2]:
+                del self._grey[old]
+            color = self._load(number)
+            self._grey[number] = None if color is None else self._dis.grey(color)
+        return self._grey[number]
+
+    def _motion_of(self, number: int) -> Found | None:
+        here = self._picture(number)
+        prev, next = (self._picture(number + side) for side in (-1, 1))
+        if here is None or (prev is None and next is None):
+            return None
+        motion, order = self._dis.between(prev, here, next, self._depth)
+        change = None
+        if prev is not None and next is not None:
+            change = self._dis.change(prev, here, next)
+        self.consistency.add(number, motion[..., :2], motion[..., 2:], change)
+        return motion, order

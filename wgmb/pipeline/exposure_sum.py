@@ -18,23 +18,22 @@ from ..gpu_frame.weighted_sum import WeightedSum
 from .blur import Blur
 
 _AT_ONCE = 2  # pictures that are summed in one pass
+Part = tuple[Cell, FrameInShot | Frame, Blur]
+"""A cell, its frame as textures or as arrays, which are uploaded, and what blurs it."""
 
 
 class ExposureSum:
-    """Makes one picture of the cells of an exposure (see exposure.py), on the Blur's device.
+    """Makes one picture of the cells of an exposure (see exposure.py), on the device of its Blurs.
 
-    The frame of a cell is given as textures, or as arrays, which are uploaded. One without motion,
-    or whose shutter is closed, counts as it is.
+    The frame of a cell without motion, or whose shutter is closed, counts as it is.
     """
 
-    def __init__(self, blur: Blur):
-        self.blur = blur
-        self._images = TexturePool(blur.device)
-        self._sum = WeightedSum(blur.device)
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device = device
+        self._images = TexturePool(device)
+        self._sum = WeightedSum(device)
 
-    def texture(
-        self, size: tuple[int, int], parts: Iterable[tuple[Cell, FrameInShot | Frame]]
-    ) -> wgpu.GPUTexture:
+    def texture(self, size: tuple[int, int], parts: Iterable[Part]) -> wgpu.GPUTexture:
         """The exposure of pictures of `size` (width, height): linear light, rgba32float.
 
         The next call overwrites it.
@@ -45,23 +44,23 @@ class ExposureSum:
 
     def draw(
         self,
-        parts: Iterable[tuple[Cell, FrameInShot | Frame]],
+        parts: Iterable[Part],
         output: wgpu.GPUTexture,
         timing: Clock | None = None,
     ) -> None:
         """Submit the exposure into `output`, rgba32float of the pictures' size.
 
-        `timing` takes the time of the blur's passes, and may end the work before a cell. The Blur
-        keeps the shutter of the last cell.
+        `timing` takes the time of the blur's passes, and may end the work before a cell. A Blur
+        keeps the shutter of its last cell.
         """
         waiting: list[tuple[float, wgpu.GPUTexture]] = []
         begun = False
         with gpu.reported((output.size[0], output.size[1])):
-            for cell, frame in parts:
+            for cell, frame, blur in parts:
                 if timing is not None:
                     timing.check()
                 name = f"part {len(waiting)}"
-                waiting.append((cell.share, self._picture(name, cell, frame, timing)))
+                waiting.append((cell.share, self._picture(name, cell, frame, blur, timing)))
                 if len(waiting) == _AT_ONCE:
                     self._add(waiting, output, begun)
                     begun, waiting = True, []
@@ -71,24 +70,29 @@ class ExposureSum:
     def _add(
         self, waiting: list[tuple[float, wgpu.GPUTexture]], output: wgpu.GPUTexture, onto: bool
     ) -> None:
-        encoder = self.blur.device.create_command_encoder(label="exposure")
+        encoder = self._device.create_command_encoder(label="exposure")
         shares = np.array([share for share, _ in waiting], np.float32)
         self._sum.encode(encoder, [texture for _, texture in waiting], shares, output, onto=onto)
-        gpu.submit(self.blur.device, encoder)
+        gpu.submit(self._device, encoder)
 
     def _picture(
-        self, name: str, cell: Cell, frame: FrameInShot | Frame, timing: Clock | None
+        self,
+        name: str,
+        cell: Cell,
+        frame: FrameInShot | Frame,
+        blur: Blur,
+        timing: Clock | None,
     ) -> wgpu.GPUTexture:
         sharp = frame.frame if isinstance(frame, FrameInShot) else frame
         if "motion" not in sharp.has or cell.shutter.degrees <= 0:
             return self._sharp(name, sharp)
-        self.blur.shutter = cell.shutter
-        texture = self._images.texture(name, sharp.size, self.blur.output)
+        blur.shutter = cell.shutter
+        texture = self._images.texture(name, sharp.size, blur.output)
         if isinstance(frame, Frame):
-            self.blur.draw(frame, texture.create_view(), timing)
+            blur.draw(frame, texture.create_view(), timing)
             return texture
-        encoder = self.blur.device.create_command_encoder(label="cell")
-        self.blur.encode(
+        encoder = self._device.create_command_encoder(label="cell")
+        blur.encode(
             encoder,
             frame.frame,
             texture.create_view(),
@@ -97,7 +101,7 @@ class ExposureSum:
             number=frame.number,
             timing=timing,
         )
-        gpu.submit(self.blur.device, encoder)
+        gpu.submit(self._device, encoder)
         return texture
 
     def _sharp(self, name: str, frame: FrameViews | Frame) -> wgpu.GPUTexture:

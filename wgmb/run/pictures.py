@@ -254,6 +254,7 @@ def steady(
         run.blur,
         run.motion,
         holdout=holdout or Holdout(displays=not request.blur.holdout),
+        fallback=run.fallback,
         fill=request.video.duplicates == "fill",
         cuts=cuts.is_search,
         known_cuts=cuts.frames(0),

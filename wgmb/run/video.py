@@ -25,7 +25,7 @@ from ..shots.motion import MotionSource
 from ..shots.reader import Picture
 from ..shutter import Shutter
 from ..video.clock import Clock
-from ..video.exposures import Exposures, VideoBlur
+from ..video.exposures import Exposures, Fallback, VideoBlur
 from ..video.holdouts import NONE, check_masks, files_of, holdout_of
 from ..video.output_times import OutputFrame, OutputFrames
 from ..video.planes import Planes
@@ -85,7 +85,22 @@ class VideoRequest(SettingsGroups):
         settings = replace(self.blur, method=self.blur.method or flow.method).for_pictures()
         blur = settings.make(shutter.make(), device)
         motion, _ = flow.source(blur.device)
-        return VideoRun(replace(self, blur=settings, shutter=shutter), blur, motion, how)
+        fallback = None
+        if searched := self.video.fallback(blur.device):
+            how += "; what is too fast for it is searched"
+            fallback = self._thorough(shutter.make(), blur), searched
+        shown = replace(self, blur=settings, shutter=shutter)
+        return VideoRun(shown, blur, motion, how, fallback)
+
+    def _thorough(self, shutter: Shutter, blur: Blur) -> Blur:
+        """The blur of searched pictures: gather, unless another method is asked for or fits."""
+        if self.blur.method is not None:
+            return blur
+        try:
+            settings = replace(self.blur, method="gather").for_pictures()
+            return settings.make(shutter, blur.device)
+        except InputError:  # an option of the other method
+            return blur
 
 
 @dataclass(frozen=True)
@@ -97,6 +112,7 @@ class VideoRun:
     motion: MotionSource | None
     how: str
     """The source of the motion, in words."""
+    fallback: Fallback | None = None
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -118,7 +134,7 @@ class VideoRun:
         qualities = {"best": "`flow_quality=fast`", "fast": "`flow_quality=draft`"}
         if flow.flow == "search" and flow.flow_quality in qualities:
             found = f"{qualities[flow.flow_quality]} takes less"
-        elif flow.flow == "search" and is_installed("cv2"):
+        elif (flow.flow == "search" and is_installed("cv2")) or self.fallback is not None:
             found = "`flow=dis` takes less, but loses what is fast"
         elif flow.flow == "dis" and (flow.flow_quality, method) != ("fast", "tap"):
             by = "`flow_quality=fast`" if flow.flow_quality == "best" else "`method=tap`"
@@ -147,6 +163,7 @@ class VideoRun:
             self.motion,
             clock=plan.clock,
             holdout=holdout_of(request.blur.holdout, plan.reader),
+            fallback=self.fallback,
             fill=request.video.duplicates == "fill",
             cuts=cuts.is_search,
             known_cuts=cuts.frames(0),
@@ -188,6 +205,14 @@ class VideoRun:
     def _told_lost(self, before: tuple[int, int]) -> str:
         """A line about pictures since `before` in which something fast was lost, or ''."""
         lost, checked = (now - old for now, old in zip(self._lost_so_far(), before, strict=True))
+        if self.fallback is not None:
+            if not lost:
+                return ""
+            return (
+                f"something moves too fast for dense inverse search in {lost} of {checked} "
+                "pictures; they were searched as well, and blurred with "
+                f"{self.fallback[0].method.name}, which takes longer: `flow=dis` does without"
+            )
         if lost <= LOST * checked:
             return ""
         return (

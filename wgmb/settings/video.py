@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from ..video.read.reader import VideoReader
 
 
+_FALLBACK = "draft"  # quality of the search where dense inverse search loses too much
+
+
 @dataclass(frozen=True, kw_only=True)
 class FlowSettings:
     """Source of the motion of pictures."""
@@ -50,6 +53,19 @@ class FlowSettings:
         from ..flow import Flow
 
         return Flow(quality=settings.flow_quality, device=device), how
+
+    def fallback(self, device: wgpu.GPUDevice) -> MotionSource | None:
+        """The source of motion for a video's pictures of which the quick one loses too much.
+
+        None unless "auto" became dense inverse search.
+        """
+        if self.flow != "auto" or self.chosen(device)[0].flow != "dis":
+            return None
+        from ..flow import Flow
+        from ..flow.dis import Dis
+        from ..shots.better import BetterMatch
+
+        return BetterMatch(Dis("fast"), Flow(quality=_FALLBACK, device=device))
 
     def chosen(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
         """A copy in which `flow` is chosen as it suits the device, and the choice in words."""

@@ -17,7 +17,7 @@ from ..exposure import Cell
 from ..gpu.textures import TexturePool
 from ..methods.contract import reach_of
 from ..pipeline.blur import Blur
-from ..pipeline.exposure_sum import ExposureSum
+from ..pipeline.exposure_sum import ExposureSum, Part
 from ..shots.motion import MotionSource
 from ..shots.reader import FLASH, Picture, ShotReader
 from ..shutter import Shutter
@@ -29,6 +29,10 @@ from .planes import Average, Planes, averages
 from .read.reader import VideoReader
 from .thumbnail import Thumbnail, is_cut, is_double
 
+Fallback = tuple[Blur, MotionSource]
+"""A blur of the pictures of which the source of motion loses too much, and its own source."""
+Views = Sequence[tuple[VideoFrames, Blur]]
+"""Pictures with their motion, and what blurs them: as usual, and where there is a fallback, its."""
 _BEFORE = 10  # pictures decoded before the first exposure, which its motion may depend on
 
 
@@ -37,7 +41,8 @@ class Exposures:
 
     `motion`: where motion comes from (wgmb/flow); None: pictures are averaged as they are.
     `holdout`: what stays sharp. `fill`: repeated pictures are left out, and motion
-    goes on over the gap. `cuts`: whether cuts are looked for, beside `known_cuts`, the numbers of
+    goes on over the gap. `fallback`: what blurs the pictures of which `motion` loses too much, and
+    its own source. `cuts`: whether cuts are looked for, beside `known_cuts`, the numbers of
     pictures that begin a shot. `planes`: make their light, which may be expanded for the blur.
     `flash`: how long a flash of several pictures lasts at most [s]. `tolerance`: by how much their
     times may be rounded [s]. InputError where the method takes two frames to either side.
@@ -49,6 +54,7 @@ class Exposures:
         motion: MotionSource | None,
         *,
         holdout: Holdout | None = None,
+        fallback: Fallback | None = None,
         fill: bool = False,
         cuts: bool = True,
         known_cuts: Collection[int] = (),
@@ -61,7 +67,8 @@ class Exposures:
         self.holdout = holdout or Holdout(displays=False)
         self._flash, self._tolerance = flash, tolerance
         self._blur, self._motion = blur, motion
-        self._sum, self._planes = ExposureSum(blur), planes or Planes(blur.device)
+        self._fallback = fallback
+        self._sum, self._planes = ExposureSum(blur.device), planes or Planes(blur.device)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
         self.shots: ShotReader[Thumbnail] | None = None
@@ -89,13 +96,20 @@ class Exposures:
             flash=self._flash,
             tolerance=self._tolerance,
         )
-        views = VideoFrames(shots, self._blur, self._motion, self.holdout, self._planes)
+        views = [self._frames(shots, self._blur, self._motion)]
+        if self._fallback is not None:
+            views.append(self._frames(shots, *self._fallback))
         for frame in wanted:
             cells = shots.cells(float(frame.time), float(frame.interval), shutter)
             yield frame, Exposure(self, shots, views, cells)
 
+    def _frames(
+        self, shots: ShotReader[Thumbnail], blur: Blur, motion: MotionSource | None
+    ) -> tuple[VideoFrames, Blur]:
+        return VideoFrames(shots, blur, motion, self.holdout, self._planes), blur
+
     def light(
-        self, shots: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell]
+        self, shots: ShotReader[Thumbnail], views: Views, cells: Sequence[Cell]
     ) -> wgpu.GPUTexture:
         """The exposure of these cells as linear light (rgba32float)."""
         light = self._light(shots, views, cells)
@@ -111,7 +125,7 @@ class Exposures:
     def coded(
         self,
         shots: ShotReader[Thumbnail],
-        views: VideoFrames,
+        views: Views,
         cells: Sequence[Cell],
         coding: Coding,
     ) -> CodedPicture:
@@ -125,10 +139,16 @@ class Exposures:
         return self._planes.encode(encoder, light.create_view(), coding)
 
     def _light(
-        self, shots: ShotReader[Thumbnail], views: VideoFrames, cells: Sequence[Cell]
+        self, shots: ShotReader[Thumbnail], views: Views, cells: Sequence[Cell]
     ) -> wgpu.GPUTexture:
         """The same as it is blurred: expanded."""
-        parts = ((cell, views.in_shot(cell.index)) for cell in cells)
+
+        def part(cell: Cell) -> Part:
+            loses = len(views) > 1 and views[0][0].loses(cell.index)
+            frames, blur = views[loses]
+            return cell, frames.in_shot(cell.index), blur
+
+        parts = map(part, cells)
         return self._sum.texture(shots[cells[0].index].content.coded.size, parts)
 
 
@@ -180,7 +200,7 @@ class Exposure:
 
     _run: Exposures
     _shots: ShotReader[Thumbnail]
-    _views: VideoFrames
+    _views: Views
     _cells: Sequence[Cell]
 
     def light(self) -> wgpu.GPUTexture:

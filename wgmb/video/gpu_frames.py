@@ -8,6 +8,7 @@ import wgpu
 from .. import gpu
 from ..exposure import evened
 from ..flow import Shot
+from ..flow.dis import DisShot
 from ..gpu.textures import TexturePool
 from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
@@ -60,6 +61,11 @@ class VideoFrames:
         near = (found.get(i) for i in (index - 1, index + 1))
         before, after = (one if one is not None and one.has_vectors else None for one in near)
         return FrameInShot(found[index], before, after, self._shots[index].number)
+
+    def loses(self, index: int) -> bool:
+        """True if the source tells that it loses too much of a picture, or of one beside it."""
+        shot = None if self._source is None else self._source.shot(index)
+        return isinstance(shot, DisShot) and shot.loses(index)
 
     def _frame(self, index: int) -> FrameViews:
         """The views of one picture."""

@@ -8,6 +8,7 @@ import wgpu
 
 from ..flow import Flow
 from ..gpu.textures import TexturePool
+from ..shots.better import BetterMatch, Both
 from ..shots.motion import MotionSource, ShotMotion
 from ..shots.reader import ShotReader
 from .planes import Planes
@@ -17,7 +18,8 @@ from .thumbnail import Thumbnail
 class VideoMotion(ShotMotion):
     """The motion of the pictures that a ShotReader keeps, by their indices there.
 
-    Flow takes them as textures of `device`, in light that is not expanded; others as grey.
+    Flow takes them as textures of `device`, in light that is not expanded; BetterMatch also as
+    grey, and others as grey alone.
     """
 
     def __init__(
@@ -29,8 +31,9 @@ class VideoMotion(ShotMotion):
     ):
         self._shots, self._planes = shots, Planes(device)
         self._images = TexturePool(device)
-        on_gpu = isinstance(source, Flow)
-        super().__init__(source, self._texture if on_gpu else self._grey, shots.moves_on, depth)
+        pictures = {Flow: self._texture, BetterMatch: self._both}
+        picture = pictures.get(type(source), self._grey)
+        super().__init__(source, picture, shots.moves_on, depth)
 
     def _texture(self, index: int) -> wgpu.GPUTexture:
         coded = self._shots[index].content.coded
@@ -41,3 +44,6 @@ class VideoMotion(ShotMotion):
 
     def _grey(self, index: int) -> Any:
         return self._shots[index].content.grey
+
+    def _both(self, index: int) -> Both:
+        return Both(self._grey(index), lambda: self._texture(index))

@@ -54,7 +54,7 @@ class VideoSubject:
         self.finding = "\n".join([f"motion: {self._maker.how}", *self._reader.notes])
         self._planes = Planes(device)
         self._frames = PictureFrames(self._reader, self._planes, self._maker.known)
-        self._sums: dict[int, ExposureSum] = {}
+        self._sum = ExposureSum(device)
         self._state = state
         self._exposed: VideoExposure | None = None
         self._lacking: list[int] = []
@@ -217,8 +217,8 @@ class VideoSubject:
         neighbours = "neighbours" in blur.method.uses
         found = self._exposure(self._state, shutter).cells
         try:
-            parts = ((cell, self._frames(cell.index, neighbours)) for cell in found)
-            self._sum(blur).draw(parts, light, timing)
+            parts = ((cell, self._frames(cell.index, neighbours), blur) for cell in found)
+            self._sum.draw(parts, light, timing)
         finally:
             blur.shutter = shutter
         if light is not target:
@@ -230,14 +230,6 @@ class VideoSubject:
         encoder = self._device.create_command_encoder(label="compress")
         self._planes.compress(encoder, light.create_view(), output.create_view())
         gpu.submit(self._device, encoder)
-
-    def _sum(self, blur: Blur) -> ExposureSum:
-        held = self._sums.get(id(blur))
-        if held is None or held.blur is not blur:
-            while len(self._sums) >= 4:
-                del self._sums[next(iter(self._sums))]
-            held = self._sums[id(blur)] = ExposureSum(blur)
-        return held
 
 
 def _near(number: int, reach: int, known: Knowledge) -> list[int]:

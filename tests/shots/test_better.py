@@ -1,0 +1,88 @@
+"""Motion of two sources, per pixel that which matches better; and which pictures need both."""
+
+import numpy as np
+import pytest
+
+import make_frames as make
+from wgmb.color.srgb import linear, to_display
+from wgmb.flow import Flow
+
+pytest.importorskip("cv2")
+
+from wgmb.flow.dis import Dis
+from wgmb.shots.better import AROUND, BetterMatch, Both, better
+
+
+def shifted(shift, height, width):
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    picture = make.texture((x - shift) / 3, y / 3)
+    return to_display(picture, 8)[..., 1]
+
+
+def found(dx, depth, height, width):
+    way = np.zeros((height, width, 4), np.float32)
+    way[..., 0], way[..., 2] = -dx, dx
+    return way, np.full((height, width), depth, np.float32)
+
+
+@pytest.mark.parametrize("height, width", [(90, 121), (203, 601), (100, 481)])
+@pytest.mark.parametrize("sides", [(-1, 1), (-1,), (1,)])
+def test_each_half_of_a_picture_follows_the_source_that_is_right_there(height, width, sides):
+    """The left half moves by 2 px, the right one by 6; each source has one motion throughout."""
+    near = [None, None, None]
+    for n in (0, *sides):
+        near[n + 1] = shifted(2 * n, height, width)
+        near[n + 1][:, width // 2 :] = shifted(6 * n, height, width)[:, width // 2 :]
+    motion, depth = better(near, found(2, 1.0, height, width), found(6, 0.5, height, width))
+    reach = 2 * AROUND  # at the border of the halves, both may be right
+    left, right = width // 2 - reach, width // 2 + reach
+    assert (motion[8:-8, 8:left, 2] == 2).mean() > 0.99 and (depth[:, 8:left] == 1).mean() > 0.99
+    assert (motion[8:-8, right:-8, 2] == 6).mean() > 0.99
+    assert ((motion[..., 2] == 6) == (depth == 0.5)).all()
+    np.testing.assert_array_equal(motion[..., 0], -motion[..., 2])
+
+
+def test_without_depth_there_is_none():
+    near = [shifted(2 * n, 64, 96) for n in (-1, 0, 1)]
+    one, other = found(2, 1.0, 64, 96), found(6, 0.5, 64, 96)
+    motion, depth = better(near, (one[0], None), other)
+    assert depth is None
+    np.testing.assert_array_equal(motion, one[0])
+
+
+def test_what_dense_inverse_search_loses_comes_from_the_search():
+    """A disc at 44 px a frame before squares that stand."""
+    shown = enumerate(make.disc_before_squares(5, 44))
+    pictures = {n: linear(np.repeat(grey[..., None] / np.float32(255), 3, 2)) for n, grey in shown}
+    quick, search = Dis("fast"), Flow(quality="draft")
+
+    def both(n):
+        light = pictures.get(n)
+        return None if light is None else Both(quick.grey(light), lambda: light)
+
+    motion, depth = BetterMatch(quick, search).shot(both)(2)
+    one = quick.shot(pictures.get)(2)
+    other = search.shot(pictures.get)(2)
+    is_searched = (motion == other[0]).all(axis=2)
+    assert ((motion == one[0]).all(axis=2) | is_searched).all()
+    np.testing.assert_array_equal(depth[is_searched], other[1][is_searched])
+    moved = np.abs(other[0][..., 2] - 44) < 1
+    assert moved.sum() > 100 and is_searched[moved].mean() > 0.8
+    assert (np.abs(one[0][..., 2] - 44) < 1)[moved].mean() < 0.5
+    assert BetterMatch(quick, search).shot(both)(9) is None
+
+
+@pytest.mark.parametrize("first", [0, 3, 7])
+def test_whether_a_picture_loses_something_depends_on_its_neighbours_alone(first):
+    """A disc is too fast for some pictures of a shot; they and those beside them count."""
+    pictures = {n: next(make.disc_before_squares(1, 1)) for n in range(12)}
+    fast = make.disc_before_squares(5, 45)
+    pictures |= dict(zip(range(4, 9), fast, strict=True))
+    whole = Dis().shot(pictures.get, depth=False)
+    told = {n: whole.loses(n) for n in range(12)}
+    assert told[6] and told[7] and not told[0] and not told[11]
+    part = Dis().shot(pictures.get, depth=False)
+    assert [part.loses(n) for n in range(first, 12)] == [told[n] for n in range(first, 12)]
+    alone = Dis().shot(pictures.get, depth=False)
+    np.testing.assert_array_equal(part(11)[0], alone(11)[0])
+    np.testing.assert_array_equal(part(10)[0], alone(10)[0])

@@ -1,0 +1,107 @@
+"""Motion of two sources: a search, where it matches better than dense inverse search."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..flow import Flow
+from ..flow.dis import Dis, Found
+
+LONGEST = 480  # px along the longer side at which matches are compared
+PATCH = 5  # px of these a side of a match
+AROUND = 9  # px of these a side over which matches are averaged
+
+
+class Both(NamedTuple):
+    """A picture as both sources take it: (height, width) uint8, and what gives its light,
+    as Flow takes it."""
+
+    grey: np.ndarray
+    light: Callable[[], Any]
+
+
+class BetterMatch:
+    """Motion and depth order from dense inverse search and from a search, whichever matches better.
+
+    A search that finds nothing leaves states without order, which are specks in a blurred picture;
+    there, dense inverse search is smooth.
+    """
+
+    def __init__(self, quick: Dis, search: Flow):
+        self._quick, self._search = quick, search
+
+    def shot(
+        self, load: Callable[[int], Both | None], depth: bool = True
+    ) -> Callable[[int], Found | None]:
+        """Motion (height, width, 4) [px] and depth of a shot's pictures, which `load` gives."""
+
+        def grey(number: int) -> np.ndarray | None:
+            both = load(number)
+            return None if both is None else both.grey
+
+        def light(number: int) -> Any:
+            both = load(number)
+            return None if both is None else both.light()
+
+        quick, search = self._quick.shot(grey, depth), self._search.shot(light)
+
+        def better_of(number: int) -> Found | None:
+            one, other = quick(number), search(number)
+            if one is None or other is None:
+                return None
+            near = [grey(n) for n in (number - 1, number, number + 1)]
+            return better(near, one, other)
+
+        return better_of
+
+
+def better(near: list[np.ndarray | None], one: Found, other: Found) -> Found:
+    """`other` where its match, averaged over some pixels, is better than that of `one`.
+
+    `near`: a picture between its neighbours, of which one may lack, (height, width) uint8.
+    """
+    cv2: Any = importlib.import_module("cv2")
+    here = near[1]
+    assert here is not None
+    height, width = here.shape
+    step = -(-max(here.shape) // LONGEST)
+    small = [None if g is None else _small(g, step).astype(np.float32) for g in near]
+    matches = []
+    for motion, _ in (one, other):
+        thin = motion[step // 2 :: step, step // 2 :: step] / np.float32(step)
+        matches.append(_match(small, np.ascontiguousarray(thin)))
+    gain = cv2.blur(matches[0] - matches[1], (AROUND, AROUND))
+    takes = np.repeat(np.repeat(gain > 0, step, axis=0), step, axis=1)
+    rows, columns = (n - m for n, m in zip((height, width), takes.shape, strict=True))
+    takes = np.pad(takes, ((0, max(rows, 0)), (0, max(columns, 0))), mode="edge")
+    takes = takes[:height, :width]
+    motion = np.where(takes[..., None], other[0], one[0])
+    if one[1] is None or other[1] is None:
+        return motion, None
+    return motion, np.where(takes, other[1], one[1])
+
+
+def _small(grey: np.ndarray, step: int) -> np.ndarray:
+    """The means around the pixels [step // 2 :: step] of a picture."""
+    cv2: Any = importlib.import_module("cv2")
+    return cv2.blur(grey, (step, step))[step // 2 :: step, step // 2 :: step]
+
+
+def _match(near: list[np.ndarray | None], motion: np.ndarray) -> np.ndarray:
+    """Mean difference of patches along a motion, to the neighbour that fits better."""
+    cv2: Any = importlib.import_module("cv2")
+    prev, here, next = near
+    assert here is not None
+    y, x = np.mgrid[: here.shape[0], : here.shape[1]].astype(np.float32)
+    found = []
+    for other, way in ((prev, motion[..., :2]), (next, motion[..., 2:])):
+        if other is not None:
+            at = x + way[..., 0], y + way[..., 1]
+            edge = cv2.BORDER_REPLICATE
+            moved = cv2.remap(other, *at, cv2.INTER_LINEAR, borderMode=edge)
+            found.append(cv2.blur(np.abs(moved - here), (PATCH, PATCH)))
+    return np.minimum.reduce(found)
