@@ -10,9 +10,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from standard_words import groups_of
-
 import parts
+from standard_words import groups_of
 from wgmb.gpu import kernels
 
 HERE = Path(__file__).parent / "dawn"

@@ -1,4 +1,4 @@
-// Kernels: a shader as tools/page_export.py exports it, compiled with its texel formats and constants.
+// Kernels: a shader as tools/page/page_export.py exports it, compiled with its texel formats and constants.
 
 /** The text of a shader with other texel formats, as `{Output: 'rgba16float'}`. */
 export function withTexels(text, texels) {

@@ -1,4 +1,4 @@
-// Repeats the passes that Python recorded (tools/page_recording.py): the scene once, then one choice of method,
+// Repeats the passes that Python recorded (tools/page/page_recording.py): the scene once, then one choice of method,
 // curve and samples. Nothing is computed here; the caller fills the buffers of group 0, which the shutter changes.
 import { bindGroups, makeKernel } from './gpu.js';
 

@@ -1,10 +1,10 @@
 // What Python computes for a frame before the GPU begins, again in JavaScript: pure functions that give the bytes
 // of buffers. Numbers are doubles until they are stored, as in Python; tests/test_page_uniforms.py compares the bytes.
-// Struct offsets, workgroups and constants come from tools/page_export.py; names are those of the Python modules.
+// Struct offsets, workgroups and constants come from tools/page/page_export.py; names are those of the Python modules.
 
 let shaders, K;     // of the export: its shaders, its constants
 
-/// Takes what tools/page_export.py exports; call it before anything else.
+/// Takes what tools/page/page_export.py exports; call it before anything else.
 export function setExport(exported) {
   shaders = exported.shaders;
   K = exported.constants;

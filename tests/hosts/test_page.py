@@ -313,7 +313,7 @@ def test_the_committed_page_is_made_of_this_tree(page):
         return text.replace(packed, ""), json.loads(data)
 
     committed = make_page.OUTPUT.read_text("utf-8")
-    again = "python tools/make_page.py makes docs/page.html anew"
+    again = "python tools/page/make_page.py makes docs/page.html anew"
     assert parts(committed) == parts(page.read_text("utf-8")), again
 
 

@@ -136,7 +136,7 @@ def test_what_is_not_of_the_core_has_an_extra():
 
 @pytest.mark.parametrize(
     "folder",
-    sorted({file.parent for file in [*FILES, *KERNELS]}),
+    sorted({file.parent for file in [*FILES, *KERNELS, *(ROOT / "tools").rglob("*.py")]}),
     ids=lambda folder: str(folder.relative_to(ROOT)),
 )
 def test_a_folder_can_be_looked_over(folder):

@@ -1,6 +1,6 @@
 """Export to JSON what the page takes from Python: shaders with their layouts, and constants.
 
-    python tools/page_export.py [SHADER ...] > exported.json
+    python tools/page/page_export.py [SHADER ...] > exported.json
 
 Nothing of it is written down a second time: the shaders are those of wgsl/, joined with what they
 include, and the constants are those of the modules that use them.
@@ -14,8 +14,8 @@ import re
 from typing import Any
 
 import numpy as np
-from standard_words import groups_of
 
+from standard_words import groups_of
 from wgmb import shutter
 from wgmb.errors import ShaderError
 from wgmb.gpu import wgsl

@@ -1,6 +1,6 @@
 """Record the passes of a method as JSON, for docs/page/replay.js to run in a browser.
 
-    python tools/page_recording.py > recordings.json
+    python tools/page/page_recording.py > recordings.json
 
 A built-in scene is rendered and blurred once with every choice of the page, on a device with
 what WebGPU guarantees and no feature; every dispatch is written down with its kernel, its

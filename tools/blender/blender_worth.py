@@ -1,6 +1,6 @@
 """Quality and time of sharp frames with a blur against the path tracer's own blur.
 
-PYTHONPATH=.:blender:tests/blender python tools/blender_worth.py FOLDER [--shaded]
+PYTHONPATH=.:blender:tests/blender python tools/blender/blender_worth.py FOLDER [--shaded]
 
 Runs in the environment of tests/blender (`./run test all` makes it). The scene is
 the tests' crossing, 480 x 270, with a centred shutter of 180 degrees: emission only, or `--shaded`:

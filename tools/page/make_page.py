@@ -1,6 +1,6 @@
 """Make docs/page.html: one file that draws live in a browser, without a request to any network.
 
-    python tools/make_page.py [--media] [OUTPUT]
+    python tools/page/make_page.py [--media] [OUTPUT]
 
 The parts are in docs/page/; shaders, constants and recorded passes come from Python. The same
 parts give the same bytes. `--media` first renders docs/page/media/ anew: the video and the images
@@ -21,7 +21,7 @@ from typing import Any
 import page_export
 import page_recording
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PARTS = ROOT / "docs" / "page"
 MEDIA = PARTS / "media"
 OUTPUT = ROOT / "docs" / "page.html"

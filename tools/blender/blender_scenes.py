@@ -1,4 +1,6 @@
-"""Scenes with a path tracer's own motion blur: python tools/blender_scenes.py FOLDER [SCENE ...]
+"""Scenes with a path tracer's own motion blur.
+
+    python tools/blender/blender_scenes.py FOLDER [SCENE ...]
 
 A scene is one of this file's, of light_scenes.py or of hard_scenes.py, or an animated glTF file,
 FILE.glb or FILE.glb:ANIMATION (else its first): its cycle is played SPEED times as fast as the

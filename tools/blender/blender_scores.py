@@ -1,8 +1,10 @@
-"""Score the methods on Blender's scenes: python tools/blender_scores.py [--hard] FOLDER/SCENE ...
+"""Score the methods on Blender's scenes.
 
-Folders as tools/blender_scenes.py makes them. Writes docs/laboratory/blender-scores.md, or with
---hard (scenes of light_scenes.py and hard_scenes.py) docs/laboratory/hard-scenes.md, and a picture
-per scene.
+    python tools/blender/blender_scores.py [--hard] FOLDER/SCENE ...
+
+Folders as blender_scenes.py makes them. Writes docs/laboratory/blender-scores.md, or with --hard
+(scenes of light_scenes.py and hard_scenes.py) docs/laboratory/hard-scenes.md, and a picture per
+scene.
 """
 
 import json
@@ -23,7 +25,7 @@ from wgmb import (
 from wgmb.io import exr
 from wgmb.lab.results import machine
 
-DOCS = Path(__file__).parent.parent / "docs"
+DOCS = Path(__file__).parents[2] / "docs"
 SHUTTERS = {"050": 180, "100": 360}
 METHODS = (("tap", 16), ("tiles", 35), ("reproject", 16), ("gather", 16), ("gather", 64))
 STILL, FRAMES = "gather 16, shading off", "gather 16, shading frames"
@@ -118,9 +120,9 @@ def page(device, table: str, sections: list[str]) -> str:
         "* Paths that bend more than five positions can describe (the far cloth of flag turns by "
         "75° per frame).\n"
         "\n## Make your own\n\n"
-        "```sh\npython tools/blender_scenes.py FOLDER\n"
-        "python tools/blender_scenes.py FOLDER FILE.glb\n"
-        "python tools/blender_scores.py FOLDER/*\n```\n\n"
+        "```sh\npython tools/blender/blender_scenes.py FOLDER\n"
+        "python tools/blender/blender_scenes.py FOLDER FILE.glb\n"
+        "python tools/blender/blender_scores.py FOLDER/*\n```\n\n"
         "The first two render the scenes above, and a scene of an animated glTF file. They need a "
         "separate environment (Python 3.11, `pip install bpy==4.5.15 OpenEXR`). The third "
         "writes this page.\n\n"
@@ -177,9 +179,10 @@ def hard_page(device, table: str, sections: list[str]) -> str:
         + table
         + HARD_NOTES
         + "\n## Make your own\n\n"
-        "```sh\npython tools/blender_scenes.py FOLDER shadows shadows_pan reflections slant\n"
-        "python tools/blender_scenes.py FOLDER grass glass swarm car fireworks\n"
-        "python tools/blender_scores.py --hard FOLDER/*\n```\n\n"
+        "```sh\n"
+        "python tools/blender/blender_scenes.py FOLDER shadows shadows_pan reflections slant\n"
+        "python tools/blender/blender_scenes.py FOLDER grass glass swarm car fireworks\n"
+        "python tools/blender/blender_scores.py --hard FOLDER/*\n```\n\n"
         "In the pictures below, at 360°: the truth and gather with 16 samples; below them, "
         f"{metrics.FLIP_GAIN:g} times FLIP of gather with `--shading off` and of gather.\n\n"
         + "\n".join(sections)
