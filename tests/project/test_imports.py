@@ -14,7 +14,7 @@ pytestmark = pytest.mark.fast
 ROOT = Path(__file__).parents[2]
 PACKAGE, SHADERS = ROOT / "wgmb", ROOT / "wgsl"
 
-# A room imports only from the rooms of lines above its own, and from itself.
+# A folder, or a module beside it, imports only from the lines above its own, and from itself.
 LAYERS = [
     {"_version", "errors", "threads", "requirements"},
     {"extras", "charts", "gpu"},
@@ -33,7 +33,7 @@ LAYERS = [
     {"cli"},  # may start the viewer
     {"__init__", "__main__"},
 ]
-PLACE = {room: number for number, layer in enumerate(LAYERS) for room in layer}
+PLACE = {name: number for number, layer in enumerate(LAYERS) for name in layer}
 MOST_FILES = 20  # of a folder
 HOMES = {
     "wgpu": set(PLACE) - {"io", "color", "sequence", "shots", "output", "cli"},
@@ -66,7 +66,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 KERNELS = sorted(SHADERS.rglob("*.wgsl"))
 
 
-def room_of(file: Path) -> str:
+def place_of(file: Path) -> str:
     first = file.relative_to(PACKAGE).parts[0]
     return first.removesuffix(".py")
 
@@ -87,15 +87,15 @@ def imported(file: Path, home: Path = PACKAGE):
 
 @pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(PACKAGE)))
 def test_imports_point_upwards_in_the_table_and_third_parties_stay_at_home(file):
-    room = room_of(file)
-    assert room in PLACE, f"{room} is in no layer: say where it belongs"
+    folder = place_of(file)
+    assert folder in PLACE, f"{folder} is in no layer: say where it belongs"
     for module in imported(file):
         if module[0] == "wgmb":
             other = module[1] if module[1] in PLACE else "__init__"
-            ok = room == other or PLACE[other] < PLACE[room] or room == "__main__"
-            assert ok, f"{room} imports {'.'.join(module)}"
+            ok = folder == other or PLACE[other] < PLACE[folder] or folder == "__main__"
+            assert ok, f"{folder} imports {'.'.join(module)}"
         elif module[0] in HOMES:
-            assert room in HOMES[module[0]], f"{room} imports {module[0]}"
+            assert folder in HOMES[module[0]], f"{folder} imports {module[0]}"
 
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -157,8 +157,8 @@ def test_threads_start_in_one_module():
     assert holders - {"threads"} == LOCKS
 
 
-def test_no_room_stands_empty():
-    assert {room_of(file) for file in FILES} == set(PLACE)
+def test_no_folder_stands_empty():
+    assert {place_of(file) for file in FILES} == set(PLACE)
 
 
 @pytest.mark.parametrize("file", KERNELS, ids=lambda f: str(f.relative_to(SHADERS)))
@@ -184,13 +184,13 @@ def test_shaders_lie_where_their_python_does(file):
     if own.parts[0] != "common":
         stem = PACKAGE / own.parent / own.stem
         begun = PACKAGE / own.parent / own.stem.split("_")[0]
-        room = PACKAGE / own.parent
-        names = [stem, begun] if room == PACKAGE else [stem, begun, room]
-        places = [room, *(name.with_suffix(".py") for name in names)]
+        folder = PACKAGE / own.parent
+        names = [stem, begun] if folder == PACKAGE else [stem, begun, folder]
+        places = [folder, *(name.with_suffix(".py") for name in names)]
         assert any(p.exists() and p != PACKAGE for p in places)
 
 
-def test_the_page_on_architecture_lists_every_room():
+def test_the_page_on_architecture_lists_every_folder():
     page = (ROOT / "docs/development/architecture.md").read_text("utf-8")
     rows = re.findall(r"^\| ([^|]*`[^|]*) \|", page.split("## Declarations")[0], re.M)
     listed = [name.rstrip("/") for row in rows for name in re.findall(r"`(\w+/?)`", row)]
