@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from fine_scenes import soft_disk
 
 import wgmb
 from images import blades, body, camera, crossing
@@ -232,6 +233,16 @@ def test_gather_is_its_twin_where_surfaces_hardly_move_apart():
     )
     assert 0 == none < thin < every
     assert differing_from_gather(sources, 100) < 0.01
+
+
+def test_gather_is_its_twin_out_of_focus():
+    """A wide rim, over which motions change evenly, has no edge in it while it moves slowly."""
+    sources = [(offset, *soft_disk(offset, size=(24, 72))) for offset in (0, -1, 1)]
+    slowly, quickly = (
+        (gather_twin.separate(*sources[0], longest).depth[1] > 0).any() for longest in (0.1, 0.3)
+    )
+    assert quickly and not slowly
+    assert differing_from_gather(sources, 72) < 0.01
 
 
 @pytest.mark.full

@@ -112,6 +112,7 @@ def separate(offset, color, motion, depth, longest, prev=None, next=None, far=()
             apart = np.sqrt(max(np.sum((motion[p] - motion[y, x]) ** 2) for p in near))
             beyond = (1.05**2 - 1) * min(1, max(0.1, 4 / max(apart, 1e-6)))
             edges[y, x] = apart > 0.5 and max(depths) > (1 + beyond) * min(depths)
+            edges[y, x] &= apart * longest >= 0.6 or not is_ramp(motion, (y, x))
             k = 1.05**2
             shows_third[y, x] = edges[y, x] and any(
                 min(depths) * k < d < max(depths) / k for d in depths
@@ -147,6 +148,18 @@ def separate(offset, color, motion, depth, longest, prev=None, next=None, far=()
     return Layers(offset, [found[0], back[0]], paths, depths, found[3], inferred,
                   separated & told_by_color, edgeless, smooth,
                   ~separated, trajectories(own), z * ratios)  # fmt: skip
+
+
+def is_ramp(motion, at):
+    """True if motions change by 0.6 as much in the two pixels before, and after, as beside it."""
+    height, width = motion.shape[:2]
+    for way in ((0, 1), (1, 0)):
+        places = (np.array(at) + k * np.array(way) for k in (-3, -1, 1, 3))
+        m = [motion[tuple(np.clip(p, 0, (height - 1, width - 1)))] for p in places]
+        before, change, after = np.diff(m, axis=0)
+        if change @ change > 0.25 and min(before @ change, after @ change) > 0.6 * change @ change:
+            return True
+    return False
 
 
 def is_wide(z, at, near):
@@ -567,6 +580,8 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
     def search_layer(f, back, seed, first):
         """One search; where it led, and whether something is there."""
         frame, u = layers[f], t - layers[f].offset
+        if seed is None:  # along the path of the pixel's place; behind it too
+            seed = moved(frame.trajectory[int(back and f > 0)][y, x], u)
         d, residual, pixel = iterate_fixed_point(
             frame.trajectory[int(back)], centre, seed, u, first
         )
@@ -637,9 +652,9 @@ def is_hidden(own, frame, found):
 
 
 def iterate_fixed_point(paths, centre, seed, u, first):
-    """Fixed point of d = displacement(centre - d): d, the last step, pixel; None: from 0."""
+    """Fixed point of d = displacement(centre - d) from a seed on: d, the last step, pixel."""
     height, width = paths.shape[:2]
-    d, steps = (np.zeros(2), 7) if seed is None else (seed, 4)
+    d, steps = seed, 6 if first is None else 4
     residual, pixel, before = np.inf, None, 0j
     if first is not None and (np.abs(d - first[0]) < 0.75).all():
         return d, residual, pixel
@@ -656,8 +671,6 @@ def iterate_fixed_point(paths, centre, seed, u, first):
             break
         if first is not None and (np.abs(d - first[0]) < 0.75).all():
             break
-        if seed is None and n == 0:  # to the pixel's own path, from which the search starts
-            continue
         if (
             n < steps - 1
             and 0.5 < abs(way) / max(abs(before), 1e-6) < 2.2

@@ -19,7 +19,9 @@ const LEAST_SHARE: f32 = 0.1;
 const FAST: f32 = 2.0;          // difference of the motions at an edge that tells whether vectors are filtered [px],
 const MIXED: f32 = 0.2;         // where they differ by more than this share of it on the same side of the edge
 const SLOW_MOTION: f32 = 1.0;   // how far surfaces move apart, at most, that hardly do while the shutter is open, by both vectors [px];
-const WIDE_MOTION: f32 = 8.0;   // the same of a wide front: its rim is a small part of it
+const WIDE_MOTION: f32 = 8.0;   // the same of a wide front's own pixels, as a rule: beside it, the 5 x 5 show less of it;
+const RAMP_MOTION: f32 = 0.6;   // the same of what is no edge if motions change as much around it:
+const RAMP_SHARE: f32 = 0.6;    // by more than this share
 const WHOLE_SQUARES: u32 = 0x1ce7u; // of the 5 x 5 bits, the first three of the first three rows: 3 x 3 that begin there end within
 
 /// First pass: a pixel is at an edge if depths differ in its 3 x 3, and motions from its own too. The more motions differ,
@@ -53,7 +55,10 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
     }
     let difference2 = max(same2, other2);
     let share = clamp(APART_MOTION * inverseSqrt(max(difference2, 1e-12)), LEAST_SHARE, 1.0);
-    let is_there = difference2 > EDGE_MOTION * EDGE_MOTION && beyond > share * apart;
+    let longest = max_abs_time(0.0);
+    let apart2 = difference2 * longest * longest;
+    let may_be = difference2 > EDGE_MOTION * EDGE_MOTION && beyond > share * apart;
+    let is_there = may_be && !is_ramp(px, may_be && apart2 < RAMP_MOTION * RAMP_MOTION);
     if is_there {
         let low = nearest + apart;
         let high = farthest / (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO);
@@ -64,11 +69,26 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
             if same2 > MIXED * MIXED * other2 { count_edge(px, MIXED_EDGE); }
         }
     }
-    let longest = max_abs_time(0.0);
-    let apart2 = difference2 * longest * longest;
     let wide = is_wide(px, between, is_there && apart2 < WIDE_MOTION * WIDE_MOTION);
     let is_slow = wide || apart2 < SLOW_MOTION * SLOW_MOTION;
     textureStore(edge_flags_out, px, vec4u(flag_depth(here.y, is_there, is_slow)));
+}
+
+/// True if motions change before and after a pixel, across or down, as they do beside it: in the rim of a body out of focus, over
+/// which renderers average them. Not looked for unless `wanted`.
+fn is_ramp(px: vec2i, wanted: bool) -> bool {
+    var result = false;
+    for (var i = 0; i < select(0, 2, wanted); i++) {
+        let along = vec2i(1 - i, i);
+        let low = textureLoad(motion, clamped(px - along), 0);
+        let high = textureLoad(motion, clamped(px + along), 0);
+        let change = high - low;
+        let change2 = dot(change, change);
+        let before = dot(low - textureLoad(motion, clamped(px - 3 * along), 0), change);
+        let after = dot(textureLoad(motion, clamped(px + 3 * along), 0) - high, change);
+        result = result || (change2 > EDGE_MOTION * EDGE_MOTION && min(before, after) > RAMP_SHARE * change2);
+    }
+    return result;
 }
 
 /// True if, in the 5 x 5 around an edge, some 3 x 3 pixels are all in front; not looked for unless `wanted`.
