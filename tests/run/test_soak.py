@@ -64,6 +64,16 @@ def test_the_viewer_bears_whatever_is_done_to_it(tmp_path):
     assert ended.value[1] >= 10
 
 
+@pytest.mark.parametrize(("growth", "ok"), [(0.0, True), (0.5, True), (3.0, False)])
+def test_growth_is_told_from_what_comes_and_goes(growth, ok):
+    seconds = np.arange(0, 3600, 5.0)
+    opened = 60 * (seconds // 45 % 3) + 300 * (1 - np.exp(-seconds / 150))
+    looks = np.stack([seconds, 500 + opened + growth * seconds / 60], axis=1)
+    rate, error, *_ = viewing._slope(looks)
+    assert (rate - 2 * error <= viewing._MOST_USED) == ok
+    assert abs(rate - growth) <= max(3 * error, 0.2)
+
+
 @pytest.mark.full
 def test_files_that_were_cut_off_are_refused(tmp_path):
     check(damage.truncations, 15, tmp_path)

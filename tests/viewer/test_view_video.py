@@ -1,7 +1,9 @@
 """The viewer shows videos: pictures at once, their blur as soon as their motion is known."""
 
+import gc
 import os
 import time
+import weakref
 from dataclasses import replace
 from fractions import Fraction
 from itertools import count
@@ -61,6 +63,31 @@ def clip(tmp_path_factory):
 def flash(tmp_path_factory):
     """The same with a white picture 5."""
     return passing(tmp_path_factory.mktemp("flash") / "a.mp4", white=5)
+
+
+@pytest.mark.parametrize("flow", ["dis", "search"])
+def test_pictures_are_let_go_of_at_once_after_a_seek_and_at_the_end(flow, tmp_path):
+    pictures = [clips.frame(clips.planes(n % 12), "yuv420p") for n in range(120)]
+    reader = VideoReader(clips.write(tmp_path / "long.mp4", pictures))
+    source, _ = FlowSettings(flow=flow).source(gpu.open_device())
+    gc.collect()
+    gc.disable()
+    try:
+        find = PictureFinder(reader, gpu.open_device(), source, MotionRequest())
+        seen = []
+        for number in (1, 100):  # the second one is far away
+            find(number)
+            shots = find._shots
+            seen += [weakref.ref(shots[i].content) for i in shots.kept]
+            del shots
+        early = [ref() is None for ref in seen[:2]]
+        find.close()
+        assert all(early) and all(ref() is None for ref in seen)
+        gone = weakref.ref(find)
+        del find
+        assert gone() is None
+    finally:
+        gc.enable()
 
 
 def passing(path, white=None, repeats=(), times=None):

@@ -55,5 +55,9 @@ class ShotMotion:
         """Motion (height, width, 4) [px] and depth of a frame; None where it is alone."""
         return self.shot(number)(number)
 
+    def close(self) -> None:
+        """Let go of the shot: it refers back to this, and holds pictures."""
+        self._shot = None
+
     def _load(self, number: int) -> Any:
         return self._picture(number) if self._moves_on(self._number, number) else None

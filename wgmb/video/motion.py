@@ -29,21 +29,31 @@ class VideoMotion(ShotMotion):
         device: wgpu.GPUDevice,
         depth: bool = True,
     ):
-        self._shots, self._planes = shots, Planes(device)
-        self._images = TexturePool(device)
-        pictures = {Flow: self._texture, BetterMatch: self._both}
-        picture = pictures.get(type(source), self._grey)
+        searched = _Searched(shots, device)
+        pictures = {Flow: searched.texture, BetterMatch: searched.both}
+        picture = pictures.get(type(source), searched.grey)
         super().__init__(source, picture, shots.moves_on, depth)
 
-    def _texture(self, index: int) -> wgpu.GPUTexture:
+
+class _Searched:
+    """Pictures that a ShotReader keeps, as they are searched."""
+
+    def __init__(self, shots: ShotReader[Thumbnail], device: wgpu.GPUDevice):
+        self._shots, self._planes = shots, Planes(device)
+        self._images = TexturePool(device)
+
+    def texture(self, index: int) -> wgpu.GPUTexture:
+        """A picture's light, in the texture of the one before."""
         coded = self._shots[index].content.coded
         texel = self._planes.texel(coded.coding)
         texture = self._images.texture("searched", coded.size, texel)
         self._planes.draw(coded, texture)
         return texture
 
-    def _grey(self, index: int) -> Any:
+    def grey(self, index: int) -> Any:
+        """A picture's display values."""
         return self._shots[index].content.grey
 
-    def _both(self, index: int) -> Both:
-        return Both(self._grey(index), lambda: self._texture(index))
+    def both(self, index: int) -> Both:
+        """The grey picture at once, its texture when it is asked for."""
+        return Both(self.grey(index), lambda: self.texture(index))

@@ -20,8 +20,8 @@ from .adaptive import QUICK, Pace
 from .portions import DroppedError
 
 REFERENCE_SAMPLES = 1024
-_KEPT = 12  # Blurs at most
-_MEMORY = 2 << 30  # bytes of them all, if that is more than the last two take
+_KEPT = 6  # Blurs at most: of two images the quick one, the full one and its confidence
+_MEMORY = 1 << 30  # bytes of them all, if that is more than the last two take
 _PIXEL = 240  # bytes that the largest, `gather`, takes for a pixel
 
 

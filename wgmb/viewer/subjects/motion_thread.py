@@ -10,6 +10,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import wgpu
@@ -82,12 +83,12 @@ class MotionThread:
     def _work(self, device: wgpu.GPUDevice, motion: MotionSource | None) -> None:
         try:
             reader = VideoReader(self._path, max_mb=self._max_mb)
-            find = PictureFinder(reader, device, motion, self._request)
-            for number in self._to_do():
-                known = find(number)
-                with self._lock:
-                    self._making = None
-                    self._keep(number, known)
+            with closing(PictureFinder(reader, device, motion, self._request)) as find:
+                for number in self._to_do():
+                    known = find(number)
+                    with self._lock:
+                        self._making = None
+                        self._keep(number, known)
         except (Error, OSError, MemoryError, wgpu.GPUError) as error:
             self.problem = " ".join(str(error).split()) or "not enough memory"
         finally:

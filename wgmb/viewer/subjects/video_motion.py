@@ -109,6 +109,12 @@ class PictureFinder:
             holdout=None if found is None or not self._held else self._held(here),
         )
 
+    def close(self) -> None:
+        """Let go of the pictures: what reads them refers back to this, and they are large."""
+        if self._motion is not None:
+            self._motion.close()
+        self._shots = self._motion = self._held = None
+
     def _shots_around(self, number: int) -> ShotReader[Thumbnail]:
         """A ShotReader that knows all around a picture: another one where the last is far away."""
         shots = self._shots
@@ -119,6 +125,7 @@ class PictureFinder:
             behind = sum(shots[i].number < number for i in kept)
             if number <= last + _NEAR and (at_start or behind >= _BEFORE):
                 return shots
+        self.close()
         first = max(number - _BEFORE - _EARLIER, 0)
         self._shots = shots = ShotReader(
             self._pictures(first),
