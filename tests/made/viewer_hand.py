@@ -54,8 +54,12 @@ class Hand:
         self.viewer.canvas.submit_event({"event_type": kind, "modifiers": (), **event})
 
     def look(self, seconds=0.02):
+        """The window's next frame; of frames being opened, after the test of their vectors."""
         self.now += seconds
-        return frame(self.viewer)[..., :3].astype(np.int16)
+        image = frame(self.viewer)
+        while self.viewer.stage.report.waiting == "sharp: testing the vectors":
+            image = frame(self.viewer)
+        return image[..., :3].astype(np.int16)
 
     def look_until(self, done):
         for _ in range(400):

@@ -3,13 +3,16 @@
 import threading
 import time
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import make_clips as clips
-from viewer_hand import ALONE, SMALL, put
+from viewer_hand import ALONE, SAMPLE, SMALL, put
 from wgmb import InputError, gpu
+from wgmb.io import exr
+from wgmb.sequence.layers.vector_convention import ConventionFinder
 from wgmb.viewer import offscreen
 from wgmb.viewer.draw.composer import NOTHING
 from wgmb.viewer.draw.portions import DroppedError, Portions
@@ -106,6 +109,28 @@ def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
     assert seen[-1] == ("", SMALL, False)
     widths = [size[0] for _, size, _ in seen]
     assert widths == sorted(widths)  # it never jumps back
+
+
+def test_frames_are_first_shown_as_they_are_before_their_vectors_are_tested(monkeypatch):
+    tested, finding = [], ConventionFinder.finding
+    watched = property(lambda self: tested.append(self) or finding.__get__(self))
+    monkeypatch.setattr(ConventionFinder, "finding", watched)
+    renderer = Renderer(gpu.open_device())
+    state = put(ALONE.opened(SAMPLE), method="gather", samples=4, shading="off")
+    first = renderer.draw(Request(state, AREA), 0.0)
+    assert not tested and first.state == state == first.corrected(state)
+    assert first.report.waiting == "sharp: testing the vectors" and first.report.busy
+    file = exr.read(Path(SAMPLE.replace("####", f"{int(state.frame):04d}"))).parts[0]
+    sharp = renderer.download()
+    for i, channel in enumerate("RGB"):
+        plane = next(v for k, v in file.channels.items() if k.rpartition(".")[2] == channel)
+        np.testing.assert_array_equal(sharp[..., i], plane.astype(np.float32))
+    second = renderer.draw(Request(state, AREA), 1.0)
+    assert tested and "vectors: " in second.available.finding and not second.report.waiting
+    for now in range(2, 9):
+        report = renderer.draw(Request(state, AREA), float(now)).report
+    assert not report.busy and report.preview == ""
+    np.testing.assert_array_equal(renderer.download(), whole(state))
 
 
 def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import replace
 
+import numpy as np
 import wgpu
 
 from ..methods import METHODS
@@ -32,14 +33,14 @@ class Choices:
         self._device, self.displayed = device, DisplayCache(device)
         self._scene: SceneSubject | None = None
         self._clips: OrderedDict[tuple, ClipSubject | VideoSubject] = OrderedDict()
+        self._coming: tuple[tuple, ClipSubject] | None = None  # seen, but its vectors unknown
 
     def subject(self, state: State) -> Subject:
         """The scene or the frames that the state is about."""
         if state.is_scene:
             self._scene = self._scene or SceneSubject(self._device)
             return self._scene
-        masks = state.blur.holdout, state.blur.scale
-        key = (state.source, state.input, masks, state.read_as, _motion_of(state))
+        key = _key(state)
         if key not in self._clips:
             made = self._opened(state)
             self._forget(1 if state.kept else 0)  # B may find the motion in another way
@@ -47,10 +48,30 @@ class Choices:
         self._clips.move_to_end(key)
         return self._clips[key]
 
+    def first_light(self, state: State) -> np.ndarray | None:
+        """The picture alone of frames that are opened now, once; None of all else.
+
+        (height, width, 4), as the file has it. It need not wait for what their vectors mean.
+        """
+        if state.is_scene or state.is_video or state.mode in BOTH_EYES:
+            return None
+        key, display = _key(state), self.displayed.display(state)
+        if display is not None or key in self._clips or (self._coming and self._coming[0] == key):
+            return None
+        clip = ClipSubject(self._device, state, display)
+        self._coming = key, clip
+        return clip.light()
+
     def _opened(self, state: State) -> ClipSubject | VideoSubject:
         if state.is_video:
             return VideoSubject(self._device, state)
-        return ClipSubject(self._device, state, self.displayed.display(state))
+        coming, self._coming = self._coming, None
+        if coming is not None and coming[0] == _key(state):
+            clip = coming[1]
+        else:
+            clip = ClipSubject(self._device, state, self.displayed.display(state))
+        assert clip.finding  # what cannot be read is not opened
+        return clip
 
     def _forget(self, left: int) -> None:
         """Let go of all but the last of what was shown before."""
@@ -140,6 +161,12 @@ class Choices:
         if state.against not in (rivals := self.rivals(state)):
             state = replace(state, against=rivals[0])
         return state
+
+
+def _key(state: State) -> tuple:
+    """Settings with which files are opened."""
+    masks = state.blur.holdout, state.blur.scale
+    return state.source, state.input, masks, state.read_as, _motion_of(state)
 
 
 def _motion_of(state: State) -> tuple:

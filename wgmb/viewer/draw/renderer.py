@@ -77,6 +77,9 @@ class Renderer:
     def draw(self, request: Request, now: float) -> Drawn:
         """Go on with what is requested, `now` [s]; InputError if it cannot be shown."""
         choices = self.choices
+        light = None if request.full else choices.first_light(request.state)
+        if light is not None:
+            return self._as_it_is(request, light)
         state = choices.possible(request.state)
         report = self.update(state, request.area, now, request.moving, request.full)
         available = Available(
@@ -95,6 +98,25 @@ class Renderer:
             under = self._inspected(state, available.looks, self._slots["first"], report)
         images = self._on_screen
         return Drawn(request, state, report, available, images, under, self.chromaticities)
+
+    def _as_it_is(self, request: Request, light: np.ndarray) -> Drawn:
+        """Frames that were just opened: the sharp picture, before all else is known of them."""
+        state, choices, started = request.state, self.choices, time.perf_counter()
+        size, name = (light.shape[1], light.shape[0]), "first 1"
+        self._images.upload(name, light, "rgba32float")
+        slot = Slot("sharp", ("as it is", state.picture), (size,), name, done=1)
+        slot.texture = self._images.texture(name, size, "rgba32float")
+        self._slots["first"] = slot
+        self._on_screen, self.chromaticities = {"first": slot.image}, {}
+        report = FrameStatus(size, size, fit(size, request.area, state), request.area, size=size)
+        report.labels, report.waiting = ("sharp", "sharp"), "sharp: testing the vectors"
+        report.busy = report.changed = True
+        report.seconds["draw"] = time.perf_counter() - started
+        self.report = report
+        available = Available(
+            [state.method], [state.look], [], [state.against], choices.options(state.method)
+        )
+        return Drawn(request, state, report, available, self._on_screen)
 
     def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> FrameStatus:
         """Go on with what `state` shows in `area` [px] of the canvas, `now` [s].
@@ -334,6 +356,8 @@ class Renderer:
         known: list[tuple],
     ) -> None:
         size, antialias = coming.fine[:2]
+        # What is quick is not dropped, and the next pass is recorded while one is computed.
+        timing = None if quick and self._is_slow else self._timing
         volumes = state.is_scene and "volume" in self.choices.methods(state)
         if name in _PASSES and not (name == "sharp" and volumes):
             passes = subject.passes()
@@ -352,13 +376,13 @@ class Renderer:
             by = view, blur, antialias
             with self._blurs.kept_if_done(blur):
                 coming.done = self._perceived[slot].draw(
-                    coming.texture, state, eye, subject, *by, seconds, self._timing, known
+                    coming.texture, state, eye, subject, *by, seconds, timing, known
                 )
             return
         budget = coming.done, float("inf") if quick else seconds
         coming.total = blur.samples
         with self._blurs.kept_if_done(blur):
-            coming.done = subject.draw(blur, coming.texture, budget, self._timing)
+            coming.done = subject.draw(blur, coming.texture, budget, timing)
 
     def _label(self, name: str, state: State) -> str:
         if name == "result":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import fields, replace
+from functools import cached_property
 
 import numpy as np
 import wgpu
@@ -110,7 +111,10 @@ class SceneSubject:
 
 
 class ClipSubject:
-    """Frames on disk: their own size, their own moments, the methods they have passes for."""
+    """Frames on disk: their own size, their own moments, the methods they have passes for.
+
+    `finding`: what their vectors mean; to find that out takes longer than to read a frame.
+    """
 
     def __init__(self, device: wgpu.GPUDevice, state: State, display: Display | None):
         self._device, self._images = device, TexturePool(device)
@@ -122,10 +126,25 @@ class ClipSubject:
         self._sharp = Blur("tap", device=device)
         self._uploaders: dict[tuple, Blur] = {}
         self._uploaded: dict[tuple, tuple[_Which | None, dict]] = {}
-        self.finding = f"vectors: {self._clip.finding}"
         self._now = self._which(state)
-        if "motion" not in self.has(state):
-            self.finding += "; shown sharp, `wgmb blur` finds the motion in such frames"
+
+    @cached_property
+    def finding(self) -> str:
+        """The convention of the vectors, in words."""
+        found = f"vectors: {self._clip.finding}"
+        if "motion" in self._frame(self._now).has:
+            return found
+        return f"{found}; shown sharp, `wgmb blur` finds the motion in such frames"
+
+    def light(self) -> np.ndarray | None:
+        """The present picture alone, (height, width, 4), as its file has it.
+
+        None of a part of a picture, whose frame is drawn on a canvas of its own.
+        """
+        source = self._clip.source(*self._now[:2])
+        if source.window not in (None, (0, 0, *source.size)):
+            return None
+        return _opaque(source.rgba)
 
     def has(self, state: State) -> frozenset[str]:
         """Inputs that a method may ask for."""
@@ -223,7 +242,7 @@ class ClipSubject:
         frame, images = self._frame(self._now), self._images
         inputs = self._inputs(self._sharp)
         color, depth, motion_ = (f"{name} {self._now[1]}" for name in ("color", "depth", "motion"))
-        images.upload(color, self._sharp_rgba(frame), "rgba32float")
+        images.upload(color, _opaque(frame.color), "rgba32float")
         found = {"color": images.texture(color, frame.size, "rgba32float")}
         if frame.depth is not None:
             images.upload(depth, frame.depth, "r32float")
@@ -236,11 +255,6 @@ class ClipSubject:
             found["motion"] = motion
         return found
 
-    def _sharp_rgba(self, frame: Frame) -> np.ndarray:
-        rgba = np.ones((*frame.color.shape[:2], 4), np.float32)
-        rgba[..., : frame.color.shape[2]] = frame.color
-        return rgba
-
     def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Clock | None) -> int:
         """Draw with `blur`, all its samples."""
         encoder = self._device.create_command_encoder(label="blur")
@@ -248,6 +262,13 @@ class ClipSubject:
         blur.encode(encoder, output=view, timing=timing, **self._inputs(blur))
         gpu.submit(self._device, encoder)
         return blur.samples
+
+
+def _opaque(color: np.ndarray) -> np.ndarray:
+    """Colours (height, width, 3 or 4) with alpha, of 1 where they have none."""
+    rgba = np.ones((*color.shape[:2], 4), np.float32)
+    rgba[..., : color.shape[2]] = color
+    return rgba
 
 
 def _layers(source: FrameFile, wanted_depth: str | None) -> dict[str, str]:
