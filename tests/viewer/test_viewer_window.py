@@ -1,5 +1,7 @@
 """Sizes, pixel ratios and errors of the viewer, and its pace while something moves."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -139,6 +141,34 @@ def test_pace_finds_what_keeps_to_its_target():
             rest, drawing = took(pace.level)
             pace.observe(rest + drawing, drawing, 2)
         assert pace.level == settled  # nothing jumps
+
+
+def played(pace, unchanged, drawing, frames=200, busy=1.0):
+    """The levels of frames that take `unchanged` and, at half the width, `drawing` seconds."""
+    levels = []
+    for number in range(frames):
+        scale, _ = pace.quality(pace.level, 1)
+        seconds = busy * (1 + 0.1 * (number % 3 - 1)) * (unchanged + drawing * scale**2 / 0.25)
+        pace.observe(seconds, seconds, 1)  # nobody tells which part of it depends on the level
+        levels.append(pace.level)
+    return levels
+
+
+def test_a_light_scene_is_played_at_half_the_width_and_again_once_the_machine_is_idle():
+    pace = Pace(5, 1 / 24)
+    assert played(pace, 0.012, 0.022)[-1] <= 5
+    busy = played(pace, 0.012, 0.022, busy=8.0)
+    assert pace.SCALES[busy[-1]] >= 0.3  # to draw fewer pixels would save little
+    levels = played(pace, 0.012, 0.022, frames=600)
+    assert levels[-1] <= 5
+    assert len(set(levels[-100:])) == 1  # and it stays
+
+
+def test_what_is_too_fine_is_tried_ever_later():
+    pace = Pace(6, 1 / 24)
+    levels = played(pace, 0.0, 0.045, frames=3000)
+    changes = [sum(a != b for a, b in pairwise(part)) for part in (levels[:300], levels[-300:])]
+    assert changes[1] <= 4 and changes[1] <= changes[0]
 
 
 def test_one_slow_frame_changes_nothing():

@@ -146,16 +146,16 @@ class SceneOnGpu:
 
     def reprojections(self, time: float = 0.0) -> Reprojections:
         """Camera and body motion around `time` [frame intervals from this frame]."""
-        prev, here, next_ = (self._camera(time + k) for k in (-1, 0, 1))
-        return Reprojections(here, prev, next_)
-
-    def _camera(self, frames: float) -> Camera:
-        t = self.time + frames / self.fps
+        times = self.time + (time + np.array([-1.0, 0.0, 1.0])) / self.fps
         shot = self.scene.camera
-        view = np.linalg.inv(shot.world_from_camera(t)[0])
-        clip = shot.clip_from_camera(t, self.size[0] / self.size[1])[0]
-        bodies = {i + 1: b.world_from_body(t)[0] for i, b in enumerate(self.scene.bodies)}
-        return Camera(clip @ view, view, bodies)
+        views = np.linalg.inv(shot.world_from_camera(times))
+        clips = shot.clip_from_camera(times, self.size[0] / self.size[1])
+        bodies = [body.world_from_body(times) for body in self.scene.bodies]
+        prev, here, next_ = (
+            Camera(clip @ view, view, {i + 1: places[k] for i, places in enumerate(bodies)})
+            for k, (clip, view) in enumerate(zip(clips, views, strict=True))
+        )
+        return Reprojections(here, prev, next_)
 
 
 def _bodies(scene: Scene, source: wgsl.WgslSource) -> np.ndarray:

@@ -18,18 +18,26 @@ struct View {
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let now = instant(view.time);
+    let middle = vec2f(id.xy) + 0.5;
+    var ray = camera_ray(middle, now);
+    var hit = Hit(BACKGROUND_DEPTH, 0u, Pose());
     var sum = vec3f(0.0);
     let rays = turns_of(scene.rays * scene.rays, id.x);
     for (var i = 0u; i < rays; i++) {
         let within = (vec2f(vec2u(i % scene.rays, i / scene.rays)) + 0.5) / f32(scene.rays);
-        let ray = camera_ray(vec2f(id.xy) + within, now);
-        sum += radiance(nearest(ray, now), ray, now);
+        ray = camera_ray(vec2f(id.xy) + within, now);
+        hit = nearest(ray, now);
+        sum += radiance(hit, ray, now);
     }
     textureStore(color, id.xy, vec4f(sum / f32(scene.rays * scene.rays), 1.0));
 
-    // Depth, normal and index are of one ray through the centre: they cannot be averaged.
-    let ray = camera_ray(vec2f(id.xy) + 0.5, now);
-    let hit = nearest(ray, now);
+    // Depth, normal and index are of one ray through the centre, as they cannot be averaged. If there was one ray
+    // only, it was that one.
+    let more = turns_of(select(1u, 0u, scene.rays == 1u), id.x);
+    for (var i = 0u; i < more; i++) {
+        ray = camera_ray(middle, now);
+        hit = nearest(ray, now);
+    }
     let there = hit.depth < BACKGROUND_DEPTH;
     textureStore(depth, id.xy, vec4f(hit.depth));
     textureStore(normal, id.xy, vec4f(select(vec3f(0.0), world_normal(hit, ray, now), there), 0.0));

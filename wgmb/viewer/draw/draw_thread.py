@@ -127,12 +127,12 @@ class DrawThread:
                     self._failed = request, error
                 self._news()
                 continue
-            renderer.finished(time.perf_counter() - started, drawn.state.scene.antialias)
             report, busy = drawn.report, drawn.report.busy
             told = request, busy, report.waiting, report.reference, report.measured
             if report.changed or told != last:
                 last = told
                 self._publish(images.answer(renderer, drawn))
+                renderer.finished(time.perf_counter() - started, drawn.state.scene.antialias)
             else:
                 time.sleep(_PAUSE)  # until the mouse is still, or motion is found
         renderer.choices.close()
