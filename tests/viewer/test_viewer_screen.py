@@ -18,6 +18,7 @@ from wgmb.viewer.draw.screen import Screen, ScreenThread
 from wgmb.viewer.state.state import TONES
 
 SIZE = 90, 60
+WINDOW = "bgra8unorm"  # as most windows have it
 AREA = (0, 0, *SIZE)
 RNG = np.random.default_rng(0)
 FIRST, SECOND = (RNG.random((21, 30, 4)).astype(np.float16) for _ in range(2))
@@ -60,7 +61,7 @@ def view_of(first, second, **changes):
 
 @pytest.fixture
 def beside():
-    made = ScreenThread(gpu.open_device(), "rgba8unorm", lambda: None)
+    made = ScreenThread(gpu.open_device(), WINDOW, lambda: None)
     yield made
     made.close()
 
@@ -93,7 +94,7 @@ def test_the_window_does_not_wait_for_composing_and_shows_the_last_view(beside, 
 
     monkeypatch.setattr(Composer, "compose", held)
     canvas = gpu.open_device().create_texture(
-        size=(*SIZE, 1), format="rgba8unorm", usage=0x10 | 0x4 | 0x1
+        size=(*SIZE, 1), format=WINDOW, usage=0x10 | 0x4 | 0x2 | 0x1
     )
     beside.show(replace(first, state=replace(first.state, exposure=1.0)))
     beside.show(second)  # the one before is not composed any more
@@ -104,6 +105,16 @@ def test_the_window_does_not_wait_for_composing_and_shows_the_last_view(beside, 
     assert np.abs(now - was).mean() > 0.1
     beside.paint(canvas)
     np.testing.assert_array_equal(painted(canvas)[:, 2:88], np.round(255 * now))
+
+    opened.clear()  # the window is larger now: what the picture leaves free is black
+    beside.show(replace(second, size=(200, 120)))
+    larger = gpu.open_device().create_texture(
+        size=(200, 120, 1), format=WINDOW, usage=0x10 | 0x4 | 0x2 | 0x1
+    )
+    beside.paint(larger)
+    assert not painted(larger)[SIZE[1] :].any() and not painted(larger)[:, SIZE[0] :].any()
+    np.testing.assert_array_equal(painted(larger)[: SIZE[1], 2:88], np.round(255 * now))
+    opened.set()
 
 
 @pytest.mark.parametrize("mode", ["wipe", "split", "difference"])
@@ -144,11 +155,12 @@ def composed(one, view):
 
 
 def painted(canvas):
-    """(height, width, 3) of what is on a canvas."""
+    """(height, width, 3), red first, of what is on a canvas."""
     device = gpu.open_device()
-    layout = {"bytes_per_row": 4 * SIZE[0], "rows_per_image": SIZE[1]}
-    texels: Any = device.queue.read_texture({"texture": canvas}, layout, (*SIZE, 1))
-    return np.frombuffer(texels, np.uint8).reshape(SIZE[1], SIZE[0], 4)[..., :3]
+    width, height, _ = canvas.size
+    layout = {"bytes_per_row": 4 * width, "rows_per_image": height}
+    texels: Any = device.queue.read_texture({"texture": canvas}, layout, (width, height, 1))
+    return np.frombuffer(texels, np.uint8).reshape(height, width, 4)[..., 2::-1]
 
 
 def test_what_goes_wrong_in_composing_is_raised_in_the_window(beside, monkeypatch):

@@ -18,13 +18,30 @@ _USAGE = wgpu.TextureUsage
 _NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4", "16uint": "<u2"}
 _NUMPY |= {"8uint": "u1", "8unorm": "u1"}
 _STORABLE = ("rgba16float", "rgba32float", "r32float", "r32uint", "rg32uint", "rgba32uint")
-_CHANNELS = {"r": 1, "rg": 2, "rgba": 4}
+_CHANNELS = {"r": 1, "rg": 2, "rgba": 4, "bgra": 4}
 
 
 def numpy_of(format: str) -> tuple[np.dtype, int]:
     """Numpy type and number of channels of a texture format such as `rgba16float`."""
     letters = re.split(r"\d", format)[0]
     return np.dtype(_NUMPY[format[len(letters) :]]), _CHANNELS[letters]
+
+
+def write(device: wgpu.GPUDevice, texture: wgpu.GPUTexture, image: np.ndarray) -> None:
+    """Put an array (height, width[, channels]) of the texture's own type into its first corner."""
+    image = np.ascontiguousarray(image)
+    height, width = image.shape[:2]
+    row = image.strides[0]
+    band = max(1, _BAND // row)
+    for top in range(0, height, band):
+        rows = image[top : top + band]
+        device.queue.write_texture(
+            {"texture": texture, "origin": (0, top, 0)},
+            rows,
+            {"bytes_per_row": row},
+            (width, len(rows), 1),
+        )
+        submit(device)  # what is written is held in memory until a submit
 
 
 class ScratchBuffer:
@@ -91,23 +108,13 @@ class TexturePool:
     def upload(self, name: str, image: np.ndarray, format: str) -> wgpu.GPUTextureView:
         """Put `image` (height, width[, channels]) into the texture called `name`."""
         height, width = image.shape[:2]
-        kind, channels = numpy_of(format)
+        kind, _ = numpy_of(format)
         if kind == np.float16 and image.dtype != np.float16:
             image = np.where(np.isinf(image), image, np.clip(image, -_HALF_MAX, _HALF_MAX))
         with np.errstate(over="ignore"):  # what f32 cannot hold is infinite, and counted as bad
             image = np.ascontiguousarray(image, kind)
         texture = self.texture(name, (width, height), format)
-        row = width * channels * kind.itemsize
-        band = max(1, _BAND // row)
-        for top in range(0, height, band):
-            rows = image[top : top + band]
-            self.device.queue.write_texture(
-                {"texture": texture, "origin": (0, top, 0)},
-                rows,
-                {"bytes_per_row": row},
-                (width, len(rows), 1),
-            )
-            submit(self.device)  # what is written is held in memory until a submit
+        write(self.device, texture, image)
         return self.view_of(texture)
 
     def download(self, encoder, texture: wgpu.GPUTexture) -> np.ndarray:

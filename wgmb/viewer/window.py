@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any
 
@@ -43,6 +44,7 @@ _AFTER_EVENT = 3  # frames: ImGui hides what appears for its first one
 _MESSAGE = 4.0  # seconds a message stays
 _WAIT = 0.03  # seconds between frames that only wait for a video's motion
 _TIMES = 90  # frames in the plots
+_TURN = 0.0005  # seconds that a thread may keep the window's waiting for the interpreter
 _HANDLED = ("pointer_down", "pointer_up", "pointer_move", "wheel", "key_down", "key_up")
 _SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "char", "resize")
 
@@ -76,7 +78,8 @@ class Viewer:
         self._context = canvas.get_wgpu_context()
         # Plain formats: the picture and ImGui's colours are display values already.
         format = self._context.get_preferred_format(self.device.adapter).removesuffix("-srgb")
-        self._context.configure(device=self.device, format=format)
+        usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.COPY_DST
+        self._context.configure(device=self.device, format=format, usage=usage)
         self.stage: Renderer | DrawThread
         self.screen: Screen | ScreenThread
         if threaded:
@@ -490,10 +493,26 @@ def view(
     window: Any = canvas._window
     drop: Any = lambda _, paths: viewer.dropped(paths)  # noqa: E731
     glfw.set_drop_callback(window, drop)
-    loop.run()
+    with _short_turns():
+        loop.run()
     viewer.close()
     if viewer.failed is not None:
         raise viewer.failed
+
+
+@contextmanager
+def _short_turns():
+    """Let threads take short turns in the interpreter.
+
+    The window's thread waits for a turn after each of a hundred calls of wgpu in a frame, while
+    others compute in Python.
+    """
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(_TURN)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
 
 
 def _forget_locals(error: BaseException | None) -> None:

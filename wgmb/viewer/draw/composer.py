@@ -130,7 +130,7 @@ class Composer:
 
     def picture(self) -> np.ndarray:
         """(height, width, 3) display values 0..1 of the picture, the panel not in it."""
-        return visible(self.download(), self._visible)
+        return visible(self.download(), self._visible, self._format)
 
     def values(self, x: float, y: float) -> np.ndarray | None:
         """(3,) display values 0..1 of what was composed at a place [px]; None outside it."""
@@ -175,10 +175,11 @@ class Composer:
         return self._pipelines[constants]
 
 
-def visible(texels: np.ndarray, box: Box) -> np.ndarray:
-    """(height, width, 3) display values 0..1 in a box of texels."""
+def visible(texels: np.ndarray, box: Box, format: str) -> np.ndarray:
+    """(height, width, 3) display values 0..1 in a box of texels; their `format`."""
     x, y, width, height = (round(value) for value in box)
-    part = texels[y : y + height, x : x + width, :3].astype(np.float32)
+    channels = slice(2, None, -1) if format.startswith("bgra") else slice(3)
+    part = texels[y : y + height, x : x + width, channels].astype(np.float32)
     return part / 255 if texels.dtype == np.uint8 else part
 
 
@@ -204,6 +205,14 @@ def draw(
     pass_.set_bind_group(group, bound)
     pass_.draw(3)
     pass_.end()
+    gpu.submit(device, encoder)
+
+
+def clear(device: wgpu.GPUDevice, target: wgpu.GPUTexture) -> None:
+    """Make a texture black."""
+    encoder = device.create_command_encoder(label="clear")
+    attachment = {"view": target.create_view(), "load_op": "clear", "store_op": "store"}
+    encoder.begin_render_pass(color_attachments=[attachment]).end()
     gpu.submit(device, encoder)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import wgpu
 
 from ... import gpu
-from ...gpu.textures import TexturePool
+from ...gpu.textures import write
 from ...threads import begin
-from .composer import BLIT, Composer, View, draw, pipeline, visible
+from .composer import BLIT, Composer, View, clear, draw, pipeline, visible
 from .place import overlap
 
 
@@ -50,16 +50,16 @@ class Screen:
 class ScreenThread:
     """A Screen whose views are composed in a thread with a device of its own.
 
-    `paint` puts the last one that is ready on the canvas; `news` is called in the thread when there
-    is another one. Without a GPU, composing and compiling take longer than the panel can wait.
+    `paint` puts the last one that is ready on the canvas, whose textures need the usage COPY_DST;
+    `news` is called in the thread when there is another one. Without a GPU, composing and compiling
+    take longer than the panel can wait, and to draw a texel takes six times as long as to copy it.
     """
 
     def __init__(self, device: wgpu.GPUDevice, format: str, news: Callable[[], None]):
-        self._painter, self._images = _Painter(device, format), TexturePool(device)
+        self._device, self._format = device, format
         self._news, self._changed = news, threading.Condition()
         self._wanted: View | None = None
         self._ready: tuple[View, np.ndarray] | None = None
-        self._painted: np.ndarray | None = None
         self._failed: Exception | None = None
         self._ended, self.seconds = False, 0.0
         beside = gpu.second_device(device)
@@ -76,14 +76,13 @@ class ScreenThread:
 
     def paint(self, target: wgpu.GPUTexture) -> None:
         """Put the last view that is ready on the canvas's texture."""
-        if self._ready is None:
-            return
-        texels = self._ready[1]
-        height, width = texels.shape[:2]
-        if texels is not self._painted:
-            self._images.upload("picture", texels, _TEXEL)
-            self._painted = texels
-        self._painter.paint(self._images.texture("picture", (width, height), _TEXEL), target)
+        with self._changed:
+            ready, wanted = self._ready, self._wanted
+        if ready is None or wanted is None or ready[0].size != wanted.size:
+            clear(self._device, target)
+        if ready is not None:
+            width, height, _ = target.size
+            write(self._device, target, ready[1][:height, :width])
 
     def picture(self) -> np.ndarray:
         """(height, width, 3) display values 0..1 of the view shown last, the panel not in it."""
@@ -93,14 +92,14 @@ class ScreenThread:
                 raise self._failed
             assert self._ready is not None
             view, texels = self._ready
-        return visible(texels, overlap(view.place, view.area))
+        return visible(texels, overlap(view.place, view.area), self._format)
 
     def values(self, x: float, y: float) -> np.ndarray | None:
         """(3,) display values 0..1 on the canvas at a place [px]; None outside the picture."""
         texels = self._ready[1] if self._ready else np.zeros((0, 0, 4), np.uint8)
         if not (0 <= x < texels.shape[1] and 0 <= y < texels.shape[0]):
             return None
-        return visible(texels, (int(x), int(y), 1, 1))[0, 0]
+        return visible(texels, (int(x), int(y), 1, 1), self._format)[0, 0]
 
     def close(self) -> None:
         """Let the thread end."""
@@ -116,7 +115,7 @@ class ScreenThread:
 
     def _work(self, device: wgpu.GPUDevice) -> None:
         try:
-            composer = Composer(device, _TEXEL, in_bands=True)
+            composer = Composer(device, self._format, in_bands=True)
             while (view := self._next()) is not None:
                 composer.compose(view)
                 texels = composer.download()
@@ -137,9 +136,6 @@ class ScreenThread:
                 lambda: self._ended or (self._wanted is not None and not self._is_current())
             )
             return None if self._ended else self._wanted
-
-
-_TEXEL = "rgba8unorm"
 
 
 class _Painter:
