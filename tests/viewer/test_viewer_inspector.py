@@ -7,7 +7,7 @@ from viewer_hand import ALONE, SAMPLE, Hand, library, put
 from wgmb.methods import METHODS
 from wgmb.viewer import controls
 from wgmb.viewer.draw.request import Available
-from wgmb.viewer.panel import inspector
+from wgmb.viewer.panel import inspector, scopes
 
 SIZE = 320, 180
 
@@ -123,11 +123,26 @@ def test_the_histogram_counts_pixels_by_stops():
     light[0] = 4.0
     light[1, :, :3] = np.inf
     light[2, :, :3] = 0.0
-    shares = inspector.histogram(light)
-    low, high = inspector.STOPS
+    shares = scopes.histogram(light)
+    low, high = scopes.STOPS
     width = (high - low) / len(shares)
     want = {int((-2 - low) / width): 0.25, int((2 - low) / width): 0.25, 63: 0.25, 0: 0.25}
     assert {i: s for i, s in enumerate(shares) if s} == pytest.approx(want)
+
+
+@pytest.mark.parametrize("width", [60, 240, 1920])
+def test_the_waveform_is_the_histogram_of_each_column(width):
+    stops = np.linspace(-9.0, 5.9, 8)
+    light = np.zeros((64, width, 3), np.float32)
+    light[32:] = 2.0 ** stops[np.arange(width) * 8 // width][:, None]  # a ramp below black
+    table = scopes.waveform(light)
+    rows, columns = table.shape
+    low, high = scopes.STOPS
+    for step, column in enumerate(range(columns // 16, columns, columns // 8)):
+        want = np.zeros(rows, np.float32)
+        above = int((stops[step] - low) / (high - low) * rows)
+        want[rows - 1], want[rows - 1 - above] = 0.5, 0.5
+        np.testing.assert_allclose(table[:, column], want, atol=1e-6)
 
 
 def test_arrows_lead_to_where_the_next_frame_has_the_pixel():

@@ -9,7 +9,7 @@ from wgmb.color.srgb import srgb
 from wgmb.methods import METHODS
 from wgmb.scene import builtin
 from wgmb.viewer import State
-from wgmb.viewer.panel import inspector
+from wgmb.viewer.panel import scopes
 
 pytest_plugins = ["viewer_hand"]
 
@@ -69,7 +69,7 @@ def test_false_colours_are_those_of_the_stops(small):
     state = small.viewer.state = put(ALONE, exposure=-2.0, tone="false", look="sharp")
     light = library(state)[0].frame(0.0).color[..., :3] * 2**-2.0
     stops = np.log2(np.maximum(light @ [0.2126, 0.7152, 0.0722], 1e-20))
-    low, high = inspector.STOPS
+    low, high = scopes.STOPS
     at = np.clip((stops - low) / (high - low), 0, 1)
     ramp = [(0, 0, 0.02), (0.28, 0.06, 0.46), (0.8, 0.2, 0.3), (0.99, 0.7, 0.15), (1, 1, 0.9)]
     want = [np.interp(at, np.linspace(0, 1, 5), column) for column in np.transpose(ramp)]

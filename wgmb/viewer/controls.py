@@ -45,7 +45,7 @@ KEYS = {
     "s": "save image, PNG and EXR",
     "v": "start or stop recording MP4",
     "f": "full screen",
-    "i": "numbers under the mouse, and a histogram",
+    "i": "numbers under the mouse, and scopes",
     "a": "motion as arrows",
     "h": "this help",
     "Esc": "quit",

@@ -31,6 +31,7 @@ from .draw.screen import Screen, ScreenThread
 from .draw.slot import FrameStatus
 from .panel import inspector, overlay
 from .panel.panel import Info, Panel
+from .panel.scopes import Scopes
 from .panel.theme import style
 from .scaled_canvas import SIZES, ScaledCanvas
 from .state.recent import RecentFiles, default_path
@@ -114,7 +115,7 @@ class Viewer:
         self._info: Info | None = None
         self._sliding = False
         self._mouse = -1.0, -1.0
-        self._histogram: tuple[object, np.ndarray | None] = None, None
+        self._scopes = Scopes(self.device, self._imgui.backend)
         # Before ImGui's handlers, which keep to themselves what they take.
         canvas.add_event_handler(self._guarded(self._on_any), *_SEEN, order=-201)
         canvas.add_event_handler(self._guarded(self._on_event), *_HANDLED, order=-200)
@@ -383,9 +384,8 @@ class Viewer:
             inspector.draw_arrows(under["motion"], layout.place, area)
         if not self.state.inspect:
             return
-        light = under.get("light")
-        if light is not self._histogram[0]:
-            self._histogram = light, None if light is None else inspector.histogram(light)
+        if self._scopes.look_at(under.get("light")):
+            self._due = _AFTER_EVENT  # its window becomes larger with the next frame
         (x, y), (left, top, width, height) = self._mouse, layout.place
         u, v = (x - left) / width, (y - top) / height
         preview = bool(drawn.report.preview)
@@ -395,7 +395,7 @@ class Viewer:
             display = self.screen.values(x * ratio, y * ratio)
             at = u, v
             text = inspector.lines(drawn.state, drawn.available, under, at, display, preview)
-        inspector.show(text, self._histogram[1], area)
+        inspector.show(text, self._scopes, area)
 
     def _ask_for_more(self, busy: bool) -> None:
         waiting = self._now < self.message[1] or self.actions.export is not None

@@ -1,14 +1,12 @@
-"""The inspector: numbers under the mouse, a histogram, and motion as arrows over the picture."""
+"""The inspector: numbers under the mouse, scopes, and motion as arrows over the picture."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from imgui_bundle import ImVec2, imgui
+from imgui_bundle import imgui
 
-from ...color.primaries import REC709, luminance
-from ...gpu import wgsl
 from ...methods import METHODS
 from ...pipeline.arguments import SAMPLES
 from ..capabilities import QUICKEST
@@ -16,12 +14,9 @@ from ..controls import Box
 from ..draw.place import overlap
 from ..draw.request import Available
 from ..state.state import State
+from .scopes import Scopes
 from .theme import ACCENT, packed
 
-_COMPOSE = wgsl.load("viewer/draw/compose.wgsl")
-STOPS = int(_COMPOSE.constant("LOWEST")), int(_COMPOSE.constant("HIGHEST"))
-"""Range of the histogram and of false colours [stops from 1.0]."""
-_BINS = 64
 _STEP = 40.0  # from one arrow to the next [logical px]
 _SHORTEST = 0.5  # motion that has an arrow [px]
 _VALUES = 96.0  # where they begin, beside their names [logical px]
@@ -84,20 +79,6 @@ def method_line(state: State, available: Available, is_preview: bool = False) ->
     return f"{text} ({lacks})"
 
 
-def histogram(light: np.ndarray) -> np.ndarray:
-    """Share of the pixels (64,) by their luminance, over STOPS; darker and brighter ones at ends.
-
-    `light`: (height, width, 3 or more), taken as Rec. 709.
-    """
-    colors = light[..., :3] if light.shape[2] >= 3 else light[..., :1].repeat(3, axis=2)
-    bright = np.nan_to_num(
-        colors @ np.asarray(luminance(REC709), np.float32), posinf=2.0 ** STOPS[1]
-    )
-    stops = np.log2(np.maximum(bright, 2.0 ** (STOPS[0] - 1)))
-    counts, _ = np.histogram(np.clip(stops, *STOPS), bins=_BINS, range=STOPS)
-    return (counts / max(stops.size, 1)).astype(np.float32)
-
-
 def arrows(motion: np.ndarray, place: Box, area: Box) -> list[tuple[float, ...]]:
     """Arrows (x, y, x, y) [logical px] from a grid of pixels to where the next frame has them.
 
@@ -128,8 +109,8 @@ def draw_arrows(motion: np.ndarray, place: Box, area: Box) -> None:
     ink.pop_clip_rect()
 
 
-def show(text: list[str], shares: np.ndarray | None, area: Box) -> None:
-    """The text and the histogram in a corner of the picture."""
+def show(text: list[str], scopes: Scopes, area: Box) -> None:
+    """The text and the scopes in a corner of the picture."""
     x, y, width, height = area
     imgui.set_next_window_pos((x + 12, y + height - 12), pivot=(0.0, 1.0))
     imgui.set_next_window_bg_alpha(0.92)
@@ -143,11 +124,5 @@ def show(text: list[str], shares: np.ndarray | None, area: Box) -> None:
         imgui.push_text_wrap_pos(max(width - 36, _NARROWEST))
         imgui.text(value.strip())
         imgui.pop_text_wrap_pos()
-    if shares is not None:
-        peak = float(np.sqrt(shares).max())
-        imgui.plot_histogram(
-            "##histogram", np.sqrt(shares), scale_min=0.0, scale_max=peak,
-            graph_size=ImVec2(240, 48),
-        )  # fmt: skip
-        imgui.text_disabled(f"{STOPS[0]} to +{STOPS[1]} stops")
+    scopes.show()
     imgui.end()
