@@ -65,7 +65,7 @@ def flash(tmp_path_factory):
     return passing(tmp_path_factory.mktemp("flash") / "a.mp4", white=5)
 
 
-@pytest.mark.parametrize("flow", ["dis", "search"])
+@pytest.mark.parametrize("flow", ["dis", pytest.param("search", marks=pytest.mark.full)])
 def test_pictures_are_let_go_of_at_once_after_a_seek_and_at_the_end(flow, tmp_path):
     pictures = [clips.frame(clips.planes(n % 12), "yuv420p") for n in range(120)]
     reader = VideoReader(clips.write(tmp_path / "long.mp4", pictures))
