@@ -3,10 +3,12 @@ edges, and the first scene that everybody makes."""
 
 import numpy as np
 
-from wgmb import Body, CameraPath, Scene
+from images import frame_of
+from wgmb import Blur, Body, CameraPath, Frame, Render, Scene, Shutter
 from wgmb.scene.bodies import at, moving, rotation, translation
 
 FPS = 24.0
+SIZE = (160, 90)
 CREAM, GREEN, BLUE, RED = (0.88, 0.84, 0.74), (0.1, 0.35, 0.08), (0.1, 0.2, 0.6), (0.7, 0.1, 0.08)
 BRICK, MORTAR, GREY = (0.5, 0.2, 0.13), (0.62, 0.58, 0.53), (0.6, 0.6, 0.6)
 
@@ -86,3 +88,27 @@ def soft_disk(t, size=(90, 160), speed=18.0, soft=10.0):
     motion = cover * np.array([-speed, 0, speed, 0])
     depth = np.where(cover[..., 0] >= 0.5, 3.0, 9.0)
     return tuple(a.astype("f4") for a in (color, motion, depth))
+
+
+NAMES = (*SCENES, "soft_disk")
+
+
+def sharp(name, scene=None):
+    """The frame of a scene, or of that of this name, between its neighbours."""
+    if name == "soft_disk":
+        return frame_of([soft_disk(t) for t in (0, -1, 1)])
+    render = Render(scene or SCENES[name](), Blur("gather", shutter=0), size=SIZE, antialias=6)
+    own, prev, after = (
+        Frame(f.color, depth=f.depth, motion=render.blur.motion(f))
+        for f in (render.frame(t / FPS) for t in (0, -1, 1))
+    )
+    return own.between(prev, after)
+
+
+def truth(name, degrees, scene=None):
+    """The same with a shutter of so many degrees: (height, width, 3)."""
+    if name == "soft_disk":
+        times = Shutter(degrees).sample_times(128).astype(float)
+        return np.mean([soft_disk(t)[0] for t in times], axis=0)
+    blur = Blur("distributed", samples=256, shutter=degrees, seed=1)
+    return Render(scene or SCENES[name](), blur, size=SIZE)(0.0)[..., :3]

@@ -2,16 +2,13 @@
 
 from functools import cache
 
-import numpy as np
+import fine_scenes
 import pytest
-from fine_scenes import SCENES, soft_disk
 
 import wgmb
-from images import frame_of
-from wgmb import Shutter, metrics
+from wgmb import metrics
 from wgmb.scene import builtin
 
-SIZE = (160, 90)
 DECIBELS, SHARE = 0.1, 1.02  # by which it may be behind: PSNR [dB], ratio of FLIP
 SIMPLER = ("reproject", "tiles", "tap")
 BUILT_IN = {
@@ -44,30 +41,14 @@ BEHIND = {
 ROUNDING = 0.08, 1.02  # of the device: PSNR [dB], ratio of FLIP
 
 
-@cache
-def render(name):
-    scene = SCENES[name]() if name in SCENES else builtin.make(name, **BUILT_IN[name])
-    return wgmb.Render(scene, wgmb.Blur("gather", shutter=0), size=SIZE, antialias=6)
+def scene_of(name):
+    """A built-in scene; None: one of fine_scenes.py."""
+    return builtin.make(name, **BUILT_IN[name]) if name in BUILT_IN else None
 
 
 @cache
 def sharp(name):
-    """The frame between its neighbours."""
-    if name == "soft_disk":
-        return frame_of([soft_disk(t) for t in (0, -1, 1)])
-    own, prev, after = (
-        wgmb.Frame(f.color, depth=f.depth, motion=render(name).blur.motion(f))
-        for f in (render(name).frame(t / 24) for t in (0, -1, 1))
-    )
-    return own.between(prev, after)
-
-
-def truth(name, degrees):
-    if name == "soft_disk":
-        times = Shutter(degrees).sample_times(128).astype(float)
-        return np.mean([soft_disk(t)[0] for t in times], axis=0)
-    blur = wgmb.Blur("distributed", samples=256, shutter=degrees, seed=1)
-    return wgmb.Render(render(name).scene, blur, size=SIZE)(0.0)[..., :3]
+    return fine_scenes.sharp(name, scene_of(name))
 
 
 def score(name, method, degrees, want):
@@ -77,7 +58,7 @@ def score(name, method, degrees, want):
 
 
 def assert_not_behind(name, degrees):
-    want = truth(name, degrees)
+    want = fine_scenes.truth(name, degrees, scene_of(name))
     psnr, flip = score(name, "gather", degrees, want)
     decibels, share = BEHIND.get((name, degrees), (0.0, 0.0))
     simpler = [score(name, method, degrees, want) for method in SIMPLER]
@@ -95,7 +76,7 @@ def test_gather_is_not_behind_a_simpler_method(name, degrees):
 
 @pytest.mark.full
 @pytest.mark.parametrize("degrees", [90, 180, 360])
-@pytest.mark.parametrize("name", [*BUILT_IN, *SCENES, "soft_disk"])
+@pytest.mark.parametrize("name", [*BUILT_IN, *fine_scenes.NAMES])
 def test_gather_is_behind_nowhere_else(name, degrees):
     assert_not_behind(name, degrees)
 

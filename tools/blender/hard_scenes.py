@@ -1,4 +1,5 @@
-"""Scenes of what no method was tuned on: grass, glass, a swarm, a car, light that glows."""
+"""Scenes of what no method was tuned on: grass, glass, a swarm, a car, light that glows, and the
+first scene that everybody makes."""
 
 import math
 import random
@@ -260,6 +261,20 @@ def fireworks():
     sun((0.4, 0.8, -0.8), 1.0)
 
 
+def beginner():
+    """The first scene that everybody makes: a monkey and a cube pass over a floor, under a sun."""
+    floor = material("checker", (0.8, 0.8, 0.8), (0.2, 0.2, 0.2), 0.5)
+    add("plane", floor, size=40, location=(0, 0, -1))
+    grey = material("plain", (0.8, 0.8, 0.8))
+    monkey = add("monkey", grey, location=(0, 0, 0.3))
+    cube = box(grey, (1, 1, 1), (0, -1.6, -0.3))
+    for thing, speed in ((monkey, 0.35), (cube, -0.29)):
+        animate(thing, "location", lambda t, v=speed: v * t, 0)
+        animate(thing, "rotation_euler", lambda t: 0.75 + 0.1 * t, 2)
+    camera((0, -9, 2.2), (0, 0, 0.35), 50)
+    sun((0.45, 0.6, -0.85))
+
+
 HARD = {
     make.__name__: Scene(make, SIZE, 64, half, light=True, bounces=bounces)
     for make, half, bounces in (
@@ -268,5 +283,6 @@ HARD = {
         (swarm, 96, (0, 0, 0)),
         (car, 96, (0, 0, 0)),
         (fireworks, 96, (0, 0, 0)),
+        (beginner, 96, (0, 0, 0)),
     )
 }
