@@ -16,6 +16,7 @@ from wgmb.sequence.layers.vector_convention import ConventionFinder
 from wgmb.viewer import offscreen
 from wgmb.viewer.draw.composer import NOTHING
 from wgmb.viewer.draw.portions import DroppedError, Portions
+from wgmb.viewer.draw.quality import Quality
 from wgmb.viewer.draw.renderer import Renderer
 from wgmb.viewer.draw.request import Request
 from wgmb.viewer.window import frame
@@ -150,6 +151,20 @@ def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with()
     assert seen[0] == (half, half, True, True)  # both at once, the slow one by `tap`
     assert (whole, half, False, True) in seen  # then the quick one in full
     assert seen[-1] == (whole, whole, False, False)
+
+
+def test_an_image_is_not_measured_against_the_reference_of_another_size(monkeypatch):
+    monkeypatch.setattr(Quality, "ENOUGH", 1)
+    renderer = Renderer(gpu.open_device())
+    state = put(STATE.with_method("tap"), look="error")
+    for now in range(60):
+        report = renderer.draw(Request(state, AREA), float(now)).report
+        if report.measured:
+            break
+    assert report.measured
+    larger = Request(state, (0, 0, 2 * SMALL[0], 2 * SMALL[1]))
+    reports = [renderer.draw(larger, float(now)).report for now in range(60, 64)]
+    assert reports[-1].size == (2 * SMALL[0], 2 * SMALL[1])
 
 
 def test_a_side_that_is_not_drawn_yet_does_not_flicker(viewer):

@@ -6,7 +6,7 @@ import sys
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any
@@ -74,7 +74,8 @@ class Viewer:
         clock: Callable[[], float] = time.perf_counter,
     ):
         self.canvas = canvas = ScaledCanvas(canvas, interface)
-        self.state, self.clock = state, clock
+        self.state = state.settled()  # loads what reads ranges of frames, before one waits for it
+        self.clock = clock
         self.device = device or gpu.open_device()
         self._context = canvas.get_wgpu_context()
         # Plain formats: the picture and ImGui's colours are display values already.
@@ -493,7 +494,7 @@ def view(
     window: Any = canvas._window
     drop: Any = lambda _, paths: viewer.dropped(paths)  # noqa: E731
     glfw.set_drop_callback(window, drop)
-    with _short_turns():
+    with short_turns():
         loop.run()
     viewer.close()
     if viewer.failed is not None:
@@ -501,7 +502,7 @@ def view(
 
 
 @contextmanager
-def _short_turns():
+def short_turns() -> Iterator[None]:
     """Let threads take short turns in the interpreter.
 
     The window's thread waits for a turn after each of a hundred calls of wgpu in a frame, while

@@ -394,9 +394,13 @@ class Renderer:
         return f"{state.method}: {name}" if name in self.choices.shows(state) else name
 
     def _measure(self, first: Slot, last: Slot) -> Measured | None:
-        """Return the difference between the first image and the reference, once both are ready."""
+        """Return the difference between the first image and the reference, once both are ready.
+
+        While one is drawn anew, the other may still be that of another state or size.
+        """
         key = (first.key, first.fine, last.key, last.fine)
-        if first.kind == "COLOR" and first.ready:
+        alike = (first.key[2], first.fine[0]) == (last.key[2], last.fine[0])
+        if first.kind == "COLOR" and first.ready and alike:
             self.quality.measure(
                 key, last.done, last.total, lambda: [self.download(s) for s in (first, last)]
             )
