@@ -24,6 +24,7 @@ from wgmb import Blur, Flow, Frame, metrics
 from wgmb.color.srgb import linear, srgb, to_display
 from wgmb.flow.dis import Dis
 from wgmb.io import stills
+from wgmb.shots.better import BetterMatch, Both
 
 DEGREES = 180
 COPIES = 16  # pictures that minterpolate makes of one
@@ -47,10 +48,16 @@ CLIPS = {
     "somersault": Clip("demo.mp4", 178, 4),
     "walker": Clip("demo.mp4", 84, 4),
     "signs": Clip("book.mkv", 46, 4),
+    "cups": Clip("02_cups.mp4", 100, 4),
+    "juggler": Clip("05_default_juggle.mp4", 100, 4),
+    "bedroom": Clip("bedroom.mp4", 100, 4),
+    "dog": Clip("01_dog.mp4", 100, 4),
     "bottles": Clip("bottle-detection.mp4", 203, 4, is_halved=False),
     "signs, unseen": Clip("walk.mkv", 40, 4),
+    "blocks, unseen": Clip("03_blocks.mp4", 100, 4),
+    "coffee, unseen": Clip("04_coffee.mp4", 100, 4),
 }
-"""The last two were looked at only when all was done."""
+"""The last four were looked at only when all was done."""
 
 Pictures = dict[int, np.ndarray]
 """Linear pictures (height, width, 3) by number, 0 the one in the middle."""
@@ -104,6 +111,35 @@ def blurred(source: Any, method: Literal["tap", "gather"]) -> Callable[[Pictures
     return make
 
 
+def automatic() -> Callable[[Pictures, int], Pictures]:
+    """Blur as by default without a GPU: where something is lost, a search as well."""
+    tap, gather = blurred(Dis("fast"), "tap"), blurred(_Searched(), "gather")
+
+    def make(kept: Pictures, frames: int) -> Pictures:
+        quick = Dis("fast").shot(kept.get, depth=False)
+        searched = {n for n in range(frames) if quick.loses(n)}
+        if not searched:
+            return tap(kept, frames)
+        return {n: (gather if n in searched else tap)(kept, frames)[n] for n in range(frames)}
+
+    return make
+
+
+class _Searched:
+    """BetterMatch for pictures in linear light."""
+
+    def __init__(self):
+        self._quick = Dis("fast")
+        self._better = BetterMatch(self._quick, Flow(quality="draft"))
+
+    def shot(self, load: Callable[[int], np.ndarray | None]) -> Any:
+        def both(number: int) -> Both | None:
+            picture = load(number)
+            return None if picture is None else Both(self._quick.grey(picture), lambda: picture)
+
+        return self._better.shot(both)
+
+
 def interpolated(kept: Pictures, frames: int) -> Pictures:
     """The mean of the pictures that FFmpeg's minterpolate makes around each."""
     shown = [to_display(kept[n], 8) for n in sorted(kept)]
@@ -141,7 +177,7 @@ def makers() -> Iterator[tuple[str, Callable[[Pictures, int], Pictures]]]:
     yield "`dis` fast, `tap`", blurred(Dis("fast"), "tap")
     yield "`dis` best, `gather`", blurred(Dis("best"), "gather")
     yield "`search` draft, `gather`", blurred(Flow(quality="draft"), "gather")
-    yield "`search` fast, `gather`", blurred(Flow(quality="fast"), "gather")
+    yield "`auto`", automatic()
     yield "minterpolate 16x", interpolated
 
 

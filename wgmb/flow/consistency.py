@@ -7,8 +7,8 @@ import numpy as np
 SPACING = 4  # px from one pixel that is looked at to the next
 REACH = 2  # pictures to either side whose ways tell whether one, or one beside it, loses something
 APART = 2.0  # px by which the way there and back may end beside its start
-SHARE = 0.0125  # of a picture, above which it counts as lost
-SHARE_OF_CHANGES = 0.06  # of what changes in it, above which that counts as lost too
+SHARE = 0.006  # of a picture, above which too much is lost
+SHARE_OF_CHANGES = 0.06  # of what changes in it, above which that is too much as well
 LEAST = 0.005  # share of a picture that must change for that
 CHANGE = 15.0  # levels of 255 that a block differs from both neighbours where it changes
 
@@ -30,8 +30,9 @@ def returns(way: np.ndarray, back: np.ndarray, spacing: int) -> np.ndarray:
 class Consistency:
     """Tells in which pictures of a shot the ways of too many pixels do not lead back.
 
-    What one neighbour hides leads back from the other. A picture is known as soon as its own ways
-    and those of both neighbours are added; only every 4th pixel along each axis is kept.
+    What one neighbour hides leads back from the other, and what does not change cannot be lost. A
+    picture is known as soon as its own ways and those of both neighbours are added; only every 4th
+    pixel along each axis is kept.
     """
 
     def __init__(self) -> None:
@@ -47,11 +48,12 @@ class Consistency:
         number: int,
         to_prev: np.ndarray,
         to_next: np.ndarray,
-        change: np.ndarray | None = None,
+        change: np.ndarray | None,
     ) -> None:
         """Take the ways (height, width, 2) [px] of a picture.
 
-        `change`: by how much blocks of 4 x 4 pixels differ from both neighbours, 0 to 255.
+        `change`: by how much blocks of 4 x 4 pixels differ from both neighbours, 0 to 255; None at
+        the ends of a shot.
         """
         thin = (way[::SPACING, ::SPACING].copy() for way in (to_prev, to_next))
         self._ways[number] = next(thin), next(thin)
@@ -61,7 +63,8 @@ class Consistency:
             del self._ways[old]
             self._changes.pop(old, None)
         for n in (number - 1, number, number + 1):
-            if n not in self.shares and all(k in self._ways for k in (n - 1, n, n + 1)):
+            known = all(k in self._ways for k in (n - 1, n, n + 1))
+            if n not in self.shares and known and n in self._changes:
                 self._judge(n)
 
     def knows(self, number: int) -> bool:
@@ -72,12 +75,12 @@ class Consistency:
         to_prev, to_next = self._ways[number]
         prev_back, next_back = self._ways[number - 1][1], self._ways[number + 1][0]
         found = returns(to_prev, prev_back, SPACING) | returns(to_next, next_back, SPACING)
-        self.shares[number] = 1 - float(found.mean())
-        self.loses[number] = self.shares[number] > SHARE
-        if number in self._changes:
-            changes = self._changes[number] > CHANGE
-            share = float(np.mean(~found[changes])) if changes.mean() > LEAST else 0.0
-            self.loses[number] |= share > SHARE_OF_CHANGES
+        changes = self._changes[number] > CHANGE
+        changing, lost = float(changes.mean()), float((changes & ~found).mean())
+        self.shares[number] = lost
+        self.loses[number] = lost > SHARE or (
+            changing > LEAST and lost > SHARE_OF_CHANGES * changing
+        )
 
     @property
     def lost(self) -> int:

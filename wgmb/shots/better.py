@@ -13,7 +13,7 @@ from ..flow.dis import Dis, Found
 
 LONGEST = 480  # px along the longer side at which matches are compared
 PATCH = 5  # px of these a side of a match
-AROUND = 9  # px of these a side over which matches are averaged
+AROUND = 25  # px of these a side over which matches are averaged
 
 
 class Both(NamedTuple):
