@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from viewer_hand import ALONE, SAMPLE, Hand, library, put
+from wgmb import gpu
 from wgmb.methods import METHODS
 from wgmb.viewer import controls
-from wgmb.viewer.draw.request import Available
+from wgmb.viewer.draw.renderer import Renderer
+from wgmb.viewer.draw.request import Available, Request
 from wgmb.viewer.panel import inspector, scopes
 
 SIZE = 320, 180
@@ -128,6 +130,19 @@ def test_the_histogram_counts_pixels_by_stops():
     width = (high - low) / len(shares)
     want = {int((-2 - low) / width): 0.25, int((2 - low) / width): 0.25, 63: 0.25, 0: 0.25}
     assert {i: s for i, s in enumerate(shares) if s} == pytest.approx(want)
+
+
+def test_numbers_do_not_wait_for_the_confidence_which_takes_as_long_as_the_picture():
+    state = put(ALONE, method="gather", samples=4, shading="off", inspect=True)
+    renderer = Renderer(gpu.open_device())
+    seen = []
+    for now in range(12):
+        drawn = renderer.draw(Request(state, (0, 0, 96, 54)), float(now))
+        seen.append(({*drawn.under}, drawn.report.busy))
+        if not drawn.report.busy:
+            break
+    first = {"light", "depth", "motion"}
+    assert seen[-3:] == [(set(), True), (first, True), (first | {"confidence"}, False)]
 
 
 @pytest.mark.parametrize("width", [60, 240, 1920])

@@ -128,7 +128,7 @@ class DrawThread:
                 self._news()
                 continue
             report, busy = drawn.report, drawn.report.busy
-            told = request, busy, report.waiting, report.reference, report.measured
+            told = request, busy, report.waiting, report.reference, report.measured, {*drawn.under}
             if report.changed or told != last:
                 last = told
                 self._publish(images.answer(renderer, drawn))

@@ -33,34 +33,43 @@ class Inspected:
     ) -> dict[str, np.ndarray]:
         """The arrays (height, width, channels) of a slot's image, by name.
 
-        A new image is shown first, without them; the report then says that there is more to do.
+        A new image is shown first, without them, and then without its confidence, which takes as
+        long as the image; the report then says that there is more to do.
         """
         key = image.key, image.fine, image.done, state.inspect
-        if self._kept[0] != key and report.changed:
+        is_known = self._kept[0] == key
+        if not is_known and report.changed:
             report.busy = True
             return {}
-        if self._kept[0] != key:
+        lacks = state.inspect and state.look == "result" and _SURE in looks
+        if not is_known:
             self._kept = key, self._arrays(state, looks, image)
+            report.busy = lacks
+        elif lacks and _SURE not in self._kept[1]:
+            self._kept = key, self._kept[1] | {_SURE: self._confidence(state, image)}
         return self._kept[1]
 
     def _arrays(self, state: State, looks: Collection[str], image: Slot) -> dict[str, np.ndarray]:
         assert image.texture is not None
-        size, antialias = image.texture.size[:2], image.fine[1]
         arrays = {"light": self._array(image.texture)}
         subject = self._choices.subject(state)
         if any(look in looks for look in _PASSES.values()):
-            subject.look_at(state, size, 1)
+            subject.look_at(state, image.texture.size[:2], 1)
             for name, texture in subject.passes().items():
                 if _PASSES.get(name) in looks:
                     arrays[name] = self._array(texture)
-        if state.inspect and state.look == "result" and _SURE in looks:
-            subject.look_at(state, size, antialias)
-            blur = self._blurs("first", _SURE, state, size, None)
-            texture = self._images.texture(_SURE, size, blur.output)
-            with self._blurs.kept_if_done(blur):
-                subject.draw(blur, texture, (0, float("inf")), self._timing)
-            arrays[_SURE] = self._array(texture)
         return arrays
+
+    def _confidence(self, state: State, image: Slot) -> np.ndarray:
+        assert image.texture is not None
+        size, antialias = image.texture.size[:2], image.fine[1]
+        subject = self._choices.subject(state)
+        subject.look_at(state, size, antialias)
+        blur = self._blurs("first", _SURE, state, size, None)
+        texture = self._images.texture(_SURE, size, blur.output)
+        with self._blurs.kept_if_done(blur):
+            subject.draw(blur, texture, (0, float("inf")), self._timing)
+        return self._array(texture)
 
     def _array(self, texture: wgpu.GPUTexture) -> np.ndarray:
         encoder = self._device.create_command_encoder(label="inspected")
