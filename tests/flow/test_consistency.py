@@ -30,6 +30,7 @@ def test_ways_there_and_back_are_compared_where_they_lead():
 
 
 CHANGED = np.full((16, 24), 90, np.uint8)
+CHANGED[:3] = 0
 
 
 def steady(dx, height=64, width=96):
@@ -89,6 +90,18 @@ def test_what_is_lost_of_the_little_that_changes_counts_too(size, loses):
     for n in range(3):
         still.add(n, to_prev * 0, to_next * 0, 0 * change)
     assert still.loses == {1: False}
+
+
+def test_noise_is_no_change_but_what_moves_in_it_is():
+    rng = np.random.default_rng(2)
+    noise = rng.integers(14, 22, (32, 48)).astype(np.uint8)
+    moving = noise.copy()
+    moving[8:16, 10:20] += 30
+    for change, loses in ((noise, False), (moving, True)):
+        kept = Consistency()
+        for n in range(3):
+            kept.add(n, *rng.integers(-20, 20, (2, 128, 192, 2)).astype(np.float32), change)
+        assert kept.loses == {1: loses}
 
 
 def test_what_does_not_change_is_not_lost():

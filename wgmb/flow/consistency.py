@@ -10,7 +10,8 @@ APART = 2.0  # px by which the way there and back may end beside its start
 SHARE = 0.006  # of a picture, above which too much is lost
 SHARE_OF_CHANGES = 0.06  # of what changes in it, above which that is too much as well
 LEAST = 0.005  # share of a picture that must change for that
-CHANGE = 15.0  # levels of 255 that a block differs from both neighbours where it changes
+CHANGE = 15.0  # levels of 255 that a block differs from both neighbours where it changes,
+QUIET = 10  # beyond this percentile of all blocks, which is noise
 
 
 def returns(way: np.ndarray, back: np.ndarray, spacing: int) -> np.ndarray:
@@ -75,7 +76,8 @@ class Consistency:
         to_prev, to_next = self._ways[number]
         prev_back, next_back = self._ways[number - 1][1], self._ways[number + 1][0]
         found = returns(to_prev, prev_back, SPACING) | returns(to_next, next_back, SPACING)
-        changes = self._changes[number] > CHANGE
+        change = self._changes[number]
+        changes = change > CHANGE + np.percentile(change, QUIET)
         changing, lost = float(changes.mean()), float((changes & ~found).mean())
         self.shares[number] = lost
         self.loses[number] = lost > SHARE or (
