@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import make_frames as make
-from wgmb.flow.consistency import APART, SHARE, Consistency, returns
 from wgmb.flow.dis import Dis
+from wgmb.flow.dis.consistency import APART, SHARE, Consistency, returns
 
 pytestmark = pytest.mark.fast
 

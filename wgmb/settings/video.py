@@ -63,7 +63,7 @@ class FlowSettings:
             return None
         from ..flow import Flow
         from ..flow.dis import Dis
-        from ..shots.better import BetterMatch
+        from ..flow.dis.better_match import BetterMatch
 
         return BetterMatch(Dis("fast"), Flow(quality=_FALLBACK, device=device))
 

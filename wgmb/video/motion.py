@@ -7,8 +7,8 @@ from typing import Any
 import wgpu
 
 from ..flow import Flow
+from ..flow.dis.better_match import BetterMatch, Both
 from ..gpu.textures import TexturePool
-from ..shots.better import BetterMatch, Both
 from ..shots.motion import MotionSource, ShotMotion
 from ..shots.reader import ShotReader
 from .planes import Planes

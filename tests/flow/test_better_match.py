@@ -10,7 +10,7 @@ from wgmb.flow import Flow
 pytest.importorskip("cv2")
 
 from wgmb.flow.dis import Dis
-from wgmb.shots.better import AROUND, BetterMatch, Both, better
+from wgmb.flow.dis.better_match import AROUND, BetterMatch, Both, better
 
 
 def shifted(shift, height, width):

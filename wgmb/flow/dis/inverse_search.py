@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import extras
-from ..color.srgb import to_display
-from ..errors import InputError
+from ... import extras
+from ...color.srgb import to_display
+from ...errors import InputError
 from .consistency import REACH, SPACING, Consistency
 
 QUALITIES = ("fast", "best")
@@ -24,11 +24,6 @@ _LEAST = 16  # pixels a side that OpenCV needs
 _APART = 0.005  # per pixel that a motion is off that of most of the picture, by which it is nearer
 Load = Callable[[int], np.ndarray | None]
 Found = tuple[np.ndarray, np.ndarray | None]
-
-
-def is_installed() -> bool:
-    """Return True if OpenCV is there."""
-    return extras.is_installed("cv2")
 
 
 class Dis:

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..flow import Flow
-from ..flow.dis import Dis, Found
+from .. import Flow
+from .inverse_search import Dis, Found
 
 LONGEST = 480  # px along the longer side at which matches are compared
 PATCH = 5  # px of these a side of a match
