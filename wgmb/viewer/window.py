@@ -117,6 +117,7 @@ class Viewer:
         self._sliding = False
         self._mouse = -1.0, -1.0
         self._scopes = Scopes(self.device, self._imgui.backend)
+        self._inspected = 0  # lines of the inspector
         # Before ImGui's handlers, which keep to themselves what they take.
         canvas.add_event_handler(self._guarded(self._on_any), *_SEEN, order=-201)
         canvas.add_event_handler(self._guarded(self._on_event), *_HANDLED, order=-200)
@@ -385,8 +386,6 @@ class Viewer:
             inspector.draw_arrows(under["motion"], layout.place, area)
         if not self.state.inspect:
             return
-        if self._scopes.look_at(under.get("light")):
-            self._due = _AFTER_EVENT  # its window becomes larger with the next frame
         (x, y), (left, top, width, height) = self._mouse, layout.place
         u, v = (x - left) / width, (y - top) / height
         preview = bool(drawn.report.preview)
@@ -396,6 +395,9 @@ class Viewer:
             display = self.screen.values(x * ratio, y * ratio)
             at = u, v
             text = inspector.lines(drawn.state, drawn.available, under, at, display, preview)
+        if self._scopes.look_at(under.get("light")) or len(text) != self._inspected:
+            self._due = _AFTER_EVENT  # its window becomes larger with the next frame
+        self._inspected = len(text)
         inspector.show(text, self._scopes, area)
 
     def _ask_for_more(self, busy: bool) -> None:
