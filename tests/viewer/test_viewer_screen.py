@@ -24,7 +24,7 @@ RNG = np.random.default_rng(0)
 FIRST, SECOND = (RNG.random((21, 30, 4)).astype(np.float16) for _ in range(2))
 SETTINGS: list[dict[str, Any]] = [{}, {"compare": "wipe"}, {"tone": "soft"}]
 LOWER = """
-import os, sys, threading
+import os, sys, threading, time
 from pathlib import Path
 from wgmb import gpu
 def priorities():
@@ -47,6 +47,18 @@ assert priorities()[threading.get_native_id()][1] == own
 second = gpu.second_device(first)
 later = {k: v for k, v in priorities().items() if k not in start and k not in opened}
 assert later and all(priority == own for _, priority in later.values()), later
+from wgmb.viewer.draw.draw_thread import DrawThread
+from wgmb.viewer.draw.screen import ScreenThread
+def of_threads():
+    return {t.name: os.getpriority(os.PRIO_PROCESS, t.native_id) for t in threading.enumerate()}
+drawing, screen = DrawThread(first), ScreenThread(second, "bgra8unorm", lambda: None)
+until = time.monotonic() + 60
+while not own < of_threads()["composing"] < of_threads()["drawing"]:
+    assert time.monotonic() < until, of_threads()
+    time.sleep(0.01)
+assert of_threads()["MainThread"] == own
+drawing.close()
+screen.close()
 """
 
 

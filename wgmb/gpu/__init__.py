@@ -16,7 +16,7 @@ from .device import (
     texel,
 )
 from .kernels import FrameBindings, Kernel, kernel, uniform
-from .priority import yielding
+from .priority import lower_priority, yielding
 
 __all__ = [
     "SOFTWARE",
@@ -31,6 +31,7 @@ __all__ = [
     "constant",
     "give_back",
     "kernel",
+    "lower_priority",
     "open_device",
     "reported",
     "second_device",

@@ -1,4 +1,4 @@
-"""Priority of a software driver's threads: what is computed beside a window yields to it."""
+"""Priority of threads, a software driver's too: what is computed beside a window yields to it."""
 
 from __future__ import annotations
 
@@ -12,6 +12,12 @@ from pathlib import Path
 _TASKS = Path("/proc/self/task")
 _RASTERIZER = "llvmpipe-"  # how Mesa calls the threads that draw triangles, such as a window's
 _LOWER, _LOWEST = 10, 19
+
+
+def lower_priority(by: int = _LOWER) -> None:
+    """Lower the priority of the calling thread, and of those that it starts. On Linux only."""
+    if sys.platform == "linux":
+        _lower(threading.get_native_id(), by)
 
 
 @contextmanager
@@ -28,8 +34,12 @@ def yielding() -> Iterator[None]:
         if thread in before or thread in of_python or name.startswith(_RASTERIZER):
             continue
         with suppress(OSError):  # it has ended
-            lower = min(os.getpriority(os.PRIO_PROCESS, thread) + _LOWER, _LOWEST)
-            os.setpriority(os.PRIO_PROCESS, thread, lower)
+            _lower(thread, _LOWER)
+
+
+def _lower(thread: int, by: int) -> None:
+    priority = min(os.getpriority(os.PRIO_PROCESS, thread) + by, _LOWEST)
+    os.setpriority(os.PRIO_PROCESS, thread, priority)
 
 
 def _threads() -> dict[int, str]:

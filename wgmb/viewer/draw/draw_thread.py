@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import wgpu
 
+from ... import gpu
 from ...gpu.textures import TexturePool
 from ...threads import begin
 from .composer import Image
@@ -111,6 +112,7 @@ class DrawThread:
         return drawing.moving or drawing.full or now.picture == drawing.picture
 
     def _work(self, device: wgpu.GPUDevice) -> None:
+        gpu.lower_priority()
         renderer = Renderer(device, Portions(device, self._is_wanted), _PLAYED)
         images = _Downloads(TexturePool(device))
         busy, last = False, ()

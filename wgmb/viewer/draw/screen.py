@@ -15,6 +15,8 @@ from ...threads import begin
 from .composer import BLIT, Composer, View, clear, draw, pipeline, visible
 from .place import overlap
 
+_YIELDS = 5  # by how much the priority of composing is lower than the window's; drawing's by 10
+
 
 class Screen:
     """Composes views, and paints the last one on a canvas."""
@@ -114,6 +116,7 @@ class ScreenThread:
         return at_end or (ready is not None and wanted is not None and ready[0] is wanted)
 
     def _work(self, device: wgpu.GPUDevice) -> None:
+        gpu.lower_priority(_YIELDS)
         try:
             composer = Composer(device, self._format, in_bands=True)
             while (view := self._next()) is not None:
