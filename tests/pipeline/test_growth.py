@@ -237,6 +237,9 @@ def _coded(number: int) -> Thumbnail:
 class _Sideways:
     """All moves by the same."""
 
+    def reach(self, size):
+        return 1
+
     def shot(self, load, depth=True):
         width, height = SIZE
         motion = np.full((height, width, 4), (-3, 0, 3, 0), np.float32)

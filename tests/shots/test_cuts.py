@@ -16,7 +16,7 @@ from wgmb import (
 )
 from wgmb.cli import app
 from wgmb.io import stills
-from wgmb.shots.cuts import is_cut, jumps
+from wgmb.shots.cuts import is_cut, jumps, pictures_differ
 
 
 @pytest.fixture
@@ -70,6 +70,18 @@ def test_noise_is_no_cut(tmp_path):
 def test_pictures_without_anything_in_them_are_no_cut():
     dark = wgmb.Frame(np.zeros((HEIGHT, WIDTH, 3), "f4"))
     assert not is_cut(dark, dark, 1)
+
+
+@pytest.mark.parametrize("size", [(16, 1920), (120, 1920), (640, 24)])
+def test_cuts_are_told_from_motion_in_bands(size):
+    """The small copy of a band is not so low that nothing can be found again in it."""
+    height, width = size
+    cell = max(4, min(size) // 6)
+    noise = np.random.default_rng(1).random((height // cell + 2, width // cell + 2, 3), np.float32)
+    whole = noise.repeat(cell, axis=0).repeat(cell, axis=1)
+    a, b = whole[:height, :width], whole[2 : height + 2, 4 : width + 4]
+    assert not pictures_differ(a, b)
+    assert pictures_differ(a, np.ascontiguousarray(whole[::-1, ::-1][:height, :width]))
 
 
 @pytest.mark.parametrize("side", [-1, 1])

@@ -10,6 +10,7 @@ from wgmb.color.srgb import linear
 from wgmb.flow import Flow
 from wgmb.gpu.textures import TexturePool
 from wgmb.pipeline.exposure_sum import ExposureSum
+from wgmb.shots import motion
 from wgmb.shots.cuts import pictures_differ
 from wgmb.shots.reader import Picture, ShotReader
 from wgmb.video.gpu_frames import VideoFrames
@@ -24,6 +25,9 @@ class PictureFinding:
     def __init__(self):
         self.shots = 0
         self.seen: dict[int, list[int]] = {}
+
+    def reach(self, size):
+        return 4
 
     def shot(self, load, depth=True):
         self.shots += 1
@@ -139,6 +143,33 @@ def test_motion_that_stays_on_the_gpu_is_that_of_arrays():
     even = np.array([2, 2, 2 / 3, 2 / 3], "f4")  # its own interval is 0.2 s, those around 0.1, 0.3
     off = np.abs(exposed.motion(2) - want * even)
     assert np.median(off) < 0.05 and (off < 0.5).mean() > 0.9
+
+
+def test_the_motion_of_neighbours_has_all_pictures_that_it_depends_on(monkeypatch):
+    """Else it took a picture for the last of its shot, and another time not."""
+    count, width, missing, made = 24, 320, set(), Flow.shot
+
+    def watched(flow, load, depth=True):
+        def loaded(number):
+            picture = load(number)
+            if picture is None and 0 <= number < count:
+                missing.add(number)
+            return picture
+
+        return made(flow, loaded, depth)
+
+    monkeypatch.setattr(Flow, "shot", watched)
+    monkeypatch.setattr(motion, "REACH", 1)
+    blur = Blur("gather")
+    flow = Flow(device=blur.device)
+    noise = np.random.default_rng(1).random((16, width + 2 * count, 3))
+    read = (Picture(float(n), coded(noise[:, 2 * n : 2 * n + width]), n) for n in range(count))
+    shots = ShotReader(read, reach=motion.window((width, 16), flow))
+    frames = VideoFrames(shots, blur, flow)
+    for number in (11, 12):
+        shots.cells(number, 1.0, Shutter(180))
+        frames.in_shot(number)
+    assert not missing
 
 
 def test_a_cut_ends_exposures_and_motion():

@@ -24,6 +24,9 @@ class Sideways:
     def __init__(self):
         self.asked = set()
 
+    def reach(self, size):
+        return 1
+
     def shot(self, load, depth=True):
         def found(number):
             here = load(number)

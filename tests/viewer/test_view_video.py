@@ -116,6 +116,9 @@ class Held:
         self.made, self.free = [], True
         self.dis = Dis("best")
 
+    def reach(self, size):
+        return 4
+
     def shot(self, load, depth=True):
         found = self.dis.shot(load)
 

@@ -8,6 +8,7 @@ import wgpu
 from .. import gpu
 from ..errors import InputError, did_you_mean
 from .passes import FlowPasses
+from .pyramid import level_sizes
 from .shot import EFFORTS, IN_SOFTWARE, Load, Shot
 
 
@@ -37,6 +38,10 @@ class Flow:
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         in_software = self.device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self._effort = (EFFORTS | IN_SOFTWARE if in_software else EFFORTS)[quality]
+
+    def reach(self, size: tuple[int, int]) -> int:
+        """Frames to either side of one that its motion may depend on: one more for every level."""
+        return 1 + len(level_sizes(self._effort.searched_size(size)))
 
     def shot(self, load: Load, depth: bool = True) -> Shot:
         """Flow of the frames of a shot.

@@ -21,7 +21,7 @@ from .data_windows import Placement
 from .dependencies import Dependencies
 from .files import SequenceFiles
 from .findings import SequenceFindings
-from .flow_motion import FAR, PictureMotion, standing
+from .flow_motion import PictureMotion, standing
 from .frame_builder import OPTIONAL, FrameBuilder
 from .frame_cache import FrameCache
 from .frame_file import FrameFile
@@ -151,7 +151,7 @@ class Clip:
     def move_by(self, motion: MotionSource | None) -> None:
         """Find motion in the pictures (see wgmb/flow) if the files hold none; None: all stand."""
         self.builder.picture_motion = PictureMotion(self.cache, motion) if motion else standing
-        self.cache.margin = FAR if motion else 0
+        self.cache.margin = 0  # a source of motion widens it
         self._neighbours.forget_all()
 
     def expand_highlights(self, highlights: float) -> None:

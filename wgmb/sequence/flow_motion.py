@@ -10,7 +10,7 @@ from ..shots.motion import Found, MotionSource, ShotMotion
 from .frame_cache import FrameCache
 from .frame_file import FrameFile
 
-FAR = 5  # frames around one that its motion may depend on
+FAR = 9  # frames around one that its motion may depend on, in pictures of up to 16,384 px
 
 
 def standing(source: FrameFile) -> Found:
@@ -33,6 +33,8 @@ class PictureMotion:
     def __call__(self, source: FrameFile) -> Found | None:
         """None where a frame is alone in its shot."""
         number, view = source.number, source.view
+        height, width = source.rgba.shape[:2]
+        self._stored.margin = max(self._stored.margin, self._motion.reach((width, height)))
         if view not in self._views:
             self._views[view] = ShotMotion(
                 self._motion,
@@ -47,7 +49,7 @@ class PictureMotion:
 
     def _same_shot(self, a: int, b: int, view: str | None) -> bool:
         """True if no cut lies between two frames; frames far apart count as different shots."""
-        if abs(a - b) > 2 * FAR:
+        if abs(a - b) > 2 * self._stored.margin:
             return False
         return not any(self._is_cut(n, view) for n in range(min(a, b) + 1, max(a, b) + 1))
 
@@ -55,7 +57,7 @@ class PictureMotion:
         """True if a cut, a gap, or another data window lies before a frame."""
         key = number, view
         if key not in self._cuts:
-            while len(self._cuts) > 8 * FAR:
+            while len(self._cuts) > 8 * self._stored.margin:
                 self._cuts.pop(next(iter(self._cuts)))
             before, after = (self._source(n, view) for n in (number - 1, number))
             self._cuts[key] = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -19,7 +20,7 @@ _INSIDE = 0.05  # share of probes that must still be in the neighbour's picture
 _MOST = 0.5  # difference of tones beyond which a pixel has merely changed
 _JUMP = 8  # times the motion to the other side
 _FAR = 0.1  # of the picture's width
-SMALL = 96  # pixels of width of the copies that are compared where there are no vectors
+_SMALL = 96  # pixels of width of the copies that are compared where there are no vectors
 _BLOCK = 8  # pixels a side
 _SEARCH = 0.2  # of the width: farther nothing is looked for
 _STEP = 2  # pixels between places where a block is looked for
@@ -38,10 +39,18 @@ def pictures_differ(before: np.ndarray, after: np.ndarray) -> bool:
     return smalls_differ(_small(before), _small(after))
 
 
+def small_step(width: int, height: int) -> int:
+    """Pixels of a picture along each axis of one pixel of its small copy.
+
+    The copy is about 96 pixels wide; that of a band is at least two blocks high.
+    """
+    return max(1, min(width // _SMALL, height // (2 * _BLOCK)))
+
+
 def smalls_differ(a: np.ndarray, b: np.ndarray) -> bool:
     """Return True if a cut lies between two pictures, of which these are small copies.
 
-    Copies are display values (height, width, 3), about SMALL pixels wide. Blocks of one are looked
+    Copies are display values (height, width, 3); see small_step. Blocks of one are looked
     for in the other within a fifth of the width. Measured: what is left is 0.55 to 0.63 of the
     blocks' own contrast where all moves, by up to 118 of 640 px, and 0.97 to 1.48 between unrelated
     pictures. A fade is no cut: its pictures are compared at equal brightness and contrast, where
@@ -72,11 +81,11 @@ def _follows(a: np.ndarray, b: np.ndarray, share: float, least: float) -> bool:
     blocks = _blocks(a)
     contrast = np.abs(blocks - blocks.mean(axis=(1, 3), keepdims=True)).sum(axis=4).mean()
     most = share * max(float(contrast), least)
-    reach = round(_SEARCH * b.shape[1] / _STEP) * _STEP
+    reach = round(_SEARCH * min(b.shape[1], 2 * _SMALL) / _STEP) * _STEP
     a = np.ascontiguousarray(np.moveaxis(a, 2, 0))  # planes: sums along rows are quick
     b = np.pad(np.moveaxis(b, 2, 0), ((0, 0), (reach, reach), (reach, reach)), mode="edge")
     left, apart = np.full((height, width), np.inf), np.empty_like(a)
-    for y, x in _ways(reach):
+    for y, x in _ways(min(reach, a.shape[1]), reach):
         there = b[:, reach + y : reach + y + a.shape[1], reach + x : reach + x + a.shape[2]]
         np.abs(np.subtract(a, there, out=apart), out=apart)
         rows = apart.sum(axis=0).reshape(height, _BLOCK, -1).sum(axis=1)
@@ -87,10 +96,10 @@ def _follows(a: np.ndarray, b: np.ndarray, share: float, least: float) -> bool:
 
 
 @cache
-def _ways(reach: int) -> list[tuple[int, int]]:
-    """Displacements up to `reach` pixels down and across, the shortest first."""
-    ways = range(-reach, reach + 1, _STEP)
-    return sorted(((y, x) for y in ways for x in ways), key=lambda way: way[0] ** 2 + way[1] ** 2)
+def _ways(down: int, across: int) -> list[tuple[int, int]]:
+    """Displacements up to so many pixels down and across, the shortest first."""
+    rows, columns = (range(-n, n + 1, _STEP) for n in (down, across))
+    return sorted(product(rows, columns), key=lambda way: way[0] ** 2 + way[1] ** 2)
 
 
 def copies(a: np.ndarray, b: np.ndarray) -> bool:
@@ -114,8 +123,8 @@ def _blocks(plane: np.ndarray) -> np.ndarray:
 
 
 def _small(color: np.ndarray) -> np.ndarray:
-    """Display values of a copy that is at least SMALL pixels wide, if the picture is."""
-    step = max(1, color.shape[1] // SMALL)
+    """Display values of the small copy of a picture."""
+    step = small_step(color.shape[1], color.shape[0])
     height, width = (n // step for n in color.shape[:2])
     cut = color[: height * step, : width * step, :3]
     parts = cut.reshape(height, step, width * step, 3).mean(axis=1, dtype=np.float32)

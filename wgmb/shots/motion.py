@@ -7,11 +7,17 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from .reader import REACH
+
 Found = tuple[np.ndarray, np.ndarray | None]
 
 
 class MotionSource(Protocol):
     """Motion from pictures: Flow (wgmb/flow) and Dis are two."""
+
+    def reach(self, size: tuple[int, int]) -> int:
+        """Frames to either side of one that its motion may depend on, by their width and height."""
+        ...
 
     def shot(self, load: Callable[[int], Any], depth: bool = True) -> Callable[[int], Found | None]:
         """Motion (height, width, 4) [px] and depth of a shot's frames, by their number.
@@ -20,6 +26,11 @@ class MotionSource(Protocol):
         may leave the depth out, as None.
         """
         ...
+
+
+def window(size: tuple[int, int], *sources: MotionSource | None) -> int:
+    """Pictures to keep to either side of one, for its motion and that of its neighbours."""
+    return max([REACH, *(1 + source.reach(size) for source in sources if source is not None)])
 
 
 class ShotMotion:

@@ -16,8 +16,7 @@ from typing import Generic, TypeVar
 from ..exposure import Cell, cells_in_shot
 from ..shutter import Shutter
 
-_BEYOND = 6  # pictures read beyond an exposure: as far as flow looks
-_TO_KEEP = 6  # pictures kept before an exposure
+REACH = 6  # pictures kept before an exposure and read beyond it, where motion looks no farther
 FLASH = 1.01 / 24  # seconds that a flash of several pictures lasts at most
 LONGEST = 10  # pictures of a flash at most
 
@@ -50,6 +49,7 @@ class ShotReader(Generic[T]):
     `known_cuts`: numbers of pictures that begin a shot all the same.
     `is_double(before, after)`: whether a picture only repeats the one before; it is left out, and
     its neighbours' cells reach over its time.
+    `reach`: pictures that are kept before those asked for, and read beyond them.
     `flash`: how long a flash of several pictures lasts at most [s]. `tolerance`: by how much the
     file may have rounded a picture's time [s]; so much earlier, it is shown already.
     """
@@ -61,12 +61,13 @@ class ShotReader(Generic[T]):
         is_cut: Callable[[T, T], bool] | None = None,
         known_cuts: Collection[int] = (),
         is_double: Callable[[T, T], bool] | None = None,
+        reach: int = REACH,
         flash: float = FLASH,
         tolerance: float = 0.0,
     ):
         self._pictures, self._tolerance = pictures, tolerance
         self._is_cut, self._is_double = is_cut, is_double
-        self._known_cuts, self._flash = known_cuts, flash
+        self._known_cuts, self._flash, self._reach = known_cuts, flash, reach
         self._kept: dict[int, Picture[T]] = {}
         self._count = 0
         self._last: Picture[T] | None = None
@@ -85,15 +86,15 @@ class ShotReader(Generic[T]):
         """Indices of the pictures that are kept."""
         return range(min(self._kept, default=0), max(self._kept, default=-1) + 1)
 
-    def at(self, time: float, behind: int = _TO_KEEP) -> int:
+    def at(self, time: float, behind: int = 0) -> int:
         """The index of the picture that is shown at `time`; some after it are kept, too.
 
-        Asked for in the order of time, or as far back as is kept: `behind` pictures.
-        NoPicturesError if there are none.
+        Asked for in the order of time, or as far back as is kept: `behind` pictures, and not less
+        than the reach. NoPicturesError if there are none.
         """
         self.read_beyond(time)
         here = self._index_at(time)
-        self._forget_before(here - behind)
+        self._forget_before(here - max(behind, self._reach))
         return here
 
     def cells(self, at: float, interval: float, shutter: Shutter) -> list[Cell]:
@@ -111,7 +112,7 @@ class ShotReader(Generic[T]):
             return self._kept[index].time
 
         found = cells_in_shot(here, neighbour, time, at, interval, shutter)
-        self._forget_before(min(found[0].index, here) - _TO_KEEP)
+        self._forget_before(min(found[0].index, here) - self._reach)
         return found
 
     def same_shot(self, index: int, other: int) -> bool:
@@ -141,7 +142,7 @@ class ShotReader(Generic[T]):
     def read_beyond(self, time: float) -> None:
         """Read some pictures after the one that is shown at `time`, as far as there are."""
         beyond = sum(picture.time > time for picture in self._kept.values())
-        while beyond < _BEYOND and self._read_one():
+        while beyond < self._reach and self._read_one():
             beyond += self._kept[self._count - 1].time > time
 
     def _read_one(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import chain, islice
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,7 +19,7 @@ from ..gpu.textures import TexturePool
 from ..methods.contract import reach_of
 from ..pipeline.blur import Blur
 from ..pipeline.exposure_sum import ExposureSum, Part
-from ..shots.motion import MotionSource
+from ..shots.motion import MotionSource, window
 from ..shots.reader import FLASH, Picture, ShotReader
 from ..shutter import Shutter
 from .clock import Clock
@@ -33,7 +34,7 @@ Fallback = tuple[Blur, MotionSource]
 """A blur of the pictures of which the source of motion loses too much, and its own source."""
 Views = Sequence[tuple[VideoFrames, Blur]]
 """Pictures with their motion, and what blurs them: as usual, and where there is a fallback, its."""
-_BEFORE = 10  # pictures decoded before the first exposure, which its motion may depend on
+_BEFORE = 14  # pictures decoded before the first exposure, which its motion may depend on
 
 
 class Exposures:
@@ -88,11 +89,14 @@ class Exposures:
 
         `pictures` and `wanted`, in the order of their times, are read as far as is needed.
         """
+        begin = list(islice(pictures, 1))
+        size = begin[0].content.coded.size if begin else (1, 1)
         self.shots = shots = ShotReader(
-            pictures,
+            chain(begin, pictures),
             is_cut=is_cut if self._cuts else None,
             known_cuts=self._known_cuts,
             is_double=is_double if self._fill else None,
+            reach=window(size, self._motion, self._fallback and self._fallback[1]),
             flash=self._flash,
             tolerance=self._tolerance,
         )

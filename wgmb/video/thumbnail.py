@@ -18,8 +18,8 @@ from ..color.coding import (
 from ..color.srgb import srgb
 from ..shots.cuts import (
     SAMPLED,
-    SMALL,
     copies,
+    small_step,
     smalls_differ,
 )
 from .planes.matrices import from_samples
@@ -50,9 +50,9 @@ class Thumbnail:
 
     @cached_property
     def small(self) -> np.ndarray:
-        """(height, width, 3) display values of a copy about SMALL pixels wide."""
+        """(height, width, 3) display values of a small copy; see small_step."""
         width, height = self.coded.size
-        step = max(1, width // SMALL)
+        step = small_step(width, height)
         size = width // step, height // step
         luma, *chroma = self._colors
         planes = [_means(luma, size, step, (1, 1), min(step, _LUMA_ROWS), whole=True)]

@@ -34,6 +34,10 @@ class BetterMatch:
     def __init__(self, quick: Dis, search: Flow):
         self._quick, self._search = quick, search
 
+    def reach(self, size: tuple[int, int]) -> int:
+        """Frames to either side of one that its motion may depend on."""
+        return max(self._quick.reach(size), self._search.reach(size))
+
     def shot(
         self, load: Callable[[int], Both | None], depth: bool = True
     ) -> Callable[[int], Found | None]:

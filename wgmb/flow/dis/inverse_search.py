@@ -20,7 +20,7 @@ from ...errors import InputError
 from .consistency import REACH, SPACING, Consistency
 
 QUALITIES = ("fast", "best")
-_LEAST = 16  # pixels a side that OpenCV needs
+_LEAST = 32  # pixels a side below which OpenCV fails; smaller pictures are continued
 _APART = 0.005  # per pixel that a motion is off that of most of the picture, by which it is nearer
 Load = Callable[[int], np.ndarray | None]
 Found = tuple[np.ndarray, np.ndarray | None]
@@ -45,6 +45,10 @@ class Dis:
         if not fast:
             self._flow.setFinestScale(0)
         self._shots: list[Consistency] = []
+
+    def reach(self, size: tuple[int, int]) -> int:
+        """Frames to either side of one that its motion, or what it loses, depends on."""
+        return REACH + 1
 
     def shot(self, load: Load, depth: bool = True) -> DisShot:
         """Motion (height, width, 4) to_prev, to_next [px] and depth of a shot's frames.
@@ -97,9 +101,13 @@ class Dis:
         return np.minimum(prev, next)
 
     def _way(self, here: np.ndarray, other: np.ndarray) -> np.ndarray:
-        if min(here.shape) < _LEAST:
-            return np.zeros((*here.shape, 2), np.float32)
-        return self._flow.calc(here, other, None)
+        height, width = here.shape
+        if min(here.shape) >= _LEAST:
+            return self._flow.calc(here, other, None)
+        more = 0, max(_LEAST - height, 0), 0, max(_LEAST - width, 0)  # above, below, left, right
+        edge = self._cv2.BORDER_REPLICATE
+        grown = (self._cv2.copyMakeBorder(p, *more, edge) for p in (here, other))
+        return np.ascontiguousarray(self._flow.calc(*grown, None)[:height, :width])
 
     def _depth(self, way: np.ndarray) -> np.ndarray:
         """Depth by motion: pixels that do not move like most of the picture are nearer."""

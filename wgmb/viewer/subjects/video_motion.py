@@ -14,7 +14,7 @@ import numpy as np
 import wgpu
 
 from ...shots.cut_list import CutList
-from ...shots.motion import MotionSource
+from ...shots.motion import MotionSource, window
 from ...shots.reader import NoPicturesError, Picture, ShotReader
 from ...video.holdouts import NONE, Held, holdout_of
 from ...video.motion import VideoMotion
@@ -132,6 +132,7 @@ class PictureFinder:
             is_cut=self._is_cut if self._cuts.is_search else None,
             known_cuts=self._cuts.frames(0),
             is_double=is_double if self._fill else None,
+            reach=window(self._reader.size, self._source),
             tolerance=self._reader.tolerance,
         )
         source = self._source
