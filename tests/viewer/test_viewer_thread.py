@@ -14,6 +14,7 @@ from wgmb import InputError, gpu
 from wgmb.io import exr
 from wgmb.sequence.layers.vector_convention import ConventionFinder
 from wgmb.viewer import offscreen
+from wgmb.viewer.draw import draw_thread
 from wgmb.viewer.draw.composer import NOTHING
 from wgmb.viewer.draw.portions import DroppedError, Portions
 from wgmb.viewer.draw.quality import Quality
@@ -153,6 +154,14 @@ def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with()
     assert seen[-1] == (whole, whole, False, False)
 
 
+def test_a_look_and_a_comparison_at_once_are_shown_one_after_the_other(viewer):
+    seen_until(viewer, lambda: is_final(viewer))
+    viewer.state = put(STATE, look="depth", compare="wipe", against="tiles")
+    seen_until(viewer, lambda: is_final(viewer))
+    first, second = viewer._drawn.sides(False)
+    assert first.kind == "DEPTH" and second.kind == "COLOR" and second.array.any()
+
+
 def test_an_image_is_not_measured_against_the_reference_of_another_size(monkeypatch):
     monkeypatch.setattr(Quality, "ENOUGH", 1)
     renderer = Renderer(gpu.open_device())
@@ -204,6 +213,17 @@ def test_another_setting_drops_what_is_drawn_but_playing_does_not(viewer):
     shown = Request(put(STATE, exposure=2.0, wipe=0.1), AREA)
     stage._drawing, stage._wanted = still, shown
     assert stage._is_wanted()
+
+
+def test_what_goes_wrong_after_drawing_ends_the_viewer_too(monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("broken")
+
+    monkeypatch.setattr(draw_thread._Downloads, "answer", broken)
+    viewer = offscreen(STATE, SMALL, threaded=True)
+    with pytest.raises(ZeroDivisionError, match="broken"):
+        seen_until(viewer, lambda: False)
+    viewer.close()
 
 
 def test_what_cannot_be_drawn_is_a_message_and_the_last_state_stays(viewer):

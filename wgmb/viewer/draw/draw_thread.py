@@ -120,23 +120,21 @@ class DrawThread:
             started = time.perf_counter()
             try:
                 drawn = renderer.draw(request, started)
+                report, busy = drawn.report, drawn.report.busy
+                reached = report.waiting, report.reference, report.measured, {*drawn.under}
+                if not report.changed and (request, busy, *reached) == last:
+                    time.sleep(_PAUSE)  # until the mouse is still, or motion is found
+                    continue
+                last = request, busy, *reached
+                self._publish(images.answer(renderer, drawn))
+                renderer.finished(time.perf_counter() - started, drawn.state.scene.antialias)
             except DroppedError:
                 busy = True
-                continue
             except Exception as error:  # which the window raises
                 busy = False
                 with self._changed:
                     self._failed = request, error
                 self._news()
-                continue
-            report, busy = drawn.report, drawn.report.busy
-            told = request, busy, report.waiting, report.reference, report.measured, {*drawn.under}
-            if report.changed or told != last:
-                last = told
-                self._publish(images.answer(renderer, drawn))
-                renderer.finished(time.perf_counter() - started, drawn.state.scene.antialias)
-            else:
-                time.sleep(_PAUSE)  # until the mouse is still, or motion is found
         renderer.choices.close()
 
     def _publish(self, answer: _Answer) -> None:

@@ -190,8 +190,11 @@ class Renderer:
     def _displayed(
         self, slots: tuple[str, ...], state: State, subject: Subject
     ) -> dict[str, Image]:
-        """The images by slot, colours as the display of an OpenColorIO config shows them."""
-        images = {slot: self._slots[slot].image for slot in slots}
+        """The images by slot, colours as the display of an OpenColorIO config shows them.
+
+        None of a second slot that is not drawn yet.
+        """
+        images = {slot: self._slots[slot].image for slot in slots if self._slots[slot].texture}
         displayed, self.chromaticities = self.choices.displayed, {}
         if isinstance(subject, VideoSubject):
             self.chromaticities = {"chromaticities": primaries_of(subject.coding)}
