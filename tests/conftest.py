@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import wgpu
 
+import sampler
 import standard
 import tiers
 from wgmb import gpu
@@ -52,6 +53,12 @@ def _without_a_gpu(request, monkeypatch):
 @pytest.fixture(scope="session")
 def device():
     return gpu.open_device()
+
+
+@pytest.fixture(scope="session")
+def mixing(device):
+    """The greatest error of a colour of 0..1 that this device's sampler mixes of four texels."""
+    return 2 * sampler.greatest_error(device)
 
 
 @pytest.fixture(scope="session")

@@ -489,7 +489,7 @@ def scatter(frame, tiles, span, slices, own):
     crowded = [tile["missed"] for row in tiles for tile in row if tile["crowded"]]
     sources = set().union(*crowded)
     exact = frame.depth[0].astype("f4")
-    depths = (exact.view("u4") >> 17 << 17).view("f4")
+    depths = (exact.view("u4") + np.uint32(256) >> 17 << 17).view("f4")
     quads = [
         min(((y, x) for y in (j, min(j + 1, height - 1)) for x in (i, min(i + 1, width - 1))),
             key=lambda at: exact[at])

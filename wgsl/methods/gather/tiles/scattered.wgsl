@@ -9,6 +9,7 @@ const LEAST_SCATTERED: f32 = 1.0;   // what moves less per frame interval [px] n
 const PLACE_BITS: u32 = 9u;         // of x and y each, as far as motions are followed
 const HALF_PLACE: i32 = 256;        // [px]
 const LOST_BITS: u32 = 17u;         // of a depth, which is known to 1/64 of itself
+const DEPTH_NOISE: u32 = 256u;      // last places by which depths that are equal may differ
 
 /// The slices in a buffer of so many words, for so many frames.
 fn slice_count(words: u32, frames: u32) -> u32 {
@@ -40,7 +41,8 @@ fn pack_scattered(px: vec2u, block: vec2u, depth: f32) -> u32 {
     let off = vec2i(px) - vec2i(block * BLOCK) + HALF_PLACE;
     let is_near = all(off >= vec2i(0)) && all(off < vec2i(2 * HALF_PLACE));
     let place = u32(off.x) | (u32(off.y) << PLACE_BITS);
-    return select(0u, ~(((bitcast<u32>(depth) >> LOST_BITS) << (2u * PLACE_BITS)) | place), is_near);
+    let known = (bitcast<u32>(depth) + DEPTH_NOISE) >> LOST_BITS;
+    return select(0u, ~((known << (2u * PLACE_BITS)) | place), is_near);
 }
 
 /// The pixel in a word that is not 0.
