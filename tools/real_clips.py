@@ -23,8 +23,8 @@ import numpy as np
 from wgmb import Blur, Flow, Frame, metrics
 from wgmb.color.srgb import linear, srgb, to_display
 from wgmb.flow.dis import Dis
+from wgmb.flow.dis.better_match import BetterMatch, Both
 from wgmb.io import stills
-from wgmb.shots.better import BetterMatch, Both
 
 DEGREES = 180
 COPIES = 16  # pictures that minterpolate makes of one

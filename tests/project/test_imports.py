@@ -64,6 +64,7 @@ LOCKS = {  # modules that take locks, beside `threads`, where threads start
 }  # fmt: skip
 FILES = sorted(PACKAGE.rglob("*.py"))
 KERNELS = sorted(SHADERS.rglob("*.wgsl"))
+TOOLS = sorted((ROOT / "tools").rglob("*.py"))
 
 
 def place_of(file: Path) -> str:
@@ -96,6 +97,14 @@ def test_imports_point_upwards_in_the_table_and_third_parties_stay_at_home(file)
             assert ok, f"{folder} imports {'.'.join(module)}"
         elif module[0] in HOMES:
             assert folder in HOMES[module[0]], f"{folder} imports {module[0]}"
+
+
+@pytest.mark.parametrize("file", TOOLS, ids=lambda f: str(f.relative_to(ROOT)))
+def test_tools_import_modules_that_are_there(file):
+    for module in imported(file, ROOT):
+        if module[0] == "wgmb" and module[1:2] != ["tools"]:  # which is a folder beside it
+            place = PACKAGE.joinpath(*module[1:-1])
+            assert place.is_dir() or place.with_suffix(".py").is_file(), ".".join(module)
 
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -136,7 +145,7 @@ def test_what_is_not_of_the_core_has_an_extra():
 
 @pytest.mark.parametrize(
     "folder",
-    sorted({file.parent for file in [*FILES, *KERNELS, *(ROOT / "tools").rglob("*.py")]}),
+    sorted({file.parent for file in [*FILES, *KERNELS, *TOOLS]}),
     ids=lambda folder: str(folder.relative_to(ROOT)),
 )
 def test_a_folder_can_be_looked_over(folder):
