@@ -45,6 +45,8 @@ _AFTER_EVENT = 3  # frames: ImGui hides what appears for its first one
 _MESSAGE = 4.0  # seconds a message stays
 _WAIT = 0.03  # seconds between frames that only wait for a video's motion
 _TIMES = 90  # frames in the plots
+_RATE = 60  # frames of the window in a second, at most
+_RATE_BESIDE = 30  # without a GPU, where each takes 10 ms from what is drawn beside it
 _TURN = 0.0005  # seconds that a thread may keep the window's waiting for the interpreter
 _HANDLED = ("pointer_down", "pointer_up", "pointer_move", "wheel", "key_down", "key_up")
 _SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "char", "resize")
@@ -485,7 +487,8 @@ def view(
             viewer.canvas.release_surface()
             super().close()
 
-    canvas = Window(title=TITLE, size=size, update_mode="ondemand", max_fps=60)
+    rate = _RATE_BESIDE if devices.get("threaded") else _RATE
+    canvas = Window(title=TITLE, size=size, update_mode="ondemand", max_fps=rate)
 
     def soon(call: Callable[[], None]) -> None:
         with suppress(AttributeError, RuntimeError):  # the loop has ended

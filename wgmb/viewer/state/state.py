@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -222,8 +223,7 @@ class State:
         """First and last frame of `frames`; of a video, of the output."""
         if self.is_video:
             return 0, len(video_time.output(self).frames) - 1
-        numbers = frame_numbers.frame_numbers(self.frames)
-        return min(numbers), max(numbers)
+        return _ends(self.frames)
 
     def opened(self, source: str, max_mb: float = limits.MAX_MB) -> State:
         """The same state with another scene or other files, seen anew.
@@ -396,3 +396,10 @@ class State:
 
 
 _SHOWING = (*(name for name in saved.VIEW if name != "frame"), "help", "kept", "inspect", "arrows")
+
+
+@lru_cache(maxsize=8)
+def _ends(frames: str) -> tuple[int, int]:
+    """First and last of frame numbers; to read them takes a tenth of a frame of the window."""
+    numbers = frame_numbers.frame_numbers(frames)
+    return min(numbers), max(numbers)

@@ -64,8 +64,9 @@ fn texel(@builtin(position) at: vec4f) -> @location(0) vec4f {
 /// Display values of the pixel whose centre is `at`.
 fn shown(at: vec2f) -> vec3f {
     if !inside(at, view.area) { return BACKGROUND; }
-    if inside(at, view.key) { return color_bar(at); }
+    if (FIRST == DEPTH || COMPARE == ERROR) && inside(at, view.key) { return color_bar(at); }
     let color = comparison(at);
+    if FIRST != MOTION { return color; }
     return select(color, wheel(at, color), inside(at, view.wheel));
 }
 
