@@ -55,6 +55,12 @@ def device():
     return gpu.open_device()
 
 
+@pytest.fixture
+def as_without_a_gpu(device, monkeypatch):
+    """What wgmb does in software, on any device."""
+    monkeypatch.setattr(gpu, "SOFTWARE", device.adapter_info["adapter_type"])
+
+
 @pytest.fixture(scope="session")
 def mixing(device):
     """The greatest error of a colour of 0..1 that this device's sampler mixes of four texels."""

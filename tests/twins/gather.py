@@ -492,7 +492,7 @@ def scatter(frame, tiles, span, slices, own):
     depths = (exact.view("u4") + np.uint32(256) >> 17 << 17).view("f4")
     quads = [
         min(((y, x) for y in (j, min(j + 1, height - 1)) for x in (i, min(i + 1, width - 1))),
-            key=lambda at: exact[at])
+            key=lambda at: depths[at])
         for j in range(0, height, 2) for i in range(0, width, 2)
     ]  # fmt: skip
     for k in range(slices):

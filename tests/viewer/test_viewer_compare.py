@@ -9,6 +9,7 @@ from wgmb.color.srgb import srgb
 from wgmb.scene import builtin
 from wgmb.viewer import controls
 from wgmb.viewer.draw import renderer
+from wgmb.viewer.draw.adaptive import Pace
 from wgmb.viewer.draw.place import key_box
 
 pytest_plugins = ["viewer_hand"]
@@ -106,6 +107,8 @@ def test_the_reference_converges_and_is_measured(small, monkeypatch):
 
 def test_what_is_shown_never_has_less_in_it_than_before(small, monkeypatch):
     monkeypatch.setattr(renderer, "_STEP", 0.0)  # a few samples at a time
+    monkeypatch.setattr(small.viewer.stage, "_is_slow", True)
+    monkeypatch.setattr(small.viewer.stage, "pace", Pace(5))
     small.viewer.state = put(ALONE, method="accumulate", samples=32)
     want, shown = small.picture(), small.viewer.stage._slots
     small.submit("pointer_down", x=50, y=40, button=1, buttons=(1,))

@@ -106,6 +106,7 @@ def test_it_says_which_method_and_why():
     assert inspector.method_line(state, flat) == "method   tap, 16 samples (no depth)"
 
 
+@pytest.mark.usefixtures("as_without_a_gpu")
 def test_a_preview_is_not_called_by_the_method_that_it_stands_for():
     state, can = put(ALONE, method="gather"), available(METHODS, ["result", "depth"])
     assert inspector.method_line(state, can, True) == "method   tap, a preview of gather"

@@ -101,6 +101,7 @@ def test_the_window_goes_on_while_something_is_drawn(monkeypatch):
         viewer.close()
 
 
+@pytest.mark.usefixtures("as_without_a_gpu")
 def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
     renderer = Renderer(gpu.open_device())
     seen = []
@@ -135,6 +136,7 @@ def test_frames_are_first_shown_as_they_are_before_their_vectors_are_tested(monk
     np.testing.assert_array_equal(renderer.download(), whole(state))
 
 
+@pytest.mark.usefixtures("as_without_a_gpu")
 def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with():
     renderer = Renderer(gpu.open_device())
     kept = put(STATE, shutter=90.0).keeping()

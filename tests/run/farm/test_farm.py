@@ -7,16 +7,18 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import farm_stubs
 import pytest
 from make_job import job_of
 
 import make_frames as make
-from wgmb import DeviceError
+from wgmb import DeviceError, gpu
 from wgmb.extras import install_command
 from wgmb.run.farm import farm as farming
 from wgmb.run.farm.farm import Farm, as_farm_job
+from wgmb.run.farm.workers import hardware_adapters
 
 COUNT = 12
 
@@ -92,6 +94,16 @@ def test_a_real_worker_without_a_gpu_is_named_once(shot, whole, tmp_path):
     assert "does nothing: no GPU adapter" in notes[0]
 
 
+def test_workers_take_the_adapter_that_the_environment_names(monkeypatch):
+    """On a machine with two GPUs, of which the environment names one."""
+    monkeypatch.delenv("WGMB_ADAPTER", raising=False)
+    info = {"adapter_type": "DiscreteGPU", "backend_type": "Vulkan"}
+    monkeypatch.setattr(gpu, "adapters", lambda: [SimpleNamespace(info=info)] * 2)
+    assert hardware_adapters() == ["0", "1"]
+    monkeypatch.setenv("WGMB_ADAPTER", "1")
+    assert hardware_adapters() == []
+
+
 @DASK_LEAVES_SOCKETS
 def test_workers_have_the_environment_of_today(shot, whole, tmp_path, monkeypatch):
     """Though the process that they are forked from may have begun with another one."""
@@ -150,7 +162,8 @@ def test_for_a_worker_that_is_lost_at_its_start_another_one_comes(monkeypatch):
 def test_a_worker_that_is_named_is_so_in_the_words_of_the_command_line(
     shot, tmp_path, capsys, monkeypatch
 ):
-    monkeypatch.setenv("VK_ICD_FILENAMES", os.devnull)
+    for driver in ("VK_ICD_FILENAMES", "VK_DRIVER_FILES", "__EGL_VENDOR_LIBRARY_FILENAMES"):
+        monkeypatch.setenv(driver, os.devnull)
     code, _, err = make.inside(capsys, *words(shot, tmp_path / "out", "--workers", 1))
     assert code == 3
     assert "worker 0 on" in err

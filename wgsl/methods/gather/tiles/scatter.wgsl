@@ -32,7 +32,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) group
     for (var i = 1u; i < 4u; i++) {
         let other = min(corner + vec2u(i % 2u, i / 2u), frame.size - 1u);
         let at = textureLoad(front_surface, other, 0);
-        let is_nearer = abs(unpack_depth(at)) < abs(unpack_depth(surface));
+        let is_nearer = known_depth(abs(unpack_depth(at))) < known_depth(abs(unpack_depth(surface)));
         px = select(px, other, is_nearer);
         surface = select(surface, at, is_nearer);
     }

@@ -36,13 +36,17 @@ fn scattered_index(f: u32, slice: u32, slices: u32, block: vec2u) -> u32 {
     return ((f * slices + slice) * blocks.y + block.y) * blocks.x + block.x;
 }
 
+/// The depth as far as it is known; depths that are equal but for rounding are the same.
+fn known_depth(depth: f32) -> u32 {
+    return (bitcast<u32>(depth) + DEPTH_NOISE) >> LOST_BITS;
+}
+
 /// The word of a pixel of that depth; 0 if it is too far from the block.
 fn pack_scattered(px: vec2u, block: vec2u, depth: f32) -> u32 {
     let off = vec2i(px) - vec2i(block * BLOCK) + HALF_PLACE;
     let is_near = all(off >= vec2i(0)) && all(off < vec2i(2 * HALF_PLACE));
     let place = u32(off.x) | (u32(off.y) << PLACE_BITS);
-    let known = (bitcast<u32>(depth) + DEPTH_NOISE) >> LOST_BITS;
-    return select(0u, ~((known << (2u * PLACE_BITS)) | place), is_near);
+    return select(0u, ~((known_depth(depth) << (2u * PLACE_BITS)) | place), is_near);
 }
 
 /// The pixel in a word that is not 0.
