@@ -57,7 +57,7 @@ def device():
 
 @pytest.fixture
 def as_without_a_gpu(device, monkeypatch):
-    """What wgmb does in software, on any device."""
+    """The ways of software, on any device."""
     monkeypatch.setattr(gpu, "SOFTWARE", device.adapter_info["adapter_type"])
 
 

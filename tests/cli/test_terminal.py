@@ -142,7 +142,7 @@ def closed(number: int):
     ("prepare", "command", "code", "said"),
     [
         (full(2), "info nowhere.exr", 2, ""),
-        (closed(2), "info nowhere.exr", 2, ""),
+        pytest.param(closed(2), "info nowhere.exr", 2, "", marks=pytest.mark.full),
         (closed(1), "info still.png", 1, "wgmb: standard output: bad file descriptor\n"),
         (closed(1), "shutter -o shutter.svg", 1, "wgmb: standard output: bad file descriptor\n"),
     ],

@@ -54,6 +54,7 @@ def test_the_page_shows_what_the_run_shows(book):
         assert np.abs(a - b).mean() < 0.5
 
 
+@pytest.mark.full
 def test_downloaded_alone_it_renders_its_own_frames(tmp_path):
     first = nbformat.read(make_notebook.PATH, as_version=4).cells[1].source
     (tmp_path / "alone").mkdir()

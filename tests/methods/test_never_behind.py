@@ -82,7 +82,7 @@ def test_gather_is_behind_nowhere_else(name, degrees):
 
 
 @pytest.mark.covers(0)
-@pytest.mark.parametrize("name", ["foliage", *BUILT_IN, "beginner"])
+@pytest.mark.parametrize("name", ["soft_disk", "foliage", *BUILT_IN, "beginner"])
 def test_a_shutter_that_is_hardly_open_shows_the_frame(name):
     """With all silhouettes separated, 44 to 55 dB: coverage told by colours, and backgrounds of
     neighbours, are not the frame's."""

@@ -286,8 +286,8 @@ def several():
 @pytest.mark.parametrize("curve", [pytest.param("box", marks=pytest.mark.full), "triangle"])
 def test_several_volumes_are_their_twin(curve):
     shutter = Shutter(360, curve=curve)
-    got = wgmb.Render(several(), wgmb.Blur("volume", shutter=shutter), fps=24, size=(64, 36))(0.3)
-    want = twin.picture(several(), 0.3, shutter, 24, (64, 36))
+    got = wgmb.Render(several(), wgmb.Blur("volume", shutter=shutter), fps=24, size=(40, 22))(0.3)
+    want = twin.picture(several(), 0.3, shutter, 24, (40, 22))
     apart = np.abs(srgb(got[..., :3]) - want).max(axis=-1)
     assert (apart > 0.01).mean() < 0.005
 

@@ -60,6 +60,7 @@ sys.exit(code)
 """
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("command", ["info", "blur"])
 @pytest.mark.parametrize("kind", ["frame", "video"])
 def test_a_command_neither_connects_nor_starts_a_program(tmp_path, command, kind):

@@ -57,6 +57,7 @@ def write_video(path, rate):
     return path
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize("fps_in, fps", [(24, "24"), (24, "60"), (24, "6"), (60, "24")])
 @pytest.mark.parametrize("flow", ["none", "dis", pytest.param("search", marks=pytest.mark.full)])
 def test_pictures_are_those_of_the_file(tmp_path, device, flow, fps_in, fps):

@@ -59,7 +59,11 @@ def ignore_ctrl_c():
 
 @pytest.mark.parametrize(
     ("number", "prepare"),
-    [(signal.SIGINT, None), (signal.SIGTERM, None), (signal.SIGTERM, ignore_ctrl_c)],
+    [
+        (signal.SIGINT, None),
+        pytest.param(signal.SIGTERM, None, marks=pytest.mark.full),
+        (signal.SIGTERM, ignore_ctrl_c),
+    ],
     ids=["Ctrl-C", "SIGTERM", "SIGTERM in the background"],
 )
 def test_an_interrupted_run_ends_with_130_one_line_and_whole_files(
@@ -127,6 +131,7 @@ def test_a_library_that_breaks_by_itself_is_not(monkeypatch):
         app.main(["devices"])
 
 
+@pytest.mark.covers(1)
 @pytest.mark.parametrize(("words", "code"), [("--version", 0), ("nonsense", 2)])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_after_the_end_changes_no_exit_code(words, code, number):

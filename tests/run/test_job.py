@@ -72,11 +72,11 @@ def check(capsys, pattern, parts, *options, suffix="exr", name="o.####"):
 @pytest.mark.parametrize(
     ("method", "chunk"),
     [
-        ("tap", 1),
+        pytest.param("tap", 1, marks=pytest.mark.full),
         ("gather", 3),
         pytest.param("gather", COUNT, marks=pytest.mark.full),
         pytest.param("gather --reach 2", 3, marks=pytest.mark.full),
-        ("reproject", 4),
+        pytest.param("reproject", 4, marks=pytest.mark.full),
         pytest.param("tiles", 7, marks=pytest.mark.full),
         pytest.param("fusion", 4, marks=pytest.mark.full),
     ],

@@ -148,7 +148,7 @@ def piped(source):
     return stream([picture for _, picture in reader], reader.coding)
 
 
-@pytest.mark.parametrize("flow", ["none", "dis"])
+@pytest.mark.parametrize("flow", ["none", pytest.param("dis", marks=pytest.mark.full)])
 def test_a_pipe_gives_the_pictures_of_the_file(source, piped, tmp_path, flow):
     blur_video(source, tmp_path / "o.mkv", codec="ffv1", fps=60, flow=flow)
     want = [picture.planes for _, picture in VideoReader(tmp_path / "o.mkv")]

@@ -43,6 +43,7 @@ def test_a_whole_video_is_done_and_a_damaged_one_is_made_again(tmp_path, capsys,
     assert make.names_in(tmp_path) == sorted(["in", to.name])
 
 
+@pytest.mark.covers(0)
 @pytest.mark.parametrize(
     "other", [["--shutter", "90"], ["--fps", "25"], ["--frames", "1-3"], ["--samples", "4"]]
 )
