@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from viewer_hand import ALONE, SAMPLE, SMALL, Hand, library, put
-from wgmb import gpu
+from wgmb import Blur, gpu
 from wgmb.color.srgb import srgb
+from wgmb.gpu.textures import TexturePool
 from wgmb.viewer import controls
 from wgmb.viewer.capabilities import Choices
 from wgmb.viewer.draw import blurs
@@ -15,6 +16,7 @@ from wgmb.viewer.draw.adaptive import Pace
 from wgmb.viewer.draw.blurs import Blurs
 from wgmb.viewer.panel.panel import commands
 from wgmb.viewer.state.state import Kept
+from wgmb.viewer.subjects.subject import ClipSubject
 
 LAYOUT = controls.WindowLayout((0, 0, 9, 9), (0, 0, 9, 9))
 A = put(ALONE, shutter=360.0)
@@ -99,3 +101,19 @@ def test_blurs_are_kept_as_far_as_memory_allows(monkeypatch):
     assert asked(large) == [False, False, False, True, True]
     monkeypatch.undo()
     assert asked(large) == 5 * [True]
+
+
+def test_frames_keep_no_method_and_the_textures_of_a_few():
+    device, state = gpu.open_device(), ALONE.opened(SAMPLE)
+    subject = ClipSubject(device, state, None)
+    size = subject.size(state)
+    texture = TexturePool(device).texture("output", size, "rgba32float")
+    drawn = []
+    for method in ("tap", "tiles", "fusion", "reproject", "gather"):
+        blur = Blur(method, samples=4, device=device)
+        subject.look_at(state, size, 1)
+        subject.draw(blur, texture, (0, 1.0), None)
+        drawn.append(weakref.ref(blur))
+        del blur
+    assert not any(blur() for blur in drawn)
+    assert len(subject._uploads) == 3

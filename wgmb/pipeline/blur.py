@@ -33,6 +33,7 @@ from ..gpu_frame.views import (
 from ..methods import FRAME_METHODS, METHODS, check_method
 from ..methods.contract import (
     Inputs,
+    Method,
     PreparedFrame,
     extent_of,
     frames_around,
@@ -327,14 +328,7 @@ class Blur:
         The textures are reused by the next frame.
         """
         with self._working(frame.size):
-            self._residency.forget()
-            inputs = self._views(frame)
-            self._residency.forget()
-        # These views may be encoded again, and all is to be done again.
-        return {
-            name: replace(value, key=None) if isinstance(value, FrameViews) else value
-            for name, value in inputs.items()
-        }
+            return uploaded(frame, self.method, self._residency)
 
     @contextmanager
     def _working(self, size: tuple[int, int]):
@@ -348,9 +342,7 @@ class Blur:
 
     def _views(self, frame: Frame) -> dict[str, Any]:
         """The frame and the neighbours that the method takes, as keywords of `encode`."""
-        names = {0: "frame", -1: "prev", 1: "next", -2: "prev_prev", 2: "next_next"}
-        views = self._residency.views_of(frames_around(frame, self.method))
-        return {"number": frame.number} | {names[offset]: one for offset, one in views.items()}
+        return _keywords(frame, self.method, self._residency)
 
     def _require(self, available: Collection[str], whose: str = "") -> None:
         if missing := self.method.needs - set(available):
@@ -365,3 +357,25 @@ class Blur:
     ) -> gpu.FrameBindings:
         """Return the bindings shared by all passes: frame, shutter, times of the samples."""
         return self._constants.bindings(size, number, window)
+
+
+def uploaded(frame: Frame, method: Method, residency: Residency) -> dict[str, Any]:
+    """Keywords of `encode` for a frame and its neighbours, which are uploaded anew.
+
+    The textures are those of `residency`, and reused by the next frame.
+    """
+    residency.forget()
+    inputs = _keywords(frame, method, residency)
+    residency.forget()
+    # These views may be encoded again, and all is to be done again.
+    return {
+        name: replace(value, key=None) if isinstance(value, FrameViews) else value
+        for name, value in inputs.items()
+    }
+
+
+def _keywords(frame: Frame, method: Method, residency: Residency) -> dict[str, Any]:
+    """The frame and the neighbours that a method takes, as keywords of `encode`."""
+    names = {0: "frame", -1: "prev", 1: "next", -2: "prev_prev", 2: "next_next"}
+    views = residency.views_of(frames_around(frame, method))
+    return {"number": frame.number} | {names[offset]: one for offset, one in views.items()}

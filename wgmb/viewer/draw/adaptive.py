@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-_PATIENCE, _MOST_PATIENCE = 5, 160  # quick frames before a finer level is tried
+PATIENCE, MOST_PATIENCE = 5, 160  # quick frames before a finer level is tried
 _MOST_UNCHANGED = 0.8  # share of a frame that no level changes, at most
 QUICK = 4  # the fewest samples while something moves
 
@@ -24,7 +24,7 @@ class Pace:
         self.level, self._target = level, target
         self._took: deque[tuple[float, float]] = deque(maxlen=3)
         self._quick = 0  # frames in succession after which a finer level seems possible
-        self._patience = _PATIENCE
+        self._patience = PATIENCE
         self._finer: int | None = None  # the level that was changed to last, if it was finer
         self._before: tuple[int, float] | None = None  # the level before, and its seconds
 
@@ -52,7 +52,7 @@ class Pace:
         last = len(self.SCALES) - 1
         if took > 1.1 * target and self.level < last:
             if self.level == self._finer:
-                self._patience = min(2 * self._patience, _MOST_PATIENCE)
+                self._patience = min(2 * self._patience, MOST_PATIENCE)
             fits = [k for k in range(self.level + 1, last) if predicted(k) <= target]
             self._set(min(fits, default=last), took)
         elif self.level and (took < 0.7 * target or predicted(self.level - 1) < 0.85 * target):

@@ -6,6 +6,7 @@ is still the picture is drawn in full, and what converges (rays, the reference) 
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -32,13 +33,13 @@ from .portions import DroppedError
 from .quality import Measured, Quality
 from .request import Available, Drawn, Request
 from .slot import FrameStatus, Slot
+from .stand_in import HALF, StandIn
 from .video_light import VideoLight, primaries_of
 
 _STEP = 0.07  # seconds of work on what converges, between two frames of the window
 _QUICK_STEP = 0.03  # while something moves
 _SETTLE = 0.35  # seconds of stillness before antialiasing
 _SHORT = 0.02  # seconds
-_HALF = 5  # the level of detail with half the width
 _PASSES = {"sharp": "color", "depth": "depth", "velocity": "motion"}
 
 
@@ -55,7 +56,7 @@ class Renderer:
         self.device = device
         self.choices, self.quality = Choices(device), Quality()
         self._is_slow = device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        self.pace = Pace(5 if self._is_slow else 0, target)
+        self.pace, self._stand_in = Pace(HALF if self._is_slow else 0, target), StandIn(target)
         self.report = FrameStatus()
         self._images, self._video_light = TexturePool(device), VideoLight(device)
         self._perceived = {slot: Perceived(device) for slot in ("first", "second")}
@@ -67,6 +68,7 @@ class Renderer:
         self.chromaticities: dict[str, Any] = {}  # of what is shown, as an attribute of an EXR
         self._level, self._still_since, self._still = 0, 0.0, ()
         self._preview, self._ready = False, False
+        self._has_choice, self._fewest = False, 0  # of the quickest method; pixels for the other
         self._moved = False
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._timing = timing
@@ -131,8 +133,11 @@ class Renderer:
         full_size = whole(place) if state.is_scene else size
         names = self._wanted(state)
         can = any(self.choices.has_preview(state, name) for name, _ in names)
-        slow = self._is_slow and not full and can
+        self._has_choice = slow = self._is_slow and not full and can
         if slow:
+            smallest = Pace.SCALES[HALF] ** 2 if state.is_scene else 1.0
+            self._fewest = round(math.prod(full_size) * smallest)
+            self._stand_in.begin((state.source, state.suited_blur, state.mode, full_size))
             self._slow_quality(state, place, moving)
         else:
             self._quick_quality(state, place, now, moving, full)
@@ -150,7 +155,7 @@ class Renderer:
                 lacks |= of_slot.busy
                 if name in ("result", KEPT) and (draft := of_slot.draft):
                     report.drafts.append(f"{KEPT}: {draft}" if name == KEPT else draft)
-            is_first_alone = slow and not self._preview and report.changed and slot != slots[-1]
+            is_first_alone = slow and not quick and report.changed and slot != slots[-1]
             if is_first_alone:  # it is shown before the second one, which may take long
                 break
         first, last = self._slots["first"], self._slots[slots[-1]]
@@ -226,9 +231,18 @@ class Renderer:
         if not self.report.moving:
             self._moved = False
         elif self.report.changed:
-            if self._moved:  # the first one may have had shaders to compile
-                self.pace.observe(seconds, self.report.seconds["draw"], antialias)
-            self._moved = True
+            if not self._moved:  # the first one may have had shaders to compile
+                self._moved = True
+                return
+            self._observe(seconds, antialias)
+
+    def _observe(self, seconds: float, antialias: int) -> None:
+        drawing, pixels = self.report.seconds["draw"], math.prod(self.report.size)
+        if self._preview or not self._has_choice:
+            self.pace.observe(seconds, drawing, antialias)
+        if self._has_choice:
+            took = seconds, drawing, antialias, pixels
+            self._moved = self._stand_in.is_kept(*took, self._fewest)
 
     def _size(self, state, size, place) -> tuple[tuple[int, int], int]:
         """Size to draw [px] and rays per pixel side, at the level of detail."""
@@ -255,14 +269,17 @@ class Renderer:
             self._level = 0
 
     def _slow_quality(self, state, place, moving) -> None:
-        """By the quickest method while moving and at first, then at half the size, then in full."""
+        """By the quickest method at first, then at half the size, then in full.
+
+        While moving by the method that is set, where that is quick enough.
+        """
         key = state.picture, place
         if moving or key != self._still:
-            self._still, self._preview = key, True
-            self._level = max(self.pace.level, 1)
+            self._still, self._preview = key, not moving or self._stand_in.is_needed
+            self._level = max((self.pace if self._preview else self._stand_in.pace).level, 1)
         elif self._ready and self._preview:
             self._preview = False
-            self._level = _HALF if self._level >= _HALF else 0
+            self._level = HALF if self._level >= HALF else 0
         elif self._ready:
             self._level = 0
 
@@ -328,7 +345,9 @@ class Renderer:
         if shown.key != key or coming.done >= min(shown.done, coming.total):
             self._slots[slot] = coming
         report.changed = True
-        report.seconds[coming.label] = time.perf_counter() - started
+        report.seconds[coming.label] = took = time.perf_counter() - started
+        if not (quick or full) and self.choices.has_preview(state, name):
+            self._stand_in.observe_still(took, math.prod(size))
 
     def _known(self, name: str, state: State, subject: Subject, full: bool) -> list[tuple]:
         """The findings about a video's motion, all that are needed if `full`.

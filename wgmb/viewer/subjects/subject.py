@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -15,9 +16,10 @@ from ...extent import EVERYWHERE
 from ...frame import Frame
 from ...gpu.textures import TexturePool
 from ...gpu.timing import Clock
+from ...gpu_frame.residency import Residency
 from ...methods import METHODS
 from ...methods.contract import reach_of
-from ...pipeline.blur import Blur
+from ...pipeline.blur import Blur, uploaded
 from ...render import Render
 from ...scene import builtin
 from ...scene.scene import Scene
@@ -36,6 +38,7 @@ from .video import VideoSubject
 
 _MEMORY = 1 << 30  # bytes of frames kept, so that going to and fro needs no reading
 _FRAMES_KEPT = 2, 16  # but so many at least, at most
+_SETS_KEPT = 3  # of a frame's textures: for two images that are compared, and for their previews
 # A frame's number, its view, if it is one of a pair, and frames that are read to either side of it.
 _Which = tuple[int, str | None, bool, int]
 Texture = wgpu.GPUTexture
@@ -110,6 +113,15 @@ class SceneSubject:
         return blur.samples
 
 
+@dataclass
+class _Uploads:
+    """A set of textures, and what is in them."""
+
+    residency: Residency
+    which: _Which | None = None
+    inputs: dict[str, Any] = field(default_factory=dict)
+
+
 class ClipSubject:
     """Frames on disk: their own size, their own moments, the methods they have passes for.
 
@@ -124,8 +136,7 @@ class ClipSubject:
         self._layers: dict[tuple, dict[str, str]] = {}
         self._frames: OrderedDict[_Which, Frame] = OrderedDict()
         self._sharp = Blur("tap", device=device)
-        self._uploaders: dict[tuple, Blur] = {}
-        self._uploaded: dict[tuple, tuple[_Which | None, dict]] = {}
+        self._uploads: OrderedDict[tuple, _Uploads] = OrderedDict()
         self._now = self._which(state)
 
     @cached_property
@@ -230,12 +241,21 @@ class ClipSubject:
 
     def _inputs(self, blur: Blur) -> dict:
         """The frame's textures, one set for all methods that take the same."""
-        key = blur.method.needs, blur.method.uses, reach_of(blur.method)
-        which, inputs = self._uploaded.get(key, (None, {}))
-        if which != self._now:
-            inputs = self._uploaders.setdefault(key, blur).upload(self._frame(self._now))
-            self._uploaded[key] = self._now, inputs
-        return dict(inputs)
+        method, frame = blur.method, self._frame(self._now)
+        key = method.needs | method.uses, reach_of(method)
+        while len(self._uploads) >= _SETS_KEPT and key not in self._uploads:
+            self._uploads.popitem(last=False)
+        if key not in self._uploads:
+            images = TexturePool(self._device)
+            self._uploads[key] = _Uploads(Residency(images, key[0], 2 * key[1] + 1))
+        self._uploads.move_to_end(key)
+        kept = self._uploads[key]
+        if kept.which != self._now:
+            kept.which = None
+            with gpu.reported(frame.size):
+                kept.inputs = uploaded(frame, method, kept.residency)
+            kept.which = self._now
+        return dict(kept.inputs)
 
     def passes(self) -> dict[str, Texture]:
         """The sharp picture and what lies under it, by name; only what there is."""

@@ -1,0 +1,99 @@
+"""The method that plays without a GPU: the one that is set, or the quickest in its stead."""
+
+from itertools import pairwise
+
+import pytest
+
+from viewer_hand import ALONE, SMALL, put
+from wgmb import gpu
+from wgmb.viewer.draw.adaptive import Pace
+from wgmb.viewer.draw.renderer import Renderer
+from wgmb.viewer.draw.request import Request
+from wgmb.viewer.draw.stand_in import HALF, StandIn
+
+FULL = 960 * 540
+FEWEST = round(FULL * Pace.SCALES[HALF] ** 2)
+TARGET = 1 / 24
+STATE = put(ALONE, method="gather", samples=4, shading="off")
+AREA = (0, 0, *SMALL)
+
+
+def played(stand_in, pace, quickest, own, frames=400, unchanged=0.004):
+    """For every frame whether the quickest method stood in, and the seconds that it took.
+
+    `quickest` and `own`: seconds of a whole picture.
+    """
+    frames_of = []
+    for number in range(frames):
+        needed = stand_in.is_needed
+        level = max((pace if needed else stand_in.pace).level, 1)
+        pixels = FULL * pace.quality(level, 1)[0] ** 2
+        uneven = 1 + 0.1 * (number % 3 - 1)
+        drawing = (quickest if needed else own) * pixels / FULL * uneven
+        took = unchanged + drawing
+        if needed:
+            pace.observe(took, drawing, 1)
+        stand_in.is_kept(took, drawing, 1, round(pixels), FEWEST)
+        frames_of.append((needed, took))
+    return frames_of
+
+
+@pytest.mark.fast
+def test_a_method_that_keeps_the_rate_is_played_itself_at_half_the_width_or_more():
+    stand_in, pace = StandIn(TARGET), Pace(HALF, TARGET)
+    stand_in.begin(("gather",))
+    stand_in.observe_still(2.0, FULL)  # with its compiling
+    stand_in.observe_still(0.08, FULL)
+    frames = played(stand_in, pace, 0.02, 0.08)
+    assert not any(needed for needed, _ in frames[20:])
+    assert all(took < 1.2 * TARGET for _, took in frames[20:])
+    assert stand_in.pace.level < HALF  # finer, as far as the time allows
+
+
+@pytest.mark.fast
+def test_one_that_is_too_slow_is_not_even_tried_where_its_still_image_took_long():
+    stand_in, pace = StandIn(TARGET), Pace(HALF, TARGET)
+    stand_in.begin(("gather",))
+    stand_in.observe_still(1.0, FULL)
+    assert all(needed for needed, _ in played(stand_in, pace, 0.05, 1.0))
+
+
+@pytest.mark.fast
+def test_one_that_proves_too_slow_is_tried_ever_later():
+    stand_in, pace = StandIn(TARGET), Pace(HALF, TARGET)
+    stand_in.begin(("gather",))
+    stand_in.observe_still(0.02, FULL)  # which was true of a machine that is busy now
+    needed = [n for n, _ in played(stand_in, pace, 0.02, 0.5)]
+    assert not all(needed) and all(needed[20:])
+    stand_in.begin(("tiles",))  # nothing is known of it: the quickest one must take a quarter
+    assert all(n for n, _ in played(stand_in, pace, 0.05, 0.2))
+    tried = [n for n, _ in played(stand_in, pace, 0.003, 0.5, frames=1000)]
+    begun = [i for i, (a, b) in enumerate(pairwise(tried)) if a and not b]
+    assert len(begun) == 1  # its frames have told what it takes
+
+
+@pytest.mark.fast
+def test_one_slow_frame_does_not_end_it():
+    stand_in, pace = StandIn(TARGET), Pace(HALF, TARGET)
+    stand_in.begin(("gather",))
+    stand_in.observe_still(0.08, FULL)
+    played(stand_in, pace, 0.02, 0.08, frames=50)
+    assert stand_in.is_kept(0.12, 0.1, 1, FEWEST, FEWEST) and not stand_in.is_needed
+    assert not stand_in.is_kept(0.2, 0.18, 1, FEWEST, FEWEST) and stand_in.is_needed
+
+
+def test_playing_shows_the_method_that_is_set_once_it_is_quick_enough():
+    for target, wanted in ((60.0, False), (1e-9, True)):
+        renderer = Renderer(gpu.open_device(), target=target)
+        for number in range(4):
+            renderer.draw(Request(STATE, AREA), float(number))
+        for number in range(9):
+            state = put(STATE, frame=1 + 0.3 * number)
+            drawn = renderer.draw(Request(state, AREA, moving=True), 10.0 + number)
+            renderer.finished(0.01, 1)
+        assert bool(drawn.report.preview) == wanted
+        assert drawn.report.size[0] >= SMALL[0] // 2 or wanted
+    paused = Request(state, AREA)
+    for number in range(4):
+        drawn = renderer.draw(paused, 20.0 + number)
+    assert drawn.report.preview == "" and drawn.report.size == SMALL
