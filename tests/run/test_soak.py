@@ -67,11 +67,14 @@ def test_the_viewer_bears_whatever_is_done_to_it(tmp_path):
 @pytest.mark.parametrize(("growth", "ok"), [(0.0, True), (0.5, True), (3.0, False)])
 def test_growth_is_told_from_what_comes_and_goes(growth, ok):
     seconds = np.arange(0, 3600, 5.0)
-    opened = 60 * (seconds // 45 % 3) + 300 * (1 - np.exp(-seconds / 150))
-    looks = np.stack([seconds, 500 + opened + growth * seconds / 60], axis=1)
+    compiled = 300 * (1 - np.exp(-seconds / 150)) + 250 * (seconds > 540)  # and a block of wgpu's
+    opened = 60 * (seconds // 45 % 3)
+    looks = np.stack([seconds, 500 + opened + compiled + growth * seconds / 60], axis=1)
     rate, error, *_ = viewing._slope(looks)
     assert (rate - 2 * error <= viewing._MOST_USED) == ok
     assert abs(rate - growth) <= max(3 * error, 0.2)
+    for shorter in (100, 720, 1300):  # while all is still being compiled, nothing can be told
+        assert viewing._slope(looks[seconds < shorter])[1] == np.inf
 
 
 @pytest.mark.full

@@ -204,6 +204,12 @@ def test_work_that_nobody_wants_is_dropped_between_two_passes_and_leaves_nothing
     np.testing.assert_array_equal(renderer.download(), whole(STATE))
 
 
+def test_no_pass_is_begun_any_more_once_its_kernel_is_compiled():
+    portions = Portions(gpu.open_device(), lambda: False)
+    with pytest.raises(DroppedError):
+        portions.watch(None).begin_compute_pass(label="any")
+
+
 def test_another_setting_drops_what_is_drawn_but_playing_does_not(viewer):
     stage = viewer.stage
     still, moving = Request(STATE, AREA), Request(STATE, AREA, moving=True)

@@ -24,7 +24,8 @@ from .table import Line, Trial, row
 
 _MOST = 8.0  # MiB a minute, playing
 _MOST_USED = 1.0  # MiB a minute of a long use, once it is warm
-_WARM = 600.0  # seconds until every method, look and file has been seen, of long uses
+_WARM = 900.0  # seconds until all methods are compiled, and wgpu's blocks of memory are enough
+_SHORTEST = 600.0  # seconds of a use, once it is warm, that can be judged
 _SAMPLE = 5.0  # seconds from one look at the memory to the next
 _BLOCK = 60.0  # seconds whose mean is one point of the slope: what is open changes meanwhile
 _SIZE = 640, 400
@@ -78,14 +79,14 @@ def viewer_used(trial: Trial) -> Iterator[Line]:
 def _slope(looks: np.ndarray) -> tuple[float, float, float, float]:
     """From (seconds, MiB) MiB a minute and their standard error, and MiB at first and at last.
 
-    Of the last two thirds of a long use, from _WARM on at the earliest, or of its second half.
+    Of the last two thirds of a use, from _WARM on at the earliest; the error of one that is too
+    short is infinite.
     """
-    end = looks[-1, 0]
-    later = looks[looks[:, 0] >= min(max(_WARM, end / 3), end / 2)]
+    later = looks[looks[:, 0] >= max(_WARM, looks[-1, 0] / 3)]
+    if len(later) == 0 or later[-1, 0] - later[0, 0] < _SHORTEST:
+        return 0.0, np.inf, looks[0, 1], looks[-1, 1]
     blocks = ((later[:, 0] - later[0, 0]) // _BLOCK).astype(int)
     held = np.array([later[blocks == block].mean(axis=0) for block in np.unique(blocks)])
-    if len(held) < 4:
-        return 0.0, np.inf, held[0, 1], held[-1, 1]
     (rate, _), spread = np.polyfit(held[:, 0] / 60, held[:, 1], 1, cov=True)
     return float(rate), float(np.sqrt(spread[0, 0])), held[0, 1], held[-1, 1]
 

@@ -155,6 +155,7 @@ class _OneByOne:
         self._clock = clock
 
     def begin_compute_pass(self, *, label: str):
+        self._clock.check()  # to compile its kernel may have taken long
         return _Alone(self._clock, label)
 
     def clear_buffer(self, buffer, offset: int = 0, size: int | None = None) -> None:
