@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import wgpu
 
 import make_clips as clips
 from viewer_hand import ALONE, SAMPLE, SMALL, put
@@ -221,6 +222,25 @@ def test_another_setting_drops_what_is_drawn_but_playing_does_not(viewer):
     shown = Request(put(STATE, exposure=2.0, wipe=0.1), AREA)
     stage._drawing, stage._wanted = still, shown
     assert stage._is_wanted()
+
+
+def test_a_frame_that_cannot_be_shown_just_now_is_tried_again(viewer, monkeypatch):
+    seen_until(viewer, lambda: is_final(viewer))
+    texture, left = viewer._context.get_current_texture, [2]
+
+    def covered():
+        left[0] -= 1
+        if left[0] >= 0:
+            raise wgpu.DrawCancelled("Occluded")
+        return texture()
+
+    monkeypatch.setattr(viewer._context._context, "get_current_texture", covered)
+    viewer.state = put(STATE, exposure=1.0)
+    for _ in range(3):
+        viewer.canvas.force_draw()
+        assert viewer.failed is None
+    assert left[0] < 0
+    frame(viewer)
 
 
 def test_what_goes_wrong_after_drawing_ends_the_viewer_too(monkeypatch):

@@ -48,6 +48,23 @@ def quitting(self):
 window.Viewer._draw = quitting
 view(State().with_settings(method="tap"))
 """
+DYING = """
+import os, subprocess
+ours, theirs = os.pipe()
+command = ["Xvfb", "-displayfd", str(theirs), "-screen", "0", "640x480x24", "-nolisten", "tcp"]
+server = subprocess.Popen(command, pass_fds=[theirs], stderr=subprocess.DEVNULL)
+os.environ["DISPLAY"] = ":" + os.read(ours, 20).decode().strip()
+from wgmb.viewer import State, view, window
+drawn, draw = [], window.Viewer._draw
+def dying(self):
+    drawn.append(self)
+    if len(drawn) == 8:
+        server.kill()
+        server.wait()
+    draw(self)
+window.Viewer._draw = dying
+view(State(playing=True).with_settings(method="tap"), size=(320, 240))
+"""
 CLOSE = """
 import ctypes, sys
 x = ctypes.CDLL("libX11.so.6")
@@ -368,6 +385,11 @@ def test_an_error_while_drawing_ends_the_program(desk):
 
 def test_quitting_while_drawing_releases_the_surface_first(desk):
     assert desk("-c", WATCHED + QUITTING).end() == (0, "")
+
+
+def test_the_end_of_the_x_server_is_one_line(desk):
+    code, said = desk("-c", DYING).end()
+    assert code == 1 and len(said.splitlines()) == 1 and "connection" in said, said
 
 
 def test_without_a_display_it_says_so(tmp_path):

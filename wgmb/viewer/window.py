@@ -36,6 +36,7 @@ from .panel.theme import style
 from .scaled_canvas import SIZES, ScaledCanvas
 from .state.recent import RecentFiles, default_path
 from .state.state import COMPARE, State
+from .x_connection import display_watch
 
 TITLE = "wgmb"
 _AFTER_WHEEL = 0.3  # seconds for which turning the wheel counts as moving
@@ -58,8 +59,8 @@ class Viewer:
     `interface`: size of the panel and its text. `threaded`: pictures are drawn in a thread with
     `drawing_device` and composed in another one, and the window never waits for them; the threads
     have the window drawn by `call_soon`, of the canvas's loop. `recent`: files that can be opened
-    again, and where those that are shown are noted. `failed` holds the exception that
-    ended the viewer, if one did.
+    again, and where those that are shown are noted. `has_display`: False once nothing can be
+    shown on it any more. `failed` holds the exception that ended the viewer, if one did.
     """
 
     def __init__(
@@ -73,6 +74,7 @@ class Viewer:
         interface: float = 1.0,
         recent: RecentFiles | None = None,
         call_soon: Callable[[Callable[[], None]], object] | None = None,
+        has_display: Callable[[], bool] = lambda: True,
         clock: Callable[[], float] = time.perf_counter,
     ):
         self.canvas = canvas = ScaledCanvas(canvas, interface)
@@ -97,6 +99,7 @@ class Viewer:
         self.failed: BaseException | None = None
         self.message = ("", 0.0)  # and until when it is shown
         self._recent = recent
+        self._has_display = has_display
         self._good = self._requested = state  # drawn without an error, and requested last
         self._call_soon = call_soon
         self._drawn: Drawn | None = None
@@ -135,6 +138,8 @@ class Viewer:
                 return
             try:
                 function(*arguments)
+            except wgpu.DrawCancelled:
+                raise
             except Exception as error:
                 self.failed = _translated(error)
                 self._quit()
@@ -253,8 +258,15 @@ class Viewer:
             self._call_soon(self.canvas.request_draw)
 
     def _draw_unless_failed(self) -> None:
-        """Draw a frame; one that cannot be drawn is not presented either."""
-        self._guarded(self._draw)()
+        """Draw a frame; one that cannot be drawn is not presented either.
+
+        Where the window cannot be drawn to just now, as it is covered, it is tried again.
+        """
+        try:
+            self._guarded(self._draw)()
+        except wgpu.DrawCancelled:
+            self.canvas.request_draw()
+            raise
         if self.failed is not None:
             raise wgpu.DrawCancelled
 
@@ -283,6 +295,8 @@ class Viewer:
         free = min(width, area[2] + 1) if drawn else width
         size = max(round(free), 1), max(height, 1)
         self.screen.show(View(state, images, self._place(), area, size, ratio))
+        if not self._has_display():  # wgpu would panic
+            raise wgpu.DrawCancelled
         self.screen.paint(self._context.get_current_texture())
         if drawn:
             self._note_times(drawn.report)
@@ -495,7 +509,8 @@ def view(
             loop.call_soon_threadsafe(call)
 
     recent = RecentFiles(default_path())
-    viewer = Viewer(canvas, state, **devices, interface=interface, recent=recent, call_soon=soon)
+    with_loop: dict[str, Any] = {"call_soon": soon, "has_display": display_watch()}
+    viewer = Viewer(canvas, state, **devices, **with_loop, interface=interface, recent=recent)
     window: Any = canvas._window
     drop: Any = lambda _, paths: viewer.dropped(paths)  # noqa: E731
     glfw.set_drop_callback(window, drop)
