@@ -13,7 +13,7 @@ import pytest
 
 import make_clips as clips
 import make_frames as make
-from viewer_hand import put
+from viewer_hand import ALONE, SAMPLE, put
 from wgmb import (
     Blur,
     InputError,
@@ -662,3 +662,17 @@ def test_where_nothing_can_be_decoded_a_picture_is_left_out_or_the_run_says_so(
     run = VideoBlur(footage, Blur("tap", device=device), None, clock=clock)
     with pytest.raises(InputError, match=r"from 0\.[0-9]* s on can be decoded"):
         next(run.pictures(Shutter(180), list(OutputFrames(footage, clock, Fraction(24)))))
+
+
+def test_only_what_is_shown_stays_open(clip):
+    viewer = opened(clip, flow="none")
+    choices = viewer.stage.choices
+    settled(viewer)
+    video = choices.subject(viewer.state)
+    frames = put(ALONE.opened(SAMPLE), method="tap", samples=4)
+    viewer.state = frames.keeping()  # B, too, is of the frames
+    settled(viewer)
+    assert [*choices._clips.values()] == [choices.subject(frames)] != [video]
+    viewer.state = put(ALONE, method="tap", samples=4)
+    settled(viewer)
+    assert not choices._clips

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -32,7 +32,7 @@ class Choices:
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self.displayed = device, DisplayCache(device)
         self._scene: SceneSubject | None = None
-        self._clips: OrderedDict[tuple, ClipSubject | VideoSubject] = OrderedDict()
+        self._clips: dict[tuple, ClipSubject | VideoSubject] = {}
         self._coming: tuple[tuple, ClipSubject] | None = None  # seen, but its vectors unknown
 
     def subject(self, state: State) -> Subject:
@@ -42,11 +42,13 @@ class Choices:
             return self._scene
         key = _key(state)
         if key not in self._clips:
-            made = self._opened(state)
-            self._forget(1 if state.kept else 0)  # B may find the motion in another way
-            self._clips[key] = made
-        self._clips.move_to_end(key)
+            self._clips[key] = self._opened(state)
         return self._clips[key]
+
+    def close_others(self, state: State) -> None:
+        """Let go of the files that the state is not about."""
+        # B may find the motion in another way.
+        self._close_but(() if state.is_scene else (_key(state), _key(state.as_kept)))
 
     def first_light(self, state: State) -> np.ndarray | None:
         """The picture alone of frames that are opened now, once; None of all else.
@@ -73,16 +75,15 @@ class Choices:
         assert clip.finding  # what cannot be read is not opened
         return clip
 
-    def _forget(self, left: int) -> None:
-        """Let go of all but the last of what was shown before."""
-        while len(self._clips) > left:
-            _, clip = self._clips.popitem(last=False)
+    def _close_but(self, keys: Collection[tuple]) -> None:
+        for key in [key for key in self._clips if key not in keys]:
+            clip = self._clips.pop(key)
             if isinstance(clip, VideoSubject):
                 clip.close()
 
     def close(self) -> None:
         """End what goes on beside the window."""
-        self._forget(0)
+        self._close_but(())
 
     def methods(self, state: State) -> list[str]:
         """Names of the methods that can be used."""

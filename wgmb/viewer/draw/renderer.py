@@ -127,6 +127,7 @@ class Renderer:
         """
         started = time.perf_counter()
         subject = self.choices.subject(state)
+        self.choices.close_others(state)
         size = subject.size(state)
         shape = subject.shape if isinstance(subject, VideoSubject) else size
         place = fit(shape, area, state)
