@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
 from viewer_hand import ALONE, SAMPLE, Hand, library, put
 from wgmb import gpu
 from wgmb.methods import METHODS
 from wgmb.viewer import controls
+from wgmb.viewer.draw.inspected import Inspected
 from wgmb.viewer.draw.renderer import Renderer
 from wgmb.viewer.draw.request import Available, Request
 from wgmb.viewer.panel import inspector, scopes
@@ -144,6 +146,38 @@ def test_numbers_do_not_wait_for_the_confidence_which_takes_as_long_as_the_pictu
             break
     first = {"light", "depth", "motion"}
     assert seen[-3:] == [(set(), True), (first, True), (first | {"confidence"}, False)]
+
+
+def test_its_window_is_large_enough_for_what_comes_late(monkeypatch):
+    call, waits = Inspected.__call__, [None] * 6
+
+    def late(*arguments):
+        under = call(*arguments)
+        if "confidence" in under and waits:
+            waits.pop()
+            arguments[-1].busy = True
+            return {name: array for name, array in under.items() if name != "confidence"}
+        return under
+
+    monkeypatch.setattr(Inspected, "__call__", late)
+    state = put(ALONE, method="gather", samples=4, shading="off", inspect=True)
+    hand = Hand(state, (640, 480))
+    viewer, wanted, heights = hand.viewer, [True], []
+    viewer.canvas.request_draw = lambda: wanted.append(True)
+    hand.submit("pointer_move", x=320, y=240, button=0, buttons=())
+    while wanted:  # as a window is drawn: only if somebody asks for it
+        wanted.clear()
+        hand.look()
+        heights.append(window_height(viewer))
+    for _ in range(3):
+        hand.look()
+    assert window_height(viewer) == heights[-1] > heights[0]
+
+
+def window_height(viewer):
+    imgui.set_current_context(viewer._imgui.imgui_context)
+    window = imgui.internal.find_window_by_name("inspector")
+    return window.size.y if window else 0.0
 
 
 @pytest.mark.parametrize("width", [60, 240, 1920])
