@@ -3,6 +3,9 @@
 Without a GPU, passes of seconds run on the same processor as the panel. Here they run in the
 driver's threads while the window goes on, each pass by itself, so that all is dropped at once when
 something else is wanted. Images come as arrays of halves.
+
+With a GPU, the window's own thread draws, by the same Renderer: there a pass takes milliseconds,
+and images stay in the GPU's memory; this thread would bring each of them down and up again.
 """
 
 from __future__ import annotations
