@@ -13,17 +13,17 @@ import argparse
 import subprocess
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import av
 import cv2
 import numpy as np
 
-from wgmb import Blur, Flow, Frame, metrics
+import wgmb
+from wgmb import metrics
 from wgmb.color.srgb import linear, srgb, to_display
-from wgmb.flow.dis import Dis
-from wgmb.flow.dis.better_match import BetterMatch, Both
 from wgmb.io import stills
 
 DEGREES = 180
@@ -94,50 +94,16 @@ def _linear(shown: np.ndarray, is_halved: bool) -> np.ndarray:
     return cv2.resize(light[: 2 * height, : 2 * width], (width, height), interpolation=3)
 
 
-def blurred(source: Any, method: Literal["tap", "gather"]) -> Callable[[Pictures, int], Pictures]:
-    """Blur by a source of motion and a method."""
-    blur = Blur(method, shutter=DEGREES, samples="auto" if method == "tap" else None)
+def blurred(**settings: Any) -> Callable[[Pictures, int], Pictures]:
+    """Blur as `wgmb blur` does, with these settings."""
 
     def make(kept: Pictures, frames: int) -> Pictures:
-        shot = source.shot(kept.get)
-        moved = {}
-        for n, picture in kept.items():
-            motion, depth = shot(n)
-            moved[n] = Frame(picture, motion=motion, depth=depth)
-        return {
-            n: blur(moved[n].between(moved[n - 1], moved[n + 1]))[..., :3] for n in range(frames)
-        }
+        shown = [to_display(kept[n], 8) for n in sorted(kept)]
+        made = wgmb.blur_pictures(shown, shutter=DEGREES, **settings)
+        wanted = islice(made, 1, frames + 1)  # without the first one, which has no neighbour
+        return {n: linear(picture / np.float32(255)) for n, picture in enumerate(wanted)}
 
     return make
-
-
-def automatic() -> Callable[[Pictures, int], Pictures]:
-    """Blur as by default without a GPU: where something is lost, a search as well."""
-    tap, gather = blurred(Dis("fast"), "tap"), blurred(_Searched(), "gather")
-
-    def make(kept: Pictures, frames: int) -> Pictures:
-        quick = Dis("fast").shot(kept.get, depth=False)
-        searched = {n for n in range(frames) if quick.loses(n)}
-        if not searched:
-            return tap(kept, frames)
-        return {n: (gather if n in searched else tap)(kept, frames)[n] for n in range(frames)}
-
-    return make
-
-
-class _Searched:
-    """BetterMatch for pictures in linear light."""
-
-    def __init__(self):
-        self._quick = Dis("fast")
-        self._better = BetterMatch(self._quick, Flow(quality="draft"))
-
-    def shot(self, load: Callable[[int], np.ndarray | None]) -> Any:
-        def both(number: int) -> Both | None:
-            picture = load(number)
-            return None if picture is None else Both(self._quick.grey(picture), lambda: picture)
-
-        return self._better.shot(both)
 
 
 def interpolated(kept: Pictures, frames: int) -> Pictures:
@@ -174,10 +140,10 @@ def in_yuv(picture: np.ndarray) -> np.ndarray:
 def makers() -> Iterator[tuple[str, Callable[[Pictures, int], Pictures]]]:
     """Names and makers of the results that are compared."""
     yield "sharp", lambda kept, frames: {n: kept[n] for n in range(frames)}
-    yield "`dis` fast, `tap`", blurred(Dis("fast"), "tap")
-    yield "`dis` best, `gather`", blurred(Dis("best"), "gather")
-    yield "`search` draft, `gather`", blurred(Flow(quality="draft"), "gather")
-    yield "`auto`", automatic()
+    yield "`dis` fast, `tap`", blurred(flow="dis", flow_quality="fast")
+    yield "`dis` best, `gather`", blurred(flow="dis", flow_quality="best", method="gather")
+    yield "`search` draft, `gather`", blurred(flow="search", flow_quality="draft")
+    yield "`auto`", blurred()
     yield "minterpolate 16x", interpolated
 
 

@@ -22,6 +22,7 @@ from ..pipeline.exposure_sum import ExposureSum, Part
 from ..shots.motion import MotionSource, window
 from ..shots.reader import FLASH, Picture, ShotReader
 from ..shutter import Shutter
+from .changing_light import ChangingLight
 from .clock import Clock
 from .gpu_frames import VideoFrames
 from .holdouts import Holdout
@@ -100,17 +101,15 @@ class Exposures:
             flash=self._flash,
             tolerance=self._tolerance,
         )
-        views = [self._frames(shots, self._blur, self._motion)]
-        if self._fallback is not None:
-            views.append(self._frames(shots, *self._fallback))
+        ways = [(self._blur, self._motion), *([self._fallback] if self._fallback else [])]
+        changing = ChangingLight(self.device)
+        views = [
+            (VideoFrames(shots, blur, motion, self.holdout, self._planes, changing), blur)
+            for blur, motion in ways
+        ]
         for frame in wanted:
             cells = shots.cells(float(frame.time), float(frame.interval), shutter)
             yield frame, Exposure(self, shots, views, cells)
-
-    def _frames(
-        self, shots: ShotReader[Thumbnail], blur: Blur, motion: MotionSource | None
-    ) -> tuple[VideoFrames, Blur]:
-        return VideoFrames(shots, blur, motion, self.holdout, self._planes), blur
 
     def light(
         self, shots: ShotReader[Thumbnail], views: Views, cells: Sequence[Cell]
@@ -146,14 +145,26 @@ class Exposures:
         self, shots: ShotReader[Thumbnail], views: Views, cells: Sequence[Cell]
     ) -> wgpu.GPUTexture:
         """The same as it is blurred: expanded."""
+        begins = True
 
         def part(cell: Cell) -> Part:
+            nonlocal begins
             loses = len(views) > 1 and views[0][0].loses(cell.index)
             frames, blur = views[loses]
-            return cell, frames.in_shot(cell.index), blur
+            frame = frames.in_shot(cell.index)
+            if frames.change(cell, begins):
+                begins = False
+            return cell, frame, blur
 
-        parts = map(part, cells)
-        return self._sum.texture(shots[cells[0].index].content.coded.size, parts)
+        size = shots[cells[0].index].content.coded.size
+        light = self._sum.texture(size, map(part, cells))
+        if begins:
+            return light
+        output = self._images.texture("changed", size, "rgba32float")
+        encoder = self.device.create_command_encoder(label="changing light")
+        views[0][0].changing.add(encoder, light.create_view(), output.create_view())
+        gpu.submit(self.device, encoder)
+        return output
 
 
 class VideoBlur(Exposures):

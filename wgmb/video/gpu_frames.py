@@ -6,7 +6,7 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..exposure import evened
+from ..exposure import Cell, evened
 from ..flow import Shot
 from ..flow.dis import DisShot
 from ..gpu.textures import TexturePool
@@ -14,6 +14,7 @@ from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
 from ..shots.motion import MotionSource
 from ..shots.reader import ShotReader
+from .changing_light import ChangingLight, Surroundings, shares_of
 from .holdouts import Holdout
 from .motion import VideoMotion
 from .planes import Planes
@@ -27,7 +28,8 @@ class VideoFrames:
     """Textures of the pictures of `shots`, on the device of the Blur that takes them.
 
     `motion`: where motion comes from, or None. `holdout`: what stays sharp, where there is motion.
-    `planes`: make their light; motion is searched in light that is not expanded.
+    `planes`: make their light; motion is searched in light that is not expanded. `changing`: adds
+    what light changes, for all that blur pictures of `shots`.
     """
 
     def __init__(
@@ -37,9 +39,11 @@ class VideoFrames:
         motion: MotionSource | None = None,
         holdout: Holdout | None = None,
         planes: Planes | None = None,
+        changing: ChangingLight | None = None,
     ):
         self._shots, self._device = shots, blur.device
         self._planes, self._images = planes or Planes(blur.device), TexturePool(blur.device)
+        self.changing = changing or ChangingLight(blur.device)
         self._neighbours = "neighbours" in blur.method.uses
         wants_depth = "depth" in blur.method.needs | blur.method.uses
         self._source = VideoMotion(motion, shots, blur.device, wants_depth) if motion else None
@@ -61,6 +65,24 @@ class VideoFrames:
         near = (found.get(i) for i in (index - 1, index + 1))
         before, after = (one if one is not None and one.has_vectors else None for one in near)
         return FrameInShot(found[index], before, after, self._shots[index].number)
+
+    def change(self, cell: Cell, begins: bool) -> bool:
+        """Submit what the light changes in the part of an exposure that `cell` is.
+
+        `begins`: it is the first part that does. False where there is no motion.
+        """
+        index = cell.index
+        frame = self._frame(index)
+        if frame.motion is None or cell.shutter.degrees <= 0:
+            return False
+        near = tuple(i if self._shots.moves_on(index, i) else None for i in (index - 1, index + 1))
+        factors = self._factors(index)
+        surroundings = Surroundings((near[0], index, near[1]), factors, frame.motion, frame.holdout)
+        encoder = self._device.create_command_encoder(label="changing light")
+        shares = shares_of(cell.shutter, factors)
+        self.changing.encode(encoder, self._light, surroundings, shares, cell.share, begins)
+        gpu.submit(self._device, encoder)
+        return True
 
     def loses(self, index: int) -> bool:
         """True if the source tells that it loses too much of a picture, or of one beside it."""

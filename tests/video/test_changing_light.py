@@ -1,0 +1,182 @@
+"""Light that changes from picture to picture changes evenly while the shutter is open."""
+
+import numpy as np
+import pytest
+
+import wgmb
+from wgmb import Shutter
+from wgmb.gpu.textures import TexturePool
+from wgmb.video.changing_light import ChangingLight, Surroundings, shares_of, step_of
+
+SIZE = HEIGHT, WIDTH = 48, 70
+STEP = 4
+
+
+def texture(seed):
+    """Waves of 9 to 30 px, linear."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    rng = np.random.default_rng(seed)
+    waves = sum(
+        np.sin(a * x + b * y + c)[..., None] * rng.uniform(0.5, 1, 3)
+        for a, b, c in rng.uniform([0.2, -0.5, 0], [0.6, 0.5, 6], (4, 3))
+    )
+    return (0.3 + 0.07 * waves).astype(np.float32)
+
+
+def changed(device, pictures, motion, shares, holdout=None, factors=(1.0, 1.0), parts=(1.0,)):
+    """The middle one of three pictures, of which one may lack, with its changes."""
+    images = TexturePool(device)
+
+    def load(index):
+        rgba = np.dstack([pictures[index], np.ones(pictures[index].shape[:2], np.float32)])
+        return images.upload(f"picture {index}", rgba, "rgba32float").texture
+
+    held = None if holdout is None else images.upload("holdout", holdout, "r32float")
+    ways = images.upload("motion", motion, "rgba32float")
+    indices = (0 if 0 in pictures else None, 1, 2 if 2 in pictures else None)
+    around = Surroundings(indices, factors, ways, held)
+    light = ChangingLight(device)
+    encoder = device.create_command_encoder()
+    for k, part in enumerate(parts):
+        light.encode(encoder, load, around, shares, part, k == 0)
+    height, width = pictures[1].shape[:2]
+    output = images.texture("output", (width, height), "rgba32float")
+    light.add(encoder, load(1).create_view(), output.create_view())
+    return images.download(encoder, output)[..., :3]
+
+
+def reduced(picture):
+    """Twin of reduce.wgsl."""
+    height, width = (-(-n // STEP) for n in picture.shape[:2])
+    small = np.zeros((height, width, 3))
+    for y, x in np.ndindex(height, width):
+        block = picture[STEP * y : STEP * (y + 1), STEP * x : STEP * (x + 1)]
+        small[y, x] = np.sqrt(block.reshape(-1, 3).mean(0))
+    return small
+
+
+def between(picture, x, y):
+    height, width = picture.shape[:2]
+    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
+    left, top = int(x), int(y)
+    right, low = min(left + 1, width - 1), min(top + 1, height - 1)
+    s, t = x - left, y - top
+    above = (1 - s) * picture[top, left] + s * picture[top, right]
+    return (1 - t) * above + t * ((1 - s) * picture[low, left] + s * picture[low, right])
+
+
+def toward(here, other, x, y, way):
+    """Twin of change.wgsl's `toward`."""
+    height, width = here.shape[:2]
+    to = x + way[0], y + way[1]
+    if not (0 <= to[0] <= width - 1 and 0 <= to[1] <= height - 1):
+        return np.zeros(3)
+    around = [(dx, dy) for dy in range(-2, 3) for dx in range(-2, 3)]
+    own = np.array(
+        [here[np.clip(y + dy, 0, height - 1), np.clip(x + dx, 0, width - 1)] for dx, dy in around]
+    )
+    found = np.array([between(other, to[0] + dx, to[1] + dy) for dx, dy in around])
+    a, b = own.mean(1), found.mean(1)
+    shared = max(np.mean(a * b) - a.mean() * b.mean(), 0)
+    unlike = max(a.var() - shared**2 / max(b.var(), 255.0**-2), 0)
+    far = np.abs((found - own).mean(0)).mean()
+    same = np.exp(-unlike / (8 / 255) ** 2 - (far / (60 / 255)) ** 2)
+    same *= 1 - np.exp(-((far / (4 / 255)) ** 2))
+    return same * (between(other, *to) ** 2 - here[y, x] ** 2)
+
+
+def test_the_passes_are_their_twin(device):
+    pictures = {k: gain * texture(1) for k, gain in enumerate((0.8, 1.0, 1.15))}
+    pictures[2][:, 40:] = texture(2)[:, 40:]
+    rng = np.random.default_rng(3)
+    motion = rng.uniform(-9, 9, (HEIGHT, WIDTH, 4)).astype(np.float32)
+    holdout = (rng.random(SIZE) < 0.2).astype(np.float32)
+    shares, factors = (0.1, 0.2), (1.25, 0.8)
+    small = {k: reduced(picture) for k, picture in pictures.items()}
+    height, width = small[1].shape[:2]
+    changes = np.zeros((height, width, 3))
+    for y, x in np.ndindex(height, width):
+        px = min(STEP * y + STEP // 2, HEIGHT - 1), min(STEP * x + STEP // 2, WIDTH - 1)
+        for k, side in enumerate((0, 2)):
+            way = motion[px][side : side + 2] / factors[k] / STEP
+            gained = toward(small[1], small[side], x, y, way)
+            changes[y, x] += (1 - holdout[px]) * shares[k] * gained
+    expected = pictures[1].astype(np.float64)
+    for y, x in np.ndindex(HEIGHT, WIDTH):
+        at = (np.array([x, y]) + 0.5) / STEP - 0.5
+        expected[y, x] += between(changes, *np.maximum(at, 0))
+    got = changed(device, pictures, motion, shares, holdout, factors, parts=(0.25, 0.75))
+    assert np.abs(changes).max() > 0.01
+    np.testing.assert_allclose(got, expected, atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    "size, step", [((70, 48), 4), ((960, 540), 4), ((1080, 1920), 8), ((3840, 2160), 16)]
+)
+def test_small_pictures_are_of_like_size(size, step):
+    assert step_of(size) == step
+
+
+def test_a_fade_is_even(device):
+    motion = np.zeros((HEIGHT, WIDTH, 4), np.float32)
+    pictures = {0: 0.85 * texture(1), 1: texture(1), 2: 1.25 * texture(1)}
+    got = changed(device, pictures, motion, (0.0625, 0.0625))
+    even = 0.875 * pictures[1] + 0.0625 * (pictures[0] + pictures[2])
+    left = np.abs(got - even).mean() / np.abs(pictures[1] - even).mean()
+    assert left < 0.15
+    pictures.pop(0)
+    one = changed(device, pictures, motion, (0.0625, 0.0625))
+    assert (one.mean() - pictures[1].mean()) > 0.003  # from the next picture alone
+
+
+@pytest.mark.parametrize("other", ["noise", "something else", "another place"])
+def test_what_is_no_change_of_light_leaves_the_picture(device, other):
+    rng = np.random.default_rng(1)
+    motion = np.zeros((HEIGHT, WIDTH, 4), np.float32)
+    here = texture(1)
+    there = {
+        "noise": here + rng.normal(0, 0.004, here.shape).astype(np.float32),
+        "something else": texture(5) * 1.2,
+        "another place": here * 1.4,
+    }[other]
+    if other == "another place":
+        motion[..., :] = 500.0
+    got = changed(device, {0: there, 1: here, 2: there}, motion, (0.0625, 0.0625))
+    assert np.abs(got - here).mean() < 0.15 * 0.125 * np.abs(there - here).mean()
+
+
+def test_what_is_held_out_keeps_its_light(device):
+    motion = np.zeros((HEIGHT, WIDTH, 4), np.float32)
+    holdout = np.ones(SIZE, np.float32)
+    pictures = {k: gain * texture(1) for k, gain in enumerate((0.7, 1.0, 1.5))}
+    got = changed(device, pictures, motion, (0.0625, 0.0625), holdout)
+    np.testing.assert_array_equal(got, pictures[1])
+
+
+@pytest.mark.parametrize(
+    "shutter, factors, shares",
+    [
+        (Shutter(180), (1, 1), (0.0625, 0.0625)),
+        (Shutter(360), (1, 1), (0.125, 0.125)),
+        (Shutter(180, phase="start"), (1, 1), (0, 0.25)),
+        (Shutter(36, phase=0.3), (0.5, 2), (0, 0.6)),
+        (Shutter(180, curve="triangle"), (1, 1), (1 / 24, 1 / 24)),
+    ],
+)
+def test_shares_are_those_of_even_changes(shutter, factors, shares):
+    np.testing.assert_allclose(shares_of(shutter, factors), shares, atol=1e-4)
+
+
+def test_videos_have_it(device):
+    """A picture that flares up between two: a sixteenth of the light of each neighbour."""
+    pytest.importorskip("cv2")
+    y, x = np.mgrid[:72, :96]
+    waves = 0.3 + 0.1 * (np.sin(x / 4) * np.cos(y / 5))[..., None] * [1, 0.8, 0.6]
+    pictures = [(gain * waves).astype(np.float32) for gain in (1, 1, 1.5, 1, 1)]
+    made = list(wgmb.blur_pictures(pictures, transfer="linear", flow="dis", device=device))
+    assert made[2].mean() == pytest.approx((0.875 * 1.5 + 0.125) * waves.mean(), rel=0.02)
+    assert made[1].mean() == pytest.approx((0.9375 + 0.0625 * 1.5) * waves.mean(), rel=0.02)
+    plain = list(
+        wgmb.blur_pictures(pictures, transfer="linear", flow="dis", shutter=0, device=device)
+    )
+    np.testing.assert_allclose(plain[2], pictures[2], atol=1e-6)
