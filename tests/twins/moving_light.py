@@ -159,7 +159,7 @@ def values(light, before, after, bright, change, pulled=False):
 
 def first_level(found, pulled=False):
     """Brightness and its gradient."""
-    return _level(0.2 * (found[..., :3] @ LUMINANCE) if pulled else np.exp(-found[..., 3]))
+    return _level(0.2 * (found[..., :3] @ LUMINANCE) if pulled else np.exp(-found[..., 3]) - 1)
 
 
 def next_level(level):
@@ -183,19 +183,20 @@ def _level(v):
 class Patch:
     """A patch of a level, which is looked for in another one."""
 
-    def __init__(self, here, there, index):
+    def __init__(self, here, there, index, apart=1):
+        """`apart`: from one of its pixels that is compared to the next."""
         height, width = here.shape[:2]
         self.x, self.y = (
             max(min(STRIDE * i, n - PATCH), 0) for i, n in zip(index, (width, height), strict=True)
         )
-        rows = np.minimum(self.y + np.arange(PATCH), height - 1)
-        columns = np.minimum(self.x + np.arange(PATCH), width - 1)
+        rows = np.minimum(self.y + np.arange(0, PATCH, apart), height - 1)
+        columns = np.minimum(self.x + np.arange(0, PATCH, apart), width - 1)
         self.px, self.py = np.meshgrid(columns + 0.5, rows + 0.5)
         block = here[rows][:, columns]
         self.own, self.gradient, self.there = block[..., 0], block[..., 1:3], there[..., 0]
         gx, gy = self.gradient[..., 0], self.gradient[..., 1]
         m = np.array([[(gx * gx).sum(), (gx * gy).sum()], [(gx * gy).sum(), (gy * gy).sum()]])
-        self.is_flat = np.trace(m) < 1e-5 * PATCH**2
+        self.is_flat = np.trace(m) < 1e-5 * self.own.size
         self.inverse = np.linalg.inv(m + (0.001 * np.trace(m) + 1e-9) * np.eye(2))
 
     def compare(self, flow):

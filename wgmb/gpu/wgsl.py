@@ -97,7 +97,7 @@ class WgslSource:
         def declared(mark: re.Match) -> str:
             return f"{mark[1]}texture_storage_{mark[2]}<{mark[4]}, read>{mark[3]}{mark[4]}"
 
-        pattern = r"(var \w+: )texture_(2d|2d_array)<u32>(; *// stored as )(\w+)"
+        pattern = r"(var \w+: )texture_(2d|2d_array)<[uf]32>(; *// stored as )(\w+)"
         text = re.sub(pattern, declared, self.text)
         for name in re.findall(r"var (\w+): texture_storage_\w+<\w+, read>", text):
             text = re.sub(rf"(textureLoad\({name}(?:, \w+)+), 0\)", r"\1)", text)

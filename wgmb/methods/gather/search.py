@@ -134,12 +134,15 @@ class Search:
         if added is None:
             none = self._images.texture("no light", (1, 1), "rgba16float")
             layers = self._images.view_of(none, dimension="2d-array")
+            changes = self._blocks.at_least(4)
         else:
             layers, times = added.layers.create_view(dimension="2d-array"), added.times
+            changes = added.change_flags
             nodes["first"], nodes["step"], nodes["count"] = times.first, times.step, times.count
         return {
             "light_nodes": uniform(self._device, "light nodes", nodes),
             "added_light": layers,
+            "light_changes": changes,
         }
 
     def _differences(self, encoder, inputs, surfaces, cells) -> wgpu.GPUTextureView:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import wgpu
 
@@ -21,6 +22,25 @@ class SurfaceLight:
     motion: View
 
 
+def screen(stage: Stage, frames: Mapping[int, SurfaceLight]) -> None:
+    """Record in which tiles light may differ in a neighbour; `frames` as those of `changes`."""
+    for offset, other in frames.items():
+        if offset:
+            stage.run("screen", **_both(stage, frames[0], other, offset))
+
+
+def _both(stage: Stage, own: SurfaceLight, other: SurfaceLight, offset: int) -> dict[str, Any]:
+    """Bindings of passes that compare the frame with the neighbour at `offset`."""
+    return {
+        "side": stage.uniform("light", "Side", next=offset > 0),
+        "light_here": own.light,
+        "light_there": other.light,
+        "depth_here": own.depth,
+        "depth_there": other.depth,
+        "motion_here": own.motion,
+    }
+
+
 def changes(
     stage: Stage,
     frames: Mapping[int, SurfaceLight],
@@ -30,36 +50,35 @@ def changes(
     """Changes of the logarithm of light to each neighbour, by its offset; black where unknown.
 
     `frames`: by their offsets, 0 the frame itself. `by_color`: the light is the picture itself. The
-    stage's change flags are told.
+    stage's change flags are told. Known in the tiles that `screen` has found doubtful.
     """
     here = frames[0]
     plain = {}
     for offset, frame in frames.items():
-        plain[offset] = stage.texture(f"plain {offset}", "r32uint")
-        stage.run("plain", depth=frame.depth, motion=frame.motion, plain=plain[offset])
+        entry, over = ("everywhere", None) if offset else ("main", "doubtful")
+        plain[offset] = (stage.texture if offset else stage.sparse)(f"plain {offset}", "r32uint")
+        stage.run(
+            "plain", entry, over=over, depth=frame.depth, motion=frame.motion, plain=plain[offset]
+        )
     result = {}
     for offset, there in frames.items():
         if offset == 0:
             continue
         raw, smooth, limited = (
-            stage.texture(name, "rgba16float")
+            stage.sparse(name, "rgba16float")
             for name in ("raw", "smooth", f"{stage.name} changes {offset}")
         )
         stage.run(
             "measure",
-            side=stage.uniform("measure", "Side", next=offset > 0),
-            light_here=here.light,
-            light_there=there.light,
-            depth_here=here.depth,
-            depth_there=there.depth,
-            motion_here=here.motion,
+            over="doubtful",
+            **_both(stage, here, there, offset),
             motion_there=there.motion,
             plain_here=plain[0],
             plain_there=plain[offset],
             ratio=raw,
         )
         peaks, gain, coherence = (
-            stage.texture(name, "r32float") for name in ("peaks", "gain", "coherence")
+            stage.sparse(name, "r32float") for name in ("peaks", "gain", "coherence")
         )
         four, one, none = (
             stage.unused("rgba16float"),
@@ -78,6 +97,7 @@ def changes(
             stage.run(
                 "gain",
                 entry,
+                over="doubtful",
                 constants={"HAS_ALBEDO": albedo is not None, "COLORS": by_color},
                 ratio=ratio,
                 scalar=scalar,
@@ -86,7 +106,6 @@ def changes(
                 coherence=coherence if entry == "find_gain" else none,
                 ratio_out=ratio_out,
                 scalar_out=scalar_out,
-                found=stage.change_flags,
             )
         result[offset] = limited
     return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,30 +48,39 @@ def grids(size: tuple[int, int]) -> list[tuple[int, int]]:
 
 
 def pyramid(stage: Stage, name: str, source: View) -> list[View]:
-    """All levels of the picture of `source`."""
-    levels: list[View] = []
-    for i, size in enumerate(level_sizes(stage.size)):
-        level = stage.texture(f"level {i} {name}", "rgba16float", size)
-        stage.run("pyramid", "halve" if i else "begin", size=size,
-                  source=levels[-1] if i else source, level=level)  # fmt: skip
+    """All levels of the picture of `source`; of shadows, where light rests there are none."""
+    first, format = f"level 0 {name}", "rgba16float"
+    levels = [(stage.texture if stage.pulled else stage.sparse)(first, format)]
+    over = "whole" if stage.pulled else "near"
+    stage.run("pyramid", "begin", over=over, source=source, level=levels[0])
+    for i, size in enumerate(level_sizes(stage.size)[1:], 1):
+        level = stage.texture(f"level {i} {name}", format, size)
+        stage.run("pyramid", "halve", size=size, source=levels[-1], level=level)
         levels.append(level)
     return levels
 
 
+def planes(stage: Stage, depth: View, linear: wgpu.GPUSampler) -> View:
+    """The tangent plane of the surface at every pixel, of the frame itself."""
+    result = stage.sparse("planes", "rgba32float")
+    _accept(stage, "find_planes", depth=depth, linear=linear, weighted=result)
+    return result
+
+
 def flow(
     stage: Stage, side: int, here: tuple[View, list[View]], neighbour: tuple[View, list[View]],
-    depth: View, linear: wgpu.GPUSampler,
+    surfaces: Mapping[str, View], linear: wgpu.GPUSampler,
 ) -> LightFlow:  # fmt: skip
     """Flow to the neighbour at the offset `side`; `here`, `neighbour`: values and their pyramid.
 
-    `depth`: of the frame itself, over whose surfaces both move.
+    `surfaces`: "depth" and "planes" of the frame itself, over whose surfaces both move.
     """
     raw = {
         True: _search(stage, "ahead", here[1], neighbour[1], linear),
         False: _search(stage, "back", neighbour[1], here[1], linear),
     }
     given = {
-        ahead: {"values": own[0], "values_there": other[0], "depth": depth, "linear": linear}
+        ahead: {"values": own[0], "values_there": other[0], "linear": linear, **surfaces}
         for ahead, own, other in ((True, here, neighbour), (False, neighbour, here))
     }
     names = {True: f"ahead {side}", False: f"back {side}"}
@@ -80,42 +90,46 @@ def flow(
     }
     trusted = {}
     for ahead in (True, False):
-        trusted[ahead] = stage.texture(f"flow {names[ahead]}", "rgba16float")
-        stage.run(
-            "accept", "trust", flow=filled[ahead], flow_back=filled[not ahead],
-            around=stage.none("rgba32float"), flow_out=trusted[ahead],
-            weighted=stage.texture("weighted", "rgba32float"), **given[ahead],
-        )  # fmt: skip
-    explained = stage.texture(f"explained {side}", "rgba32float")
+        trusted[ahead] = stage.sparse(f"flow {names[ahead]}", "rgba16float")
+        _accept(stage, "trust", flow=filled[ahead], flow_back=filled[not ahead],
+                flow_out=trusted[ahead], **given[ahead])  # fmt: skip
+    explained = stage.sparse(f"explained {side}", "rgba32float")
     if not stage.pulled:
-        differences = stage.texture("weighted", "rgba32float")
-        stage.run(
-            "explain", flow=trusted[True], flow_back=trusted[False], values=here[0],
-            values_there=neighbour[0], linear=linear, differences=differences,
-        )  # fmt: skip
+        differences = stage.sparse("weighted", "rgba32float")
+        _accept(stage, "explain", flow=trusted[True], flow_back=trusted[False],
+                weighted=differences, **given[True])  # fmt: skip
         blurred(stage, differences, GUARD, explained)
     return LightFlow(trusted[True], trusted[False], explained)
 
 
 def blurred(stage: Stage, source: View, sigma: float, output: View) -> None:
     """A Gaussian of `sigma` [px]."""
-    half = stage.texture("half blurred", "rgba32float")
-    given: dict[str, Any] = {"constants": {"SIGMA": sigma}, "found": stage.change_flags}
+    half = stage.sparse("half blurred", "rgba32float")
+    given: dict[str, Any] = {"over": "near", "constants": {"SIGMA": sigma}}
     stage.run("blur", "across", source=source, output=half, **given)
     stage.run("blur", "down", source=half, output=output, **given)
 
 
 def _filled(stage: Stage, name: str, flow: View, back: View, bindings: dict[str, Any]) -> View:
     """Flow in which that around it stands for what is not trusted; `bindings`: all others."""
-    known, result = (stage.texture(n, "rgba16float") for n in ("known", f"filled {name}"))
-    weighted, around = (stage.texture(n, "rgba32float") for n in ("weighted", "around"))
-    bindings = bindings | {"flow_back": back}
-    stage.run("accept", "trust", flow=flow, around=stage.none("rgba32float"), flow_out=known,
-              weighted=weighted, **bindings)  # fmt: skip
+    result = stage.sparse(f"filled {name}", "rgba16float")
+    weighted, around = (stage.sparse(n, "rgba32float") for n in ("weighted", "around"))
+    bindings = bindings | {"flow": flow, "flow_back": back}
+    _accept(stage, "weigh", weighted=weighted, **bindings)
     blurred(stage, weighted, SPREAD, around)
-    stage.run("accept", "fill", flow=known, around=around, flow_out=result, weighted=weighted,
-              **bindings)  # fmt: skip
+    _accept(stage, "fill", around=around, known=weighted, flow_out=result, **bindings)
     return result
+
+
+def _accept(stage: Stage, entry: str, **bindings) -> None:
+    """Record an entry point of accept.wgsl, which does not use all of them."""
+    none, wide = stage.none("rgba16float"), stage.none("rgba32float")
+    given = {
+        "flow": none, "flow_back": none, "values": none, "values_there": none, "around": wide,
+        "known": wide, "planes": wide, "flow_out": stage.unused("rgba16float"),
+        "weighted": stage.unused("rgba32float"),
+    }  # fmt: skip
+    stage.run("accept", entry, over="near", **given | bindings)
 
 
 def _search(stage: Stage, name: str, here: list[View], other: list[View], linear) -> View:
@@ -125,20 +139,24 @@ def _search(stage: Stage, name: str, here: list[View], other: list[View], linear
     for i in reversed(range(len(sizes))):
         grid = patch_grid(sizes[i])
         first, second = (stage.texture(f"patches {i} {k}", "rgba32float", grid) for k in "ab")
-        found = stage.texture(f"level flow {i} {name}", "rgba16float", sizes[i])
+        flow_name = f"level flow {i} {name}"
+        found = stage.texture(flow_name, "rgba16float", sizes[i])
+        if i == 0:
+            found = stage.sparse(flow_name, "rgba16float")
         no_patches, no_flow = stage.unused("rgba32float"), stage.unused("rgba16float")
         for entry, size, patches, patches_out, flow_out in (
             ("search", grid, stage.none("rgba32float"), first, no_flow),
             ("propagate", grid, first, second, no_flow),
             ("propagate", grid, second, first, no_flow),
-            ("write_flow", sizes[i], first, no_patches, found),
+            ("write_flow" if i else "write_finest", sizes[i], first, no_patches, found),
         ):
             if entry == "propagate" and i == 0:
                 continue  # patches of the coarser level were
             stage.run(
-                "flow", entry, size=size, constants={"FINEST": i == 0}, here=here[i],
+                "flow", entry, size=size, constants={"LEVEL": i}, here=here[i],
                 there=other[i], coarse=coarse, patches=patches, linear=linear,
-                patches_out=patches_out, flow_out=flow_out, changes=stage.change_flags,
+                patches_out=patches_out, flow_out=flow_out,
+                over="near" if entry == "write_finest" else None,
             )  # fmt: skip
         coarse = found
     return coarse

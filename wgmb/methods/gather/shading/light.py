@@ -13,11 +13,12 @@ import wgpu
 
 from ....gpu import wgsl
 from ....gpu.textures import ScratchBuffer, TexturePool
-from .changes import SurfaceLight, View, changes
+from .changes import SurfaceLight, View, changes, screen
 from .flow import (
     LightFlow,
     flow,
     grids,
+    planes,
     pyramid,
 )
 from .stage import FOLDER, Stage
@@ -100,7 +101,7 @@ class MovingLight:
                 size=16 * (2 + change_flags.size // 16),
                 usage=usage | wgpu.BufferUsage.INDIRECT,
             )
-            for name in ("changing", "close")
+            for name in ("doubtful", "changing", "near", "whole")
         }
         stage = Stage(
             self._device, self._images, encoder, bindings, "", False, {}, change_flags, lists
@@ -109,12 +110,17 @@ class MovingLight:
             replace(stage, name="glossy" if kind.pulled else "diffuse", pulled=kind.pulled)
             for kind in kinds
         ]
+        tiles = _tile_grid(stage.size)
+        for stage, kind in zip(stages, kinds, strict=True):
+            screen(stage, kind.frames)
+        stage.run("near", "list_doubtful", size=tiles, **lists)
+        stage.run("near", "size_doubtful", size=(1, 1), **lists)
         changed = [
             changes(stage, kind.frames, kind.albedo, kind.by_color)
             for stage, kind in zip(stages, kinds, strict=True)
         ]
-        for entry, over in (("main", _tile_grid(stage.size)), ("size_lists", (1, 1))):
-            stage.run("near", entry, size=over, found=change_flags, **lists)
+        stage.run("near", "main", size=tiles, **lists)
+        stage.run("near", "size_lists", size=(1, 1), **lists)
         gated = stage.gated(grids(stage.size)).gates
         earlier = None
         for stage, kind, by_side in zip(stages, kinds, changed, strict=True):
@@ -137,8 +143,9 @@ class MovingLight:
         seen = {offset: (view, pyramid(stage, str(offset), view))
                 for offset, view in present.items()}  # fmt: skip
         depth = kind.frames[0].depth
+        surfaces = {"depth": depth, "planes": planes(stage, depth, self._linear)}
         flows = {
-            side: flow(stage, side, seen[0], seen[side], depth, self._linear) for side in changed
+            side: flow(stage, side, seen[0], seen[side], surfaces, self._linear) for side in changed
         }
         result = self._images.texture(
             f"light {stage.name}", stage.size, "rgba16float", times.count + 2
@@ -160,7 +167,7 @@ class MovingLight:
             entry = "main" if i < times.count else "add_neighbour"
             if side not in changed:
                 entry = "rest" if i < times.count else "add_nothing"
-            way = flows.get(side, LightFlow(none, none, none))
+            way = flows.get(side, LightFlow(none, none, stage.none("rgba32float")))
             there = present.get(side, none)
             if entry == "main" and not kind.pulled:
                 for name, along, value, by in (
@@ -168,8 +175,8 @@ class MovingLight:
                     ("from_there", 1 - share, there, way.back),
                 ):
                     push = stage.uniform("push", "Push", along=along)
-                    stage.run("push", over="close", push=push, values=value, flow=by,
-                              found=stage.change_flags, pushed=buffers[name])  # fmt: skip
+                    stage.run("push", over="near", push=push, values=value, flow=by,
+                              pushed=buffers[name])  # fmt: skip
             before, after = (changed.get(one, none) for one in (-1, 1))
             compose = partial(
                 stage.run,
@@ -192,8 +199,8 @@ class MovingLight:
                 **buffers,
             )
             if entry == "main":
-                compose("begin")
-            compose(entry, over="changing" if entry == "main" else None)
+                compose("begin", over="near")
+            compose(entry, over="changing" if entry == "main" else "near")
         return result
 
 

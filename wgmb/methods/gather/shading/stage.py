@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import wgpu
@@ -21,7 +21,9 @@ class Stage:
     """Records passes over `bindings.size` into `encoder`.
 
     `name`: of the kind of light. `gates`: workgroups of passes by their sizes; none: all run.
-    `change_flags`: see Added. `lists`: of tiles that are "changing" and that are "close" to them.
+    `change_flags`: see Added. `lists`: of tiles in which light is "doubtful" and "changing", of
+    those "near" these, and of the "whole" image; empty if light changes nowhere. `begun`: names of
+    sparse textures that are clear of the frame before.
     """
 
     device: wgpu.GPUDevice
@@ -33,6 +35,7 @@ class Stage:
     gates: dict[tuple[int, int], dict]
     change_flags: wgpu.GPUBuffer
     lists: Mapping[str, wgpu.GPUBuffer]
+    begun: set[str] = field(default_factory=set)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -51,6 +54,17 @@ class Stage:
         """Bound where a pass writes nothing."""
         return self.images.view(f"spare {format}", (1, 1), format)
 
+    def sparse(self, name: str, format: str) -> wgpu.GPUTextureView:
+        """The same, for passes over lists of tiles: 0 in all others."""
+        view, blank = self.texture(name, format), self.texture(f"blank {format}", format)
+        if name not in self.begun:
+            whole = (*self.size, 1)
+            self.encoder.copy_texture_to_texture(
+                {"texture": blank.texture}, {"texture": view.texture}, whole
+            )
+            self.begun.add(name)
+        return view
+
     def run(
         self,
         file: str,
@@ -66,15 +80,18 @@ class Stage:
         The textures of another size than the frame's come with their own.
         """
         path, given = f"{FOLDER}/{file}.wgsl", dict(constants or {})
-        if "override PULLED" in wgsl.load(path).text:
+        text = wgsl.load(path).text
+        if "override PULLED" in text:
             given["PULLED"] = self.pulled
         kernel = gpu.kernel(self.device, path, None, **given)
         size = size or self.size
         gate = self.gates.get(size) if self.gates else None
         if over:
             gate = {"buffer": self.lists[over], "offset": 0, "size": 12}
-        if "> listed:" in wgsl.load(path).text:
-            resources["listed"] = self.lists[over or "changing"]
+        if "> listed:" in text:
+            resources["listed"] = self.lists[over or "whole"]
+        if "> found:" in text:
+            resources["found"] = self.change_flags
         if self.gates and gate is None:
             raise KeyError(f"no gate for passes of {size}")
         kernel.run(self.encoder, entry, replace(self.bindings, size=size), gate, **resources)
@@ -94,7 +111,7 @@ class Stage:
             label="gates", size=length, usage=usage.STORAGE | usage.INDIRECT
         )
         self.run("gate", size=(1, 1), sizes=self.uniform("gate", "Sizes", counts=counts),
-                 found=self.change_flags, gates=gates)  # fmt: skip
+                 gates=gates)  # fmt: skip
         each = {
             size: {"buffer": gates, "offset": 12 * i, "size": 12} for i, size in enumerate(sizes)
         }

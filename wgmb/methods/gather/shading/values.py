@@ -23,9 +23,11 @@ def values(
     closed = none if stage.pulled else _closed(stage, here, sides, 0 if by_color else STEPS)
     result = {}
     for offset in (0, *changed):
-        result[offset] = stage.texture(f"values {offset}", "rgba16float")
+        name, format = f"values {offset}", "rgba16float"
+        result[offset] = (stage.texture if stage.pulled else stage.sparse)(name, format)
         stage.run(
             "values",
+            over="whole" if stage.pulled else "near",
             light_here=here.light,
             closed=closed,
             own=changed.get(offset, none),
@@ -37,11 +39,12 @@ def values(
 
 def _closed(stage: Stage, here: SurfaceLight, sides: Mapping[str, Any], steps: int) -> View:
     """The light without its shadows."""
-    state, other = (stage.texture(f"closing {k}", "rgba32float") for k in "ab")
+    state, other = (stage.sparse(f"closing {k}", "rgba32float") for k in "ab")
     for entry in ("begin", *("grow",) * steps, *("shrink",) * steps):
         stage.run(
             "closing",
             entry,
+            over="near",
             light_here=here.light,
             depth_here=here.depth,
             state=other,

@@ -4,6 +4,7 @@
 //#include common/path.wgsl
 //#include common/shutter.wgsl
 //#include methods/gather/search/search.wgsl
+//#include methods/gather/shading/active.wgsl
 
 struct LightNodes {
     first: f32,         // time of the first one [frame intervals]
@@ -14,6 +15,7 @@ struct LightNodes {
 @group(1) @binding(9) var linear: sampler;
 @group(1) @binding(12) var<uniform> light_nodes: LightNodes;
 @group(1) @binding(13) var added_light: texture_2d_array<f32>;  // premultiplied by weight; a: how sure it is; of the last two layers: seen there
+@group(1) @binding(14) var<storage, read> light_changes: array<u32>;    // one word, then those of tiles: see active.wgsl
 
 override MOVING_LIGHT: bool = false;    // whether there is any
 
@@ -27,6 +29,12 @@ fn sample_duration(times: SampleTimes, i: u32) -> f32 {
     return strata[i].end - strata[i].begin;
 }
 
+/// False at a place of this frame [px] where light rests in all frames: there the addition is 0, and sure.
+fn is_light_moving(at: vec2f) -> bool {
+    let px = min(vec2u(max(at, vec2f(0.0))), frame.size - 1u);
+    return (light_changes[1u + light_tile(px)] & CHANGES) != 0u;
+}
+
 /// For a sample `at` [px] of a layer, around the time `t`, for as long as `duration`.
 fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
     if layer == 0u { return vec4f(light_during(at, t, duration).rgb, 0.0); }
@@ -34,6 +42,7 @@ fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
     let offset = offset_of(min(f, 2u));
     let surface = surface_of(vec2i(floor(at)), min(layer, 5u));
     let here = at + displacement5(unpack_trajectory(surface), -offset);
+    if !is_light_moving(here) { return vec4f(0.0); }
     let own = surface_of(vec2i(floor(here)), 0u);
     let back = here + displacement5(unpack_trajectory(own), offset) - at;
     let node = light_nodes.count + select(0u, 1u, offset > 0.0);
@@ -55,6 +64,7 @@ fn light_unknown(at: vec2f, layer: u32, t: f32, duration: f32) -> f32 {
 
 /// Addition at a place of this frame [px]: the mean over a time. a: its confidence.
 fn light_during(at: vec2f, t: f32, duration: f32) -> vec4f {
+    if !is_light_moving(at) { return vec4f(0.0, 0.0, 0.0, 1.0); }
     let uv = at / vec2f(frame.size);
     let last = f32(light_nodes.count) - 1.0;
     let half = max(0.5 * duration / light_nodes.step, 0.5);

@@ -226,8 +226,8 @@ fn static_color(px: vec2u) -> vec4f {
 /// Of the frame's own pixel, the mean over the exposure.
 fn lit_color(px: vec2u) -> vec4f {
     let color = textureLoad(own_color, px, 0);
-    if !MOVING_LIGHT { return color; }
     let x = vec2f(px) + 0.5;
+    if !MOVING_LIGHT || !is_light_moving(x) { return color; }
     let times = shutter_times(x, 0.0);
     let share = 1.0 / f32(times.count);
     var sum = vec4f(0.0);
@@ -240,8 +240,8 @@ fn lit_color(px: vec2u) -> vec4f {
 
 /// Of the frame's own pixel, the share of the exposure in which its light is not known.
 fn static_unlit(px: vec2u) -> f32 {
-    if !MOVING_LIGHT { return 0.0; }
     let x = vec2f(px) + 0.5;
+    if !MOVING_LIGHT || !is_light_moving(x) { return 0.0; }
     let times = shutter_times(x, 0.0);
     var sum = 0.0;
     let count = turns_of(times.count, px.x);

@@ -1,19 +1,21 @@
-// Trust in the flow: it leads back, to equal darkness, along one surface: what is dark by itself, as the side of a box
-// is, does not move to another side. Where it cannot be trusted, the flow around replaces it.
+// Trust in the flow, and what it explains. It is trusted if it leads back, to equal darkness, along one surface: what is
+// dark by itself, as the side of a box is, does not move to another side. Else the flow around replaces it.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/listed.wgsl
 
-@group(1) @binding(0) var flow: texture_2d<f32>;        // to the other frame [px]
+@group(1) @binding(0) var flow: texture_2d<f32>;        // stored as rgba16float: to the other frame [px]
 @group(1) @binding(1) var flow_back: texture_2d<f32>;
 @group(1) @binding(2) var values: texture_2d<f32>;
 @group(1) @binding(3) var values_there: texture_2d<f32>;
-@group(1) @binding(4) var around: texture_2d<f32>;      // of `fill`: weighted flow, weight, blurred
+@group(1) @binding(4) var around: texture_2d<f32>;      // of `fill`: `known`, blurred
 @group(1) @binding(5) var linear: sampler;
 @group(1) @binding(6) var flow_out: Flow;               // flow [px], trust 0..1
-@group(1) @binding(7) var weighted: Weighted;           // flow times weight, weight
-
+@group(1) @binding(7) var weighted: Weighted;           // flow times weight, weight, trust; of `explain`: differences with, without; of `find_planes`: see `planes`
 @group(1) @binding(8) var depth: texture_2d<f32>;
+@group(1) @binding(9) var planes: texture_2d<f32>;      // stored as rgba32float, by `find_planes`: the inverse of depth; its change a pixel across, down
+@group(1) @binding(10) var known: texture_2d<f32>;      // of `fill`: what `weigh` wrote
 
 alias Flow = texture_storage_2d<rgba16float, write>;
 alias Weighted = texture_storage_2d<rgba32float, write>;
@@ -27,53 +29,95 @@ const OFF_PLANE: f32 = 0.02;    // by which one surface may leave its tangent pl
 const BEND: f32 = 0.5;          // and this much more over the picture's width: a turn of about 45 degrees
 const PRESENT: f32 = 0.1;       // value from which on there is something to move
 
+/// Of the flow as it was found, weighted.
 @compute @workgroup_size(WG_X, WG_Y)
-fn trust(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let by = textureLoad(flow, id.xy, 0).xy;
-    let at = (vec2f(id.xy) + 0.5 + by) / vec2f(frame.size);
-    let value = textureLoad(values, id.xy, 0).a;
-    let astray = length(by + textureSampleLevel(flow_back, linear, at, 0.0).xy);
-    let unlike = abs(textureSampleLevel(values_there, linear, at, 0.0).a - value);
-    let stays = is_one_surface(vec2i(id.xy), vec2i(floor(vec2f(id.xy) + 0.5 + by)));
-    let trusted = f32(stays) * clamp(2.0 - astray / (ASTRAY + ASTRAY_SHARE * length(by)), 0.0, 1.0)
-        * clamp(2.0 - unlike / (UNLIKE + UNLIKE_SHARE * value), 0.0, 1.0);
+fn weigh(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let by = textureLoad(flow, id, 0).xy;
+    let value = textureLoad(values, id, 0).a;
+    let trusted = trust_in(by, id, value);
     let weight = trusted * min(value / PRESENT, 1.0);
-    textureStore(flow_out, id.xy, vec4f(by, trusted, 0.0));
-    textureStore(weighted, id.xy, vec4f(weight * by, weight, 0.0));
+    textureStore(weighted, id, vec4f(weight * by, weight, trusted));
 }
 
+/// That around it stands for what is not trusted.
 @compute @workgroup_size(WG_X, WG_Y)
-fn fill(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let own = textureLoad(flow, id.xy, 0);
-    let near = textureLoad(around, id.xy, 0);
-    let keep = own.z * min(near.z / 0.05, 1.0);
-    let filled = mix(near.xy / max(near.z, 1e-4), own.xy, keep);
-    textureStore(flow_out, id.xy, vec4f(select(own.xy, filled, near.z > 0.01), own.z, 0.0));
-    textureStore(weighted, id.xy, vec4f(0.0));
+fn fill(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let own = textureLoad(flow, id, 0).xy;
+    let trusted = textureLoad(known, id, 0).w;
+    let near = textureLoad(around, id, 0);
+    let keep = trusted * min(near.z / 0.05, 1.0);
+    let filled = mix(near.xy / max(near.z, 1e-4), own, keep);
+    textureStore(flow_out, id, vec4f(select(own, filled, near.z > 0.01), 0.0, 0.0));
 }
 
-/// True if each of the pixels is about on the other's tangent plane, along which the inverse of depth is linear.
+/// Of the filled flow.
+@compute @workgroup_size(WG_X, WG_Y)
+fn trust(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let by = textureLoad(flow, id, 0).xy;
+    textureStore(flow_out, id, vec4f(by, trust_in(by, id, textureLoad(values, id, 0).a), 0.0));
+}
+
+fn trust_in(by: vec2f, id: vec2u, value: f32) -> f32 {
+    let at = vec2f(id) + 0.5 + by;
+    let uv = at / vec2f(frame.size);
+    let astray = length(by + textureSampleLevel(flow_back, linear, uv, 0.0).xy);
+    let unlike = abs(textureSampleLevel(values_there, linear, uv, 0.0).a - value);
+    let stays = is_one_surface(vec2i(id), vec2i(floor(at)));
+    return f32(stays) * clamp(2.0 - astray / (ASTRAY + ASTRAY_SHARE * length(by)), 0.0, 1.0)
+        * clamp(2.0 - unlike / (UNLIKE + UNLIKE_SHARE * value), 0.0, 1.0);
+}
+
+/// Differences from frame to frame: with the motion that was found, and without any.
+@compute @workgroup_size(WG_X, WG_Y)
+fn explain(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let x = vec2f(id) + 0.5;
+    let scale = 1.0 / vec2f(frame.size);
+    let own = textureLoad(values, id, 0).a;
+    let other = textureLoad(values_there, id, 0).a;
+    let ahead = textureSampleLevel(values_there, linear, (x + textureLoad(flow, id, 0).xy) * scale, 0.0).a;
+    let back = textureSampleLevel(values, linear, (x + textureLoad(flow_back, id, 0).xy) * scale, 0.0).a;
+    textureStore(weighted, id, vec4f(abs(ahead - own) + abs(back - other), 2.0 * abs(other - own), 0.0, 0.0));
+}
+
+/// True if each of the pixels is about on the other's tangent plane, along which the inverse of depth is linear. False where
+/// light rests.
 fn is_one_surface(a: vec2i, b: vec2i) -> bool {
     let way = vec2f(b - a);
     let most = 1.0 + OFF_PLANE + BEND * length(way) / f32(frame.size.x);
-    let there = inverse_depth(a) + dot(way, slope(a));
-    let here = inverse_depth(b) - dot(way, slope(b));
-    return is_as_deep(there, inverse_depth(b), most) && is_as_deep(here, inverse_depth(a), most);
+    let at = textureLoad(planes, a, 0).xyz;
+    let landing = inside(b);
+    let at_there = textureLoad(planes, landing, 0).xyz;
+    let there = at.x + dot(way, at.yz);
+    let here = at_there.x - dot(way, at_there.yz);
+    return is_as_deep(there, at_there.x, most) && is_as_deep(here, at.x, most);
 }
 
 fn is_as_deep(a: f32, b: f32, most: f32) -> bool {
     return max(a, b) < most * min(a, b);
 }
 
-/// The change of the inverse of depth per pixel, to the sides where it changes less.
-fn slope(px: vec2i) -> vec2f {
-    return vec2f(slope_along(px, vec2i(SLOPE_REACH, 0)), slope_along(px, vec2i(0, SLOPE_REACH))) / f32(SLOPE_REACH);
+/// The tangent plane at every pixel.
+@compute @workgroup_size(WG_X, WG_Y)
+fn find_planes(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
+    let own = inverse_depth(px);
+    let across = slope_along(px, own, vec2i(SLOPE_REACH, 0));
+    let down = slope_along(px, own, vec2i(0, SLOPE_REACH));
+    textureStore(weighted, px, vec4f(own, vec2f(across, down) / f32(SLOPE_REACH), 0.0));
 }
 
-fn slope_along(px: vec2i, by: vec2i) -> f32 {
-    let own = inverse_depth(px);
+/// The change of the inverse of depth, to the side where it changes less.
+fn slope_along(px: vec2i, own: f32, by: vec2i) -> f32 {
     let ahead = inverse_depth(px + by) - own;
     let behind = own - inverse_depth(px - by);
     return select(behind, ahead, abs(ahead) < abs(behind));

@@ -10,29 +10,12 @@ const NEAR: u32 = 4u;           // it changes in a tile that is NEAR_TILES away 
 const NEAR_TILES: u32 = 2u;     // flow and its means look less far than that
 
 fn light_tile(px: vec2u) -> u32 {
-    return light_tile_of(px, frame.size);
-}
-
-/// In a picture of this size.
-fn light_tile_of(px: vec2u, size: vec2u) -> u32 {
-    let across = (size.x + LIGHT_TILE - 1u) / LIGHT_TILE;
+    let across = (frame.size.x + LIGHT_TILE - 1u) / LIGHT_TILE;
     return px.y / LIGHT_TILE * across + px.x / LIGHT_TILE;
 }
 
 // A list of tiles: workgroups of an indirect dispatch over their pixels, WG_X * WG_Y each; the number of tiles; the tiles.
 const TILE_GROUPS = LIGHT_TILE * LIGHT_TILE / (WG_X * WG_Y);   // of a tile
-const GROUPS_PER_ROW: u32 = 32768u;     // of a dispatch; devices take 65,535
+const LIGHT_GROUPS_PER_ROW: u32 = 32768u;     // of a dispatch; devices take 65,535
 const LISTED: u32 = 3u;         // word of the number
 const FIRST_LISTED: u32 = 4u;
-
-/// The place of an invocation in a list of tiles.
-fn listed_index(group: vec3u) -> u32 {
-    return (group.y * GROUPS_PER_ROW + group.x) / TILE_GROUPS;
-}
-
-/// The pixel of an invocation in its tile.
-fn pixel_in_tile(tile: u32, group: vec3u, local: u32) -> vec2u {
-    let across = (frame.size.x + LIGHT_TILE - 1u) / LIGHT_TILE;
-    let n = group.x % TILE_GROUPS * (WG_X * WG_Y) + local;
-    return LIGHT_TILE * vec2u(tile % across, tile / across) + vec2u(n % LIGHT_TILE, n / LIGHT_TILE);
-}

@@ -4,12 +4,13 @@
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/listed.wgsl
 
 @group(1) @binding(0) var light_here: texture_2d<f32>;
 @group(1) @binding(1) var depth_here: texture_2d<f32>;
 @group(1) @binding(2) var before: texture_2d<f32>;      // changes to the previous frame, to the next one
 @group(1) @binding(3) var after: texture_2d<f32>;
-@group(1) @binding(4) var state: texture_2d<f32>;       // what the pass before wrote: light, depth, negative at a crease
+@group(1) @binding(4) var state: texture_2d<f32>;       // stored as rgba32float, by the pass before: light, depth, negative at a crease, 0 where light rests
 @group(1) @binding(5) var output: State;
 
 alias State = texture_storage_2d<rgba32float, write>;
@@ -24,11 +25,13 @@ fn own_light(px: vec2i) -> vec3f {
 
 /// The brightest of the three frames.
 @compute @workgroup_size(WG_X, WG_Y)
-fn begin(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
+fn begin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
+    let surface = select(1.0, -1.0, is_crease(px)) * depth_at(px);
     let most = max(vec3f(0.0), max(textureLoad(before, px, 0).rgb, textureLoad(after, px, 0).rgb));
-    textureStore(output, px, vec4f(own_light(px) + most, select(1.0, -1.0, is_crease(px)) * depth_at(px)));
+    textureStore(output, px, vec4f(own_light(px) + most, surface));
 }
 
 fn depth_at(px: vec2i) -> f32 {
@@ -51,15 +54,17 @@ fn is_crease(px: vec2i) -> bool {
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn grow(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    spread(vec2i(id.xy), 1.0);
+fn grow(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    spread(vec2i(id), 1.0);
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn shrink(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    spread(vec2i(id.xy), -1.0);
+fn shrink(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    spread(vec2i(id), -1.0);
 }
 
 /// The greatest (`sign` 1) or smallest (-1) of the pixel and the four around it on the same surface.
@@ -68,7 +73,8 @@ fn spread(px: vec2i, sign: f32) {
     var most = sign * own.rgb;
     for (var k = 0; k < 4; k++) {
         let by = select(vec2i(0, k * 2 - 5), vec2i(k * 2 - 1, 0), k < 2);
-        let there = textureLoad(state, inside(px + by), 0);
+        let near = inside(px + by);
+        let there = textureLoad(state, near, 0);
         let same = max(there.a, abs(own.a)) < AS_DEEP * min(there.a, abs(own.a));
         most = max(most, select(most, sign * there.rgb, same));
     }

@@ -1,6 +1,6 @@
 // Addition to the colours of this frame for the light of another time.
 //#include common/frame.wgsl
-//#include methods/gather/shading/active.wgsl
+//#include methods/gather/shading/listed.wgsl
 //#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/pushed.wgsl
 
@@ -12,19 +12,18 @@ struct Node {
 @group(1) @binding(1) var light_here: texture_2d<f32>;
 @group(1) @binding(2) var albedo: texture_2d<f32>;
 @group(1) @binding(3) var weight: texture_2d<f32>;
-@group(1) @binding(4) var before: texture_2d<f32>;      // changes to the previous frame, to the next one
-@group(1) @binding(5) var after: texture_2d<f32>;
+@group(1) @binding(4) var before: texture_2d<f32>;      // stored as rgba16float: changes to the previous frame, to the next one
+@group(1) @binding(5) var after: texture_2d<f32>;       // stored as rgba16float
 @group(1) @binding(6) var values: texture_2d<f32>;
 @group(1) @binding(7) var values_there: texture_2d<f32>;
 @group(1) @binding(8) var flow: texture_2d<f32>;        // and trust
 @group(1) @binding(9) var flow_back: texture_2d<f32>;
-@group(1) @binding(10) var explained: texture_2d<f32>;  // what explain.wgsl wrote, blurred
+@group(1) @binding(10) var explained: texture_2d<f32>;  // stored as rgba32float: what accept.wgsl wrote, blurred
 @group(1) @binding(11) var earlier: texture_2d<f32>;    // what is added for other reasons
 @group(1) @binding(12) var linear: sampler;
 @group(1) @binding(13) var<storage, read_write> from_here: array<u32>;   // see push.wgsl
 @group(1) @binding(14) var<storage, read_write> from_there: array<u32>;
-@group(1) @binding(15) var<storage, read> listed: array<u32>;   // the tiles of `main`, see active.wgsl
-@group(1) @binding(16) var added: Added;                // [linear, premultiplied by weight]; a: how sure it is, 0 to 1
+@group(1) @binding(15) var added: Added;                // [linear, premultiplied by weight]; a: how sure it is, 0 to 1
 
 alias Added = texture_storage_2d<rgba16float, write>;
 
@@ -42,21 +41,22 @@ fn step_around(x: f32, half: f32) -> f32 {
     return smoothstep(0.5 - half, 0.5 + half, x);
 }
 
-/// Nothing yet: light rests where it changes in no frame, and that is sure.
+/// Nothing yet: light rests where it changes in no frame, and that is sure. It is read in tiles with changes, and beside them.
 @compute @workgroup_size(WG_X, WG_Y)
-fn begin(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
+fn begin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
     var before = vec3f(0.0);
-    if ONTO { before = textureLoad(earlier, id.xy, 0).rgb; }
-    textureStore(added, id.xy, vec4f(before, as_sure_as(vec2i(id.xy), 1.0)));
+    if ONTO { before = textureLoad(earlier, id, 0).rgb; }
+    textureStore(added, id, vec4f(before, as_sure_as(vec2i(id), 1.0)));
 }
 
 /// The tiles in which light changes.
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
-    let k = listed_index(group);
-    let px = vec2i(pixel_in_tile(listed[FIRST_LISTED + k], group, local));
-    if k >= listed[LISTED] || any(px >= vec2i(frame.size)) { return; }
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     let change = moved(px);
     store(px, change.rgb, as_sure_as(px, change.a));
 }
@@ -110,26 +110,29 @@ fn as_sure_as(px: vec2i, sure: f32) -> f32 {
 
 /// Addition for a neighbouring frame's own light, at the share 1 of the way to it; a: 1 if the surface is seen there.
 @compute @workgroup_size(WG_X, WG_Y)
-fn add_neighbour(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let change = textureLoad(before, id.xy, 0);
-    store(vec2i(id.xy), change.rgb, change.a);
+fn add_neighbour(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let change = textureLoad(before, id, 0);
+    store(vec2i(id), change.rgb, change.a);
 }
 
 /// At a time on whose side there is no neighbour, light rests. It is not known where it changes on the other side.
 @compute @workgroup_size(WG_X, WG_Y)
-fn rest(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
+fn rest(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     let change = max(most_of(textureLoad(before, px, 0).rgb), most_of(textureLoad(after, px, 0).rgb));
     store(px, vec3f(0.0), as_sure_as(px, 1.0 - min(change / COUNTS, 1.0)));
 }
 
 /// Nothing: there is no neighbour on that side.
 @compute @workgroup_size(WG_X, WG_Y)
-fn add_nothing(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    store(vec2i(id.xy), vec3f(0.0), 0.0);
+fn add_nothing(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    store(vec2i(id), vec3f(0.0), 0.0);
 }
 
 fn store(px: vec2i, change: vec3f, a: f32) {

@@ -2,23 +2,26 @@
 // "Fast Optical Flow using Dense Inverse Search", 2016) of small pictures without texture. Patches on a grid are
 // compared without their means; each starts from the coarser level, from standing still, and from its neighbours.
 //#include common/frame.wgsl
-//#include methods/gather/shading/active.wgsl
 //#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/listed.wgsl
+//#include methods/gather/shading/resting.wgsl
 
-@group(1) @binding(0) var here: texture_2d<f32>;        // a level of pyramid.wgsl
+@group(1) @binding(0) var here: texture_2d<f32>;        // stored as rgba16float: a level of pyramid.wgsl
 @group(1) @binding(1) var there: texture_2d<f32>;
 @group(1) @binding(2) var coarse: texture_2d<f32>;      // flow of the coarser level [px of it]; 1 x 1: there is none
-@group(1) @binding(3) var patches: texture_2d<f32>;     // of `propagate` and `write_flow`: what the pass before wrote
+@group(1) @binding(3) var patches: texture_2d<f32>;     // stored as rgba32float; of `propagate` and `write_flow`: what the pass before wrote
 @group(1) @binding(4) var linear: sampler;
 @group(1) @binding(5) var patches_out: Patches;         // flow [px], squared difference
 @group(1) @binding(6) var flow_out: Flow;
-@group(1) @binding(7) var<storage, read> changes: array<u32>;     // one word, then those of tiles: see active.wgsl
 
 alias Patches = texture_storage_2d<rgba32float, write>;
 alias Flow = texture_storage_2d<rgba16float, write>;
 
-override FINEST: bool = false;  // the level is the frame itself, and only what is near changes counts
+override LEVEL: u32 = 0u;       // of the pyramid, 0 the frame itself
+override APART: i32 = select(1, 2, LEVEL < 2u);     // from one pixel of a patch that is compared to the next [px]
+override TAPS: i32 = PATCH / APART;                 // along a side; the gradients are those of all pixels
 
+const COARSE: u32 = 2u;         // levels beyond have all patches
 const PATCH: i32 = 12;          // side [px]
 const STRIDE: i32 = 4;          // from one patch to the next [px]
 const STEPS: i32 = 6;           // most of a search
@@ -46,12 +49,13 @@ struct Patch {
 fn patch_at(corner: vec2i, last: vec2i) -> Patch {
     var sum = 0.0;
     var m = vec3f(0.0);
-    for (var k = 0; k < PATCH * PATCH; k++) {
-        let a = textureLoad(here, min(corner + vec2i(k % PATCH, k / PATCH), last), 0).xyz;
+    for (var k = 0; k < TAPS * TAPS; k++) {
+        let px = min(corner + APART * vec2i(k % TAPS, k / TAPS), last);
+        let a = textureLoad(here, px, 0).xyz;
         sum += a.x;
         m += vec3f(a.y * a.y, a.y * a.z, a.z * a.z);
     }
-    let count = f32(PATCH * PATCH);
+    let count = f32(TAPS * TAPS);
     let is_flat = m.x + m.z < FLAT * count;
     // A little is added, so that along an edge without corners a patch stays where it is.
     let held = m + (0.001 * (m.x + m.z) + 1e-9) * vec3f(1.0, 0.0, 1.0);
@@ -71,8 +75,8 @@ fn compare(one: Patch, by: vec2f, last: vec2i) -> Compared {
     var sum2 = 0.0;
     var slope = vec2f(0.0);
     var slope_sum = vec2f(0.0);
-    for (var k = 0; k < PATCH * PATCH; k++) {
-        let px = min(one.corner + vec2i(k % PATCH, k / PATCH), last);
+    for (var k = 0; k < TAPS * TAPS; k++) {
+        let px = min(one.corner + APART * vec2i(k % TAPS, k / TAPS), last);
         let a = textureLoad(here, px, 0).xyz;
         let d = textureSampleLevel(there, linear, (vec2f(px) + 0.5 + by) * scale, 0.0).x - a.x;
         sum += d;
@@ -80,7 +84,7 @@ fn compare(one: Patch, by: vec2f, last: vec2i) -> Compared {
         slope += a.yz * d;
         slope_sum += a.yz;
     }
-    let mean = sum / f32(PATCH * PATCH);
+    let mean = sum / f32(TAPS * TAPS);
     let force = slope - mean * slope_sum;
     let step = -vec2f(one.inverse.x * force.x + one.inverse.y * force.y,
                       one.inverse.y * force.x + one.inverse.z * force.y);
@@ -118,10 +122,10 @@ fn coarse_flow(px: vec2i, last: vec2i) -> vec2f {
     return 2.0 * textureLoad(coarse, clamp(px / 2, vec2i(0), size - 1), 0).xy;
 }
 
-/// False for a pixel of the finest level that is far from all changes.
-fn counts(px: vec2i, size: vec2i) -> bool {
-    if !FINEST { return true; }
-    return (changes[1u + light_tile_of(vec2u(px), vec2u(size))] & NEAR) != 0u;
+/// False for a pixel of a level that is far from all changes. On coarse levels, patches are larger than what is near.
+fn counts(px: vec2i) -> bool {
+    let at = min(vec2u(px) << vec2u(LEVEL), frame.size - 1u);
+    return LEVEL > COARSE || is_near(at);
 }
 
 /// Each patch by itself.
@@ -130,14 +134,14 @@ fn search(@builtin(global_invocation_id) id: vec3u) {
     let size = vec2i(textureDimensions(here));
     if any(vec2i(id.xy) >= patches_along(size)) { return; }
     let last = size - 1;
-    if !counts(min(corner_of(vec2i(id.xy), size) + PATCH / 2, last), size) {
+    if !counts(min(corner_of(vec2i(id.xy), size) + PATCH / 2, last)) {
         textureStore(patches_out, id.xy, vec4f(0.0));
         return;
     }
     let one = patch_at(corner_of(vec2i(id.xy), size), last);
     let middle = one.corner + PATCH / 2;
     var best = Best(vec2f(0.0), compare(one, vec2f(0.0), last));
-    let moves = !one.is_flat && best.found.cost > STILL * f32(PATCH * PATCH);
+    let moves = !one.is_flat && best.found.cost > STILL * f32(TAPS * TAPS);
     if one.is_flat { best.flow = coarse_flow(middle, last); }
     if moves {
         take(&best, one, coarse_flow(middle, last), last);
@@ -156,7 +160,8 @@ fn propagate(@builtin(global_invocation_id) id: vec3u) {
     let count = patches_along(size);
     if any(vec2i(id.xy) >= count) { return; }
     let last = size - 1;
-    let own = textureLoad(patches, id.xy, 0);
+    let index = id.xy;
+    let own = textureLoad(patches, index, 0);
     var best = Best(own.xy, Compared(own.z, vec2f(0.0)));
     if own.w > 0.0 {
         let one = patch_at(corner_of(vec2i(id.xy), size), last);
@@ -170,27 +175,38 @@ fn propagate(@builtin(global_invocation_id) id: vec3u) {
     textureStore(patches_out, id.xy, vec4f(best.flow, best.found.cost, own.w));
 }
 
-/// The flow of every pixel: the mean of the patches over it, those most that it is alike by.
+/// The flow of every pixel of a coarse level: see flow_at().
 @compute @workgroup_size(WG_X, WG_Y)
 fn write_flow(@builtin(global_invocation_id) id: vec3u) {
-    let size = vec2i(textureDimensions(here));
-    if any(vec2i(id.xy) >= size) { return; }
     let px = vec2i(id.xy);
-    if !counts(px, size) {
-        textureStore(flow_out, px, vec4f(0.0));
-        return;
-    }
+    if any(px >= vec2i(textureDimensions(here))) { return; }
+    textureStore(flow_out, px, vec4f(flow_at(px), 0.0, 0.0));
+}
+
+/// That of the finest level, in tiles close to changes.
+@compute @workgroup_size(WG_X, WG_Y)
+fn write_finest(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    textureStore(flow_out, id, vec4f(flow_at(vec2i(id)), 0.0, 0.0));
+}
+
+/// The mean of the patches over a pixel, those most that it is alike by; far from all changes none.
+fn flow_at(px: vec2i) -> vec2f {
+    let size = vec2i(textureDimensions(here));
     let count = patches_along(size);
     let own = textureLoad(here, px, 0).x;
-    let first = px / STRIDE - PATCH / STRIDE + 1;     // three cover the pixel, at the picture's end a fourth
+    let first = px / STRIDE - PATCH / STRIDE + 1;
+    let along = select(vec2i(PATCH / STRIDE), vec2i(PATCH / STRIDE + 1), px >= size - PATCH);   // at the picture's end, one more
+    let turns = select(0, along.x * along.y, counts(px));
     var sum = vec3f(0.0);
-    for (var k = 0; k < 16; k++) {
-        let index = clamp(first + vec2i(k % 4, k / 4), vec2i(0), count - 1);
+    for (var k = 0; k < turns; k++) {
+        let index = clamp(first + vec2i(k % along.x, k / along.x), vec2i(0), count - 1);
         let corner = corner_of(index, size);
         let covers = all(px >= corner) && all(px < corner + PATCH);
         let flow = textureLoad(patches, index, 0).xy;
         let found = textureSampleLevel(there, linear, (vec2f(px) + 0.5 + flow) / vec2f(size), 0.0).x;
         sum += select(0.0, 1.0 / max(1.0, UNLIKE * abs(found - own)), covers) * vec3f(flow, 1.0);
     }
-    textureStore(flow_out, px, vec4f(sum.xy / max(sum.z, 1e-6), 0.0, 0.0));
+    return sum.xy / max(sum.z, 1e-6);
 }

@@ -1,10 +1,10 @@
 // Of the changes of light, those that are seen in the picture and are more than noise.
 //#include common/frame.wgsl
-//#include methods/gather/shading/active.wgsl
 //#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/listed.wgsl
 
-@group(1) @binding(0) var ratio: texture_2d<f32>;       // what `measure` wrote
-@group(1) @binding(1) var scalar: texture_2d<f32>;      // of `find_gain` and `limit_ratio`: what the pass before wrote
+@group(1) @binding(0) var ratio: texture_2d<f32>;       // stored as rgba16float, by measure.wgsl
+@group(1) @binding(1) var scalar: texture_2d<f32>;      // stored as r32float; of `find_gain` and `limit_ratio`: what the pass before wrote
 @group(1) @binding(2) var light_here: texture_2d<f32>;
 @group(1) @binding(3) var albedo: texture_2d<f32>;
 @group(1) @binding(4) var coherence: texture_2d<f32>;   // of `find_gain`: what `find_coherence` wrote
@@ -30,51 +30,39 @@ const SHOWN: f32 = 0.02;        // light times albedo from which on a change is 
 const MOST: f32 = 4.0;          // greatest change of the logarithm
 const FALLOFF: f32 = 0.5;       // 1 / (2 sigma^2), sigma = 1 px
 const RADIUS: i32 = 3;          // of that Gaussian [px]
-const CAREFUL: f32 = 0.99;      // for rounding
 const NARROW_FALLOFF: f32 = 2.0;    // sigma = 0.5 px
 
 /// A Gaussian of half a pixel over what is seen.
 @compute @workgroup_size(WG_X, WG_Y)
-fn smooth_ratio(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
+fn smooth_ratio(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     let own = textureLoad(ratio, px, 0);
     var sum = vec4f(0.0);
     for (var k = 0; k < 9; k++) {
         let by = vec2i(k % 3, k / 3) - 1;
-        let there = textureLoad(ratio, inside(px + by), 0);
+        let near = inside(px + by);
+        let there = textureLoad(ratio, near, 0);
         sum += exp(-NARROW_FALLOFF * f32(by.x * by.x + by.y * by.y)) * there.a * vec4f(there.rgb, 1.0);
     }
     let mean = select(own.rgb, sum.rgb / max(sum.a, 1e-6), !PULLED);
-    if own.a > 0.0 && abs(dot(mean, LUMINANCE)) > CAREFUL * LEAST { atomicOr(&found.tiles[light_tile(id.xy)], MAY_CHANGE); }
     textureStore(ratio_out, px, select(vec4f(0.0), vec4f(mean, 1.0), own.a > 0.0));
-}
-
-/// True if light may change within a distance of a pixel, of a tile's half at most [px].
-fn may_change(px: vec2i, distance: i32) -> bool {
-    var around = 0u;
-    for (var k = 0; k < 4; k++) {
-        let corner = vec2u(inside(px + distance * (2 * vec2i(k & 1, k >> 1u) - 1)));
-        around |= atomicLoad(&found.tiles[light_tile(corner)]);
-    }
-    return (around & MAY_CHANGE) != 0u;
 }
 
 /// The visibility of a change.
 @compute @workgroup_size(WG_X, WG_Y)
-fn find_peaks(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
-    if !may_change(px, RADIUS) {
-        textureStore(scalar_out, px, vec4f(0.0));
-        return;
-    }
+fn find_peaks(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     var sum = 0.0;
     var total = 0.0;
     for (var y = -RADIUS; y <= RADIUS; y++) {
         for (var x = -RADIUS; x <= RADIUS; x++) {
             let weight = exp(-FALLOFF * f32(x * x + y * y));
-            sum += weight * dot(textureLoad(ratio, inside(px + vec2i(x, y)), 0).rgb, LUMINANCE);
+            let near = inside(px + vec2i(x, y));
+            sum += weight * dot(textureLoad(ratio, near, 0).rgb, LUMINANCE);
             total += weight;
         }
     }
@@ -89,61 +77,59 @@ fn find_peaks(@builtin(global_invocation_id) id: vec3u) {
 
 /// The agreement in sign of the changes around: displaced texture has both signs.
 @compute @workgroup_size(WG_X, WG_Y)
-fn find_coherence(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
+fn find_coherence(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
     var sum = 0.0;
     var absolute = 0.0;
     var total = 0.0;
     for (var y = -2 * RADIUS; y <= 2 * RADIUS; y++) {
         for (var x = -2 * RADIUS; x <= 2 * RADIUS; x++) {
             let weight = exp(-0.25 * FALLOFF * f32(x * x + y * y));     // sigma = 2 px
-            let change = dot(textureLoad(ratio, inside(vec2i(id.xy) + vec2i(x, y)), 0).rgb, LUMINANCE);
+            let near = inside(vec2i(id) + vec2i(x, y));
+            let change = dot(textureLoad(ratio, near, 0).rgb, LUMINANCE);
             sum += weight * change;
             absolute += weight * abs(change);
             total += weight;
         }
     }
-    textureStore(scalar_out, id.xy, vec4f(abs(sum) / max(absolute, 1e-4 * total)));
+    textureStore(scalar_out, id, vec4f(abs(sum) / max(absolute, 1e-4 * total)));
 }
 
 /// The greatest of 5 x 5, from 0 for what does not count to 1.
 @compute @workgroup_size(WG_X, WG_Y)
-fn find_gain(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    if !may_change(vec2i(id.xy), RADIUS + 2) {
-        textureStore(scalar_out, id.xy, vec4f(0.0));
-        return;
-    }
+fn find_gain(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
     var most = 0.0;
     for (var k = 0; k < 25; k++) {
-        most = max(most, textureLoad(scalar, inside(vec2i(id.xy) + vec2i(k % 5, k / 5) - 2), 0).x);
+        let near = inside(vec2i(id) + vec2i(k % 5, k / 5) - 2);
+        most = max(most, textureLoad(scalar, near, 0).x);
     }
     var gain = clamp((most - LEAST) / LEAST, 0.0, 1.0);
     if COLORS {
         var agreed = 0.0;
         for (var k = 0; k < 9; k++) {
-            agreed = max(agreed, textureLoad(coherence, inside(vec2i(id.xy) + vec2i(k % 3, k / 3) - 1), 0).x);
+            agreed = max(agreed, textureLoad(coherence, inside(vec2i(id) + vec2i(k % 3, k / 3) - 1), 0).x);
         }
         gain *= clamp((agreed - INCOHERENT) / (COHERENT - INCOHERENT), 0.0, 1.0);
     }
-    textureStore(scalar_out, id.xy, vec4f(gain));
+    textureStore(scalar_out, id, vec4f(gain));
 }
 
 /// The changes that count.
 @compute @workgroup_size(WG_X, WG_Y)
-fn limit_ratio(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
-    if !may_change(px, 2 * RADIUS + 2) {
-        textureStore(ratio_out, px, vec4f(0.0, 0.0, 0.0, textureLoad(ratio, px, 0).a));
-        return;
-    }
+fn limit_ratio(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     var sum = 0.0;
     var total = 0.0;
     for (var y = -RADIUS; y <= RADIUS; y++) {
         for (var x = -RADIUS; x <= RADIUS; x++) {
             let weight = exp(-FALLOFF * f32(x * x + y * y));
-            sum += weight * textureLoad(scalar, inside(px + vec2i(x, y)), 0).x;
+            let near = inside(px + vec2i(x, y));
+            sum += weight * textureLoad(scalar, near, 0).x;
             total += weight;
         }
     }

@@ -3,10 +3,7 @@
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
-
-struct Side {
-    next: u32,          // 1: the neighbour is the next frame; 0: the previous one
-}
+//#include methods/gather/shading/listed.wgsl
 
 @group(1) @binding(0) var<uniform> side: Side;
 @group(1) @binding(1) var light_here: texture_2d<f32>;
@@ -15,19 +12,19 @@ struct Side {
 @group(1) @binding(4) var depth_there: texture_2d<f32>;
 @group(1) @binding(5) var motion_here: texture_2d<f32>;     // to_prev, to_next [px]
 @group(1) @binding(6) var motion_there: texture_2d<f32>;
-@group(1) @binding(7) var plain_here: texture_2d<u32>;
-@group(1) @binding(8) var plain_there: texture_2d<u32>;
+@group(1) @binding(7) var plain_here: texture_2d<u32>;      // stored as r32uint, by plain.wgsl
+@group(1) @binding(8) var plain_there: texture_2d<u32>;     // stored as r32uint
 @group(1) @binding(9) var ratio: Ratio;     // of light, as a logarithm; a: 1 where the surface is seen there
 
 alias Ratio = texture_storage_2d<rgba16float, write>;
 
 const LEADS_BACK: f32 = 1.0;    // a vector that leads farther away from where it came from [px] is of something else
-const AS_DEEP: f32 = 1.15;      // ratio of the depths of the same surface in two frames
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
+fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     let both = textureLoad(motion_here, px, 0);
     let way = select(both.xy, both.zw, side.next == 1u);
     let at = vec2f(px) + 0.5 + way;
@@ -36,19 +33,24 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let back = way + way_back(at);
     let z = valid_depth(textureLoad(depth_here, px, 0).x);
     let z_there = valid_depth(textureLoad(depth_there, landing, 0).x);
-    let as_deep = max(z, z_there) < AS_DEEP * min(z, z_there) && z < NO_DEPTH;
+    let as_deep = is_as_deep_there(z, z_there);
     let seen = is_there && as_deep && dot(back, back) < LEADS_BACK * LEADS_BACK
-        && is_plain(plain_here, px) && is_plain(plain_there, landing);
+        && are_plain(px, landing);
     let here = valid_light(textureLoad(light_here, px, 0));
     let there = cubic(at);
     let change = log(there + dark()) - log(here + dark());
     textureStore(ratio, px, select(vec4f(0.0), vec4f(change, 1.0), seen));
 }
 
-/// True if the pixel and those around it show one surface.
-fn is_plain(plain: texture_2d<u32>, px: vec2i) -> bool {
+/// True if the pixels and those around them show one surface.
+fn are_plain(px: vec2i, px_there: vec2i) -> bool {
     var all_plain = 1u;
-    for (var k = 0; k < 9; k++) { all_plain &= textureLoad(plain, inside(px + vec2i(k % 3, k / 3) - 1), 0).x; }
+    for (var k = 0; k < 9; k++) {
+        let by = vec2i(k % 3, k / 3) - 1;
+        let near = inside(px + by);
+        let near_there = inside(px_there + by);
+        all_plain &= textureLoad(plain_here, near, 0).x & textureLoad(plain_there, near_there, 0).x;
+    }
     return all_plain == 1u;
 }
 

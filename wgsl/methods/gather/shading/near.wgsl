@@ -1,10 +1,12 @@
-// Tiles near those in which light changes, and lists of both.
+// Lists of tiles: those in which light may change; those in which it does, those near them, and all.
 //#include common/frame.wgsl
 //#include methods/gather/shading/active.wgsl
 
 @group(1) @binding(0) var<storage, read_write> found: Found;
-@group(1) @binding(1) var<storage, read_write> changing: TileList;  // in which it changes; all 0 at first
-@group(1) @binding(2) var<storage, read_write> close: TileList;     // near them
+@group(1) @binding(1) var<storage, read_write> changing: TileList;  // all lists are 0 at first
+@group(1) @binding(2) var<storage, read_write> near: TileList;
+@group(1) @binding(3) var<storage, read_write> whole: TileList;
+@group(1) @binding(4) var<storage, read_write> doubtful: TileList;
 
 struct Found {
     any: u32,           // see gain.wgsl
@@ -17,33 +19,65 @@ struct TileList {       // see active.wgsl
     tiles: array<u32>,
 }
 
-/// An invocation is a tile.
+/// After `screen`: an invocation is a tile. Tiles beside one in which light may change are read with it.
+@compute @workgroup_size(WG_X, WG_Y)
+fn list_doubtful(@builtin(global_invocation_id) id: vec3u) {
+    let tiles = light_tiles();
+    if any(id.xy >= tiles) { return; }
+    if tiles_to(vec2i(id.xy), MAY_CHANGE, 1) <= 1 { doubtful.tiles[atomicAdd(&doubtful.count, 1u)] = id.y * tiles.x + id.x; }
+}
+
+@compute @workgroup_size(1)
+fn size_doubtful() {
+    doubtful.groups = groups_for(atomicLoad(&doubtful.count));
+}
+
+/// After `limit_ratio`: an invocation is a tile.
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let tiles = (frame.size + LIGHT_TILE - 1u) / LIGHT_TILE;
+    let tiles = light_tiles();
     if any(id.xy >= tiles) { return; }
-    let low = id.xy - min(id.xy, vec2u(NEAR_TILES));
-    let high = min(id.xy + NEAR_TILES + 1u, tiles);
-    var around = 0u;
-    for (var y = low.y; y < high.y; y++) {
-        for (var x = low.x; x < high.x; x++) { around |= atomicLoad(&found.tiles[y * tiles.x + x]); }
-    }
+    let distance = tiles_to(vec2i(id.xy), CHANGES, i32(NEAR_TILES));
     let tile = id.y * tiles.x + id.x;
-    if (atomicLoad(&found.tiles[tile]) & CHANGES) != 0u { changing.tiles[atomicAdd(&changing.count, 1u)] = tile; }
-    if (around & CHANGES) != 0u {
+    whole.tiles[tile] = tile;
+    if distance == 0 { changing.tiles[atomicAdd(&changing.count, 1u)] = tile; }
+    if distance <= i32(NEAR_TILES) {
         atomicOr(&found.tiles[tile], NEAR);
-        close.tiles[atomicAdd(&close.count, 1u)] = tile;
+        near.tiles[atomicAdd(&near.count, 1u)] = tile;
     }
 }
 
-/// After all tiles: workgroups for both lists.
+/// After all tiles: workgroups for the lists.
 @compute @workgroup_size(1)
 fn size_lists() {
+    let tiles = light_tiles();
+    atomicStore(&whole.count, select(0u, tiles.x * tiles.y, atomicLoad(&changing.count) > 0u));
     changing.groups = groups_for(atomicLoad(&changing.count));
-    close.groups = groups_for(atomicLoad(&close.count));
+    near.groups = groups_for(atomicLoad(&near.count));
+    whole.groups = groups_for(atomicLoad(&whole.count));
 }
 
 fn groups_for(tiles: u32) -> vec3u {
     let wanted = tiles * TILE_GROUPS;
-    return vec3u(min(wanted, GROUPS_PER_ROW), (wanted + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW, 1u);
+    return vec3u(min(wanted, LIGHT_GROUPS_PER_ROW), (wanted + LIGHT_GROUPS_PER_ROW - 1u) / LIGHT_GROUPS_PER_ROW, 1u);
+}
+
+/// Tiles across and down.
+fn light_tiles() -> vec2u {
+    return (frame.size + LIGHT_TILE - 1u) / LIGHT_TILE;
+}
+
+/// From a tile to the nearest one of which this is known; more than `reach`: there is none so close.
+fn tiles_to(tile: vec2i, known: u32, reach: i32) -> i32 {
+    let count = vec2i(light_tiles());
+    var distance = reach + 1;
+    for (var y = -reach; y <= reach; y++) {
+        for (var x = -reach; x <= reach; x++) {
+            let at = tile + vec2i(x, y);
+            let is_there = all(at >= vec2i(0)) && all(at < count);
+            let word = atomicLoad(&found.tiles[select(0, at.y * count.x + at.x, is_there)]);
+            distance = select(distance, min(distance, max(abs(x), abs(y))), is_there && (word & known) != 0u);
+        }
+    }
+    return distance;
 }

@@ -2,6 +2,7 @@
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/listed.wgsl
 
 @group(1) @binding(0) var depth: texture_2d<f32>;
 @group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
@@ -12,15 +13,28 @@ alias Plain = texture_storage_2d<r32uint, write>;
 const APART: f32 = 1.0;         // difference of motions from which on depths that hardly differ are an edge [px]
 const TOUCHING: f32 = 1.01;     // ratio of such depths
 
+/// Of a neighbour: its surfaces may be anywhere.
 @compute @workgroup_size(WG_X, WG_Y)
-fn main(@builtin(global_invocation_id) id: vec3u) {
+fn everywhere(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
-    let own = textureLoad(motion, id.xy, 0);
+    textureStore(plain, id.xy, vec4u(u32(is_plain(id.xy))));
+}
+
+/// Of the frame itself.
+@compute @workgroup_size(WG_X, WG_Y)
+fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    textureStore(plain, id, vec4u(u32(is_plain(id))));
+}
+
+fn is_plain(id: vec2u) -> bool {
+    let own = textureLoad(motion, id, 0);
     var nearest = NO_DEPTH;
     var farthest = 0.0;
     var apart2 = 0.0;
     for (var k = 0; k < 9; k++) {
-        let px = inside(vec2i(id.xy) + vec2i(k % 3, k / 3) - 1);
+        let px = inside(vec2i(id) + vec2i(k % 3, k / 3) - 1);
         let z = valid_depth(textureLoad(depth, px, 0).x);
         let difference = textureLoad(motion, px, 0) - own;
         nearest = min(nearest, z);
@@ -29,5 +43,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let parted = farthest > nearest * (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO);
     let touching = farthest > nearest * TOUCHING && apart2 > APART * APART;
-    textureStore(plain, id.xy, vec4u(u32(!(parted || touching))));
+    return !(parted || touching);
 }

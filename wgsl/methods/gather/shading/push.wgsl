@@ -1,7 +1,8 @@
 // Darkness pushed along its flow to where it is at a time between two frames: a bilinear splat, in whole numbers, so
 // that the order does not count.
 //#include common/frame.wgsl
-//#include methods/gather/shading/active.wgsl
+//#include methods/gather/shading/listed.wgsl
+//#include methods/gather/shading/resting.wgsl
 //#include methods/gather/shading/pushed.wgsl
 //#include methods/gather/shading/light.wgsl
 
@@ -12,18 +13,15 @@ struct Push {
 @group(1) @binding(0) var<uniform> push: Push;
 @group(1) @binding(1) var values: texture_2d<f32>;
 @group(1) @binding(2) var flow: texture_2d<f32>;        // and trust
-@group(1) @binding(3) var<storage, read> found: array<u32>;     // one word, then those of tiles: see active.wgsl
-@group(1) @binding(5) var<storage, read> listed: array<u32>;    // see active.wgsl
-@group(1) @binding(4) var<storage, read_write> pushed: array<atomic<u32>>;  // two words a pixel: see unpack_pushed()
+@group(1) @binding(3) var<storage, read_write> pushed: array<atomic<u32>>;  // two words a pixel: see unpack_pushed()
 
 const PRESENT: f32 = 0.1;       // value from which on there is something to move
 
 /// The tiles near changes.
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
-    let k = listed_index(group);
-    let id = pixel_in_tile(listed[FIRST_LISTED + k], group, local);
-    if k >= listed[LISTED] || any(id >= frame.size) { return; }
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
     let value = textureLoad(values, id, 0);
     let known = textureLoad(flow, id, 0);
     let weight = known.z * min(value.a / PRESENT, 1.0);

@@ -1,18 +1,20 @@
 // Pictures of what moves, each level half as large as the one before, with their gradients.
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/listed.wgsl
 
-@group(1) @binding(0) var source: texture_2d<f32>;      // values, or the finer level
-@group(1) @binding(1) var level: Level;                 // brightness; its change a pixel across, down
+@group(1) @binding(0) var source: texture_2d<f32>;      // stored as rgba16float: values, or the finer level
+@group(1) @binding(1) var level: Level;                 // brightness, of shadows less 1; its change a pixel across, down
 
 alias Level = texture_storage_2d<rgba16float, write>;
 
 const CONTRAST: f32 = 0.2;      // of a logarithm of light
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn begin(@builtin(global_invocation_id) id: vec3u) {
-    let px = vec2i(id.xy);
-    if any(px >= vec2i(textureDimensions(source))) { return; }
+fn begin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     let across = brightness(px + vec2i(1, 0)) - brightness(px - vec2i(1, 0));
     let down = brightness(px + vec2i(0, 1)) - brightness(px - vec2i(0, 1));
     textureStore(level, px, vec4f(brightness(px), 0.5 * across, 0.5 * down, 0.0));
@@ -28,8 +30,9 @@ fn halve(@builtin(global_invocation_id) id: vec3u) {
 }
 
 fn brightness(px: vec2i) -> f32 {
-    let value = textureLoad(source, clamp(px, vec2i(0), vec2i(textureDimensions(source)) - 1), 0);
-    return select(exp(-value.a), CONTRAST * dot(value.rgb, LUMINANCE), PULLED);
+    let near = clamp(px, vec2i(0), vec2i(textureDimensions(source)) - 1);
+    let value = textureLoad(source, near, 0);
+    return select(exp(-value.a) - 1.0, CONTRAST * dot(value.rgb, LUMINANCE), PULLED);
 }
 
 /// The mean of 2 x 2 pixels of the finer level.
@@ -37,6 +40,8 @@ fn quarter(px: vec2i) -> f32 {
     let last = vec2i(textureDimensions(source)) - 1;
     let a = clamp(2 * px, vec2i(0), last);
     let b = min(a + 1, last);
-    return 0.25 * (textureLoad(source, a, 0).x + textureLoad(source, vec2i(b.x, a.y), 0).x
-        + textureLoad(source, vec2i(a.x, b.y), 0).x + textureLoad(source, b, 0).x);
+    let right = vec2i(b.x, a.y);
+    let below = vec2i(a.x, b.y);
+    return 0.25 * (textureLoad(source, a, 0).x + textureLoad(source, right, 0).x
+        + textureLoad(source, below, 0).x + textureLoad(source, b, 0).x);
 }

@@ -2,6 +2,7 @@
 // of the light; reflections: the logarithm of the light. a: the weight.
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/listed.wgsl
 
 @group(1) @binding(0) var light_here: texture_2d<f32>;
 @group(1) @binding(1) var before: texture_2d<f32>;      // changes to the previous frame, to the next one
@@ -13,9 +14,10 @@
 alias Values = texture_storage_2d<rgba16float, write>;
 
 @compute @workgroup_size(WG_X, WG_Y)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let px = vec2i(id.xy);
+fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    let px = vec2i(id);
     let level = log(valid_light(textureLoad(light_here, px, 0)) + dark());
     let a = textureLoad(before, px, 0).rgb;
     let b = textureLoad(after, px, 0).rgb;

@@ -1,0 +1,14 @@
+// Passes over a list of tiles. Elsewhere their textures are 0.
+//#include methods/gather/shading/active.wgsl
+
+@group(1) @binding(20) var<storage, read> listed: array<u32>;   // see active.wgsl
+
+/// The pixel of an invocation; outside of the image where there is none.
+fn listed_pixel(group: vec3u, local: u32) -> vec2u {
+    let k = (group.y * LIGHT_GROUPS_PER_ROW + group.x) / TILE_GROUPS;
+    let tile = listed[FIRST_LISTED + min(k, listed[LISTED] - 1u)];
+    let across = (frame.size.x + LIGHT_TILE - 1u) / LIGHT_TILE;
+    let n = group.x % TILE_GROUPS * (WG_X * WG_Y) + local;
+    let px = LIGHT_TILE * vec2u(tile % across, tile / across) + vec2u(n % LIGHT_TILE, n / LIGHT_TILE);
+    return select(frame.size, px, k < listed[LISTED]);
+}

@@ -1,0 +1,9 @@
+// Where light rests.
+//#include methods/gather/shading/active.wgsl
+
+@group(1) @binding(21) var<storage, read> found: array<u32>;    // one word, then those of tiles: see active.wgsl
+
+/// True near changes of light. What flow and its means write is known there, and in the tiles beside these.
+fn is_near(px: vec2u) -> bool {
+    return (found[1u + light_tile(px)] & NEAR) != 0u;
+}
