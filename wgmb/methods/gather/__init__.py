@@ -82,7 +82,7 @@ class Gather:
         self.reach = options.reach
         if self._shading in ("off", "frames"):
             self.uses = frozenset({"neighbours"})
-        self._light = MovingLight(device)
+        self._light = MovingLight(device, confidence=confidence)
         self._tiles = ActiveTiles(device)
         self._layers = Layers(device, images)
         self._motions, self._scatter = TileMotions(device, images), Scatter(device)

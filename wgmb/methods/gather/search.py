@@ -24,7 +24,7 @@ class Search:
     ):
         self._device, self._images = device, images
         self._confidence, self._output = confidence, output
-        self._blocks = ScratchBuffer(device)
+        self._blocks, self._no_changes = ScratchBuffer(device), ScratchBuffer(device)
 
     def encode(self, encoder, inputs, layers, starts, worklists, output, added: Added | None):
         """Record the classification of blocks, then all pixels.
@@ -34,7 +34,12 @@ class Search:
         timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
         timed["FAR"] = any(abs(frame.offset) > 1 for frame in inputs.frames)
         timed["WEIGHTED"] = inputs.frame.weight is not None
-        classify = gpu.kernel(self._device, "methods/gather/search/classify.wgsl", **timed)
+        classify = gpu.kernel(
+            self._device,
+            "methods/gather/search/classify.wgsl",
+            MOVING_LIGHT=added is not None,
+            **timed,
+        )
         data = np.zeros((), classify.source.dtype("SourceFrames"))
         near = [frame.offset for frame in inputs.frames if abs(frame.offset) <= 1]
         far = [frame.offset for frame in inputs.frames[len(near) :]]
@@ -59,13 +64,16 @@ class Search:
             "single-layer mask", blocks, "r32uint", -(-inputs.samples // times) + 1
         )
         mask = array(words)
-        # Three lists: of plain blocks, of others, and of others in crowded tiles.
+        # Lists of plain blocks, of others, of others in crowded tiles; the same near moving light.
         size = (
             4 * -(-(blocks[0] * blocks[1] + int(classify.source.constant("CELLS_WORD"))) // 64) * 64
         )
-        lists = {"buffer": self._blocks.at_least(3 * size), "offset": 0, "size": 3 * size}
-        encoder.clear_buffer(lists["buffer"], 0, 3 * size)
-        for entry, over in (("main", blocks), ("size_lists", (3 * classify.workgroup[0], 1))):
+        count = int(classify.source.constant("LISTS"))
+        lists = {"buffer": self._blocks.at_least(count * size), "offset": 0, "size": count * size}
+        encoder.clear_buffer(lists["buffer"], 0, count * size)
+        light = {one: self._light(one) for one in (None, added)}
+        changes = light[added]["light_changes"]
+        for entry, over in (("main", blocks), ("size_lists", (count * classify.workgroup[0], 1))):
             classify.run(
                 encoder,
                 entry,
@@ -73,59 +81,49 @@ class Search:
                 single_layer_mask=mask,
                 active_cells=worklists["active"],
                 lists=lists,
+                light_changes=changes,
                 **searched,
             )
-        plain, others, crowded = (lists | {"offset": k * size, "size": size} for k in range(3))
+        plain, others, crowded, *lit = (
+            lists | {"offset": k * size, "size": size} for k in range(count)
+        )
         separated = worklists["separated"]
         differences = self._differences(encoder, inputs, layers["surfaces"], separated)
-        for entry, cells, kind in (
-            ("main", others, {}),
-            ("main", crowded, {"CROWDED": True}),
-            ("main", plain, {"PLAIN": True}),
-            ("copy_static", worklists["static"], {"PLAIN": True}),
-        ):
-            for lit, groups in self._groups(encoder, inputs, cells, added):
-                kernel = gpu.kernel(
-                    self._device,
-                    "methods/gather/search/resolve.wgsl",
-                    {"Output": self._output, "mattes": layers["mattes"].format},
-                    CONFIDENCE=self._confidence,
-                    **kind,
-                    MOVING_LIGHT=lit is not None,
-                    **timed,
-                )
-                kernel.run(
-                    encoder,
-                    entry,
-                    inputs.bindings,
-                    groups,
-                    worklist=cells,
-                    single_layer_mask=mask,
-                    second_differences=differences,
-                    own_color=inputs.frame.color,
-                    own_weight=inputs.frame.weight or inputs.unbound,
-                    linear=inputs.linear,
-                    output=output,
-                    **self._light(lit),
-                    **searched,
-                    **arrays,
-                )
-
-    def _groups(
-        self, encoder, inputs, cells: dict, added: Added | None
-    ) -> list[tuple[Added | None, dict]]:
-        """Workgroups of a pass over `cells`: with moving light, and without it where none moves."""
-        if added is None:
-            return [(None, cells)]
-        kernel = gpu.kernel(self._device, "methods/gather/shading/choose.wgsl")
-        usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDIRECT
-        groups = self._device.create_buffer(label="groups", size=32, usage=usage)
-        alone = replace(inputs.bindings, size=(1, 1))
-        kernel.run(encoder, "main", alone, found=added.change_flags, worklist=cells, groups=groups)
-        return [
-            (one, {"buffer": groups, "offset": offset, "size": 12})
-            for one, offset in ((added, 0), (None, 12))
+        passes = [
+            ("main", others, {}, None),
+            ("main", crowded, {"CROWDED": True}, None),
+            ("main", plain, {"PLAIN": True}, None),
+            ("copy_static", worklists["static"], {"PLAIN": True}, added),
         ]
+        if added is not None:
+            passes += [("main", lit[1], {}, added), ("main", lit[2], {"CROWDED": True}, added),
+                       ("main", lit[0], {"PLAIN": True}, added)]  # fmt: skip
+        for entry, cells, kind, moving in passes:
+            kernel = gpu.kernel(
+                self._device,
+                "methods/gather/search/resolve.wgsl",
+                {"Output": self._output, "mattes": layers["mattes"].format},
+                CONFIDENCE=self._confidence,
+                **kind,
+                MOVING_LIGHT=moving is not None,
+                **timed,
+            )
+            kernel.run(
+                encoder,
+                entry,
+                inputs.bindings,
+                cells,
+                worklist=cells,
+                single_layer_mask=mask,
+                second_differences=differences,
+                own_color=inputs.frame.color,
+                own_weight=inputs.frame.weight or inputs.unbound,
+                linear=inputs.linear,
+                output=output,
+                **light[moving],
+                **searched,
+                **arrays,
+            )
 
     def _light(self, added: Added | None) -> dict:
         """Bindings of the search for moving light, or for none."""
@@ -134,7 +132,7 @@ class Search:
         if added is None:
             none = self._images.texture("no light", (1, 1), "rgba16float")
             layers = self._images.view_of(none, dimension="2d-array")
-            changes = self._blocks.at_least(4)
+            changes = self._no_changes.at_least(4)
         else:
             layers, times = added.layers.create_view(dimension="2d-array"), added.times
             changes = added.change_flags

@@ -139,24 +139,23 @@ def _search(stage: Stage, name: str, here: list[View], other: list[View], linear
     for i in reversed(range(len(sizes))):
         grid = patch_grid(sizes[i])
         first, second = (stage.texture(f"patches {i} {k}", "rgba32float", grid) for k in "ab")
-        flow_name = f"level flow {i} {name}"
-        found = stage.texture(flow_name, "rgba16float", sizes[i])
-        if i == 0:
-            found = stage.sparse(flow_name, "rgba16float")
+        finest, name_of_flow = i == 0, f"level flow {i} {name}"
+        if finest:
+            found = stage.sparse(name_of_flow, "rgba16float")
+        else:
+            found = stage.texture(name_of_flow, "rgba16float", sizes[i])
         no_patches, no_flow = stage.unused("rgba32float"), stage.unused("rgba16float")
-        for entry, size, patches, patches_out, flow_out in (
-            ("search", grid, stage.none("rgba32float"), first, no_flow),
-            ("propagate", grid, first, second, no_flow),
-            ("propagate", grid, second, first, no_flow),
-            ("write_flow" if i else "write_finest", sizes[i], first, no_patches, found),
-        ):
-            if entry == "propagate" and i == 0:
-                continue  # patches of the coarser level were
+        passes = [("search", grid, stage.none("rgba32float"), first, no_flow)]
+        if finest:  # from flow that was propagated on the coarser level
+            passes += [("write_finest", None, first, no_patches, found)]
+        else:
+            passes += [("propagate", grid, first, second, no_flow),
+                       ("write_flow", sizes[i], second, no_patches, found)]  # fmt: skip
+        for entry, size, patches, patches_out, flow_out in passes:
             stage.run(
-                "flow", entry, size=size, constants={"LEVEL": i}, here=here[i],
-                there=other[i], coarse=coarse, patches=patches, linear=linear,
+                "flow", entry, size=size, over=None if size else "near", constants={"LEVEL": i},
+                here=here[i], there=other[i], coarse=coarse, patches=patches, linear=linear,
                 patches_out=patches_out, flow_out=flow_out,
-                over="near" if entry == "write_finest" else None,
             )  # fmt: skip
         coarse = found
     return coarse

@@ -65,8 +65,8 @@ class Added:
     """The addition: a layer for each node, then one for the previous frame and one for the next
     one.
 
-    The alpha of a node says how sure its light is, from 0 to 1; that of a neighbour, whether the
-    surface is seen there.
+    The alpha of a node says how sure its light is, from 0 to 1, if that is asked for; that of a
+    neighbour, whether the surface is seen there.
 
     `change_flags`: a buffer whose first word is 1 if light changes anywhere; if not, the layers are
     undefined. The others are of tiles, see active.wgsl.
@@ -80,8 +80,10 @@ class Added:
 class MovingLight:
     """The passes that find out where light was at other times."""
 
-    def __init__(self, device: wgpu.GPUDevice):
+    def __init__(self, device: wgpu.GPUDevice, *, confidence: bool = True):
+        """`confidence`: the alpha of nodes is told."""
         self._device, self._images = device, TexturePool(device)
+        self._confidence = confidence
         self._pushed = {name: ScratchBuffer(device) for name in ("from_here", "from_there")}
         self._linear = device.create_sampler(mag_filter="linear", min_filter="linear")
 
@@ -161,6 +163,7 @@ class MovingLight:
             "HAS_ALBEDO": kind.albedo is not None,
             "WEIGHTED": weight is not None,
             "ONTO": earlier is not None,
+            "TOLD": self._confidence,
         }
         for i, time in enumerate([*times, -1.0, 1.0]):
             side, share = (-1 if time < 0 else 1), min(abs(time), 1.0)

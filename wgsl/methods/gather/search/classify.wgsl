@@ -6,14 +6,19 @@
 //#include common/shutter.wgsl
 //#include methods/gather/worklist.wgsl
 //#include methods/gather/search/search.wgsl
+//#include methods/gather/shading/active.wgsl
 
 @group(1) @binding(3) var single_layer_mask: Mask;  // by block: words of bits, TIMES_PER_WORD a layer; last, 1 if all are set
 @group(1) @binding(4) var<storage, read> active_cells: WorkList;
-@group(1) @binding(5) var<storage, read_write> lists: array<atomic<u32>>;   // three WorkLists of blocks: PLAIN, others, CROWDED; all 0 at first
+@group(1) @binding(5) var<storage, read_write> lists: array<atomic<u32>>;   // six WorkLists of blocks: PLAIN, others, CROWDED; those that moving light may come to; all 0 at first
+@group(1) @binding(6) var<storage, read> light_changes: array<u32>;         // one word, then those of tiles: see active.wgsl
 
+override MOVING_LIGHT: bool = false;
 override WEIGHTED: bool = false;    // pixels have weights, and may show more than one in a block
 
 alias Mask = texture_storage_2d_array<r32uint, write>;
+
+const LISTS: u32 = 6u;
 
 struct Block {
     low: vec2u,         // its first and its last pixel
@@ -57,7 +62,8 @@ fn main(@builtin(local_invocation_index) local: u32,
         if i >= samples { break; }
     }
     textureStore(single_layer_mask, id, (frame.samples - 1u) / TIMES_PER_WORD + 1u, vec4u(u32(all_single)));
-    join_list(id, is_static || (all_single && !WEIGHTED), block.is_crowded);
+    let kind = select(select(1u, 2u, block.is_crowded), 0u, is_static || (all_single && !WEIGHTED));
+    join_list(id, kind + select(0u, 3u, MOVING_LIGHT && may_be_lit(block)));
 }
 
 fn block_at(id: vec2u) -> Block {
@@ -124,9 +130,24 @@ fn handicap_of(f: u32) -> f32 {
     return select(NEIGHBOUR_DEPTH_BIAS, 1.0, f == 0u);
 }
 
-/// Add a block to its list: the plain ones, the crowded ones or the others.
-fn join_list(id: vec2u, is_plain: bool, is_crowded: bool) {
-    let section = select(select(1u, 2u, is_crowded), 0u, is_plain) * (arrayLength(&lists) / 3u);
+/// True if a place that a block shows may be where light changes: a surface goes there from its place in this frame.
+fn may_be_lit(block: Block) -> bool {
+    let way = max(way_of(block.a, 0u), max(way_of(block.b, 1u), way_of(block.c, 2u)));
+    let reach = (way + f32(BLOCK)) / f32(LIGHT_TILE) + 1.0;
+    let distance = light_changes[1u + light_tile(block.low)] >> DISTANCE_BITS;
+    return f32(distance) <= reach || reach >= f32(FAR_TILES);
+}
+
+/// The longest way of candidates of frame `f` from this frame's instant to another one of the exposure [px].
+fn way_of(candidates: Candidates, f: u32) -> f32 {
+    let window = abs(exposure_window(sources.offsets[f]));
+    let times = abs(exposure_window(0.0));
+    return candidates.header.z * max(times.x, times.y) / max(max(window.x, window.y), 1e-9);
+}
+
+/// Add a block to the list of its kind.
+fn join_list(id: vec2u, kind: u32) {
+    let section = kind * (arrayLength(&lists) / LISTS);
     let place = atomicAdd(&lists[section + COUNT_WORD], 1u);
     atomicStore(&lists[section + CELLS_WORD + place], pack_cell(id));
 }
@@ -134,7 +155,7 @@ fn join_list(id: vec2u, is_plain: bool, is_crowded: bool) {
 /// After all blocks: workgroups for all lists.
 @compute @workgroup_size(1)
 fn size_lists(@builtin(workgroup_id) group: vec3u) {
-    let section = group.x * (arrayLength(&lists) / 3u);
+    let section = group.x * (arrayLength(&lists) / LISTS);
     let wanted = (atomicLoad(&lists[section + COUNT_WORD]) + BLOCKS_PER_GROUP - 1u) / BLOCKS_PER_GROUP;
     atomicStore(&lists[section], min(wanted, GROUPS_PER_ROW));
     atomicStore(&lists[section + 1u], 1u);

@@ -7,7 +7,9 @@ const LIGHT_TILE: u32 = 16u;    // side [px]
 const MAY_CHANGE: u32 = 1u;     // light differs from frame to frame somewhere in it, if only by noise
 const CHANGES: u32 = 2u;        // it changes in it, or beside it
 const NEAR: u32 = 4u;           // it changes in a tile that is NEAR_TILES away at most
-const NEAR_TILES: u32 = 2u;     // flow and its means look less far than that
+const DISTANCE_BITS: u32 = 8u;  // from this bit on: tiles to the nearest one in which it changes, FAR_TILES at most
+const FAR_TILES: i32 = 8;
+const NEAR_TILES: i32 = 1;     // flow and its means look less far than that
 
 fn light_tile(px: vec2u) -> u32 {
     let across = (frame.size.x + LIGHT_TILE - 1u) / LIGHT_TILE;

@@ -30,6 +30,7 @@ alias Added = texture_storage_2d<rgba16float, write>;
 override HAS_ALBEDO: bool = true;   // else it is 1
 override WEIGHTED: bool = false;    // multiply by `weight`
 override ONTO: bool = false;        // add to `earlier`
+override TOLD: bool = true;         // how sure it is
 
 const LEAST_COVERED: f32 = 0.05;    // what comes from one frame alone counts less than this close to the instant of the other
 const LEAST_LIGHT: f32 = 0.005;     // share of the light that the darkest shadow leaves
@@ -74,7 +75,9 @@ fn moved(px: vec2i) -> vec4f {
         low = min(low, min(a, b));
         high = max(high, max(a, b));
     }
-    return vec4f(clamp(change.rgb, low, high), sure(px, change.a));
+    var certain = 1.0;
+    if TOLD { certain = sure(px, change.a); }
+    return vec4f(clamp(change.rgb, low, high), certain);
 }
 
 /// Confidence of the light, for flow of the trust `trusted`: the share of the change between both frames that the flow

@@ -37,11 +37,12 @@ fn size_doubtful() {
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let tiles = light_tiles();
     if any(id.xy >= tiles) { return; }
-    let distance = tiles_to(vec2i(id.xy), CHANGES, i32(NEAR_TILES));
+    let distance = tiles_to(vec2i(id.xy), CHANGES, FAR_TILES - 1);
     let tile = id.y * tiles.x + id.x;
+    atomicOr(&found.tiles[tile], u32(distance) << DISTANCE_BITS);
     whole.tiles[tile] = tile;
     if distance == 0 { changing.tiles[atomicAdd(&changing.count, 1u)] = tile; }
-    if distance <= i32(NEAR_TILES) {
+    if distance <= NEAR_TILES {
         atomicOr(&found.tiles[tile], NEAR);
         near.tiles[atomicAdd(&near.count, 1u)] = tile;
     }
