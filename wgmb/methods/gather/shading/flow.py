@@ -121,10 +121,10 @@ def _filled(stage: Stage, name: str, flow: View, back: View, bindings: dict[str,
     return result
 
 
-def _accept(stage: Stage, entry: str, **bindings) -> None:
+def _accept(stage: Stage, entry: str, **bindings: Any) -> None:
     """Record an entry point of accept.wgsl, which does not use all of them."""
     none, wide = stage.none("rgba16float"), stage.none("rgba32float")
-    given = {
+    given: dict[str, Any] = {
         "flow": none, "flow_back": none, "values": none, "values_there": none, "around": wide,
         "known": wide, "planes": wide, "flow_out": stage.unused("rgba16float"),
         "weighted": stage.unused("rgba32float"),
