@@ -29,6 +29,8 @@ class FlowPasses:
         self.landings, self.costs = ScratchBuffer(device), ScratchBuffer(device)
         self._free: dict[tuple, list[wgpu.GPUTexture]] = {}
         self._frames: dict[tuple[int, int], gpu.FrameBindings] = {}
+        self._lent: set[int] = set()  # uids of textures that stay
+        self._views: dict[tuple[int, str], wgpu.GPUTextureView] = {}  # of these
 
     def run(
         self,
@@ -76,9 +78,11 @@ class FlowPasses:
             return free.pop()
         gpu.check_size(self.device, *size)
         usage = _USAGE.TEXTURE_BINDING | _USAGE.STORAGE_BINDING | _USAGE.COPY_SRC
-        return self.device.create_texture(
+        made = self.device.create_texture(
             label=f"flow {kind[0]}", size=(*size, kind[1]), format=kind[0], usage=usage
         )
+        self._lent.add(made.uid)
+        return made
 
     def give(self, *textures: wgpu.GPUTexture) -> None:
         """Take back textures that no later pass reads."""
@@ -89,16 +93,23 @@ class FlowPasses:
 
     def scratch(self, size: tuple[int, int], format: str, name: str) -> wgpu.GPUTexture:
         """A texture for one stage; the next one that asks for this name gets the same."""
-        return self.images.texture(name, size, format)
+        texture = self.images.texture(name, size, format)
+        self._lent.add(texture.uid)
+        return texture
 
     def _frame(self, size: tuple[int, int]) -> gpu.FrameBindings:
         if size not in self._frames:
             self._frames[size] = gpu.FrameBindings.of_size(self.device, size)
         return self._frames[size]
 
-    @staticmethod
-    def _bound(kernel: gpu.Kernel, name: str, value):
+    def _bound(self, kernel: gpu.Kernel, name: str, value):
         if not isinstance(value, wgpu.GPUTexture):
             return value
         array = "_2d_array" in kernel.bindings[name].type if name in kernel.bindings else False
-        return value.create_view(dimension="2d-array" if array else "2d")
+        dimension = "2d-array" if array else "2d"
+        view = self._views.get((value.uid, dimension))
+        if view is None:
+            view = value.create_view(dimension=dimension)
+            if value.uid in self._lent:
+                self._views[value.uid, dimension] = view
+        return view

@@ -12,7 +12,7 @@ import wgpu
 
 from ..errors import ShaderError
 from . import wgsl
-from .bind_groups import BindGroups, forget_constants, made_group
+from .bind_groups import BindGroups, constant, forget_constants, made_group
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,7 @@ def uniform(device: wgpu.GPUDevice, file: str, struct: str, **values: Any) -> wg
     data = np.zeros((), wgsl.load(file).dtype(struct))
     for name, value in values.items():
         data[name] = value
-    usage = wgpu.BufferUsage.UNIFORM
-    return device.create_buffer_with_data(label=struct, data=data, usage=usage)
+    return constant(device, struct, data)
 
 
 class Kernel:
