@@ -1,4 +1,4 @@
-"""The method that plays without a GPU: the one that is set, or the quickest in its stead."""
+"""The quickest method in the stead of the one that is set: at first, and while something plays."""
 
 from itertools import pairwise
 
@@ -97,3 +97,50 @@ def test_playing_shows_the_method_that_is_set_once_it_is_quick_enough():
     for number in range(4):
         drawn = renderer.draw(paused, 20.0 + number)
     assert drawn.report.preview == "" and drawn.report.size == SMALL
+
+
+def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
+    renderer = Renderer(gpu.open_device())
+    seen = []
+    for now in range(4):
+        report = renderer.draw(Request(STATE, AREA), float(now)).report
+        seen.append((report.preview, report.size, report.busy))
+    assert seen[0][0] == "preview by tap at 50%" and seen[0][2]
+    assert seen[-1] == ("", SMALL, False)
+    widths = [size[0] for _, size, _ in seen]
+    assert widths == sorted(widths)  # it never jumps back
+
+
+def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with():
+    renderer = Renderer(gpu.open_device())
+    kept = put(STATE, shutter=90.0).keeping()
+    state = put(kept.with_method("tap"), compare="flicker")
+    seen = []
+    for now in range(8):
+        drawn = renderer.draw(Request(state, AREA), float(now))
+        slots = renderer._slots["first"], renderer._slots["second"]
+        widths = [slot.texture.size[0] for slot in slots]
+        seen.append((*widths, slots[1].is_preview, drawn.report.busy))
+        assert {*drawn.images} == {"first", "second"}
+        if not drawn.report.busy:
+            break
+    whole, half = SMALL[0], SMALL[0] // 2
+    assert seen[0] == (half, half, True, True)  # both at once, the slow one by `tap`
+    assert (whole, half, False, True) in seen  # then the quick one in full
+    assert seen[-1] == (whole, whole, False, False)
+
+
+def test_a_preview_beside_a_finer_image_tells_its_own_size():
+    renderer = Renderer(gpu.open_device())
+    renderer.pace.level = len(Pace.SCALES) - 1
+    state = put(STATE, shutter=90.0).keeping().with_method("tap")
+    seen = []
+    for now in range(8):
+        report = renderer.draw(Request(state, AREA), float(now)).report
+        second = renderer._slots["second"]
+        seen.append((report.size[0], second.texture.size[0], report.preview))
+        if not report.busy:
+            break
+    small, half = SMALL[0] // 5, SMALL[0] // 2
+    told = "preview by tap at 20%"
+    assert seen[:3] == [(small, small, told), (half, small, told), (half, half, "")]

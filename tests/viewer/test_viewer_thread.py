@@ -103,18 +103,6 @@ def test_the_window_goes_on_while_something_is_drawn(monkeypatch):
 
 
 @pytest.mark.usefixtures("as_without_a_gpu")
-def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
-    renderer = Renderer(gpu.open_device())
-    seen = []
-    for now in range(4):
-        report = renderer.draw(Request(STATE, AREA), float(now)).report
-        seen.append((report.preview, report.size, report.busy))
-    assert seen[0][0] == "preview by tap at 50%" and seen[0][2]
-    assert seen[-1] == ("", SMALL, False)
-    widths = [size[0] for _, size, _ in seen]
-    assert widths == sorted(widths)  # it never jumps back
-
-
 def test_frames_are_first_shown_as_they_are_before_their_vectors_are_tested(monkeypatch):
     tested, finding = [], ConventionFinder.finding
     watched = property(lambda self: tested.append(self) or finding.__get__(self))
@@ -138,25 +126,6 @@ def test_frames_are_first_shown_as_they_are_before_their_vectors_are_tested(monk
 
 
 @pytest.mark.usefixtures("as_without_a_gpu")
-def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with():
-    renderer = Renderer(gpu.open_device())
-    kept = put(STATE, shutter=90.0).keeping()
-    state = put(kept.with_method("tap"), compare="flicker")
-    seen = []
-    for now in range(8):
-        drawn = renderer.draw(Request(state, AREA), float(now))
-        slots = renderer._slots["first"], renderer._slots["second"]
-        widths = [slot.texture.size[0] for slot in slots]
-        seen.append((*widths, slots[1].is_preview, drawn.report.busy))
-        assert {*drawn.images} == {"first", "second"}
-        if not drawn.report.busy:
-            break
-    whole, half = SMALL[0], SMALL[0] // 2
-    assert seen[0] == (half, half, True, True)  # both at once, the slow one by `tap`
-    assert (whole, half, False, True) in seen  # then the quick one in full
-    assert seen[-1] == (whole, whole, False, False)
-
-
 def test_a_look_and_a_comparison_at_once_are_shown_one_after_the_other(viewer):
     seen_until(viewer, lambda: is_final(viewer))
     viewer.state = put(STATE, look="depth", compare="wipe", against="tiles")
@@ -293,6 +262,7 @@ def test_what_goes_wrong_in_the_panel_is_what_ends_the_viewer(viewer, monkeypatc
         seen_until(viewer, lambda: False)
 
 
+@pytest.mark.full
 def test_a_recording_has_every_frame_in_full(viewer, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     added = []

@@ -55,7 +55,7 @@ class Pace:
                 self._patience = min(2 * self._patience, MOST_PATIENCE)
             fits = [k for k in range(self.level + 1, last) if predicted(k) <= target]
             self._set(min(fits, default=last), took)
-        elif self.level and (took < 0.7 * target or predicted(self.level - 1) < 0.85 * target):
+        elif self.level and (took < 0.7 * target or predicted(self.level - 1) < 0.95 * target):
             self._quick += 1
             if self._quick >= self._patience:
                 self._set(self.level - 1, took)

@@ -166,8 +166,9 @@ class Renderer:
         if state.is_compared_with_kept:
             own, other = state.differences(state.as_kept), state.as_kept.differences(state)
             report.labels = ", ".join([first.label, *own]), ", ".join([last.label, *other])
-        if any(self._slots[slot].is_preview for slot in slots):
-            share = report.size[0] / max(full_size[0], 1)
+        previews = [self._slots[slot] for slot in slots if self._slots[slot].is_preview]
+        if previews:
+            share = previews[0].fine[0][0] / max(full_size[0], 1)
             of_size = f" at {share:.0%}" if share < 0.995 else ""
             report.preview = f"preview by {QUICKEST}{of_size}"
         self._on_screen = self._displayed(slots, state, subject)

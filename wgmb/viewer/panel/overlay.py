@@ -19,19 +19,20 @@ def name_images(
     """Label the images in an area `width` wide from `x`, `y` [logical px]."""
     first, second = labels
     left, right = x + 12, x + width - 12
-    if state.mode == "error":
+    mode = state.mode if first != second else "off"  # of a comparison, one image is there so far
+    if mode == "error":
         tag(f"error of {first}, x {state.gain:.0f}", left, y)
-    elif state.mode == "flicker":
+    elif mode == "flicker":
         tag(second if flicked else first, left, y)
-    elif state.mode == "wipe":
+    elif mode == "wipe":
         tag(first, left, y)
         tag(second, right, y, right=True)
-    elif state.mode in ("split", "pair"):
+    elif mode in ("split", "pair"):
         tag(first, left, y)
         tag(second, x + width / 2 + 12, y)
-    elif state.mode == "red-cyan":
+    elif mode == "red-cyan":
         tag(f"red: {first}; cyan: {second}", left, y)
-    elif state.mode == "difference":
+    elif mode == "difference":
         tag(f"{first} - {second}, x {state.gain:.0f}", left, y)
     elif state.look != "result" or not state.panel:
         tag(first, left, y)
