@@ -200,3 +200,18 @@ def test_every_scalar_constant_can_be_read(file):
     source = wgsl.load(file)
     for name in re.findall(r"^const (\w+)\s*:\s*[fiu]32", source.text, re.M):
         assert np.isfinite(source.constant(name))
+
+
+def test_a_texture_is_read_from_storage_if_it_was_made_for_it(device):
+    usage = wgpu.TextureUsage.TEXTURE_BINDING
+    sampled = device.create_texture(size=(4, 4, 1), format="rgba32float", usage=usage)
+    usage |= wgpu.TextureUsage.STORAGE_BINDING
+    both = device.create_texture(size=(4, 4, 1), format="rgba32float", usage=usage)
+    formats = [gpu.stored(texture.create_view()) for texture in (sampled, both)]
+    assert formats == ["given", "rgba32float"]
+    source = wgsl.load("methods/gather/layers/edges.wgsl")
+    for format, kind in zip(
+        formats, ("texture_2d<f32>", "texture_storage_2d<rgba32float, read>"), strict=True
+    ):
+        read = source.with_texels(motion=format).reading_storage()
+        assert {b.name: b.type for b in read.bindings()}["motion"] == kind

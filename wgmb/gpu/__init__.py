@@ -15,7 +15,7 @@ from .device import (
     submit,
     texel,
 )
-from .kernels import FrameBindings, Kernel, kernel, uniform
+from .kernels import FrameBindings, Kernel, kernel, stored, uniform
 from .priority import lower_priority, yielding
 
 __all__ = [
@@ -35,6 +35,7 @@ __all__ = [
     "open_device",
     "reported",
     "second_device",
+    "stored",
     "submit",
     "texel",
     "uniform",

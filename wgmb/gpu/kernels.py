@@ -142,6 +142,16 @@ def kernel(device, file: str, texels: dict[str, str] | None = None, **constants:
     return _kernel(device, file, formats, tuple(sorted(constants.items())))
 
 
+def stored(view: wgpu.GPUTextureView) -> str:
+    """Texel format as which shaders may read the texture of `view` from storage, for `texels`.
+
+    "given": it cannot be, as a caller's own texture need not be made for it.
+    """
+    texture = view.texture
+    storable = bool(texture.usage & wgpu.TextureUsage.STORAGE_BINDING)
+    return texture.format if storable and texture.mip_level_count == 1 else "given"
+
+
 def forget_kernels() -> None:
     """Let go of all compiled kernels, and of constants: their device is lost."""
     _kernel.cache_clear()

@@ -91,13 +91,14 @@ class WgslSource:
     def reading_storage(self) -> WgslSource:
         """The same shader, with textures marked "stored as FORMAT" bound as storage textures.
 
+        Not those "stored as given", which are a caller's: `with_texels` gives their format.
         Their one textureLoad() names the level 0, which storage textures do not have.
         """
 
         def declared(mark: re.Match) -> str:
             return f"{mark[1]}texture_storage_{mark[2]}<{mark[4]}, read>{mark[3]}{mark[4]}"
 
-        pattern = r"(var \w+: )texture_(2d|2d_array)<[uf]32>(; *// stored as )(\w+)"
+        pattern = r"(var \w+: )texture_(2d|2d_array)<[uf]32>(; *// stored as )(?!given\b)(\w+)"
         text = re.sub(pattern, declared, self.text)
         for name in re.findall(r"var (\w+): texture_storage_\w+<\w+, read>", text):
             text = re.sub(rf"(textureLoad\({name}(?:, \w+)+), 0\)", r"\1)", text)

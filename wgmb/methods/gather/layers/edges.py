@@ -24,7 +24,8 @@ class Edges:
         "edge_flags" per pixel and "crowds" per tile."""
         size = inputs.bindings.size
         flags = self._images.view("edge flags", size, "r32uint")
-        kernel = gpu.kernel(self._device, "methods/gather/layers/edges.wgsl")
+        texels = {"motion": gpu.stored(frame.motion), "depth": gpu.stored(frame.depth)}
+        kernel = gpu.kernel(self._device, "methods/gather/layers/edges.wgsl", texels)
         kinds = int(kernel.source.constant("KINDS"))
         crowds = self._crowds.at_least(4 * kinds * math.prod(grid_of(size)))
         encoder.clear_buffer(crowds)

@@ -31,7 +31,8 @@ class ActiveTiles:
 
     def encode(self, encoder, inputs) -> dict[str, dict]:
         """Record which tiles are active; the worklists of active_tiles.wgsl, by name."""
-        kernel = gpu.kernel(self._device, "methods/gather/tiles/active_tiles.wgsl")
+        file = "methods/gather/tiles/active_tiles.wgsl"
+        kernel = gpu.kernel(self._device, file)
         grid = grid_of(inputs.bindings.size)
         words = -(-(grid[0] * grid[1] + int(kernel.source.constant("CELLS_WORD"))) // 64) * 64
         size = 4 * words * int(kernel.source.constant("SECTIONS"))
@@ -47,7 +48,8 @@ class ActiveTiles:
                 "motion": frame.motion,
                 "lists": lists,
             }
-            kernel.run(encoder, "mark_active_tiles", tiles, **own)
+            marking = gpu.kernel(self._device, file, {"motion": gpu.stored(frame.motion)})
+            marking.run(encoder, "mark_active_tiles", tiles, **own)
         kernel.run(encoder, "find_distances", tiles, **own)
         kernel.run(encoder, "build_worklists", replace(inputs.bindings, size=(grid[1], 1)), **own)
         return {

@@ -2,8 +2,8 @@
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 
-@group(1) @binding(1) var motion: texture_2d<f32>;      // of one frame: to_prev, to_next [px]
-@group(1) @binding(2) var depth: texture_2d<f32>;
+@group(1) @binding(1) var motion: texture_2d<f32>;      // stored as given: of one frame: to_prev, to_next [px]
+@group(1) @binding(2) var depth: texture_2d<f32>;   // stored as given
 
 const EDGE: u32 = 1u;           // the last two bits of a depth: the pixel may show two surfaces,
 const SLOW: u32 = 2u;           // and they hardly move apart while the shutter is open
@@ -14,7 +14,8 @@ fn clamped(px: vec2i) -> vec2i {
 }
 
 fn depth_at(px: vec2i) -> f32 {
-    return valid_depth(textureLoad(depth, clamped(px), 0).x);
+    let at = clamped(px);
+    return valid_depth(textureLoad(depth, at, 0).x);
 }
 
 /// A depth packed with the flags of an edge.

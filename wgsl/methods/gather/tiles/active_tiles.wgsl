@@ -12,7 +12,7 @@ struct SourceFrame {
 }
 
 @group(1) @binding(0) var<uniform> source: SourceFrame;
-@group(1) @binding(1) var motion: texture_2d<f32>;      // of that frame: to_prev, to_next [px]
+@group(1) @binding(1) var motion: texture_2d<f32>;      // stored as given: of that frame: to_prev, to_next [px]
 @group(1) @binding(2) var<storage, read_write> lists: array<atomic<u32>>;   // SECTIONS, all 0 at first
 
 // The sections of `lists`. These are WorkLists:
