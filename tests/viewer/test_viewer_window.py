@@ -103,13 +103,9 @@ def test_a_lost_gpu_is_told():
 def test_times_of_the_gpu_are_told_by_pass(monkeypatch):
     monkeypatch.setattr(TimestampClock, "usable", staticmethod(lambda device: True))
     hand = Hand(put(PLAIN, method="reproject", samples=64))
-    passes = {}
-    for _ in range(2):  # without a GPU, one by the quickest method comes first
+    for _ in range(3):  # without a GPU, one by the quickest method comes first
         hand.look()
-        passes |= hand.viewer.stage.report.passes
     made = {"scene/gbuffer.wgsl:main", "methods/reproject.wgsl:resolve"}
-    assert made <= passes.keys()
-    hand.look()
     assert made <= hand.viewer._info.passes.keys()
 
 
