@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from wgmb import viewer
+from wgmb.viewer.allocator import bound_free_memory
 from wgmb.viewer.state.state import COMPARE, TONES, State
 from wgmb.viewer.window import Viewer
 from wgmb.viewer.window import frame as viewed
@@ -106,6 +107,7 @@ def used(seconds: float, seed: int, folder: str) -> list[Any]:
     sample = Path(__file__).parents[2] / "sample"
     video = footage.flat(Path(folder) / "a.mp4", 48, (320, 180), fps=24)
     sources = ["crossing", str(sample / "crossing.####.exr"), str(video)]
+    bound_free_memory()  # as `view` does
     window = viewer.offscreen(State(), _SIZE, threaded=True)
     rng, looks, done = random.Random(seed), [], 0
     started = time.perf_counter()

@@ -22,6 +22,7 @@ from .. import gpu
 from ..errors import DeviceError, InputError
 from . import controls
 from .actions import Actions
+from .allocator import bound_free_memory
 from .draw.composer import NOTHING, View
 from .draw.draw_thread import DrawThread
 from .draw.place import fit, key_box
@@ -478,11 +479,14 @@ def view(
 ) -> None:
     """Open a window and return when it is closed; errors in it are raised.
 
+    Bounds what glibc's allocator keeps for itself in this process.
+
     `interface`: size of the panel and its text, times what the system says.
     """
     low, high = SIZES
     if not low <= interface <= high:
         raise InputError(f"`interface` must be {low:g} to {high:g}, got {interface:g}")
+    bound_free_memory()
     devices = open_devices(adapter)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # GLFW's remarks; what it returns says the same
