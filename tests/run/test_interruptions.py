@@ -115,10 +115,11 @@ def test_an_interruption_that_python_lost_is_heard_at_the_next_frame(
     assert 0 < len(list((tmp_path / "out").glob("o.*.exr"))) < 10
 
 
-def test_a_library_that_breaks_when_it_is_interrupted_is_an_interruption(capsys, monkeypatch):
+@pytest.mark.parametrize("kind", [AssertionError, ImportError])
+def test_a_library_that_breaks_when_it_is_interrupted_is_an_interruption(capsys, monkeypatch, kind):
     def broken(*_):
         terminal.interrupted.set()
-        raise AssertionError("half done")
+        raise kind("half done")
 
     monkeypatch.setattr(app, "make_app", broken)
     assert app.main(["devices"]) == 130

@@ -80,8 +80,8 @@ def toward(here, other, x, y, way):
     shared = max(np.mean(a * b) - a.mean() * b.mean(), 0)
     unlike = max(a.var() - shared**2 / max(b.var(), 255.0**-2), 0)
     far = np.abs((found - own).mean(0)).mean()
-    same = np.exp(-unlike / (8 / 255) ** 2 - (far / (60 / 255)) ** 2)
-    same *= 1 - np.exp(-((far / (4 / 255)) ** 2))
+    same = np.exp(-unlike / 0.0314**2 - (far / 0.235) ** 2)
+    same *= 1 - np.exp(-((far / 0.0157) ** 2))
     return same * (between(other, *to) ** 2 - here[y, x] ** 2)
 
 

@@ -95,8 +95,8 @@ def test_blurs_are_kept_as_far_as_memory_allows(monkeypatch):
         made = [weakref.ref(kept("first", "result", state, size, None)) for state in states]
         return [ref() is not None for ref in made]
 
-    small, large = (64, 36), (640, 360)
-    monkeypatch.setattr(blurs, "_MEMORY", 4 * blurs._PIXEL * 64 * 36)
+    small, large = (64, 36), (480, 270)
+    monkeypatch.setattr(kept, "_most", 4 * blurs._PIXEL * 64 * 36)
     assert asked(small) == [False, True, True, True, True]
     assert asked(large) == [False, False, False, True, True]
     monkeypatch.undo()

@@ -124,6 +124,8 @@ def main(arguments: list[str] | None = None) -> int:
     except Error as error:
         return _say_why(str(error), USAGE)
     except ImportError as error:
+        if terminal.interrupted.is_set():  # within the import of a module
+            return _say_why("interrupted", INTERRUPTED)
         cause = error.__cause__  # of a command's module that cannot be loaded
         own = words[0] if words[0] in {package.extra for package in EXTRAS.values()} else ""
         if not (why := reason(cause if isinstance(cause, ImportError) else error, own)):

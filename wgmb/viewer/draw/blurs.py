@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import wgpu
 
+from ... import gpu
 from ...errors import InputError
 from ...methods import METHODS
 from ...pipeline.arguments import SAMPLES
@@ -22,6 +23,7 @@ from .portions import DroppedError
 REFERENCE_SAMPLES = 1024
 _KEPT = 6  # Blurs at most: of two images the quick one, the full one and its confidence
 _MEMORY = 1 << 30  # bytes of them all, if that is more than the last two take
+_IN_SOFTWARE = 1 << 28  # the same without a GPU, where wgpu gives no memory back to the system
 _PIXEL = 240  # bytes that the largest, `gather`, takes for a pixel
 
 
@@ -41,6 +43,8 @@ class Blurs:
     def __init__(self, device: wgpu.GPUDevice, choices: Choices, pace: Pace):
         self._device, self._choices, self._pace = device, choices, pace
         self._blurs: OrderedDict[tuple, _Kept] = OrderedDict()
+        in_software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        self._most = _IN_SOFTWARE if in_software else _MEMORY
 
     def __call__(
         self,
@@ -91,7 +95,7 @@ class Blurs:
 
         def lacks_room() -> bool:
             held = sum(kept.bytes for kept in self._blurs.values())
-            return len(self._blurs) >= _KEPT or held + coming > _MEMORY
+            return len(self._blurs) >= _KEPT or held + coming > self._most
 
         while len(self._blurs) > 1 and lacks_room():
             self._blurs.popitem(last=False)

@@ -11,6 +11,7 @@ import wgpu
 from ... import gpu
 from ...color.coding import Coding
 from ...color.spaces import ColorConfig, ColorSpace
+from ...exposure import Cell
 from ...frame import Frame
 from ...gpu.textures import TexturePool
 from ...gpu.timing import Clock
@@ -19,6 +20,7 @@ from ...methods import METHODS
 from ...pipeline.blur import Blur
 from ...pipeline.exposure_sum import ExposureSum
 from ...shutter import Shutter
+from ...video.changing_light import ChangingLight, Surroundings, shares_of
 from ...video.holdouts import STATIC, holdout_of
 from ...video.planes import Planes
 from ..state.allowed import check_video
@@ -31,6 +33,7 @@ from .video_frames import PictureFrames
 from .video_motion import MotionRequest
 
 _PASSES = frozenset({"color", "motion", "depth"})
+_LIGHTS = "light before", "light here", "light after"  # names of textures
 _AHEAD = 48  # pictures whose motion is made while playing
 
 
@@ -54,6 +57,7 @@ class VideoSubject:
         self.finding = "\n".join([f"motion: {self._maker.how}", *self._reader.notes])
         self._planes = Planes(device)
         self._frames = PictureFrames(self._reader, self._planes, self._maker.known)
+        self._changing = ChangingLight(device)
         self._sum = ExposureSum(device)
         self._state = state
         self._exposed: VideoExposure | None = None
@@ -177,6 +181,7 @@ class VideoSubject:
             expansion.check_video(self._reader.path, self.coding)
             self._planes = Planes(self._device, expansion)
             self._frames = PictureFrames(self._reader, self._planes, self._maker.known)
+            self._changing = ChangingLight(self._device)
         self._exposed = self._exposure(state, Shutter(0))
 
     def passes(self) -> dict[str, wgpu.GPUTexture]:
@@ -216,14 +221,54 @@ class VideoSubject:
             light = self._images.texture("light", size, "rgba32float")
         neighbours = "neighbours" in blur.method.uses
         found = self._exposure(self._state, shutter).cells
+        moving = [cell for cell in found if self._moves_in(cell)]
+        exposed = light
+        if moving:
+            exposed = self._images.texture("exposed", light.size[:2], "rgba32float")
         try:
             parts = ((cell, self._frames(cell.index, neighbours), blur) for cell in found)
-            self._sum.draw(parts, light, timing)
+            self._sum.draw(parts, exposed, timing)
         finally:
             blur.shutter = shutter
+        if moving:
+            self._change_light(moving, exposed, light)
         if light is not target:
             self._compress(light, target)
         return blur.samples
+
+    def _moves_in(self, cell: Cell) -> bool:
+        return cell.shutter.degrees > 0 and "motion" in self._frames(cell.index).has
+
+    def _change_light(
+        self, cells: Sequence[Cell], exposed: wgpu.GPUTexture, output: wgpu.GPUTexture
+    ) -> None:
+        """Add what light changes in the pictures of these cells to the exposure."""
+        for cell in cells:
+            indices, factors = self._frames.around(cell.index)
+            frame, names = self._frames(cell.index), dict(zip(indices, _LIGHTS, strict=True))
+
+            def light(index: int, names: dict = names) -> wgpu.GPUTexture:
+                other = self._frames(index)
+                self._images.upload(names[index], padded(other.color, 4, 1), "rgba32float")
+                return self._images.texture(names[index], other.size, "rgba32float")
+
+            holdout = frame.holdout
+            assert frame.motion is not None
+            held = None if holdout is None else self._images.upload("held", holdout, "r32float")
+            motion = self._images.upload("moving", frame.motion, "rgba32float")
+            encoder = self._device.create_command_encoder(label="changing light")
+            self._changing.encode(
+                encoder,
+                light,
+                Surroundings(indices, factors, motion, held),
+                shares_of(cell.shutter, factors),
+                cell.share,
+                cell is cells[0],
+            )
+            gpu.submit(self._device, encoder)
+        encoder = self._device.create_command_encoder(label="changing light")
+        self._changing.add(encoder, exposed.create_view(), output.create_view())
+        gpu.submit(self._device, encoder)
 
     def _compress(self, light: wgpu.GPUTexture, output: wgpu.GPUTexture) -> None:
         """Make expanded light as it was."""

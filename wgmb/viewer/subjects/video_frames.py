@@ -43,6 +43,22 @@ class PictureFrames:
             *(one if one is not None and "motion" in one.has else None for one in (before, after))
         )
 
+    def around(self, number: int) -> tuple[tuple[int | None, int, int | None], tuple[float, float]]:
+        """Numbers of a picture and those that its motion leads to, and what `evened` its motion."""
+        known = self._known(number)
+        if known is None:
+            return (None, number, None), (1.0, 1.0)
+        before = None if known.begins else known.before
+        after = None if known.ends else known.after
+        return (before, number, after), self._factors(number, known)
+
+    def _factors(self, number: int, known: PictureFinding) -> tuple[float, float]:
+        """See evened(); of the motion to the previous and the next picture."""
+        before = None if known.begins_shot else known.before
+        after = None if known.ends_shot else known.after
+        near = [n for n in (before, number, after) if n is not None]
+        return evened(self._times[near], near.index(number), (not known.begins, not known.ends))
+
     def _frame(self, number: int) -> Frame:
         known = self._known(number)
         held = self._frames.get(number)
@@ -58,11 +74,7 @@ class PictureFrames:
         color = self._color(number)
         if known is None or known.motion is None:
             return Frame(color, number=number).locked()
-        before = None if known.begins_shot else known.before
-        after = None if known.ends_shot else known.after
-        near = [n for n in (before, number, after) if n is not None]
-        there = not known.begins, not known.ends
-        back, ahead = evened(self._times[near], near.index(number), there)
+        back, ahead = self._factors(number, known)
         motion = known.motion
         if (back, ahead) != (1.0, 1.0):
             motion = motion * np.array([back, back, ahead, ahead], np.float32)

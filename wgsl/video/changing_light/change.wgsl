@@ -21,10 +21,10 @@ override STEP: u32 = 4u;
 
 const SIDE: i32 = 5;            // of a patch [small px]
 const RADIUS: i32 = 2;
-const UNLIKE: f32 = 8.0 / 255.0;    // deviation that another brightness and contrast do not explain: something else
-const FAR: f32 = 60.0 / 255.0;      // mean difference of something else,
-const NOISE: f32 = 4.0 / 255.0;     // and of nothing
-const LEAST: f32 = 1.0 / 65025.0;   // variance
+const UNLIKE: f32 = 0.0314;     // deviation that another brightness and contrast do not explain: something else
+const FAR: f32 = 0.235;         // mean difference of something else,
+const NOISE: f32 = 0.0157;      // and of nothing
+const LEAST: f32 = 1.5e-5;      // variance
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
