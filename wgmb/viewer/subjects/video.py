@@ -244,7 +244,7 @@ class VideoSubject:
     ) -> None:
         """Add what light changes in the pictures of these cells to the exposure."""
         for cell in cells:
-            indices, factors = self._frames.around(cell.index)
+            indices, factors = self._frames.surroundings(cell.index)
             frame, names = self._frames(cell.index), dict(zip(indices, _LIGHTS, strict=True))
 
             def light(index: int, names: dict = names) -> wgpu.GPUTexture:

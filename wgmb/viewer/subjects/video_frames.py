@@ -43,7 +43,9 @@ class PictureFrames:
             *(one if one is not None and "motion" in one.has else None for one in (before, after))
         )
 
-    def around(self, number: int) -> tuple[tuple[int | None, int, int | None], tuple[float, float]]:
+    def surroundings(
+        self, number: int
+    ) -> tuple[tuple[int | None, int, int | None], tuple[float, float]]:
         """Numbers of a picture and those that its motion leads to, and what `evened` its motion."""
         known = self._known(number)
         if known is None:
