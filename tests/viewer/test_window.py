@@ -387,9 +387,11 @@ def test_quitting_while_drawing_releases_the_surface_first(desk):
     assert desk("-c", WATCHED + QUITTING).end() == (0, "")
 
 
-def test_the_end_of_the_x_server_is_one_line(desk):
+def test_the_end_of_the_x_server_is_told_by_xlib_alone(desk):
+    """In one line, or in two where the connection is reset before it is closed."""
     code, said = desk("-c", DYING).end()
-    assert code == 1 and len(said.splitlines()) == 1 and "connection" in said, said
+    assert code == 1 and len(said.splitlines()) <= 2 and "connection" in said.lower(), said
+    assert "panicked" not in said and "Traceback" not in said
 
 
 def test_without_a_display_it_says_so(tmp_path):
