@@ -63,3 +63,25 @@ def test_a_writer_between_the_steps_of_another_leaves_both_files_whole(tmp_path)
     for descriptor in descriptors:
         os.close(descriptor)
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="tells of a zombie by /proc")
+def test_what_a_killed_process_left_goes_though_nobody_has_asked_for_its_exit_status(tmp_path):
+    code = f"""import sys
+from pathlib import Path
+from wgmb.io import atomic
+atomic.create(atomic.temporary_name(Path({str(tmp_path / "a.exr")!r})))
+print(flush=True)
+sys.stdin.read()"""
+    writer = subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert writer.stdout.readline()
+    (left,) = tmp_path.iterdir()
+    atomic.sweep(tmp_path, ["a.exr"])
+    assert left.exists()
+    writer.kill()
+    os.waitid(os.P_PID, writer.pid, os.WEXITED | os.WNOWAIT)
+    atomic.sweep(tmp_path, ["a.exr"])
+    assert not left.exists()
+    writer.communicate()

@@ -129,9 +129,7 @@ def _is_left(path: Path, process: int) -> bool:
     """Return True if the process that wrote `path` has ended."""
     if process == os.getpid() or fcntl is None:
         return process != os.getpid()
-    with contextlib.suppress(ProcessLookupError):
-        with contextlib.suppress(PermissionError):  # somebody else's process
-            os.kill(process, 0)
+    if not _has_ended(process):
         return False
     # A process of another container may have that number: it holds a lock.
     try:
@@ -146,4 +144,16 @@ def _is_left(path: Path, process: int) -> bool:
         return True
     finally:
         os.close(descriptor)
+    return True
+
+
+def _has_ended(process: int) -> bool:
+    """Return True if there is no such process, or if only its exit status is left (Linux)."""
+    with contextlib.suppress(ProcessLookupError):
+        with contextlib.suppress(PermissionError):  # somebody else's process
+            os.kill(process, 0)
+        with contextlib.suppress(OSError):  # another system has no such file
+            stat = Path(f"/proc/{process}/stat").read_bytes()
+            return stat.rpartition(b")")[2].split()[:1] == [b"Z"]
+        return False
     return True
