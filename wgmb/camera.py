@@ -42,8 +42,10 @@ class Camera:
             array = np.asarray(matrix, np.float64)
             if array.shape != (4, 4) or not np.isfinite(array).all():
                 raise InputError(f"{name} must be a finite 4 x 4 matrix, got shape {array.shape}")
-            if name.startswith("body") and not _invertible(array):
-                raise InputError(f"{name} must be invertible")
+        if self.bodies:
+            can = _invertible(np.asarray([*self.bodies.values()], np.float64))
+            for k in (k for k, one in zip(self.bodies, can, strict=True) if not one):
+                raise InputError(f"body {k} must be invertible")
         if any(not 0 < k <= MAX_INDEX for k in self.bodies):
             raise InputError(f"object indices must be 1 to {MAX_INDEX}")
         if len(self.bodies) > MOST_BODIES:
@@ -219,6 +221,7 @@ def _power(turn: np.ndarray, share: float) -> np.ndarray:
     return np.eye(3) + math.sin(part) * k + (1 - math.cos(part)) * k @ k
 
 
-def _invertible(matrix: np.ndarray) -> bool:
+def _invertible(matrices: np.ndarray) -> np.ndarray:
+    """True for each of (..., 4, 4) matrices that has an inverse."""
     with np.errstate(all="ignore"):
-        return bool(np.linalg.cond(matrix) < 1e15)  # NaN is not
+        return np.linalg.cond(matrices) < 1e15  # NaN is not

@@ -11,6 +11,7 @@ from wgmb import (
     Reprojections,
     Shutter,
 )
+from wgmb.gpu_frame import velocity
 
 SIZE = (40, 60)  # height, width: the lens of `camera` makes 1.7 half heights of distance 1
 FOCAL = 1.7 * SIZE[0] / 2  # [px]
@@ -263,3 +264,14 @@ def test_the_limit_follows_a_bent_path_as_the_shutter_sees_it():
     blur = wgmb.Blur("tap", shutter=Shutter(360, "start"), max_blur=5.0)
     got = blur.motion(wgmb.Frame(PICTURE, given_vectors((20, 0)), to_prev=given_vectors(0)))
     np.testing.assert_allclose(got[0, 0], (0, 0, 5, 0), atol=1e-4)
+
+
+def test_bands_give_the_same_bits_as_the_whole(monkeypatch):
+    rng = np.random.default_rng(5)
+    ids = rng.integers(0, 4, SIZE)
+    here, there = (camera((x, 0, 0), bodies={2: body(x, 0), 3: body(0, x)}) for x in (0.0, 0.3))
+    depth = rng.uniform(2, 9, SIZE)
+    whole = motion(depth, here, there, None, ids)
+    monkeypatch.setattr(velocity, "_BAND", 7 * SIZE[1])
+    np.testing.assert_array_equal(motion(depth, here, there, None, ids), whole)
+    assert np.abs(whole).max() > 1

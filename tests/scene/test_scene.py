@@ -17,7 +17,8 @@ from wgmb import (
     gpu,
 )
 from wgmb.gpu.textures import TexturePool
-from wgmb.scene import builtin
+from wgmb.gpu.timing import WallClock
+from wgmb.scene import builtin, gbuffer
 from wgmb.scene.bodies import (
     SHAPES,
     at,
@@ -323,3 +324,30 @@ def test_antialiasing_is_the_mean_of_rays():
     fine = frame(plain(scene), 0.0, (144, 81), antialias=1)[0].color
     want = fine.reshape(27, 3, 48, 3, 4).mean(axis=(1, 3))
     np.testing.assert_allclose(got, want, atol=2e-3)
+
+
+@pytest.mark.parametrize("antialias", [1, 2])
+def test_bands_give_the_same_bits_as_the_whole(antialias, monkeypatch):
+    size, scene = (97, 51), builtin.make("crossing")
+
+    def seen():
+        clock = WallClock(gpu.open_device())
+        blur = wgmb.Blur("tap", device=clock.device)
+        on_gpu = SceneOnGpu(
+            blur.device, scene, size=size, time=0.3, fps=24, span=(-0.5, 0.5), antialias=antialias
+        )
+        images, textures = TexturePool(blur.device), {}
+        for encode in (on_gpu.encode, on_gpu.encode_light):
+            watched = clock.watch(None)
+            textures |= encode(watched, blur.frame_bindings(size), images, "band", 0.1)
+        encoder = blur.device.create_command_encoder
+        return clock, {name: images.download(encoder(), t) for name, t in textures.items()}
+
+    clock, whole = seen()
+    assert len(clock.labels) == 2
+    monkeypatch.setattr(gbuffer, "_BAND", 5 * 97 * 44 * antialias**2)
+    clock, parts = seen()
+    assert len(clock.labels) == 2 * 13  # of 4 rows each, as workgroups have 2
+    assert parts.keys() == whole.keys() and len(whole) == 6
+    for name, image in whole.items():
+        np.testing.assert_array_equal(parts[name], image)

@@ -13,6 +13,7 @@ import make_clips as clips
 from viewer_hand import ALONE, SAMPLE, SMALL, put
 from wgmb import InputError, gpu
 from wgmb.io import exr
+from wgmb.scene import gbuffer
 from wgmb.sequence.layers.vector_convention import ConventionFinder
 from wgmb.viewer import offscreen
 from wgmb.viewer.draw import draw_thread
@@ -172,6 +173,21 @@ def test_work_that_nobody_wants_is_dropped_between_two_passes_and_leaves_nothing
     left[0] = 10**9
     renderer.draw(full, 0.0)
     np.testing.assert_array_equal(renderer.download(), whole(STATE))
+
+
+@pytest.mark.usefixtures("as_without_a_gpu")
+def test_the_first_preview_is_dropped_after_any_band_of_a_scene(monkeypatch):
+    device, passes = gpu.open_device(), []
+    portions = Portions(device, lambda: len(passes) < 2)
+    take = portions.take
+    monkeypatch.setattr(portions, "take", lambda *given: passes.append(given[0]) or take(*given))
+    monkeypatch.setattr(gbuffer, "_BAND", 1 << 12)
+    renderer = Renderer(device, portions)
+    with pytest.raises(DroppedError):
+        renderer.draw(Request(STATE, AREA), 0.0)
+    assert passes == ["scene/gbuffer.wgsl:main"] * 2
+    passes.clear()
+    assert renderer.draw(Request(STATE, AREA, moving=True), 0.0).report.changed  # is not dropped
 
 
 def test_no_pass_is_begun_any_more_once_its_kernel_is_compiled():

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -83,6 +84,17 @@ class Kernel:
             {b.name: b.index for b in self.bindings.values() if b.group == group}
             for group in self.groups
         ]
+
+    def bands(self, bindings: FrameBindings, most: int) -> Iterator[tuple[int, FrameBindings]]:
+        """The image as bands of whole rows, of about `most` pixels each.
+
+        Yields the first row of each [px], and what a dispatch over it is run with. Without a GPU,
+        a dispatch is not interrupted, and takes seconds for a large image.
+        """
+        (width, height), edge = bindings.size, self.workgroup[1]
+        rows = max(most // (width * edge), 1) * edge
+        for top in range(0, height, rows):
+            yield top, replace(bindings, size=(width, min(rows, height - top)))
 
     def run(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 import wgpu
@@ -13,6 +13,7 @@ from ..gpu import wgsl
 from .views import FrameViews, View
 
 FILE = "gpu_frame/velocity.wgsl"
+_BAND = 1 << 21  # pixels of a dispatch: a twentieth of a second on two cores without a GPU
 
 
 class VelocityPass:
@@ -51,21 +52,23 @@ class VelocityPass:
             LIMITED=limited,
             ADDED=frame.object_motion,
         )
-        uniform, table, indices = self._matrices(bindings.size, frame.camera)
-        kernel.run(
-            encoder,
-            "main",
-            bindings,
-            velocity=uniform,
-            to_prev=to_prev or self._none,
-            to_next=frame.to_next or self._none,
-            depth=frame.depth or self._none,
-            object=frame.object_id or self._no_object,
-            scale=frame.scale or self._none,
-            reprojections=table,
-            indices=indices,
-            motion=output,
-        )
+        data, table, indices = self._matrices(bindings.size, frame.camera)
+        for top, band in kernel.bands(bindings, _BAND):
+            data["top"] = top
+            kernel.run(
+                encoder,
+                "main",
+                band,
+                velocity=gpu.constant(self._device, "velocity", data),
+                to_prev=to_prev or self._none,
+                to_next=frame.to_next or self._none,
+                depth=frame.depth or self._none,
+                object=frame.object_id or self._no_object,
+                scale=frame.scale or self._none,
+                reprojections=table,
+                indices=indices,
+                motion=output,
+            )
 
     def _matrices(self, size: tuple[int, int], camera: Reprojections | None):
         source = wgsl.load(FILE)
@@ -79,14 +82,13 @@ class VelocityPass:
             # Row i of a matrix in numpy is column i in WGSL.
             table["prev"] = matrices[:, 0].transpose(0, 2, 1)
             table["next"] = matrices[:, 1].transpose(0, 2, 1)
-        storage, constant = wgpu.BufferUsage.STORAGE, partial(gpu.constant, self._device)
-        return (
-            constant("velocity", data),
+        storage = wgpu.BufferUsage.STORAGE
+        buffer = (
             self._written(table)
             if self.in_place and camera is not None
-            else constant("reprojections", table, storage),
-            constant("indices", indices, storage),
+            else gpu.constant(self._device, "reprojections", table, storage)
         )
+        return data, buffer, gpu.constant(self._device, "indices", indices, storage)
 
     def _written(self, table: np.ndarray) -> wgpu.GPUBuffer:
         """The buffer that is written anew for every frame."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -19,6 +20,7 @@ ROWS = 257  # poses between which the GPU interpolates
 MOST_RAYS = 8  # a side, for antialiasing
 MOST = 1e15  # coordinates and zooms: the square of a number must fit into f32
 MOST_LOOPS = 32_768  # turns of a shader's loops: lavapipe ends them all at twice that, silently
+_BAND = 1 << 26  # turns of loops in a dispatch: a tenth of a second on two cores without a GPU
 
 
 class SceneOnGpu:
@@ -47,25 +49,46 @@ class SceneOnGpu:
         if n > (most := source.constant("MOST_BODIES")):
             raise InputError(f"a scene has at most {most} bodies, got {n}")
         self.antialias, self.span = antialias, span
+        self._last: tuple[float, dict[str, Any]] | None = (
+            None  # an instant, and what is bound for it
+        )
         self.constants = {"RINGS": rings > 0, "BACKDROP": scene.backdrop is not None}
 
     @cached_property
     def resources(self) -> dict[str, wgpu.GPUBuffer | wgpu.GPUTextureView]:
-        """Buffers and textures to bind, created on first use."""
+        """Buffers and textures to bind for all of the span, created on first use."""
+        first, step = self._rows
+        return self._resources(first + step * np.arange(ROWS))
+
+    @property
+    def _rows(self) -> tuple[float, float]:
+        """Time of the first row of poses, and from one to the next [frame intervals]."""
+        first, last = self.span
+        return first, max((last - first) / (ROWS - 1), 1e-6)
+
+    def _instant(self, time: float) -> dict[str, wgpu.GPUBuffer | wgpu.GPUTextureView]:
+        """The same for one instant [frame intervals]: its poses alone, as INSTANT has them."""
+        if self._last is None or self._last[0] != time:
+            first, step = self._rows
+            x = np.clip((np.float32(time) - np.float32(first)) / np.float32(step), 0, ROWS - 1)
+            row = min(int(x), ROWS - 2)
+            rows = first + step * np.array([row, row + 1])
+            self._last = time, self._resources(rows, np.float32(x - row))
+        return self._last[1]
+
+    def _resources(
+        self, times: np.ndarray, after: np.float32 | None = None
+    ) -> dict[str, wgpu.GPUBuffer | wgpu.GPUTextureView]:
+        """For rows of poses at `times` [frame intervals]; `after`: the share of the second of two
+        in the only row."""
         if self.scene.figure is not None:
             raise InputError(f"scene {self.scene.name!r} is flat: only method 'volume' draws it")
-        scene, size, time, source = (
-            self.scene,
-            self.size,
-            self.time,
-            wgsl.load("scene/trace.wgsl"),
-        )
-        first, last = self.span
-        step = max((last - first) / (ROWS - 1), 1e-6)
-        times = time + (first + step * np.arange(ROWS)) / self.fps
+        scene, size, source = self.scene, self.size, wgsl.load("scene/trace.wgsl")
+        first, step = self._rows
+        moments = self.time + times / self.fps
         with np.errstate(all="ignore"):
-            places = [body.world_from_body(times) for body in scene.bodies]
-            camera = _world_from_picture(scene, times, size)
+            places = [body.world_from_body(moments) for body in scene.bodies]
+            camera = _world_from_picture(scene, moments, size)
         _check_finite(camera, places)
         data = np.zeros((), source.dtype("Scene"))
         sun = np.array(scene.sun[:3]) / np.linalg.norm(scene.sun[:3])
@@ -77,20 +100,21 @@ class SceneOnGpu:
         data["spheres"], data["boxes"], data["cylinders"] = map(shapes.count, SHAPES[:3])
         if scene.backdrop is not None:
             scene.backdrop.fill(data["backdrop"])
-        zoom = float(np.ravel(scene.camera.zoom(np.array([time])))[0])
+        zoom = float(np.ravel(scene.camera.zoom(np.array([self.time])))[0])
         data["pixel"] = 2 / (zoom * size[1])
         data["rays"] = self.antialias
         for bounds, place in zip(data["bounds"], places, strict=False):
             bounds[:3] = _halves(*_bounds(place))
+        poses = _poses(camera, places).astype(np.float32)
+        if after is not None:
+            poses = poses[:1] * (1 - after) + poses[1:] * after
         buffer = self.device.create_buffer_with_data
         return {
             "scene": buffer(label="scene", data=data, usage=wgpu.BufferUsage.UNIFORM),
-            "bodies": buffer(
-                label="bodies", data=_bodies(scene, source), usage=wgpu.BufferUsage.STORAGE
+            "bodies": gpu.constant(
+                self.device, "bodies", _bodies(scene, source), wgpu.BufferUsage.STORAGE
             ),
-            "poses": TexturePool(self.device).upload(
-                "poses", _poses(camera, places), "rgba32float"
-            ),
+            "poses": TexturePool(self.device).upload("poses", poses, "rgba32float"),
         }
 
     def encode(
@@ -106,8 +130,8 @@ class SceneOnGpu:
         if self.loops * antialias * antialias > MOST_LOOPS:
             raise InputError(f"{bodies} bodies are too many for {antialias} x {antialias} rays")
         color = gpu.texel(self.device, 4)
-        kernel = gpu.kernel(self.device, "scene/gbuffer.wgsl", {"Color": color}, **self.constants)
-        view = gpu.uniform(self.device, "scene/gbuffer.wgsl", "View", time=time)
+        constants = self.constants | {"INSTANT": True, "CENTRED": antialias % 2 == 1}
+        kernel = gpu.kernel(self.device, "scene/gbuffer.wgsl", {"Color": color}, **constants)
         formats = {
             "color": color,
             "depth": "r32float",
@@ -116,7 +140,7 @@ class SceneOnGpu:
         }
         textures = {k: images.texture(f"{name} {k}", self.size, f) for k, f in formats.items()}
         views = {k: t.create_view() for k, t in textures.items()}
-        kernel.run(encoder, "main", bindings, view=view, **self.resources, **views)
+        self._run(encoder, kernel, bindings, time, views)
         return textures
 
     def encode_light(
@@ -135,14 +159,27 @@ class SceneOnGpu:
         """
         if self.scene.backdrop is not None:
             return {}
-        kernel = gpu.kernel(self.device, "scene/light.wgsl", None, **self.constants)
-        view = gpu.uniform(self.device, "scene/light.wgsl", "View", time=time)
+        kernel = gpu.kernel(self.device, "scene/light.wgsl", None, INSTANT=True, **self.constants)
         textures = {
             k: images.texture(f"{name} {k}", self.size, "rgba32float") for k in ("light", "albedo")
         }
         views = {k: t.create_view() for k, t in textures.items()}
-        kernel.run(encoder, "main", bindings, view=view, **self.resources, **views)
+        self._run(encoder, kernel, bindings, time, views)
         return {"diffuse_light": textures["light"], "diffuse_color": textures["albedo"]}
+
+    def _run(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        kernel: gpu.Kernel,
+        bindings: gpu.FrameBindings,
+        time: float,
+        views: dict[str, wgpu.GPUTextureView],
+    ) -> None:
+        """Record a kernel's dispatches, band by band."""
+        resources, turns = self._instant(time), self.loops * self.antialias**2
+        for top, band in kernel.bands(bindings, _BAND // turns):
+            view = gpu.uniform(self.device, kernel.source.name, "View", top=top)
+            kernel.run(encoder, "main", band, view=view, **resources, **views)
 
     def reprojections(self, time: float = 0.0) -> Reprojections:
         """Camera and body motion around `time` [frame intervals from this frame]."""

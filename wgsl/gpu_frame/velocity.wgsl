@@ -13,6 +13,7 @@ struct Reprojection {       // of one rigid body; both matrices multiply homogen
 struct Velocity {
     viewport: Viewport,
     bodies: u32,            // rows of `reprojections`
+    top: u32,               // first row of the image that is written; the dispatch has as many as are [px]
 }
 
 @group(1) @binding(0) var<uniform> velocity: Velocity;
@@ -25,7 +26,6 @@ struct Velocity {
 @group(1) @binding(7) var motion: texture_storage_2d<rgba32float, write>;   // to_prev, to_next [px]
 @group(1) @binding(8) var<storage, read> indices: array<u32>;   // of the bodies in `reprojections`, ascending; 0 first
 
-const SEARCH_STEPS: u32 = 16u;      // as many bodies as 2 to this power
 const MAX_COMPONENT: f32 = 1e12;    // longer motion [px] is shortened to this before it is limited: its square is finite
 
 override PREV: bool = false;        // which inputs there are
@@ -39,17 +39,18 @@ override ADDED: bool = false;       // vectors are of the objects alone: the cam
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
+    let px = vec2u(id.x, velocity.top + id.y);
+    if any(px >= frame.size) { return; }
     var result = vec4f(0.0);
     var nothing_there = false;
     if CAMERA {
-        let z = textureLoad(depth, id.xy, 0).x;
+        let z = textureLoad(depth, px, 0).x;
         nothing_there = is_nothing(velocity.viewport, z);
-        result = camera_motion(id.xy, z, nothing_there);
+        result = camera_motion(px, z, nothing_there);
     }
     if PREV || NEXT {
-        var vectors = textureLoad(to_prev, id.xy, 0);
-        let ahead = textureLoad(to_next, id.xy, 0).xy;
+        var vectors = textureLoad(to_prev, px, 0);
+        let ahead = textureLoad(to_next, px, 0).xy;
         if !PAIRED { vectors = vec4f(vectors.xy, ahead); }
         if !PREV { vectors = vec4f(-ahead, ahead); }
         if !NEXT { vectors = vec4f(vectors.xy, -vectors.xy); }
@@ -57,11 +58,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         if ADDED { result += vectors; } else if !nothing_there { result = vectors; }
     }
     if SCALED {
-        let factor = textureLoad(scale, id.xy, 0).x;
+        let factor = textureLoad(scale, px, 0).x;
         result *= select(0.0, factor, is_finite(factor));
     }
     if LIMITED { result = limited(result); }
-    textureStore(motion, id.xy, result);
+    textureStore(motion, px, result);
 }
 
 /// Displacements to where the matrices put the point at `px` in the previous and the next frame [px].
@@ -88,11 +89,12 @@ fn camera_motion(px: vec2u, z: f32, nothing_there: bool) -> vec4f {
 fn row_of(index: u32) -> u32 {
     var low = 0u;
     var high = velocity.bodies;
-    for (var i = 0u; i < SEARCH_STEPS; i++) {
+    loop {
         let middle = (low + high) / 2u;
         let above = indices[middle] <= index;
         low = select(low, middle, above);
         high = select(middle, high, above);
+        if high - low <= 1u { break; }
     }
     return select(0u, low, indices[low] == index);
 }

@@ -27,12 +27,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var sum = vec4f(0.0);
     if progress.first > 0u { sum = sums[at]; }
     let count = turns_of(progress.count, id.x);
-    for (var i = 0u; i < count; i++) {
+    var i = 0u;
+    loop {
         let point = fract(shift + fract(f32(progress.first + i) * R3));
         let x = vec2f(id.xy) + point.xy;
         let now = instant(time_at_share(point.z) + dot(shutter.rolling, x / vec2f(frame.size) - 0.5));
-        let ray = camera_ray(x, now);
+        let ray = camera_ray(x, pose(0u, now));
         sum += vec4f(radiance(nearest(ray, now), ray, now), 1.0);
+        i++;
+        if i >= count { break; }
     }
     sums[at] = sum;
     textureStore(output, id.xy, vec4f(sum.rgb / sum.w, 1.0));

@@ -10,36 +10,37 @@
 
 alias Color = texture_storage_2d<rgba32float, write>;
 
+override CENTRED: bool = true;  // one of the rays is through the pixel's centre: their number a side is odd
+
 struct View {
-    time: f32,      // of the image, in the time of the rows of poses [frame intervals]
+    top: u32,       // first row of the image that is drawn, the dispatch has as many as are drawn [px]
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let now = instant(view.time);
-    let middle = vec2f(id.xy) + 0.5;
-    var ray = camera_ray(middle, now);
-    var hit = Hit(BACKGROUND_DEPTH, 0u, Pose());
+    let px = vec2u(id.x, view.top + id.y);
+    if any(px >= frame.size) { return; }
+    let now = Instant(0u, 0.0);
+    let camera = pose(0u, now);
+    let rays = turns_of(scene.rays * scene.rays, px.x);
+    // Depth, normal and index are of one ray through the centre, as they cannot be averaged.
+    let centre = camera_ray(vec2f(px) + 0.5, camera);
+    var seen = Hit(BACKGROUND_DEPTH, 0u, Pose());
+    if !CENTRED { seen = nearest(centre, now); }
     var sum = vec3f(0.0);
-    let rays = turns_of(scene.rays * scene.rays, id.x);
-    for (var i = 0u; i < rays; i++) {
+    var i = 0u;
+    loop {
         let within = (vec2f(vec2u(i % scene.rays, i / scene.rays)) + 0.5) / f32(scene.rays);
-        ray = camera_ray(vec2f(id.xy) + within, now);
-        hit = nearest(ray, now);
+        let ray = camera_ray(vec2f(px) + within, camera);
+        let hit = nearest(ray, now);
         sum += radiance(hit, ray, now);
+        if CENTRED && i == rays / 2u { seen = hit; }
+        i++;
+        if i >= rays { break; }
     }
-    textureStore(color, id.xy, vec4f(sum / f32(scene.rays * scene.rays), 1.0));
-
-    // Depth, normal and index are of one ray through the centre, as they cannot be averaged. If there was one ray
-    // only, it was that one.
-    let more = turns_of(select(1u, 0u, scene.rays == 1u), id.x);
-    for (var i = 0u; i < more; i++) {
-        ray = camera_ray(middle, now);
-        hit = nearest(ray, now);
-    }
-    let there = hit.depth < BACKGROUND_DEPTH;
-    textureStore(depth, id.xy, vec4f(hit.depth));
-    textureStore(normal, id.xy, vec4f(select(vec3f(0.0), world_normal(hit, ray, now), there), 0.0));
-    textureStore(object, id.xy, vec4u(select(0u, bodies[hit.body].object, there)));
+    textureStore(color, px, vec4f(sum / f32(scene.rays * scene.rays), 1.0));
+    let there = seen.depth < BACKGROUND_DEPTH;
+    textureStore(depth, px, vec4f(seen.depth));
+    textureStore(normal, px, vec4f(select(vec3f(0.0), world_normal(seen, centre, now), there), 0.0));
+    textureStore(object, px, vec4u(select(0u, bodies[seen.body].object, there)));
 }

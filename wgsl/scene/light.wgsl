@@ -9,27 +9,32 @@
 alias Light = texture_storage_2d<rgba32float, write>;
 
 struct View {
-    time: f32,      // of the image, in the time of the rows of poses [frame intervals]
+    top: u32,       // first row of the image that is drawn, the dispatch has as many as are drawn [px]
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    let now = instant(view.time);
+    let px = vec2u(id.x, view.top + id.y);
+    if any(px >= frame.size) { return; }
+    let now = Instant(0u, 0.0);
+    let camera = pose(0u, now);
+    let rays = turns_of(scene.rays * scene.rays, px.x);
     var lit = 0.0;
     var color = vec3f(0.0);
-    let rays = turns_of(scene.rays * scene.rays, id.x);
-    for (var i = 0u; i < rays; i++) {
+    var i = 0u;
+    loop {
         let within = (vec2f(vec2u(i % scene.rays, i / scene.rays)) + 0.5) / f32(scene.rays);
-        let ray = camera_ray(vec2f(id.xy) + within, now);
+        let ray = camera_ray(vec2f(px) + within, camera);
         let hit = nearest(ray, now);
         if hit.depth < BACKGROUND_DEPTH {
             let one = lighting(hit, ray, normalize(ray.direction), now);
             lit += one.sun + one.ambient;
             color += one.color;
         }
+        i++;
+        if i >= rays { break; }
     }
     let share = 1.0 / f32(scene.rays * scene.rays);
-    textureStore(light, id.xy, vec4f(vec3f(lit * share), 1.0));
-    textureStore(albedo, id.xy, vec4f(color * share, 1.0));
+    textureStore(light, px, vec4f(vec3f(lit * share), 1.0));
+    textureStore(albedo, px, vec4f(color * share, 1.0));
 }

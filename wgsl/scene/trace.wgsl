@@ -47,6 +47,7 @@ const MOST_BODIES: u32 = 1024u;     // bounds are uniforms, poses rows of a text
 const RING_STEPS: u32 = 64u;        // of sphere tracing towards a ring's surface, at most
 const RING_CLOSE: f32 = 1e-4;       // distance from it that counts as a hit [scene units]
 
+override INSTANT: bool = false;     // all rays are of one instant, whose poses are the only row
 override RINGS: bool = false;       // there are rings among the bodies
 override BACKDROP: bool = false;      // bodies are the solids of volumes on a backdrop, and lit as those are
 
@@ -81,6 +82,7 @@ fn pose(index: u32, now: Instant) -> Pose {
 
 fn pose_row(column: u32, now: Instant) -> vec4f {
     let before = textureLoad(poses, vec2u(column, now.row), 0);
+    if INSTANT { return before; }
     return mix(before, textureLoad(poses, vec2u(column, now.row + 1u), 0), now.after);
 }
 
@@ -88,10 +90,9 @@ fn transformed(p: Pose, v: vec4f) -> vec3f {
     return vec3f(dot(p.x, v), dot(p.y, v), dot(p.z, v));
 }
 
-/// The ray through `x` [px].
-fn camera_ray(x: vec2f, now: Instant) -> Ray {
+/// The ray through `x` [px]; `camera` as pose(0u, ...) has it.
+fn camera_ray(x: vec2f, camera: Pose) -> Ray {
     let ndc = (x / vec2f(frame.size) * 2.0 - 1.0) * vec2f(1.0, -1.0);
-    let camera = pose(0u, now);
     return Ray(transformed(camera, vec4f(0.0, 0.0, 0.0, 1.0)), transformed(camera, vec4f(ndc, 1.0, 0.0)));
 }
 

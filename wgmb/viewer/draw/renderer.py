@@ -337,7 +337,9 @@ class Renderer:
         seconds = float("inf") if full else _QUICK_STEP if quick else _STEP
         subject.look_at(state, size, antialias, view)
         try:
-            self._draw(coming, slot, name, view, state, subject, seconds, quick, known)
+            self._draw(
+                coming, slot, name, view, state, subject, seconds, quick, report.moving, known
+            )
         except DroppedError:
             self._coming[slot] = shown
             raise
@@ -377,11 +379,12 @@ class Renderer:
         subject: Subject,
         seconds: float,
         quick: bool,
+        moving: bool,
         known: list[tuple],
     ) -> None:
         size, antialias = coming.fine[:2]
-        # What is quick is not dropped, and the next pass is recorded while one is computed.
-        timing = None if quick and self._is_slow else self._timing
+        # What moves is not dropped, and the next pass is recorded while one is computed.
+        timing = None if moving and self._is_slow else self._timing
         volumes = state.is_scene and "volume" in self.choices.methods(state)
         if name in _PASSES and not (name == "sharp" and volumes):
             passes = subject.passes()
