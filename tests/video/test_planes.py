@@ -1,11 +1,14 @@
 """Planes of videos to linear light and back: against H.273 written out, and to the sample."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from wgmb import InputError, gpu
 from wgmb.color.coding import FLOAT, CodedPicture, Coding
 from wgmb.gpu.textures import TexturePool
+from wgmb.video.changing_light import ChangingLight
 from wgmb.video.planes import Average, Planes, averages
 from wgmb.video.planes.matrices import to_samples
 
@@ -25,6 +28,8 @@ CODINGS = {
     "grey": Coding(model="grey", steps=(1, 1), full_range=True, transfer=13),
     "YCgCo": Coding(steps=(1, 1), full_range=True, matrix=8, transfer=13),
     "gamma 2.8": Coding(transfer=5, matrix=5),
+    "8 bit 4:1:0": Coding(steps=(4, 4)),
+    "alpha, 8 bit 4:2:0": Coding(alpha=True),
 }
 
 
@@ -319,6 +324,45 @@ def test_chroma_is_the_mean_of_its_pixels(device):
     cb = [128 + 224 * v for v in (0.5, -0.5 * 0.2126 / 0.9278)]
     assert got.planes[1][0, 0] == round((cb[0] + 3 * cb[1]) / 4)
     assert got.planes[0].tolist() == [[round(16 + 219 * 0.0722), 63], [63, 63]]
+
+
+@pytest.mark.parametrize("coding", [Coding(), Coding("rgb", FLOAT, (1, 1), alpha=True)])
+def test_changes_of_light_are_coded_as_if_they_were_added_before(device, coding):
+    rng = np.random.default_rng(4)
+    images, planes = TexturePool(device), Planes(device)
+    light = rng.uniform(0.1, 0.6, (22, 38, 4)).astype(np.float32)
+    light[..., 3] = 1
+    view = images.upload("light", light, "rgba32float")
+    changing = ChangingLight(device)
+    small = (rng.random((6, 10, 4)) * 0.2 - 0.1).astype(np.float32)
+    changes = images.upload("changes", small, gpu.texel(device, 4))
+    given = dataclasses.replace(changing.changes((38, 22)), view=changes)
+    y, x = ((np.arange(n) + 0.5) / 4 - 0.5 for n in (22, 38))
+    y, x = y.clip(0, 5), x.clip(0, 9)
+    top, left = (np.minimum(at.astype(int), n) for at, n in ((y, 4), (x, 8)))
+    down, right = (y - top)[:, None, None], (x - left)[:, None]
+    rows = (1 - down) * small[top] + down * small[top + 1]
+    added = light + (1 - right) * rows[:, left] + right * rows[:, left + 1]
+    added[..., 3] = 1
+    before = images.upload("before", np.maximum(added, 0).astype(np.float32), "rgba32float")
+    encoder = device.create_command_encoder()
+    got = planes.encode(encoder, view, coding, given)
+    want = planes.encode(device.create_command_encoder(), before, coding)
+    off = 2e-3 if coding.bits == FLOAT else 1
+    for one, other in zip(got.planes, want.planes, strict=True):
+        np.testing.assert_allclose(one.astype(float), other.astype(float), atol=off)
+        assert np.abs(one.astype(float) - other).mean() < 0.03 * off
+
+
+def test_what_is_not_finite_is_coded_as_black(device):
+    light = np.full((4, 6, 4), 0.5, np.float32)
+    light[1, 2] = np.nan
+    light[2, 3, 0] = np.inf
+    view = TexturePool(device).upload("light", light, "rgba32float")
+    coding = Coding("rgb", FLOAT, (1, 1), alpha=True)
+    (got,) = Planes(device).encode(device.create_command_encoder(), view, coding).planes
+    np.testing.assert_array_equal(got[[1, 2], [2, 3]], 0)
+    assert np.isfinite(got).all() and (got[0] >= 0.5).all()
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,16 @@ class ExposureSum:
         self.draw(parts, output)
         return output
 
+    def alone(self, part: Part) -> wgpu.GPUTexture:
+        """The same of a single part that is all of the exposure, as it is blurred.
+
+        It may be the frame's own light, and pixels may not be finite.
+        """
+        cell, frame, blur = part
+        size = (frame.frame if isinstance(frame, FrameInShot) else frame).size
+        with gpu.reported(size):
+            return self._picture("part 0", cell, frame, blur, None)
+
     def draw(
         self,
         parts: Iterable[Part],

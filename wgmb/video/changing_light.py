@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import wgpu
@@ -33,6 +32,23 @@ class Surroundings:
     """(0 to 1) 1 stays as it is."""
 
 
+@dataclass(frozen=True)
+class LightChanges:
+    """Changes of light in a picture; with a `step` of 0 there are none."""
+
+    view: wgpu.GPUTextureView
+    """Of small pixels, linear."""
+    linear: wgpu.GPUSampler
+    step: int
+    """Pixels along a small pixel."""
+
+    @classmethod
+    def none(cls, device: wgpu.GPUDevice) -> LightChanges:
+        """Nothing changes."""
+        view = TexturePool(device).view("none", (1, 1), gpu.texel(device, 4))
+        return cls(view, device.create_sampler(), 0)
+
+
 class ChangingLight:
     """Adds what light changes to exposures of the pictures of a video, on a device.
 
@@ -43,7 +59,9 @@ class ChangingLight:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)
-        self._changes = ScratchBuffer(device)
+        self._texel = gpu.texel(device, 4)
+        self._sums = ScratchBuffer(device)
+        self._linear = device.create_sampler(mag_filter="linear", min_filter="linear")
         self._small: dict[int, wgpu.GPUTexture] = {}  # the latest last
 
     def encode(
@@ -59,32 +77,45 @@ class ChangingLight:
 
         `picture`: linear light by index. `shares`: see `shares_of`. `part`: of the exposure.
         """
-        prev, here, next = (
-            None if index is None else self._reduced(encoder, index, picture)
-            for index in surroundings.indices
-        )
-        assert here is not None
-        size, step = (here.size[0], here.size[1]), step_of(surroundings.motion.size)
-        there = [t is not None for t in (prev, next)]
-        values = {
-            "ways": np.repeat([1 / factor for factor in surroundings.factors], 2),
-            "shares": np.where(there, shares, 0.0),
-            "part": part,
-            "begins": begins,
-        }
-        none = self._images.texture("none", (1, 1), "r32float")
-        gpu.kernel(self._device, f"{_FOLDER}/change.wgsl", STEP=step).run(
-            encoder,
-            "main",
-            gpu.FrameBindings.of_size(self._device, size),
-            light=gpu.uniform(self._device, f"{_FOLDER}/change.wgsl", "Light", **values),
-            here=here.create_view(),
-            prev=(prev or here).create_view(),
-            next=(next or here).create_view(),
-            motion=surroundings.motion,
-            holdout=surroundings.holdout or none.create_view(),
-            changes=self._buffer(size),
-        )
+        picture_size = surroundings.motion.size
+        size, step = _small_size(picture_size), step_of(picture_size)
+        none = self._images.view("none", (1, 1), "r32float")
+        sums = self._sums.at_least(_TEXEL * size[0] * size[1])
+        here = self._reduced(encoder, surroundings.indices[1], picture)
+        texels = {"here": self._texel, "Output": self._texel}
+        kernel = gpu.kernel(self._device, f"{_FOLDER}/change.wgsl", texels, STEP=step)
+        for side, index in enumerate(surroundings.indices[::2]):
+            if index is None or not (shares[side] or begins):
+                continue
+            ways = np.eye(4)[2 * side : 2 * side + 2] / surroundings.factors[side]
+            light = gpu.uniform(
+                self._device,
+                f"{_FOLDER}/change.wgsl",
+                "Light",
+                across=ways[0],
+                down=ways[1],
+                share=part * shares[side],
+                begins=begins,
+            )
+            kernel.run(
+                encoder,
+                "main",
+                gpu.FrameBindings.of_size(self._device, size),
+                light=light,
+                here=here,
+                other=self._reduced(encoder, index, picture),
+                linear=self._linear,
+                motion=surroundings.motion,
+                holdout=surroundings.holdout or none,
+                sums={"buffer": sums, "offset": 0, "size": sums.size},
+                changes=self._images.view("changes", size, self._texel),
+            )
+            begins = False
+
+    def changes(self, size: Sequence[int]) -> LightChanges:
+        """Those of all parts so far, of pictures of this size."""
+        view = self._images.view("changes", _small_size(size), self._texel)
+        return LightChanges(view, self._linear, step_of(size))
 
     def add(
         self,
@@ -93,44 +124,42 @@ class ChangingLight:
         output: wgpu.GPUTextureView,
     ) -> None:
         """Record the exposure with the changes of its parts, into `output` (rgba32float)."""
-        size, step = (light.size[0], light.size[1]), step_of(light.size)
-        gpu.kernel(self._device, f"{_FOLDER}/add.wgsl", STEP=step).run(
+        changes, texels = self.changes(light.size), {"picture": gpu.stored(light)}
+        gpu.kernel(self._device, f"{_FOLDER}/add.wgsl", texels, STEP=changes.step).run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self._device, size),
+            gpu.FrameBindings.of_size(self._device, (light.size[0], light.size[1])),
             picture=light,
-            changes=self._buffer(_small_size(light.size)),
+            changes=changes.view,
+            linear=changes.linear,
             output=output,
         )
-
-    def _buffer(self, size: tuple[int, int]) -> dict[str, Any]:
-        buffer = self._changes.at_least(_TEXEL * size[0] * size[1])
-        return {"buffer": buffer, "offset": 0, "size": buffer.size}
 
     def _reduced(
         self,
         encoder: wgpu.GPUCommandEncoder,
         index: int,
         picture: Callable[[int], wgpu.GPUTexture],
-    ) -> wgpu.GPUTexture:
+    ) -> wgpu.GPUTextureView:
         """A picture at the small size, made once."""
         if index in self._small:
             self._small[index] = self._small.pop(index)
-            return self._small[index]
+            return self._images.view_of(self._small[index])
         light = picture(index)
         free = {f"small {n}" for n in range(_KEPT)} - {t.label for t in self._small.values()}
         name = min(free) if free else self._small.pop(next(iter(self._small))).label
         size, step = _small_size(light.size), step_of(light.size)
-        made = self._images.texture(name, size, "rgba32float")
-        gpu.kernel(self._device, f"{_FOLDER}/reduce.wgsl", STEP=step).run(
+        made, seen = self._images.texture(name, size, self._texel), light.create_view()
+        texels = {"picture": gpu.stored(seen), "Output": self._texel}
+        gpu.kernel(self._device, f"{_FOLDER}/reduce.wgsl", texels, STEP=step).run(
             encoder,
             "main",
             gpu.FrameBindings.of_size(self._device, size),
-            picture=light.create_view(),
-            output=made.create_view(),
+            picture=seen,
+            output=self._images.view_of(made),
         )
         self._small[index] = made
-        return made
+        return self._images.view_of(made)
 
 
 def shares_of(shutter: Shutter, factors: Sequence[float]) -> tuple[float, float]:

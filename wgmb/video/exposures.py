@@ -22,7 +22,7 @@ from ..pipeline.exposure_sum import ExposureSum, Part
 from ..shots.motion import MotionSource, window
 from ..shots.reader import FLASH, Picture, ShotReader
 from ..shutter import Shutter
-from .changing_light import ChangingLight
+from .changing_light import ChangingLight, LightChanges
 from .clock import Clock
 from .gpu_frames import VideoFrames
 from .holdouts import Holdout
@@ -115,15 +115,19 @@ class Exposures:
         self, shots: ShotReader[Thumbnail], views: Views, cells: Sequence[Cell]
     ) -> wgpu.GPUTexture:
         """The exposure of these cells as linear light (rgba32float)."""
-        light = self._light(shots, views, cells)
-        if not self._planes.expansion:
-            return light
-        encoder = self.device.create_command_encoder(label="compress")
-        size = light.size[0], light.size[1]
-        output = self._images.texture("compressed", size, "rgba32float")
-        self._planes.compress(encoder, light.create_view(), output.create_view())
-        gpu.submit(self.device, encoder)
-        return output
+        light, changes = self._blurred(shots, views, cells)
+        size, steps = (light.size[0], light.size[1]), []
+        if changes is not None:
+            steps.append(("changed", views[0][0].changing.add))
+        if self._planes.expansion:
+            steps.append(("compressed", self._planes.compress))
+        for name, step in steps:
+            encoder = self.device.create_command_encoder(label=name)
+            output = self._images.texture(name, size, "rgba32float")
+            step(encoder, light.create_view(), output.create_view())
+            gpu.submit(self.device, encoder)
+            light = output
+        return light
 
     def coded(
         self,
@@ -137,14 +141,21 @@ class Exposures:
         if plain and averages(shots[cells[0].index].content.coded.coding, coding):
             pictures = [shots[cell.index].content.coded for cell in cells]
             return self._average(pictures, [cell.share for cell in cells], coding)
-        light = self._light(shots, views, cells)
+        light, changes = self._blurred(shots, views, cells, is_coded=True)
         encoder = self.device.create_command_encoder(label="encode")
-        return self._planes.encode(encoder, light.create_view(), coding)
+        return self._planes.encode(encoder, light.create_view(), coding, changes)
 
-    def _light(
-        self, shots: ShotReader[Thumbnail], views: Views, cells: Sequence[Cell]
-    ) -> wgpu.GPUTexture:
-        """The same as it is blurred: expanded."""
+    def _blurred(
+        self,
+        shots: ShotReader[Thumbnail],
+        views: Views,
+        cells: Sequence[Cell],
+        is_coded: bool = False,
+    ) -> tuple[wgpu.GPUTexture, LightChanges | None]:
+        """The same as it is blurred: expanded, and what light changes in it is not added.
+
+        `is_coded`: it will be, and pixels may not be finite.
+        """
         begins = True
 
         def part(cell: Cell) -> Part:
@@ -157,14 +168,11 @@ class Exposures:
             return cell, frame, blur
 
         size = shots[cells[0].index].content.coded.size
-        light = self._sum.texture(size, map(part, cells))
-        if begins:
-            return light
-        output = self._images.texture("changed", size, "rgba32float")
-        encoder = self.device.create_command_encoder(label="changing light")
-        views[0][0].changing.add(encoder, light.create_view(), output.create_view())
-        gpu.submit(self.device, encoder)
-        return output
+        if is_coded and len(cells) == 1:
+            light = self._sum.alone(part(cells[0]))
+        else:
+            light = self._sum.texture(size, map(part, cells))
+        return light, None if begins else views[0][0].changing.changes(size)
 
 
 class VideoBlur(Exposures):

@@ -15,3 +15,8 @@ fn is_color(v: vec4f) -> bool {
 fn is_finite4(v: vec4f) -> bool {
     return all((bitcast<vec4u>(v) & vec4u(0x7f800000u)) != vec4u(0x7f800000u));
 }
+
+/// Pixels that are not finite count as black.
+fn finite_or_black(color: vec4f) -> vec4f {
+    return select(vec4f(0.0), color, is_finite4(color));
+}

@@ -36,8 +36,3 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     sums[at] = sum;
     textureStore(output, id.xy, sum);
 }
-
-/// Pixels that are not finite count as black.
-fn finite_or_black(color: vec4f) -> vec4f {
-    return select(vec4f(0.0), color, is_finite4(color));
-}

@@ -9,9 +9,10 @@ from ... import gpu
 from ...color.coding import FLOAT, CodedPicture, Coding
 from ...color.highlights import Expansion
 from ...gpu.textures import TexturePool
+from ..changing_light import LightChanges
 from .average import Average, averages
 from .matrices import from_samples
-from .packed import Packed, PlaneSlot, places_of
+from .packed import Packed, places_of
 from .uniforms import curve_of, reading, writing
 
 _HALF_BITS = 12  # of samples that come back exactly from light as half floats
@@ -34,6 +35,7 @@ class Planes:
     def __init__(self, device: wgpu.GPUDevice, expansion: Expansion = Expansion()):  # noqa: B008
         self.expansion = expansion
         self.device, self._images, self._packed = device, TexturePool(device), Packed(device)
+        self._none = LightChanges.none(device)
 
     def texel(self, coding: Coding) -> str:
         """Of a picture's light: 16 bits and floats need more than half floats hold."""
@@ -95,33 +97,65 @@ class Planes:
         kernel.run(encoder, "main", frame, signals=signals, output=output)
 
     def encode(
-        self, encoder: wgpu.GPUCommandEncoder, light: wgpu.GPUTextureView, coding: Coding
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        light: wgpu.GPUTextureView,
+        coding: Coding,
+        changes: LightChanges | None = None,
     ) -> CodedPicture:
-        """Record the way of a picture's light to its planes, submit all, and return them."""
+        """Record the way of a picture's light to its planes, submit all, and return them.
+
+        `changes`: of the light, which are added. Pixels that are not finite count as black.
+        """
         check(coding)
         size = light.size[0], light.size[1]
-        samples = self._images.texture("samples", size, "rgba32float")
+        changes = changes or self._none
+        given = {
+            "code": writing(self.device, coding),
+            "light": light,
+            "changes": changes.view,
+            "linear": changes.linear,
+        }
+        constants = {
+            "CURVE": curve_of(coding),
+            "HIGHLIGHTS": self.expansion.white,
+            "ALPHA": coding.alpha,
+            "STEP": changes.step,
+        }
+        texels = {"light": gpu.stored(light)}
+        if coding.bits == FLOAT:
+            samples = self._images.texture("samples", size, "rgba32float")
+            gpu.kernel(self.device, "video/planes/encode.wgsl", texels, **constants).run(
+                encoder,
+                "main",
+                gpu.FrameBindings.of_size(self.device, size),
+                output=self._images.view_of(samples),
+                **given,
+            )
+            return CodedPicture((self._images.download(encoder, samples),), coding)
+        places = places_of(size, coding)
         kernel = gpu.kernel(
             self.device,
-            "video/planes/encode.wgsl",
-            {"Output": "rgba32float"},
-            CURVE=curve_of(coding),
-            HIGHLIGHTS=self.expansion.white,
-            ALPHA=coding.alpha,
+            "video/planes/pack.wgsl",
+            texels,
+            BITS=16 if coding.bits > 8 else 8,
+            STEP_X=max(place.step[0] for place in places),
+            STEP_Y=max(place.step[1] for place in places),
+            **constants,
         )
+        data = np.zeros((), kernel.source.dtype("Planes"))
+        data["most"] = 2**coding.bits - 1
+        for place in places:
+            data["places"][place.component, :3] = place.words, place.size[1], place.first
+        coarse = places[1 % len(places)]
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self.device, size),
-            code=writing(self.device, coding),
-            light=light,
-            output=samples.create_view(),
+            gpu.FrameBindings.of_size(self.device, (coarse.words, coarse.size[1])),
+            planes=gpu.constant(self.device, "planes", data),
+            packed=self._packed.buffer(places),
+            **given,
         )
-        if coding.bits == FLOAT:
-            return CodedPicture((self._images.download(encoder, samples),), coding)
-        places = places_of(size, coding)
-        for place in places:
-            self._pack(encoder, samples, place, places, coding)
         return self._packed.read(encoder, places, coding)
 
     def compress(
@@ -140,31 +174,3 @@ class Planes:
         )
         frame = gpu.FrameBindings.of_size(self.device, size)
         kernel.run(encoder, "main", frame, light=light, output=output)
-
-    def _pack(
-        self,
-        encoder: wgpu.GPUCommandEncoder,
-        samples: wgpu.GPUTexture,
-        place: PlaneSlot,
-        places: list[PlaneSlot],
-        coding: Coding,
-    ) -> None:
-        """Record a plane's bytes."""
-        kernel = gpu.kernel(
-            self.device,
-            "video/planes/pack.wgsl",
-            COMPONENT=place.component,
-            BITS=16 if coding.bits > 8 else 8,
-        )
-        data = np.zeros((), kernel.source.dtype("Plane"))
-        data["size"], data["step"] = place.size, place.step
-        data["words"], data["first"], data["most"] = place.words, place.first, 2**coding.bits - 1
-        uniform = wgpu.BufferUsage.UNIFORM
-        kernel.run(
-            encoder,
-            "main",
-            gpu.FrameBindings.of_size(self.device, (place.words, place.size[1])),
-            plane=self.device.create_buffer_with_data(data=data, usage=uniform),
-            samples=samples.create_view(),
-            packed=self._packed.buffer(places),
-        )
