@@ -28,6 +28,16 @@ def test_a_short_run_is_not_told():
     assert told(5, 100) == [] and told(400, 2, ("done",) * 2) == []
 
 
+def test_a_run_whose_later_frames_take_long_is_told_when_that_shows():
+    lines, now = [], [0.0]
+    estimate = Estimate(lambda *_words: None, 300, "x is quicker", lines.append, lambda: now[0])
+    for number in range(20):
+        now[0] += 0.5 if number < 10 else 20.0
+        estimate(number, "done")
+    # After the 11th frame: 9 frames of 0.5 s and one of 20 s.
+    assert lines == ["about 12 min for 289 more frames; x is quicker"]
+
+
 def test_frames_that_are_done_already_are_no_measure():
     statuses = ("skipped",) * 90 + ("done",) * 4
     assert told(60, 113, statuses) == ["about 20 min for 20 more frames; x is quicker"]

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -47,19 +48,22 @@ def pictures():
         yield np.repeat(grey[..., None], 3, axis=2)
 
 
-def blurred(run):
+def blurred(run, methods):
+    """All pictures, which `methods` blurred, as the report tells."""
     made = steady(run, Fraction(1), Fraction(1))
     shutter = run.request.shutter.make()
-    return list(PictureBlur(pictures(), made, shutter, "srgb", run.how))
+    results = list(PictureBlur(pictures(), made, shutter, "srgb", run.how))
+    assert run.report(made.exposures, path=Path(), output="", frames=0, seconds=0).method == methods
+    return results
 
 
 def test_only_pictures_that_lose_something_and_those_beside_them_are_searched(device):
     settings = VideoSettings(flow="dis", flow_quality="fast")
     run = VideoRequest(video=settings).open(device)
     source, gather = Sideways(), Blur("gather", device=run.blur.device)
-    mixed = blurred(replace(run, fallback=(gather, source)))
-    quick = blurred(run)
-    searched = blurred(replace(run, blur=gather, motion=Sideways()))
+    mixed = blurred(replace(run, fallback=(gather, source)), "tap and gather")
+    quick = blurred(run, "tap")
+    searched = blurred(replace(run, blur=gather, motion=Sideways()), "gather")
     told = [n for n in range(COUNT) if (mixed[n] != quick[n]).any()]
     assert told and told == list(range(told[0], told[-1] + 1))
     assert 3 <= told[0] <= 5 and 5 <= told[-1] <= 8

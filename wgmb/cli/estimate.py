@@ -1,4 +1,4 @@
-"""The time that a long run will take, told after its first frames with what would be quicker."""
+"""The time that a long run will take, told as soon as it shows, with what would be quicker."""
 
 from __future__ import annotations
 
@@ -31,18 +31,23 @@ class Estimate:
     ):
         self._tell, self._total, self._quicker = tell, total, quicker
         self._say, self._clock = say, clock
-        self._count, self._times = 0, list[float]()
+        self._count, self._done, self._begun = 0, 0, 0.0
+        self._is_said = False
 
     def __call__(self, number: int, status: str) -> None:
         """One frame more; `status`: done, skipped or failed."""
         self._tell(number, status)
         self._count += 1
-        if status != "done" or len(self._times) == FIRST:
+        if status != "done" or self._is_said:
             return
-        self._times.append(self._clock())
-        if len(self._times) < FIRST:
+        self._done += 1
+        if self._done == 1:  # it also started the GPU, and is left out
+            self._begun = self._clock()
+        if self._done < FIRST:
             return
-        # The first frame also started the GPU, and is left out.
-        left, each = self._total - self._count, (self._times[-1] - self._times[0]) / (FIRST - 1)
+        # Later frames may take longer: those in which something fast is searched.
+        each = (self._clock() - self._begun) / (self._done - 1)
+        left = self._total - self._count
         if left * each > LONG:
+            self._is_said = True
             self._say(f"about {spelled(left * each)} for {left} more frames; {self._quicker}")

@@ -101,7 +101,7 @@ class VideoReport:
     """Number of output frames."""
     seconds: float
     method: str = ""
-    """The blur method; "" if pictures were averaged."""
+    """The blur method, or "tap and gather"; "" if pictures were averaged, or none were made."""
     notes: list[str] = field(default_factory=list)
     """Assumptions about the input."""
     left_out: list[str] = field(default_factory=list)

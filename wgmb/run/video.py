@@ -225,7 +225,7 @@ class VideoRun:
         shots = exposures.shots
         return VideoReport(
             **facts,
-            method=self.blur.method.name if self.motion is not None else "",
+            method=" and ".join(exposures.methods) if self.motion is not None else "",
             cuts=sorted(shots.cuts) if shots else [],
             flashes=shots.flashes if shots else [],
             repeated=len(shots.doubles) if shots else 0,

@@ -73,7 +73,14 @@ class Exposures:
         self._sum, self._planes = ExposureSum(blur.device), planes or Planes(blur.device)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
+        self._used: set[str] = set()
         self.shots: ShotReader[Thumbnail] | None = None
+
+    @property
+    def methods(self) -> list[str]:
+        """Names of the methods that blurred pictures so far, the usual one first."""
+        blurs = [self._blur, *([self._fallback[0]] if self._fallback else [])]
+        return [name for name in dict.fromkeys(b.method.name for b in blurs) if name in self._used]
 
     @property
     def device(self) -> wgpu.GPUDevice:
@@ -162,6 +169,7 @@ class Exposures:
             nonlocal begins
             loses = len(views) > 1 and views[0][0].loses(cell.index)
             frames, blur = views[loses]
+            self._used.add(blur.method.name)
             frame = frames.in_shot(cell.index)
             if frames.change(cell, begins):
                 begins = False
