@@ -39,11 +39,12 @@ LIMITS = {
 
 
 def record() -> None:
-    """From now on, remember every kernel that is made."""
+    """From now on, remember every kernel that is made, as those get it that are no lavapipe."""
     make = kernels.Kernel.__init__
 
     def remembered(self, device, source, constants=None):
         make(self, device, source, constants)
+        source = source.standard or source
         row = described(source, constants or {})
         recorded[source.text, tuple(sorted((constants or {}).items()))] = row
 

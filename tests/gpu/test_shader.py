@@ -213,5 +213,17 @@ def test_a_texture_is_read_from_storage_if_it_was_made_for_it(device):
     for format, kind in zip(
         formats, ("texture_2d<f32>", "texture_storage_2d<rgba32float, read>"), strict=True
     ):
-        read = source.with_texels(motion=format).reading_storage()
+        read = source.with_texels(motion=format).reading_storage(4)
         assert {b.name: b.type for b in read.bindings()}["motion"] == kind
+        assert read.standard.text == source.with_texels(motion=format).text
+
+
+@pytest.mark.parametrize("most", [0, 4, 99])
+def test_no_more_textures_are_read_from_storage_than_a_device_takes(most):
+    source = wgsl.load("methods/gather/shading/compose.wgsl")
+    kinds = [b.type for b in source.reading_storage(most).bindings()]
+    written = sum("texture_storage" in b.type for b in source.bindings())
+    marked = len(re.findall(r"// stored as (?!given)", source.text))
+    assert sum("texture_storage" in kind for kind in kinds) == max(
+        written, min(most, written + marked)
+    )

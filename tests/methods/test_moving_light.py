@@ -225,6 +225,7 @@ def test_levels_are_their_twin(stages, close):
     for i in range(1, len(level_sizes(SIZE[::-1]))):
         want = twin.next_level(stages[f"level {i - 1} 1"])
         close(stages[f"level {i} 1"][..., :3], want, 1e-3)
+        close(stages[f"level {i} squares 1"], twin.squares(stages[f"level {i} 1"]), 1e-3)
 
 
 def test_patches_are_found_as_by_their_twin(stages):

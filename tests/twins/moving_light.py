@@ -7,7 +7,7 @@ import numpy as np
 
 NO_DEPTH = 2.0**33
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-PATCH, STRIDE, STEPS = 12, 4, 6
+PATCH, STRIDE, STEPS = 12, 4, 8
 
 
 def shifted(a, dx, dy):
@@ -175,6 +175,12 @@ def next_level(level):
     return np.dstack([middle, across / 2, down / 2])
 
 
+def squares(level):
+    """Brightness of 2 x 2 pixels from each one on."""
+    v = level[..., 0]
+    return np.dstack([shifted(v, i, j) for j in (0, 1) for i in (0, 1)])
+
+
 def _level(v):
     across, down = shifted(v, 1, 0) - shifted(v, -1, 0), shifted(v, 0, 1) - shifted(v, 0, -1)
     return np.dstack([v, across / 2, down / 2])
@@ -223,16 +229,29 @@ class Patch:
 
 
 def blurred(a, sigma):
-    """A Gaussian, along one axis and then the other."""
-    radius = int(np.ceil(3 * sigma))
-    for axis in ((1, 0), (0, 1)):
-        total, weights = 0.0, 0.0
-        for k in range(-radius, radius + 1):
-            weight = np.exp(-0.5 * k * k / sigma**2)
-            total = total + weight * shifted(a, k * axis[0], k * axis[1])
-            weights += weight
-        a = total / weights
-    return a
+    """A Gaussian at half the size, along one axis and then the other.
+
+    Of every 2 x 2 pixels one is read, another one from step to step.
+    """
+    height, width = a.shape[:2]
+    y, x = np.arange(0, height, 2), np.arange(0, width, 2)
+    reach = int(np.ceil(1.5 * sigma))
+    weights = {k: np.exp(-2 * k * k / sigma**2) for k in range(-reach, reach + 1)}
+    across, down = 0.0, 0.0
+    for k, weight in weights.items():
+        turn = abs(k) % 2, abs(k) // 2 % 2
+        rows = np.clip(y + turn[1], 0, height - 1) if k else y
+        columns = np.clip(x + 2 * k + turn[0], 0, width - 1)
+        across = across + weight * a[rows][:, columns]
+    for k, weight in weights.items():
+        down = down + weight * shifted(across, 0, k)
+    return down / sum(weights.values()) ** 2
+
+
+def doubled(half, size):
+    """Between the pixels of an image of half the size; `size`: height, width."""
+    x, y = centres(size)
+    return sampled(half, x / 2, y / 2)
 
 
 def slopes(inverse):
@@ -280,6 +299,7 @@ def filled(flow, trusted, own):
     """Flow in which that around it stands for what is not trusted."""
     weight = trusted * np.minimum(own / 0.1, 1)
     around = blurred(np.dstack([flow * weight[..., None], weight]), 5.0)
+    around = doubled(around, own.shape)
     share = around[..., 2]
     keep = (trusted * np.minimum(share / 0.05, 1))[..., None]
     mean = around[..., :2] / np.maximum(share, 1e-4)[..., None]
@@ -287,7 +307,7 @@ def filled(flow, trusted, own):
 
 
 def explained(flow, back, own, other):
-    """Differences with the motion, and without."""
+    """Differences with the motion, and without, at half the size."""
     x, y = centres(own.shape)
     ahead = sampled(other, x + flow[..., 0], y + flow[..., 1])
     behind = sampled(own, x + back[..., 0], y + back[..., 1])
@@ -339,6 +359,7 @@ def from_pushed(a, b, own, other, trusts, guard, time):
     rests = (1 - late) * (1 - trusts[0])[..., None] * own + late * (1 - trusts[1])[
         ..., None
     ] * other
+    guard = doubled(guard, own.shape[:2])
     share = np.clip((0.85 - guard[..., 0] / np.maximum(guard[..., 1], 1e-4)) / 0.25, 0, 1)
     dark_ = np.log(np.maximum(1 - moved - rests, 0.005)) - np.log(np.maximum(1 - own, 0.005))
     trusted = sum(t * n for t, n in zip(trusts, amounts, strict=True))

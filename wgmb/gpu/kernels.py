@@ -132,7 +132,7 @@ class Kernel:
 def _kernel(device, file: str, texels: tuple, constants: tuple) -> Kernel:
     source = wgsl.load(file).with_texels(**dict(texels))
     if reads_storage(device):
-        source = source.reading_storage()
+        source = source.reading_storage(device.limits["max-storage-textures-per-shader-stage"])
     return Kernel(device, source, dict(constants))
 
 

@@ -41,6 +41,7 @@ class WgslSource:
 
     text: str
     files: tuple[tuple[str, int], ...]  # (file, its first line in text)
+    standard: WgslSource | None = None  # of one that reads storage textures: the shader without
 
     @property
     def name(self) -> str:
@@ -88,21 +89,27 @@ class WgslSource:
             text = re.sub(rf"^({declared}|{marked})\w+", rf"\g<1>{texel}", text, flags=re.M)
         return WgslSource(text, self.files)
 
-    def reading_storage(self) -> WgslSource:
+    def reading_storage(self, most: int) -> WgslSource:
         """The same shader, with textures marked "stored as FORMAT" bound as storage textures.
 
         Not those "stored as given", which are a caller's: `with_texels` gives their format.
-        Their one textureLoad() names the level 0, which storage textures do not have.
+        `most`: storage textures that it may have, with those that it writes; the first ones are
+        taken. Their textureLoad() names the level 0, which storage textures do not have.
         """
+        pattern = r"(var (\w+): )texture_(2d|2d_array)<[uf]32>(; *// stored as )(?!given\b)(\w+)"
+        written = sum("texture_storage" in binding.type for binding in self.bindings())
+        marks = list(re.finditer(pattern, self.text))[: max(most - written, 0)]
+        read = {mark[2] for mark in marks}
 
         def declared(mark: re.Match) -> str:
-            return f"{mark[1]}texture_storage_{mark[2]}<{mark[4]}, read>{mark[3]}{mark[4]}"
+            if mark[2] not in read:
+                return mark[0]
+            return f"{mark[1]}texture_storage_{mark[3]}<{mark[5]}, read>{mark[4]}{mark[5]}"
 
-        pattern = r"(var \w+: )texture_(2d|2d_array)<[uf]32>(; *// stored as )(?!given\b)(\w+)"
         text = re.sub(pattern, declared, self.text)
-        for name in re.findall(r"var (\w+): texture_storage_\w+<\w+, read>", text):
-            text = re.sub(rf"(textureLoad\({name}(?:, \w+)+), 0\)", r"\1)", text)
-        return WgslSource(text, self.files)
+        for name in read:
+            text = re.sub(rf"(textureLoad\({name}(?:, [\w.]+)+), 0\)", r"\1)", text)
+        return WgslSource(text, self.files, self)
 
 
 @cache

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import wgpu
-
 from ....gpu import wgsl
 from .changes import View
 from .stage import FOLDER, Stage
@@ -41,46 +39,63 @@ def patch_grid(size: tuple[int, int]) -> tuple[int, int]:
     return across, down
 
 
+def flow_size(size: tuple[int, int]) -> tuple[int, int]:
+    """The size of the flow of a coarse level, as write_flow() of flow.wgsl."""
+    every = int(wgsl.load(f"{FOLDER}/flow.wgsl").constant("EVERY"))
+    return -(-size[0] // every), -(-size[1] // every)
+
+
 def grids(size: tuple[int, int]) -> list[tuple[int, int]]:
-    """The sizes of all passes: of levels and of patches."""
+    """The sizes of all passes: of levels, of their patches and of their flow."""
     sizes = level_sizes(size)
-    return list(dict.fromkeys([*sizes, *map(patch_grid, sizes)]))
+    return list(dict.fromkeys([*sizes, *map(patch_grid, sizes), *map(flow_size, sizes[1:])]))
 
 
-def pyramid(stage: Stage, name: str, source: View) -> list[View]:
+@dataclass(frozen=True)
+class Level:
+    """A level of a pyramid: with its gradients, and in squares of pixels: see pyramid.wgsl."""
+
+    gradients: View
+    squares: View
+
+
+def pyramid(stage: Stage, name: str, source: View) -> list[Level]:
     """All levels of the picture of `source`; of shadows, where light rests there are none."""
-    first, format = f"level 0 {name}", "rgba16float"
-    levels = [(stage.texture if stage.pulled else stage.sparse)(first, format)]
+    format, first = "rgba16float", stage.texture if stage.pulled else stage.sparse
+    levels = [Level(*(first(f"level 0 {kind}{name}", format) for kind in ("", "squares ")))]
     over = "whole" if stage.pulled else "near"
-    stage.run("pyramid", "begin", over=over, source=source, level=levels[0])
+    stage.run("pyramid", "begin", over=over, source=source, level=levels[0].gradients,
+              squares=levels[0].squares)  # fmt: skip
     for i, size in enumerate(level_sizes(stage.size)[1:], 1):
-        level = stage.texture(f"level {i} {name}", format, size)
-        stage.run("pyramid", "halve", size=size, source=levels[-1], level=level)
+        names = (f"level {i} {kind}{name}" for kind in ("", "squares "))
+        level = Level(*(stage.texture(name, format, size) for name in names))
+        stage.run("pyramid", "halve", size=size, source=levels[-1].gradients,
+                  level=level.gradients, squares=level.squares)  # fmt: skip
         levels.append(level)
     return levels
 
 
-def planes(stage: Stage, depth: View, linear: wgpu.GPUSampler) -> View:
+def planes(stage: Stage, depth: View) -> View:
     """The tangent plane of the surface at every pixel, of the frame itself."""
     result = stage.sparse("planes", "rgba32float")
-    _accept(stage, "find_planes", depth=depth, linear=linear, weighted=result)
+    _accept(stage, "find_planes", depth=depth, weighted=result)
     return result
 
 
 def flow(
-    stage: Stage, side: int, here: tuple[View, list[View]], neighbour: tuple[View, list[View]],
-    surfaces: Mapping[str, View], linear: wgpu.GPUSampler,
+    stage: Stage, side: int, here: tuple[View, list[Level]], neighbour: tuple[View, list[Level]],
+    surfaces: Mapping[str, View],
 ) -> LightFlow:  # fmt: skip
     """Flow to the neighbour at the offset `side`; `here`, `neighbour`: values and their pyramid.
 
     `surfaces`: "depth" and "planes" of the frame itself, over whose surfaces both move.
     """
     raw = {
-        True: _search(stage, "ahead", here[1], neighbour[1], linear),
-        False: _search(stage, "back", neighbour[1], here[1], linear),
+        True: _search(stage, "ahead", here[1], neighbour[1]),
+        False: _search(stage, "back", neighbour[1], here[1]),
     }
     given = {
-        ahead: {"values": own[0], "values_there": other[0], "linear": linear, **surfaces}
+        ahead: {"values": own[0], "values_there": other[0], **surfaces}
         for ahead, own, other in ((True, here, neighbour), (False, neighbour, here))
     }
     names = {True: f"ahead {side}", False: f"back {side}"}
@@ -93,7 +108,7 @@ def flow(
         trusted[ahead] = stage.sparse(f"flow {names[ahead]}", "rgba16float")
         _accept(stage, "trust", flow=filled[ahead], flow_back=filled[not ahead],
                 flow_out=trusted[ahead], **given[ahead])  # fmt: skip
-    explained = stage.sparse(f"explained {side}", "rgba32float")
+    explained = stage.sparse(f"explained {side}", "rgba32float", half_size(stage.size))
     if not stage.pulled:
         differences = stage.sparse("weighted", "rgba32float")
         _accept(stage, "explain", flow=trusted[True], flow_back=trusted[False],
@@ -103,17 +118,23 @@ def flow(
 
 
 def blurred(stage: Stage, source: View, sigma: float, output: View) -> None:
-    """A Gaussian of `sigma` [px]."""
-    half = stage.sparse("half blurred", "rgba32float")
+    """A Gaussian of `sigma` [px], at half the size."""
+    half = stage.sparse("half blurred", "rgba32float", half_size(stage.size))
     given: dict[str, Any] = {"over": "near", "constants": {"SIGMA": sigma}}
     stage.run("blur", "across", source=source, output=half, **given)
     stage.run("blur", "down", source=half, output=output, **given)
 
 
+def half_size(size: tuple[int, int]) -> tuple[int, int]:
+    """As that of light.wgsl: a pixel stands for 2 x 2."""
+    return -(-size[0] // 2), -(-size[1] // 2)
+
+
 def _filled(stage: Stage, name: str, flow: View, back: View, bindings: dict[str, Any]) -> View:
     """Flow in which that around it stands for what is not trusted; `bindings`: all others."""
     result = stage.sparse(f"filled {name}", "rgba16float")
-    weighted, around = (stage.sparse(n, "rgba32float") for n in ("weighted", "around"))
+    weighted = stage.sparse("weighted", "rgba32float")
+    around = stage.sparse("around", "rgba32float", half_size(stage.size))
     bindings = bindings | {"flow": flow, "flow_back": back}
     _accept(stage, "weigh", weighted=weighted, **bindings)
     blurred(stage, weighted, SPREAD, around)
@@ -132,7 +153,7 @@ def _accept(stage: Stage, entry: str, **bindings: Any) -> None:
     stage.run("accept", entry, over="near", **given | bindings)
 
 
-def _search(stage: Stage, name: str, here: list[View], other: list[View], linear) -> View:
+def _search(stage: Stage, name: str, here: list[Level], other: list[Level]) -> View:
     """Flow by itself, from the coarsest level to the finest."""
     coarse = stage.none("rgba16float")
     sizes = level_sizes(stage.size)
@@ -143,18 +164,18 @@ def _search(stage: Stage, name: str, here: list[View], other: list[View], linear
         if finest:
             found = stage.sparse(name_of_flow, "rgba16float")
         else:
-            found = stage.texture(name_of_flow, "rgba16float", sizes[i])
+            found = stage.texture(name_of_flow, "rgba16float", flow_size(sizes[i]))
         no_patches, no_flow = stage.unused("rgba32float"), stage.unused("rgba16float")
         passes = [("search", grid, stage.none("rgba32float"), first, no_flow)]
         if finest:  # from flow that was propagated on the coarser level
             passes += [("write_finest", None, first, no_patches, found)]
         else:
             passes += [("propagate", grid, first, second, no_flow),
-                       ("write_flow", sizes[i], second, no_patches, found)]  # fmt: skip
+                       ("write_flow", flow_size(sizes[i]), second, no_patches, found)]  # fmt: skip
         for entry, size, patches, patches_out, flow_out in passes:
             stage.run(
                 "flow", entry, size=size, over=None if size else "near", constants={"LEVEL": i},
-                here=here[i], there=other[i], coarse=coarse, patches=patches, linear=linear,
+                here=here[i].gradients, there=other[i].squares, coarse=coarse, patches=patches,
                 patches_out=patches_out, flow_out=flow_out,
             )  # fmt: skip
         coarse = found

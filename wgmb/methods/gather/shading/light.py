@@ -85,7 +85,6 @@ class MovingLight:
         self._device, self._images = device, TexturePool(device)
         self._confidence = confidence
         self._pushed = {name: ScratchBuffer(device) for name in ("from_here", "from_there")}
-        self._linear = device.create_sampler(mag_filter="linear", min_filter="linear")
 
     def encode(
         self, encoder, bindings, kinds: Sequence[Kind], times: LightTimes, weight: View | None
@@ -103,7 +102,7 @@ class MovingLight:
                 size=16 * (2 + change_flags.size // 16),
                 usage=usage | wgpu.BufferUsage.INDIRECT,
             )
-            for name in ("doubtful", "changing", "near", "whole")
+            for name in ("doubtful", "changing", "beside", "near", "whole")
         }
         stage = Stage(
             self._device, self._images, encoder, bindings, "", False, {}, change_flags, lists
@@ -145,10 +144,8 @@ class MovingLight:
         seen = {offset: (view, pyramid(stage, str(offset), view))
                 for offset, view in present.items()}  # fmt: skip
         depth = kind.frames[0].depth
-        surfaces = {"depth": depth, "planes": planes(stage, depth, self._linear)}
-        flows = {
-            side: flow(stage, side, seen[0], seen[side], surfaces, self._linear) for side in changed
-        }
+        surfaces = {"depth": depth, "planes": planes(stage, depth)}
+        flows = {side: flow(stage, side, seen[0], seen[side], surfaces) for side in changed}
         result = self._images.texture(
             f"light {stage.name}", stage.size, "rgba16float", times.count + 2
         )
@@ -165,45 +162,47 @@ class MovingLight:
             "ONTO": earlier is not None,
             "TOLD": self._confidence,
         }
+        before, after = (changed.get(one, none) for one in (-1, 1))
+        around, spare = (one("rgba32uint") for one in (partial(stage.texture, "range"), stage.none))
+        compose = partial(
+            stage.run,
+            "compose",
+            constants=constants,
+            light_here=kind.frames[0].light,
+            albedo=kind.albedo or none,
+            weight=weight or none,
+            after=after,
+            **buffers,
+        )
         for i, time in enumerate([*times, -1.0, 1.0]):
             side, share = (-1 if time < 0 else 1), min(abs(time), 1.0)
             entry = "main" if i < times.count else "add_neighbour"
             if side not in changed:
                 entry = "rest" if i < times.count else "add_nothing"
             way = flows.get(side, LightFlow(none, none, stage.none("rgba32float")))
-            there = present.get(side, none)
+            both = {"values": present[0], "values_there": present.get(side, none),
+                    "flow": way.ahead, "flow_back": way.back}  # fmt: skip
             if entry == "main" and not kind.pulled:
-                for name, along, value, by in (
-                    ("from_here", share, present[0], way.ahead),
-                    ("from_there", 1 - share, there, way.back),
-                ):
-                    push = stage.uniform("push", "Push", along=along)
-                    stage.run("push", over="near", push=push, values=value, flow=by,
-                              pushed=buffers[name])  # fmt: skip
-            before, after = (changed.get(one, none) for one in (-1, 1))
-            compose = partial(
-                stage.run,
-                "compose",
-                constants=constants,
-                node=stage.uniform("compose", "Node", time=share),
-                light_here=kind.frames[0].light,
-                albedo=kind.albedo or none,
-                weight=weight or none,
-                before=changed.get(side, none) if entry == "add_neighbour" else before,
-                after=after,
-                values=present[0],
-                values_there=there,
-                flow=way.ahead,
-                flow_back=way.back,
-                explained=way.explained,
-                earlier=none if earlier is None else layer_of(earlier, i),
-                linear=self._linear,
-                added=layer_of(result, i),
-                **buffers,
-            )
+                push = stage.uniform("push", "Push", time=share)
+                stage.run("push", over="near", push=push, **both, **buffers)
+            passes = [(entry, "near", around, spare)]
             if entry == "main":
-                compose("begin", over="near")
-            compose(entry, over="changing" if entry == "main" else "near")
+                passes = [("begin", "beside", around, spare), (entry, "changing", around, spare)]
+            if not i:
+                passes.insert(0, ("find_range", "changing", spare, around))
+            for one, over, range, range_out in passes:
+                compose(
+                    one,
+                    over=over,
+                    node=stage.uniform("compose", "Node", time=share),
+                    before=changed.get(side, none) if entry == "add_neighbour" else before,
+                    explained=way.explained,
+                    earlier=none if earlier is None else layer_of(earlier, i),
+                    added=layer_of(result, i),
+                    range=range,
+                    range_out=range_out,
+                    **both,
+                )
         return result
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -54,13 +55,14 @@ class Stage:
         """Bound where a pass writes nothing."""
         return self.images.view(f"spare {format}", (1, 1), format)
 
-    def sparse(self, name: str, format: str) -> wgpu.GPUTextureView:
+    def sparse(self, name: str, format: str, size: tuple[int, int] | None = None):
         """The same, for passes over lists of tiles: 0 in all others."""
-        view, blank = self.texture(name, format), self.texture(f"blank {format}", format)
+        size = size or self.size
+        view = self.texture(name, format, size)
+        blank = self.texture(f"blank {format} {size}", format, size)
         if name not in self.begun:
-            whole = (*self.size, 1)
             self.encoder.copy_texture_to_texture(
-                {"texture": blank.texture}, {"texture": view.texture}, whole
+                {"texture": blank.texture}, {"texture": view.texture}, (*size, 1)
             )
             self.begun.add(name)
         return view
@@ -83,7 +85,9 @@ class Stage:
         text = wgsl.load(path).text
         if "override PULLED" in text:
             given["PULLED"] = self.pulled
-        kernel = gpu.kernel(self.device, path, None, **given)
+        given_ones = re.findall(r"var (\w+): .*// stored as given", text)
+        texels = {name: gpu.stored(resources[name]) for name in given_ones}
+        kernel = gpu.kernel(self.device, path, texels, **given)
         size = size or self.size
         gate = self.gates.get(size) if self.gates else None
         if over:

@@ -5,17 +5,16 @@
 //#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/listed.wgsl
 
-@group(1) @binding(0) var flow: texture_2d<f32>;        // stored as rgba16float: to the other frame [px]
-@group(1) @binding(1) var flow_back: texture_2d<f32>;
-@group(1) @binding(2) var values: texture_2d<f32>;
-@group(1) @binding(3) var values_there: texture_2d<f32>;
-@group(1) @binding(4) var around: texture_2d<f32>;      // of `fill`: `known`, blurred
-@group(1) @binding(5) var linear: sampler;
-@group(1) @binding(6) var flow_out: Flow;               // flow [px], trust 0..1
-@group(1) @binding(7) var weighted: Weighted;           // flow times weight, weight, trust; of `explain`: differences with, without; of `find_planes`: see `planes`
-@group(1) @binding(8) var depth: texture_2d<f32>;
-@group(1) @binding(9) var planes: texture_2d<f32>;      // stored as rgba32float, by `find_planes`: the inverse of depth; its change a pixel across, down
-@group(1) @binding(10) var known: texture_2d<f32>;      // of `fill`: what `weigh` wrote
+@group(1) @binding(0) var flow: texture_2d<f32>;            // stored as rgba16float: to the other frame [px]
+@group(1) @binding(1) var flow_back: texture_2d<f32>;       // stored as rgba16float
+@group(1) @binding(2) var values: texture_2d<f32>;          // stored as rgba16float
+@group(1) @binding(3) var values_there: texture_2d<f32>;    // stored as rgba16float
+@group(1) @binding(4) var around: texture_2d<f32>;          // stored as rgba32float; of `fill`: `known`, blurred, at half the size
+@group(1) @binding(5) var flow_out: Flow;                   // flow [px], trust 0..1
+@group(1) @binding(6) var weighted: Weighted;               // flow times weight, weight, trust; of `explain`: differences with, without; of `find_planes`: see `planes`
+@group(1) @binding(7) var depth: texture_2d<f32>;           // stored as given
+@group(1) @binding(8) var planes: texture_2d<f32>;          // stored as rgba32float, by `find_planes`: the inverse of depth; its change a pixel across, down
+@group(1) @binding(9) var known: texture_2d<f32>;           // stored as rgba32float; of `fill`: what `weigh` wrote
 
 alias Flow = texture_storage_2d<rgba16float, write>;
 alias Weighted = texture_storage_2d<rgba32float, write>;
@@ -48,7 +47,7 @@ fn fill(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     if any(id >= frame.size) { return; }
     let own = textureLoad(flow, id, 0).xy;
     let trusted = textureLoad(known, id, 0).w;
-    let near = textureLoad(around, id, 0);
+    let near = around_at(vec2f(id) + 0.5);
     let keep = trusted * min(near.z / 0.05, 1.0);
     let filled = mix(near.xy / max(near.z, 1e-4), own, keep);
     textureStore(flow_out, id, vec4f(select(own, filled, near.z > 0.01), 0.0, 0.0));
@@ -65,9 +64,8 @@ fn trust(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
 
 fn trust_in(by: vec2f, id: vec2u, value: f32) -> f32 {
     let at = vec2f(id) + 0.5 + by;
-    let uv = at / vec2f(frame.size);
-    let astray = length(by + textureSampleLevel(flow_back, linear, uv, 0.0).xy);
-    let unlike = abs(textureSampleLevel(values_there, linear, uv, 0.0).a - value);
+    let astray = length(by + flow_back_at(at).xy);
+    let unlike = abs(values_there_at(at).a - value);
     let stays = is_one_surface(vec2i(id), vec2i(floor(at)));
     return f32(stays) * clamp(2.0 - astray / (ASTRAY + ASTRAY_SHARE * length(by)), 0.0, 1.0)
         * clamp(2.0 - unlike / (UNLIKE + UNLIKE_SHARE * value), 0.0, 1.0);
@@ -79,11 +77,10 @@ fn explain(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) g
     let id = listed_pixel(group, local);
     if any(id >= frame.size) { return; }
     let x = vec2f(id) + 0.5;
-    let scale = 1.0 / vec2f(frame.size);
     let own = textureLoad(values, id, 0).a;
     let other = textureLoad(values_there, id, 0).a;
-    let ahead = textureSampleLevel(values_there, linear, (x + textureLoad(flow, id, 0).xy) * scale, 0.0).a;
-    let back = textureSampleLevel(values, linear, (x + textureLoad(flow_back, id, 0).xy) * scale, 0.0).a;
+    let ahead = values_there_at(x + textureLoad(flow, id, 0).xy).a;
+    let back = values_at(x + textureLoad(flow_back, id, 0).xy).a;
     textureStore(weighted, id, vec4f(abs(ahead - own) + abs(back - other), 2.0 * abs(other - own), 0.0, 0.0));
 }
 
@@ -124,5 +121,30 @@ fn slope_along(px: vec2i, own: f32, by: vec2i) -> f32 {
 }
 
 fn inverse_depth(px: vec2i) -> f32 {
-    return 1.0 / valid_depth(textureLoad(depth, inside(px), 0).x);
+    let near = inside(px);
+    return 1.0 / valid_depth(textureLoad(depth, near, 0).x);
+}
+
+fn values_at(at: vec2f) -> vec4f {
+    let s = square_around(at);
+    return mixed(s, textureLoad(values, s.pair.xy, 0), textureLoad(values, s.pair.zy, 0),
+                 textureLoad(values, s.pair.xw, 0), textureLoad(values, s.pair.zw, 0));
+}
+
+fn values_there_at(at: vec2f) -> vec4f {
+    let s = square_around(at);
+    return mixed(s, textureLoad(values_there, s.pair.xy, 0), textureLoad(values_there, s.pair.zy, 0),
+                 textureLoad(values_there, s.pair.xw, 0), textureLoad(values_there, s.pair.zw, 0));
+}
+
+fn flow_back_at(at: vec2f) -> vec4f {
+    let s = square_around(at);
+    return mixed(s, textureLoad(flow_back, s.pair.xy, 0), textureLoad(flow_back, s.pair.zy, 0),
+                 textureLoad(flow_back, s.pair.xw, 0), textureLoad(flow_back, s.pair.zw, 0));
+}
+
+fn around_at(at: vec2f) -> vec4f {
+    let s = square_within(half_size(), 0.5 * at);
+    return mixed(s, textureLoad(around, s.pair.xy, 0), textureLoad(around, s.pair.zy, 0),
+                 textureLoad(around, s.pair.xw, 0), textureLoad(around, s.pair.zw, 0));
 }

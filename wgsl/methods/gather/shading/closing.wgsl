@@ -6,10 +6,10 @@
 //#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/listed.wgsl
 
-@group(1) @binding(0) var light_here: texture_2d<f32>;
-@group(1) @binding(1) var depth_here: texture_2d<f32>;
-@group(1) @binding(2) var before: texture_2d<f32>;      // changes to the previous frame, to the next one
-@group(1) @binding(3) var after: texture_2d<f32>;
+@group(1) @binding(0) var light_here: texture_2d<f32>;  // stored as given
+@group(1) @binding(1) var depth_here: texture_2d<f32>;  // stored as given
+@group(1) @binding(2) var before: texture_2d<f32>;      // stored as rgba16float: changes to the previous frame, to the next one
+@group(1) @binding(3) var after: texture_2d<f32>;       // stored as rgba16float
 @group(1) @binding(4) var state: texture_2d<f32>;       // stored as rgba32float, by the pass before: light, depth, negative at a crease, 0 where light rests
 @group(1) @binding(5) var output: State;
 
@@ -35,7 +35,8 @@ fn begin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
 }
 
 fn depth_at(px: vec2i) -> f32 {
-    return valid_depth(textureLoad(depth_here, inside(px), 0).x);
+    let near = inside(px);
+    return valid_depth(textureLoad(depth_here, near, 0).x);
 }
 
 /// True if the surface turns at the pixel. Along a plane the inverse of depth is linear.

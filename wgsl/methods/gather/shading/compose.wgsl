@@ -9,23 +9,25 @@ struct Node {
 }
 
 @group(1) @binding(0) var<uniform> node: Node;
-@group(1) @binding(1) var light_here: texture_2d<f32>;
-@group(1) @binding(2) var albedo: texture_2d<f32>;
-@group(1) @binding(3) var weight: texture_2d<f32>;
+@group(1) @binding(1) var light_here: texture_2d<f32>;  // stored as given
+@group(1) @binding(2) var albedo: texture_2d<f32>;      // stored as given
+@group(1) @binding(3) var weight: texture_2d<f32>;      // stored as given
 @group(1) @binding(4) var before: texture_2d<f32>;      // stored as rgba16float: changes to the previous frame, to the next one
 @group(1) @binding(5) var after: texture_2d<f32>;       // stored as rgba16float
-@group(1) @binding(6) var values: texture_2d<f32>;
-@group(1) @binding(7) var values_there: texture_2d<f32>;
-@group(1) @binding(8) var flow: texture_2d<f32>;        // and trust
-@group(1) @binding(9) var flow_back: texture_2d<f32>;
-@group(1) @binding(10) var explained: texture_2d<f32>;  // stored as rgba32float: what accept.wgsl wrote, blurred
-@group(1) @binding(11) var earlier: texture_2d<f32>;    // what is added for other reasons
-@group(1) @binding(12) var linear: sampler;
+@group(1) @binding(6) var values: texture_2d<f32>;      // stored as rgba16float
+@group(1) @binding(7) var values_there: texture_2d<f32>;    // stored as rgba16float
+@group(1) @binding(8) var flow: texture_2d<f32>;        // stored as rgba16float; and trust
+@group(1) @binding(9) var flow_back: texture_2d<f32>;   // stored as rgba16float
+@group(1) @binding(10) var explained: texture_2d<f32>;  // stored as rgba32float: what accept.wgsl wrote, blurred, at half the size
+@group(1) @binding(11) var earlier: texture_2d<f32>;    // stored as rgba16float: what is added for other reasons
+@group(1) @binding(12) var range: texture_2d<u32>;      // stored as rgba32uint, by `find_range`: the least and the greatest change around
 @group(1) @binding(13) var<storage, read_write> from_here: array<u32>;   // see push.wgsl
 @group(1) @binding(14) var<storage, read_write> from_there: array<u32>;
 @group(1) @binding(15) var added: Added;                // [linear, premultiplied by weight]; a: how sure it is, 0 to 1
+@group(1) @binding(16) var range_out: Range;
 
 alias Added = texture_storage_2d<rgba16float, write>;
+alias Range = texture_storage_2d<rgba32uint, write>;
 
 override HAS_ALBEDO: bool = true;   // else it is 1
 override WEIGHTED: bool = false;    // multiply by `weight`
@@ -42,7 +44,24 @@ fn step_around(x: f32, half: f32) -> f32 {
     return smoothstep(0.5 - half, 0.5 + half, x);
 }
 
-/// Nothing yet: light rests where it changes in no frame, and that is sure. It is read in tiles with changes, and beside them.
+/// What a frame shows around.
+@compute @workgroup_size(WG_X, WG_Y)
+fn find_range(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_pixel(group, local);
+    if any(id >= frame.size) { return; }
+    var low = vec3f(0.0);
+    var high = vec3f(0.0);
+    for (var k = 0; k < 9; k++) {
+        let near = inside(vec2i(id) + vec2i(k % 3, k / 3) - 1);
+        let a = textureLoad(before, near, 0).rgb;
+        let b = textureLoad(after, near, 0).rgb;
+        low = min(low, min(a, b));
+        high = max(high, max(a, b));
+    }
+    textureStore(range_out, id, vec4u(pack2x16float(low.rg), pack2x16float(vec2f(low.b, high.r)), pack2x16float(high.gb), 0u));
+}
+
+/// Nothing yet: light rests where it changes in no frame, and that is sure. It is read in tiles with changes, and in those beside them.
 @compute @workgroup_size(WG_X, WG_Y)
 fn begin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);
@@ -66,15 +85,10 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
 fn moved(px: vec2i) -> vec4f {
     var change = vec4f(0.0);
     if PULLED { change = pulled(px); } else { change = pushed(px); }
-    var low = vec3f(0.0);
-    var high = vec3f(0.0);
-    for (var k = 0; k < 9; k++) {       // no more than a frame showed
-        let near = inside(px + vec2i(k % 3, k / 3) - 1);
-        let a = textureLoad(before, near, 0).rgb;
-        let b = textureLoad(after, near, 0).rgb;
-        low = min(low, min(a, b));
-        high = max(high, max(a, b));
-    }
+    let packed = textureLoad(range, px, 0);
+    let middle = unpack2x16float(packed.y);
+    let low = vec3f(unpack2x16float(packed.x), middle.x);
+    let high = vec3f(middle.y, unpack2x16float(packed.z));
     var certain = 1.0;
     if TOLD { certain = sure(px, change.a); }
     return vec4f(clamp(change.rgb, low, high), certain);
@@ -84,14 +98,13 @@ fn moved(px: vec2i) -> vec4f {
 /// explains, either way. 1 where nothing changes.
 fn sure(px: vec2i, trusted: f32) -> f32 {
     let x = vec2f(px) + 0.5;
-    let scale = 1.0 / vec2f(frame.size);
-    let ahead = (x + textureLoad(flow, px, 0).xy) * scale;
-    let back = (x + textureLoad(flow_back, px, 0).xy) * scale;
+    let ahead = x + textureLoad(flow, px, 0).xy;
+    let back = x + textureLoad(flow_back, px, 0).xy;
     let here = levels(textureLoad(values, px, 0));
     let there = levels(textureLoad(values_there, px, 0));
     let differs = most_of(there - here);
-    let missed = max(most_of(levels(textureSampleLevel(values_there, linear, ahead, 0.0)) - here),
-                     most_of(levels(textureSampleLevel(values, linear, back, 0.0)) - there));
+    let missed = max(most_of(levels(values_there_at(ahead)) - here),
+                     most_of(levels(values_at(back)) - there));
     let explains = 1.0 - min(missed / max(differs, COUNTS), 1.0);
     return 1.0 - min(differs / COUNTS, 1.0) * (1.0 - trusted * explains);
 }
@@ -170,7 +183,7 @@ fn pushed(px: vec2i) -> vec4f {
         / max(covered.x + covered.y, LEAST_COVERED) * min(max(a.w, b.w), 1.0);
     let late = step_around(node.time, 0.2);
     let rests = (1.0 - late) * (1.0 - trusts.x) * own + late * (1.0 - trusts.y) * other;
-    let differs = textureLoad(explained, px, 0);
+    let differs = explained_at(vec2f(px) + 0.5);
     let guard = clamp((0.85 - differs.x / max(differs.y, 1e-4)) / 0.25, 0.0, 1.0);
     let change = log(max(1.0 - mixed - rests, vec3f(LEAST_LIGHT))) - log(max(1.0 - own, vec3f(LEAST_LIGHT)));
     let trusted = dot(trusts, vec2f(value.a, value_there.a)) / max(value.a + value_there.a, 1e-3);
@@ -180,22 +193,49 @@ fn pushed(px: vec2i) -> vec4f {
 /// The light that has come here by then along both flows; as a change of its logarithm. a: how far it is trusted.
 fn pulled(px: vec2i) -> vec4f {
     let x = vec2f(px) + 0.5;
-    let scale = 1.0 / vec2f(frame.size);
     var ahead = textureLoad(flow, px, 0).xyz;
     var back = textureLoad(flow_back, px, 0).xyz;
     for (var k = 0; k < 3; k++) {
-        ahead = textureSampleLevel(flow, linear, (x - node.time * ahead.xy) * scale, 0.0).xyz;
-        back = textureSampleLevel(flow_back, linear, (x - (1.0 - node.time) * back.xy) * scale, 0.0).xyz;
+        ahead = flow_at(x - node.time * ahead.xy).xyz;
+        back = flow_back_at(x - (1.0 - node.time) * back.xy).xyz;
     }
-    let at = (x - node.time * ahead.xy) * scale;
-    let at_there = (x - (1.0 - node.time) * back.xy) * scale;
+    let at = x - node.time * ahead.xy;
+    let at_there = x - (1.0 - node.time) * back.xy;
     let late = step_around(node.time, 0.4);
-    let shares = vec2f(1.0 - late, late) * vec2f(textureSampleLevel(flow, linear, at, 0.0).z,
-                                                 textureSampleLevel(flow_back, linear, at_there, 0.0).z);
+    let shares = vec2f(1.0 - late, late) * vec2f(flow_at(at).z, flow_back_at(at_there).z);
     let level = textureLoad(values, px, 0).rgb;
-    let come = shares.x * (textureSampleLevel(values, linear, at, 0.0).rgb - level)
-        + shares.y * (textureSampleLevel(values_there, linear, at_there, 0.0).rgb - level);
+    let come = shares.x * (values_at(at).rgb - level) + shares.y * (values_there_at(at_there).rgb - level);
     let total = shares.x + shares.y;
     let trusted = min(total / 0.3, 1.0);
     return vec4f(come / max(total, 1e-3) * trusted, trusted);
+}
+
+fn values_at(at: vec2f) -> vec4f {
+    let s = square_around(at);
+    return mixed(s, textureLoad(values, s.pair.xy, 0), textureLoad(values, s.pair.zy, 0),
+                 textureLoad(values, s.pair.xw, 0), textureLoad(values, s.pair.zw, 0));
+}
+
+fn values_there_at(at: vec2f) -> vec4f {
+    let s = square_around(at);
+    return mixed(s, textureLoad(values_there, s.pair.xy, 0), textureLoad(values_there, s.pair.zy, 0),
+                 textureLoad(values_there, s.pair.xw, 0), textureLoad(values_there, s.pair.zw, 0));
+}
+
+fn flow_at(at: vec2f) -> vec4f {
+    let s = square_around(at);
+    return mixed(s, textureLoad(flow, s.pair.xy, 0), textureLoad(flow, s.pair.zy, 0),
+                 textureLoad(flow, s.pair.xw, 0), textureLoad(flow, s.pair.zw, 0));
+}
+
+fn flow_back_at(at: vec2f) -> vec4f {
+    let s = square_around(at);
+    return mixed(s, textureLoad(flow_back, s.pair.xy, 0), textureLoad(flow_back, s.pair.zy, 0),
+                 textureLoad(flow_back, s.pair.xw, 0), textureLoad(flow_back, s.pair.zw, 0));
+}
+
+fn explained_at(at: vec2f) -> vec4f {
+    let s = square_within(half_size(), 0.5 * at);
+    return mixed(s, textureLoad(explained, s.pair.xy, 0), textureLoad(explained, s.pair.zy, 0),
+                 textureLoad(explained, s.pair.xw, 0), textureLoad(explained, s.pair.zw, 0));
 }

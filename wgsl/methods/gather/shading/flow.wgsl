@@ -7,24 +7,24 @@
 //#include methods/gather/shading/resting.wgsl
 
 @group(1) @binding(0) var here: texture_2d<f32>;        // stored as rgba16float: a level of pyramid.wgsl
-@group(1) @binding(1) var there: texture_2d<f32>;
-@group(1) @binding(2) var coarse: texture_2d<f32>;      // flow of the coarser level [px of it]; 1 x 1: there is none
+@group(1) @binding(1) var there: texture_2d<f32>;       // stored as rgba16float: its `squares`
+@group(1) @binding(2) var coarse: texture_2d<f32>;      // stored as rgba16float: by `write_flow`, of the coarser level; 1 x 1: there is none
 @group(1) @binding(3) var patches: texture_2d<f32>;     // stored as rgba32float; of `propagate` and `write_flow`: what the pass before wrote
-@group(1) @binding(4) var linear: sampler;
-@group(1) @binding(5) var patches_out: Patches;         // flow [px], squared difference
-@group(1) @binding(6) var flow_out: Flow;
+@group(1) @binding(4) var patches_out: Patches;         // flow [px], squared difference
+@group(1) @binding(5) var flow_out: Flow;
 
 alias Patches = texture_storage_2d<rgba32float, write>;
 alias Flow = texture_storage_2d<rgba16float, write>;
 
 override LEVEL: u32 = 0u;       // of the pyramid, 0 the frame itself
-override APART: i32 = select(1, 2, LEVEL < 2u);     // from one pixel of a patch that is compared to the next [px]
+override APART: i32 = select(1, 2, LEVEL < 3u);     // from one pixel of a patch that is compared to the next [px]
 override TAPS: i32 = PATCH / APART;                 // along a side; the gradients are those of all pixels
 
 const COARSE: u32 = 2u;         // levels beyond have all patches
 const PATCH: i32 = 12;          // side [px]
 const STRIDE: i32 = 4;          // from one patch to the next [px]
-const STEPS: i32 = 6;           // most of a search
+const EVERY: i32 = 2;           // px of a coarse level from one to the next whose flow is told: patches begin at the others
+const STEPS: i32 = 8;           // most of a search
 const SHORT: f32 = 0.02;        // a step shorter than this ends it [px]
 const FLAT: f32 = 1e-5;         // mean squared gradient below which a patch does not tell its motion
 const STILL: f32 = 1e-6;        // mean squared difference below which a patch stays where it is
@@ -63,6 +63,16 @@ fn patch_at(corner: vec2i, last: vec2i) -> Patch {
     return Patch(corner, sum / count, inverse, is_flat);
 }
 
+/// Between pixels, of which (0, 0) is the first one's middle; edges repeat.
+fn brightness_there(at: vec2f, last: vec2i) -> f32 {
+    let near = clamp(at, vec2f(0.0), vec2f(last));
+    let px = vec2i(near);
+    let share = near - vec2f(px);
+    let square = textureLoad(there, px, 0);
+    let pair = mix(square.xz, square.yw, share.x);
+    return mix(pair.x, pair.y, share.y);
+}
+
 struct Compared {
     cost: f32,
     step: vec2f,
@@ -70,7 +80,6 @@ struct Compared {
 
 /// The difference of the patch from its moved copy, and the step that reduces it.
 fn compare(one: Patch, by: vec2f, last: vec2i) -> Compared {
-    let scale = 1.0 / vec2f(last + 1);
     var sum = 0.0;
     var sum2 = 0.0;
     var slope = vec2f(0.0);
@@ -78,7 +87,7 @@ fn compare(one: Patch, by: vec2f, last: vec2i) -> Compared {
     for (var k = 0; k < TAPS * TAPS; k++) {
         let px = min(one.corner + APART * vec2i(k % TAPS, k / TAPS), last);
         let a = textureLoad(here, px, 0).xyz;
-        let d = textureSampleLevel(there, linear, (vec2f(px) + 0.5 + by) * scale, 0.0).x - a.x;
+        let d = brightness_there(vec2f(px) + by, last) - a.x;
         sum += d;
         sum2 += d * d;
         slope += a.yz * d;
@@ -116,10 +125,12 @@ fn descend(best: ptr<function, Best>, one: Patch, last: vec2i) {
     }
 }
 
+/// At a pixel of this level [px of it].
 fn coarse_flow(px: vec2i, last: vec2i) -> vec2f {
     let size = vec2i(textureDimensions(coarse));
     if all(size == vec2i(1)) { return vec2f(0.0); }
-    return 2.0 * textureLoad(coarse, clamp(px / 2, vec2i(0), size - 1), 0).xy;
+    let near = clamp(px / (2 * EVERY), vec2i(0), size - 1);
+    return 2.0 * textureLoad(coarse, near, 0).xy;
 }
 
 /// False for a pixel of a level that is far from all changes. On coarse levels, patches are larger than what is near.
@@ -175,12 +186,13 @@ fn propagate(@builtin(global_invocation_id) id: vec3u) {
     textureStore(patches_out, id.xy, vec4f(best.flow, best.found.cost, own.w));
 }
 
-/// The flow of every pixel of a coarse level: see flow_at().
+/// The flow of a coarse level, of the last of EVERY x EVERY pixels [px of it]: the middles of the finer level's patches are there.
 @compute @workgroup_size(WG_X, WG_Y)
 fn write_flow(@builtin(global_invocation_id) id: vec3u) {
-    let px = vec2i(id.xy);
-    if any(px >= vec2i(textureDimensions(here))) { return; }
-    textureStore(flow_out, px, vec4f(flow_at(px), 0.0, 0.0));
+    let size = vec2i(textureDimensions(here));
+    let px = min(EVERY * vec2i(id.xy) + EVERY - 1, size - 1);
+    if any(EVERY * vec2i(id.xy) >= size) { return; }
+    textureStore(flow_out, id.xy, vec4f(flow_at(px), 0.0, 0.0));
 }
 
 /// That of the finest level, in tiles close to changes.
@@ -205,7 +217,7 @@ fn flow_at(px: vec2i) -> vec2f {
         let corner = corner_of(index, size);
         let covers = all(px >= corner) && all(px < corner + PATCH);
         let flow = textureLoad(patches, index, 0).xy;
-        let found = textureSampleLevel(there, linear, (vec2f(px) + 0.5 + flow) / vec2f(size), 0.0).x;
+        let found = brightness_there(vec2f(px) + flow, size - 1);
         sum += select(0.0, 1.0 / max(1.0, UNLIKE * abs(found - own)), covers) * vec3f(flow, 1.0);
     }
     return sum.xy / max(sum.z, 1e-6);

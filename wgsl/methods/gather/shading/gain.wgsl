@@ -5,9 +5,9 @@
 
 @group(1) @binding(0) var ratio: texture_2d<f32>;       // stored as rgba16float, by measure.wgsl
 @group(1) @binding(1) var scalar: texture_2d<f32>;      // stored as r32float; of `find_gain` and `limit_ratio`: what the pass before wrote
-@group(1) @binding(2) var light_here: texture_2d<f32>;
-@group(1) @binding(3) var albedo: texture_2d<f32>;
-@group(1) @binding(4) var coherence: texture_2d<f32>;   // of `find_gain`: what `find_coherence` wrote
+@group(1) @binding(2) var light_here: texture_2d<f32>;      // stored as given
+@group(1) @binding(3) var albedo: texture_2d<f32>;      // stored as given
+@group(1) @binding(4) var coherence: texture_2d<f32>;   // stored as r32float; of `find_gain`: what `find_coherence` wrote
 @group(1) @binding(5) var ratio_out: Ratio;
 @group(1) @binding(6) var scalar_out: Scalar;
 @group(1) @binding(7) var<storage, read_write> found: Found;
@@ -50,6 +50,12 @@ fn smooth_ratio(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
     textureStore(ratio_out, px, select(vec4f(0.0), vec4f(mean, 1.0), own.a > 0.0));
 }
 
+/// Of a Gaussian, by the distance along one axis [px]; up to RADIUS.
+fn weight_of(distance: i32) -> f32 {
+    let weights = vec4f(1.0, exp(-FALLOFF), exp(-4.0 * FALLOFF), exp(-9.0 * FALLOFF));
+    return weights[abs(distance)];
+}
+
 /// The visibility of a change.
 @compute @workgroup_size(WG_X, WG_Y)
 fn find_peaks(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
@@ -59,8 +65,9 @@ fn find_peaks(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id
     var sum = 0.0;
     var total = 0.0;
     for (var y = -RADIUS; y <= RADIUS; y++) {
+        let of_row = weight_of(y);
         for (var x = -RADIUS; x <= RADIUS; x++) {
-            let weight = exp(-FALLOFF * f32(x * x + y * y));
+            let weight = of_row * weight_of(x);
             let near = inside(px + vec2i(x, y));
             sum += weight * dot(textureLoad(ratio, near, 0).rgb, LUMINANCE);
             total += weight;
@@ -110,7 +117,8 @@ fn find_gain(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id)
     if COLORS {
         var agreed = 0.0;
         for (var k = 0; k < 9; k++) {
-            agreed = max(agreed, textureLoad(coherence, inside(vec2i(id) + vec2i(k % 3, k / 3) - 1), 0).x);
+            let near = inside(vec2i(id) + vec2i(k % 3, k / 3) - 1);
+            agreed = max(agreed, textureLoad(coherence, near, 0).x);
         }
         gain *= clamp((agreed - INCOHERENT) / (COHERENT - INCOHERENT), 0.0, 1.0);
     }
@@ -126,8 +134,9 @@ fn limit_ratio(@builtin(local_invocation_index) local: u32, @builtin(workgroup_i
     var sum = 0.0;
     var total = 0.0;
     for (var y = -RADIUS; y <= RADIUS; y++) {
+        let of_row = weight_of(y);
         for (var x = -RADIUS; x <= RADIUS; x++) {
-            let weight = exp(-FALLOFF * f32(x * x + y * y));
+            let weight = of_row * weight_of(x);
             let near = inside(px + vec2i(x, y));
             sum += weight * textureLoad(scalar, near, 0).x;
             total += weight;

@@ -1,7 +1,7 @@
 // Workgroups of all later passes: none if light changes nowhere.
 //#include common/frame.wgsl
 
-const GATES: u32 = 16u;
+const GATES: u32 = 32u;
 
 struct Sizes {
     counts: array<vec4u, GATES>,    // invocations across and down of the passes; 0, 0

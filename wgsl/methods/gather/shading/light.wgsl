@@ -31,3 +31,30 @@ fn valid_light(given: vec4f) -> vec3f {
 fn inside(px: vec2i) -> vec2i {
     return clamp(px, vec2i(0), vec2i(frame.size) - 1);
 }
+
+struct Square {         // four pixels, and where between their middles a place is
+    pair: vec4i,        // the first one, the last one
+    share: vec2f,
+}
+
+/// Those around a place [px]; edges repeat. (Samplers of most GPUs are less exact than that, and lavapipe's slower.)
+fn square_around(at: vec2f) -> Square {
+    return square_within(frame.size, at);
+}
+
+/// The same in an image of another size.
+fn square_within(size: vec2u, at: vec2f) -> Square {
+    let corner = floor(at - 0.5);
+    let first = vec4i(vec2i(corner), vec2i(corner) + 1);
+    return Square(clamp(first, vec4i(0), vec4i(size.xyxy) - 1), at - 0.5 - corner);
+}
+
+/// The values of its pixels, between them.
+fn mixed(square: Square, own: vec4f, right: vec4f, below: vec4f, both: vec4f) -> vec4f {
+    return mix(mix(own, right, square.share.x), mix(below, both, square.share.x), square.share.y);
+}
+
+/// Of images of which a pixel stands for 2 x 2 of the frame.
+fn half_size() -> vec2u {
+    return (frame.size + 1u) / 2u;
+}

@@ -5,10 +5,20 @@
 
 /// The pixel of an invocation; outside of the image where there is none.
 fn listed_pixel(group: vec3u, local: u32) -> vec2u {
+    return listed_part(group, local, 1u);
+}
+
+/// The same in an image of half the size; outside of the whole one where there is none.
+fn listed_half(group: vec3u, local: u32) -> vec2u {
+    return listed_part(group, local, 2u);
+}
+
+fn listed_part(group: vec3u, local: u32, divisor: u32) -> vec2u {
     let k = (group.y * LIGHT_GROUPS_PER_ROW + group.x) / TILE_GROUPS;
     let tile = listed[FIRST_LISTED + min(k, listed[LISTED] - 1u)];
     let across = (frame.size.x + LIGHT_TILE - 1u) / LIGHT_TILE;
     let n = group.x % TILE_GROUPS * (WG_X * WG_Y) + local;
-    let px = LIGHT_TILE * vec2u(tile % across, tile / across) + vec2u(n % LIGHT_TILE, n / LIGHT_TILE);
-    return select(frame.size, px, k < listed[LISTED]);
+    let side = LIGHT_TILE / divisor;
+    let px = side * vec2u(tile % across, tile / across) + vec2u(n % side, n / side);
+    return select(frame.size, px, k < listed[LISTED] && n < side * side);
 }

@@ -6,12 +6,12 @@
 //#include methods/gather/shading/listed.wgsl
 
 @group(1) @binding(0) var<uniform> side: Side;
-@group(1) @binding(1) var light_here: texture_2d<f32>;
-@group(1) @binding(2) var light_there: texture_2d<f32>;
-@group(1) @binding(3) var depth_here: texture_2d<f32>;
-@group(1) @binding(4) var depth_there: texture_2d<f32>;
-@group(1) @binding(5) var motion_here: texture_2d<f32>;     // to_prev, to_next [px]
-@group(1) @binding(6) var motion_there: texture_2d<f32>;
+@group(1) @binding(1) var light_here: texture_2d<f32>;      // stored as given
+@group(1) @binding(2) var light_there: texture_2d<f32>;      // stored as given
+@group(1) @binding(3) var depth_here: texture_2d<f32>;      // stored as given
+@group(1) @binding(4) var depth_there: texture_2d<f32>;      // stored as given
+@group(1) @binding(5) var motion_here: texture_2d<f32>;     // stored as given: to_prev, to_next [px]
+@group(1) @binding(6) var motion_there: texture_2d<f32>;      // stored as given
 @group(1) @binding(7) var plain_here: texture_2d<u32>;      // stored as r32uint, by plain.wgsl
 @group(1) @binding(8) var plain_there: texture_2d<u32>;     // stored as r32uint
 @group(1) @binding(9) var ratio: Ratio;     // of light, as a logarithm; a: 1 where the surface is seen there
@@ -61,7 +61,8 @@ fn way_back(at: vec2f) -> vec2f {
     var sum = vec2f(0.0);
     for (var k = 0; k < 4; k++) {
         let step = vec2f(f32(k & 1), f32(k >> 1u));
-        let both = textureLoad(motion_there, inside(vec2i(corner + step)), 0);
+        let px = inside(vec2i(corner + step));
+        let both = textureLoad(motion_there, px, 0);
         let shares = mix(1.0 - share, share, step);
         sum += shares.x * shares.y * select(both.zw, both.xy, side.next == 1u);
     }

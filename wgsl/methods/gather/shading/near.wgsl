@@ -1,4 +1,4 @@
-// Lists of tiles: those in which light may change; those in which it does, those near them, and all.
+// Lists of tiles: those in which light may change; those in which it does, those near them, of these the others, and all.
 //#include common/frame.wgsl
 //#include methods/gather/shading/active.wgsl
 
@@ -7,6 +7,7 @@
 @group(1) @binding(2) var<storage, read_write> near: TileList;
 @group(1) @binding(3) var<storage, read_write> whole: TileList;
 @group(1) @binding(4) var<storage, read_write> doubtful: TileList;
+@group(1) @binding(5) var<storage, read_write> beside: TileList;
 
 struct Found {
     any: u32,           // see gain.wgsl
@@ -42,6 +43,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     atomicOr(&found.tiles[tile], u32(distance) << DISTANCE_BITS);
     whole.tiles[tile] = tile;
     if distance == 0 { changing.tiles[atomicAdd(&changing.count, 1u)] = tile; }
+    if distance > 0 && distance <= NEAR_TILES { beside.tiles[atomicAdd(&beside.count, 1u)] = tile; }
     if distance <= NEAR_TILES {
         atomicOr(&found.tiles[tile], NEAR);
         near.tiles[atomicAdd(&near.count, 1u)] = tile;
@@ -55,6 +57,7 @@ fn size_lists() {
     atomicStore(&whole.count, select(0u, tiles.x * tiles.y, atomicLoad(&changing.count) > 0u));
     changing.groups = groups_for(atomicLoad(&changing.count));
     near.groups = groups_for(atomicLoad(&near.count));
+    beside.groups = groups_for(atomicLoad(&beside.count));
     whole.groups = groups_for(atomicLoad(&whole.count));
 }
 

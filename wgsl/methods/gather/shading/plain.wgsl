@@ -4,8 +4,8 @@
 //#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/listed.wgsl
 
-@group(1) @binding(0) var depth: texture_2d<f32>;
-@group(1) @binding(1) var motion: texture_2d<f32>;      // to_prev, to_next [px]
+@group(1) @binding(0) var depth: texture_2d<f32>;       // stored as given
+@group(1) @binding(1) var motion: texture_2d<f32>;      // stored as given: to_prev, to_next [px]
 @group(1) @binding(2) var plain: Plain;                 // 1, or 0 at an edge
 
 alias Plain = texture_storage_2d<r32uint, write>;

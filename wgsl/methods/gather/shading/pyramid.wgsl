@@ -1,10 +1,11 @@
-// Pictures of what moves, each level half as large as the one before, with their gradients.
+// Pictures of what moves, each level half as large as the one before: with their gradients, and for reading between pixels.
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/listed.wgsl
 
 @group(1) @binding(0) var source: texture_2d<f32>;      // stored as rgba16float: values, or the finer level
 @group(1) @binding(1) var level: Level;                 // brightness, of shadows less 1; its change a pixel across, down
+@group(1) @binding(2) var squares: Level;               // brightness of 2 x 2 pixels from each one on: its own, right, below, both
 
 alias Level = texture_storage_2d<rgba16float, write>;
 
@@ -15,18 +16,26 @@ fn begin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
     let id = listed_pixel(group, local);
     if any(id >= frame.size) { return; }
     let px = vec2i(id);
-    let across = brightness(px + vec2i(1, 0)) - brightness(px - vec2i(1, 0));
-    let down = brightness(px + vec2i(0, 1)) - brightness(px - vec2i(0, 1));
-    textureStore(level, px, vec4f(brightness(px), 0.5 * across, 0.5 * down, 0.0));
+    let own = brightness(px);
+    let right = brightness(px + vec2i(1, 0));
+    let below = brightness(px + vec2i(0, 1));
+    let across = right - brightness(px - vec2i(1, 0));
+    let down = below - brightness(px - vec2i(0, 1));
+    textureStore(level, px, vec4f(own, 0.5 * across, 0.5 * down, 0.0));
+    textureStore(squares, px, vec4f(own, right, below, brightness(px + 1)));
 }
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn halve(@builtin(global_invocation_id) id: vec3u) {
     let px = vec2i(id.xy);
     if any(px >= (vec2i(textureDimensions(source)) + 1) / 2) { return; }
-    let across = quarter(px + vec2i(1, 0)) - quarter(px - vec2i(1, 0));
-    let down = quarter(px + vec2i(0, 1)) - quarter(px - vec2i(0, 1));
-    textureStore(level, px, vec4f(quarter(px), 0.5 * across, 0.5 * down, 0.0));
+    let own = quarter(px);
+    let right = quarter(px + vec2i(1, 0));
+    let below = quarter(px + vec2i(0, 1));
+    let across = right - quarter(px - vec2i(1, 0));
+    let down = below - quarter(px - vec2i(0, 1));
+    textureStore(level, px, vec4f(own, 0.5 * across, 0.5 * down, 0.0));
+    textureStore(squares, px, vec4f(own, right, below, quarter(px + 1)));
 }
 
 fn brightness(px: vec2i) -> f32 {

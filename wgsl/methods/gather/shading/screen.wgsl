@@ -5,11 +5,11 @@
 //#include methods/gather/shading/light.wgsl
 
 @group(1) @binding(0) var<uniform> side: Side;
-@group(1) @binding(1) var light_here: texture_2d<f32>;
-@group(1) @binding(2) var light_there: texture_2d<f32>;
-@group(1) @binding(3) var depth_here: texture_2d<f32>;
-@group(1) @binding(4) var depth_there: texture_2d<f32>;
-@group(1) @binding(5) var motion_here: texture_2d<f32>;     // to_prev, to_next [px]
+@group(1) @binding(1) var light_here: texture_2d<f32>;      // stored as given
+@group(1) @binding(2) var light_there: texture_2d<f32>;      // stored as given
+@group(1) @binding(3) var depth_here: texture_2d<f32>;      // stored as given
+@group(1) @binding(4) var depth_there: texture_2d<f32>;      // stored as given
+@group(1) @binding(5) var motion_here: texture_2d<f32>;     // stored as given: to_prev, to_next [px]
 @group(1) @binding(6) var<storage, read_write> found: Found;
 
 struct Found {
@@ -22,12 +22,13 @@ const DIFFERS: f32 = 0.075;     // share of a channel; changes of less than LEAS
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
-    let both = textureLoad(motion_here, id.xy, 0);
+    let px = id.xy;
+    let both = textureLoad(motion_here, px, 0);
     let at = vec2f(id.xy) + 0.5 + select(both.xy, both.zw, side.next == 1u);
     let landing = inside(vec2i(floor(at)));
-    let z = valid_depth(textureLoad(depth_here, id.xy, 0).x);
+    let z = valid_depth(textureLoad(depth_here, px, 0).x);
     let z_there = valid_depth(textureLoad(depth_there, landing, 0).x);
-    let here = valid_light(textureLoad(light_here, id.xy, 0));
+    let here = valid_light(textureLoad(light_here, px, 0));
     let there = valid_light(textureLoad(light_there, landing, 0));
     let differs = any(abs(there - here) > DIFFERS * (here + dark()));
     let is_there = all(at >= vec2f(0.0)) && all(at < vec2f(frame.size));

@@ -4,9 +4,9 @@
 //#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/listed.wgsl
 
-@group(1) @binding(0) var light_here: texture_2d<f32>;
-@group(1) @binding(1) var before: texture_2d<f32>;      // changes to the previous frame, to the next one
-@group(1) @binding(2) var after: texture_2d<f32>;
+@group(1) @binding(0) var light_here: texture_2d<f32>;  // stored as given
+@group(1) @binding(1) var before: texture_2d<f32>;      // stored as rgba16float: changes to the previous frame, to the next one
+@group(1) @binding(2) var after: texture_2d<f32>;       // stored as rgba16float
 @group(1) @binding(3) var closed: texture_2d<f32>;      // what closing.wgsl wrote
 @group(1) @binding(4) var own: texture_2d<f32>;         // changes to the frame that is asked for; black: this one
 @group(1) @binding(5) var values: Values;
