@@ -26,13 +26,13 @@ def screen(stage: Stage, frames: Mapping[int, SurfaceLight]) -> None:
     """Record in which tiles light may differ in a neighbour; `frames` as those of `changes`."""
     for offset, other in frames.items():
         if offset:
-            stage.run("screen", **_both(stage, frames[0], other, offset))
+            stage.run("changes/screen", **_both(stage, frames[0], other, offset))
 
 
 def _both(stage: Stage, own: SurfaceLight, other: SurfaceLight, offset: int) -> dict[str, Any]:
     """Bindings of passes that compare the frame with the neighbour at `offset`."""
     return {
-        "side": stage.uniform("light", "Side", next=offset > 0),
+        "side": stage.uniform("changes/both", "Side", next=offset > 0),
         "light_here": own.light,
         "light_there": other.light,
         "depth_here": own.depth,
@@ -58,7 +58,12 @@ def changes(
         entry, over = ("everywhere", None) if offset else ("main", "doubtful")
         plain[offset] = (stage.texture if offset else stage.sparse)(f"plain {offset}", "r32uint")
         stage.run(
-            "plain", entry, over=over, depth=frame.depth, motion=frame.motion, plain=plain[offset]
+            "changes/plain",
+            entry,
+            over=over,
+            depth=frame.depth,
+            motion=frame.motion,
+            plain=plain[offset],
         )
     result = {}
     for offset, there in frames.items():
@@ -69,7 +74,7 @@ def changes(
             for name in ("raw", "smooth", f"{stage.name} changes {offset}")
         )
         stage.run(
-            "measure",
+            "changes/measure",
             over="doubtful",
             **_both(stage, here, there, offset),
             motion_there=there.motion,
@@ -95,7 +100,7 @@ def changes(
             if entry == "find_coherence" and not by_color:
                 continue
             stage.run(
-                "gain",
+                "changes/gain",
                 entry,
                 over="doubtful",
                 constants={"HAS_ALBEDO": albedo is not None, "COLORS": by_color},

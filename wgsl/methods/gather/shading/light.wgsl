@@ -3,10 +3,6 @@
 //#include common/finite.wgsl
 //#include common/frame.wgsl
 
-struct Side {
-    next: u32,          // 1: the neighbour is the next frame; 0: the previous one
-}
-
 const LUMINANCE: vec3f = vec3f(0.2126, 0.7152, 0.0722);
 const AS_DEEP_THERE: f32 = 1.15;    // ratio of the depths of the same surface in two frames
 const BRIGHTEST_LIGHT: f32 = 1e4;   // more than this is taken for this

@@ -3,14 +3,9 @@
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/changes/both.wgsl
 //#include methods/gather/shading/listed.wgsl
 
-@group(1) @binding(0) var<uniform> side: Side;
-@group(1) @binding(1) var light_here: texture_2d<f32>;      // stored as given
-@group(1) @binding(2) var light_there: texture_2d<f32>;      // stored as given
-@group(1) @binding(3) var depth_here: texture_2d<f32>;      // stored as given
-@group(1) @binding(4) var depth_there: texture_2d<f32>;      // stored as given
-@group(1) @binding(5) var motion_here: texture_2d<f32>;     // stored as given: to_prev, to_next [px]
 @group(1) @binding(6) var motion_there: texture_2d<f32>;      // stored as given
 @group(1) @binding(7) var plain_here: texture_2d<u32>;      // stored as r32uint, by plain.wgsl
 @group(1) @binding(8) var plain_there: texture_2d<u32>;     // stored as r32uint

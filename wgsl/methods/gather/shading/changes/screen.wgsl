@@ -3,13 +3,8 @@
 //#include common/frame.wgsl
 //#include methods/gather/shading/active.wgsl
 //#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/changes/both.wgsl
 
-@group(1) @binding(0) var<uniform> side: Side;
-@group(1) @binding(1) var light_here: texture_2d<f32>;      // stored as given
-@group(1) @binding(2) var light_there: texture_2d<f32>;      // stored as given
-@group(1) @binding(3) var depth_here: texture_2d<f32>;      // stored as given
-@group(1) @binding(4) var depth_there: texture_2d<f32>;      // stored as given
-@group(1) @binding(5) var motion_here: texture_2d<f32>;     // stored as given: to_prev, to_next [px]
 @group(1) @binding(6) var<storage, read_write> found: Found;
 
 struct Found {
