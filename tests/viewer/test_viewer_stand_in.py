@@ -106,9 +106,8 @@ def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
         report = renderer.draw(Request(STATE, AREA), float(now)).report
         seen.append((report.preview, report.size, report.busy))
     assert seen[0][0] == "preview by tap at 50%" and seen[0][2]
-    assert seen[-1] == ("", SMALL, False)
-    widths = [size[0] for _, size, _ in seen]
-    assert widths == sorted(widths)  # it never jumps back
+    assert seen[1] == ("preview by tap", SMALL, True)  # in full, before what may take long
+    assert seen[2:] == [("", SMALL, False)] * 2
 
 
 def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with():
@@ -126,11 +125,11 @@ def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with()
             break
     whole, half = SMALL[0], SMALL[0] // 2
     assert seen[0] == (half, half, True, True)  # both at once, the slow one by `tap`
-    assert (whole, half, False, True) in seen  # then the quick one in full
+    assert seen[1] == (whole, whole, True, True)  # then in full, before what may take long
     assert seen[-1] == (whole, whole, False, False)
 
 
-def test_a_preview_beside_a_finer_image_tells_its_own_size():
+def test_a_preview_tells_its_size_and_for_which_of_two_images_it_stands():
     renderer = Renderer(gpu.open_device())
     renderer.pace.level = len(Pace.SCALES) - 1
     state = put(STATE, shutter=90.0).keeping().with_method("tap")
@@ -141,6 +140,7 @@ def test_a_preview_beside_a_finer_image_tells_its_own_size():
         seen.append((report.size[0], second.texture.size[0], report.preview))
         if not report.busy:
             break
-    small, half = SMALL[0] // 5, SMALL[0] // 2
-    told = "preview by tap at 20%"
-    assert seen[:3] == [(small, small, told), (half, small, told), (half, half, "")]
+    small, whole = 2 * (SMALL[0] // 5,), 2 * (SMALL[0],)
+    in_full = *whole, "preview by tap for B: gather"
+    assert seen[0] == (*small, "preview by tap at 20% for B: gather")
+    assert seen[1:-1] == [in_full] * 2 and seen[-1] == (*whole, "")

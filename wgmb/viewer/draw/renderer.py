@@ -170,7 +170,8 @@ class Renderer:
         if previews:
             share = previews[0].fine[0][0] / max(full_size[0], 1)
             of_size = f" at {share:.0%}" if share < 0.995 else ""
-            report.preview = f"preview by {QUICKEST}{of_size}"
+            of_one = f" for {previews[0].label}" if len(previews) < len(slots) else ""
+            report.preview = f"preview by {QUICKEST}{of_size}{of_one}"
         self._on_screen = self._displayed(slots, state, subject)
         self._ready = not is_first_alone and all(self._coming[slot].ready for slot in slots)
         report.busy = moving or not self._ready or self._level > 0 or self._preview or lacks
@@ -271,7 +272,7 @@ class Renderer:
             self._level = 0
 
     def _slow_quality(self, state, place, moving) -> None:
-        """By the quickest method at first, then at half the size, then in full.
+        """By the quickest method at first, coarse and then in full size, then as it is set.
 
         While moving by the method that is set, where that is quick enough.
         """
@@ -279,11 +280,9 @@ class Renderer:
         if moving or key != self._still:
             self._still, self._preview = key, not moving or self._stand_in.is_needed
             self._level = max((self.pace if self._preview else self._stand_in.pace).level, 1)
-        elif self._ready and self._preview:
-            self._preview = False
-            self._level = HALF if self._level >= HALF else 0
         elif self._ready:
-            self._level = 0
+            self._preview = self._preview and self._level > 1
+            self._level = 1 if self._preview else 0
 
     def _wanted(self, state: State) -> list[tuple[str, str | None]]:
         """One or two names, of a look, a method or the reference, each with the view it is of."""
