@@ -75,8 +75,10 @@ def gather(frames, times):
         for x in range(width):
             here = [t[y // TILE][x // TILE] for t in tiles]
             if max(tile["longest"] for tile in here[: len(layers) - len(far)]) >= 0.01:
+                sharpness = sharpness_of(layers, here, span, len(times))
                 seen = [
-                    instant(layers, here, x, y, t, own, n, len(times)) for n, t in enumerate(times)
+                    instant(layers, here, (x, y), t, own, (n, len(times)), sharpness)
+                    for n, t in enumerate(times)
                 ]
                 if any(one is None for one in seen):
                     filled = hidden(layers[0], x, y, own)
@@ -514,11 +516,12 @@ def scatter(frame, tiles, span, slices, own):
 # ---- search ---------------------------------------------------------------------------------
 
 
-def instant(layers, tiles, x, y, t, color, n, samples):
-    """The samples at the pixel at time `t`, number `n`: edge, the edge behind it, the opaque one.
+def instant(layers, tiles, pixel, t, color, sample, sharpness):
+    """The samples at the pixel at time `t`: edge, the edge behind it, the opaque one.
 
-    None: something that all frames hide.
+    `sample`: its number, and how many there are. None: something that all frames hide.
     """
+    (x, y), (n, samples) = pixel, sample
     slice_ = (2 * n + 1) * min(SLICES, samples) // (2 * samples)
     (opaque, front_edge, back_edge), miss = resolve_visibility(layers, tiles, x, y, t, slice_)
     shown = []
@@ -530,7 +533,7 @@ def instant(layers, tiles, x, y, t, color, n, samples):
         shown.append(opaque)
     clear, sum_ = 1.0, 0.0
     for s in shown:
-        got, cover = fetch(layers[s.frame], s)
+        got, cover = fetch(layers[s.frame], s, sharpness)
         sum_ = sum_ + clear * got
         clear *= 1 - cover
     if clear < 0.5:
@@ -710,7 +713,14 @@ def is_before(edge, opaque):
     return edge.depth < opaque.depth / (1.0 if apart else 1.05)
 
 
-def fetch(frame, s):
+def sharpness_of(layers, tiles, span, samples):
+    """How sharp edges are: not where something moves over 2 px from sample to sample."""
+    near = [f for f, layer in enumerate(layers) if abs(layer.offset) <= 1]
+    lengths = [tiles[f]["longest"] / max(abs(t - layers[f].offset) for t in span) for f in near]
+    return np.clip(2 - (span[1] - span[0]) * max(lengths) / samples, 0, 1)
+
+
+def fetch(frame, s, sharpness):
     """Colour and coverage of a sample, from the texels of its own surface."""
     if not s.back and frame.edgeless[s.pixel]:
         if frame.offset == 0 and frame.smooth[s.pixel]:
@@ -722,7 +732,8 @@ def fetch(frame, s):
     for dj in (0, 1):
         for di in (0, 1):
             i, j = corner[0] + di, corner[1] + dj
-            share = np.prod(1 - np.abs(s.at - 0.5 - (i, j)))
+            line = 1 - np.abs(s.at - 0.5 - (i, j))
+            share = np.prod(line + sharpness * (line**2 * (3 - 2 * line) - line))
             p = min(max(j, 0), height - 1), min(max(i, 0), width - 1)
             z, behind = frame.depth[0][p], frame.depth[1][p] > 0
             if s.back and behind:

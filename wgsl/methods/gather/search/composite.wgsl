@@ -12,6 +12,9 @@
 override WEIGHTED: bool = false;    // pixels have weights
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 
+const SHARP_STEP: f32 = 1.0;        // edges are sharp where nothing moves farther from sample to sample [px],
+const SOFT_STEP: f32 = 2.0;         // and bilinear from here on
+
 /// The matte of a pixel of frame `f`.
 fn matte_at(px: vec2u, f: u32) -> Matte {
     return unpack_matte(textureLoad(mattes, px, f, 0), WEIGHTED);
@@ -36,7 +39,7 @@ fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
 }
 
 /// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then what is opaque.
-fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite {
+fn composite_front_to_back(visible: Visible, t: f32, duration: f32, sharpness: f32) -> Composite {
     let front_edge = is_before(visible.front_edge, visible.opaque);
     let back_edge = front_edge && is_before(visible.back_edge, visible.opaque)
         && is_behind(visible.back_edge, visible.front_edge);
@@ -55,7 +58,7 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite
         var one = Composite();
         var i = 0u;
         loop {
-            if n < parts { add_texel(&one, part, i); }
+            if n < parts { add_texel(&one, part, i, sharpness); }
             i++;
             if n >= parts || i >= 4u { break; }
         }
@@ -91,12 +94,19 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32) -> Composite
     return sum;
 }
 
-/// Add texel `i` of the four around a sample, with its bilinear weight, if it is of the same surface.
-fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32) {
+/// How sharp edges are, 0 to 1, where the longest step from sample to sample is so long [px].
+fn sharpness_of(step: f32) -> f32 {
+    return clamp((SOFT_STEP - step) / (SOFT_STEP - SHARP_STEP), 0.0, 1.0);
+}
+
+/// Add texel `i` of the four around a sample, if it is of the same surface. Its weight is bilinear, which blurs as a motion of
+/// more than a pixel does, and hides the gaps between long steps; the sharper, the more the nearer texel counts.
+fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32, sharpness: f32) {
     let front = sample.layer / 2u * 2u;
     let is_back = sample.layer % 2u == 1u;
     let corner = floor(sample.at - 0.5);
-    let share = sample.at - 0.5 - corner;
+    let bilinear = sample.at - 0.5 - corner;
+    let share = mix(bilinear, smoothstep(vec2f(0.0), vec2f(1.0), bilinear), sharpness);
     let step = vec2f(vec2u(i & 1u, i >> 1u));
     let px = nearest_pixel(corner + step);
     let shares = mix(1.0 - share, share, step);

@@ -149,11 +149,15 @@ fn is_static_tile(a: Candidates, b: Candidates, c: Candidates) -> bool {
 
 /// Sample times of the pixel at `x` [px], moved by `shift` within their strata.
 fn sample_times(x: vec2f, shift: f32, a: Candidates, b: Candidates, c: Candidates) -> SampleTimes {
-    let blur_length = max(blur_length_of(a, 0u), max(blur_length_of(b, 1u), blur_length_of(c, 2u)));
-    return with_adaptive_count(shutter_times(x, shift), blur_length);
+    return with_adaptive_count(shutter_times(x, shift), longest_blur(a, b, c));
 }
 
-/// Length of the longest candidate motion of frame `f` while the shutter is open [px].
+/// Length of the longest candidate motion while the shutter is open [px].
+fn longest_blur(a: Candidates, b: Candidates, c: Candidates) -> f32 {
+    return max(blur_length_of(a, 0u), max(blur_length_of(b, 1u), blur_length_of(c, 2u)));
+}
+
+/// The same of frame `f`.
 fn blur_length_of(candidates: Candidates, f: u32) -> f32 {
     let window = abs(exposure_window(sources.offsets[f]));
     return candidates.header.z * (shutter.span.y - shutter.span.x) / max(max(window.x, window.y), 1e-9);
