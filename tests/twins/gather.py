@@ -135,7 +135,8 @@ def separate(offset, color, motion, depth, longest, prev=None, next=None, far=()
     back = [np.zeros_like(color), own.copy(), np.zeros((height, width))]
     inferred = np.zeros((height, width), bool)
     for y, x in np.argwhere(separated):
-        parts = separate_pixel(color, motion, z, edges, y, x, (bends, ratios), (prev, next), far)
+        told = bends, ratios, told_by_color[y, x]
+        parts = separate_pixel(color, motion, z, edges, y, x, told, (prev, next), far)
         if parts:
             for array, value in zip([*found, *back, inferred], parts, strict=True):
                 array[y, x] = value
@@ -271,7 +272,8 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     """Front colour, path, depth, coverage; back colour, path, depth; whether it is inferred.
 
     Paths are a motion and a bend, that of the nearest pixel that shows this surface alone, as is
-    the ratio of depths to those in the frame itself. `told_around`: bends and ratios of all pixels.
+    the ratio of depths to those in the frame itself; vectors that are not filtered are those of the
+    nearest pixel. `told_around`: bends and ratios of all pixels, whether vectors are not filtered.
     """
     height, width = z.shape
     inner = list(around(height, width, y, x, 1))
@@ -332,7 +334,10 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     whole = coverage > 0.98
     front_place = purest if thin and not whole else nearest_pure(nearer)
     back_place = nearest_pure(farther)
-    bends, ratios = told_around
+    bends, ratios, unfiltered = told_around
+    if unfiltered:
+        before = motion[min(nearer, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)]
+        behind = motion[y, x] if z[y, x] >= between else behind
     if coverage < 1 - 0.98:
         back_depth = (z[y, x] if z[y, x] >= between else back_depth) * ratios[back_place]
         own = np.concatenate([motion[y, x], bends[back_place]])
@@ -714,7 +719,7 @@ def is_before(edge, opaque):
 
 
 def sharpness_of(layers, tiles, span, samples):
-    """How sharp edges are: not where something moves over 2 px from sample to sample."""
+    """The sharpness of edges, 0 where something moves over 2 px from sample to sample."""
     near = [f for f, layer in enumerate(layers) if abs(layer.offset) <= 1]
     lengths = [tiles[f]["longest"] / max(abs(t - layers[f].offset) for t in span) for f in near]
     return np.clip(2 - (span[1] - span[0]) * max(lengths) / samples, 0, 1)

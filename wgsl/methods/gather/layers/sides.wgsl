@@ -103,6 +103,18 @@ fn sort_around(edge: EdgePixel) -> Around {
     return around;
 }
 
+/// The pixel of the 5 x 5 in front that is nearest, itself if it is in front.
+fn nearest_front(edge: EdgePixel) -> vec2i {
+    var place = Place(edge.px, INFINITE);
+    for (var i = 0; i < 25; i++) {
+        let there = neighbour(edge.px, i, edge.between);
+        if there.counts && there.is_front && there.distance2 < place.distance2 {
+            place = Place(there.at, there.distance2);
+        }
+    }
+    return place.at;
+}
+
 struct Side {           // weighted sums over the pixels on one side of an edge
     total: f32,         // of the shares
     motion: vec4f,
