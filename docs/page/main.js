@@ -168,7 +168,7 @@ async function showOwn() {
   $('own-note').hidden = true;
   $('own-wipe').hidden = false;
   $('own-controls').hidden = !film;
-  $('own-wipe').style.aspectRatio = `${size[0]} / ${size[1]}`;
+  $('own-wipe').style.setProperty('--aspect', `${size[0]} / ${size[1]}`);
   let [before, here, next] = film ? [] : pixels.length > 2 ? pixels : [null, ...pixels];
   if (film) {
     const time = Number($('own-time').value), step = 1 / Math.max(1, Number($('own-fps').value) || 30);

@@ -288,11 +288,18 @@ def test_files_that_do_not_fit_are_told(visit):
 def test_phones_and_desks(visit):
     tap = {"do": "tap", "of": "#wipe", "at": [0.25, 0.3]}
     line = {"do": "evaluate", "script": "wgmb.state.line"}
+    tall = {"do": "evaluate", "script": OWN.replace("COUNT", "2").replace("160, 96", "96, 192")}
+    box = "document.getElementById('own-wipe').getBoundingClientRect()"
+    look = {"do": "evaluate", "script": f"[{box}.width / {box}.height, {box}.height, innerHeight]"}
     phone, desk = visit(
-        {"phone": True, "width": 390, "height": 844, "steps": [tap, line]}, {"width": 1280}
+        {"phone": True, "width": 390, "height": 844, "steps": [tap, line]},
+        {"width": 1280, "hash": "still=1", "steps": [tall, look]},
     )
     assert phone["mode"] == desk["mode"] == "live"
     assert phone["results"][1] == pytest.approx(0.25, abs=0.02)
+    told, (aspect, high, window) = desk["results"]
+    assert told == "" and aspect == pytest.approx(1 / 2, rel=0.01)
+    assert high <= window, "a tall picture is seen as a whole"
 
 
 @pytest.mark.full
