@@ -144,3 +144,10 @@ def test_a_preview_tells_its_size_and_for_which_of_two_images_it_stands():
     in_full = *whole, "preview by tap for B: gather"
     assert seen[0] == (*small, "preview by tap at 20% for B: gather")
     assert seen[1:-1] == [in_full] * 2 and seen[-1] == (*whole, "")
+
+
+@pytest.mark.usefixtures("as_without_a_gpu")
+def test_two_previews_whose_difference_says_nothing_yet_are_named():
+    state = put(STATE.keeping().with_method("tiles"), compare="difference")
+    report = Renderer(gpu.open_device()).draw(Request(state, AREA), 0.0).report
+    assert report.preview == "preview by tap at 50% for both"

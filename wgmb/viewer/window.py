@@ -412,7 +412,9 @@ class Viewer:
             display = self.screen.values(x * ratio, y * ratio)
             at = u, v
             text = inspector.lines(drawn.state, drawn.available, under, at, display, preview)
-        if self._scopes.look_at(under.get("light")) or len(text) != self._inspected:
+        is_shown = not (preview or drawn.report.moving)  # else the scopes would take too long
+        light = under.get("light") if is_shown else None
+        if self._scopes.look_at(light) or len(text) != self._inspected:
             self._due = _AFTER_EVENT  # its window becomes larger with the next frame
         self._inspected = len(text)
         inspector.show(text, self._scopes, area)

@@ -164,7 +164,7 @@ class _Downloads:
         self._kept: dict[str, tuple[tuple, np.ndarray]] = {}
 
     def answer(self, renderer: Renderer, drawn: Drawn) -> _Answer:
-        """The drawing with its images as arrays."""
+        """The drawing with its images as arrays; numbers of what is not final are its light."""
         first = renderer.first
         light = self._array("light", first)
         images = {}
@@ -172,7 +172,8 @@ class _Downloads:
             whole = light if image.stamp == first.stamp else self._array(slot, image)
             halves = self._halves(slot, image, whole)
             images[slot] = Image(None, image.kind, image.stamp, halves)
-        return _Answer(replace(drawn, images=images), light)
+        under = drawn.under or ({"light": light} if drawn.state.inspect else {})
+        return _Answer(replace(drawn, images=images, under=under), light)
 
     def _array(self, name: str, image: Image) -> np.ndarray:
         if name not in self._kept or self._kept[name][0] != image.stamp:

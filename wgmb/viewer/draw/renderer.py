@@ -170,8 +170,9 @@ class Renderer:
         if previews:
             share = previews[0].fine[0][0] / max(full_size[0], 1)
             of_size = f" at {share:.0%}" if share < 0.995 else ""
-            of_one = f" for {previews[0].label}" if len(previews) < len(slots) else ""
-            report.preview = f"preview by {QUICKEST}{of_size}{of_one}"
+            alone = f" for {previews[0].label}" if len(previews) < len(slots) else ""
+            of_which = " for both" if len(previews) == 2 else alone
+            report.preview = f"preview by {QUICKEST}{of_size}{of_which}"
         self._on_screen = self._displayed(slots, state, subject)
         self._ready = not is_first_alone and all(self._coming[slot].ready for slot in slots)
         report.busy = moving or not self._ready or self._level > 0 or self._preview or lacks
