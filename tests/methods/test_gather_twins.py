@@ -40,6 +40,18 @@ def test_gather_is_its_twin_where_surfaces_hardly_move_apart():
     assert differing_from_gather(sources, 100) < 0.01
 
 
+def test_gather_is_its_twin_where_depths_contradict_colours():
+    """Two columns of a box are as deep as what is behind it, and have vectors of their own."""
+    sources = []
+    for offset in (0, -1, 1):
+        color, motion, depth = crossing((24, 40), offset, wall=False)
+        last = (depth < 5) & ~np.roll(depth < 5, -1, axis=1)
+        wrong = last | np.roll(last, -1, axis=1)
+        motion[wrong] += (-3, 1, 3, -1)
+        sources.append((offset, color, motion, np.where(wrong, np.inf, depth)))
+    assert differing_from_gather(sources, 360) < 0.01
+
+
 def test_gather_is_its_twin_out_of_focus():
     """A wide rim, over which motions change evenly, has no edge in it while it moves slowly."""
     sources = [(offset, *soft_disk(offset, size=(24, 72))) for offset in (0, -1, 1)]

@@ -57,6 +57,8 @@ def blurred(frame, reach, degrees=360, **options):
 
 
 def truth(degrees=360):
+    """The mean of many instants: of bars with hard edges, that of 16 is 38 dB from the limit, that
+    of 256 is 62."""
     times = Shutter(degrees).sample_times(256)
     return np.mean([bars(float(t))[0] for t in times], axis=0)
 

@@ -334,8 +334,9 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     whole = coverage > 0.98
     front_place = purest if thin and not whole else nearest_pure(nearer)
     back_place = nearest_pure(farther)
-    bends, ratios, unfiltered = told_around
-    if unfiltered:
+    bends, ratios, is_exact = told_around
+    before = motion[y, x] if whole else before
+    if is_exact:
         before = motion[min(nearer, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)]
         behind = motion[y, x] if z[y, x] >= between else behind
     if coverage < 1 - 0.98:
@@ -352,7 +353,7 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     )
     if not whole:
         back_color = back_color + (rest - front_color) / (1 - coverage)
-    front_path = np.concatenate([motion[y, x] if whole else before, bends[front_place]])
+    front_path = np.concatenate([before, bends[front_place]])
     behind = np.concatenate([behind, bends[back_place]])
     front_depth = z[y, x] if whole and z[y, x] < between else mean(z, front)
     front_depth, back_depth = front_depth * ratios[front_place], back_depth * ratios[back_place]

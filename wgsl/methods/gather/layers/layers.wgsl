@@ -162,7 +162,7 @@ fn split_layers(split: ptr<function, Split>, edge: EdgePixel, around: Around, si
         if measured <= FULL && sides.thin { (*split).front_at = sides.purest; }
         if measured <= FULL || edge.z >= edge.between { (*split).front_z = front_z; }
     }
-    if (around_tile(edge.px) & UNFILTERED) != 0u {  // a vector is then of a pixel's middle, no mixture
+    if (around_tile(edge.px) & UNFILTERED) != 0u {  // vectors are those of the middles of pixels
         (*split).front_motion = textureLoad(motion, nearest_front(edge), 0);
         if edge.z >= edge.between { (*split).back_motion = edge.motion; }
     }

@@ -12,7 +12,7 @@
 override WEIGHTED: bool = false;    // pixels have weights
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 
-const SHARP_STEP: f32 = 1.0;        // edges are sharp where nothing moves farther from sample to sample [px],
+const SHARP_STEP: f32 = 1.0;        // edges are sharp up to this motion from sample to sample [px],
 const SOFT_STEP: f32 = 2.0;         // and bilinear from here on
 
 /// The matte of a pixel of frame `f`.
@@ -94,13 +94,13 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32, sharpness: f
     return sum;
 }
 
-/// How sharp edges are, 0 to 1, where the longest step from sample to sample is so long [px].
+/// The sharpness of edges, 0 to 1, by the longest step from sample to sample [px].
 fn sharpness_of(step: f32) -> f32 {
     return clamp((SOFT_STEP - step) / (SOFT_STEP - SHARP_STEP), 0.0, 1.0);
 }
 
-/// Add texel `i` of the four around a sample, if it is of the same surface. Its weight is bilinear, which blurs as a motion of
-/// more than a pixel does, and hides the gaps between long steps; the sharper, the more the nearer texel counts.
+/// Add texel `i` of the four around a sample, if it is of the same surface. Bilinear weights hide the gaps between long steps,
+/// but blur as much as a motion of 1.4 px. With sharpness, the nearer texel counts for more.
 fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32, sharpness: f32) {
     let front = sample.layer / 2u * 2u;
     let is_back = sample.layer % 2u == 1u;
