@@ -1,5 +1,7 @@
 """Numbers under the mouse, the histogram and arrows of motion."""
 
+import time
+
 import numpy as np
 import pytest
 from imgui_bundle import imgui
@@ -7,11 +9,12 @@ from imgui_bundle import imgui
 from viewer_hand import ALONE, SAMPLE, Hand, library, put
 from wgmb import gpu
 from wgmb.methods import METHODS
-from wgmb.viewer import controls
+from wgmb.viewer import controls, offscreen
 from wgmb.viewer.draw.inspected import Inspected
 from wgmb.viewer.draw.renderer import Renderer
 from wgmb.viewer.draw.request import Available, Request
 from wgmb.viewer.panel import inspector, scopes
+from wgmb.viewer.window import frame
 
 SIZE = 320, 180
 
@@ -121,6 +124,24 @@ def test_a_preview_is_not_called_by_the_method_that_it_stands_for():
         assert hand.viewer.stage.report.preview.startswith("preview by tap")
         hand.picture()
     assert "a preview of gather" in texts[0] and texts[-1] == "method   gather, 4 samples"
+
+
+@pytest.mark.usefixtures("as_without_a_gpu")
+def test_numbers_of_a_preview_are_there_while_the_picture_is_drawn(monkeypatch):
+    texts = []
+    monkeypatch.setattr(inspector, "show", lambda text, *_: texts.append(text))
+    viewer = offscreen(put(ALONE, method="gather", samples=4), (320, 180), threaded=True)
+    event = {"event_type": "pointer_move", "x": 30, "y": 90, "button": 0, "buttons": ()}
+    viewer.canvas.submit_event(event)
+    while not viewer._drawn:
+        frame(viewer)
+        time.sleep(0.01)
+    viewer.state = put(viewer.state, inspect=True)  # once the preview is there
+    frame(viewer)
+    assert viewer._drawn.report.preview and {*viewer._drawn.under} == {"light"}
+    assert texts[-1][0] == "method   tap, a preview of gather"
+    assert texts[-1][2].startswith("linear   ") and "..." not in texts[-1]
+    viewer.close()
 
 
 def test_the_histogram_counts_pixels_by_stops():

@@ -12,7 +12,6 @@ import wgpu
 import make_clips as clips
 from viewer_hand import ALONE, SAMPLE, SMALL, put
 from wgmb import InputError, gpu
-from wgmb.gpu.textures import TexturePool
 from wgmb.io import exr
 from wgmb.scene import gbuffer
 from wgmb.sequence.layers.vector_convention import ConventionFinder
@@ -195,18 +194,6 @@ def test_no_pass_is_begun_any_more_once_its_kernel_is_compiled():
     portions = Portions(gpu.open_device(), lambda: False)
     with pytest.raises(DroppedError):
         portions.watch(None).begin_compute_pass(label="any")
-
-
-@pytest.mark.usefixtures("as_without_a_gpu")
-def test_numbers_of_a_preview_are_there_while_the_picture_is_drawn():
-    device = gpu.open_device()
-    renderer, downloads = Renderer(device), draw_thread._Downloads(TexturePool(device))
-    for inspect in (False, True):
-        drawn = renderer.draw(Request(put(STATE, inspect=inspect, frame=inspect), AREA), 0.0)
-        assert drawn.report.preview and not drawn.under
-        under = downloads.answer(renderer, drawn).drawn.under
-        assert {*under} == ({"light"} if inspect else set())
-    np.testing.assert_array_equal(under["light"], renderer.download())
 
 
 def test_another_setting_drops_what_is_drawn_but_playing_does_not(viewer):

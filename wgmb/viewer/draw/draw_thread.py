@@ -65,6 +65,7 @@ class DrawThread:
     def draw(self, request: Request, now: float) -> Drawn | None:
         """The last answer, None before the first; `request` is worked on from now on.
 
+        As long as there are no numbers for the inspector, they are the first image's light.
         What went wrong with a request for the same picture is raised.
         """
         with self._changed:
@@ -79,7 +80,9 @@ class DrawThread:
             return None
         report = replace(answer.drawn.report, changed=answer is not self._taken)
         self._taken = answer
-        return replace(answer.drawn, report=report)
+        return replace(
+            answer.drawn, report=report, under=answer.drawn.under or {"light": answer.light}
+        )
 
     @property
     def report(self) -> FrameStatus:
@@ -164,7 +167,7 @@ class _Downloads:
         self._kept: dict[str, tuple[tuple, np.ndarray]] = {}
 
     def answer(self, renderer: Renderer, drawn: Drawn) -> _Answer:
-        """The drawing with its images as arrays; numbers of what is not final are its light."""
+        """The drawing with its images as arrays."""
         first = renderer.first
         light = self._array("light", first)
         images = {}
@@ -172,8 +175,7 @@ class _Downloads:
             whole = light if image.stamp == first.stamp else self._array(slot, image)
             halves = self._halves(slot, image, whole)
             images[slot] = Image(None, image.kind, image.stamp, halves)
-        under = drawn.under or ({"light": light} if drawn.state.inspect else {})
-        return _Answer(replace(drawn, images=images, under=under), light)
+        return _Answer(replace(drawn, images=images), light)
 
     def _array(self, name: str, image: Image) -> np.ndarray:
         if name not in self._kept or self._kept[name][0] != image.stamp:
