@@ -24,6 +24,7 @@ const SIDE: i32 = 5;            // of a patch [small px]
 const RADIUS: i32 = 2;
 const UNLIKE: f32 = 0.0314;     // deviation that another brightness and contrast do not explain: something else
 const FAR: f32 = 0.235;         // mean difference of something else,
+const NEAR: f32 = 0.1;          // of what may as well be something else, as a fade does little harm,
 const NOISE: f32 = 0.0157;      // and of nothing
 const LEAST: f32 = 1.5e-5;      // variance
 
@@ -33,12 +34,26 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let px = min(STEP * id.xy + STEP / 2u, textureDimensions(motion) - 1u);
     let ways = textureLoad(motion, px, 0);
     let way = vec2f(dot(light.across, ways), dot(light.down, ways)) / f32(STEP);
-    let held = textureLoad(holdout, min(px, textureDimensions(holdout) - 1u), 0).x;
     let index = id.y * frame.size.x + id.x;
     let before = select(sums[index].xyz, vec3f(0.0), light.begins == 1u);
-    let sum = vec4f(before + light.share * (1.0 - held) * along(vec2i(id.xy), way), 0.0);
+    let sum = vec4f(before + light.share * (1.0 - held(id.xy)) * along(vec2i(id.xy), way), 0.0);
     sums[index] = sum;
     textureStore(changes, id.xy, sum);
+}
+
+/// The most that is held out of the pixels that a small pixel's change reaches.
+fn held(small: vec2u) -> f32 {
+    let size = textureDimensions(holdout);
+    if all(size == vec2u(1u)) { return textureLoad(holdout, vec2u(0u), 0).x; }
+    let middle = STEP * small + STEP / 2u;
+    let end = min(middle + STEP, size);
+    var most = 0.0;
+    for (var y = max(middle.y, STEP) - STEP; y < end.y; y++) {
+        for (var x = max(middle.x, STEP) - STEP; x < end.x; x++) {
+            most = max(most, textureLoad(holdout, vec2u(x, y), 0).x);
+        }
+    }
+    return most;
 }
 
 /// Difference of the light at the end of a way, as far as the same is seen there.
@@ -65,7 +80,8 @@ fn along(px: vec2i, way: vec2f) -> vec3f {
     let both = max(spread.z, 0.0);
     let unlike = max(spread.x - both * both / max(spread.y, LEAST), 0.0);
     let far = dot(abs(apart), vec3f(1.0 / 3.0)) / count;
-    let same = exp(-unlike / (UNLIKE * UNLIKE) - far * far / (FAR * FAR)) * (1.0 - exp(-far * far / (NOISE * NOISE)));
+    let lit = exp(-unlike / (UNLIKE * UNLIKE) - far * far / (FAR * FAR));
+    let same = max(lit, exp(-far * far / (NEAR * NEAR))) * (1.0 - exp(-far * far / (NOISE * NOISE)));
     let own = textureLoad(here, px, 0).rgb;
     let found = between(to);
     return same * (found * found - own * own);
