@@ -82,6 +82,7 @@ def test_one_slow_frame_does_not_end_it():
     assert not stand_in.is_kept(0.2, 0.18, 1, FEWEST, FEWEST) and stand_in.is_needed
 
 
+@pytest.mark.usefixtures("as_without_a_gpu")
 def test_playing_shows_the_method_that_is_set_once_it_is_quick_enough():
     for target, wanted in ((60.0, False), (1e-9, True)):
         renderer = Renderer(gpu.open_device(), target=target)
@@ -99,6 +100,7 @@ def test_playing_shows_the_method_that_is_set_once_it_is_quick_enough():
     assert drawn.report.preview == "" and drawn.report.size == SMALL
 
 
+@pytest.mark.usefixtures("as_without_a_gpu")
 def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
     renderer = Renderer(gpu.open_device())
     seen = []
@@ -110,6 +112,7 @@ def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
     assert seen[2:] == [("", SMALL, False)] * 2
 
 
+@pytest.mark.usefixtures("as_without_a_gpu")
 def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with():
     renderer = Renderer(gpu.open_device())
     kept = put(STATE, shutter=90.0).keeping()
@@ -129,6 +132,7 @@ def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with()
     assert seen[-1] == (whole, whole, False, False)
 
 
+@pytest.mark.usefixtures("as_without_a_gpu")
 def test_a_preview_tells_its_size_and_for_which_of_two_images_it_stands():
     renderer = Renderer(gpu.open_device())
     renderer.pace.level = len(Pace.SCALES) - 1
