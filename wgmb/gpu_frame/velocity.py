@@ -13,7 +13,7 @@ from ..gpu import wgsl
 from .views import FrameViews, View
 
 FILE = "gpu_frame/velocity.wgsl"
-_BAND = 1 << 21  # pixels of a dispatch: a twentieth of a second on two cores without a GPU
+_BAND = 1 << 20  # pixels of a dispatch: a tenth of a second on two cores without a GPU
 
 
 class VelocityPass:

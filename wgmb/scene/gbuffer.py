@@ -20,7 +20,7 @@ ROWS = 257  # poses between which the GPU interpolates
 MOST_RAYS = 8  # a side, for antialiasing
 MOST = 1e15  # coordinates and zooms: the square of a number must fit into f32
 MOST_LOOPS = 32_768  # turns of a shader's loops: lavapipe ends them all at twice that, silently
-_BAND = 1 << 26  # turns of loops in a dispatch: a tenth of a second on two cores without a GPU
+_BAND = 1 << 24  # turns of loops in a dispatch: a tenth of a second on two cores without a GPU
 
 
 class SceneOnGpu:
