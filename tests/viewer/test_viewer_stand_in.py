@@ -110,6 +110,8 @@ def test_first_comes_a_whole_picture_by_the_quickest_method_and_it_says_so():
     assert seen[0][0] == "preview by tap at 50%" and seen[0][2]
     assert seen[1] == ("preview by tap", SMALL, True)  # in full, before what may take long
     assert seen[2:] == [("", SMALL, False)] * 2
+    widths = [size[0] for _, size, _ in seen]
+    assert widths == sorted(widths)  # it never jumps back
 
 
 @pytest.mark.usefixtures("as_without_a_gpu")
@@ -130,6 +132,8 @@ def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with()
     assert seen[0] == (half, half, True, True)  # both at once, the slow one by `tap`
     assert seen[1] == (whole, whole, True, True)  # then in full, before what may take long
     assert seen[-1] == (whole, whole, False, False)
+    for widths in ([one[0] for one in seen], [one[1] for one in seen]):
+        assert widths == sorted(widths)  # it never jumps back
 
 
 @pytest.mark.usefixtures("as_without_a_gpu")
