@@ -13,6 +13,7 @@ from viewer_hand import ALONE
 from wgmb import gpu
 from wgmb.viewer.draw import composer
 from wgmb.viewer.draw.composer import Composer, Image, View
+from wgmb.viewer.draw.frame_status import FrameStatus
 from wgmb.viewer.draw.place import fit
 from wgmb.viewer.draw.screen import Screen, ScreenThread
 from wgmb.viewer.state.state import TONES
@@ -68,7 +69,7 @@ def view_of(first, second, **changes):
         Image(None, "COLOR", (id(first),), first),
         Image(None, "COLOR", (id(second),), second),
     )
-    return View(state, images, fit((30, 21), AREA, state), AREA, SIZE, 1.0)
+    return View(state, images, fit((30, 21), AREA, state), AREA, SIZE, 1.0, FrameStatus())
 
 
 @pytest.fixture
@@ -112,13 +113,21 @@ def test_the_window_does_not_wait_for_composing_and_shows_the_last_view(beside, 
     beside.show(second)  # the one before is not composed any more
     beside.paint(canvas)
     np.testing.assert_array_equal(painted(canvas)[:, 2:88], np.round(255 * was))
+    assert beside.painted is first
     opened.set()
     now = beside.picture()
     assert np.abs(now - was).mean() > 0.1
     beside.paint(canvas)
     np.testing.assert_array_equal(painted(canvas)[:, 2:88], np.round(255 * now))
+    assert beside.painted is second
 
-    opened.clear()  # the window is larger now: what the picture leaves free is black
+    opened.clear()
+    named = replace(second, report=FrameStatus(labels=("tap", "tap")))
+    beside.show(named)  # the same picture, of which more is said
+    beside.paint(canvas)
+    assert beside.painted is named
+
+    # The window is larger now: what the picture leaves free is black.
     beside.show(replace(second, size=(200, 120)))
     larger = gpu.open_device().create_texture(
         size=(200, 120, 1), format=WINDOW, usage=0x10 | 0x4 | 0x2 | 0x1

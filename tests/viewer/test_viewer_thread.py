@@ -17,11 +17,12 @@ from wgmb.scene import gbuffer
 from wgmb.sequence.layers.vector_convention import ConventionFinder
 from wgmb.viewer import offscreen
 from wgmb.viewer.draw import draw_thread
-from wgmb.viewer.draw.composer import NOTHING
+from wgmb.viewer.draw.composer import NOTHING, Composer
 from wgmb.viewer.draw.portions import DroppedError, Portions
 from wgmb.viewer.draw.quality import Quality
 from wgmb.viewer.draw.renderer import Renderer
 from wgmb.viewer.draw.request import Request
+from wgmb.viewer.panel import overlay
 from wgmb.viewer.window import frame
 
 STATE = put(ALONE, method="gather", samples=4, shading="off")
@@ -101,6 +102,27 @@ def test_the_window_goes_on_while_something_is_drawn(monkeypatch):
     finally:
         gate.opened.set()
         viewer.close()
+
+
+def test_words_over_a_picture_come_with_it(viewer, monkeypatch):
+    opened, written, compose = threading.Event(), [], Composer.compose
+    opened.set()
+
+    def held(self, view):
+        opened.wait(60)
+        compose(self, view)
+
+    monkeypatch.setattr(Composer, "compose", held)
+    monkeypatch.setattr(overlay, "tag", lambda text, *_, **__: written.append(text))
+    seen_until(viewer, lambda: is_final(viewer) and viewer.screen._is_current())
+    opened.clear()
+    viewer.state = put(STATE, look="depth")
+    seen_until(viewer, lambda: is_final(viewer))
+    written.clear()
+    frame(viewer)
+    assert "depth" not in written and "far" not in written
+    opened.set()
+    seen_until(viewer, lambda: {"depth", "far"} <= {*written})
 
 
 @pytest.mark.usefixtures("as_without_a_gpu")

@@ -25,11 +25,11 @@ from .actions import Actions
 from .allocator import bound_free_memory
 from .draw.composer import NOTHING, View
 from .draw.draw_thread import DrawThread
-from .draw.place import fit, key_box
+from .draw.frame_status import FrameStatus
+from .draw.place import fit
 from .draw.renderer import Renderer
 from .draw.request import Drawn, Request
 from .draw.screen import Screen, ScreenThread
-from .draw.slot import FrameStatus
 from .panel import inspector, overlay
 from .panel.panel import Info, Panel
 from .panel.scopes import Scopes
@@ -295,7 +295,8 @@ class Viewer:
         # The panel is over the rest, but for the part of a pixel that rounding leaves.
         free = min(width, area[2] + 1) if drawn else width
         size = max(round(free), 1), max(height, 1)
-        self.screen.show(View(state, images, self._place(), area, size, ratio))
+        report, flicked = (drawn.report if drawn else FrameStatus()), self._flicked()
+        self.screen.show(View(state, images, self._place(), area, size, ratio, report, flicked))
         if not self._has_display():  # wgpu would panic
             raise wgpu.DrawCancelled
         self.screen.paint(self._context.get_current_texture())
@@ -367,7 +368,6 @@ class Viewer:
             export=self.actions.export_message,
             recent=self._recent.sources if self._recent else [],
             message=self.message[0] if self._now < self.message[1] else report.waiting,
-            flicked=self._flicked(),
         )
         self._good, self._requested = drawn.state, self.state
 
@@ -386,15 +386,12 @@ class Viewer:
         if self._info is None or self._drawn is None:
             overlay.tag(f"opening {self.state.source} ...", 16, 16)
             return
-        size, ratio = self.canvas.get_logical_size(), self.canvas.get_pixel_ratio()
-        key = key_box(self.state, self._drawn.report.kind, self._place(), self._area_px(), ratio)
-        logical = None
-        if key is not None:
-            x, y, width, height = (v / ratio for v in key)
-            logical = x, y, width, height
+        size, area = self.canvas.get_logical_size(), self._area()
+        if self.screen.painted is not None:
+            overlay.describe(self.screen.painted, area)
         if self.state.inspect or self.state.arrows:
             self._inspect(self._drawn)
-        self.state = self.panel.draw(self.state, self._info, size, self._area(), logical)
+        self.state = self.panel.draw(self.state, self._info, size, area)
 
     def _inspect(self, drawn: Drawn) -> None:
         """Draw arrows, and the numbers under the mouse."""

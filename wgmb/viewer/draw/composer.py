@@ -14,6 +14,7 @@ from ... import gpu
 from ...gpu import wgsl
 from ...gpu.textures import TexturePool
 from ..state.state import State
+from .frame_status import FrameStatus
 from .place import Box, key_box, overlap, whole
 
 BLIT = "viewer/draw/blit.wgsl"
@@ -60,6 +61,16 @@ class View:
     size: tuple[int, int]
     ratio: float
     """Pixels for one of the panel's."""
+    report: FrameStatus
+    """Of the images: what is written over them."""
+    flicked: bool = False
+    """The first image is that of the second side."""
+
+    @property
+    def key(self) -> Box | None:
+        """The box of the first image's colour key [px], or None if it needs none."""
+        kind = self.images[0].kind
+        return key_box(self.state, kind, self.place, self.area, self.ratio)
 
     @property
     def mode(self) -> str:
@@ -265,7 +276,7 @@ def _uniform(view: View) -> np.ndarray:
     data["line"], data["thick"] = place[0] + state.wipe * place[2], view.ratio
     data["exposure"], data["gain"] = 2.0**state.exposure, state.gain
     data["middle"], data["fastest"] = state.middle, state.fastest
-    if (key := key_box(state, first.kind, place, view.area, view.ratio)) is not None:
+    if (key := view.key) is not None:
         data["wheel" if first.kind == "MOTION" else "key"] = key
     return data
 

@@ -23,10 +23,10 @@ from ... import gpu
 from ...gpu.textures import TexturePool
 from ...threads import begin
 from .composer import Image
+from .frame_status import FrameStatus
 from .portions import DroppedError, Portions
 from .renderer import Renderer
 from .request import Drawn, Request
-from .slot import FrameStatus
 
 _PLAYED = 1 / 24  # seconds that a frame may take while it plays
 _POLL = 0.2  # seconds after which the thread looks whether it should end

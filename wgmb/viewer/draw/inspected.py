@@ -12,7 +12,8 @@ from ...gpu.timing import Clock
 from ..capabilities import Choices
 from ..state.state import State
 from .blurs import Blurs
-from .slot import FrameStatus, Slot
+from .frame_status import FrameStatus
+from .slot import Slot
 
 _SURE = "confidence"  # what gather shows of itself
 _PASSES = {"depth": "depth", "motion": "velocity"}  # by the look that shows them

@@ -26,13 +26,14 @@ from ..subjects.video import VideoSubject
 from .adaptive import Pace
 from .blurs import Blurs
 from .composer import Image
+from .frame_status import FrameStatus
 from .inspected import Inspected
 from .perception import Perceived, seen_frames
 from .place import Box, fit, whole
 from .portions import DroppedError
 from .quality import Measured, Quality
 from .request import Available, Drawn, Request
-from .slot import FrameStatus, Slot
+from .slot import Slot
 from .stand_in import HALF, StandIn
 from .video_light import VideoLight, primaries_of
 

@@ -11,8 +11,8 @@ from ...color.spaces import Display
 from ...methods.options import Option
 from ..state.state import State
 from .composer import NOTHING, Image
+from .frame_status import FrameStatus
 from .place import Box
-from .slot import FrameStatus
 
 
 @dataclass(frozen=True)

@@ -23,14 +23,18 @@ class Screen:
 
     def __init__(self, device: wgpu.GPUDevice, format: str):
         self._painter, self._composer = _Painter(device, format), Composer(device, "rgba16float")
+        self._composed: View | None = None
+        self.painted: View | None = None  # the view on the canvas
 
     def show(self, view: View) -> None:
         """Compose a view, if it is not the one that was composed last."""
         self._composer.compose(view)
+        self._composed = view
 
     def paint(self, target: wgpu.GPUTexture) -> None:
         """Put what was composed on the canvas's texture."""
         self._painter.paint(self._composer.texture, target)
+        self.painted = self._composed
 
     @property
     def seconds(self) -> float:
@@ -63,6 +67,7 @@ class ScreenThread:
         self._wanted: View | None = None
         self._ready: tuple[View, np.ndarray] | None = None
         self._failed: Exception | None = None
+        self.painted: View | None = None  # the view on the canvas
         self._ended, self.seconds = False, 0.0
         beside = gpu.second_device(device)
         self._thread = begin(lambda: self._work(beside), "composing")
@@ -72,9 +77,10 @@ class ScreenThread:
         with self._changed:
             if self._failed is not None:
                 raise self._failed
-            if self._wanted is None or self._wanted.stamp != view.stamp:
-                self._wanted = view
-                self._changed.notify_all()
+            self._wanted = view
+            if self._ready is not None and self._ready[0].stamp == view.stamp:
+                self._ready = view, self._ready[1]
+            self._changed.notify_all()
 
     def paint(self, target: wgpu.GPUTexture) -> None:
         """Put the last view that is ready on the canvas's texture."""
@@ -83,6 +89,7 @@ class ScreenThread:
         if ready is None or wanted is None or ready[0].size != wanted.size:
             clear(self._device, target)
         if ready is not None:
+            self.painted = ready[0]
             width, height, _ = target.size
             write(self._device, target, ready[1][:height, :width])
 
@@ -123,6 +130,8 @@ class ScreenThread:
                 composer.compose(view)
                 texels = composer.download()
                 with self._changed:
+                    if self._wanted is not None and self._wanted.stamp == view.stamp:
+                        view = self._wanted  # which says more of the same picture
                     self._ready, self.seconds = (view, texels), composer.seconds
                     self._changed.notify_all()
                 self._news()

@@ -1,14 +1,12 @@
-"""The content of a slot, and the report of one update of it."""
+"""The content of a slot."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import wgpu
 
 from .composer import Image
-from .place import Box
-from .quality import Measured
 
 
 @dataclass
@@ -34,27 +32,3 @@ class Slot:
     def image(self) -> Image:
         """For the screen."""
         return Image(self.texture, self.kind, (self.key, self.fine, self.done))
-
-
-@dataclass
-class FrameStatus:
-    """Result of one update, for the panel."""
-
-    full: tuple[int, int] = (0, 0)
-    shape: tuple[float, float] = (1, 1)  # width and height of the whole picture, in square pixels
-    place: Box = (0, 0, 0, 0)
-    area: Box = (0, 0, 0, 0)
-    moving: bool = False
-    size: tuple[int, int] = (0, 0)
-    preview: str = ""  # of what, where a quick method stands for the one that is set
-    drafts: list[str] = field(default_factory=list)  # in what way motion is no more than a draft
-    seconds: dict[str, float] = field(default_factory=dict)  # on the clock
-    passes: dict[str, float] = field(default_factory=dict)  # on the GPU, where it tells
-    labels: tuple[str, str] = ("", "")
-    kind: str = "COLOR"
-    reference: tuple[int, int] = (0, 1)  # samples done, of how many
-    measured: Measured | None = None
-    waiting: str = ""  # what is shown meanwhile, and what for
-    made_of: tuple[int, ...] = ()  # pictures that share the exposure of a video's output frame
-    busy: bool = False
-    changed: bool = False

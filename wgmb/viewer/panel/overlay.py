@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from ..controls import KEYS, MOUSE, Box
-from ..state.state import State
+from ..draw.composer import View
 from .theme import ACCENT, INK, packed
 
 _RED = (0.95, 0.3, 0.25, 1.0)
@@ -13,17 +13,26 @@ _HELP_WIDTH, _HELP_MARGIN = 540.0, 28.0  # of the help, around its lines [logica
 _BEHIND = (0.05, 0.05, 0.06, 0.72)
 
 
-def name_images(
-    state: State, labels: tuple[str, str], flicked: bool, x: float, y: float, width: float
-) -> None:
+def describe(view: View, area: Box) -> None:
+    """Write over a view that is on the canvas, in an area [logical px], what it shows."""
+    (x, y, width, _), report = area, view.report
+    _name_images(view, x, y + 12, width)
+    if view.key is not None:
+        left, top, wide, high = (v / view.ratio for v in view.key)
+        _explain(view, (left, top, wide, high))
+    for n, remark in enumerate(filter(None, (report.preview, *report.drafts))):
+        tag(remark, x + 12, y + 40 + 28 * n)
+
+
+def _name_images(view: View, x: float, y: float, width: float) -> None:
     """Label the images in an area `width` wide from `x`, `y` [logical px]."""
-    first, second = labels
+    state, (first, second) = view.state, view.report.labels
     left, right = x + 12, x + width - 12
     mode = state.mode if first != second else "off"  # of a comparison, one image is there so far
     if mode == "error":
         tag(f"error of {first}, x {state.gain:.0f}", left, y)
     elif mode == "flicker":
-        tag(second if flicked else first, left, y)
+        tag(second if view.flicked else first, left, y)
     elif mode == "wipe":
         tag(first, left, y)
         tag(second, right, y, right=True)
@@ -38,11 +47,11 @@ def name_images(
         tag(first, left, y)
 
 
-def explain(state: State, box: Box, height: int) -> None:
-    """Words beside the colours' key in `box` [logical px]; the picture is `height` px high."""
-    x, y, wide, high = box
+def _explain(view: View, box: Box) -> None:
+    """Words beside the colours' key in `box` [logical px]."""
+    state, (x, y, wide, high) = view.state, box
     if state.look == "velocity":
-        speed = state.fastest * height
+        speed = state.fastest * view.report.full[1]
         tag(f"{speed:.0f} px per frame", x - 10, y + high - 24, right=True)
         return
     tag("0", x, y - 26)

@@ -9,8 +9,8 @@ import numpy as np
 from imgui_bundle import imgui
 
 from ..controls import Box
+from ..draw.frame_status import FrameStatus
 from ..draw.request import Available
-from ..draw.slot import FrameStatus
 from ..state.state import State
 from ..state.video_time import output, output_frame
 from ..state.words import for_shell
@@ -36,7 +36,6 @@ class Info:
     message: str = ""
     recent: list[str] = field(default_factory=list)
     """Files that were looked at before."""
-    flicked: bool = False
 
 
 class Panel:
@@ -57,20 +56,12 @@ class Panel:
         """Of the panel [logical px]."""
         return min(WIDTH, 0.5 * window[0]) if state.panel else 0.0
 
-    def draw(
-        self, state: State, info: Info, window: tuple[float, float], area: Box, key: Box | None
-    ) -> State:
+    def draw(self, state: State, info: Info, window: tuple[float, float], area: Box) -> State:
         """One frame of it; the state as the sliders now stand.
 
-        `area` is the picture's, `key` where its colours are explained [logical px].
+        `area`: the picture's [logical px].
         """
         self._ui.places, self._ui.refused, self.actions = {}, "", []
-        report, (x, y, wide, _) = info.report, area
-        overlay.name_images(state, report.labels, info.flicked, x, y + 12, wide)
-        if key is not None:
-            overlay.explain(state, key, report.full[1])
-        for n, remark in enumerate(filter(None, (report.preview, *report.drafts))):
-            overlay.tag(remark, x + 12, y + 40 + 28 * n)
         overlay.tell(info.recording, info.message, area)
         if state.help:
             overlay.give_help(area)
