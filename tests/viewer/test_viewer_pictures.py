@@ -9,6 +9,7 @@ from wgmb.color.srgb import srgb
 from wgmb.methods import METHODS
 from wgmb.scene import builtin
 from wgmb.viewer import State
+from wgmb.viewer.draw.place import key_box
 from wgmb.viewer.panel import scopes
 
 pytest_plugins = ["viewer_hand"]
@@ -72,8 +73,19 @@ def test_false_colours_are_those_of_the_stops(small):
     low, high = scopes.STOPS
     at = np.clip((stops - low) / (high - low), 0, 1)
     ramp = [(0, 0, 0.02), (0.28, 0.06, 0.46), (0.8, 0.2, 0.3), (0.99, 0.7, 0.15), (1, 1, 0.9)]
-    want = [np.interp(at, np.linspace(0, 1, 5), column) for column in np.transpose(ramp)]
-    assert np.abs(small.picture() - np.moveaxis(want, 0, 2)).max() < 2e-3
+
+    def colors(at):
+        return np.stack([np.interp(at, np.linspace(0, 1, 5), c) for c in np.transpose(ramp)], -1)
+
+    shown, want = small.picture(), colors(at)
+    place = (0, 0, shown.shape[1], shown.shape[0])
+    x, y, wide, height = key_box(state, "COLOR", place, place, 1.0)
+    key = np.round([y, y + height, x, x + wide]).astype(int)
+    key = slice(*key[:2]), slice(*key[2:])
+    across = (np.arange(shown.shape[1]) + 0.5 - x) / wide
+    want[key] = colors(across)[key[1]]
+    assert want[key].shape[0] >= 8 and want[key].shape[1] >= 60
+    assert np.abs(shown - want).max() < 2e-3
 
 
 def test_velocity_has_the_colours_of_display(bare):

@@ -28,7 +28,8 @@ def key_box(state: State, kind: str, place: Box, area: Box, ratio: float) -> Box
     if kind == "MOTION":
         edge = min(_WHEEL * ratio, 0.3 * min(width, height))
         return x + width - edge - margin, y + height - edge - margin, edge, edge
-    if kind == "DEPTH" or state.mode == "error":
+    is_false = kind == "COLOR" and state.tone == "false"
+    if kind == "DEPTH" or state.mode == "error" or is_false:
         long, high = min(_KEY_WIDTH * ratio, 0.4 * width), _KEY_HEIGHT * ratio
         return x + margin, y + height - high - margin, long, high
     return None

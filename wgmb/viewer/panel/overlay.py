@@ -6,6 +6,7 @@ from imgui_bundle import ImVec2, imgui
 
 from ..controls import KEYS, MOUSE, Box
 from ..draw.composer import View
+from .scopes import STOPS
 from .theme import ACCENT, INK, packed
 
 _RED = (0.95, 0.3, 0.25, 1.0)
@@ -53,6 +54,12 @@ def _explain(view: View, box: Box) -> None:
     if state.look == "velocity":
         speed = state.fastest * view.report.full[1]
         tag(f"{speed:.0f} px per frame", x - 10, y + high - 24, right=True)
+        return
+    if state.look != "depth" and state.mode != "error":  # false colours
+        low, high = STOPS
+        tag(f"{low}", x, y - 26)
+        tag("0", x - low / (high - low) * wide, y - 26, middle=True)
+        tag(f"+{high} stops", x + wide, y - 26, right=True)
         return
     tag("0", x, y - 26)
     if state.look == "depth":

@@ -64,7 +64,8 @@ fn texel(@builtin(position) at: vec4f) -> @location(0) vec4f {
 /// Display values of the pixel whose centre is `at`.
 fn shown(at: vec2f) -> vec3f {
     if !inside(at, view.area) { return BACKGROUND; }
-    if (FIRST == DEPTH || COMPARE == ERROR) && inside(at, view.key) { return color_bar(at); }
+    let has_key = FIRST == DEPTH || COMPARE == ERROR || (FIRST == COLOR && TONE == FALSE);
+    if has_key && inside(at, view.key) { return color_bar(at); }
     let color = comparison(at);
     if FIRST != MOTION { return color; }
     return select(color, wheel(at, color), inside(at, view.wheel));
@@ -178,11 +179,11 @@ fn heat(x: f32) -> vec3f {
     return mix(color, vec3f(1.0, 1.0, 0.90), clamp(u - 3.0, 0.0, 1.0));
 }
 
-/// The colour bar of the error, or of depth; from low to high, left to right.
+/// The colour bar of the error, of depth, or of false colours; from low to high, left to right.
 fn color_bar(at: vec2f) -> vec3f {
     let x = (at.x - view.key.x) / view.key.z;
-    if COMPARE == ERROR { return heat(x); }
-    return vec3f(1.0 - x);
+    if FIRST == DEPTH && COMPARE != ERROR { return vec3f(1.0 - x); }
+    return heat(x);
 }
 
 fn wheel(at: vec2f, around: vec3f) -> vec3f {
