@@ -12,6 +12,7 @@ import wgpu
 import make_clips as clips
 from viewer_hand import ALONE, SAMPLE, SMALL, put
 from wgmb import InputError, gpu
+from wgmb.gpu.timing import WallClock
 from wgmb.io import exr
 from wgmb.scene import gbuffer
 from wgmb.sequence.layers.vector_convention import ConventionFinder
@@ -23,6 +24,7 @@ from wgmb.viewer.draw.quality import Quality
 from wgmb.viewer.draw.renderer import Renderer
 from wgmb.viewer.draw.request import Request
 from wgmb.viewer.panel import overlay
+from wgmb.viewer.panel.sections import short_name
 from wgmb.viewer.window import frame
 
 STATE = put(ALONE, method="gather", samples=4, shading="off")
@@ -198,6 +200,18 @@ def test_work_that_nobody_wants_is_dropped_between_two_passes_and_leaves_nothing
 
 
 @pytest.mark.usefixtures("as_without_a_gpu")
+def test_every_pass_has_its_time_although_the_first_one_found_the_queue_busy(monkeypatch):
+    run = WallClock._run
+    monkeypatch.setattr(WallClock, "_run", lambda self, encoder: 9.0 + run(self, encoder))
+    portions = Portions(gpu.open_device(), lambda: True)
+    monkeypatch.undo()
+    report = Renderer(portions.device, portions).draw(Request(STATE, AREA, full=True), 0.0).report
+    assert len(report.passes) > 20 and all(seconds > 0 for seconds in report.passes.values())
+    assert sum(report.passes.values()) < report.seconds["draw"]
+    names = {short_name(name) for name in report.passes}
+    assert {"resolve main", "gbuffer main"} <= names and max(map(len, names)) < 36
+
+
 def test_the_first_preview_is_dropped_after_any_band_of_a_scene(monkeypatch):
     device, passes = gpu.open_device(), []
     portions = Portions(device, lambda: len(passes) < 2)

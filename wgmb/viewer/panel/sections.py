@@ -325,6 +325,11 @@ def times(ui: Widgets, state: State, info: Info) -> State:
     ui.plot("frame", info.frame_times)
     ui.plot("drawing", info.draw_times)
     for name, seconds in info.passes.items():
-        imgui.text_disabled(name)
+        imgui.text_disabled(short_name(name))
         ui.right(f"{1e3 * seconds:.1f} ms")
     return state
+
+
+def short_name(of_pass: str) -> str:
+    """The name of a pass without its shader's folders, so that its time has room beside it."""
+    return of_pass.rpartition("/")[2].replace(".wgsl:", " ")
