@@ -744,7 +744,7 @@ def fetch(frame, s, sharpness):
             z, behind = frame.depth[0][p], frame.depth[1][p] > 0
             if s.back and behind:
                 color, cover = color + share * frame.color[1][p], cover + share
-            elif s.true_depth / 1.05 <= z <= 1.05 * s.true_depth:
+            elif s.true_depth / 1.25 <= z <= 1.25 * s.true_depth:
                 color = color + share * frame.color[0][p]
                 cover += share * (1.0 if s.back else frame.coverage[p])
     if s.back and cover > 1e-4:

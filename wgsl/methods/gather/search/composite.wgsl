@@ -12,6 +12,7 @@
 override WEIGHTED: bool = false;    // pixels have weights
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 
+const TEXEL_DEPTH_RATIO: f32 = 1.25;   // of a texel of a surface to its sample: at outlines, round bodies fall away steeply
 const SHARP_STEP: f32 = 1.0;        // edges are sharp up to this motion from sample to sample [px],
 const SOFT_STEP: f32 = 2.0;         // and bilinear from here on
 
@@ -114,8 +115,8 @@ fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32, sharpness: f
     let from_back = is_back && matte.has_back;
     let z = matte.depth;
     // What lies as deep, and of a back layer the other back layers. What lies before it is composited by itself.
-    let is_beyond = z > sample.true_depth * SURFACE_DEPTH_RATIO;
-    let is_before = z < sample.true_depth / SURFACE_DEPTH_RATIO;
+    let is_beyond = z > sample.true_depth * TEXEL_DEPTH_RATIO;
+    let is_before = z < sample.true_depth / TEXEL_DEPTH_RATIO;
     let belongs = from_back || !(is_beyond || is_before);
     let amount = select(0.0, shares.x * shares.y, belongs);
     (*sum).color += amount * textureLoad(layer_colors, px, front + u32(from_back), 0);
