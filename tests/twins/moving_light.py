@@ -306,13 +306,52 @@ def filled(flow, trusted, own):
     return np.where(share[..., None] > 0.01, mean * (1 - keep) + flow * keep, flow)
 
 
-def explained(flow, back, own, other):
-    """Differences with the motion, and without, at half the size."""
+def explained(flow, back, own, other, flow_other, depth, seen):
+    """Differences with the flow, without, and with the other neighbour's turned round; half size.
+
+    `flow_other`: with its trust. What a body hides in either frame differs from nothing.
+    """
     x, y = centres(own.shape)
     ahead = sampled(other, x + flow[..., 0], y + flow[..., 1])
     behind = sampled(own, x + back[..., 0], y + back[..., 1])
     with_ = np.abs(ahead - own) + np.abs(behind - other)
-    return blurred(np.dstack([with_, 2 * np.abs(other - own)]), 4.0)
+    way = flow_other[..., :2]
+    was = way
+    for _ in range(2):
+        was = way[nearest(x + was[..., 0], y + was[..., 1])]
+    hidden_there = ~on_one_surface(-way, depth) | ~seen[nearest(x - way[..., 0], y - way[..., 1])]
+    hidden_here = ~on_one_surface(was, depth) | ~seen
+    ahead = sampled(other, x - way[..., 0], y - way[..., 1])
+    behind = sampled(own, x + was[..., 0], y + was[..., 1])
+    turned = np.where(hidden_there, 0, np.abs(ahead - own))
+    turned = turned + np.where(hidden_here, 0, np.abs(behind - other))
+    trusted = flow_other[..., 2]
+    turned = with_ * (1 - trusted) + turned * trusted
+    return blurred(np.dstack([with_, 2 * np.abs(other - own), turned]), 4.0)
+
+
+def nearest(x, y):
+    """Rows and columns of the pixels at these places of an image of the size of `x`."""
+    height, width = x.shape
+    rows, columns = (np.floor(n).astype(int) for n in (y, x))
+    return np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+
+
+def chosen(flow, flow_other, around, around_other):
+    """The flow that explains more, its trust, and how much it explains; around: see explained."""
+
+    def share(found, still):
+        return np.clip((0.85 - found / np.maximum(still, 1e-4)) / 0.25, 0, 1)
+
+    around, around_other = (doubled(a, flow.shape[:2]) for a in (around, around_other))
+    explains = share(around[..., 0], around[..., 1])
+    other = share(around[..., 2], around[..., 1]) * share(
+        around_other[..., 0], around_other[..., 1]
+    )
+    better = flow_other[..., 2] * other > flow[..., 2] * explains
+    better &= around[..., 2] < 0.75 * around[..., 0]
+    turned = np.dstack([-flow_other[..., :2], flow_other[..., 2], other])
+    return np.where(better[..., None], turned, np.dstack([flow[..., :3], explains]))
 
 
 def pushed(found, flow, trusted, along):
@@ -340,8 +379,10 @@ def smooth(x, half):
     return u * u * (3 - 2 * u)
 
 
-def from_pushed(a, b, own, other, trusts, guard, time):
+def from_pushed(a, b, own, other, trusts, explains, time):
     """The change of the logarithm of light, from what came from here (a) and from there (b).
+
+    `explains`: how much the flow explains.
 
     Beside it, the share of the darkness of both frames (own, other: with how much) that is trusted.
     """
@@ -359,11 +400,9 @@ def from_pushed(a, b, own, other, trusts, guard, time):
     rests = (1 - late) * (1 - trusts[0])[..., None] * own + late * (1 - trusts[1])[
         ..., None
     ] * other
-    guard = doubled(guard, own.shape[:2])
-    share = np.clip((0.85 - guard[..., 0] / np.maximum(guard[..., 1], 1e-4)) / 0.25, 0, 1)
     dark_ = np.log(np.maximum(1 - moved - rests, 0.005)) - np.log(np.maximum(1 - own, 0.005))
     trusted = sum(t * n for t, n in zip(trusts, amounts, strict=True))
-    return share[..., None] * dark_, share * trusted / np.maximum(sum(amounts), 1e-3)
+    return explains[..., None] * dark_, explains * trusted / np.maximum(sum(amounts), 1e-3)
 
 
 def pulled(own, other, flows, trusts, time):

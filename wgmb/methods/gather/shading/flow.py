@@ -16,11 +16,10 @@ SPREAD, GUARD = 5.0, 4.0  # [px] sigma of the fill, and of where motion has to e
 
 @dataclass(frozen=True)
 class LightFlow:
-    """Flow from the frame to a neighbour and back [px], with trust; and what it explains."""
+    """Flow from the frame to a neighbour and back [px], with trust; of shadows, what it tells."""
 
     ahead: View
     back: View
-    explained: View
 
 
 def level_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
@@ -82,14 +81,66 @@ def planes(stage: Stage, depth: View) -> View:
     return result
 
 
-def flow(
+def flows(
+    stage: Stage,
+    pictures: Mapping[int, tuple[View, list[Level]]],
+    changed: Mapping[int, View],
+    surfaces: Mapping[str, View],
+) -> dict[int, LightFlow]:
+    """Flow to each neighbour, by its offset; `pictures`: values and their pyramids, 0 of the frame.
+
+    `changed`: changes of light to each neighbour. `surfaces`: "depth" and "planes" of the frame
+    itself, over whose surfaces all move.
+    """
+    searched = {side: _flow(stage, side, pictures[0], pictures[side], surfaces) for side in changed}
+    return (
+        searched
+        if stage.pulled
+        else _extrapolated(stage, searched, pictures, changed, surfaces["planes"])
+    )
+
+
+def _extrapolated(
+    stage: Stage,
+    searched: Mapping[int, LightFlow],
+    pictures: Mapping[int, tuple[View, list[Level]]],
+    changed: Mapping[int, View],
+    planes: View,
+) -> dict[int, LightFlow]:
+    """The same, by that to the other neighbour where this explains more; with what it explains."""
+    none, wide = stage.none("rgba16float"), stage.none("rgba32float")
+    nothing = LightFlow(none, none)
+    given: dict[int, dict[str, Any]] = {
+        side: {
+            "values": pictures[0][0], "values_there": pictures[side][0], "planes": planes,
+            "flow": way.ahead, "flow_back": way.back, "change": changed[side],
+            "flow_other": searched.get(-side, nothing).ahead,
+        }
+        for side, way in searched.items()
+    }  # fmt: skip
+    around: dict[int, View] = {}
+    for side in searched:
+        differences = stage.sparse("weighted", "rgba32float")
+        stage.run("extrapolate", "explain", over="near", differences=differences, around=wide,
+                  around_other=wide, flow_out=stage.unused("rgba16float"),
+                  **given[side])  # fmt: skip
+        around[side] = stage.sparse(f"explained {side}", "rgba32float", half_size(stage.size))
+        blurred(stage, differences, GUARD, around[side])
+    result = {}
+    for side, way in searched.items():
+        chosen = stage.sparse(f"chosen {side}", "rgba16float")
+        stage.run("extrapolate", "choose", over="near", around=around[side],
+                  around_other=around.get(-side, wide), flow_out=chosen,
+                  differences=stage.unused("rgba32float"), **given[side])  # fmt: skip
+        result[side] = LightFlow(chosen, way.back)
+    return result
+
+
+def _flow(
     stage: Stage, side: int, here: tuple[View, list[Level]], neighbour: tuple[View, list[Level]],
     surfaces: Mapping[str, View],
 ) -> LightFlow:  # fmt: skip
-    """Flow to the neighbour at the offset `side`; `here`, `neighbour`: values and their pyramid.
-
-    `surfaces`: "depth" and "planes" of the frame itself, over whose surfaces both move.
-    """
+    """Flow to the neighbour at the offset `side`; `here`, `neighbour`: values and their pyramid."""
     raw = {
         True: _search(stage, "ahead", here[1], neighbour[1]),
         False: _search(stage, "back", neighbour[1], here[1]),
@@ -108,13 +159,7 @@ def flow(
         trusted[ahead] = stage.sparse(f"flow {names[ahead]}", "rgba16float")
         _accept(stage, "trust", flow=filled[ahead], flow_back=filled[not ahead],
                 flow_out=trusted[ahead], **given[ahead])  # fmt: skip
-    explained = stage.sparse(f"explained {side}", "rgba32float", half_size(stage.size))
-    if not stage.pulled:
-        differences = stage.sparse("weighted", "rgba32float")
-        _accept(stage, "explain", flow=trusted[True], flow_back=trusted[False],
-                weighted=differences, **given[True])  # fmt: skip
-        blurred(stage, differences, GUARD, explained)
-    return LightFlow(trusted[True], trusted[False], explained)
+    return LightFlow(trusted[True], trusted[False])
 
 
 def blurred(stage: Stage, source: View, sigma: float, output: View) -> None:

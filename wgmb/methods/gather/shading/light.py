@@ -16,7 +16,7 @@ from ....gpu.textures import ScratchBuffer, TexturePool
 from .changes import SurfaceLight, View, changes, screen
 from .flow import (
     LightFlow,
-    flow,
+    flows,
     grids,
     planes,
     pyramid,
@@ -145,7 +145,7 @@ class MovingLight:
                 for offset, view in present.items()}  # fmt: skip
         depth = kind.frames[0].depth
         surfaces = {"depth": depth, "planes": planes(stage, depth)}
-        flows = {side: flow(stage, side, seen[0], seen[side], surfaces) for side in changed}
+        found = flows(stage, seen, changed, surfaces)
         result = self._images.texture(
             f"light {stage.name}", stage.size, "rgba16float", times.count + 2
         )
@@ -179,7 +179,7 @@ class MovingLight:
             entry = "main" if i < times.count else "add_neighbour"
             if side not in changed:
                 entry = "rest" if i < times.count else "add_nothing"
-            way = flows.get(side, LightFlow(none, none, stage.none("rgba32float")))
+            way = found.get(side, LightFlow(none, none))
             both = {"values": present[0], "values_there": present.get(side, none),
                     "flow": way.ahead, "flow_back": way.back}  # fmt: skip
             if entry == "main" and not kind.pulled:
@@ -196,7 +196,6 @@ class MovingLight:
                     over=over,
                     node=stage.uniform("compose", "Node", time=share),
                     before=changed.get(side, none) if entry == "add_neighbour" else before,
-                    explained=way.explained,
                     earlier=none if earlier is None else layer_of(earlier, i),
                     added=layer_of(result, i),
                     range=range,

@@ -1,20 +1,16 @@
-// Trust in the flow, and what it explains. It is trusted if it leads back, to equal darkness, along one surface: what is
-// dark by itself, as the side of a box is, does not move to another side. Else the flow around replaces it.
+// Trust in the flow: it is trusted if it leads back, to equal darkness, along one surface. What is dark by itself, as the
+// side of a box is, does not move to another side. Else the flow around replaces it.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
-//#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/listed.wgsl
+//#include methods/gather/shading/moving.wgsl
+//#include methods/gather/shading/one_surface.wgsl
 
-@group(1) @binding(0) var flow: texture_2d<f32>;            // stored as rgba16float: to the other frame [px]
-@group(1) @binding(1) var flow_back: texture_2d<f32>;       // stored as rgba16float
-@group(1) @binding(2) var values: texture_2d<f32>;          // stored as rgba16float
-@group(1) @binding(3) var values_there: texture_2d<f32>;    // stored as rgba16float
-@group(1) @binding(4) var around: texture_2d<f32>;          // stored as rgba32float; of `fill`: `known`, blurred, at half the size
-@group(1) @binding(5) var flow_out: Flow;                   // flow [px], trust 0..1
-@group(1) @binding(6) var weighted: Weighted;               // flow times weight, weight, trust; of `explain`: differences with, without; of `find_planes`: see `planes`
-@group(1) @binding(7) var depth: texture_2d<f32>;           // stored as given
-@group(1) @binding(8) var planes: texture_2d<f32>;          // stored as rgba32float, by `find_planes`: the inverse of depth; its change a pixel across, down
-@group(1) @binding(9) var known: texture_2d<f32>;           // stored as rgba32float; of `fill`: what `weigh` wrote
+@group(1) @binding(0) var around: texture_2d<f32>;          // stored as rgba32float; of `fill`: `known`, blurred, at half the size
+@group(1) @binding(1) var flow_out: Flow;                   // flow [px], trust 0..1
+@group(1) @binding(2) var weighted: Weighted;               // flow times weight, weight, trust; of `find_planes`: see `planes`
+@group(1) @binding(3) var depth: texture_2d<f32>;           // stored as given
+@group(1) @binding(4) var known: texture_2d<f32>;           // stored as rgba32float; of `fill`: what `weigh` wrote
 
 alias Flow = texture_storage_2d<rgba16float, write>;
 alias Weighted = texture_storage_2d<rgba32float, write>;
@@ -24,8 +20,6 @@ const ASTRAY_SHARE: f32 = 0.1;  // and this share of the flow; twice as far, not
 const UNLIKE: f32 = 0.2;        // difference of values trusted wholly,
 const UNLIKE_SHARE: f32 = 0.5;  // and this share of the value
 const SLOPE_REACH: i32 = 2;     // [px] to either side, over which the slope of a surface is measured
-const OFF_PLANE: f32 = 0.02;    // by which one surface may leave its tangent plane [share of the depth],
-const BEND: f32 = 0.5;          // and this much more over the picture's width: a turn of about 45 degrees
 const PRESENT: f32 = 0.1;       // value from which on there is something to move
 
 /// Of the flow as it was found, weighted.
@@ -71,36 +65,6 @@ fn trust_in(by: vec2f, id: vec2u, value: f32) -> f32 {
         * clamp(2.0 - unlike / (UNLIKE + UNLIKE_SHARE * value), 0.0, 1.0);
 }
 
-/// Differences from frame to frame: with the motion that was found, and without any.
-@compute @workgroup_size(WG_X, WG_Y)
-fn explain(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
-    let id = listed_pixel(group, local);
-    if any(id >= frame.size) { return; }
-    let x = vec2f(id) + 0.5;
-    let own = textureLoad(values, id, 0).a;
-    let other = textureLoad(values_there, id, 0).a;
-    let ahead = values_there_at(x + textureLoad(flow, id, 0).xy).a;
-    let back = values_at(x + textureLoad(flow_back, id, 0).xy).a;
-    textureStore(weighted, id, vec4f(abs(ahead - own) + abs(back - other), 2.0 * abs(other - own), 0.0, 0.0));
-}
-
-/// True if each of the pixels is about on the other's tangent plane, along which the inverse of depth is linear. False where
-/// light rests.
-fn is_one_surface(a: vec2i, b: vec2i) -> bool {
-    let way = vec2f(b - a);
-    let most = 1.0 + OFF_PLANE + BEND * length(way) / f32(frame.size.x);
-    let at = textureLoad(planes, a, 0).xyz;
-    let landing = inside(b);
-    let at_there = textureLoad(planes, landing, 0).xyz;
-    let there = at.x + dot(way, at.yz);
-    let here = at_there.x - dot(way, at_there.yz);
-    return is_as_deep(there, at_there.x, most) && is_as_deep(here, at.x, most);
-}
-
-fn is_as_deep(a: f32, b: f32, most: f32) -> bool {
-    return max(a, b) < most * min(a, b);
-}
-
 /// The tangent plane at every pixel.
 @compute @workgroup_size(WG_X, WG_Y)
 fn find_planes(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
@@ -123,24 +87,6 @@ fn slope_along(px: vec2i, own: f32, by: vec2i) -> f32 {
 fn inverse_depth(px: vec2i) -> f32 {
     let near = inside(px);
     return 1.0 / valid_depth(textureLoad(depth, near, 0).x);
-}
-
-fn values_at(at: vec2f) -> vec4f {
-    let s = square_around(at);
-    return mixed(s, textureLoad(values, s.pair.xy, 0), textureLoad(values, s.pair.zy, 0),
-                 textureLoad(values, s.pair.xw, 0), textureLoad(values, s.pair.zw, 0));
-}
-
-fn values_there_at(at: vec2f) -> vec4f {
-    let s = square_around(at);
-    return mixed(s, textureLoad(values_there, s.pair.xy, 0), textureLoad(values_there, s.pair.zy, 0),
-                 textureLoad(values_there, s.pair.xw, 0), textureLoad(values_there, s.pair.zw, 0));
-}
-
-fn flow_back_at(at: vec2f) -> vec4f {
-    let s = square_around(at);
-    return mixed(s, textureLoad(flow_back, s.pair.xy, 0), textureLoad(flow_back, s.pair.zy, 0),
-                 textureLoad(flow_back, s.pair.xw, 0), textureLoad(flow_back, s.pair.zw, 0));
 }
 
 fn around_at(at: vec2f) -> vec4f {

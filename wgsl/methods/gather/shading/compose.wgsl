@@ -2,6 +2,7 @@
 //#include common/frame.wgsl
 //#include methods/gather/shading/listed.wgsl
 //#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/moving.wgsl
 //#include methods/gather/shading/pushed.wgsl
 
 struct Node {
@@ -14,11 +15,6 @@ struct Node {
 @group(1) @binding(3) var weight: texture_2d<f32>;      // stored as given
 @group(1) @binding(4) var before: texture_2d<f32>;      // stored as rgba16float: changes to the previous frame, to the next one
 @group(1) @binding(5) var after: texture_2d<f32>;       // stored as rgba16float
-@group(1) @binding(6) var values: texture_2d<f32>;      // stored as rgba16float
-@group(1) @binding(7) var values_there: texture_2d<f32>;    // stored as rgba16float
-@group(1) @binding(8) var flow: texture_2d<f32>;        // stored as rgba16float; and trust
-@group(1) @binding(9) var flow_back: texture_2d<f32>;   // stored as rgba16float
-@group(1) @binding(10) var explained: texture_2d<f32>;  // stored as rgba32float: what accept.wgsl wrote, blurred, at half the size
 @group(1) @binding(11) var earlier: texture_2d<f32>;    // stored as rgba16float: what is added for other reasons
 @group(1) @binding(12) var range: texture_2d<u32>;      // stored as rgba32uint, by `find_range`: the least and the greatest change around
 @group(1) @binding(13) var<storage, read_write> from_here: array<u32>;   // see push.wgsl
@@ -183,11 +179,9 @@ fn pushed(px: vec2i) -> vec4f {
         / max(covered.x + covered.y, LEAST_COVERED) * min(max(a.w, b.w), 1.0);
     let late = step_around(node.time, 0.2);
     let rests = (1.0 - late) * (1.0 - trusts.x) * own + late * (1.0 - trusts.y) * other;
-    let differs = explained_at(vec2f(px) + 0.5);
-    let guard = clamp((0.85 - differs.x / max(differs.y, 1e-4)) / 0.25, 0.0, 1.0);
     let change = log(max(1.0 - mixed - rests, vec3f(LEAST_LIGHT))) - log(max(1.0 - own, vec3f(LEAST_LIGHT)));
     let trusted = dot(trusts, vec2f(value.a, value_there.a)) / max(value.a + value_there.a, 1e-3);
-    return guard * vec4f(change, trusted);
+    return textureLoad(flow, px, 0).w * vec4f(change, trusted);
 }
 
 /// The light that has come here by then along both flows; as a change of its logarithm. a: how far it is trusted.
@@ -208,34 +202,4 @@ fn pulled(px: vec2i) -> vec4f {
     let total = shares.x + shares.y;
     let trusted = min(total / 0.3, 1.0);
     return vec4f(come / max(total, 1e-3) * trusted, trusted);
-}
-
-fn values_at(at: vec2f) -> vec4f {
-    let s = square_around(at);
-    return mixed(s, textureLoad(values, s.pair.xy, 0), textureLoad(values, s.pair.zy, 0),
-                 textureLoad(values, s.pair.xw, 0), textureLoad(values, s.pair.zw, 0));
-}
-
-fn values_there_at(at: vec2f) -> vec4f {
-    let s = square_around(at);
-    return mixed(s, textureLoad(values_there, s.pair.xy, 0), textureLoad(values_there, s.pair.zy, 0),
-                 textureLoad(values_there, s.pair.xw, 0), textureLoad(values_there, s.pair.zw, 0));
-}
-
-fn flow_at(at: vec2f) -> vec4f {
-    let s = square_around(at);
-    return mixed(s, textureLoad(flow, s.pair.xy, 0), textureLoad(flow, s.pair.zy, 0),
-                 textureLoad(flow, s.pair.xw, 0), textureLoad(flow, s.pair.zw, 0));
-}
-
-fn flow_back_at(at: vec2f) -> vec4f {
-    let s = square_around(at);
-    return mixed(s, textureLoad(flow_back, s.pair.xy, 0), textureLoad(flow_back, s.pair.zy, 0),
-                 textureLoad(flow_back, s.pair.xw, 0), textureLoad(flow_back, s.pair.zw, 0));
-}
-
-fn explained_at(at: vec2f) -> vec4f {
-    let s = square_within(half_size(), 0.5 * at);
-    return mixed(s, textureLoad(explained, s.pair.xy, 0), textureLoad(explained, s.pair.zy, 0),
-                 textureLoad(explained, s.pair.xw, 0), textureLoad(explained, s.pair.zw, 0));
 }

@@ -4,19 +4,15 @@
 //#include methods/gather/shading/listed.wgsl
 //#include methods/gather/shading/resting.wgsl
 //#include methods/gather/shading/pushed.wgsl
-//#include methods/gather/shading/light.wgsl
+//#include methods/gather/shading/moving.wgsl
 
 struct Push {
     time: f32,          // share of the way to the neighbour
 }
 
 @group(1) @binding(0) var<uniform> push: Push;
-@group(1) @binding(1) var values: texture_2d<f32>;          // stored as rgba16float
-@group(1) @binding(2) var values_there: texture_2d<f32>;    // stored as rgba16float
-@group(1) @binding(3) var flow: texture_2d<f32>;            // stored as rgba16float; and trust
-@group(1) @binding(4) var flow_back: texture_2d<f32>;       // stored as rgba16float
-@group(1) @binding(5) var<storage, read_write> from_here: array<atomic<u32>>;   // two words a pixel: see unpack_pushed()
-@group(1) @binding(6) var<storage, read_write> from_there: array<atomic<u32>>;
+@group(1) @binding(1) var<storage, read_write> from_here: array<atomic<u32>>;   // two words a pixel: see unpack_pushed()
+@group(1) @binding(2) var<storage, read_write> from_there: array<atomic<u32>>;
 
 const PRESENT: f32 = 0.1;       // value from which on there is something to move
 
