@@ -107,8 +107,8 @@ def test_the_reference_converges_and_is_measured(small, monkeypatch):
 
 def test_what_is_shown_never_has_less_in_it_than_before(small, monkeypatch):
     monkeypatch.setattr(renderer, "_STEP", 0.0)  # a few samples at a time
-    monkeypatch.setattr(small.viewer.stage, "_is_slow", True)
-    monkeypatch.setattr(small.viewer.stage, "pace", Pace(5))
+    monkeypatch.setattr(small.viewer.stage.detail, "is_slow", True)
+    monkeypatch.setattr(small.viewer.stage.detail, "pace", Pace(5))
     small.viewer.state = put(ALONE, method="accumulate", samples=32)
     want, shown = small.picture(), small.viewer.stage._slots
     small.submit("pointer_down", x=50, y=40, button=1, buttons=(1,))

@@ -139,7 +139,7 @@ def test_a_quick_picture_does_not_wait_for_a_slow_one_that_it_is_compared_with()
 @pytest.mark.usefixtures("as_without_a_gpu")
 def test_a_preview_tells_its_size_and_for_which_of_two_images_it_stands():
     renderer = Renderer(gpu.open_device())
-    renderer.pace.level = len(Pace.SCALES) - 1
+    renderer.detail.pace.level = len(Pace.SCALES) - 1
     state = put(STATE, shutter=90.0).keeping().with_method("tap")
     seen = []
     for now in range(8):

@@ -110,7 +110,7 @@ def test_times_of_the_gpu_are_told_by_pass(monkeypatch):
 
 
 def test_moving_is_coarse_and_stillness_is_fine(hand):
-    hand.viewer.stage.pace = Pace(5)
+    hand.viewer.stage.detail.pace = Pace(5)
     hand.submit("pointer_down", x=100, y=500, button=1, buttons=(1,))
     hand.submit("pointer_move", x=110, y=500, button=0, buttons=(1,))
     hand.look()

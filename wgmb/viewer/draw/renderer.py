@@ -26,6 +26,7 @@ from ..subjects.video import VideoSubject
 from .adaptive import Pace
 from .blurs import Blurs
 from .composer import Image
+from .detail import Detail
 from .frame_status import FrameStatus
 from .inspected import Inspected
 from .perception import Perceived, seen_frames
@@ -34,12 +35,10 @@ from .portions import DroppedError
 from .quality import Measured, Quality
 from .request import Available, Drawn, Request
 from .slot import Slot
-from .stand_in import HALF, StandIn
 from .video_light import VideoLight, primaries_of
 
 _STEP = 0.07  # seconds of work on what converges, between two frames of the window
 _QUICK_STEP = 0.03  # while something moves
-_SETTLE = 0.35  # seconds of stillness before antialiasing
 _SHORT = 0.02  # seconds
 _PASSES = {"sharp": "color", "depth": "depth", "velocity": "motion"}
 
@@ -56,21 +55,16 @@ class Renderer:
     ):
         self.device = device
         self.choices, self.quality = Choices(device), Quality()
-        self._is_slow = device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        self.pace, self._stand_in = Pace(HALF if self._is_slow else 0, target), StandIn(target)
+        self.detail = Detail(device.adapter_info["adapter_type"] == gpu.SOFTWARE, target)
         self.report = FrameStatus()
         self._images, self._video_light = TexturePool(device), VideoLight(device)
         self._perceived = {slot: Perceived(device) for slot in ("first", "second")}
         self._past: SceneSubject | None = None
-        self._blurs = Blurs(device, self.choices, self.pace)
+        self._blurs = Blurs(device, self.choices, self.detail.pace)
         self._slots = {"first": Slot(), "second": Slot()}
         self._coming = dict(self._slots)  # takes the place of what is shown
         self._on_screen: dict[str, Image] = {}
         self.chromaticities: dict[str, Any] = {}  # of what is shown, as an attribute of an EXR
-        self._level, self._still_since, self._still = 0, 0.0, ()
-        self._preview, self._ready = False, False
-        self._has_choice, self._fewest = False, 0  # of the quickest method; pixels for the other
-        self._moved = False
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._timing = timing
         if timing is None and TimestampClock.usable(device):
@@ -134,18 +128,11 @@ class Renderer:
         place = fit(shape, area, state)
         full_size = whole(place) if state.is_scene else size
         names = self._wanted(state)
-        can = any(self.choices.has_preview(state, name) for name, _ in names)
-        self._has_choice = slow = self._is_slow and not full and can
-        if slow:
-            smallest = Pace.SCALES[HALF] ** 2 if state.is_scene else 1.0
-            self._fewest = round(math.prod(full_size) * smallest)
-            self._stand_in.begin((state.source, state.suited_blur, state.mode, full_size))
-            self._slow_quality(state, place, moving)
-        else:
-            self._quick_quality(state, place, now, moving, full)
-        size, antialias = self._size(state, size, place)
+        can, detail = any(self.choices.has_preview(state, name) for name, _ in names), self.detail
+        detail.begin(state, place, full_size, now, moving=moving, full=full, has_preview=can)
+        size, antialias = detail.size(state, size, place)
         report = FrameStatus(full_size, shape, place, area, moving)
-        quick = (moving or self._preview) and not full
+        quick = (moving or detail.is_preview) and not full
         slots, lacks, is_first_alone = ("first", "second")[: len(names)], False, False
         for slot, (name, eye) in zip(slots, names, strict=True):
             if name != "perceived":
@@ -157,7 +144,9 @@ class Renderer:
                 lacks |= of_slot.busy
                 if name in ("result", KEPT) and (draft := of_slot.draft):
                     report.drafts.append(f"{KEPT}: {draft}" if name == KEPT else draft)
-            is_first_alone = slow and not quick and report.changed and slot != slots[-1]
+            is_first_alone = (
+                detail.has_choice and not quick and report.changed and slot != slots[-1]
+            )
             if is_first_alone:  # it is shown before the second one, which may take long
                 break
         first, last = self._slots["first"], self._slots[slots[-1]]
@@ -175,8 +164,9 @@ class Renderer:
             of_which = " for both" if len(previews) == 2 else alone
             report.preview = f"preview by {QUICKEST}{of_size}{of_which}"
         self._on_screen = self._displayed(slots, state, subject)
-        self._ready = not is_first_alone and all(self._coming[slot].ready for slot in slots)
-        report.busy = moving or not self._ready or self._level > 0 or self._preview or lacks
+        done = not is_first_alone and all(self._coming[slot].ready for slot in slots)
+        detail.is_complete = done
+        report.busy = moving or not done or detail.level > 0 or detail.is_preview or lacks
         if isinstance(subject, VideoSubject):
             report.made_of = subject.made_of(state, state.shutter.make())
         if names[-1][0] == REFERENCE:
@@ -233,58 +223,7 @@ class Renderer:
 
     def finished(self, seconds: float, antialias: int) -> None:
         """The window's frame took so long; moving frames set the pace."""
-        if not self.report.moving:
-            self._moved = False
-        elif self.report.changed:
-            if not self._moved:  # the first one may have had shaders to compile
-                self._moved = True
-                return
-            self._observe(seconds, antialias)
-
-    def _observe(self, seconds: float, antialias: int) -> None:
-        drawing, pixels = self.report.seconds["draw"], math.prod(self.report.size)
-        if self._preview or not self._has_choice:
-            self.pace.observe(seconds, drawing, antialias)
-        if self._has_choice:
-            took = seconds, drawing, antialias, pixels
-            self._moved = self._stand_in.is_kept(*took, self._fewest)
-
-    def _size(self, state, size, place) -> tuple[tuple[int, int], int]:
-        """Size to draw [px] and rays per pixel side, at the level of detail."""
-        if not state.is_scene:
-            self._level = 0
-            return size, 1
-        scale, antialias = self.pace.quality(self._level, state.scene.antialias)
-        width, height = whole(place)
-        return (max(round(width * scale), 1), max(round(height * scale), 1)), antialias
-
-    def _quick_quality(self, state, place, now, moving, full) -> None:
-        """Coarse while moving, then in full, then antialiased."""
-        self._preview = False
-        if full:
-            self._level = 0
-        elif moving:
-            self._level, self._still_since = self.pace.level, now
-        elif (key := (state.picture, place)) != self._still:
-            self._still, self._still_since = key, now
-            self._level = min(self._level, 1) if self._level else min(self.pace.level, 1)
-        elif self._level > 1:
-            self._level = 1
-        elif self._level == 1 and now - self._still_since > _SETTLE:
-            self._level = 0
-
-    def _slow_quality(self, state, place, moving) -> None:
-        """By the quickest method at first, coarse and then in full size, then as it is set.
-
-        While moving by the method that is set, where that is quick enough.
-        """
-        key = state.picture, place
-        if moving or key != self._still:
-            self._still, self._preview = key, not moving or self._stand_in.is_needed
-            self._level = max((self.pace if self._preview else self._stand_in.pace).level, 1)
-        elif self._ready:
-            self._preview = self._preview and self._level > 1
-            self._level = 1 if self._preview else 0
+        self.detail.finished(self.report, seconds, antialias)
 
     def _wanted(self, state: State) -> list[tuple[str, str | None]]:
         """One or two names, of a look, a method or the reference, each with the view it is of."""
@@ -321,10 +260,10 @@ class Renderer:
         known = self._known(name, state, subject, full)
         frame = state.moment if name == "perceived" else None
         key = (name, view, state.picture, eye, frame, tuple(known))
-        is_preview = self._preview and self.choices.has_preview(state, name)
-        fine = (size, antialias, self._level if quick else None, is_preview)
+        is_preview = self.detail.is_preview and self.choices.has_preview(state, name)
+        fine = (size, antialias, self.detail.level if quick else None, is_preview)
         if (coming.key, coming.fine) != (key, fine):
-            coarse = self._level or is_preview
+            coarse = self.detail.level or is_preview
             if coarse and shown.key == key and not _coarser(shown.fine, fine):
                 return
             texture = f"{slot} {1 + shown.name.endswith('1')}"
@@ -352,7 +291,7 @@ class Renderer:
         report.changed = True
         report.seconds[coming.label] = took = time.perf_counter() - started
         if not (quick or full) and self.choices.has_preview(state, name):
-            self._stand_in.observe_still(took, math.prod(size))
+            self.detail.observe_still(took, math.prod(size))
 
     def _known(self, name: str, state: State, subject: Subject, full: bool) -> list[tuple]:
         """The findings about a video's motion, all that are needed if `full`.
@@ -385,7 +324,7 @@ class Renderer:
     ) -> None:
         size, antialias = coming.fine[:2]
         # What moves is not dropped, and the next pass is recorded while one is computed.
-        timing = None if moving and self._is_slow else self._timing
+        timing = None if moving and self.detail.is_slow else self._timing
         volumes = state.is_scene and "volume" in self.choices.methods(state)
         if name in _PASSES and not (name == "sharp" and volumes):
             passes = subject.passes()
@@ -395,7 +334,7 @@ class Renderer:
             coming.kind = {"depth": "DEPTH", "velocity": "MOTION"}.get(name, "COLOR")
             return
         stand_in = QUICKEST if coming.is_preview else None
-        blur = self._blurs(slot, name, state, size, self._level if quick else None, stand_in)
+        blur = self._blurs(slot, name, state, size, self.detail.level if quick else None, stand_in)
         coming.texture = self._images.texture(coming.name, size, blur.output)
         if name == "perceived" and (eye := state.eye):
             if state.is_scene:  # of its own, so that what else is drawn keeps its moment
