@@ -23,7 +23,7 @@ fn own_light(px: vec2i) -> vec3f {
     return log(valid_light(textureLoad(light_here, px, 0)) + dark());
 }
 
-/// The brightest of the three frames.
+/// The brightest of the three frames, without noise.
 @compute @workgroup_size(WG_X, WG_Y)
 fn begin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);
@@ -31,7 +31,23 @@ fn begin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
     let px = vec2i(id);
     let surface = select(1.0, -1.0, is_crease(px)) * depth_at(px);
     let most = max(vec3f(0.0), max(textureLoad(before, px, 0).rgb, textureLoad(after, px, 0).rgb));
-    textureStore(output, px, vec4f(own_light(px) + most, surface));
+    textureStore(output, px, vec4f(smooth_light(px, abs(surface)) + most, surface));
+}
+
+/// The mean of 3 x 3 pixels of the same surface without the brightest one: noise is no light.
+fn smooth_light(px: vec2i, z: f32) -> vec3f {
+    var sum = vec4f(0.0);
+    var most = vec3f(-1e9);
+    for (var k = 0; k < 9; k++) {
+        let near = px + vec2i(k % 3, k / 3) - 1;
+        let z_near = depth_at(near);
+        if max(z, z_near) < AS_DEEP * min(z, z_near) {
+            let light = own_light(inside(near));
+            sum += vec4f(light, 1.0);
+            most = max(most, light);
+        }
+    }
+    return select(own_light(px), (sum.rgb - most) / max(sum.a - 1.0, 1.0), sum.a > 1.0);
 }
 
 fn depth_at(px: vec2i) -> f32 {
