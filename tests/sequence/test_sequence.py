@@ -24,6 +24,24 @@ def contents(folder) -> dict[str, bytes]:
     return {p.name: p.read_bytes() for p in folder.iterdir()}
 
 
+# ---- frames ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["f2", "f4"])
+def test_a_picture_is_in_memory_once(tmp_path, kind):
+    want = np.random.default_rng(3).random((9, 16, 4)).astype(kind)
+    make.write_exr(tmp_path / "a.0001.exr", make.colors(want, kind=kind))
+    source = Clip(tmp_path / "a.####.exr").source(1)
+    picture = source.rgba
+    np.testing.assert_array_equal(picture, want)
+    assert not picture.flags.writeable and source.rgba is picture
+    assert source.file is not None
+    for channels in (source.channels, source.file.parts[0].channels):
+        for i, name in enumerate("RGBA"):
+            assert np.shares_memory(channels[name], picture)
+            np.testing.assert_array_equal(channels[name], want[..., i])
+
+
 # ---- names ----------------------------------------------------------------------------------
 
 

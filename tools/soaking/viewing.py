@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from wgmb import viewer
-from wgmb.viewer.allocator import bound_free_memory
+from wgmb.allocator import bound_free_memory
 from wgmb.viewer.state.state import COMPARE, TONES, State
 from wgmb.viewer.window import Viewer
 from wgmb.viewer.window import frame as viewed

@@ -19,6 +19,7 @@ from cyclopts import Parameter
 from cyclopts.config import Dict
 
 from .._version import __version__
+from ..allocator import bound_free_memory
 from ..errors import (
     DeviceError,
     Error,
@@ -253,6 +254,7 @@ def _say_why(text: str, code: int) -> int:
 def run(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     sys.unraisablehook = terminal.hush
+    bound_free_memory()
     codes: list[int] = []
     atexit.register(_insist, codes)  # before all others, so it is called after them
     code = main(arguments)

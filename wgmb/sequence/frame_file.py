@@ -86,14 +86,25 @@ class FrameFile:
         """Width and height [px] of the whole picture, of which an EXR may hold a window."""
         return self.size if self.window is None else self.window[2:]
 
-    @property
+    @cached_property
     def rgba(self) -> np.ndarray:
-        """The picture, (height, width, 3 or 4), as stored (float16 or float32)."""
+        """The picture, (height, width, 3 or 4), as stored (float16 or float32); read-only.
+
+        Its channels, in the file too, become views of it, so that they are in memory once.
+        """
         planes = [self.channels[name] if name else np.float16(0) for name in self.color]
         kind = np.float16 if all(p.dtype == np.float16 for p in planes) else np.float32
         rgba = np.empty((*self.size[::-1], len(planes)), kind)
         for i, plane in enumerate(planes):
             rgba[..., i] = plane
+        rgba.flags.writeable = False
+        for i, (name, plane) in enumerate(zip(self.color, planes, strict=True)):
+            if name and plane.dtype == kind:
+                self.channels[name] = rgba[..., i]
+                if self.part is not None:
+                    part, own = self.origin.get(name, (self.part, name))
+                    if part.channels.get(own) is plane:
+                        part.channels[own] = rgba[..., i]
         return rgba
 
     @property

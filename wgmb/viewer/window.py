@@ -19,10 +19,10 @@ from rendercanvas.offscreen import OffscreenRenderCanvas
 from wgpu.utils.imgui import ImguiRenderer
 
 from .. import gpu
+from ..allocator import bound_free_memory
 from ..errors import DeviceError, InputError
 from . import controls
 from .actions import Actions
-from .allocator import bound_free_memory
 from .draw.composer import NOTHING, View
 from .draw.draw_thread import DrawThread
 from .draw.frame_status import FrameStatus

@@ -1,4 +1,4 @@
-"""How finely images are drawn: coarse or quick at first and while something moves, then in full."""
+"""The level of detail of images: coarse or quick at first and during motion, then in full."""
 
 from __future__ import annotations
 

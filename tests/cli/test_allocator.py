@@ -8,7 +8,7 @@ import pytest
 LEFT = """
 import sys, threading
 import numpy as np
-from wgmb.viewer.allocator import bound_free_memory
+from wgmb.allocator import bound_free_memory
 if not bound_free_memory():
     sys.exit(7)
 def held():
