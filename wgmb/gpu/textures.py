@@ -12,9 +12,7 @@ from ..errors import InputError
 from .device import check_size, submit
 
 _BAND = 4 << 20  # bytes written at once: five times faster at 4K than all at once
-_READBACK = (
-    16 << 20
-)  # bytes read back at once: a buffer has a limit, and takes memory beside the texture
+_READBACK = 16 << 20  # bytes read back at once: a buffer takes memory beside the texture
 _HALF_MAX = 65504.0  # largest finite f16
 _USAGE = wgpu.TextureUsage
 _NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4", "16uint": "<u2"}
