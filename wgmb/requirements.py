@@ -9,6 +9,7 @@ from __future__ import annotations
 import operator
 import re
 import sys
+from collections.abc import Iterable
 from importlib import metadata
 from itertools import zip_longest
 from typing import NamedTuple
@@ -75,7 +76,7 @@ def of_extra(extra: str) -> list[Requirement]:
     for one in _of_extra(extra, lines, set()):
         same = found.setdefault((one.name.lower(), one.marker), one)
         parts = [*same.versions.split(","), *one.versions.split(",")]
-        versions = ",".join(dict.fromkeys(part for part in parts if part))
+        versions = ",".join(_narrowed(dict.fromkeys(part for part in parts if part)))
         found[one.name.lower(), one.marker] = same._replace(versions=versions)
     return list(found.values())
 
@@ -95,6 +96,17 @@ def _of_extra(extra: str, lines: list[str], visited: set[str]) -> list[Requireme
             if inner not in visited:
                 found += _of_extra(inner, lines, visited)
     return found
+
+
+def _narrowed(conditions: Iterable[str]) -> list[str]:
+    """Conditions without each `>=` and `<` that another one of them implies, `>=` first."""
+    kept = list(conditions)
+    for sign, strictest in ((">=", -1), ("<", 0)):
+        alike = [part for part in kept if re.fullmatch(rf"{sign}\s*\d+(?:\.\d+)*", part)]
+        if len(alike) > 1:
+            alike.sort(key=lambda part: _numbers(part.removeprefix(sign).strip()))
+            kept = [part for part in kept if part not in alike or part == alike[strictest]]
+    return sorted(kept, key=lambda part: not part.startswith(">"))
 
 
 def _holds(version: str, condition: str) -> bool:

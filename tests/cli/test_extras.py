@@ -187,8 +187,22 @@ def test_requirements_of_an_extra_are_those_of_the_extras_within(installed):
     assert requirements.of_extra("nothing") == []
     assert [str(line) for line in requirements.of_extra("both")] == [
         'two>=1.5; (sys_platform != "none")',
-        "One.Pkg>=2,<3,>=2.1",
+        "One.Pkg>=2.1,<3",
     ]
+
+
+@pytest.mark.parametrize(
+    ("conditions", "joined"),
+    [
+        (("<19,>=14.1", ">=18.1,<19"), ">=18.1,<19"),
+        ((">=2,<10", ">=1.9,<9.5"), ">=2,<9.5"),
+        (("!=2.3,>=2.10", ">=2.9,<=3"), ">=2.10,!=2.3,<=3"),
+        (("~=2.4", ""), "~=2.4"),
+    ],
+)
+def test_ranges_of_a_package_are_joined_to_the_narrowest(installed, conditions, joined):
+    installed([f"some{condition}; extra == 'a'" for condition in conditions])
+    assert [str(one) for one in requirements.of_extra("a")] == [f"some{joined}"]
 
 
 @pytest.mark.parametrize(
