@@ -13,7 +13,7 @@ _MIB = 1 << 20
 _BOUNDS = {
     _ARENA_MAX: 4,
     _TRIM_THRESHOLD: 16 * _MIB,
-    _MMAP_THRESHOLD: 4 * _MIB,  # larger arrays go back to the system at once
+    _MMAP_THRESHOLD: 2 * _MIB,  # larger arrays go back to the system at once
 }
 
 

@@ -92,20 +92,26 @@ class FrameFile:
 
         Its channels, in the file too, become views of it, so that they are in memory once.
         """
-        planes = [self.channels[name] if name else np.float16(0) for name in self.color]
-        kind = np.float16 if all(p.dtype == np.float16 for p in planes) else np.float32
-        rgba = np.empty((*self.size[::-1], len(planes)), kind)
-        for i, plane in enumerate(planes):
-            rgba[..., i] = plane
-        rgba.flags.writeable = False
-        for i, (name, plane) in enumerate(zip(self.color, planes, strict=True)):
-            if name and plane.dtype == kind:
-                self.channels[name] = rgba[..., i]
-                if self.part is not None:
-                    part, own = self.origin.get(name, (self.part, name))
-                    if part.channels.get(own) is plane:
-                        part.channels[own] = rgba[..., i]
-        return rgba
+        names = [name for name in self.color if name]
+        half = all(self.channels[name].dtype == np.float16 for name in names)
+        rgba = np.zeros((*self.size[::-1], len(self.color)), np.float16 if half else np.float32)
+        locked = rgba.view()
+        locked.flags.writeable = False
+        for i, name in enumerate(self.color):
+            if name:
+                rgba[..., i] = self.channels[name]
+                self._share(name, locked[..., i])
+        return locked
+
+    def _share(self, name: str, plane: np.ndarray) -> None:
+        """Let a channel of the picture be `plane`, which has the same values."""
+        stored = self.channels[name]
+        if stored.dtype == plane.dtype:
+            self.channels[name] = plane
+            if self.part is not None:
+                part, own = self.origin.get(name, (self.part, name))
+                if part.channels.get(own) is stored:
+                    part.channels[own] = plane
 
     @property
     def window(self) -> Window | None:
