@@ -13,16 +13,36 @@ def valid(depth):
 def found_again(frame, step, back, z, y, x):
     """The vectors of a pixel's surface in another frame, and its depth there as a ratio; or None.
 
-    `step` leads there; `back`: which of the vectors there lead back.
+    `step` leads there; `back`: which of the vectors there lead back. Where another surface is, the
+    one of the four pixels around whose vector leads back best; else what is a little off in depth.
     """
     place = np.array([x, y]) + 0.5 + step
     if frame is None or (place < 0).any() or (place >= frame[3].shape[::-1]).any():
         return None
-    j, i = int(place[1]), int(place[0])
-    vectors, given = frame[2][j, i].astype(float), frame[3][j, i]
-    ratio = valid(given) / z
-    leads_back = np.hypot(*(vectors[back] + step)) < 1.5
-    return (vectors, ratio) if given > 0 and 1 / 1.5 < ratio < 1.5 and leads_back else None
+
+    def surface(i, j):
+        vectors, given = frame[2][j, i].astype(float), frame[3][j, i]
+        ratio, off = valid(given) / z, np.hypot(*(vectors[back] + step))
+        return (vectors, ratio, off) if given > 0 and off < 1.5 else (vectors, 0.0, off)
+
+    own = surface(int(place[0]), int(place[1]))
+    if is_same(own):
+        return own[:2]
+    last = np.array(frame[3].shape[::-1]) - 1
+    corner = np.floor(place - 0.5)
+    beside = [
+        surface(*np.clip(corner + off, 0, last).astype(int))
+        for off in ((0, 0), (1, 0), (0, 1), (1, 1))
+    ]
+    same = [one for one in beside if is_same(one)]
+    if same:
+        return min(same, key=lambda one: one[2])[:2]
+    return own[:2] if 1 / 1.5 < own[1] < 1.5 else None
+
+
+def is_same(found):
+    """True if a depth, as a ratio, is that of the same surface."""
+    return 1 / 1.15 < found[1] < 1.15
 
 
 def depth_ratio(offset, motion, z, y, x, prev, next):
@@ -40,8 +60,7 @@ def bend(motion, z, y, x, prev, next):
     here, there = (motion[:2] + motion[2:]) / 2, []
     for frame, step, back in ((prev, motion[:2], np.s_[2:]), (next, motion[2:], np.s_[:2])):
         found = found_again(frame, step, back, z, y, x)
-        is_same = found and 1 / 1.15 < found[1] < 1.15
-        there.append((found[0][:2] + found[0][2:]) / 2 if is_same else None)
+        there.append((found[0][:2] + found[0][2:]) / 2 if found and is_same(found) else None)
     before, after = there
     if (before is None and after is None) or (np.abs(motion) < 0.01).all():
         return 0.0, 0.0, 0.0

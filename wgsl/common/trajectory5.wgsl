@@ -66,20 +66,35 @@ fn turn_factor(here: vec2f, mean: vec2f) -> f32 {
     return select(1.0, 2.0 / (half_angle * (1.0 + half_angle)), turns);
 }
 
-/// Half the acceleration in a neighbouring frame of what is displaced by `step` [px] up to it.
+/// Half the acceleration in a neighbouring frame of what is displaced by `step` [px] up to it: where it is by then, or beside a
+/// silhouette, in the one of the four pixels around whose vector leads back best.
 fn acceleration_in(motion_there: texture_2d<f32>, depth_there: texture_2d<f32>, px: vec2i, step: vec2f, z: f32,
                    is_next: bool) -> Acceleration {
     let at = vec2f(px) + 0.5 + step;
     let is_inside = all(at >= vec2f(0.0)) && all(at < vec2f(frame.size));
-    let there = vec2i(clamp(at, vec2f(0.0), vec2f(frame.size) - 1.0));
-    let vectors = textureLoad(motion_there, there, 0);
-    let given = textureLoad(depth_there, there, 0).x;
-    let ratio = valid_depth(given) / z;
-    let off = select(vectors.zw, vectors.xy, is_next) + step;
-    let returns = is_inside && given > 0.0 && dot(off, off) < RETURNS * RETURNS;
-    let change = max(ratio, 1.0 / ratio);
-    let depth_ratio = select(1.0, ratio, returns && change < MOST_DEPTH_CHANGE);
-    return Acceleration(0.5 * (vectors.xy + vectors.zw), returns && change < SAME_DEPTH_RATIO, depth_ratio);
+    var result = Acceleration(vec2f(0.0), false, 1.0);
+    var least = RETURNS * RETURNS;
+    var i = 0;
+    loop {
+        let corner = floor(at - 0.5) + vec2f(vec2i((i - 1) & 1, (i - 1) >> 1u));
+        let there = vec2i(clamp(select(corner, at, i == 0), vec2f(0.0), vec2f(frame.size) - 1.0));
+        let vectors = textureLoad(motion_there, there, 0);
+        let given = textureLoad(depth_there, there, 0).x;
+        let ratio = valid_depth(given) / z;
+        let off = select(vectors.zw, vectors.xy, is_next) + step;
+        let returns = is_inside && given > 0.0 && dot(off, off) < least;
+        let change = max(ratio, 1.0 / ratio);
+        let is_known = returns && change < SAME_DEPTH_RATIO;
+        if is_known || (i == 0 && returns && change < MOST_DEPTH_CHANGE) { result.depth_ratio = ratio; }
+        if is_known {
+            result.half = 0.5 * (vectors.xy + vectors.zw);
+            result.is_known = true;
+            least = dot(off, off);
+        }
+        i++;
+        if i > 4 || (i == 1 && (is_known || !is_inside)) { break; }
+    }
+    return result;
 }
 
 /// The part of a trajectory that three positions do not tell, in a word: its third term, or KINKED.
