@@ -326,15 +326,22 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     opaque = 1.0 if thin or not has_alpha else mean(color, front)[3]
     clear = mean(color, back)[3] if has_alpha else 1.0
     shares = [(motion[p] - behind) @ way / (way @ way) for p in inner]
+    is_guess = False
+    bends, ratios, is_exact = told_around
     if opaque - clear > 0.5:
         coverage = np.clip((color[y, x, 3] - clear) / (opaque - clear), 0, 1)
-    elif not thin and not any(0.1 < share < 0.9 for share in shares):
-        coverage = coverage_by_color(color[y, x], mean(color, front), back_color, coverage)
+    elif is_exact or not any(0.1 < share < 0.9 for share in shares):
+        at_middle = float(z[y, x] < between) if is_exact else coverage
+        coverage, told = coverage_by_color(color[y, x], mean(color, front), back_color, at_middle)
+        is_guess = not told and at_middle < 0.5
+        if is_guess:
+            coverage = np.clip(coverage, 0, front_around(z < between, y, x))
+        elif not told:
+            coverage = at_middle
     coverage = np.round(511 * coverage) / 511
     whole = coverage > 0.98
     front_place = purest if thin and not whole else nearest_pure(nearer)
     back_place = nearest_pure(farther)
-    bends, ratios, is_exact = told_around
     before = motion[y, x] if whole else before
     if is_exact:
         before = motion[min(nearer, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)]
@@ -353,6 +360,8 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     )
     if not whole:
         back_color = back_color + (rest - front_color) / (1 - coverage)
+    if is_guess:
+        front_color, back_color = coverage * color[y, x], color[y, x]
     front_path = np.concatenate([before, bends[front_place]])
     behind = np.concatenate([behind, bends[back_place]])
     front_depth = z[y, x] if whole and z[y, x] < between else mean(z, front)
@@ -361,14 +370,22 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
 
 
 def coverage_by_color(own, front, back, at_middle):
-    """Place of a colour between two others, on the side of one half that the pixel's middle is."""
+    """Place of a colour between two others, on the side of one half that the pixel's middle is.
+
+    And whether it is near the line between them; else the farther off, the less it is.
+    """
     way, off = (front - back)[:3], (own - back)[:3]
-    if np.linalg.norm(way) <= 0.05:
-        return at_middle
-    share = off @ way / (way @ way)
-    if np.linalg.norm(off - share * way) >= 0.25 * np.linalg.norm(way):
-        return at_middle
-    return np.clip(share, 0.5, 1) if at_middle >= 0.5 else np.clip(share, 0, 0.5)
+    share = off @ way / max(way @ way, 1e-12)
+    rest = off - share * way
+    if way @ way <= 0.05**2 or rest @ rest >= way @ way / 16:
+        return off @ way / max(way @ way + rest @ rest, 1e-12), False
+    return np.clip(share, 0.5, 1) if at_middle >= 0.5 else np.clip(share, 0, 0.5), True
+
+
+def front_around(is_front, y, x):
+    """The share of a pixel that is front if the pixels around are, evenly softened."""
+    near = np.pad(is_front, 1, mode="edge")[y : y + 3, x : x + 3]
+    return (near * np.outer((1, 2, 1), (1, 2, 1))).sum() / 16
 
 
 # ---- tiles ----------------------------------------------------------------------------------

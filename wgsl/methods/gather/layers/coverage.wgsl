@@ -1,10 +1,48 @@
 // Coverage of an edge pixel by its front surface: if vectors tell it, which some renderers filter, or else by colour.
 //#include common/frame.wgsl
+//#include methods/gather/surface.wgsl
+//#include methods/gather/layers/crowd.wgsl
 //#include methods/gather/layers/edge_flags.wgsl
+//#include methods/gather/layers/sides.wgsl
 
 const BETWEEN: f32 = 0.4;       // a vector from 0.1 to 0.9 of the way between two is a mixture of them
 const LEAST_CONTRAST: f32 = 0.05;   // of two colours that tell coverage
+const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
 const OFF_AXIS: f32 = 0.25;     // distance of a mixed colour or vector from the line between two, as a share of its length
+
+struct Coverage {       // of the front
+    share: f32,         // in steps of a matte
+    is_guess: bool,     // the pixels around tell it, not this one
+}
+
+/// Where alphas differ they tell coverage better than vectors, which some renderers do not filter.
+fn measured_coverage(edge: EdgePixel, sides: Sides, axis: vec4f, background: vec4f) -> Coverage {
+    let front_alpha = select(sides.front.color.a / max(sides.front.weight, 1e-9), 1.0, sides.thin);
+    let back_alpha = sides.back.color.a / sides.back.weight;
+    let by_alpha = front_alpha - back_alpha > MATTE_CONTRAST && edge.counts > 0.0;
+    let by_vector = dot(edge.motion - sides.back_motion, axis) / dot(axis, axis);
+    var measured = Coverage(clamp(select(by_vector,
+        (edge.color.a / edge.counts - back_alpha) / (front_alpha - back_alpha), by_alpha), 0.0, 1.0), false);
+    let unfiltered = is_unfiltered(edge.px);
+    if !by_alpha && edge.counts > 0.0 && (unfiltered || !are_filtered(edge.px, sides.back_motion, axis)) {
+        measured = coverage_by_color(edge, sides, background,
+                                     select(measured.share, f32(edge.z < edge.between), unfiltered));
+    }
+    measured.share = round(measured.share * f32(WHOLE)) / f32(WHOLE);
+    return measured;
+}
+
+/// The same where vectors and depths are of the middles of pixels: by the colour, over or under one half, as that middle says. If the
+/// colour does not tell, a middle in front covers its pixel; one behind is covered as far as the pixels around are in front, or as
+/// little as the colour may be of the front.
+fn coverage_by_color(edge: EdgePixel, sides: Sides, background: vec4f, at_middle: f32) -> Coverage {
+    let front = sides.front.color / max(sides.front.weight, 1e-9);
+    let place = place_between(edge.color / edge.counts, front, background);
+    let least = select(0.0, 0.5, at_middle >= 0.5);
+    if place.is_told { return Coverage(clamp(place.share, least, least + 0.5), false); }
+    if at_middle >= 0.5 { return Coverage(at_middle, false); }
+    return Coverage(clamp(place.damped, 0.0, front_around(edge)), true);
+}
 
 /// True if a vector, from that of the background on, lies near the way to that of the foreground: else it is of a third surface.
 fn is_mixture(own: vec4f, axis: vec4f) -> bool {
@@ -23,14 +61,19 @@ fn are_filtered(px: vec2i, back: vec4f, axis: vec4f) -> bool {
     return result;
 }
 
-/// Coverage where vectors are of the pixel's middle, by the colour's place between those of front and back, if it is between them.
-/// It is over or under one half, as that middle says.
-fn coverage_by_color(own: vec4f, front: vec4f, back: vec4f, at_middle: f32) -> f32 {
+struct ColorPlace {     // of a colour between those of back and front: 0, 1
+    share: f32,
+    is_told: bool,      // it is near the line between them
+    damped: f32,        // the share, the less the farther from the line
+}
+
+fn place_between(own: vec4f, front: vec4f, back: vec4f) -> ColorPlace {
     let axis = front.rgb - back.rgb;
     let length2 = dot(axis, axis);
-    let share = dot(own.rgb - back.rgb, axis) / max(length2, 1e-12);
+    let way = dot(own.rgb - back.rgb, axis);
+    let share = way / max(length2, 1e-12);
     let off = own.rgb - back.rgb - share * axis;
-    let is_between = length2 > LEAST_CONTRAST * LEAST_CONTRAST && dot(off, off) < OFF_AXIS * OFF_AXIS * length2;
-    let least = select(0.0, 0.5, at_middle >= 0.5);
-    return select(at_middle, clamp(share, least, least + 0.5), is_between);
+    let off2 = dot(off, off);
+    let is_told = length2 > LEAST_CONTRAST * LEAST_CONTRAST && off2 < OFF_AXIS * OFF_AXIS * length2;
+    return ColorPlace(share, is_told, way / max(length2 + off2, 1e-12));
 }

@@ -45,6 +45,11 @@ fn around_tile(px: vec2i) -> u32 {
     return atomicLoad(&crowds[word_of(vec2u(px) / TILE, AROUND_TILE)]);
 }
 
+/// True if vectors around the tile of a pixel are not filtered.
+fn is_unfiltered(px: vec2i) -> bool {
+    return (around_tile(px) & UNFILTERED) != 0u;
+}
+
 /// True if a pixel of these flags, in whose tile this is known, is at an edge that is seen while the shutter is open.
 fn is_visible_edge(flags: u32, around: u32) -> bool {
     return is_edge(flags) && ((flags & SLOW) == 0u || (around & UNFILTERED) == 0u);

@@ -33,7 +33,6 @@ const BACK: u32 = 1u;
 
 const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and below 1 less it for 0
 const MOST_CONTRAST: f32 = 2.0; // of a front layer to the brightest pixel of it around, which may be half background
-const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
 
 /// Those of a pixel and of the ones to its left and right together.
 fn three_flags(px: vec2i) -> u32 {
@@ -134,7 +133,8 @@ fn split_layers(split: ptr<function, Split>, edge: EdgePixel, around: Around, si
     let seen = background_around(edge.px, sides.back_motion, back_z);
     let seen_around = seen.count > 0.0;
     let background = select(sides.back.color / sides.back.weight, seen.color / max(seen.count, 1.0), seen_around);
-    let measured = measured_coverage(edge, sides, axis, background);
+    let coverage = measured_coverage(edge, sides, axis, background);
+    let measured = coverage.share;
     let front_z = sides.front.depth / sides.front.total;
     (*split).told = select(0u, AROUND, seen_around);
     (*split).back_z = back_z;
@@ -148,13 +148,13 @@ fn split_layers(split: ptr<function, Split>, edge: EdgePixel, around: Around, si
         if edge.z >= edge.between { (*split).back_z = edge.z; }
         (*split).front_z = front_z;
     } else {
-        let coverage = select(measured, 1.0, measured > FULL);
+        let share = select(measured, 1.0, measured > FULL);
         // Together they are the pixel's colour: what would be less than black in front, or too bright, is behind.
-        let behind = (1.0 - coverage) * edge.counts;
+        let behind = (1.0 - share) * edge.counts;
         let rest = edge.color - behind * background;
-        let most = select(MOST_CONTRAST * coverage * edge.counts * sides.brightest, vec4f(INFINITE), seen_around);
+        let most = select(MOST_CONTRAST * share * edge.counts * sides.brightest, vec4f(INFINITE), seen_around);
         let front = max(min(rest, most), vec4f(0.0));
-        (*split).coverage = coverage;
+        (*split).coverage = share;
         (*split).front = front;
         (*split).back = background + select(vec4f(0.0), (rest - front) / max(behind, 1e-6), behind > 0.0);
         (*split).back_motion = sides.back_motion;
@@ -162,26 +162,14 @@ fn split_layers(split: ptr<function, Split>, edge: EdgePixel, around: Around, si
         if measured <= FULL && sides.thin { (*split).front_at = sides.purest; }
         if measured <= FULL || edge.z >= edge.between { (*split).front_z = front_z; }
     }
-    if (around_tile(edge.px) & UNFILTERED) != 0u {  // vectors are those of the middles of pixels
+    if coverage.is_guess {      // both surfaces have the pixel's colour
+        (*split).front = (*split).coverage * edge.color;
+        (*split).back = edge.color / edge.counts;
+    }
+    if is_unfiltered(edge.px) { // vectors are those of the middles of pixels
         (*split).front_motion = textureLoad(motion, nearest_front(edge), 0);
         if edge.z >= edge.between { (*split).back_motion = edge.motion; }
     }
-}
-
-/// Coverage of the front, in steps of a matte. Where alphas differ they tell it better than vectors, which some renderers do
-/// not filter.
-fn measured_coverage(edge: EdgePixel, sides: Sides, axis: vec4f, background: vec4f) -> f32 {
-    let front_alpha = select(sides.front.color.a / max(sides.front.weight, 1e-9), 1.0, sides.thin);
-    let back_alpha = sides.back.color.a / sides.back.weight;
-    let by_alpha = front_alpha - back_alpha > MATTE_CONTRAST && edge.counts > 0.0;
-    let by_vector = dot(edge.motion - sides.back_motion, axis) / dot(axis, axis);
-    var measured = clamp(select(by_vector,
-        (edge.color.a / edge.counts - back_alpha) / (front_alpha - back_alpha), by_alpha), 0.0, 1.0);
-    if !by_alpha && !sides.thin && edge.counts > 0.0 && !are_filtered(edge.px, sides.back_motion, axis) {
-        let front = sides.front.color / max(sides.front.weight, 1e-9);
-        measured = coverage_by_color(edge.color / edge.counts, front, background, measured);
-    }
-    return round(measured * f32(WHOLE)) / f32(WHOLE);
 }
 
 /// Write both layers. The bends of their paths come from the nearest pure pixels: filtered vectors lead to mixtures.
@@ -192,7 +180,7 @@ fn store_layers(edge: EdgePixel, split: Split) {
     let z = split.front_z * front_path.depth_ratio;
     let back_z = split.back_z * back_path.depth_ratio;
     let has_back = back_z > 0.0;
-    let by_color = (around_tile(edge.px) & UNFILTERED) != 0u;
+    let by_color = is_unfiltered(edge.px);
     textureStore(surfaces, edge.px, FRONT, pack_surface(front_path.trajectory, -z, select(0u, BY_COLOR, by_color)));
     if has_back { textureStore(colors, edge.px, BACK, split.back); }     // else nobody reads it
     textureStore(surfaces, edge.px, BACK,

@@ -115,6 +115,18 @@ fn nearest_front(edge: EdgePixel) -> vec2i {
     return place.at;
 }
 
+/// The share of a pixel that the front of its 3 x 3 covers if surfaces end half way between the middles of pixels, evenly softened.
+fn front_around(edge: EdgePixel) -> f32 {
+    var sum = 0.0;
+    for (var i = 0; i < 9; i++) {
+        let off = vec2i(i % 3, i / 3) - 1;
+        let weights = 2 - abs(off);
+        let is_front = flagged_depth(flags_at(edge.px + off)) < edge.between;
+        sum += select(0.0, f32(weights.x * weights.y) / 16.0, is_front);
+    }
+    return sum;
+}
+
 struct Side {           // weighted sums over the pixels on one side of an edge
     total: f32,         // of the shares
     motion: vec4f,
