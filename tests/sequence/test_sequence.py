@@ -42,6 +42,20 @@ def test_a_picture_is_in_memory_once(tmp_path, kind):
             np.testing.assert_array_equal(channels[name], want[..., i])
 
 
+def test_vectors_that_are_motion_as_stored_are_in_memory_once(shot):
+    """Blender's x to the previous frame and y to the next; bit for bit, all channels stay."""
+    clip, fresh = Clip(shot), Clip(shot).source(3).channels
+    source = clip.source(3)
+    frame = clip.with_neighbours(source)
+    motion = frame.motion
+    assert motion is not None and source.file is not None
+    for axis in "XW":
+        assert np.shares_memory(source.channels[f"ViewLayer.Vector.{axis}"], motion)
+    for name, plane in source.channels.items():
+        assert plane.dtype == fresh[name].dtype and plane.tobytes() == fresh[name].tobytes()
+        assert source.file.parts[0].channels[name] is plane
+
+
 # ---- names ----------------------------------------------------------------------------------
 
 

@@ -103,8 +103,19 @@ class FrameFile:
                 self._share(name, locked[..., i])
         return locked
 
+    def share(self, array: np.ndarray) -> None:
+        """Let channels that are, bit for bit, a component of `array` be views of it.
+
+        Nobody may write to `array`: of Blender's vectors, two components are as stored.
+        """
+        for name, stored in self.channels.items():
+            for plane in np.moveaxis(array, 2, 0):
+                if _is_same(stored, plane):
+                    self._share(name, plane)
+                    break
+
     def _share(self, name: str, plane: np.ndarray) -> None:
-        """Let a channel of the picture be `plane`, which has the same values."""
+        """Let a channel be `plane`, which has the same values."""
         stored = self.channels[name]
         if stored.dtype == plane.dtype:
             self.channels[name] = plane
@@ -121,6 +132,14 @@ class FrameFile:
         left, top, right, bottom = self.part.display_window
         x, y = self.part.data_window[:2]
         return x - left, y - top, right - left + 1, bottom - top + 1
+
+
+def _is_same(a: np.ndarray, b: np.ndarray) -> bool:
+    """Return True for two planes of the same bits."""
+    if a.dtype != b.dtype or a.shape != b.shape:
+        return False
+    a, b = (plane.view(f"u{plane.itemsize}") for plane in (a, b))
+    return np.array_equal(a[::61], b[::61]) and np.array_equal(a, b)
 
 
 def is_video(pattern: str | Path) -> bool:

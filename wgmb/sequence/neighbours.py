@@ -165,6 +165,8 @@ class Neighbours:
             self._alone.pop(key, None)
             self._make_room(self._alone)
             frame = self.frame(source, wanted).locked()
+            if frame.motion is not None:
+                source.share(frame.motion)
             self._alone[key] = source, wanted, frame
         return frame
 
