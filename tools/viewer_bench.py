@@ -1,13 +1,14 @@
 """The time until the viewer shows what is set, and for which its panel stands still meanwhile.
 
-    xvfb-run -s '-screen 0 1920x1080x24' python tools/viewer_bench.py [--inline] [SUBJECT ...]
+    xvfb-run -s '-screen 0 1920x1080x24' python tools/viewer_bench.py [--inline]
+        [--size WxH] [SUBJECT ...]
 
 SUBJECT: scene, frames (1920 x 1080, with depth), video (1280 x 720). For each the window is opened
 and the shutter set anew, with the mouse at rest and moving: then the panel is drawn 24 times a
 second. Printed are the seconds to the first image and to the final one, how long a frame of the
 panel was waited for at most, in 99 % and in 50 % of all frames but the one that opens the window,
 and how many processes were ready to run in that minute (the load). `--inline` draws in the
-window's own thread, as with a GPU.
+window's own thread, as with a GPU. `--size`: of the window, 1280x720 by default.
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ from rendercanvas.glfw import RenderCanvas
 from wgmb import Blur, Frame, Render
 from wgmb.io import exr
 from wgmb.scene import builtin
+from wgmb.settings.scene import size_of
 from wgmb.viewer import State, Viewer
 from wgmb.viewer.window import open_devices, short_turns
 
-SIZE = (1280, 720)
 _EVERY = 1 / 24  # seconds from one frame of the panel to the next, at best
 
 
@@ -37,10 +38,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("subjects", nargs="*", default=["scene", "frames", "video"])
     parser.add_argument("--inline", action="store_true")
+    parser.add_argument("--size", default="1280x720")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, short_turns():
         for name in given.subjects:
-            measure(name, source_of(name, Path(folder)), threaded=not given.inline)
+            measure(name, source_of(name, Path(folder)), size_of(given.size), not given.inline)
     return 0
 
 
@@ -88,9 +90,9 @@ def video(folder: Path) -> str:
     return str(path)
 
 
-def measure(name: str, source: str, threaded: bool) -> None:
+def measure(name: str, source: str, size: tuple[int, int], threaded: bool) -> None:
     """Open a source, then change the shutter, then another method."""
-    canvas = RenderCanvas(title="wgmb", size=SIZE, update_mode="manual", vsync=False)
+    canvas = RenderCanvas(title="wgmb", size=size, update_mode="manual", vsync=False)
     state, news = State().opened(source), []
     devices = open_devices() if threaded else {}
     viewer = Viewer(canvas, state, **devices, call_soon=news.append)

@@ -10,7 +10,7 @@ import numpy as np
 import wgpu
 
 from ... import gpu
-from ...gpu.textures import write
+from ...gpu.textures import TexturePool, write
 from ...threads import begin
 from .composer import BLIT, Composer, View, clear, draw, pipeline, visible
 from .place import overlap
@@ -66,6 +66,9 @@ class ScreenThread:
         self._news, self._changed = news, threading.Condition()
         self._wanted: View | None = None
         self._ready: tuple[View, np.ndarray] | None = None
+        self._images = TexturePool(device)
+        self._picture: wgpu.GPUTexture
+        self._written: np.ndarray | None = None  # what is in that texture
         self._failed: Exception | None = None
         self.painted: View | None = None  # the view on the canvas
         self._ended, self.seconds = False, 0.0
@@ -90,8 +93,25 @@ class ScreenThread:
             clear(self._device, target)
         if ready is not None:
             self.painted = ready[0]
-            width, height, _ = target.size
-            write(self._device, target, ready[1][:height, :width])
+            self._put(ready[1], target)
+
+    def _put(self, texels: np.ndarray, target: wgpu.GPUTexture) -> None:
+        """Copy what is on the canvas, from a texture that is written only when it changes.
+
+        Most frames of the window are for its panel, and to write takes six times as long.
+        """
+        if texels is not self._written:
+            height, width = texels.shape[:2]
+            picture = self._images.texture("picture", (width, height), self._format)
+            write(self._device, picture, texels)
+            self._picture, self._written = picture, texels
+        wide, high = (
+            min(a, b) for a, b in zip(target.size[:2], self._picture.size[:2], strict=True)
+        )
+        encoder = self._device.create_command_encoder(label="picture")
+        from_, to = {"texture": self._picture}, {"texture": target}
+        encoder.copy_texture_to_texture(from_, to, (wide, high, 1))
+        gpu.submit(self._device, encoder)
 
     def picture(self) -> np.ndarray:
         """(height, width, 3) display values 0..1 of the view shown last, the panel not in it."""
