@@ -23,6 +23,11 @@ def circles(t):
     return 24 * np.cos(np.radians(60) * t + 0.4), 24 * np.sin(np.radians(60) * t + 0.4)
 
 
+def shakes(t):
+    """By 90 degrees a frame across, by 115 degrees down, as a camera in a hand."""
+    return 16 * np.sin(np.radians(90) * t + 0.6), 9 * np.cos(np.radians(115) * t + 0.9) + 0.3
+
+
 def starts(t):
     return 26 * max(t, 0.0), 9 * max(t, 0.0)
 
@@ -107,6 +112,12 @@ def test_turns_are_told_up_to_120_degrees(method, least):
     assert decibel(frame_of([shot(turns, t) for t in (0, -1, 1)]), turns, method) > least
 
 
+@pytest.mark.parametrize("method, least", [("gather", 38), more("reproject", 37.2)])
+def test_swings_across_and_down_have_angles_of_their_own(method, least):
+    """As changes that go on evenly, they give 36.6 dB each."""
+    assert decibel(frame_of([shot(shakes, t) for t in (0, -1, 1)]), shakes, method) > least
+
+
 def lamp(degrees, t):
     """A light 2.6 px wide, on a circle by so many degrees a frame: colour, motion, depth."""
     fine, (height, width) = 4, SIZE
@@ -144,7 +155,7 @@ def test_a_parabola_stays_one(method, least):
 
 @pytest.mark.full
 @pytest.mark.covers(1)
-@pytest.mark.parametrize("path", [swings, circles, starts, bounces])
+@pytest.mark.parametrize("path", [swings, circles, shakes, starts, bounces])
 @pytest.mark.parametrize("frames", [2, 3])
 @pytest.mark.parametrize("method", ["gather", "reproject"])
 def test_methods_are_their_twins_on_such_paths(method, path, frames):

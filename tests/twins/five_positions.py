@@ -72,7 +72,7 @@ def bend(motion, z, y, x, prev, next):
         return 0.0, 0.0, 0.0
     before = continued(here, after) if before is None else before
     after = continued(here, before) if after is None else after
-    factor = min(turn_factor(here, (before + after) / 2), limit / max(most, 1e-6))
+    factor = np.minimum(turn_factors(here, (before + after) / 2), limit / max(most, 1e-6))
     return *(factor * (after - before) / 6), 0.0
 
 
@@ -85,15 +85,24 @@ def continued(here, there):
     return 2 * here - there
 
 
-def turn_factor(here, mean):
-    """Return the factor of the third term for a path that turns or swings."""
-    if here @ here <= 1:
-        return 1.0
-    cosine = mean @ here / (here @ here)
-    off = mean - cosine * here
-    if cosine <= -0.5 or off @ off >= 0.04 * (here @ here):
-        return 1.0
-    angle = np.arccos(min(cosine, 1.0))
+def turn_factors(here, mean):
+    """Return the factors of the third term, across and down, for a path that turns or swings."""
+    if here @ here > 1:
+        cosine = mean @ here / (here @ here)
+        off = mean - cosine * here
+        if cosine > -0.5 and off @ off < 0.04 * (here @ here):
+            return np.full(2, turn_factor(cosine))
+    return np.array(
+        [
+            turn_factor(m / h) if abs(h) > 1 and m / h > -0.7 else 1.0
+            for h, m in zip(here, mean, strict=True)
+        ]
+    )
+
+
+def turn_factor(cosine):
+    """Of an angle per frame."""
+    angle = np.arccos(np.clip(cosine, -0.5, 1.0))
     # By which the cubic misses a circle in the middle between two frames.
     circle = np.sin(angle / 2) - np.sin(angle) / 2
     cubic = np.sin(angle) * (1 - np.cos(angle)) / 8

@@ -13,6 +13,7 @@ const KINK_ACCELERATION: f32 = 1.0;     // from this half acceleration on [px] a
 const KINK_RATIO: f32 = 0.15;           // if those before and after it are smaller by this
 const LEAST_TURNED: f32 = 1.0;          // half acceleration [px] from which on turns are told
 const LEAST_COSINE: f32 = -0.5;         // of the angle per frame: beyond 120 degrees it may be another one
+const LEAST_SWING: f32 = -0.7;          // the same of a swing along one axis; it counts as one of 120 degrees
 const SAME_LENGTH: f32 = 0.2;           // of accelerations on a circle: relative difference of their squares
 const OFF_TURN: f32 = 0.2;              // share of the acceleration by which a turn may miss
 
@@ -37,7 +38,7 @@ fn trajectory_between(motion: vec4f, before: Acceleration, after: Acceleration) 
     // Straight before and after, but not here: it starts, stops or bounces in this very frame.
     trajectory.has_kink = both && length(here) > KINK_ACCELERATION && most < KINK_RATIO * length(here);
     if (before.is_known || after.is_known) && !stays && most <= limit && !trajectory.has_kink {
-        let factor = min(turn_factor(here, 0.5 * (earlier + later)), limit / max(most, 1e-6));
+        let factor = min(turn_factors(here, 0.5 * (earlier + later)), vec2f(limit / max(most, 1e-6)));
         trajectory.third = factor * (later - earlier) / 6.0;
     }
     return trajectory;
@@ -53,17 +54,27 @@ fn continued(here: vec2f, there: vec2f) -> vec2f {
     return 2.0 * select(1.0, cosine, turns) * here - there;
 }
 
-/// Factor of the third term for bodies that turn about a point or swing by an angle w per frame: the mean of the
-/// neighbouring accelerations is cos w times their own. It makes the path exact in the middle between the frames.
-/// 1 for all other bodies.
-fn turn_factor(here: vec2f, mean: vec2f) -> f32 {
+/// Factors of the third term, across and down. The mean of the neighbouring accelerations is cos w times their own if a body turns
+/// about a point or swings, by an angle w per frame; one across and another one down if it swings both ways, as a hand-held camera.
+fn turn_factors(here: vec2f, mean: vec2f) -> vec2f {
     let length2 = dot(here, here);
     let cosine = dot(mean, here) / max(length2, 1e-12);
     let off = mean - cosine * here;
     let turns = length2 > LEAST_TURNED * LEAST_TURNED && cosine > LEAST_COSINE
         && dot(off, off) < OFF_TURN * OFF_TURN * length2;
+    return select(vec2f(swing_factor(here.x, mean.x), swing_factor(here.y, mean.y)), vec2f(turn_factor(cosine)), turns);
+}
+
+/// The same along one axis.
+fn swing_factor(here: f32, mean: f32) -> f32 {
+    let cosine = here * mean / max(here * here, 1e-12);
+    return select(1.0, turn_factor(cosine), abs(here) > LEAST_TURNED && cosine > LEAST_SWING);
+}
+
+/// That of an angle of this cosine. It makes the path exact in the middle between the frames.
+fn turn_factor(cosine: f32) -> f32 {
     let half_angle = sqrt(0.5 + 0.5 * clamp(cosine, LEAST_COSINE, 1.0));    // its cosine
-    return select(1.0, 2.0 / (half_angle * (1.0 + half_angle)), turns);
+    return 2.0 / (half_angle * (1.0 + half_angle));
 }
 
 /// Half the acceleration in a neighbouring frame of what is displaced by `step` [px] up to it: where it is by then, or beside a
